@@ -1,0 +1,1 @@
+//! Bond-based peridynamics of elastomers.

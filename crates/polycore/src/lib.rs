@@ -1,0 +1,3 @@
+//! Shared ground of the polymer-mechanics toolkit: tensors, Langevin statistics, hyperelastic laws,
+//! units, scenes, reports and output.
+

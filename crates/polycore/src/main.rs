@@ -1,0 +1,2 @@
+//! The `polycore` command line.
+fn main() {}

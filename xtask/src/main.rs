@@ -1,0 +1,2 @@
+//! Project tasks: validate, bench, test.
+fn main() {}
