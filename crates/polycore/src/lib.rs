@@ -1,3 +1,8 @@
 //! Shared ground of the polymer-mechanics toolkit: tensors, Langevin statistics, hyperelastic laws,
 //! units, scenes, reports and output.
 
+pub mod error;
+pub mod scene;
+pub mod units;
+
+pub use error::Error;

@@ -1,0 +1,82 @@
+//! The error of this crate: what failed, on which file or value.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// What can go wrong outside reading a scene (see [`crate::scene::SceneError`] for that).
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused an operation on a file.
+    #[error("cannot {operation} {}: {source}", path.display())]
+    Io {
+        /// A verb: `create`, `rename`, …
+        operation: &'static str,
+        /// The file or directory.
+        path: PathBuf,
+        /// The reason given by the operating system.
+        source: io::Error,
+    },
+    /// The output directory cannot be used; found before any computation.
+    #[error("the output directory {} cannot be used: {reason}", path.display())]
+    OutputDirectory {
+        /// The directory.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// A file exists but its content is not what it should be.
+    #[error("{} is not a valid {format}: {reason}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// `VTKHDF file`, `report`, …
+        format: &'static str,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Data that cannot be written or drawn.
+    #[error("{what}: {reason}")]
+    Data {
+        /// The array, curve or picture.
+        what: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A number outside the range on which an operation is defined.
+    #[error("{quantity} = {value} is outside {allowed}")]
+    Domain {
+        /// The name of the argument.
+        quantity: &'static str,
+        /// The offending value.
+        value: f64,
+        /// The allowed range.
+        allowed: &'static str,
+    },
+    /// An iteration that did not converge.
+    #[error("{iteration} did not converge in {steps} steps (residual {residual:e})")]
+    NoConvergence {
+        /// The name of the iteration.
+        iteration: &'static str,
+        /// Steps done.
+        steps: usize,
+        /// The last residual.
+        residual: f64,
+    },
+}
+
+impl Error {
+    /// For `map_err`: `fs::rename(a, b).map_err(Error::io("rename", b))`.
+    pub fn io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(io::Error) -> Self {
+        let path = path.as_ref().to_path_buf();
+        move |source| Self::Io { operation, path, source }
+    }
+
+    /// Exit code of the command lines: 2 for bad input (an unusable output directory), 1 for a failed run.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::OutputDirectory { .. } => crate::scene::EXIT_BAD_INPUT,
+            _ => 1,
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! Errors in scenes: where, what was found, what is allowed.
+
+use std::fmt;
+use std::ops::Range;
+use std::path::Path;
+
+use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use toml::de::DeTable;
+
+use super::{EXIT_BAD_INPUT, Source, VERSION, locate};
+
+/// What is wrong with a scene: a [`miette::Diagnostic`] with file, line, caret and help.
+#[derive(Debug)]
+pub struct SceneError(Box<Inside>);
+
+#[derive(Debug)]
+struct Inside {
+    code: &'static str,
+    message: String,
+    key: Option<String>,
+    help: Option<String>,
+    /// Label, place, line and text; none when the file could not be read at all.
+    place: Option<Place>,
+}
+
+#[derive(Debug)]
+struct Place {
+    label: String,
+    span: Range<usize>,
+    line: usize,
+    text: NamedSource<String>,
+}
+
+impl SceneError {
+    /// The whole message in one line, without the picture of the source.
+    pub fn message(&self) -> &str {
+        &self.0.message
+    }
+
+    /// The dotted path of the key the error is about.
+    pub fn key(&self) -> Option<&str> {
+        self.0.key.as_deref()
+    }
+
+    /// The line, counted from 1.
+    pub fn line(&self) -> Option<usize> {
+        self.0.place.as_ref().map(|place| place.line)
+    }
+
+    /// The exit code for bad input.
+    pub fn exit_code(&self) -> u8 {
+        EXIT_BAD_INPUT
+    }
+
+    pub(super) fn file(path: &Path, code: &'static str, what: String, help: Option<String>) -> Self {
+        let message = format!("{}: {what}", path.display());
+        Self(Box::new(Inside { code, message, key: None, help, place: None }))
+    }
+
+    fn at(
+        source: &Source,
+        code: &'static str,
+        key: Option<String>,
+        span: Range<usize>,
+        message: String,
+    ) -> Self {
+        let length = source.text.len();
+        let start = floor_boundary(&source.text, span.start.min(length));
+        let end = floor_boundary(&source.text, span.end.clamp(start, length));
+        let line = 1 + source.text[..start].matches('\n').count();
+        let text =
+            NamedSource::new(source.path.display().to_string(), source.text.clone()).with_language("toml");
+        let place = Place { label: String::new(), span: start..end, line, text };
+        Self(Box::new(Inside { code, message, key, help: None, place: Some(place) }))
+    }
+
+    fn label(mut self, label: impl Into<String>) -> Self {
+        if let Some(place) = &mut self.0.place {
+            place.label = label.into();
+        }
+        self
+    }
+
+    fn help(mut self, help: Option<String>) -> Self {
+        self.0.help = help;
+        self
+    }
+
+    pub(super) fn syntax(source: &Source, error: &toml::de::Error) -> Self {
+        let end = source.text.trim_end().len();
+        let span = error.span().unwrap_or(end..end);
+        let cut = span.start >= end;
+        let help = cut.then(|| "the text ends in the middle of something; is the file complete?".to_owned());
+        let message = format!("not valid TOML: {}", error.message());
+        Self::at(source, "scene::syntax", None, span, message).label("here").help(help)
+    }
+
+    pub(super) fn no_version(source: &Source, similar: Option<(String, Range<usize>)>) -> Self {
+        let suggestion = similar.as_ref().map(|(name, _)| format!("; did you mean `version` by `{name}`?"));
+        let message =
+            format!("`version` is missing; allowed: `version = {VERSION}`{}", suggestion.unwrap_or_default());
+        let span = similar.map_or(0..0, |(_, span)| span);
+        let help = Some(format!("begin the file with `version = {VERSION}`"));
+        Self::at(source, "scene::version", Some("version".into()), span, message).label("here").help(help)
+    }
+
+    pub(super) fn bad_version(source: &Source, span: Range<usize>) -> Self {
+        let found = source.text.get(span.clone()).unwrap_or_default();
+        let message = format!("`version`: found {}; allowed: {VERSION}", shorten(found));
+        let help = Some(format!("this program reads scenes of version {VERSION}"));
+        Self::at(source, "scene::version", Some("version".into()), span, message)
+            .label("found here")
+            .help(help)
+    }
+
+    pub(super) fn value(source: &Source, key: &str, span: Range<usize>, found: &str, allowed: &str) -> Self {
+        let message = format!("`{key}`: found {found}; allowed: {allowed}");
+        let help = Some(format!("allowed: {allowed}"));
+        Self::at(source, "scene::value", Some(key.into()), span, message).label(found).help(help)
+    }
+
+    /// Translates serde's words for the reader of a TOML file.
+    pub(super) fn from_serde(source: &Source, root: &DeTable<'_>, error: &toml::de::Error) -> Self {
+        let span = error.span().unwrap_or(0..0);
+        let parent = locate::path(root, &span);
+        let serde = error.message();
+        let quoted = quoted(serde);
+        let Some((&name, allowed)) = quoted.split_first() else {
+            return Self::wrong(source, parent, span, serde);
+        };
+        if serde.starts_with("unknown field") {
+            // the span of a key; inside buffered values (untagged enums) serde only knows the table
+            let above =
+                parent.as_deref().map(|path| path.strip_suffix(name).unwrap_or(path).trim_end_matches('.'));
+            let (path, span) =
+                locate::key(root, above.unwrap_or(""), name).unwrap_or((name.to_owned(), span));
+            let what = format!("unknown key `{name}`{}", within(&path, name));
+            return Self::choice(source, "scene::unknown_key", path, span, &what, name, allowed);
+        }
+        if serde.starts_with("unknown variant") {
+            let path = parent.unwrap_or_default();
+            let what = format!("`{path}`: found `{name}`");
+            return Self::choice(source, "scene::unknown_choice", path, span, &what, name, allowed);
+        }
+        if serde.starts_with("missing field") {
+            let path = parent.map_or_else(|| name.to_owned(), |path| format!("{path}.{name}"));
+            let place = if path == name { 0..0 } else { span };
+            let message = format!("`{path}` is missing");
+            let label = format!("`{name}` is needed here");
+            return Self::at(source, "scene::missing_key", Some(path), place, message).label(label);
+        }
+        Self::wrong(source, parent, span, serde)
+    }
+
+    fn wrong(source: &Source, key: Option<String>, span: Range<usize>, serde: &str) -> Self {
+        let words = translate(serde);
+        let message = match &key {
+            Some(key) => format!("`{key}`: {words}"),
+            None => words,
+        };
+        Self::at(source, "scene::value", key, span, message).label("found here")
+    }
+
+    fn choice(
+        source: &Source,
+        code: &'static str,
+        key: String,
+        span: Range<usize>,
+        what: &str,
+        name: &str,
+        allowed: &[&str],
+    ) -> Self {
+        let suggestion = nearest(name, allowed.iter().copied());
+        let list = allowed.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        let list = if list.is_empty() { "nothing".to_owned() } else { list };
+        let hint = suggestion.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
+        let label = suggestion.map_or("not known".to_owned(), |name| format!("did you mean `{name}`?"));
+        let message = format!("{what}; allowed: {list}{hint}");
+        Self::at(source, code, Some(key), span, message).label(label)
+    }
+}
+
+impl fmt::Display for SceneError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.message)
+    }
+}
+
+impl std::error::Error for SceneError {}
+
+impl Diagnostic for SceneError {
+    fn code<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        Some(Box::new(self.0.code))
+    }
+
+    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
+        self.0.help.as_ref().map(|help| Box::new(help) as Box<dyn fmt::Display>)
+    }
+
+    fn source_code(&self) -> Option<&dyn SourceCode> {
+        self.0.place.as_ref().map(|place| &place.text as &dyn SourceCode)
+    }
+
+    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
+        let place = self.0.place.as_ref()?;
+        let label = LabeledSpan::new_with_span(Some(place.label.clone()), place.span.clone());
+        Some(Box::new(std::iter::once(label)))
+    }
+}
+
+/// The candidate that `name` most likely stands for.
+pub(super) fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let lower = name.to_lowercase();
+    let scored = candidates
+        .map(|candidate| (strsim::damerau_levenshtein(&lower, &candidate.to_lowercase()), candidate));
+    let (distance, candidate) = scored.min()?;
+    let longest = name.chars().count().max(candidate.chars().count());
+    (distance <= (longest / 3).max(1) && distance < longest).then_some(candidate)
+}
+
+pub(super) fn similar_file(path: &Path) -> Option<String> {
+    let name = path.file_name()?.to_str()?;
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let Ok(entries) = std::fs::read_dir(parent) else {
+        return Some(format!("there is no directory {} either", parent.display()));
+    };
+    let mut names: Vec<String> =
+        entries.take(10_000).flatten().filter_map(|entry| entry.file_name().into_string().ok()).collect();
+    names.sort();
+    let similar = nearest(name, names.iter().map(String::as_str))?;
+    Some(format!("did you mean {}?", parent.join(similar).display()))
+}
+
+pub(super) fn scene_inside(directory: &Path) -> Option<String> {
+    let case = directory.join("case.toml");
+    case.is_file().then(|| format!("did you mean {}?", case.display()))
+}
+
+/// The words between backticks.
+fn quoted(message: &str) -> Vec<&str> {
+    message.split('`').skip(1).step_by(2).collect()
+}
+
+fn within(path: &str, name: &str) -> String {
+    match path.strip_suffix(name).map(|above| above.trim_end_matches('.')) {
+        Some("") | None => String::new(),
+        Some(above) => format!(" in `{above}`"),
+    }
+}
+
+/// Rust's type names into TOML's.
+fn translate(serde: &str) -> String {
+    if serde.starts_with("data did not match any variant") {
+        return "none of the allowed forms fits".to_owned();
+    }
+    let Some((found, expected)) = serde.rsplit_once(", expected ") else { return serde.to_owned() };
+    let expected = match expected {
+        "f64" | "f32" => "a number",
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, not negative",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
+        "a sequence" => "an array",
+        "a map" => "a table",
+        other if other.starts_with("struct ") => "a table",
+        other if other.starts_with("nonzero ") || other.starts_with("a nonzero ") => {
+            "a whole number, not zero"
+        }
+        other => other,
+    };
+    let found =
+        found.strip_prefix("invalid type: ").or(found.strip_prefix("invalid value: ")).unwrap_or(found);
+    format!(
+        "found {}; allowed: {expected}",
+        found.replace("floating point", "number").replace("sequence", "array")
+    )
+}
+
+fn shorten(text: &str) -> String {
+    let line = text.lines().next().unwrap_or_default();
+    if line.chars().count() > 40 {
+        line.chars().take(40).chain("…".chars()).collect()
+    } else {
+        line.to_owned()
+    }
+}
+
+fn floor_boundary(text: &str, mut at: usize) -> usize {
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    at
+}

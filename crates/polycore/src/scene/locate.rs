@@ -1,0 +1,89 @@
+//! From key paths to places in the text, and back.
+
+use std::ops::Range;
+
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
+
+type Key<'i> = Spanned<DeString<'i>>;
+type Value<'i> = Spanned<DeValue<'i>>;
+
+/// The span of the value at `path` (`a.b[2].c`), or of its nearest existing parent other than the root.
+pub(super) fn span(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
+    let mut table = Some(root);
+    let mut found = None;
+    for part in path.split('.') {
+        let (name, indices) = match part.find('[') {
+            Some(at) => part.split_at(at),
+            None => (part, ""),
+        };
+        let Some(mut value) = table.and_then(|table| table.get(name)) else { return found };
+        found = Some(value.span());
+        for index in indices.split(['[', ']']).filter(|index| !index.is_empty()) {
+            let element = value.get_ref().as_array().zip(index.parse::<usize>().ok());
+            let Some(next) = element.and_then(|(array, index)| array.get(index)) else { return found };
+            value = next;
+            found = Some(value.span());
+        }
+        table = value.get_ref().as_table();
+    }
+    found
+}
+
+/// The path of the innermost key or value around `place`.
+pub(super) fn path(root: &DeTable<'_>, place: &Range<usize>) -> Option<String> {
+    let mut found = None;
+    visit(root, "", &mut |path, key, value| {
+        let covers = |span: Range<usize>| span.start <= place.start && place.end <= span.end;
+        // children come after their parents
+        if covers(value.span()) || key.is_some_and(|key| covers(key.span())) {
+            found = Some(path.to_owned());
+        }
+    });
+    found
+}
+
+/// The span of a key called `name`, preferably directly in the table at `parent`.
+pub(super) fn key(root: &DeTable<'_>, parent: &str, name: &str) -> Option<(String, Range<usize>)> {
+    let mut found: Option<(String, Range<usize>)> = None;
+    visit(root, "", &mut |path, key, _| {
+        if let Some(key) = key.filter(|key| key.get_ref() == name) {
+            let direct = path.strip_suffix(name).is_some_and(|above| above.trim_end_matches('.') == parent);
+            if found.is_none() || direct {
+                found = Some((path.to_owned(), key.span()));
+            }
+        }
+    });
+    found
+}
+
+fn visit<'t, 'i>(
+    table: &'t DeTable<'i>,
+    above: &str,
+    each: &mut impl FnMut(&str, Option<&'t Key<'i>>, &'t Value<'i>),
+) {
+    for (key, value) in table {
+        let name = key.get_ref();
+        let path = if above.is_empty() { name.to_string() } else { format!("{above}.{name}") };
+        each(&path, Some(key), value);
+        inside(value, &path, each);
+    }
+}
+
+fn inside<'t, 'i>(
+    value: &'t Value<'i>,
+    path: &str,
+    each: &mut impl FnMut(&str, Option<&'t Key<'i>>, &'t Value<'i>),
+) {
+    match value.get_ref() {
+        DeValue::Table(table) => visit(table, path, each),
+        DeValue::Array(array) => {
+            for (index, element) in array.iter().enumerate() {
+                let path = format!("{path}[{index}]");
+                each(&path, None, element);
+                inside(element, &path, each);
+            }
+        }
+        _ => {}
+    }
+}
