@@ -2,6 +2,8 @@
 //! units, scenes, reports and output.
 
 pub mod error;
+pub mod output;
+pub mod report;
 pub mod scene;
 pub mod units;
 

@@ -1,0 +1,261 @@
+//! What a case must reproduce, and the judgement whether it did.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+use super::{Value, number};
+use crate::units::Ratio;
+
+/// An expectation, written in a scene as
+///
+/// ```toml
+/// [[expect]]
+/// quantity = "stress_concentration"   # the name of a scalar of the report
+/// reference = 3.0
+/// tolerance = "1 %"                   # of |reference|; or a plain number, absolute, in the unit of the value
+/// source = "Kirsch (1898), infinite plate"
+/// quick = false                       # optional: not judged in --quick runs
+/// ```
+///
+/// or with `at_most = …` and/or `at_least = …` in place of `reference` and `tolerance`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Written", into = "Written")]
+pub struct Expect {
+    /// The name of a scalar of the report.
+    pub quantity: String,
+    /// Between which numbers it must lie.
+    pub bound: Bound,
+    /// Where the figure and its tolerance come from.
+    pub source: String,
+    /// Judged in `--quick` runs too.
+    pub quick: bool,
+}
+
+/// The accepted range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bound {
+    /// `|value - reference| <= tolerance`.
+    Near {
+        /// The figure to reproduce.
+        reference: f64,
+        /// The accepted distance.
+        tolerance: Tolerance,
+    },
+    /// `at_least <= value <= at_most`.
+    Range {
+        /// Lower bound, or none.
+        at_least: Option<f64>,
+        /// Upper bound, or none.
+        at_most: Option<f64>,
+    },
+}
+
+/// How far a value may lie from its reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tolerance {
+    /// A share of |reference|: `"1 %"`.
+    Relative(f64),
+    /// In the unit of the value: `"0.01"` or `0.01`.
+    Absolute(f64),
+}
+
+impl Tolerance {
+    /// The accepted distance from `reference`.
+    pub fn distance(self, reference: f64) -> f64 {
+        match self {
+            Self::Relative(share) => share * reference.abs(),
+            Self::Absolute(distance) => distance,
+        }
+    }
+}
+
+impl FromStr for Tolerance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = text.parse::<Ratio>().map_err(|error| error.to_string())?.si();
+        if number < 0.0 {
+            return Err(format!("tolerance `{text}` is negative"));
+        }
+        let relative = text.trim_end().ends_with(['%', '‰']);
+        Ok(if relative { Self::Relative(number) } else { Self::Absolute(number) })
+    }
+}
+
+impl fmt::Display for Tolerance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Relative(share) => write!(f, "{} %", share * 100.0),
+            Self::Absolute(distance) => write!(f, "{distance}"),
+        }
+    }
+}
+
+impl Serialize for Tolerance {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Tolerance {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl de::Visitor<'_> for Visitor {
+            type Value = Tolerance;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a tolerance like \"1 %\" (of the reference) or \"0.01\" (absolute)")
+            }
+
+            fn visit_str<E: de::Error>(self, text: &str) -> Result<Tolerance, E> {
+                text.parse().map_err(E::custom)
+            }
+
+            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Tolerance, E> {
+                value.to_string().parse().map_err(E::custom)
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Tolerance, E> {
+                self.visit_f64(value as f64)
+            }
+
+            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Tolerance, E> {
+                self.visit_f64(value as f64)
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+/// The keys as they stand in a scene.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Written {
+    quantity: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reference: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    tolerance: Option<Tolerance>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    at_least: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    at_most: Option<f64>,
+    source: String,
+    #[serde(default = "yes")]
+    quick: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+impl TryFrom<Written> for Expect {
+    type Error = String;
+
+    fn try_from(written: Written) -> Result<Self, String> {
+        let Written { quantity, reference, tolerance, at_least, at_most, source, quick } = written;
+        for (name, number) in [("reference", reference), ("at_least", at_least), ("at_most", at_most)] {
+            if let Some(number) = number.filter(|number| !number.is_finite()) {
+                return Err(format!("expectation of `{quantity}`: {name} = {number} is not finite"));
+            }
+        }
+        if source.trim().is_empty() {
+            return Err(format!(
+                "expectation of `{quantity}`: `source` is empty; say where the figure comes from"
+            ));
+        }
+        let bound = match (reference, tolerance, at_least, at_most) {
+            (Some(reference), Some(tolerance), None, None) => Bound::Near { reference, tolerance },
+            (None, None, Some(low), Some(high)) if low > high => {
+                return Err(format!(
+                    "expectation of `{quantity}`: at_least = {low} exceeds at_most = {high}"
+                ));
+            }
+            (None, None, at_least, at_most) if at_least.or(at_most).is_some() => {
+                Bound::Range { at_least, at_most }
+            }
+            _ => {
+                return Err(format!(
+                    "expectation of `{quantity}`: give either `reference` and `tolerance`, or `at_least` and/or `at_most`"
+                ));
+            }
+        };
+        Ok(Self { quantity, bound, source, quick })
+    }
+}
+
+impl From<Expect> for Written {
+    fn from(expect: Expect) -> Self {
+        let Expect { quantity, bound, source, quick } = expect;
+        let (reference, tolerance, at_least, at_most) = match bound {
+            Bound::Near { reference, tolerance } => (Some(reference), Some(tolerance), None, None),
+            Bound::Range { at_least, at_most } => (None, None, at_least, at_most),
+        };
+        Self { quantity, reference, tolerance, at_least, at_most, source, quick }
+    }
+}
+
+impl Expect {
+    /// Compares with what the report holds under the name.
+    pub(super) fn judge(&self, found: Option<&Value>) -> Judgement {
+        let (value, message) = match found {
+            Some(Value::Scalar { value, .. }) if value.is_finite() => (Some(*value), None),
+            Some(Value::Scalar { value, .. }) => (Some(*value), Some(format!("the value is {value}"))),
+            Some(Value::Curve { .. }) => {
+                (None, Some("the report has a curve of that name, not a scalar".into()))
+            }
+            None => (None, Some("the report has no value of that name".into())),
+        };
+        let within = |value: f64| match self.bound {
+            Bound::Near { reference, tolerance } => {
+                (value - reference).abs() <= tolerance.distance(reference)
+            }
+            Bound::Range { at_least, at_most } => {
+                at_least.is_none_or(|low| value >= low) && at_most.is_none_or(|high| value <= high)
+            }
+        };
+        let pass = message.is_none() && value.is_some_and(within);
+        Judgement { expect: self.clone(), value, pass, message }
+    }
+}
+
+/// An expectation with what was found.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Judgement {
+    /// What was asked for.
+    #[serde(flatten)]
+    pub expect: Expect,
+    /// What was found.
+    #[serde(with = "number::option")]
+    pub value: Option<f64>,
+    /// Whether it fits.
+    pub pass: bool,
+    /// Why there was nothing to compare.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub message: Option<String>,
+}
+
+impl Judgement {
+    /// A row of a table: verdict, quantity, value, requirement, source.
+    pub fn row(&self) -> [String; 5] {
+        let verdict = if self.pass { "pass" } else { "FAIL" };
+        let value = match (&self.message, self.value) {
+            (Some(message), _) => message.clone(),
+            (None, value) => value.map(number::short).unwrap_or_default(),
+        };
+        let asked = match self.expect.bound {
+            Bound::Near { reference, tolerance } => {
+                // ± in the form the author chose
+                format!("{} ± {tolerance}", number::short(reference))
+            }
+            Bound::Range { at_least, at_most } => {
+                let low = at_least.map(|low| format!("≥ {}", number::short(low)));
+                let high = at_most.map(|high| format!("≤ {}", number::short(high)));
+                low.into_iter().chain(high).collect::<Vec<_>>().join(", ")
+            }
+        };
+        [verdict.into(), self.expect.quantity.clone(), value, asked, self.expect.source.clone()]
+    }
+}
