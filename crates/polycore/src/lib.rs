@@ -5,6 +5,7 @@ pub mod error;
 pub mod output;
 pub mod report;
 pub mod scene;
+pub mod tensor;
 pub mod units;
 
 pub use error::Error;
