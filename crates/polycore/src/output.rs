@@ -6,6 +6,9 @@ use std::path::Path;
 
 use crate::Error;
 
+#[cfg(feature = "hdf5")]
+pub mod vtkhdf;
+
 /// Writes a file so that `path` holds either its old content or all of the new one, whatever happens.
 ///
 /// `write` fills a temporary file in the same directory, which is synchronised to disk and renamed to `path`.

@@ -1,0 +1,130 @@
+//! Our own reader, for tests, pictures and resumed runs.
+
+use std::path::{Path, PathBuf};
+
+use rust_hdf5::{H5Dataset, H5File};
+
+use super::{Layout, format_error};
+use crate::Error;
+
+/// An open VTKHDF file of particles; steps are read on demand.
+pub struct Series {
+    path: PathBuf,
+    file: H5File,
+    times: Vec<f64>,
+    offsets: Vec<usize>,
+    layout: Layout,
+}
+
+/// Opens a file written by [`super::ParticleSeries`] (the merged one or a frame).
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be read, [`Error::Format`] if it is not such a file.
+pub fn read(path: impl AsRef<Path>) -> Result<Series, Error> {
+    let path = path.as_ref();
+    // tells a missing file from a damaged one
+    std::fs::File::open(path).map_err(Error::io("open", path))?;
+    let fail = |reason: &str| format_error(path, reason);
+    let hdf5 = |error: rust_hdf5::Hdf5Error| format_error(path, error);
+    let file = H5File::open(path).map_err(hdf5)?;
+    let group = file.root_group().group("VTKHDF").map_err(hdf5)?;
+    let kind = group.attr_string("Type").map_err(hdf5)?;
+    if kind.trim_end_matches('\0') != "PolyData" {
+        return Err(fail(&format!("its type is `{kind}`, not `PolyData`")));
+    }
+    let dataset = |name: &str| file.dataset(&format!("VTKHDF/{name}")).map_err(hdf5);
+    let integers = |name: &str| dataset(name)?.read_raw::<i64>().map_err(hdf5);
+    let counts = integers("NumberOfPoints")?;
+    let [count] = counts[..] else { return Err(fail("the number of points changes from step to step")) };
+    let points = usize::try_from(count).map_err(|_| fail("a negative number of points"))?;
+    let times = dataset("Steps/Values")?.read_raw::<f64>().map_err(hdf5)?;
+    let offsets: Vec<usize> =
+        integers("Steps/PointOffsets")?.into_iter().map(|row| row.max(0) as usize).collect();
+    let rows = dataset("Points")?.shape();
+    let fits = |offset: &usize| offset.checked_add(points).is_some_and(|end| rows.first() >= Some(&end));
+    if times.is_empty()
+        || times.len() != offsets.len()
+        || rows.get(1) != Some(&3)
+        || !offsets.iter().all(fits)
+    {
+        return Err(fail("its steps and points do not fit together"));
+    }
+    let mut arrays = Vec::new();
+    for name in group.group("PointData").and_then(|group| group.dataset_names()).map_err(hdf5)? {
+        let shape = dataset(&format!("PointData/{name}"))?.shape();
+        if shape.first() != rows.first() || shape.len() > 2 {
+            return Err(fail(&format!("the array `{name}` does not fit the points")));
+        }
+        arrays.push((name, shape.get(1).copied().unwrap_or(1)));
+    }
+    Ok(Series { path: path.to_path_buf(), file, times, offsets, layout: Layout { points, arrays } })
+}
+
+impl Series {
+    /// The times of the steps, in the unit the writer used.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// The number of steps, at least one.
+    #[allow(clippy::len_without_is_empty)]
+    pub fn len(&self) -> usize {
+        self.times.len()
+    }
+
+    /// Particles in every step.
+    pub fn number_of_points(&self) -> usize {
+        self.layout.points
+    }
+
+    /// Names and numbers of components of the point arrays.
+    pub fn arrays(&self) -> &[(String, usize)] {
+        &self.layout.arrays
+    }
+
+    /// The positions at a step.
+    ///
+    /// # Errors
+    /// [`Error::Data`] beyond the last step, [`Error::Format`] for damaged data.
+    pub fn points(&self, step: usize) -> Result<Vec<[f64; 3]>, Error> {
+        let flat = self.rows("Points", 3, step)?;
+        Ok(flat.chunks_exact(3).map(|point| [point[0], point[1], point[2]]).collect())
+    }
+
+    /// A point array at a step, the components of a point together.
+    ///
+    /// # Errors
+    /// [`Error::Data`] beyond the last step or for an unknown name, [`Error::Format`] for damaged data.
+    pub fn data(&self, step: usize, name: &str) -> Result<Vec<f64>, Error> {
+        let Some((_, components)) = self.layout.arrays.iter().find(|(other, _)| other == name) else {
+            let names: Vec<&str> = self.layout.arrays.iter().map(|(name, _)| name.as_str()).collect();
+            let reason = format!("there is no such array; there are {}", names.join(", "));
+            return Err(Error::Data { what: format!("point array `{name}`"), reason });
+        };
+        self.rows(&format!("PointData/{name}"), *components, step)
+    }
+
+    pub(super) fn layout(&self) -> Layout {
+        self.layout.clone()
+    }
+
+    fn rows(&self, name: &str, columns: usize, step: usize) -> Result<Vec<f64>, Error> {
+        let Some(&start) = self.offsets.get(step) else {
+            let reason = format!("there is no step {step}; there are {}", self.len());
+            return Err(Error::Data { what: self.path.display().to_string(), reason });
+        };
+        let count = self.layout.points;
+        let slice = |dataset: H5Dataset| match dataset.ndims() {
+            1 => dataset.read_slice::<f64>(&[start], &[count]),
+            _ => dataset.read_slice::<f64>(&[start, 0], &[count, columns]),
+        };
+        let read = self.file.dataset(&format!("VTKHDF/{name}")).and_then(slice);
+        read.map_err(|error| format_error(&self.path, error))
+    }
+}
+
+impl std::fmt::Debug for Series {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Series").field("path", &self.path).field("times", &self.times).finish_non_exhaustive()
+    }
+}
