@@ -63,6 +63,12 @@ pub enum Error {
         /// The last residual.
         residual: f64,
     },
+    /// A matrix that is no deformation gradient.
+    #[error(transparent)]
+    Tensor(#[from] crate::tensor::Error),
+    /// A hyperelastic law, fit or table.
+    #[error(transparent)]
+    Hyperelastic(#[from] crate::hyperelastic::Error),
 }
 
 impl Error {

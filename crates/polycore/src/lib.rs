@@ -2,6 +2,7 @@
 //! units, scenes, reports and output.
 
 pub mod error;
+pub mod hyperelastic;
 pub mod langevin;
 pub mod output;
 pub mod report;

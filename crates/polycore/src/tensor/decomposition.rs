@@ -23,6 +23,11 @@ impl PrincipalFrame {
     pub fn spatial_tensor(&self, values: [f64; 3]) -> Tensor {
         assemble(&self.spatial, values)
     }
+
+    /// Σ vᵢ nᵢ ⊗ Nᵢ.
+    pub fn two_point_tensor(&self, values: [f64; 3]) -> Tensor {
+        self.spatial * Tensor::from_diagonal(&values.into()) * self.referential.transpose()
+    }
 }
 
 /// det A, its six triple products formed and summed in doubled precision (error ≲ 2⁻¹⁰⁰ Σ|products|).

@@ -1,0 +1,108 @@
+//! The list of laws: how each is named, built from numbers, and started in a fit.
+
+use super::{Compressible, Coupling, Error, Hyperelastic, Volumetric, chain, gent, ogden, polynomial};
+
+type Build = fn(&[f64]) -> Result<Box<dyn Hyperelastic>, Error>;
+
+/// A law as a function of its parameters. To add one: a file, and its name in [`FAMILIES`].
+#[derive(Debug, Clone, Copy)]
+pub struct Family {
+    /// The name in scenes and reports.
+    pub key: &'static str,
+    /// Names, units and domains of the parameters.
+    pub parameters: &'static [Parameter],
+    /// The law with the given parameters, as many as [`Family::parameters`]; see [`Family::law`].
+    pub(super) build: Build,
+    /// Plausible values for a rubber.
+    pub example: &'static [f64],
+    /// Where fits start, given the lower limit of each parameter and the best neo-Hookean modulus.
+    pub(super) starts: fn(&[f64], f64) -> Vec<Vec<f64>>,
+}
+
+/// A material parameter.
+#[derive(Debug, Clone, Copy)]
+pub struct Parameter {
+    /// Its name.
+    pub name: &'static str,
+    /// `Pa` or `1`.
+    pub unit: &'static str,
+    /// Where it may lie.
+    pub domain: Domain,
+}
+
+/// The domain of a parameter in a fit.
+#[derive(Debug, Clone, Copy)]
+pub enum Domain {
+    /// (−∞, ∞).
+    Real,
+    /// (0, ∞).
+    Positive,
+    /// Above the largest value of this function of the stretches in the data: a locking limit.
+    Above(fn([f64; 3]) -> f64),
+}
+
+/// Every law of Chapter 1, and the √I₂ extension.
+pub const FAMILIES: &[Family] = &[
+    polynomial::NEO_HOOKEAN,
+    polynomial::MOONEY_RIVLIN,
+    gent::GENT,
+    ogden::OGDEN_1,
+    ogden::OGDEN_2,
+    ogden::OGDEN_3,
+    chain::THREE_CHAIN,
+    chain::EIGHT_CHAIN,
+    chain::EIGHT_CHAIN_ROOT_I2,
+];
+
+impl Family {
+    /// The law with these parameters (SI, in the order of [`Family::parameters`]).
+    ///
+    /// # Errors
+    /// [`Error::Parameter`]; [`Error::Data`] for a wrong number of parameters.
+    pub fn law(&self, parameters: &[f64]) -> Result<Box<dyn Hyperelastic>, Error> {
+        if parameters.len() != self.parameters.len() {
+            return Err(Error::Data {
+                what: format!("law `{}`", self.key),
+                reason: format!("{} parameters given, {} needed", parameters.len(), self.parameters.len()),
+            });
+        }
+        (self.build)(parameters)
+    }
+}
+
+/// The family of that name.
+///
+/// # Errors
+/// [`Error::UnknownLaw`].
+pub fn family(key: &str) -> Result<&'static Family, Error> {
+    FAMILIES.iter().find(|family| family.key == key).ok_or_else(|| Error::UnknownLaw { name: key.to_owned() })
+}
+
+/// Every law with its example parameters: the incompressible forms, then each with both volumetric terms, then the
+/// compressible forms as printed. The shared check runs over this list.
+///
+/// # Errors
+/// None in practice: the examples are valid, and a test holds them to it.
+pub fn all() -> Result<Vec<Box<dyn Hyperelastic>>, Error> {
+    let mut laws: Vec<Box<dyn Hyperelastic>> = Vec::new();
+    for family in FAMILIES {
+        laws.push(family.law(family.example)?);
+    }
+    let lame = 2.0e6;
+    let volumetrics = [Volumetric::Quadratic { lame }, Volumetric::Logarithmic { lame }];
+    for family in FAMILIES {
+        for volumetric in volumetrics {
+            laws.push(Box::new(Compressible::new(family.law(family.example)?, volumetric)?));
+        }
+    }
+    for family in FAMILIES {
+        let law = family.law(family.example)?;
+        if law.printed_coupling().is_some() {
+            laws.push(Box::new(Compressible::with_coupling(law, volumetrics[0], Coupling::Printed)?));
+        }
+    }
+    let gent = family("gent")?;
+    let printed = Compressible::with_coupling(gent.law(gent.example)?, Volumetric::None, Coupling::Printed)?;
+    laws.push(Box::new(printed));
+    Ok(laws)
+}

@@ -1,0 +1,390 @@
+//! One check for every law of [`all`], and closed forms for each.
+
+use super::*;
+use crate::tensor::{Error as TensorError, StressMeasure, Voigt};
+
+const IDENTITY: [f64; 3] = [1.0; 3];
+
+fn rotation() -> Tensor {
+    *nalgebra::Rotation3::from_euler_angles(0.3, -1.1, 2.0).matrix()
+}
+
+/// At rest, small, sheared, with two and three equal stretches, general; all far from locking.
+fn deformations() -> Vec<DeformationGradient> {
+    let half = 0.5_f64.sqrt();
+    [
+        Tensor::identity(),
+        Tensor::identity() * 1.2,
+        Tensor::new(1.0 + 1e-6, 3e-7, 0.0, -2e-7, 1.0, 4e-7, 0.0, 1e-7, 1.0 - 1e-6),
+        Tensor::new(1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        Tensor::from_diagonal(&[2.0, half, half].into()),
+        rotation() * Tensor::from_diagonal(&[1.5, 1.5 + 1e-5, 0.5].into()) * rotation(),
+        Tensor::new(1.3, 0.4, -0.2, 0.1, 0.8, 0.3, -0.3, 0.2, 1.7),
+    ]
+    .into_iter()
+    .map(|matrix| DeformationGradient::new(matrix).unwrap())
+    .collect()
+}
+
+fn shifted(f: &DeformationGradient, by: &Tensor) -> DeformationGradient {
+    DeformationGradient::new(f.matrix() + by).unwrap()
+}
+
+/// Step of the central differences: truncation h² ~ 1e-10 and rounding ε/h ~ 2e-11 of the modulus.
+const STEP: f64 = 1e-5;
+const DIFFERENCE: f64 = 2e-8;
+
+fn check(law: &dyn Hyperelastic, f: &DeformationGradient) {
+    let name = law.name();
+    let pk1 = law.first_piola_kirchhoff(f).unwrap();
+    let pk2 = law.second_piola_kirchhoff(f).unwrap();
+    let cauchy = law.cauchy(f).unwrap();
+    let tangent = law.tangent(f).unwrap();
+    let energy = law.energy(f).unwrap();
+    // of the stress and tangent themselves, which the printed forms and the loose pressure may dominate
+    let scale = tangent.amax().max(pk1.amax());
+
+    // P = ∂W/∂F
+    for i in 0..3 {
+        for j in 0..3 {
+            let mut by = Tensor::zeros();
+            by[(i, j)] = STEP;
+            let (up, down) = (law.energy(&shifted(f, &by)).unwrap(), law.energy(&shifted(f, &-by)).unwrap());
+            let slope = (up - down) / (2.0 * STEP);
+            assert!(
+                (slope - pk1[(i, j)]).abs() < DIFFERENCE * scale,
+                "{name}: P{i}{j} {} {slope}",
+                pk1[(i, j)]
+            );
+        }
+    }
+    // ℂ = ∂S/∂E: with δF = F⁻ᵀ G, E changes by ±hG in the central difference exactly
+    for b in 0..6 {
+        let mut direction = Voigt::zeros();
+        direction[b] = 1.0;
+        let by = f.inverse().transpose() * voigt::to_strain(&direction) * STEP;
+        let up = law.second_piola_kirchhoff(&shifted(f, &by)).unwrap();
+        let down = law.second_piola_kirchhoff(&shifted(f, &-by)).unwrap();
+        let slope = voigt::from_stress(&(up - down)) / (2.0 * STEP);
+        let error = (slope - tangent.column(b)).amax();
+        assert!(error < DIFFERENCE * scale, "{name}: tangent column {b}: {slope} {}", tangent.column(b));
+    }
+    // symmetries
+    assert_eq!(pk2, pk2.transpose(), "{name}");
+    assert_eq!(cauchy, cauchy.transpose(), "{name}");
+    assert!((tangent - tangent.transpose()).amax() <= 1e-14 * tangent.amax(), "{name}");
+    // the measures are one stress
+    let from_pk2 = f.convert_stress(&pk2, StressMeasure::SecondPiolaKirchhoff, StressMeasure::Cauchy);
+    assert!((from_pk2 - cauchy).amax() < 1e-13 * scale, "{name}");
+    assert!((f.matrix() * pk2 - pk1).amax() < 1e-13 * scale, "{name}");
+    // objectivity: QF; isotropy: FQ
+    let q = rotation();
+    let turned = DeformationGradient::new(q * f.matrix()).unwrap();
+    assert!((law.energy(&turned).unwrap() - energy).abs() < 1e-13 * scale.max(energy), "{name}");
+    assert!((law.second_piola_kirchhoff(&turned).unwrap() - pk2).amax() < 1e-13 * scale, "{name}");
+    let expected = q * cauchy * q.transpose();
+    assert!((law.cauchy(&turned).unwrap() - expected).amax() < 1e-13 * scale, "{name}");
+    let turned = DeformationGradient::new(f.matrix() * q.transpose()).unwrap();
+    let expected = q * pk2 * q.transpose();
+    assert!((law.second_piola_kirchhoff(&turned).unwrap() - expected).amax() < 1e-13 * scale, "{name}");
+    let expected = voigt::transform_tangent(&tangent, &q);
+    assert!((law.tangent(&turned).unwrap() - expected).amax() < 1e-12 * scale, "{name}");
+}
+
+#[test]
+fn every_law_passes_the_shared_check() {
+    let laws = all().unwrap();
+    assert_eq!(laws.len(), FAMILIES.len() * 3 + 4);
+    for law in &laws {
+        assert!(law.energy_at(IDENTITY).unwrap().abs() < 1e-12 * law.shear_modulus(), "{}", law.name());
+        for f in deformations() {
+            check(law, &f);
+        }
+    }
+}
+
+/// Uniaxial nominal stress 3με(1 − ε + O(ε²)) for small ε, in tension and compression, for every incompressible law.
+#[test]
+fn small_strain_limit_of_the_incompressible_laws() {
+    for family in FAMILIES {
+        let law = family.law(family.example).unwrap();
+        for strain in [1e-7, -1e-7] {
+            let modulus = homogeneous::uniaxial(&law, 1.0 + strain).unwrap() / (3.0 * strain);
+            // ε itself is rounded to 1e-9 relative in 1 + ε
+            let error = (modulus / law.shear_modulus() - 1.0).abs();
+            assert!(error < 2e-7, "{}: {modulus} {}", family.key, law.shear_modulus());
+        }
+    }
+}
+
+/// At F = 1 the tangent is λ* 1⊗1 + 2μ𝕀 and, in the stress-free forms, S = 0; λ* is λ only for laws linear in I₁.
+#[test]
+fn small_strain_limit_of_the_compressible_laws() {
+    let lame = 1.7e6;
+    for family in FAMILIES {
+        let modulus = family.law(family.example).unwrap().shear_modulus();
+        for volumetric in [Volumetric::Quadratic { lame }, Volumetric::Logarithmic { lame }] {
+            let law = Compressible::new(family.law(family.example).unwrap(), volumetric).unwrap();
+            let response = law.response_at(IDENTITY).unwrap();
+            assert!(response.stress.iter().all(|s| s.abs() < 1e-15 * modulus), "{}", law.name());
+            for shear in response.shear {
+                assert!((shear / modulus - 1.0).abs() < 1e-12, "{}: {shear} {modulus}", law.name());
+            }
+            assert!((law.shear_modulus() / modulus - 1.0).abs() < 1e-12, "{}", law.name());
+        }
+    }
+    let bulk = |law: &str, p: &[f64]| {
+        let law = family(law).unwrap().law(p).unwrap();
+        Compressible::new(law, Volumetric::Quadratic { lame }).unwrap().bulk_modulus().unwrap()
+    };
+    // by hand from ∂²W/∂C∂C: λ + 2μ/3; with 4C₂ for Mooney–Rivlin (μ = 2(C₁ + C₂)); with 2μ/J_m for Gent
+    assert!((bulk("neo-hookean", &[3e5]) - (lame + 2e5)).abs() < 1e-9 * lame);
+    assert!((bulk("mooney-rivlin", &[1e5, 5e4]) - (lame + 2e5 + 2e5)).abs() < 1e-9 * lame);
+    assert!((bulk("gent", &[3e5, 60.0]) - (lame + 1e4 + 2e5)).abs() < 1e-9 * lame);
+}
+
+/// Errata of chapter 1: (1.19) and (1.23) are stress free as printed, (1.21) is not: S(1) = (C₁ + 4C₂)·1.
+#[test]
+fn printed_mooney_rivlin_is_stressed_at_rest() {
+    let (c1, c2) = (1.5e5, 2e4);
+    let volumetric = Volumetric::Quadratic { lame: 1e6 };
+    let rest = DeformationGradient::identity();
+    let law = MooneyRivlin::new(c1, c2).unwrap();
+    let printed = Compressible::with_coupling(law, volumetric, Coupling::Printed).unwrap();
+    let stress = printed.second_piola_kirchhoff(&rest).unwrap();
+    assert!((stress - Tensor::identity() * (c1 + 4.0 * c2)).amax() < 1e-9);
+    let mended = Compressible::new(law, volumetric).unwrap();
+    assert_eq!(mended.coupling_factor(), 2.0 * (c1 + 2.0 * c2));
+    assert_eq!(mended.second_piola_kirchhoff(&rest).unwrap(), Tensor::zeros());
+
+    let neo = NeoHookean::new(3e5).unwrap();
+    let gent = Gent::new(3e5, 60.0).unwrap();
+    for factor in [
+        Compressible::with_coupling(neo, volumetric, Coupling::Printed).unwrap().coupling_factor(),
+        Compressible::with_coupling(gent, Volumetric::None, Coupling::Printed).unwrap().coupling_factor(),
+    ] {
+        assert_eq!(factor, 3e5);
+    }
+    // (1.23) without U has the bulk modulus 2μ/3 + 2μ/J_m only: Poisson's ratio about 0
+    let gent = Compressible::with_coupling(gent, Volumetric::None, Coupling::Printed).unwrap();
+    assert!((gent.bulk_modulus().unwrap() - (2e5 + 1e4)).abs() < 1e-6);
+    let chain = EightChain::new(3e5, 25.0).unwrap();
+    let refused = Compressible::with_coupling(chain, volumetric, Coupling::Printed).unwrap_err();
+    assert_eq!(refused, Error::NotPrinted { law: "eight-chain".into() });
+}
+
+/// Textbook closed forms of the nominal stress in uniaxial tension (Treloar, *The Physics of Rubber Elasticity*).
+#[test]
+fn uniaxial_closed_forms() {
+    let b = crate::langevin::inverse;
+    for l in [0.3_f64, 0.9, 1.0 + 1e-9, 1.5, 3.0] {
+        let kinematic = (l - 1.0) * (l * l + l + 1.0) / (l * l); // λ − λ⁻²
+        let laws: [(Box<dyn Hyperelastic>, f64); 5] = [
+            (Box::new(NeoHookean::new(2.0).unwrap()), 2.0 * kinematic),
+            (Box::new(MooneyRivlin::new(2.0, 0.5).unwrap()), 2.0 * kinematic * (2.0 + 0.5 / l)),
+            (Box::new(Gent::new(2.0, 30.0).unwrap()), 2.0 * kinematic * 30.0 / (33.0 - l * l - 2.0 / l)),
+            (
+                Box::new(Ogden::new(OgdenConvention::Thesis, &[(0.7, 1.7), (-0.2, -3.0)]).unwrap()),
+                1.4 * (l.powf(0.7) - l.powf(-1.85)) - 0.4 * (l.powf(-4.0) - l.powf(0.5)),
+            ),
+            (
+                Box::new(ThreeChain::new(3.0, 36.0).unwrap()),
+                6.0 * (b(l / 6.0) - l.powf(-1.5) * b(l.powf(-0.5) / 6.0)),
+            ),
+        ];
+        for (law, expected) in laws {
+            let found = homogeneous::uniaxial(&law, l).unwrap();
+            // the closed forms cancel near λ = 1: some ulp of their terms, which are below 4 there
+            assert!(
+                (found - expected).abs() < 1e-14 * expected.abs() + 2e-14,
+                "{} {l} {found} {expected}",
+                law.name()
+            );
+        }
+    }
+}
+
+/// formulation.md, "Test numbers" of the eight-chain network: uniaxial, pure shear, equibiaxial P₁/μ₀ at 1e-7.
+#[test]
+fn eight_chain_reference_numbers() {
+    for (links, stretch, expected) in [
+        (25.0, 2.0, [1.7803184, 1.9116696, 2.0588673]),
+        (25.0, 3.0, [3.0671409, 3.1592624, 3.4714333]),
+        (8.0, 1.5, [1.0743818, 1.2293979, 1.4433431]),
+        (100.0, 3.0, [2.9287563, 3.006642, 3.0916001]),
+    ] {
+        let law = EightChain::from_shear_modulus(1.0, links).unwrap();
+        let found = [
+            homogeneous::uniaxial(&law, stretch).unwrap(),
+            homogeneous::pure_shear(&law, stretch).unwrap()[0],
+            homogeneous::equibiaxial(&law, stretch).unwrap(),
+        ];
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-7, "n = {links}, λ = {stretch}: {found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn long_chains_are_neo_hookean() {
+    let neo = NeoHookean::new(1.0).unwrap();
+    let laws: [Box<dyn Hyperelastic>; 3] = [
+        Box::new(ThreeChain::new(1.0, 1e10).unwrap()),
+        Box::new(EightChain::new(1.0, 1e10).unwrap()),
+        Box::new(Gent::new(1.0, 1e10).unwrap()),
+    ];
+    for law in laws {
+        for stretches in [[2.0, 1.0, 0.5], [3.0, 3.0, 1.0 / 9.0]] {
+            // corrections are O(λ²/n); the energy is a difference of numbers n times its size
+            let (energy, expected) = (law.energy_at(stretches).unwrap(), neo.energy_at(stretches).unwrap());
+            assert!((energy - expected).abs() < 1e-5, "{} {energy} {expected}", law.name());
+            let stress = homogeneous::biaxial(&law, stretches[0], stretches[1]).unwrap();
+            let expected = homogeneous::biaxial(&neo, stretches[0], stretches[1]).unwrap();
+            assert!((stress[0] - expected[0]).abs() < 1e-8, "{}", law.name());
+        }
+    }
+}
+
+/// Ogden's constants for Treloar's rubber (0.63, 0.0012, −0.01 MPa; 1.3, 5, −2), shear modulus ½Σμα = 0.4225 MPa,
+/// as published; in (1.24)'s own convention the same constants are twice as stiff.
+#[test]
+fn ogden_conventions() {
+    let terms = [(0.63e6, 1.3), (0.0012e6, 5.0), (-0.01e6, -2.0)];
+    let original = Ogden::new(OgdenConvention::Original, &terms).unwrap();
+    assert!((original.shear_modulus() - 0.4225e6).abs() < 1e-9 * 0.4225e6);
+    let thesis = Ogden::new(OgdenConvention::Thesis, &terms).unwrap();
+    assert!((thesis.shear_modulus() - 0.845e6).abs() < 1e-9 * 0.845e6);
+    let abaqus = Ogden::new(OgdenConvention::Abaqus, &[(0.4e6, 1.3)]).unwrap();
+    assert_eq!(abaqus.shear_modulus(), 0.4e6);
+    // the same law, written three ways
+    for convention in [OgdenConvention::Thesis, OgdenConvention::Abaqus] {
+        let rewritten = original.in_convention(convention);
+        for l in [0.5, 2.0, 5.0] {
+            let (a, b) = (homogeneous::uniaxial(&original, l), homogeneous::uniaxial(&rewritten, l));
+            let (a, b) = (a.unwrap(), b.unwrap());
+            assert!((a / b - 1.0).abs() < 1e-14, "{convention:?} {a} {b}");
+        }
+    }
+    // Treloar's bar under Ogden's constants: within 0.1 MPa at λ = 7.133, where the data have 4.0812 MPa
+    let nominal = homogeneous::uniaxial(&original, 7.133).unwrap();
+    assert!((nominal - 4.08e6).abs() < 0.3e6, "{nominal}");
+}
+
+#[test]
+fn locking_is_an_error_with_the_value_and_infinite_in_the_limit() {
+    let (links, modulus) = (25.0, 2.0);
+    let eight = EightChain::new(modulus, links).unwrap();
+    let three = ThreeChain::new(modulus, links).unwrap();
+    let gent = Gent::new(modulus, 72.0).unwrap();
+    // Λ = 5 and λ = 5 exactly
+    for (law, stretches, quantity, limit) in [
+        (&eight as &dyn Hyperelastic, [5.0, 5.0, 5.0], "chain stretch", 5.0),
+        (&three, [0.4, 5.0, 0.5], "principal stretch", 5.0),
+        (&gent, [5.0, 5.0, 5.0], "I1 - 3", 72.0),
+        (&gent, [7.0, 6.0, 1.0], "I1 - 3", 72.0),
+    ] {
+        for error in [law.energy_at(stretches).unwrap_err(), law.response_at(stretches).unwrap_err()] {
+            match error {
+                Error::Locked { quantity: q, value, limit: l, .. } => {
+                    assert_eq!((q, l), (quantity, limit));
+                    assert!(value >= limit, "{value}");
+                }
+                other => panic!("{other}"),
+            }
+        }
+    }
+    let message = gent.energy_at([5.0; 3]).unwrap_err().to_string();
+    assert_eq!(message, "Gent: I1 - 3 = 72 has reached the locking value 72");
+
+    // towards locking, with c = 1 − λ/5: β → 1/c, f → ln(2/c) − 1, all finite to the last representable stretch
+    let rest = three.energy_at([5.0 * (1.0 - 1e-9), 1.0, 1.0]).unwrap();
+    for c in [1e-3_f64, 1e-6, 1e-9, 1e-12, f64::EPSILON] {
+        let stretch = 5.0 * (1.0 - c);
+        // the stretch is rounded: the true complement
+        let c = (5.0 - stretch) / 5.0;
+        let response = three.response_at([stretch, 1.0, 1.0]).unwrap();
+        let expected = modulus / 3.0 * 5.0 / c / stretch;
+        assert!((response.stress[0] / expected - 1.0).abs() < 1e-14, "{c}");
+        let energy = three.energy_at([stretch, 1.0, 1.0]).unwrap();
+        let expected = rest + modulus * links / 3.0 * ((2.0 / c).ln() - (2.0 / 1e-9_f64).ln());
+        // the complement of the comparison state is itself rounded to 1e-7
+        assert!((energy - expected).abs() < 1e-5, "{c} {energy} {expected}");
+    }
+}
+
+#[test]
+fn extreme_stretches_give_a_finite_answer_or_a_locking_error() {
+    let q = rotation();
+    for law in &all().unwrap() {
+        for stretches in [[1e8, 1.0, 1e-8], [1e8; 3], [1e-8; 3], [1e4, 1e-4, 1.0], [1e8, 1e-8, 1e-8]] {
+            let diagonal = Tensor::from_diagonal(&stretches.into());
+            for matrix in [diagonal, diagonal * q] {
+                let Ok(f) = DeformationGradient::new(matrix) else { continue };
+                let results = [
+                    law.energy(&f).map(|energy| energy.is_finite()),
+                    law.second_piola_kirchhoff(&f).map(|s| s.iter().all(|v| v.is_finite())),
+                    law.cauchy(&f).map(|s| s.iter().all(|v| v.is_finite())),
+                    law.tangent(&f).map(|s| s.iter().all(|v| v.is_finite())),
+                ];
+                for result in results {
+                    assert!(
+                        matches!(result, Ok(true) | Err(Error::Locked { .. } | Error::Overflow { .. })),
+                        "{} {stretches:?} {result:?}",
+                        law.name()
+                    );
+                }
+            }
+        }
+        for bad in [[f64::NAN, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, -1.0], [f64::INFINITY, 1.0, 1.0]] {
+            let error = law.energy_at(bad).unwrap_err();
+            assert!(
+                matches!(error, Error::Deformation(TensorError::Stretch { .. })),
+                "{} {error}",
+                law.name()
+            );
+            let error = law.response_at(bad).unwrap_err();
+            assert!(
+                matches!(error, Error::Deformation(TensorError::Stretch { .. })),
+                "{} {error}",
+                law.name()
+            );
+        }
+    }
+}
+
+/// Neo-Hookean at stretches 1e8, 1, 1e-8: the terms of S = μ(1 − C⁻¹) + λ ln J C⁻¹ in closed form.
+#[test]
+fn extreme_stretches_keep_their_digits() {
+    let law = NeoHookean::new(2.0).unwrap();
+    let law = Compressible::new(law, Volumetric::Logarithmic { lame: 3.0 }).unwrap();
+    let f = DeformationGradient::from_stretches([1e8, 2.0, 1e-8]).unwrap();
+    let log = 2.0_f64.ln();
+    let stress = law.second_piola_kirchhoff(&f).unwrap();
+    for (i, l) in [1e8_f64, 2.0, 1e-8].into_iter().enumerate() {
+        let expected = 2.0 + (3.0 * log - 2.0) / (l * l);
+        assert!((stress[(i, i)] / expected - 1.0).abs() < 1e-14, "{i}");
+        let expected = (2.0 * l * l + 3.0 * log - 2.0) / 2.0;
+        assert!((law.cauchy(&f).unwrap()[(i, i)] / expected - 1.0).abs() < 1e-14, "{i}");
+    }
+}
+
+#[test]
+fn bad_parameters_are_refused_with_the_value() {
+    for (key, p, message) in [
+        ("neo-hookean", vec![-1.0], "neo-Hookean: shear_modulus = -1 is outside (0, ∞)"),
+        ("mooney-rivlin", vec![1.0, -2.0], "Mooney-Rivlin: C1 + C2 = -1 is outside (0, ∞)"),
+        ("gent", vec![1.0, 0.0], "Gent: J_m = 0 is outside (0, ∞)"),
+        ("ogden-1", vec![1.0, 0.0], "Ogden: alpha_1 = 0 is outside (−∞, 0) or (0, ∞)"),
+        ("three-chain", vec![1.0, 1.0], "three-chain: links = 1 is outside (1, ∞)"),
+        ("eight-chain", vec![f64::NAN, 9.0], "eight-chain: chain_modulus = NaN is outside (0, ∞)"),
+        ("eight-chain-root-i2", vec![1.0, 9.0, -1.0], "eight-chain + c√I2: c = -1 is outside [0, ∞)"),
+        ("gent", vec![1.0], "law `gent`: 1 parameters given, 2 needed"),
+        ("rubber", vec![1.0], "there is no hyperelastic law `rubber`"),
+    ] {
+        let error = family(key).and_then(|family| family.law(&p)).err().unwrap().to_string();
+        assert!(error.starts_with(message), "{error}");
+    }
+    assert!(Ogden::new(OgdenConvention::Thesis, &[]).is_err());
+    let law = NeoHookean::new(1.0).unwrap();
+    assert!(Compressible::new(law, Volumetric::Quadratic { lame: -1.0 }).is_err());
+}
