@@ -6,6 +6,9 @@ use std::path::Path;
 
 use crate::Error;
 
+pub mod csv;
+#[cfg(feature = "pictures")]
+pub mod picture;
 #[cfg(feature = "hdf5")]
 pub mod vtkhdf;
 

@@ -1,0 +1,24 @@
+//! Pictures without any system library or font: line plots (PNG, SVG) and particle fields (PNG), by [`kuva`].
+
+use std::path::Path;
+
+use crate::Error;
+
+mod axis;
+mod canvas;
+mod color;
+mod field;
+mod line;
+mod particles;
+mod plot;
+
+pub use color::ColorMap;
+pub use field::{FieldMap, Panel};
+pub use line::{LegendPlace, LinePlot, Series};
+
+fn picture_error(path: &Path, reason: impl ToString) -> Error {
+    Error::Data { what: format!("picture {}", path.display()), reason: reason.to_string() }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,46 @@
+//! Colours of fields.
+
+use std::sync::LazyLock;
+
+use kuva::plot::ColorMap as Kuva;
+
+/// How numbers become colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ColorMap {
+    /// Dark blue to yellow, perceptually uniform, legible in grey and to the colour-blind.
+    #[default]
+    Viridis,
+    /// Blue over white to red, for signed numbers; symmetric about zero unless a range is set.
+    Diverging,
+}
+
+/// Of points without a number.
+pub(super) const MISSING: [u8; 3] = [190, 190, 190];
+
+type Table = [[u8; 3]; 256];
+
+static VIRIDIS: LazyLock<Table> = LazyLock::new(|| table(&Kuva::Viridis, false));
+// the scheme runs from red to blue; hot is positive
+static DIVERGING: LazyLock<Table> = LazyLock::new(|| table(&Kuva::RedBlue, true));
+
+impl ColorMap {
+    /// The colour at `share` between 0 and 1 (clamped); grey for NaN.
+    pub(super) fn at(self, share: f64) -> [u8; 3] {
+        if share.is_nan() {
+            return MISSING;
+        }
+        let table = match self {
+            Self::Viridis => &*VIRIDIS,
+            Self::Diverging => &*DIVERGING,
+        };
+        table[(share.clamp(0.0, 1.0) * 255.0).round() as usize]
+    }
+}
+
+fn table(map: &Kuva, reversed: bool) -> Table {
+    std::array::from_fn(|index| {
+        let index = if reversed { 255 - index } else { index };
+        // none only for custom maps
+        map.map_rgb(index as f64 / 255.0).map_or(MISSING, |(r, g, b)| [r, g, b])
+    })
+}
