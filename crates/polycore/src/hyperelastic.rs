@@ -75,7 +75,7 @@ pub trait Hyperelastic: Send + Sync {
         self.energy_at(deformation.principal_stretches())
     }
 
-    /// S = 2 ∂W/∂C (PK2).
+    /// S = 2 ∂W/∂C (1.14), PK2.
     ///
     /// # Errors
     /// As [`Hyperelastic::energy_at`].
@@ -84,7 +84,7 @@ pub trait Hyperelastic: Send + Sync {
         Ok(frame.referential_tensor(response.stress))
     }
 
-    /// P = ∂W/∂F = FS (PK1).
+    /// P = ∂W/∂F = FS (1.13), PK1.
     ///
     /// # Errors
     /// As [`Hyperelastic::energy_at`].

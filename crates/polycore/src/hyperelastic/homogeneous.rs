@@ -144,6 +144,17 @@ mod tests {
     const STEP: f64 = 1e-5;
     const DIFFERENCE: f64 = 2e-8;
 
+    /// After (1.28) the thesis prints λ₁λ₂λ₃ = 3.
+    #[test]
+    fn incompressible_means_unit_volume() {
+        for (a, b) in [(2.0, 0.25), (1.5, 0.9), (7.5, 7.5)] {
+            let product: f64 = incompressible(a, b).unwrap().iter().product();
+            assert!((product - 1.0).abs() < 4e-16);
+        }
+        assert!(incompressible(2.0, 0.0).is_err());
+        assert!(incompressible(f64::NAN, 1.0).is_err());
+    }
+
     /// The pressure makes an incompressible law's stress what the tension test has: S from W plus −pJC⁻¹ with S₃₃ = 0.
     #[test]
     fn pressure_closes_the_incompressible_laws() {

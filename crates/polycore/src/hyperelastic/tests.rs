@@ -165,12 +165,74 @@ fn printed_mooney_rivlin_is_stressed_at_rest() {
     ] {
         assert_eq!(factor, 3e5);
     }
-    // (1.23) without U has the bulk modulus 2μ/3 + 2μ/J_m only: Poisson's ratio about 0
-    let gent = Compressible::with_coupling(gent, Volumetric::None, Coupling::Printed).unwrap();
-    assert!((gent.bulk_modulus().unwrap() - (2e5 + 1e4)).abs() < 1e-6);
     let chain = EightChain::new(3e5, 25.0).unwrap();
     let refused = Compressible::with_coupling(chain, volumetric, Coupling::Printed).unwrap_err();
     assert_eq!(refused, Error::NotPrinted { law: "eight-chain".into() });
+}
+
+/// (1.23) without U: K = 2μ/3 + 2μ/J_m, hence ν = 1/(2 + J_m) with λ = 2μ/J_m.
+#[test]
+fn printed_gent_has_hardly_any_bulk_modulus() {
+    let gent = Gent::new(3e5, 60.0).unwrap();
+    let printed = Compressible::with_coupling(gent, Volumetric::None, Coupling::Printed).unwrap();
+    let bulk = printed.bulk_modulus().unwrap();
+    assert!((bulk - (2e5 + 1e4)).abs() < 1e-6);
+    let poisson = (3.0 * bulk - 6e5) / (6.0 * bulk + 6e5);
+    assert!((poisson - 1.0 / 62.0).abs() < 1e-12);
+}
+
+/// (1.21) and (1.17), mended, written in tensors, with p = −J ∂W/∂J.
+#[test]
+fn stress_by_the_tensor_form_1_17() {
+    let (c1, c2, lame) = (1.5, 0.4, 7.0);
+    let law = MooneyRivlin::new(c1, c2).unwrap();
+    let law = Compressible::new(law, Volumetric::Quadratic { lame }).unwrap();
+    for f in deformations() {
+        let (c, jacobian) = (f.right_cauchy_green(), f.jacobian());
+        let first = c.trace();
+        let second = 0.5 * (first * first - (c * c).trace());
+        let factor = 2.0 * (c1 + 2.0 * c2);
+        let energy = c1 * (first - 3.0) + c2 * (second - 3.0) - factor * jacobian.ln()
+            + 0.5 * lame * (jacobian - 1.0).powi(2);
+        assert!((law.energy(&f).unwrap() - energy).abs() < 1e-13 * energy.abs().max(1.0));
+        let pressure = factor - lame * jacobian * (jacobian - 1.0);
+        let expected = Tensor::identity() * (2.0 * (c1 + first * c2))
+            - c * (2.0 * c2)
+            - c.try_inverse().unwrap() * pressure;
+        let stress = law.second_piola_kirchhoff(&f).unwrap();
+        assert!((stress - expected).amax() < 1e-13 * expected.amax().max(1.0), "{stress} {expected}");
+    }
+}
+
+/// (1.28): half the diagonals of a unit cube, all eight of them, stretched by diag(λ₁, λ₂, λ₃).
+#[test]
+fn chain_stretch_is_that_of_a_half_diagonal() {
+    let stretches = [1.9, 1.1, 0.6];
+    let corner = nalgebra::Vector3::from(stretches) * 0.5;
+    let chain_stretch = corner.norm() / 0.75_f64.sqrt();
+    let law = EightChain::new(1.0, chain_stretch * chain_stretch * 0.999).unwrap();
+    match law.energy_at(stretches) {
+        Err(Error::Locked { value, .. }) => assert!((value - chain_stretch).abs() < 1e-15),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// W = ½ tr(E ℂ E) = 3/2 με² in isochoric uniaxial strain ε, also where ε² is below the rounding of the printed sum.
+#[test]
+fn energy_of_small_strains_keeps_its_digits() {
+    for family in FAMILIES {
+        let law = family.law(family.example).unwrap();
+        let law = Compressible::new(law, Volumetric::Quadratic { lame: 0.0 }).unwrap();
+        // without U the volume is controlled by μ: shear, where λ₁λ₂ = 1 exactly
+        let gamma = 1e-5_f64;
+        let l = (0.5 * gamma).hypot(1.0) + 0.5 * gamma;
+        let expected = 0.5 * law.shear_modulus() * gamma * gamma;
+        let energy = law.energy_at([l, 1.0 / l, 1.0]).unwrap();
+        // first-order terms cancel to rounding, ε/γ = 2e-11; the three-chain law subtracts energies of order n
+        let tolerance = if family.key == "three-chain" { 1e-4 } else { 1e-9 };
+        let error = (energy / expected - 1.0).abs();
+        assert!(error < tolerance, "{}: {energy} {expected}", family.key);
+    }
 }
 
 /// Textbook closed forms of the nominal stress in uniaxial tension (Treloar, *The Physics of Rubber Elasticity*).

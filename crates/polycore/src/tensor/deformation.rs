@@ -3,14 +3,14 @@
 use super::decomposition::{adjugate, determinant, principal_frame};
 use super::{Error, PrincipalFrame, Tensor, Tensor2};
 
-/// F = ∂x/∂X, finite and with det F > 0.
+/// F = ∂x/∂X (1.3), finite and with det F > 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeformationGradient {
     matrix: Tensor,
     jacobian: f64,
 }
 
-/// Principal invariants of C (and of B).
+/// Principal invariants of C (1.7)–(1.9), and of B.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Invariants {
     /// I₁ = tr C = ‖F‖².
@@ -93,7 +93,7 @@ impl DeformationGradient {
         &self.matrix
     }
 
-    /// J = det F (3.4).
+    /// J = det F (1.4), (3.4).
     pub fn jacobian(&self) -> f64 {
         self.jacobian
     }
@@ -108,7 +108,7 @@ impl DeformationGradient {
         adjugate(&self.matrix).transpose()
     }
 
-    /// C = FᵀF (3.5), symmetric to the last bit.
+    /// C = FᵀF (1.5), (3.5), symmetric to the last bit.
     pub fn right_cauchy_green(&self) -> Tensor {
         gram(|i, k| self.matrix[(k, i)])
     }
@@ -150,7 +150,7 @@ impl DeformationGradient {
 }
 
 impl Invariants {
-    /// Of λ₁, λ₂, λ₃: I₁ = Σλᵢ², I₂ = Σλᵢ²λⱼ² (i < j), I₃ = Πλᵢ².
+    /// (1.10)–(1.12): I₁ = Σλᵢ², I₂ = Σλᵢ²λⱼ² (i < j), I₃ = Πλᵢ².
     pub fn of_stretches(stretches: [f64; 3]) -> Self {
         let [a, b, c] = stretches.map(|l| l * l);
         Self { first: a + b + c, second: a * b + b * c + c * a, third: a * b * c }
