@@ -14,7 +14,8 @@
 //! ```
 //!
 //! Every scene begins with `version = 1`; [`Source::parse`] checks and removes that key, so scene types do not
-//! declare it. Cross-field checks are the program's: it reports them with [`Source::error`].
+//! declare it. Alternatives are best written as a struct of options that is checked afterwards: serde buffers untagged
+//! enums, after which it knows neither the place nor what would have been allowed. Cross-field checks are the program's: it reports them with [`Source::error`].
 
 use std::fs::File;
 use std::io::Read;

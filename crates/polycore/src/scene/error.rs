@@ -1,10 +1,11 @@
 //! Errors in scenes: where, what was found, what is allowed.
 
 use std::fmt;
+use std::io::IsTerminal;
 use std::ops::Range;
 use std::path::Path;
 
-use miette::{Diagnostic, LabeledSpan, NamedSource, SourceCode};
+use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, NamedSource, SourceCode};
 use toml::de::DeTable;
 
 use super::{EXIT_BAD_INPUT, Source, VERSION, locate};
@@ -52,6 +53,20 @@ impl SceneError {
         EXIT_BAD_INPUT
     }
 
+    /// The message with the lines of the source it is about, as the command lines print it: one message line, never
+    /// wrapped, so that it can be searched for; in colours if standard error is a terminal.
+    pub fn render(&self) -> String {
+        let colors = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        let theme = if colors { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
+        let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false);
+        let mut text = String::new();
+        // the handler fails only if the label lies outside of the text, which `at` excludes
+        if handler.render_report(&mut text, self).is_err() {
+            text = format!("{self}\n");
+        }
+        text
+    }
+
     pub(super) fn file(path: &Path, code: &'static str, what: String, help: Option<String>) -> Self {
         let message = format!("{}: {what}", path.display());
         Self(Box::new(Inside { code, message, key: None, help, place: None }))
@@ -88,8 +103,12 @@ impl SceneError {
 
     pub(super) fn syntax(source: &Source, error: &toml::de::Error) -> Self {
         let end = source.text.trim_end().len();
-        let span = error.span().unwrap_or(end..end);
+        let mut span = error.span().unwrap_or(end..end);
         let cut = span.start >= end;
+        if cut {
+            // a caret needs a character to stand under
+            span = floor_boundary(&source.text, end.saturating_sub(1))..end;
+        }
         let help = cut.then(|| "the text ends in the middle of something; is the file complete?".to_owned());
         let message = format!("not valid TOML: {}", error.message());
         Self::at(source, "scene::syntax", None, span, message).label("here").help(help)

@@ -62,10 +62,9 @@ fn fail(text: &str) -> SceneError {
 }
 
 fn rendered(error: &SceneError) -> String {
-    let mut out = String::new();
-    let theme = miette::GraphicalTheme::unicode_nocolor();
-    miette::GraphicalReportHandler::new_themed(theme).with_width(120).render_report(&mut out, error).unwrap();
-    out
+    let text = error.render();
+    assert!(text.contains(error.message().lines().next().unwrap_or_default()), "{text}");
+    text
 }
 
 #[test]
@@ -168,6 +167,8 @@ fn a_file_cut_anywhere_is_an_error_or_complete() {
     let cut = fail(&GOOD[..GOOD.find("3.015").unwrap()]);
     assert!(cut.message().contains("not valid TOML"), "{cut}");
     assert!(rendered(&cut).contains("is the file complete?"), "{}", rendered(&cut));
+    // the caret of an error at the very end
+    assert!(rendered(&fail("version = 1\n[body]\nspacing = \"2 mm")).contains("╰── here"));
 }
 
 #[test]
