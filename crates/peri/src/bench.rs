@@ -1,0 +1,183 @@
+//! `peri bench`: bond evaluations per second, bytes per particle, and the machine's bandwidth beside them.
+
+use peri::bonds::{Bonds, CloudBonds, LatticeBonds, VolumeCorrection, force};
+use peri::calibrate::Space;
+use peri::field::Field;
+use peri::geometry::{Operation, Shape, lattice};
+use peri::potential::{KernelFit, Law};
+use peri::run::Failure;
+use serde::Serialize;
+use std::hint::black_box;
+use std::time::Instant;
+
+/// Horizon over spacing of every measurement.
+const RATIO: f64 = 3.015;
+/// Repetitions, of which the median counts.
+const REPEATS: usize = 7;
+
+/// What to measure.
+#[derive(clap::Args)]
+pub struct Bench {
+    /// Print JSON rows {what, size, threads, value, unit}.
+    #[arg(long)]
+    json: bool,
+    /// Largest number of particles.
+    #[arg(long, default_value_t = 1e7)]
+    largest: f64,
+    /// Thread counts.
+    #[arg(long, value_delimiter = ',', default_values_t = [1, 2])]
+    bench_threads: Vec<usize>,
+}
+
+#[derive(Serialize)]
+struct Row {
+    what: String,
+    size: u64,
+    threads: usize,
+    value: f64,
+    unit: &'static str,
+}
+
+impl Bench {
+    /// Measures and prints.
+    pub fn print(self) -> Result<bool, Failure> {
+        let mut rows = Vec::new();
+        for &threads in &self.bench_threads {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
+                peri::Error::Parameter {
+                    name: "--bench-threads",
+                    found: threads as f64,
+                    allowed: error.to_string(),
+                }
+            })?;
+            pool.install(|| self.measure(threads, &mut rows))?;
+        }
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&rows).unwrap_or_default());
+        } else {
+            for row in &rows {
+                println!(
+                    "{:<44} {:>9} {:>2} threads {:>12.4e} {}",
+                    row.what, row.size, row.threads, row.value, row.unit
+                );
+            }
+        }
+        Ok(true)
+    }
+
+    fn measure(&self, threads: usize, rows: &mut Vec<Row>) -> Result<(), Failure> {
+        rows.push(Row { what: "STREAM triad".into(), size: 1 << 25, threads, value: triad(), unit: "B/s" });
+        for size in [1e4, 1e5, 1e6, 1e7_f64] {
+            if size > self.largest {
+                break;
+            }
+            measure_dimension::<2>(size, threads, rows)?;
+            measure_dimension::<3>(size, threads, rows)?;
+        }
+        Ok(())
+    }
+}
+
+/// a ← b + s·c over arrays larger than any cache; bytes moved per second, best of five as STREAM has it.
+fn triad() -> f64 {
+    use rayon::prelude::*;
+    let n = 1 << 25;
+    let (b, c) = (vec![1.0; n], vec![2.0; n]);
+    let mut a = vec![0.0; n];
+    let mut best = f64::INFINITY;
+    for _ in 0..5 {
+        let start = Instant::now();
+        a.par_chunks_mut(1 << 16).zip(b.par_chunks(1 << 16).zip(c.par_chunks(1 << 16))).for_each(
+            |(a, (b, c))| {
+                for (a, (b, c)) in a.iter_mut().zip(b.iter().zip(c)) {
+                    *a = b + 3.0 * c;
+                }
+            },
+        );
+        best = best.min(start.elapsed().as_secs_f64());
+        black_box(&a);
+    }
+    3.0 * 8.0 * n as f64 / best
+}
+
+fn measure_dimension<const D: usize>(size: f64, threads: usize, rows: &mut Vec<Row>) -> Result<(), Failure> {
+    let side = size.powf(1.0 / D as f64).round();
+    let body = [Operation::Add(Shape::Box { min: [0.0; D], max: [side; D] })];
+    let lattice = lattice(&body, 1.0, 1.0)?;
+    let cells = lattice.cells;
+    let points = |index: usize| -> [f64; D] {
+        let mut rest = index;
+        std::array::from_fn(|d| {
+            let cell = rest % cells[d];
+            rest /= cells[d];
+            cell as f64 + 0.5
+        })
+    };
+    let total: usize = cells.iter().product();
+    let mut bonds = LatticeBonds::new(lattice, RATIO, VolumeCorrection::None, &[])?;
+    // the DENT specimen's stretches, and those of a stiff plate
+    for (law, range) in [(Law::Subtract, [0.95, 1.05]), (Law::Subtract, [0.5, 3.0]), (Law::Pmb, [0.95, 1.05])]
+    {
+        measure_bonds(&mut bonds, "lattice", law, range, threads, rows)?;
+    }
+    // a neighbour list of 3D bonds takes 2.5 kB a particle
+    if size <= 1e6 {
+        let points: Vec<[f64; D]> = (0..total).map(points).collect();
+        let mut cloud = CloudBonds::new(&points, &vec![1.0; total], 1.0, RATIO, VolumeCorrection::None, &[])?;
+        measure_bonds(&mut cloud, "list", Law::Subtract, [0.95, 1.05], threads, rows)?;
+    }
+    Ok(())
+}
+
+fn measure_bonds<const D: usize>(
+    bonds: &mut dyn Bonds<D>,
+    path: &str,
+    law: Law,
+    range: [f64; 2],
+    threads: usize,
+    rows: &mut Vec<Row>,
+) -> Result<(), Failure> {
+    let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
+    let built = law.build(720.0, 1200.0, false)?;
+    let fit = KernelFit::new(&*built, range, 1e-9)?;
+    bonds.set_law(&fit, peri::calibrate::modulus(space, 1.0, bonds.horizon(), 1.0));
+    let mut displacement = Field::<D>::zeros(bonds.slots());
+    for &slot in bonds.particles() {
+        let x = bonds.position(slot as usize);
+        displacement.set(slot as usize, std::array::from_fn(|d| 1e-3 * (0.37 * x[d]).sin()));
+    }
+    let mut out = Field::zeros(bonds.slots());
+    force(bonds, &displacement, &mut out);
+    // at least 20 ms a measurement
+    let start = Instant::now();
+    force(bonds, &displacement, &mut out);
+    let inner = (0.02 / start.elapsed().as_secs_f64()).ceil().clamp(1.0, 1000.0) as usize;
+    let mut times: Vec<f64> = (0..REPEATS)
+        .map(|_| {
+            let start = Instant::now();
+            for _ in 0..inner {
+                force(bonds, &displacement, &mut out);
+            }
+            black_box(&out);
+            start.elapsed().as_secs_f64() / inner as f64
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    let size = bonds.particles().len() as u64;
+    let what = format!("{D}D {path} {} {}–{} ({})", law.name(), range[0], range[1], fit.kind());
+    let rate = bonds.directed_bonds() as f64 / times[REPEATS / 2];
+    rows.push(Row { what: what.clone(), size, threads, value: rate, unit: "directed bonds/s" });
+    if law == Law::Pmb || path == "list" {
+        // bonds and particles; displacement, velocity, force and mass of the solver
+        let solver = bonds.slots() * 8 * (3 * D + 1);
+        let bytes = (bonds.bytes() + solver) as f64 / size as f64;
+        rows.push(Row {
+            what: format!("{D}D {path} memory"),
+            size,
+            threads,
+            value: bytes,
+            unit: "B/particle",
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,351 @@
+//! A cloud of particles of any position and volume: neighbour lists in compressed rows, sorted for locality.
+
+use super::kernel::{GROUP, StretchRange};
+use super::rows::{CloudData, CloudKernel, cloud_kernel};
+use super::{Bonds, Neighbour, VolumeCorrection, surface_weight};
+use crate::error::Error;
+use crate::field::{Field, chunk_range};
+use crate::geometry::Cut;
+use crate::potential::KernelFit;
+use rayon::prelude::*;
+
+/// Particles in cells of one horizon's edge, for range searches.
+pub struct CellGrid<const D: usize> {
+    low: [f64; D],
+    edge: f64,
+    cells: [usize; D],
+    starts: Vec<usize>,
+    members: Vec<u32>,
+}
+
+impl<const D: usize> CellGrid<D> {
+    /// Sorts points into cells of at least `edge`; no more cells than points in any case.
+    pub fn new(points: &[[f64; D]], edge: f64) -> Self {
+        let extreme = |pick: fn(f64, f64) -> f64, start: f64| -> [f64; D] {
+            std::array::from_fn(|d| points.iter().map(|p| p[d]).fold(start, pick))
+        };
+        let (low, high) = (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY));
+        let most = (points.len() as f64).powf(1.0 / D as f64).ceil().max(1.0);
+        let widest = (0..D).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+        let edge = edge.max(widest / (4.0 * most)).max(f64::MIN_POSITIVE);
+        let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / edge) as usize + 1);
+        let mut grid = Self { low, edge, cells, starts: Vec::new(), members: Vec::new() };
+        let keys: Vec<usize> = points.iter().map(|&p| grid.index(grid.cell(p))).collect();
+        grid.starts = vec![0; cells.iter().product::<usize>() + 1];
+        for &key in &keys {
+            grid.starts[key + 1] += 1;
+        }
+        for cell in 1..grid.starts.len() {
+            grid.starts[cell] += grid.starts[cell - 1];
+        }
+        let mut next = grid.starts.clone();
+        grid.members = vec![0; points.len()];
+        for (point, &key) in keys.iter().enumerate() {
+            grid.members[next[key]] = point as u32;
+            next[key] += 1;
+        }
+        grid
+    }
+
+    /// All members, cell by cell: an order in which near points are near.
+    pub fn order(&self) -> &[u32] {
+        &self.members
+    }
+
+    fn cell(&self, point: [f64; D]) -> [usize; D] {
+        std::array::from_fn(|d| (((point[d] - self.low[d]) / self.edge) as usize).min(self.cells[d] - 1))
+    }
+
+    fn index(&self, cell: [usize; D]) -> usize {
+        (0..D).rev().fold(0, |index, d| index * self.cells[d] + cell[d])
+    }
+
+    /// Visits every point in the cells that a ball around `point` may touch (farther points are visited too).
+    pub fn near(&self, point: [f64; D], radius: f64, mut visit: impl FnMut(usize)) {
+        let low = self.cell(point.map(|x| x - radius));
+        let high = self.cell(point.map(|x| x + radius));
+        let mut cell = low;
+        loop {
+            let index = self.index(cell);
+            for &member in &self.members[self.starts[index]..self.starts[index + 1]] {
+                visit(member as usize);
+            }
+            let mut d = 0;
+            loop {
+                if d == D {
+                    return;
+                }
+                cell[d] += 1;
+                if cell[d] <= high[d] {
+                    break;
+                }
+                cell[d] = low[d];
+                d += 1;
+            }
+        }
+    }
+}
+
+/// The bonds of a cloud.
+pub struct CloudBonds<const D: usize> {
+    position: Field<D>,
+    volumes: Vec<f64>,
+    /// Index of each slot's particle in the input.
+    input_order: Vec<u32>,
+    particles: Vec<u32>,
+    horizon: f64,
+    spacing: f64,
+    thickness: f64,
+    volume_correction: VolumeCorrection,
+    starts: Vec<usize>,
+    neighbours: Vec<u32>,
+    stiffness: Vec<f64>,
+    inverse_square: Vec<f64>,
+    factors: Option<Field<D>>,
+    kernel: Option<Box<dyn CloudKernel<D>>>,
+    table: Option<KernelFit>,
+    directed_bonds: u64,
+}
+
+impl<const D: usize> CloudBonds<D> {
+    /// Bonds of all pairs within `horizon`, less those that cross a cut.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for an empty cloud, a volume that is not positive, or two particles in one place.
+    pub fn new(
+        points: &[[f64; D]],
+        volumes: &[f64],
+        thickness: f64,
+        horizon: f64,
+        volume_correction: VolumeCorrection,
+        cuts: &[Cut<D>],
+    ) -> Result<Self, Error> {
+        if points.is_empty() {
+            return Err(Error::geometry("the body holds no particle".to_owned()));
+        }
+        if let Some(bad) = volumes.iter().position(|&v| !(v > 0.0 && v.is_finite())) {
+            return Err(Error::geometry(format!(
+                "volume of point {bad}: found {}; allowed: above 0",
+                volumes[bad]
+            )));
+        }
+        let order = CellGrid::new(points, horizon).order().to_vec();
+        let sorted: Vec<[f64; D]> = order.iter().map(|&i| points[i as usize]).collect();
+        let grid = CellGrid::new(&sorted, horizon);
+        let lists: Vec<Result<Vec<u32>, Error>> = sorted
+            .par_iter()
+            .enumerate()
+            .map(|(own, &here)| {
+                let mut list = Vec::new();
+                let mut twin = None;
+                grid.near(here, horizon, |other| {
+                    let square: f64 = (0..D).map(|d| (sorted[other][d] - here[d]).powi(2)).sum();
+                    if other != own && square == 0.0 {
+                        twin = Some(other);
+                    }
+                    if other != own
+                        && square <= horizon * horizon
+                        && !cuts.iter().any(|cut| cut.severs(here, sorted[other]))
+                    {
+                        list.push(other as u32);
+                    }
+                });
+                if let Some(twin) = twin {
+                    let (a, b) = (order[own].min(order[twin]), order[own].max(order[twin]));
+                    return Err(Error::geometry(format!("points {a} and {b} are both at {here:?} m")));
+                }
+                list.sort_unstable();
+                Ok(list)
+            })
+            .collect();
+        let mut starts = vec![0];
+        let mut neighbours = Vec::new();
+        let mut directed_bonds = 0;
+        for (own, list) in lists.into_iter().enumerate() {
+            let list = list?;
+            directed_bonds += list.len() as u64;
+            let padded = list.len().next_multiple_of(GROUP) - list.len();
+            neighbours.extend(list);
+            neighbours.extend(std::iter::repeat_n(own as u32, padded));
+            starts.push(neighbours.len());
+        }
+        let mut position = Field::zeros(sorted.len());
+        for (slot, &point) in sorted.iter().enumerate() {
+            position.set(slot, point);
+        }
+        let volumes: Vec<f64> = order.iter().map(|&i| volumes[i as usize]).collect();
+        let mean = volumes.iter().sum::<f64>() / volumes.len() as f64 / thickness;
+        let bonds = neighbours.len();
+        Ok(Self {
+            particles: (0..sorted.len() as u32).collect(),
+            position,
+            volumes,
+            input_order: order,
+            horizon,
+            spacing: mean.powf(1.0 / D as f64),
+            thickness,
+            volume_correction,
+            starts,
+            neighbours,
+            stiffness: vec![0.0; bonds],
+            inverse_square: vec![0.0; bonds],
+            factors: None,
+            kernel: None,
+            table: None,
+            directed_bonds,
+        })
+    }
+
+    /// Thickness of the body (1 in 3D), m.
+    pub fn thickness(&self) -> f64 {
+        self.thickness
+    }
+
+    /// Index in the input of the particle in each slot.
+    pub fn input_order(&self) -> &[u32] {
+        &self.input_order
+    }
+
+    fn bond(&self, slot: usize, k: usize) -> Neighbour<D> {
+        let other = self.neighbours[k] as usize;
+        let (here, there) = (self.position.get(slot), self.position.get(other));
+        let bond: [f64; D] = std::array::from_fn(|d| there[d] - here[d]);
+        let length = bond.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let volume = self.volumes[other] * self.volume_correction.factor(length, self.horizon, self.spacing);
+        let surface =
+            self.factors.as_ref().map_or(1.0, |g| surface_weight(bond, length, g.get(slot), g.get(other)));
+        Neighbour { slot: other, bond, length, volume, weight: volume * surface }
+    }
+}
+
+impl<const D: usize> Bonds<D> for CloudBonds<D> {
+    fn slots(&self) -> usize {
+        self.volumes.len()
+    }
+
+    fn particles(&self) -> &[u32] {
+        &self.particles
+    }
+
+    fn position(&self, slot: usize) -> [f64; D] {
+        self.position.get(slot)
+    }
+
+    fn volume(&self, slot: usize) -> f64 {
+        self.volumes[slot]
+    }
+
+    fn horizon(&self) -> f64 {
+        self.horizon
+    }
+
+    fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    fn neighbours(&self, slot: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
+        for k in self.starts[slot]..self.starts[slot + 1] {
+            if self.neighbours[k] as usize != slot {
+                visit(self.bond(slot, k));
+            }
+        }
+    }
+
+    fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
+        let mut stiffness = std::mem::take(&mut self.stiffness);
+        let mut inverse_square = std::mem::take(&mut self.inverse_square);
+        for slot in 0..self.volumes.len() {
+            for k in self.starts[slot]..self.starts[slot + 1] {
+                if self.neighbours[k] as usize != slot {
+                    let bond = self.bond(slot, k);
+                    stiffness[k] = 2.0 * modulus * bond.weight / bond.length;
+                    inverse_square[k] = 1.0 / (bond.length * bond.length);
+                }
+            }
+        }
+        (self.stiffness, self.inverse_square) = (stiffness, inverse_square);
+        self.kernel = cloud_kernel(fit);
+        self.table = self.kernel.is_none().then(|| fit.clone());
+    }
+
+    fn set_factors(&mut self, factors: Field<D>) {
+        self.factors = Some(factors);
+    }
+
+    fn force(
+        &self,
+        displacement: &Field<D>,
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
+        let start = chunk_range(chunk, self.volumes.len()).start;
+        if let Some(kernel) = &self.kernel {
+            let data = CloudData {
+                position: self.position.components(),
+                displacement: displacement.components(),
+                starts: &self.starts,
+                neighbours: &self.neighbours,
+                stiffness: &self.stiffness,
+                inverse_square: &self.inverse_square,
+            };
+            kernel.run(&data, start, force, track);
+        } else if let Some(fit) = &self.table {
+            self.force_by_table(fit, displacement, start, force, track);
+        }
+    }
+
+    fn directed_bonds(&self) -> u64 {
+        self.directed_bonds
+    }
+
+    fn bytes(&self) -> usize {
+        let bonds = self.neighbours.len() * (4 + 8 + 8);
+        bonds
+            + self.volumes.len() * (8 * D + 8 + 4 + 4 + 8)
+            + self.factors.as_ref().map_or(0, |f| 8 * D * f.slots())
+    }
+
+    fn as_cloud(&self) -> Option<&CloudBonds<D>> {
+        Some(self)
+    }
+}
+
+impl<const D: usize> CloudBonds<D> {
+    /// The plain loop, for laws that only a table represents.
+    fn force_by_table(
+        &self,
+        fit: &KernelFit,
+        displacement: &Field<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+        mut track: Option<&mut StretchRange>,
+    ) {
+        for offset in 0..force[0].len() {
+            let slot = start + offset;
+            let own = displacement.get(slot);
+            let mut sum = [0.0; D];
+            for k in self.starts[slot]..self.starts[slot + 1] {
+                let other = self.neighbours[k] as usize;
+                if other == slot {
+                    continue;
+                }
+                let (here, there, moved) =
+                    (self.position.get(slot), self.position.get(other), displacement.get(other));
+                let xi: [f64; D] = std::array::from_fn(|d| there[d] - here[d]);
+                let eta: [f64; D] = std::array::from_fn(|d| moved[d] - own[d]);
+                let e = (0..D).map(|d| eta[d] * (2.0 * xi[d] + eta[d])).sum::<f64>() * self.inverse_square[k];
+                let q = fit.value(e) * self.stiffness[k];
+                for d in 0..D {
+                    sum[d] += q * (xi[d] + eta[d]);
+                }
+                if let Some(range) = track.as_deref_mut() {
+                    *range = range.join(StretchRange { low: e, high: e });
+                }
+            }
+            for d in 0..D {
+                force[d][offset] = sum[d];
+            }
+        }
+    }
+}

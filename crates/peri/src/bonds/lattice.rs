@@ -1,0 +1,456 @@
+//! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
+
+use super::kernel::{Class, StretchRange, TILE, Tiles};
+use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
+use super::{Bonds, Neighbour, VolumeCorrection, surface_weight};
+use crate::error::Error;
+use crate::field::{CHUNK, Field, chunk_range};
+use crate::geometry::Cut;
+use crate::potential::KernelFit;
+use rayon::prelude::*;
+
+/// Where particles sit: a box of cells, some of them occupied.
+#[derive(Clone, Debug)]
+pub struct Lattice<const D: usize> {
+    /// Edge of a cell = distance of neighbouring particles, m.
+    pub spacing: f64,
+    /// Centre of the first cell, m.
+    pub origin: [f64; D],
+    /// Cells along each axis.
+    pub cells: [usize; D],
+    /// Which cells hold a particle; first axis fastest.
+    pub occupied: Vec<bool>,
+    /// Volume of each particle, m³ (in 2D with the thickness).
+    pub volume: f64,
+}
+
+/// The offsets within the horizon, in an order in which bond k and bond (n − 1 − k) are opposite.
+#[derive(Clone, Debug)]
+pub struct Stencil<const D: usize> {
+    /// Offsets in cells.
+    pub offsets: Vec<[i32; D]>,
+}
+
+impl<const D: usize> Stencil<D> {
+    /// All offsets 0 < |o| ≤ `ratio` (horizon over spacing).
+    pub fn new(ratio: f64) -> Self {
+        let reach = ratio.floor() as i32;
+        let side = (2 * reach + 1) as usize;
+        let offsets = (0..side.pow(D as u32))
+            .map(|index| {
+                // last axis slowest, so that consecutive offsets read consecutive slots
+                std::array::from_fn(|d| (index / side.pow(d as u32) % side) as i32 - reach)
+            })
+            .filter(|o: &[i32; D]| {
+                let square: i64 = o.iter().map(|&x| i64::from(x) * i64::from(x)).sum();
+                square > 0 && square as f64 <= ratio * ratio
+            })
+            .collect();
+        Self { offsets }
+    }
+
+    /// |ξ|/Δx of bond `k`.
+    pub fn length(&self, k: usize) -> f64 {
+        self.offsets[k].iter().map(|&x| f64::from(x * x)).sum::<f64>().sqrt()
+    }
+}
+
+/// The bonds of a lattice.
+pub struct LatticeBonds<const D: usize> {
+    lattice: Lattice<D>,
+    stencil: Stencil<D>,
+    ratio: f64,
+    volume_correction: VolumeCorrection,
+    strides: [usize; D],
+    guard: usize,
+    slots: usize,
+    particles: Vec<u32>,
+    intact: Vec<Vec<u64>>,
+    classes: Vec<Class>,
+    factors: Option<Field<D>>,
+    /// Interior value of the factors, a part of every stencil bond's weight; the stored factors are relative to it.
+    interior_factor: f64,
+    kernel: Option<Box<dyn LatticeKernel<D>>>,
+    table: Option<(KernelFit, Vec<StencilBond<D>>)>,
+    directed_bonds: u64,
+}
+
+impl<const D: usize> LatticeBonds<D> {
+    /// Bonds of all occupied cells within `ratio` spacings, less those that cross a cut.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] where no cell is occupied or the horizon reaches no neighbour.
+    pub fn new(
+        lattice: Lattice<D>,
+        ratio: f64,
+        volume_correction: VolumeCorrection,
+        cuts: &[Cut<D>],
+    ) -> Result<Self, Error> {
+        let stencil = Stencil::<D>::new(ratio);
+        if stencil.offsets.is_empty() {
+            return Err(Error::geometry(format!("a horizon of {ratio} spacings reaches no neighbour")));
+        }
+        // odd strides: rows of a power of two would fall into the same cache sets
+        let mut strides = [1; D];
+        for d in 1..D {
+            strides[d] = (strides[d - 1] * lattice.cells[d - 1]) | 1;
+        }
+        let far = ratio.floor() as usize;
+        let guard = strides.iter().map(|s| s * far).sum::<usize>().next_multiple_of(TILE);
+        let slots = (2 * guard + strides[D - 1] * lattice.cells[D - 1]).next_multiple_of(TILE);
+        let mut bonds = Self {
+            stencil,
+            ratio,
+            volume_correction,
+            strides,
+            guard,
+            slots,
+            particles: Vec::new(),
+            intact: Vec::new(),
+            classes: vec![Class::Empty; slots / TILE],
+            factors: None,
+            interior_factor: 1.0,
+            kernel: None,
+            table: None,
+            directed_bonds: 0,
+            lattice,
+        };
+        bonds.particles = bonds.occupied_slots();
+        if bonds.particles.is_empty() {
+            return Err(Error::geometry("the body holds no particle".to_owned()));
+        }
+        bonds.connect(cuts);
+        bonds.classify();
+        Ok(bonds)
+    }
+
+    /// The lattice.
+    pub fn lattice(&self) -> &Lattice<D> {
+        &self.lattice
+    }
+
+    /// The stencil.
+    pub fn stencil(&self) -> &Stencil<D> {
+        &self.stencil
+    }
+
+    /// Horizon over spacing.
+    pub fn ratio(&self) -> f64 {
+        self.ratio
+    }
+
+    /// The volume correction.
+    pub fn volume_correction(&self) -> VolumeCorrection {
+        self.volume_correction
+    }
+
+    /// Distance in slots of an offset in cells.
+    pub fn shift(&self, offset: [i32; D]) -> isize {
+        (0..D).map(|d| self.strides[d] as isize * offset[d] as isize).sum()
+    }
+
+    /// Whether bond `k` of the particle in `slot` is intact.
+    pub fn is_intact(&self, slot: usize, k: usize) -> bool {
+        self.intact[k / 64][slot] >> (k % 64) & 1 == 1
+    }
+
+    /// Weight of bond `k` of the particle in `slot`: volume correction × surface correction.
+    pub fn weight(&self, slot: usize, k: usize) -> f64 {
+        let spacing = self.lattice.spacing;
+        let length = self.stencil.length(k) * spacing;
+        let volume = self.volume_correction.factor(length, self.horizon(), spacing);
+        let Some(factors) = &self.factors else { return volume };
+        let offset = self.stencil.offsets[k];
+        let other = slot.wrapping_add_signed(self.shift(offset));
+        let bond = offset.map(|o| f64::from(o) * spacing);
+        volume * self.interior_factor * surface_weight(bond, length, factors.get(slot), factors.get(other))
+    }
+
+    /// Which slots hold a particle.
+    pub fn occupancy(&self) -> Vec<bool> {
+        let mut occupied = vec![false; self.slots];
+        for &slot in &self.particles {
+            occupied[slot as usize] = true;
+        }
+        occupied
+    }
+
+    /// The slot of the cell at `offset` from `cell`, if it lies in the box.
+    pub fn cell_at(&self, cell: [usize; D], offset: [i32; D]) -> Option<usize> {
+        let mut there = [0; D];
+        for d in 0..D {
+            there[d] =
+                cell[d].checked_add_signed(offset[d] as isize).filter(|&c| c < self.lattice.cells[d])?;
+        }
+        Some(self.slot(there))
+    }
+
+    /// The cell of a slot, if the slot is one of the box's.
+    pub fn cell_of(&self, slot: usize) -> Option<[usize; D]> {
+        let mut rest = slot.checked_sub(self.guard)?;
+        let mut cell = [0; D];
+        for d in (0..D).rev() {
+            cell[d] = rest / self.strides[d];
+            rest %= self.strides[d];
+        }
+        (0..D).all(|d| cell[d] < self.lattice.cells[d]).then_some(cell)
+    }
+
+    fn slot(&self, cell: [usize; D]) -> usize {
+        self.guard + (0..D).map(|d| self.strides[d] * cell[d]).sum::<usize>()
+    }
+
+    fn occupied_slots(&self) -> Vec<u32> {
+        let cells = self.lattice.cells;
+        let mut particles: Vec<u32> = (0..self.lattice.occupied.len())
+            .filter(|&index| self.lattice.occupied[index])
+            .map(|index| {
+                let mut rest = index;
+                let cell = std::array::from_fn(|d| {
+                    let c = rest % cells[d];
+                    rest /= cells[d];
+                    c
+                });
+                self.slot(cell) as u32
+            })
+            .collect();
+        particles.sort_unstable();
+        particles
+    }
+
+    fn connect(&mut self, cuts: &[Cut<D>]) {
+        let words = self.stencil.offsets.len().div_ceil(64);
+        let occupied = self.occupancy();
+        let bits = |slot: usize| -> Vec<u64> {
+            let mut bits = vec![0_u64; words];
+            let Some(cell) = self.cell_of(slot).filter(|_| occupied[slot]) else { return bits };
+            for (k, offset) in self.stencil.offsets.iter().enumerate() {
+                if self.cell_at(cell, *offset).is_some_and(|there| occupied[there]) {
+                    let from = self.position(slot);
+                    let to = std::array::from_fn(|d| from[d] + f64::from(offset[d]) * self.lattice.spacing);
+                    if !cuts.iter().any(|cut| cut.severs(from, to)) {
+                        bits[k / 64] |= 1 << (k % 64);
+                    }
+                }
+            }
+            bits
+        };
+        let mut intact = vec![vec![0; self.slots]; words];
+        let mut chunks: Vec<Vec<&mut [u64]>> = (0..self.slots.div_ceil(CHUNK)).map(|_| Vec::new()).collect();
+        for word in &mut intact {
+            for (chunk, part) in chunks.iter_mut().zip(word.chunks_mut(CHUNK)) {
+                chunk.push(part);
+            }
+        }
+        chunks.into_par_iter().enumerate().for_each(|(chunk, mut parts)| {
+            for (index, slot) in chunk_range(chunk, self.slots).enumerate() {
+                if occupied[slot] {
+                    for (part, value) in parts.iter_mut().zip(bits(slot)) {
+                        part[index] = value;
+                    }
+                }
+            }
+        });
+        self.directed_bonds = intact.par_iter().flatten().map(|word| u64::from(word.count_ones())).sum();
+        self.intact = intact;
+    }
+
+    /// Sorts the tiles by what the kernel must look at.
+    fn classify(&mut self) {
+        let bonds = self.stencil.offsets.len();
+        let full: Vec<u64> =
+            (0..self.intact.len()).map(|w| u64::MAX >> (64 - (bonds - 64 * w).min(64))).collect();
+        let shifts: Vec<isize> = self.stencil.offsets.iter().map(|&o| self.shift(o)).collect();
+        let (intact, factors, guard, slots) = (&self.intact, &self.factors, self.guard, self.slots);
+        let uniform = |slot: usize| {
+            let Some(factors) = factors else { return true };
+            let one = |s: usize| factors.components().iter().all(|g| g[s] == 1.0);
+            one(slot) && shifts.iter().all(|&s| one(slot.wrapping_add_signed(s)))
+        };
+        let class = |tile: usize| {
+            let mut range = tile * TILE..(tile + 1) * TILE;
+            if range.clone().all(|s| intact.iter().all(|w| w[s] == 0)) {
+                Class::Empty
+            } else if range.start >= guard
+                && range.end + guard <= slots
+                && range.all(|s| intact.iter().zip(&full).all(|(w, f)| w[s] == *f) && uniform(s))
+            {
+                Class::Full
+            } else {
+                Class::Partial
+            }
+        };
+        let classes = (0..slots / TILE).into_par_iter().map(class).collect();
+        self.classes = classes;
+    }
+}
+
+impl<const D: usize> Bonds<D> for LatticeBonds<D> {
+    fn slots(&self) -> usize {
+        self.slots
+    }
+
+    fn particles(&self) -> &[u32] {
+        &self.particles
+    }
+
+    fn position(&self, slot: usize) -> [f64; D] {
+        let mut rest = slot - self.guard;
+        let mut position = self.lattice.origin;
+        for d in (0..D).rev() {
+            position[d] += self.lattice.spacing * (rest / self.strides[d]) as f64;
+            rest %= self.strides[d];
+        }
+        position
+    }
+
+    fn volume(&self, _slot: usize) -> f64 {
+        self.lattice.volume
+    }
+
+    fn horizon(&self) -> f64 {
+        self.ratio * self.lattice.spacing
+    }
+
+    fn spacing(&self) -> f64 {
+        self.lattice.spacing
+    }
+
+    fn neighbours(&self, slot: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
+        let spacing = self.lattice.spacing;
+        for (k, &offset) in self.stencil.offsets.iter().enumerate() {
+            if self.is_intact(slot, k) {
+                let length = self.stencil.length(k) * spacing;
+                let volume =
+                    self.lattice.volume * self.volume_correction.factor(length, self.horizon(), spacing);
+                visit(Neighbour {
+                    slot: slot.wrapping_add_signed(self.shift(offset)),
+                    bond: offset.map(|o| f64::from(o) * spacing),
+                    length,
+                    volume,
+                    weight: self.lattice.volume * self.weight(slot, k),
+                });
+            }
+        }
+    }
+
+    fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
+        let spacing = self.lattice.spacing;
+        let stencil: Vec<StencilBond<D>> = (0..self.stencil.offsets.len())
+            .map(|k| {
+                let length = self.stencil.length(k) * spacing;
+                let weight =
+                    self.interior_factor * self.volume_correction.factor(length, self.horizon(), spacing);
+                let offset = self.stencil.offsets[k];
+                StencilBond {
+                    shift: self.shift(offset),
+                    bond: offset.map(|o| f64::from(o) * spacing),
+                    stiffness: 2.0 * modulus * weight * self.lattice.volume / length,
+                }
+            })
+            .collect();
+        self.kernel = lattice_kernel(fit, &stencil);
+        self.table = self.kernel.is_none().then(|| (fit.clone(), stencil));
+    }
+
+    fn set_factors(&mut self, mut factors: Field<D>) {
+        // the factor of a particle with the whole stencil, if there is one
+        let interior = self
+            .particles
+            .iter()
+            .map(|&s| s as usize)
+            .find(|&slot| (0..self.stencil.offsets.len()).all(|k| self.is_intact(slot, k)));
+        self.interior_factor = interior.map_or(1.0, |slot| factors.get(slot)[0]);
+        for slot in 0..self.slots {
+            let relative = factors.get(slot).map(|g| {
+                let g = g / self.interior_factor;
+                // the same up to rounding of the sums: exactly the interior value
+                if g == 0.0 || (g - 1.0).abs() < 1e-12 { 1.0 } else { g }
+            });
+            factors.set(slot, relative);
+        }
+        self.factors = Some(factors);
+        self.classify();
+    }
+
+    fn force(
+        &self,
+        displacement: &Field<D>,
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
+        let start = chunk_range(chunk, self.slots).start;
+        if let Some(kernel) = &self.kernel {
+            let tiles = Tiles {
+                displacement: displacement.components(),
+                intact: &self.intact,
+                classes: &self.classes,
+                factors: self.factors.as_ref().map(Field::components),
+                guard: self.guard,
+            };
+            kernel.run(&tiles, start, force, track);
+        } else if let Some((fit, stencil)) = &self.table {
+            self.force_by_table(fit, stencil, displacement, start, force, track);
+        }
+    }
+
+    fn directed_bonds(&self) -> u64 {
+        self.directed_bonds
+    }
+
+    fn bytes(&self) -> usize {
+        let factors = self.factors.as_ref().map_or(0, |_| D * self.slots * 8);
+        self.slots * 8 * self.intact.len() + self.classes.len() + self.particles.len() * 4 + factors
+    }
+
+    fn as_lattice(&self) -> Option<&LatticeBonds<D>> {
+        Some(self)
+    }
+}
+
+impl<const D: usize> LatticeBonds<D> {
+    /// The plain loop, for laws that only a table represents.
+    fn force_by_table(
+        &self,
+        fit: &KernelFit,
+        stencil: &[StencilBond<D>],
+        displacement: &Field<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+        mut track: Option<&mut StretchRange>,
+    ) {
+        for offset in 0..force[0].len() {
+            let slot = start + offset;
+            let mut sum = [0.0; D];
+            if self.classes[slot / TILE] != Class::Empty {
+                let own = displacement.get(slot);
+                for (k, bond) in stencil.iter().enumerate().filter(|(k, _)| self.is_intact(slot, *k)) {
+                    let other_slot = slot.wrapping_add_signed(bond.shift);
+                    let other = displacement.get(other_slot);
+                    let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
+                    let square: f64 = bond.bond.iter().map(|x| x * x).sum();
+                    let e = (0..D).map(|d| eta[d] * (2.0 * bond.bond[d] + eta[d])).sum::<f64>() / square;
+                    let surface = self.factors.as_ref().map_or(1.0, |g| {
+                        surface_weight(
+                            bond.bond,
+                            self.stencil.length(k) * self.lattice.spacing,
+                            g.get(slot),
+                            g.get(other_slot),
+                        )
+                    });
+                    let q = fit.value(e) * bond.stiffness * surface;
+                    for d in 0..D {
+                        sum[d] += q * (bond.bond[d] + eta[d]);
+                    }
+                    if let Some(range) = track.as_deref_mut() {
+                        *range = range.join(StretchRange { low: e, high: e });
+                    }
+                }
+            }
+            for d in 0..D {
+                force[d][offset] = sum[d];
+            }
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Who is bonded to whom, and the forces that follow: a regular lattice without a neighbour list, or a cloud with one.
+
+mod cloud;
+mod kernel;
+mod lattice;
+mod rows;
+
+pub use cloud::{CellGrid, CloudBonds};
+pub use kernel::{GROUP, StretchRange, TILE};
+pub use lattice::{Lattice, LatticeBonds, Stencil};
+
+use crate::field::{CHUNK, Field, chunk_range};
+use crate::potential::KernelFit;
+use rayon::prelude::*;
+
+/// A neighbour J of a particle I, as set-up code sees it.
+#[derive(Clone, Copy, Debug)]
+pub struct Neighbour<const D: usize> {
+    /// Slot of J.
+    pub slot: usize,
+    /// Reference bond ξ = X_J − X_I, m.
+    pub bond: [f64; D],
+    /// |ξ|, m.
+    pub length: f64,
+    /// Volume correction times V_J, m³ (without surface correction).
+    pub volume: f64,
+    /// All corrections: volume × surface factor.
+    pub weight: f64,
+}
+
+/// The bonds of a body of dimension `D`.
+///
+/// Seam for later laws that need a per-point state: a first pass over the families may fill fields that
+/// [`Bonds::force`] of another implementor reads; the solver sees forces only.
+pub trait Bonds<const D: usize>: Send + Sync {
+    /// Storage slots; fields have this length.
+    fn slots(&self) -> usize;
+    /// Slots that hold a particle, ascending.
+    fn particles(&self) -> &[u32];
+    /// Reference position of the particle in a slot, m.
+    fn position(&self, slot: usize) -> [f64; D];
+    /// Volume of the particle in a slot, m³.
+    fn volume(&self, slot: usize) -> f64;
+    /// Horizon δ, m.
+    fn horizon(&self) -> f64;
+    /// Distance of neighbouring particles (of a cloud: the cube or square root of the mean volume), m.
+    fn spacing(&self) -> f64;
+    /// Visits the intact bonds of a slot.
+    fn neighbours(&self, slot: usize, visit: &mut dyn FnMut(Neighbour<D>));
+    /// Sets the bond law q(e) and its modulus kθ, N/m⁶.
+    fn set_law(&mut self, fit: &KernelFit, modulus: f64);
+    /// Sets per-particle surface-correction factors (one field of `D` components over the slots).
+    fn set_factors(&mut self, factors: Field<D>);
+    /// Force densities Σ_J f V_J, N/m³, of work item `chunk`; collects the stretches met if asked.
+    fn force(
+        &self,
+        displacement: &Field<D>,
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    );
+    /// Intact bonds, each counted from both ends: the work of one force evaluation.
+    fn directed_bonds(&self) -> u64;
+    /// Bytes this representation holds for bonds and particles.
+    fn bytes(&self) -> usize;
+    /// The lattice behind these bonds, if there is one.
+    fn as_lattice(&self) -> Option<&LatticeBonds<D>> {
+        None
+    }
+    /// The cloud behind these bonds, if there is one.
+    fn as_cloud(&self) -> Option<&CloudBonds<D>> {
+        None
+    }
+}
+
+/// Force densities of the whole body, N/m³.
+pub fn force<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B, displacement: &Field<D>, force: &mut Field<D>) {
+    let slots = bonds.slots();
+    force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
+        debug_assert_eq!(chunk_range(chunk, slots).len(), out[0].len());
+        bonds.force(displacement, chunk, &mut out, None);
+    });
+}
+
+/// Extremes of e = λ² − 1 over all intact bonds.
+pub fn stretch_range<const D: usize, B: Bonds<D> + ?Sized>(
+    bonds: &B,
+    displacement: &Field<D>,
+) -> StretchRange {
+    let slots = bonds.slots();
+    (0..slots.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let length = chunk_range(chunk, slots).len();
+            let mut scratch = vec![0.0; D * length];
+            let mut parts = scratch.chunks_mut(length);
+            let mut out: [&mut [f64]; D] = std::array::from_fn(|_| parts.next().unwrap_or_default());
+            let mut range = StretchRange::REST;
+            bonds.force(displacement, chunk, &mut out, Some(&mut range));
+            range
+        })
+        .reduce(|| StretchRange::REST, StretchRange::join)
+}
+
+/// Weight of a bond from its ends' surface-correction factors g: (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J).
+/// Madenci & Oterkus, Peridynamic Theory and Its Applications (2014), §4.2.
+pub fn surface_weight<const D: usize>(bond: [f64; D], length: f64, own: [f64; D], other: [f64; D]) -> f64 {
+    let sum: f64 = (0..D)
+        .map(|d| {
+            let mean = 0.5 * (own[d] + other[d]);
+            (bond[d] / (length * mean)).powi(2)
+        })
+        .sum();
+    1.0 / sum.sqrt()
+}
+
+/// Whether pairs at distance r ≤ δ carry their full volume or the linear partial volume
+/// clamp((δ + Δx/2 − r)/Δx, 0, 1) of a particle that the horizon cuts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum VolumeCorrection {
+    /// Full volumes, as printed in the thesis.
+    #[default]
+    None,
+    /// Linear partial volume of the particles that the horizon cuts.
+    Linear,
+}
+
+impl VolumeCorrection {
+    /// The factor for a bond of `length`.
+    pub fn factor(self, length: f64, horizon: f64, spacing: f64) -> f64 {
+        match self {
+            Self::None => 1.0,
+            Self::Linear => ((horizon + 0.5 * spacing - length) / spacing).clamp(0.0, 1.0),
+        }
+    }
+}

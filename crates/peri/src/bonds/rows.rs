@@ -1,0 +1,198 @@
+//! From a fitted law to kernel rows of a fixed size, chosen once per scene.
+
+use super::kernel::{CloudPass, LatticePass, Row, StretchRange, Tiles};
+use crate::potential::KernelFit;
+use pulp::{Arch, Simd, WithSimd};
+
+/// One bond of the stencil: its distance in slots, ξ, and its stiffness 2kθ w V/|ξ|.
+#[derive(Clone, Copy, Debug)]
+pub struct StencilBond<const D: usize> {
+    /// Distance to the neighbour in slots.
+    pub shift: isize,
+    /// Reference bond.
+    pub bond: [f64; D],
+    /// 2kθ w V/|ξ|.
+    pub stiffness: f64,
+}
+
+/// A lattice kernel with its law in place.
+pub trait LatticeKernel<const D: usize>: Send + Sync {
+    /// See [`LatticePass::run`].
+    fn run(
+        &self,
+        tiles: &Tiles<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    );
+}
+
+/// What a cloud kernel reads, beside its law; the fields are those of [`CloudPass`].
+pub struct CloudData<'a, const D: usize> {
+    pub position: [&'a [f64]; D],
+    pub displacement: [&'a [f64]; D],
+    pub starts: &'a [usize],
+    pub neighbours: &'a [u32],
+    pub stiffness: &'a [f64],
+    pub inverse_square: &'a [f64],
+}
+
+/// A cloud kernel with its law in place.
+pub trait CloudKernel<const D: usize>: Send + Sync {
+    /// See [`CloudPass::run`].
+    fn run(
+        &self,
+        data: &CloudData<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    );
+}
+
+struct LatticeRows<const D: usize, const P: usize, const Q: usize>(Vec<Row<D, P, Q>>);
+
+struct LatticeCall<'a, 'b, const D: usize, const P: usize, const Q: usize> {
+    pass: LatticePass<'a, D, P, Q>,
+    start: usize,
+    force: &'a mut [&'b mut [f64]; D],
+    track: Option<&'a mut StretchRange>,
+}
+
+impl<const D: usize, const P: usize, const Q: usize> WithSimd for LatticeCall<'_, '_, D, P, Q> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.pass.run(simd, self.start, self.force, self.track);
+    }
+}
+
+impl<const D: usize, const P: usize, const Q: usize> LatticeKernel<D> for LatticeRows<D, P, Q> {
+    fn run(
+        &self,
+        tiles: &Tiles<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
+        Arch::new().dispatch(LatticeCall { pass: LatticePass { rows: &self.0, tiles }, start, force, track });
+    }
+}
+
+struct CloudLaw<const P: usize, const Q: usize>(f64, [f64; P], [f64; Q]);
+
+struct CloudCall<'a, 'b, const D: usize, const P: usize, const Q: usize> {
+    pass: CloudPass<'a, D, P, Q>,
+    start: usize,
+    force: &'a mut [&'b mut [f64]; D],
+    track: Option<&'a mut StretchRange>,
+}
+
+impl<const D: usize, const P: usize, const Q: usize> WithSimd for CloudCall<'_, '_, D, P, Q> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.pass.run(simd, self.start, self.force, self.track);
+    }
+}
+
+impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CloudLaw<P, Q> {
+    fn run(
+        &self,
+        data: &CloudData<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
+        let CloudData { position, displacement, starts, neighbours, stiffness, inverse_square } = *data;
+        let law = (self.0, self.1, self.2);
+        let pass = CloudPass { position, displacement, starts, neighbours, stiffness, inverse_square, law };
+        Arch::new().dispatch(CloudCall { pass, start, force, track });
+    }
+}
+
+/// q(e) = constant + e·M(e)/(1 + Σ bₖ eᵏ⁺¹), the one form the kernels know.
+struct Rational {
+    constant: f64,
+    numerator: Vec<f64>,
+    denominator: Vec<f64>,
+}
+
+impl Rational {
+    fn new(fit: &KernelFit) -> Option<Self> {
+        let KernelFit { numerator, denominator, stress_free, .. } = fit;
+        if numerator.is_empty() {
+            return None;
+        }
+        let denominator = denominator.clone();
+        if *stress_free {
+            return Some(Self { constant: 0.0, numerator: numerator.clone(), denominator });
+        }
+        // N/D = q₀ + e·M/D with M = (N − q₀ D)/e
+        let constant = numerator[0];
+        let length = (numerator.len() - 1).max(denominator.len()).max(1);
+        let at = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(0.0);
+        let numerator = (0..length).map(|k| at(numerator, k + 1) - constant * at(&denominator, k)).collect();
+        Some(Self { constant, numerator, denominator })
+    }
+}
+
+fn padded<const N: usize>(values: &[f64], scale: impl Fn(usize) -> f64) -> [f64; N] {
+    std::array::from_fn(|k| values.get(k).map_or(0.0, |v| v * scale(k)))
+}
+
+/// Sizes (numerator, denominator) that are compiled; a fit is padded with zeros to the first that holds it.
+macro_rules! for_size {
+    ($rational:expr, $make:ident $arguments:tt) => {
+        for_size!(@try $rational, $make $arguments;
+            (3, 0) (4, 0) (5, 0) (6, 0) (7, 0) (8, 0) (10, 0) (12, 0) (16, 0) (25, 0)
+            (3, 2) (4, 3) (5, 4) (6, 5) (8, 7) (11, 10))
+    };
+    (@try $rational:expr, $make:ident $arguments:tt; $(($p:literal, $q:literal))*) => {{
+        $(if $rational.numerator.len() <= $p && $rational.denominator.len() <= $q {
+            return Some($make::<D, $p, $q> $arguments);
+        })*
+        None
+    }};
+}
+
+/// The lattice kernel for a fitted law; `None` where the law is a table or larger than any compiled size.
+pub fn lattice_kernel<const D: usize>(
+    fit: &KernelFit,
+    stencil: &[StencilBond<D>],
+) -> Option<Box<dyn LatticeKernel<D>>> {
+    let rational = Rational::new(fit)?;
+    for_size!(rational, lattice_rows(&rational, stencil))
+}
+
+fn lattice_rows<const D: usize, const P: usize, const Q: usize>(
+    law: &Rational,
+    stencil: &[StencilBond<D>],
+) -> Box<dyn LatticeKernel<D>> {
+    let row = |bond: &StencilBond<D>| {
+        let inverse_square = 1.0 / bond.bond.iter().map(|x| x * x).sum::<f64>();
+        let scale = |k: usize| inverse_square.powi(k as i32 + 1);
+        Row {
+            shift: bond.shift,
+            bond: bond.bond,
+            inverse_square,
+            constant: law.constant * bond.stiffness,
+            numerator: padded(&law.numerator, |k| bond.stiffness * scale(k)),
+            denominator: padded(&law.denominator, scale),
+        }
+    };
+    Box::new(LatticeRows::<D, P, Q>(stencil.iter().map(row).collect()))
+}
+
+/// The cloud kernel for a fitted law; `None` as in [`lattice_kernel`].
+pub fn cloud_kernel<const D: usize>(fit: &KernelFit) -> Option<Box<dyn CloudKernel<D>>> {
+    let rational = Rational::new(fit)?;
+    for_size!(rational, cloud_law(&rational))
+}
+
+fn cloud_law<const D: usize, const P: usize, const Q: usize>(law: &Rational) -> Box<dyn CloudKernel<D>> {
+    Box::new(CloudLaw::<P, Q>(
+        law.constant,
+        padded(&law.numerator, |_| 1.0),
+        padded(&law.denominator, |_| 1.0),
+    ))
+}

@@ -1,0 +1,205 @@
+//! The bond modulus kθ from Young's modulus, and what a lattice makes of it.
+//!
+//! The dual force f = 2t enters the equation of motion (2.6). With t ≈ 3kθ(l − 1), (2.76) and (2.80) equal the standard
+//! constants of the prototype microelastic material; Poisson's ratio is 1/4 (3D, plane strain) or 1/3 (plane stress).
+
+use crate::bonds::{LatticeBonds, Stencil, VolumeCorrection};
+use serde::Deserialize;
+use std::f64::consts::PI;
+
+/// The space a body lives in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Space {
+    /// Thin sheet, bonds in its plane.
+    PlaneStress,
+    /// Thick slab, bonds in its cross-section (a disk, not a ball).
+    PlaneStrain,
+    /// Three dimensions.
+    Solid,
+}
+
+/// Where kθ comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Calibration {
+    /// The continuum's integrals, (2.76) and (2.80).
+    #[default]
+    Continuum,
+    /// The lattice's own sums: a homogeneous dilatation stores the exact energy.
+    Lattice,
+}
+
+/// Poisson's ratio that bond forces along the bonds allow.
+pub fn poisson_ratio(space: Space) -> f64 {
+    if space == Space::PlaneStress { 1.0 / 3.0 } else { 0.25 }
+}
+
+/// C₁₁₁₁ of the space: E/(1 − ν²) in plane stress, else E(1 − ν)/((1 + ν)(1 − 2ν)).
+pub fn stiffness_1111(space: Space, youngs_modulus: f64) -> f64 {
+    let nu = poisson_ratio(space);
+    if space == Space::PlaneStress {
+        youngs_modulus / (1.0 - nu * nu)
+    } else {
+        youngs_modulus * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu))
+    }
+}
+
+/// kθ from Young's modulus (Pa), horizon and thickness (m).
+///
+/// Solid: 2E/(πδ⁴), Eq. (2.76). Plane stress: 3E/(2πtδ³), Eq. (2.80). Plane strain on a disk: 8E/(5πtδ³).
+pub fn modulus(space: Space, youngs_modulus: f64, horizon: f64, thickness: f64) -> f64 {
+    match space {
+        Space::Solid => 2.0 * youngs_modulus / (PI * horizon.powi(4)),
+        Space::PlaneStress => 3.0 * youngs_modulus / (2.0 * PI * thickness * horizon.powi(3)),
+        Space::PlaneStrain => 8.0 * youngs_modulus / (5.0 * PI * thickness * horizon.powi(3)),
+    }
+}
+
+/// The factor on kθ for a calibration.
+pub fn lattice_factor<const D: usize>(calibration: Calibration, bonds: &LatticeBonds<D>) -> f64 {
+    match calibration {
+        Calibration::Continuum => 1.0,
+        Calibration::Lattice => {
+            let ratio = bonds.ratio();
+            1.0 / LatticeModuli::new::<D>(ratio, bonds.volume_correction()).dilatation
+        }
+    }
+}
+
+/// Small-strain moduli of a regular lattice, each over its exact value (C₁₁₁₁, C₁₁₂₂, E over E) or plain (ν, A).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LatticeModuli {
+    /// C₁₁₁₁ over the isotropic one.
+    pub c1111: f64,
+    /// C₁₁₂₂ over the isotropic one.
+    pub c1122: f64,
+    /// Young's modulus along \[100\] over E.
+    pub e100: f64,
+    /// Young's modulus along \[110\] over E.
+    pub e110: f64,
+    /// Poisson's ratio along \[100\].
+    pub nu: f64,
+    /// Zener's anisotropy 2C₄₄/(C₁₁ − C₁₂).
+    pub zener: f64,
+    /// C_iijj over the exact one: the stiffness against dilatation.
+    pub dilatation: f64,
+}
+
+impl LatticeModuli {
+    /// Moduli of the lattice with horizon `ratio` spacings: C_ijkl = 3kθ Σ w V ξ_i ξ_j ξ_k ξ_l/|ξ|³, E = Δx = 1.
+    pub fn new<const D: usize>(ratio: f64, correction: VolumeCorrection) -> Self {
+        let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
+        let modulus = modulus(space, 1.0, ratio, 1.0);
+        let stencil = Stencil::<D>::new(ratio);
+        let (mut c11, mut c12, mut trace) = (0.0, 0.0, 0.0);
+        for (k, offset) in stencil.offsets.iter().enumerate() {
+            let length = stencil.length(k);
+            let factor = 3.0 * modulus * correction.factor(length, ratio, 1.0) / length.powi(3);
+            let (x, y) = (f64::from(offset[0]), f64::from(offset[1]));
+            c11 += factor * x.powi(4);
+            c12 += factor * x * x * y * y;
+            trace += factor * length.powi(4);
+        }
+        // a central-force lattice obeys Cauchy's relation C₄₄ = C₁₂
+        let (c44, exact) = (c12, stiffness_1111(space, 1.0));
+        let (e100, nu, along_110);
+        if D == 2 {
+            e100 = c11 - c12 * c12 / c11;
+            nu = c12 / c11;
+            let (s11, s12) = (c11 / (c11 * c11 - c12 * c12), -c12 / (c11 * c11 - c12 * c12));
+            along_110 = (2.0 * s11 + 2.0 * s12 + 1.0 / c44) / 4.0;
+        } else {
+            e100 = (c11 - c12) * (c11 + 2.0 * c12) / (c11 + c12);
+            nu = c12 / (c11 + c12);
+            let (s11, s12, s44) = (1.0 / e100, -nu / e100, 1.0 / c44);
+            along_110 = s11 - 0.5 * (s11 - s12 - 0.5 * s44);
+        }
+        let isotropic = if D == 2 { 3.0 / 8.0 } else { 1.0 / 5.0 };
+        Self {
+            c1111: c11 / exact,
+            c1122: c12 / (exact / 3.0),
+            e100,
+            e110: 1.0 / along_110,
+            nu,
+            zener: 2.0 * c44 / (c11 - c12),
+            dilatation: trace * isotropic / exact,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// formulation.md, table of lattice moduli at m = 3.015, to its printed digits.
+    #[test]
+    fn lattice_moduli_table() {
+        let check = |found: LatticeModuli, expected: [f64; 6], name: &str| {
+            let found = [found.c1111, found.c1122, found.e100, found.e110, found.nu, found.zener];
+            for (f, (e, digits)) in
+                found.iter().zip(expected.iter().zip([5e-4, 5e-4, 6e-4, 6e-4, 5e-4, 5e-4]))
+            {
+                assert!((f - e).abs() <= digits, "{name}: {found:?} against {expected:?}");
+            }
+        };
+        use VolumeCorrection::{Linear, None};
+        check(LatticeModuli::new::<2>(3.015, None), [1.037, 0.990, 1.0486, 1.0017, 0.318, 0.934], "2D none");
+        check(
+            LatticeModuli::new::<2>(3.015, Linear),
+            [0.861, 0.867, 0.859, 0.865, 0.336, 1.010],
+            "2D linear",
+        );
+        check(LatticeModuli::new::<3>(3.015, None), [1.063, 1.036, 1.194, 0.978, 0.278, 1.248], "3D none");
+        check(
+            LatticeModuli::new::<3>(3.015, Linear),
+            [0.903, 0.854, 0.943, 0.822, 0.269, 1.165],
+            "3D linear",
+        );
+    }
+
+    /// Silling & Askari's c = 18K/(πδ⁴), and 9E/(πtδ³) in plane stress (Ha & Bobaru 2010,
+    /// doi:10.1007/s10704-010-9442-4): force density c(l − 1) = 2t with t = 3kθ(l − 1).
+    #[test]
+    fn equals_the_constants_of_the_linear_bond() {
+        let (e, delta, thickness) = (2.7, 0.31, 0.05);
+        let bulk = e / (3.0 * (1.0 - 2.0 * poisson_ratio(Space::Solid)));
+        let solid = 6.0 * modulus(Space::Solid, e, delta, 1.0);
+        assert!((solid / (18.0 * bulk / (PI * delta.powi(4))) - 1.0).abs() < 1e-15);
+        let sheet = 6.0 * modulus(Space::PlaneStress, e, delta, thickness);
+        assert!((sheet / (9.0 * e / (PI * thickness * delta.powi(3))) - 1.0).abs() < 1e-15);
+        let slab = 6.0 * modulus(Space::PlaneStrain, e, delta, thickness);
+        assert!((slab / (48.0 * e / (5.0 * PI * thickness * delta.powi(3))) - 1.0).abs() < 1e-15);
+    }
+
+    /// The lattice tends to the continuum: every modulus within 3 % at m = 20.
+    #[test]
+    fn lattice_tends_to_the_continuum() {
+        let far = LatticeModuli::new::<2>(20.015, VolumeCorrection::None);
+        for value in [far.c1111, far.c1122, far.e100, far.e110, far.zener, far.dilatation, 3.0 * far.nu] {
+            assert!((value - 1.0).abs() < 0.03, "{far:?}");
+        }
+    }
+
+    /// The traces of the printed double integrals (A.18), (A.38): 128π/45 on the unit disk and 64π²/35 in the unit ball,
+    /// against the distribution of distances between two points, p(r) of a disk and of a ball.
+    #[test]
+    fn double_integrals_of_the_appendix() {
+        let n = 20_000;
+        let integral = |p: &dyn Fn(f64) -> f64| -> f64 {
+            (0..n)
+                .map(|k| {
+                    let r = 2.0 * (f64::from(k) + 0.5) / f64::from(n);
+                    r * p(r) * 2.0 / f64::from(n)
+                })
+                .sum()
+        };
+        // trace of ξ⊗ξ⊗ξ⊗ξ/|ξ|³ is |ξ|; mean distance × measure²
+        let disk = |r: f64| 4.0 * r / PI * (0.5 * r).acos() - r * r / PI * (4.0 - r * r).sqrt();
+        let ball = |r: f64| 3.0 * r * r - 2.25 * r.powi(3) + 0.1875 * r.powi(5);
+        let found = integral(&disk) * PI * PI;
+        assert!((found - 128.0 * PI / 45.0).abs() < 1e-5, "{found}");
+        let found = integral(&ball) * (4.0 / 3.0 * PI).powi(2);
+        assert!((found - 64.0 * PI * PI / 35.0).abs() < 1e-5, "{found}");
+    }
+}

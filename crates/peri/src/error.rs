@@ -1,0 +1,82 @@
+//! What can go wrong in this crate.
+
+use std::path::PathBuf;
+
+/// Errors of the peridynamics crate.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The body cannot be built.
+    #[error("{0}")]
+    Geometry(String),
+    /// A material parameter or a law is out of its domain.
+    #[error("{name}: found {found}; allowed: {allowed}")]
+    Parameter {
+        /// What.
+        name: &'static str,
+        /// The value found.
+        found: f64,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// A result is not finite.
+    #[error(
+        "{quantity} is not finite at particle {particle} (X = {position:?} m), step {step}, iteration {iteration}"
+    )]
+    NotFinite {
+        /// The quantity.
+        quantity: &'static str,
+        /// The particle's index.
+        particle: usize,
+        /// Its reference position.
+        position: Vec<f64>,
+        /// Load step.
+        step: usize,
+        /// Iteration within the step.
+        iteration: u64,
+    },
+    /// The solver used all its iterations.
+    #[error(
+        "not converged after {iterations} iterations of step {step}: residual {residual:.3e}, needed {needed:.3e}"
+    )]
+    NotConverged {
+        /// Load step.
+        step: usize,
+        /// Iterations used.
+        iterations: u64,
+        /// Relative residual reached.
+        residual: f64,
+        /// Relative residual asked for.
+        needed: f64,
+    },
+    /// The run was asked to stop; its checkpoint is written.
+    #[error("interrupted; resume with `peri resume {}`", .0.display())]
+    Interrupted(PathBuf),
+    /// A checkpoint cannot be used.
+    #[error("checkpoint {}: {why}", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        why: String,
+    },
+    /// Files, output, scenes.
+    #[error(transparent)]
+    Shared(#[from] polycore::Error),
+}
+
+impl Error {
+    /// Exit code of the command line: 2 for bad input, 130 for an interrupted run, 1 otherwise.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Geometry(_) | Self::Parameter { .. } | Self::Checkpoint { .. } => 2,
+            Self::Interrupted(_) => 130,
+            Self::NotFinite { .. } | Self::NotConverged { .. } => 1,
+            Self::Shared(error) => error.exit_code(),
+        }
+    }
+
+    /// A geometry error.
+    pub fn geometry(what: String) -> Self {
+        Self::Geometry(what)
+    }
+}

@@ -1,0 +1,206 @@
+//! Bodies from shapes: boxes, disks, balls, cylinders, added and cut in order; cracks of zero width; point clouds.
+
+use crate::bonds::Lattice;
+use crate::error::Error;
+
+/// A solid region of dimension `D`; lengths in m.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape<const D: usize> {
+    /// Axis-parallel box, edges included.
+    Box {
+        /// Lower corner.
+        min: [f64; D],
+        /// Upper corner.
+        max: [f64; D],
+    },
+    /// Disk (2D) or ball (3D).
+    Ball {
+        /// Centre.
+        centre: [f64; D],
+        /// Radius.
+        radius: f64,
+    },
+    /// Cylinder of finite length along one axis.
+    Cylinder {
+        /// Centre of the axis.
+        centre: [f64; D],
+        /// Radius.
+        radius: f64,
+        /// Length along the axis.
+        length: f64,
+        /// The axis' index.
+        axis: usize,
+    },
+}
+
+impl<const D: usize> Shape<D> {
+    /// Whether the open interior contains a point. Points on a box's face belong to the box.
+    pub fn contains(&self, point: [f64; D]) -> bool {
+        match self {
+            Self::Box { min, max } => (0..D).all(|d| min[d] <= point[d] && point[d] <= max[d]),
+            Self::Ball { centre, radius } => {
+                (0..D).map(|d| (point[d] - centre[d]).powi(2)).sum::<f64>() < radius * radius
+            }
+            Self::Cylinder { centre, radius, length, axis } => {
+                let radial: f64 = (0..D).filter(|d| d != axis).map(|d| (point[d] - centre[d]).powi(2)).sum();
+                radial < radius * radius && 2.0 * (point[*axis] - centre[*axis]).abs() <= *length
+            }
+        }
+    }
+
+    /// Smallest box around it, as (lower corner, upper corner).
+    pub fn bounds(&self) -> ([f64; D], [f64; D]) {
+        match self {
+            Self::Box { min, max } => (*min, *max),
+            Self::Ball { centre, radius } => (centre.map(|c| c - radius), centre.map(|c| c + radius)),
+            Self::Cylinder { centre, radius, length, axis } => {
+                let half = |d: usize| if d == *axis { 0.5 * length } else { *radius };
+                (std::array::from_fn(|d| centre[d] - half(d)), std::array::from_fn(|d| centre[d] + half(d)))
+            }
+        }
+    }
+}
+
+/// A shape put on or taken away.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Operation<const D: usize> {
+    /// Union with the shape.
+    Add(Shape<D>),
+    /// Difference with the shape.
+    Cut(Shape<D>),
+}
+
+/// Whether a point belongs to the body that a list of operations builds.
+pub fn inside<const D: usize>(operations: &[Operation<D>], point: [f64; D]) -> bool {
+    operations.iter().fold(false, |inside, operation| match operation {
+        Operation::Add(shape) => inside || shape.contains(point),
+        Operation::Cut(shape) => inside && !shape.contains(point),
+    })
+}
+
+/// Smallest box around all added shapes; `None` where nothing is added.
+pub fn bounds<const D: usize>(operations: &[Operation<D>]) -> Option<([f64; D], [f64; D])> {
+    operations
+        .iter()
+        .filter_map(|operation| match operation {
+            Operation::Add(shape) => Some(shape.bounds()),
+            Operation::Cut(_) => None,
+        })
+        .reduce(|(low, high), (l, h)| {
+            (std::array::from_fn(|d| low[d].min(l[d])), std::array::from_fn(|d| high[d].max(h[d])))
+        })
+}
+
+/// Cells along each axis of a lattice of `spacing` over a box, as real numbers: they may be too many to count.
+pub fn cell_counts<const D: usize>(low: [f64; D], high: [f64; D], spacing: f64) -> [f64; D] {
+    std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round().max(1.0))
+}
+
+/// The lattice of cells whose centres lie inside the body. Cells are centred: the first centre lies half a spacing
+/// inside the lower corner of the bounding box.
+///
+/// # Errors
+/// [`Error::Geometry`] where nothing is added or no centre is inside.
+pub fn lattice<const D: usize>(
+    operations: &[Operation<D>],
+    spacing: f64,
+    thickness: f64,
+) -> Result<Lattice<D>, Error> {
+    let (low, high) = bounds(operations).ok_or_else(|| Error::geometry("no shape is added".to_owned()))?;
+    let cells = cell_counts(low, high, spacing).map(|c| c as usize);
+    // the box keeps its centre where its edges are no multiple of the spacing
+    let origin: [f64; D] =
+        std::array::from_fn(|d| 0.5 * (low[d] + high[d]) - 0.5 * spacing * (cells[d] - 1) as f64);
+    let total: usize = cells.iter().product();
+    let occupied: Vec<bool> = (0..total)
+        .map(|index| {
+            let mut rest = index;
+            let centre = std::array::from_fn(|d| {
+                let cell = rest % cells[d];
+                rest /= cells[d];
+                origin[d] + spacing * cell as f64
+            });
+            inside(operations, centre)
+        })
+        .collect();
+    if !occupied.contains(&true) {
+        return Err(Error::geometry(format!(
+            "no particle of a lattice with spacing {spacing} m lies inside the body"
+        )));
+    }
+    Ok(Lattice { spacing, origin, cells, occupied, volume: spacing.powi(D as i32) * thickness })
+}
+
+/// A crack of zero width that severs the bonds crossing it: a segment in 2D, a parallelogram in 3D.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cut<const D: usize> {
+    /// One corner.
+    pub corner: [f64; D],
+    /// The D − 1 edges from that corner (the last entry is unused).
+    pub edges: [[f64; D]; D],
+}
+
+impl<const D: usize> Cut<D> {
+    /// Whether the segment from `a` to `b` crosses the cut: solves a + s(b − a) = corner + Σ wᵢ edgeᵢ and asks for
+    /// 0 < s < 1, 0 ≤ w ≤ 1. A segment parallel to the cut does not cross it.
+    pub fn severs(&self, a: [f64; D], b: [f64; D]) -> bool {
+        let mut matrix = nalgebra::SMatrix::<f64, D, D>::zeros();
+        let mut right = nalgebra::SVector::<f64, D>::zeros();
+        for d in 0..D {
+            matrix[(d, 0)] = b[d] - a[d];
+            for edge in 0..D - 1 {
+                matrix[(d, edge + 1)] = -self.edges[edge][d];
+            }
+            right[d] = self.corner[d] - a[d];
+        }
+        let Some(inverse) = matrix.try_inverse() else { return false };
+        let solution = inverse * right;
+        solution[0] > 0.0 && solution[0] < 1.0 && (1..D).all(|i| (0.0..=1.0).contains(&solution[i]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn operations_apply_in_order() {
+        let outer = Shape::Box { min: [0.0, 0.0], max: [4.0, 4.0] };
+        let hole = Shape::Ball { centre: [2.0, 2.0], radius: 1.0 };
+        let body = [Operation::Add(outer), Operation::Cut(hole.clone())];
+        assert!(inside(&body, [0.5, 0.5]) && !inside(&body, [2.0, 2.5]) && inside(&body, [3.0, 2.0]));
+        let refilled = [body[0].clone(), body[1].clone(), Operation::Add(hole)];
+        assert!(inside(&refilled, [2.0, 2.5]));
+    }
+
+    #[test]
+    fn cells_are_centred_in_the_box() {
+        let body = [Operation::Add(Shape::Box { min: [-5.0, 0.0], max: [5.0, 2.0] })];
+        let lattice = lattice(&body, 1.0, 0.5).unwrap();
+        assert_eq!(lattice.cells, [10, 2]);
+        assert_eq!(lattice.origin, [-4.5, 0.5]);
+        assert_eq!(lattice.volume, 0.5);
+        assert!(lattice.occupied.iter().all(|&o| o));
+    }
+
+    #[test]
+    fn a_cylinder_stops_at_its_ends() {
+        let bar = Shape::Cylinder { centre: [0.0; 3], radius: 1.0, length: 4.0, axis: 0 };
+        assert!(
+            bar.contains([2.0, 0.0, 0.9]) && !bar.contains([2.1, 0.0, 0.0]) && !bar.contains([0.0, 0.8, 0.8])
+        );
+        assert_eq!(bar.bounds(), ([-2.0, -1.0, -1.0], [2.0, 1.0, 1.0]));
+    }
+
+    #[test]
+    fn a_cut_severs_only_what_crosses_it() {
+        let crack = Cut { corner: [0.0, 0.0], edges: [[2.0, 0.0], [0.0; 2]] };
+        assert!(crack.severs([1.0, -1.0], [1.5, 1.0]));
+        assert!(!crack.severs([3.0, -1.0], [3.0, 1.0]), "beside it");
+        assert!(!crack.severs([1.0, 0.5], [1.0, 1.0]), "above it");
+        assert!(!crack.severs([-1.0, 0.0], [3.0, 0.0]), "along it");
+        let plane = Cut { corner: [0.0; 3], edges: [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0; 3]] };
+        assert!(plane.severs([1.0, 1.0, -1.0], [1.0, 1.0, 1.0]));
+        assert!(!plane.severs([1.0, 3.0, -1.0], [1.0, 3.0, 1.0]));
+    }
+}

@@ -1,0 +1,109 @@
+//! Bond laws: tension t and energy φ of a bond of stretch l = |ζ|/|ξ|, in units of kθ.
+
+mod chain;
+mod fit;
+mod laws;
+#[cfg(test)]
+mod tests;
+
+pub use chain::{Chain, ChainPoint};
+pub use fit::KernelFit;
+pub use laws::{BondStretch, LinearBond, NetworkStretch, Printed, Scaled, Shifted};
+
+use crate::error::Error;
+use serde::Deserialize;
+
+/// A law on bond stretches. Laws are sampled when a kernel is fitted, never in a hot loop.
+pub trait BondPotential: Send + Sync {
+    /// Force density t/kθ, Eq. (2.47) with the reference state of the law.
+    fn tension(&self, stretch: f64) -> f64;
+    /// dt/dl/kθ.
+    fn tension_derivative(&self, stretch: f64) -> f64;
+    /// Energy φ/kθ per unit reference length of the bond, Eq. (2.39); zero at l = 1.
+    fn energy(&self, stretch: f64) -> f64;
+    /// Whether t(1) = 0.
+    fn is_stress_free(&self) -> bool {
+        true
+    }
+    /// Small-strain tangent K = t′(1); the calibration of kθ takes K = 3.
+    fn tangent(&self) -> f64 {
+        self.tension_derivative(1.0)
+    }
+}
+
+/// The laws by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Law {
+    /// t = T(l) − T(1): the printed chain force less its value at rest.
+    #[default]
+    Subtract,
+    /// t = T(l − 1), odd: the only one that obeys (2.70) literally.
+    Shift,
+    /// t = T(g(l)) g′(l) with (2.38) as the chain stretch.
+    Chain,
+    /// t = T(l) as printed: not stress-free, collapses.
+    Printed,
+    /// t = 3(l − 1): the linear bond of the prototype microelastic brittle material.
+    Pmb,
+}
+
+impl Law {
+    /// Every law.
+    pub const ALL: [Self; 5] = [Self::Subtract, Self::Shift, Self::Chain, Self::Printed, Self::Pmb];
+
+    /// Name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Subtract => "subtract",
+            Self::Shift => "shift",
+            Self::Chain => "chain",
+            Self::Printed => "printed",
+            Self::Pmb => "pmb",
+        }
+    }
+
+    /// Whether the law has chain parameters n̄ and D̂.
+    pub fn is_chain(self) -> bool {
+        self != Self::Pmb
+    }
+
+    /// Whether kθ is scaled to an exact small-strain modulus unless the scene says otherwise.
+    pub fn rescales(self) -> bool {
+        self == Self::Chain
+    }
+
+    /// Factor on the fictitious mass of dynamic relaxation that the law's stiffening asks for.
+    pub fn mass_safety(self) -> f64 {
+        if self == Self::Chain { 1.5 } else { 1.1 }
+    }
+
+    /// The law with n̄ `links` and D̂ = `dissociation`, times 3/K where `rescale`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where a chain parameter is out of its domain.
+    pub fn build(
+        self,
+        links: f64,
+        dissociation: f64,
+        rescale: bool,
+    ) -> Result<Box<dyn BondPotential>, Error> {
+        let chain = || Chain::new(links, dissociation);
+        Ok(match self {
+            Self::Subtract => scaled(BondStretch(chain()?), rescale),
+            Self::Shift => scaled(Shifted(chain()?), rescale),
+            Self::Chain => scaled(NetworkStretch(chain()?), rescale),
+            Self::Printed => scaled(Printed(chain()?), rescale),
+            Self::Pmb => scaled(LinearBond, rescale),
+        })
+    }
+}
+
+fn scaled<L: BondPotential + 'static>(law: L, rescale: bool) -> Box<dyn BondPotential> {
+    if rescale {
+        let factor = 3.0 / law.tangent();
+        Box::new(Scaled { law, factor })
+    } else {
+        Box::new(law)
+    }
+}

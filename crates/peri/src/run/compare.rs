@@ -1,0 +1,194 @@
+//! Comparison with closed forms, convergence, and the report.
+
+use super::outcome::{Outcome, Profile};
+use crate::bonds::Bonds;
+use crate::exact;
+use crate::scene::{ExactSpec, Scene};
+use crate::stress::{Measure, Tensor};
+use polycore::report::Report;
+use polycore::scene::Source;
+
+/// Stress against Kirsch's solution: peak and profile at θ = π/2, RMSE (2.84) over all particles and without the
+/// loading layers.
+pub fn kirsch<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    spec: &ExactSpec,
+    fields: &[(Measure, Vec<Tensor<D>>)],
+    loaded: &[bool],
+    outcome: &mut Outcome,
+) {
+    let ExactSpec::Kirsch { radius, remote_stress } = spec;
+    let (radius, remote) = (radius.si(), remote_stress.si());
+    let positions: Vec<[f64; D]> = bonds.particles().iter().map(|&s| bonds.position(s as usize)).collect();
+    let exact: Vec<f64> = positions.iter().map(|p| exact::kirsch(p[0], p[1], radius, 1.0)[0]).collect();
+    let column = column(&positions, bonds.spacing());
+    if !column.is_empty() {
+        outcome.value("kirsch_first", mean(&column[0].1, &exact), "");
+        outcome.profiles.push(profile("kirsch", &column, &exact));
+    }
+    for (measure, field) in fields {
+        let name = measure.name();
+        let normal: Vec<f64> = field.iter().map(|s| s[0][0] / remote).collect();
+        let squares = normal.iter().zip(&exact).map(|(s, e)| (s - e) * (s - e));
+        let inner = bonds.particles().iter().map(|&slot| !loaded[slot as usize]);
+        let (mut all, mut within, mut count) = (0.0, 0.0, 0_usize);
+        for (square, inner) in squares.zip(inner) {
+            all += square;
+            if inner {
+                within += square;
+                count += 1;
+            }
+        }
+        outcome.value(&format!("{name}_rmse"), (all / normal.len() as f64).sqrt(), "");
+        outcome.value(&format!("{name}_rmse_inner"), (within / count.max(1) as f64).sqrt(), "");
+        if !column.is_empty() {
+            let profile = profile(name, &column, &normal);
+            let peak = profile.value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            outcome.value(&format!("{name}_peak"), peak, "");
+            outcome.value(&format!("{name}_first"), profile.value[0], "");
+            outcome.profiles.push(profile);
+        }
+    }
+}
+
+/// Heights above the hole and the particles there: the column(s) of particles nearest the line x = 0, y > 0.
+fn column<const D: usize>(positions: &[[f64; D]], spacing: f64) -> Vec<(f64, Vec<usize>)> {
+    let mut near: Vec<usize> = (0..positions.len())
+        .filter(|&i| positions[i][0].abs() < 0.6 * spacing && positions[i][1] > 0.0)
+        .collect();
+    near.sort_by(|&a, &b| positions[a][1].total_cmp(&positions[b][1]));
+    let mut rows: Vec<(f64, Vec<usize>)> = Vec::new();
+    for particle in near {
+        let height = positions[particle][1];
+        match rows.last_mut() {
+            Some((last, members)) if height - *last < 0.1 * spacing => members.push(particle),
+            _ => rows.push((height, vec![particle])),
+        }
+    }
+    rows
+}
+
+fn mean(members: &[usize], values: &[f64]) -> f64 {
+    members.iter().map(|&i| values[i]).sum::<f64>() / members.len() as f64
+}
+
+fn profile(name: &str, column: &[(f64, Vec<usize>)], values: &[f64]) -> Profile {
+    Profile {
+        name: name.to_owned(),
+        at: column.iter().map(|row| row.0).collect(),
+        value: column.iter().map(|row| mean(&row.1, values)).collect(),
+    }
+}
+
+/// Families of variants that differ in spacing only, coarse to fine, at least two in each.
+pub fn families(outcomes: &[Outcome]) -> Vec<(String, Vec<&Outcome>)> {
+    let mut families: Vec<(String, Vec<&Outcome>)> = Vec::new();
+    for outcome in outcomes {
+        match families.iter_mut().find(|(name, _)| *name == outcome.family) {
+            Some((_, members)) => members.push(outcome),
+            None => families.push((outcome.family.clone(), vec![outcome])),
+        }
+    }
+    for (_, members) in &mut families {
+        members.sort_by(|a, b| b.spacing.total_cmp(&a.spacing));
+    }
+    families.retain(|(_, members)| members.len() > 1);
+    families
+}
+
+/// Observed order: slope of ln(error) over ln(spacing) by least squares.
+pub fn observed_order(spacing: &[f64], error: &[f64]) -> f64 {
+    let points: Vec<(f64, f64)> = spacing.iter().zip(error).map(|(h, e)| (h.ln(), e.ln())).collect();
+    let n = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let (top, bottom) =
+        points.iter().fold((0.0, 0.0), |(t, b), p| (t + (p.0 - x) * (p.1 - y), b + (p.0 - x) * (p.0 - x)));
+    top / bottom
+}
+
+/// The report of all variants; with one variant its values keep their plain names.
+pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -> Report {
+    let mut report = Report::new("peri", env!("CARGO_PKG_VERSION"), &source.text);
+    report.threads(rayon::current_num_threads());
+    let several = outcomes.len() > 1;
+    let full = |name: &str, outcome: &Outcome| {
+        if several { format!("{name}[{}]", outcome.name) } else { name.to_owned() }
+    };
+    for outcome in outcomes {
+        for (name, value, unit) in &outcome.values {
+            report.value(&full(name, outcome), *value, unit);
+        }
+        for profile in &outcome.profiles {
+            let columns = [("y", "m", profile.at.clone()), ("stress", "", profile.value.clone())];
+            report.curve(&full(&format!("profile_{}", profile.name), outcome), &columns);
+        }
+        for (name, count) in &outcome.work {
+            report.work(&full(name, outcome), *count);
+        }
+        for (phase, seconds) in &outcome.seconds {
+            report.seconds(&full(phase, outcome), *seconds);
+        }
+    }
+    if let (Some(ExactSpec::Kirsch { radius, .. }), Some(stress)) = (&scene.exact, &scene.stress) {
+        if let Some(width) = plate_width(scene) {
+            report.value("kt_finite_width", exact::heywood_gross(2.0 * radius.si() / width), "");
+        }
+        for (family, members) in families(outcomes) {
+            let spacing: Vec<f64> = members.iter().map(|o| o.spacing).collect();
+            for measure in &stress.measures {
+                let name = measure.name();
+                for kind in ["rmse", "rmse_inner"] {
+                    let errors: Vec<f64> =
+                        members.iter().filter_map(|o| o.get(&format!("{name}_{kind}"))).collect();
+                    if errors.len() == spacing.len() {
+                        let order = observed_order(&spacing, &errors);
+                        report.value(&format!("{name}_{kind}_order[{family}]"), order, "");
+                    }
+                }
+                let seconds: Vec<f64> = members
+                    .iter()
+                    .map(|o| {
+                        o.seconds_of("build")
+                            + o.seconds_of("solve")
+                            + o.seconds_of(&format!("stress {name}"))
+                    })
+                    .collect();
+                let errors: Vec<f64> =
+                    members.iter().filter_map(|o| o.get(&format!("{name}_rmse"))).collect();
+                report.curve(
+                    &format!("error_against_time_{name}[{family}]"),
+                    &[("spacing", "m", spacing.clone()), ("seconds", "s", seconds), ("rmse", "", errors)],
+                );
+            }
+        }
+    }
+    report.judge(&scene.expect, quick);
+    report
+}
+
+/// Width of the plate across the load, from the added boxes.
+pub fn plate_width(scene: &Scene) -> Option<f64> {
+    let edges = |get: fn(&crate::scene::ShapeSpec) -> &Option<Vec<polycore::units::Length>>| {
+        scene
+            .body
+            .shapes
+            .iter()
+            .filter(|s| s.add.is_some())
+            .filter_map(move |s| Some(get(s).as_ref()?.get(1)?.si()))
+    };
+    let low = edges(|s| &s.min).reduce(f64::min)?;
+    let high = edges(|s| &s.max).reduce(f64::max)?;
+    Some(high - low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn order_of_a_power_law() {
+        let h = [4.0, 2.0, 1.0];
+        let error = h.map(|h: f64| 0.3 * h.powf(0.45));
+        assert!((observed_order(&h, &error) - 0.45).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,159 @@
+//! Pictures and field files of a run.
+
+use super::compare::{families, plate_width};
+use super::outcome::Outcome;
+use crate::bonds::Bonds;
+use crate::exact;
+use crate::scene::{ExactSpec, Scene};
+use crate::solver::State;
+use crate::stress::{Measure, Tensor};
+use polycore::Error;
+use polycore::output::picture::{FieldMap, LegendPlace, LinePlot, Panel, Series};
+use polycore::output::{csv, vtkhdf::ParticleSeries};
+use std::path::Path;
+
+/// Displacement and stresses as one VTKHDF file.
+pub fn fields<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    state: &State<D>,
+    fields: &[(Measure, Vec<Tensor<D>>)],
+    path: &Path,
+) -> Result<(), Error> {
+    let in_space = |v: [f64; D]| -> [f64; 3] { std::array::from_fn(|d| v.get(d).copied().unwrap_or(0.0)) };
+    let mut series = ParticleSeries::create(path)?;
+    let (mut points, mut displacement) = (Vec::new(), Vec::new());
+    for &slot in bonds.particles() {
+        let (x, u) = (bonds.position(slot as usize), state.displacement.get(slot as usize));
+        points.push(in_space(std::array::from_fn(|d| x[d] + u[d])));
+        displacement.extend(in_space(u));
+    }
+    let tensors: Vec<(String, Vec<f64>)> = fields
+        .iter()
+        .map(|(measure, field)| {
+            let full = |t: &Tensor<D>| -> [f64; 9] {
+                std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
+            };
+            (format!("cauchy_{}", measure.name()), field.iter().flat_map(full).collect())
+        })
+        .collect();
+    let mut data: Vec<(&str, usize, &[f64])> = vec![("displacement", 3, &displacement)];
+    data.extend(tensors.iter().map(|(name, values)| (name.as_str(), 9, values.as_slice())));
+    series.step(1.0, &points, &data)?;
+    series.finish()?;
+    Ok(())
+}
+
+/// Maps of the stress components of the first measure (Fig. 2.6); plane bodies only.
+pub fn maps<const D: usize>(
+    scene: &Scene,
+    bonds: &dyn Bonds<D>,
+    state: &State<D>,
+    fields: &[(Measure, Vec<Tensor<D>>)],
+    outcome: &Outcome,
+    output: &Path,
+) -> Result<(), Error> {
+    let Some((measure, field)) = fields.first().filter(|_| D == 2) else { return Ok(()) };
+    let places: Vec<[f64; 2]> = bonds
+        .particles()
+        .iter()
+        .map(|&slot| {
+            let (x, u) = (bonds.position(slot as usize), state.displacement.get(slot as usize));
+            [x[0] + u[0], x[1] + u[1]]
+        })
+        .collect();
+    let (scale, unit) = match &scene.exact {
+        Some(ExactSpec::Kirsch { remote_stress, .. }) => (1.0 / remote_stress.si(), "/σ∞"),
+        None => (1.0, " (Pa)"),
+    };
+    let components: Vec<(&str, Vec<f64>)> = [("σ₁₁", 0, 0), ("σ₂₂", 1, 1), ("σ₁₂", 0, 1)]
+        .map(|(name, a, b)| (name, field.iter().map(|t| t[a][b] * scale).collect()))
+        .into();
+    let mut map = FieldMap::new().lengths("mm", 1e-3);
+    for (name, values) in &components {
+        let label = format!("{name}{unit}");
+        let title = format!("{label}, {}", measure.name());
+        map = map.panel(Panel::new(&title, &label, &places, values, bonds.spacing()));
+    }
+    map.write(output.join(format!("stress_{}.png", outcome.file_name())))
+}
+
+/// Profiles (Fig. 2.7), convergence (Fig. 2.8), error against run time.
+pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+    let Some(ExactSpec::Kirsch { radius, .. }) = &scene.exact else { return Ok(()) };
+    let Some(stress) = &scene.stress else { return Ok(()) };
+    let radius = radius.si();
+    profiles(scene, outcomes, stress.measures[0].name(), radius, output)?;
+    let families = families(outcomes);
+    if families.is_empty() {
+        return Ok(());
+    }
+    let mut convergence = LinePlot::new("Stress error of the plate with a hole").log_x().log_y();
+    convergence = convergence.axes("spacing Δx (mm)", "RMSE of σ₁₁/σ∞ (2.84)");
+    let mut cost = LinePlot::new("Error against run time").log_x().log_y();
+    cost = cost.axes("build + solve + stress (s)", "RMSE of σ₁₁/σ∞ (2.84)");
+    let mut rows: Vec<Vec<f64>> = vec![Vec::new(); 5];
+    for (family, members) in &families {
+        for (index, measure) in stress.measures.iter().enumerate().filter(|(_, m)| **m != Measure::Printed) {
+            let name = measure.name();
+            let label = format!("{name} {family}");
+            let error: Vec<f64> = members.iter().filter_map(|o| o.get(&format!("{name}_rmse"))).collect();
+            let spacing: Vec<f64> = members.iter().map(|o| o.spacing * 1e3).collect();
+            let seconds: Vec<f64> = members
+                .iter()
+                .map(|o| {
+                    o.seconds_of("build") + o.seconds_of("solve") + o.seconds_of(&format!("stress {name}"))
+                })
+                .collect();
+            for (row, outcome) in members.iter().enumerate() {
+                let values = [spacing[row], outcome.horizon_ratio, index as f64, seconds[row], error[row]];
+                for (column, value) in rows.iter_mut().zip(values) {
+                    column.push(value);
+                }
+            }
+            convergence = convergence.series(Series::marked_line(&label, &spacing, &error));
+            cost = cost.series(Series::marked_line(&label, &seconds, &error));
+        }
+    }
+    convergence.write(output.join("convergence.png"))?;
+    cost.write(output.join("error_against_time.png"))?;
+    let names = [("spacing", "mm"), ("horizon_ratio", ""), ("measure", ""), ("run_time", "s"), ("rmse", "")];
+    let columns: Vec<_> =
+        names.iter().zip(&rows).map(|((name, unit), data)| (*name, *unit, data.as_slice())).collect();
+    csv::write(output.join("convergence.csv"), &columns)
+}
+
+fn profiles(
+    scene: &Scene,
+    outcomes: &[Outcome],
+    measure: &str,
+    radius: f64,
+    output: &Path,
+) -> Result<(), Error> {
+    let far = 5.0 * radius;
+    let line: Vec<f64> = (0..=400).map(|k| radius + (far - radius) * f64::from(k) / 400.0).collect();
+    let exact: Vec<f64> = line.iter().map(|&y| exact::kirsch(0.0, y, radius, 1.0)[0]).collect();
+    let over_radius = |at: &[f64]| -> Vec<f64> { at.iter().map(|y| y / radius).collect() };
+    let mut plot = LinePlot::new("Stress above the hole, θ = π/2")
+        .axes("y/a", "σ₁₁/σ∞")
+        .x_range(1.0, 5.0)
+        .legend(LegendPlace::TopRight);
+    if let Some(width) = plate_width(scene) {
+        let peak = exact::heywood_gross(2.0 * radius / width);
+        plot = plot.series(Series::markers(&format!("finite width, Heywood: {peak:.3}"), &[1.0], &[peak]));
+    }
+    let first = outcomes.first().map(|o| o.family.clone());
+    for outcome in outcomes.iter().filter(|o| Some(&o.family) == first.as_ref()) {
+        if let Some(profile) = outcome.profiles.iter().find(|p| p.name == measure) {
+            let keep = profile.at.iter().filter(|&&y| y <= far).count();
+            let label = format!("{measure}, {}", outcome.name);
+            plot =
+                plot.series(Series::line(&label, &over_radius(&profile.at[..keep]), &profile.value[..keep]));
+        }
+        for profile in &outcome.profiles {
+            let path = output.join(format!("profile_{}_{}.csv", profile.name, outcome.file_name()));
+            csv::write(path, &[("y", "m", &profile.at), ("stress_ratio", "", &profile.value)])?;
+        }
+    }
+    plot = plot.series(Series::reference("Kirsch, infinite plate", &over_radius(&line), &exact));
+    plot.write(output.join("profile.png"))
+}

@@ -1,0 +1,129 @@
+//! Results of one variant.
+
+use crate::bonds::Bonds;
+use crate::scene::Variant;
+use crate::solver::{Loads, State};
+use polycore::report::Phases;
+use serde::{Deserialize, Serialize};
+
+/// Everything of a variant that outlives its fields.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Outcome {
+    /// The variant's name.
+    pub name: String,
+    /// Spacing, m.
+    pub spacing: f64,
+    /// Horizon over spacing.
+    pub horizon_ratio: f64,
+    /// Name of the variant without its spacing: variants that differ in nothing else converge together.
+    pub family: String,
+    /// Named scalars with units.
+    pub values: Vec<(String, f64, String)>,
+    /// Named profiles.
+    pub profiles: Vec<Profile>,
+    /// Work done.
+    pub work: Vec<(String, u64)>,
+    /// Seconds by phase.
+    pub seconds: Vec<(String, f64)>,
+}
+
+/// A curve along a line: abscissa in m, value relative to its reference.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Profile {
+    /// What.
+    pub name: String,
+    /// Where, m.
+    pub at: Vec<f64>,
+    /// How much.
+    pub value: Vec<f64>,
+}
+
+impl Outcome {
+    /// Nothing yet.
+    pub fn new(name: String, variant: &Variant) -> Self {
+        let family = name.split_once(' ').map_or(name.clone(), |(_, rest)| rest.to_owned());
+        Self {
+            name,
+            spacing: variant.spacing,
+            horizon_ratio: variant.horizon_ratio,
+            family,
+            values: Vec::new(),
+            profiles: Vec::new(),
+            work: Vec::new(),
+            seconds: Vec::new(),
+        }
+    }
+
+    /// Name for files: no spaces, no signs that shells know.
+    pub fn file_name(&self) -> String {
+        self.name.replace(' ', "_").replace('=', "-")
+    }
+
+    /// Adds a scalar.
+    pub fn value(&mut self, name: &str, value: f64, unit: &str) {
+        self.values.push((name.to_owned(), value, unit.to_owned()));
+    }
+
+    /// A scalar by name.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.values.iter().find(|(n, _, _)| n == name).map(|v| v.1)
+    }
+
+    /// Counts of the solution.
+    pub fn work_of<const D: usize>(&mut self, bonds: &dyn Bonds<D>, state: &State<D>) {
+        let directed = bonds.directed_bonds();
+        for (name, count) in [
+            ("particles", bonds.particles().len() as u64),
+            ("directed_bonds", directed),
+            ("steps", state.step as u64),
+            ("iterations", state.total_iterations),
+            ("force_evaluations", state.evaluations),
+            ("bond_evaluations", directed * state.evaluations),
+            ("bytes_bonds", bonds.bytes() as u64),
+        ] {
+            self.work.push((name.to_owned(), count));
+        }
+        self.value("smallest_stretch", (1.0 + state.met.low).max(0.0).sqrt(), "");
+        self.value("largest_stretch", (1.0 + state.met.high).sqrt(), "");
+    }
+
+    /// Largest displacement, total reaction of the held components, total applied force.
+    pub fn responses<const D: usize>(&mut self, bonds: &dyn Bonds<D>, loads: &Loads<D>, state: &State<D>) {
+        let mut largest = 0.0_f64;
+        let (mut reaction, mut applied) = ([0.0; D], [0.0; D]);
+        for &slot in bonds.particles() {
+            let slot = slot as usize;
+            let displacement = state.displacement.get(slot);
+            largest = largest.max(displacement.iter().map(|x| x * x).sum::<f64>().sqrt());
+            let (force, volume, held) = (state.force.get(slot), bonds.volume(slot), loads.held(slot));
+            for d in 0..D {
+                // only the pulled side: over both sides they cancel
+                if held >> d & 1 == 1 && force[d] < 0.0 {
+                    reaction[d] -= force[d] * volume;
+                }
+                let body = loads.body_force.as_ref().map_or(0.0, |field| field.get(slot)[d]);
+                applied[d] += body.max(0.0) * volume;
+            }
+        }
+        self.value("largest_displacement", largest, "m");
+        for d in 0..D {
+            let axis = ["x", "y", "z"][d];
+            if !loads.held.is_empty() {
+                self.value(&format!("reaction_{axis}"), reaction[d], "N");
+            }
+            if loads.body_force.is_some() {
+                self.value(&format!("applied_{axis}"), applied[d], "N");
+            }
+        }
+    }
+
+    /// Seconds of all phases.
+    pub fn seconds(&mut self, phases: &Phases) {
+        self.seconds = phases.seconds().map(|(name, seconds)| (name.to_owned(), seconds)).collect();
+    }
+
+    /// Seconds of a phase.
+    pub fn seconds_of(&self, phase: &str) -> f64 {
+        self.seconds.iter().filter(|(name, _)| name == phase).map(|s| s.1).sum()
+    }
+}

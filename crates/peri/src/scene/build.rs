@@ -1,0 +1,468 @@
+//! From a scene to a body and its loads. Every rule that spans several keys is checked here, once.
+
+use super::{Axis, Boundary, Held, Scene, ShapeKind, ShapeSpec, SurfaceCorrection};
+use crate::bonds::{Bonds, CloudBonds, LatticeBonds, VolumeCorrection};
+use crate::calibrate::Space;
+use crate::correction::surface_factors;
+use crate::geometry::{Cut, Operation, Shape, bounds, cell_counts, lattice};
+use crate::solver::{Loads, Support};
+use polycore::scene::{SceneError, Source};
+use polycore::units::Length;
+
+/// A discretised body.
+pub struct Body<const D: usize> {
+    /// Its bonds.
+    pub bonds: Box<dyn Bonds<D>>,
+    /// Lower and upper corner of its particles' cells, m.
+    pub bounds: ([f64; D], [f64; D]),
+    /// Thickness (1 in 3D), m.
+    pub thickness: f64,
+}
+
+/// The part of a variant that a study may change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Variant {
+    /// Spacing, m (0 for a cloud).
+    pub spacing: f64,
+    /// Horizon over spacing.
+    pub horizon_ratio: f64,
+    /// Surface correction.
+    pub surface: SurfaceCorrection,
+    /// Volume correction.
+    pub volume: VolumeCorrection,
+    /// Part of `--quick` runs.
+    pub quick: bool,
+}
+
+/// Particles a body may have at most, whatever memory there is: slots are counted in 32 bits.
+const MOST_PARTICLES: f64 = 2e9;
+/// Bytes per particle of a whole run: bonds, four fields and their sums, stress.
+const BYTES_PER_PARTICLE: [f64; 2] = [180.0, 300.0];
+
+/// Builds the body of a variant.
+///
+/// # Errors
+/// A [`SceneError`] that names the key, the value found and what is allowed.
+pub fn body_of<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    variant: &Variant,
+) -> Result<Body<D>, SceneError> {
+    let body = &scene.body;
+    let thickness = thickness(source, scene)?;
+    let cuts = cracks(source, scene)?;
+    if let Some(points) = &body.points {
+        return cloud(source, scene, variant, points, thickness, &cuts);
+    }
+    let operations = operations(source, scene)?;
+    let (low, high) = bounds(&operations)
+        .ok_or_else(|| source.error("body.shapes", "no shape is added", "at least one shape with `add`"))?;
+    let counts = cell_counts(low, high, variant.spacing);
+    refuse_too_large(source, counts.iter().product(), D)?;
+    check_shapes(source, &operations, low, high)?;
+    let lattice = lattice(&operations, variant.spacing, thickness).map_err(|error| {
+        source.error("body.shapes", error, "a body that contains at least one particle of the lattice")
+    })?;
+    let bonds = LatticeBonds::new(lattice, variant.horizon_ratio, variant.volume, &cuts)
+        .map_err(|error| source.error("body.horizon_ratio", error, "a horizon that reaches a neighbour"))?;
+    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
+}
+
+impl<const D: usize> Body<D> {
+    /// Stiffens the bonds near free surfaces.
+    pub fn correct_surface(&mut self, modulus: f64, stiffness_1111: f64) {
+        let factors = surface_factors(&*self.bonds, modulus, stiffness_1111);
+        self.bonds.set_factors(factors);
+    }
+}
+
+fn thickness(source: &Source, scene: &Scene) -> Result<f64, SceneError> {
+    match (scene.body.space, scene.body.thickness) {
+        (Space::Solid, None) => Ok(1.0),
+        (Space::Solid, Some(_)) => Err(source.error(
+            "body.thickness",
+            "a thickness",
+            "none: the body is `solid`, its size is in its shapes",
+        )),
+        (_, Some(t)) if t.si() > 0.0 => Ok(t.si()),
+        (_, Some(t)) => Err(source.error("body.thickness", format!("{} m", t.si()), "above 0")),
+        (_, None) => {
+            Err(source.error("body.thickness", "nothing", "a length; a plane body needs its thickness"))
+        }
+    }
+}
+
+fn refuse_too_large(source: &Source, cells: f64, dimension: usize) -> Result<(), SceneError> {
+    let needed = cells * BYTES_PER_PARTICLE[dimension - 2];
+    let available = available_memory();
+    if cells > MOST_PARTICLES || needed > available {
+        let found = format!("{cells:.3e} lattice cells, which need about {:.1} GiB", needed / GIB);
+        let allowed = format!(
+            "at most {MOST_PARTICLES:.0e} cells and {:.1} GiB (the memory available); take a larger spacing",
+            available / GIB
+        );
+        return Err(source.error("body.spacing", found, allowed));
+    }
+    Ok(())
+}
+
+const GIB: f64 = (1_u64 << 30) as f64;
+
+/// `MemAvailable` of Linux, or 16 GiB where it is not told.
+fn available_memory() -> f64 {
+    let told = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
+        let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?.to_owned();
+        line.split_whitespace().nth(1)?.parse::<f64>().ok()
+    });
+    told.map_or(16.0 * GIB, |kib| kib * 1024.0)
+}
+
+fn vector<const D: usize>(source: &Source, key: &str, value: &[Length]) -> Result<[f64; D], SceneError> {
+    let values: Vec<f64> = value.iter().map(|l| l.si()).collect();
+    <[f64; D]>::try_from(values.as_slice())
+        .map_err(|_| source.error(key, format!("{} components", value.len()), format!("{D} components")))
+}
+
+fn needed<T: Copy>(source: &Source, key: &str, value: Option<T>, what: &str) -> Result<T, SceneError> {
+    value.ok_or_else(|| source.error(key, "nothing", what))
+}
+
+fn operations<const D: usize>(source: &Source, scene: &Scene) -> Result<Vec<Operation<D>>, SceneError> {
+    let shapes = &scene.body.shapes;
+    let each = shapes.iter().enumerate().map(|(index, spec)| {
+        let key = format!("body.shapes[{index}]");
+        match (spec.add, spec.cut) {
+            (Some(kind), None) => Ok(Operation::Add(shape(source, &key, kind, spec)?)),
+            (None, Some(kind)) => Ok(Operation::Cut(shape(source, &key, kind, spec)?)),
+            (Some(_), Some(_)) => Err(source.error(&key, "both `add` and `cut`", "one of them")),
+            (None, None) => {
+                Err(source.error(&key, "neither `add` nor `cut`", "one of them, with the kind of shape"))
+            }
+        }
+    });
+    each.collect()
+}
+
+fn shape<const D: usize>(
+    source: &Source,
+    key: &str,
+    kind: ShapeKind,
+    spec: &ShapeSpec,
+) -> Result<Shape<D>, SceneError> {
+    let given = [
+        ("min", spec.min.is_some(), matches!(kind, ShapeKind::Box)),
+        ("max", spec.max.is_some(), matches!(kind, ShapeKind::Box)),
+        ("centre", spec.centre.is_some(), !matches!(kind, ShapeKind::Box)),
+        ("radius", spec.radius.is_some(), !matches!(kind, ShapeKind::Box)),
+        ("length", spec.length.is_some(), matches!(kind, ShapeKind::Cylinder)),
+        ("axis", spec.axis.is_some(), matches!(kind, ShapeKind::Cylinder)),
+    ];
+    for (name, is_given, belongs) in given {
+        let path = format!("{key}.{name}");
+        if is_given && !belongs {
+            return Err(source.error(
+                &path,
+                format!("`{name}`"),
+                format!("nothing: a {kind:?} has no {name}"),
+            ));
+        }
+        if belongs && !is_given {
+            return Err(source.error(&path, "nothing", format!("a {kind:?} needs its `{name}`")));
+        }
+    }
+    let positive = |name: &str, value: Option<Length>| {
+        let path = format!("{key}.{name}");
+        let value = needed(source, &path, value, "a length")?.si();
+        if value > 0.0 { Ok(value) } else { Err(source.error(&path, format!("{value} m"), "above 0")) }
+    };
+    let point = |name: &str, value: &Option<Vec<Length>>| {
+        let path = format!("{key}.{name}");
+        vector::<D>(source, &path, value.as_deref().unwrap_or_default())
+    };
+    match kind {
+        ShapeKind::Box => {
+            let (min, max) = (point("min", &spec.min)?, point("max", &spec.max)?);
+            if let Some(d) = (0..D).find(|&d| min[d] >= max[d]) {
+                let found = format!("{} m, not below `max` {} m in component {d}", min[d], max[d]);
+                return Err(source.error(&format!("{key}.min[{d}]"), found, "below `max`"));
+            }
+            Ok(Shape::Box { min, max })
+        }
+        ShapeKind::Disk | ShapeKind::Ball => {
+            if (kind == ShapeKind::Disk) != (D == 2) {
+                let allowed = if D == 2 {
+                    "`disk` or `box` in a plane body"
+                } else {
+                    "`ball`, `cylinder` or `box` in a solid"
+                };
+                return Err(source.error(key, format!("a {kind:?}"), allowed));
+            }
+            Ok(Shape::Ball {
+                centre: point("centre", &spec.centre)?,
+                radius: positive("radius", spec.radius)?,
+            })
+        }
+        ShapeKind::Cylinder => {
+            if D != 3 {
+                return Err(source.error(key, "a Cylinder", "`disk` or `box` in a plane body"));
+            }
+            let axis = match needed(source, &format!("{key}.axis"), spec.axis, "an axis")? {
+                Axis::X => 0,
+                Axis::Y => 1,
+                Axis::Z => 2,
+            };
+            Ok(Shape::Cylinder {
+                centre: point("centre", &spec.centre)?,
+                radius: positive("radius", spec.radius)?,
+                length: positive("length", spec.length)?,
+                axis,
+            })
+        }
+    }
+}
+
+/// A cut that reaches past the body on all sides leaves nothing to solve: name it rather than the empty lattice.
+fn check_shapes<const D: usize>(
+    source: &Source,
+    operations: &[Operation<D>],
+    low: [f64; D],
+    high: [f64; D],
+) -> Result<(), SceneError> {
+    for (index, operation) in operations.iter().enumerate() {
+        if let Operation::Cut(shape) = operation {
+            let (from, to) = shape.bounds();
+            if (0..D).all(|d| from[d] <= low[d] && to[d] >= high[d]) {
+                let found = format!(
+                    "a cut from {from:?} m to {to:?} m around the whole body ({low:?} m to {high:?} m)"
+                );
+                return Err(source.error(&format!("body.shapes[{index}]"), found, "smaller than the body"));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn cracks<const D: usize>(source: &Source, scene: &Scene) -> Result<Vec<Cut<D>>, SceneError> {
+    let each = scene.body.cracks.iter().enumerate().map(|(index, crack)| {
+        let key = |name: &str| format!("body.cracks[{index}].{name}");
+        let from: [f64; D] = vector(source, &key("from"), &crack.from)?;
+        let to: [f64; D] = vector(source, &key("to"), &crack.to)?;
+        let mut edges = [[0.0; D]; D];
+        edges[0] = std::array::from_fn(|d| to[d] - from[d]);
+        match (&crack.and, D) {
+            (Some(and), 3) => {
+                let and: [f64; D] = vector(source, &key("and"), and)?;
+                edges[1] = std::array::from_fn(|d| and[d] - from[d]);
+            }
+            (None, 2) => {}
+            (Some(_), _) => return Err(source.error(&key("and"), "a third corner", "none in a plane body")),
+            (None, _) => return Err(source.error(&key("and"), "nothing", "a third corner in a solid")),
+        }
+        if edges.iter().take(D - 1).any(|e| e.iter().all(|&x| x == 0.0)) {
+            return Err(source.error(&key("to"), "the same point as `from`", "another point"));
+        }
+        Ok(Cut { corner: from, edges })
+    });
+    each.collect()
+}
+
+fn cloud<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    variant: &Variant,
+    points: &std::path::Path,
+    thickness: f64,
+    cuts: &[Cut<D>],
+) -> Result<Body<D>, SceneError> {
+    let path = source.path.parent().unwrap_or(std::path::Path::new("")).join(points);
+    let bad = |found: String, allowed: &str| source.error("body.points", found, allowed);
+    let columns = if D == 2 { "columns x, y, volume (m, m³)" } else { "columns x, y, z, volume (m, m³)" };
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_path(&path)
+        .map_err(|error| bad(format!("{}: {error}", path.display()), "a readable CSV file"))?;
+    let (mut positions, mut volumes) = (Vec::new(), Vec::new());
+    for record in reader.records() {
+        let record = record.map_err(|error| bad(format!("{}: {error}", path.display()), columns))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let values: Vec<f64> = record.iter().map_while(|field| field.parse().ok()).collect();
+        if values.len() != D + 1 || values.len() != record.len() {
+            return Err(bad(format!("{}, line {line}: {record:?}", path.display()), columns));
+        }
+        if let Some(value) = values.iter().find(|v| !v.is_finite()) {
+            return Err(bad(format!("{}, line {line}: {value}", path.display()), "finite numbers"));
+        }
+        if values[D] <= 0.0 {
+            return Err(bad(
+                format!("{}, line {line}: volume {}", path.display(), values[D]),
+                "a volume above 0",
+            ));
+        }
+        positions.push(std::array::from_fn(|d| values[d]));
+        volumes.push(values[D]);
+    }
+    let horizon =
+        needed(source, "body.horizon", scene.body.horizon, "a length; a cloud needs its `horizon`")?.si();
+    if horizon.is_nan() || horizon <= 0.0 {
+        return Err(source.error("body.horizon", format!("{horizon} m"), "above 0"));
+    }
+    let bonds =
+        CloudBonds::new(&positions, &volumes, thickness, horizon, variant.volume, cuts).map_err(|error| {
+            bad(format!("{}: {error}", path.display()), "distinct points with volumes above 0")
+        })?;
+    if bonds.directed_bonds() == 0 && positions.len() > 1 {
+        return Err(source.error(
+            "body.horizon",
+            format!("{horizon} m, which reaches no neighbour"),
+            "larger",
+        ));
+    }
+    let half = 0.5 * bonds.spacing();
+    let low = std::array::from_fn(|d| positions.iter().map(|p| p[d]).fold(f64::INFINITY, f64::min) - half);
+    let high =
+        std::array::from_fn(|d| positions.iter().map(|p| p[d]).fold(f64::NEG_INFINITY, f64::max) + half);
+    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
+}
+
+/// Loads and supports of a body, and the slots in any loading layer.
+///
+/// # Errors
+/// As [`body_of`].
+pub fn loads_of<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<(Loads<D>, Vec<bool>), SceneError> {
+    let mut regions = Vec::new();
+    let mut loaded = vec![false; body.bonds.slots()];
+    for (index, boundary) in scene.boundary.iter().enumerate() {
+        let key = format!("boundary[{index}]");
+        let (members, depth) = region(source, &key, boundary, body)?;
+        if members.is_empty() {
+            return Err(source.error(&key, "a region without particles", "a region that holds at least one"));
+        }
+        for &slot in &members {
+            loaded[slot as usize] = true;
+        }
+        let support = support(source, &key, boundary, body, &members, depth)?;
+        regions.push((members, support));
+    }
+    let loads = Loads::new(body.bonds.slots(), &regions);
+    let all = (1_u8 << D) - 1;
+    if body.bonds.particles().iter().all(|&slot| loads.held(slot as usize) == all) {
+        return Err(source.error(
+            "boundary",
+            "every component of every particle is held",
+            "at least one free",
+        ));
+    }
+    Ok((loads, loaded))
+}
+
+fn region<const D: usize>(
+    source: &Source,
+    key: &str,
+    boundary: &Boundary,
+    body: &Body<D>,
+) -> Result<(Vec<u32>, Option<f64>), SceneError> {
+    let spacing = body.bonds.spacing();
+    let (low, high, depth) = match (boundary.side, &boundary.min, &boundary.max) {
+        (Some(side), None, None) => {
+            let (axis, upper) = side.axis();
+            if axis >= D {
+                return Err(source.error(
+                    &format!("{key}.side"),
+                    format!("{side:?}"),
+                    "a side along x or y of a plane body",
+                ));
+            }
+            let layers = boundary.layers.unwrap_or((body.bonds.horizon() / spacing).floor() as usize).max(1);
+            let depth = layers as f64 * spacing;
+            let extent = body.bounds.1[axis] - body.bounds.0[axis];
+            if depth > extent * (1.0 + 1e-9) {
+                let found = format!("{layers} layers, {depth} m deep");
+                return Err(source.error(
+                    &format!("{key}.layers"),
+                    found,
+                    format!("at most the body, {extent} m"),
+                ));
+            }
+            let (mut low, mut high) = ([f64::NEG_INFINITY; D], [f64::INFINITY; D]);
+            if upper {
+                low[axis] = body.bounds.1[axis] - depth;
+            } else {
+                high[axis] = body.bounds.0[axis] + depth;
+            }
+            (low, high, Some(depth))
+        }
+        (None, Some(min), Some(max)) => {
+            if boundary.layers.is_some() {
+                return Err(source.error(
+                    &format!("{key}.layers"),
+                    "`layers`",
+                    "nothing: the box has its own depth",
+                ));
+            }
+            let min = vector(source, &format!("{key}.min"), min)?;
+            (min, vector(source, &format!("{key}.max"), max)?, None)
+        }
+        _ => return Err(source.error(key, "no region", "either `side`, or `min` and `max`")),
+    };
+    let inside = |&slot: &u32| {
+        let position = body.bonds.position(slot as usize);
+        (0..D).all(|d| low[d] <= position[d] && position[d] <= high[d])
+    };
+    Ok((body.bonds.particles().iter().copied().filter(inside).collect(), depth))
+}
+
+fn support<const D: usize>(
+    source: &Source,
+    key: &str,
+    boundary: &Boundary,
+    body: &Body<D>,
+    members: &[u32],
+    depth: Option<f64>,
+) -> Result<Support<D>, SceneError> {
+    let count = |name: &str, found: usize| {
+        if found == D {
+            Ok(())
+        } else {
+            Err(source.error(
+                &format!("{key}.{name}"),
+                format!("{found} components"),
+                format!("{D} components"),
+            ))
+        }
+    };
+    let mut support = Support { displacement: [None; D], body_force: [0.0; D] };
+    if let Some(traction) = &boundary.traction {
+        count("traction", traction.len())?;
+        let depth = depth.ok_or_else(|| {
+            source.error(&format!("{key}.traction"), "a traction on a box", "`side`, or `force` on the box")
+        })?;
+        support.body_force = std::array::from_fn(|d| traction[d].si() / depth);
+    }
+    if let Some(force) = &boundary.force {
+        count("force", force.len())?;
+        let volume: f64 = members.iter().map(|&slot| body.bonds.volume(slot as usize)).sum();
+        for d in 0..D {
+            support.body_force[d] += force[d].si() / volume;
+        }
+    }
+    if let Some(displacement) = &boundary.displacement {
+        count("displacement", displacement.len())?;
+        support.displacement = std::array::from_fn(|d| match displacement[d] {
+            Held::Free => None,
+            Held::At(value) => Some(value),
+        });
+    }
+    if boundary.traction.is_none() && boundary.force.is_none() && boundary.displacement.is_none() {
+        return Err(source.error(
+            key,
+            "a region without a condition",
+            "`traction`, `force` or `displacement`",
+        ));
+    }
+    Ok(support)
+}

@@ -1,0 +1,217 @@
+//! Values that can be judged without building anything, and the list of variants to run.
+
+use super::build::Variant;
+use super::{HORIZON_RATIO, Scene, Study};
+use crate::calibrate::{Calibration, Space};
+use polycore::scene::{SceneError, Source};
+
+/// Largest horizon ratio: a stencil beyond it has more bonds than any use.
+const LARGEST_RATIO: f64 = 20.0;
+
+/// Checks a scene and lists its variants; `quick` leaves out those that a `--quick` run leaves out.
+///
+/// # Errors
+/// A [`SceneError`] that names the key, the value found and what is allowed.
+pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+    body(source, scene)?;
+    material(source, scene)?;
+    solver(source, scene)?;
+    if scene.boundary.is_empty() {
+        return Err(source.error("boundary", "nothing", "at least one [[boundary]]"));
+    }
+    if let Some(stress) = &scene.stress
+        && stress.measures.is_empty()
+    {
+        return Err(source.error("stress.measures", "an empty list", "at least one measure, or no [stress]"));
+    }
+    if let Some(super::ExactSpec::Kirsch { radius, remote_stress }) = &scene.exact {
+        positive(source, "exact.radius", radius.si(), "m")?;
+        positive(source, "exact.remote_stress", remote_stress.si(), "Pa")?;
+        if scene.body.space == Space::Solid {
+            return Err(source.error("exact.problem", "kirsch in a solid", "kirsch in a plane body"));
+        }
+        if scene.stress.is_none() {
+            return Err(source.error(
+                "exact",
+                "kirsch without [stress]",
+                "a [stress] block with the measures to compare",
+            ));
+        }
+    }
+    let variants = variants(source, scene, quick)?;
+    if variants.is_empty() {
+        return Err(source.error(
+            "study",
+            "no variant left in a --quick run",
+            "at least one without `quick = false`",
+        ));
+    }
+    Ok(variants)
+}
+
+fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(source.error(key, format!("{value} {unit}").trim_end(), "above 0"))
+    }
+}
+
+fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let body = &scene.body;
+    match (body.shapes.is_empty(), &body.points) {
+        (true, None) => {
+            return Err(source.error("body.shapes", "nothing", "at least one shape, or `points`"));
+        }
+        (false, Some(_)) => {
+            return Err(source.error("body.points", "`points` beside `shapes`", "one of them"));
+        }
+        (false, None) => {
+            let spacing = body
+                .spacing
+                .map(|s| s.si())
+                .or(scene.study.iter().find_map(|s| Some(s.spacing.first()?.si())));
+            let spacing = spacing.ok_or_else(|| {
+                source.error("body.spacing", "nothing", "a length; a lattice needs its `spacing`")
+            })?;
+            positive(source, "body.spacing", spacing, "m")?;
+            if body.horizon.is_some() {
+                return Err(source.error("body.horizon", "`horizon` of a lattice", "`horizon_ratio`"));
+            }
+        }
+        (true, Some(_)) => {
+            for (key, given) in [
+                ("body.spacing", body.spacing.is_some()),
+                ("body.horizon_ratio", body.horizon_ratio.is_some()),
+            ] {
+                if given {
+                    return Err(source.error(
+                        key,
+                        "a lattice's key",
+                        "nothing: `points` bring their own spacing; set `horizon`",
+                    ));
+                }
+            }
+            if scene.material.calibration == Calibration::Lattice {
+                return Err(source.error(
+                    "material.calibration",
+                    "lattice",
+                    "`continuum`: a cloud has no lattice sums",
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn ratio(source: &Source, key: &str, ratio: f64) -> Result<(), SceneError> {
+    if (1.0..=LARGEST_RATIO).contains(&ratio) {
+        Ok(())
+    } else {
+        Err(source.error(key, ratio, format!("1 to {LARGEST_RATIO}: the horizon must reach a neighbour")))
+    }
+}
+
+fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let material = &scene.material;
+    positive(source, "material.youngs_modulus", material.youngs_modulus.si(), "Pa")?;
+    let chain = material.law.is_chain();
+    for (key, value, least) in [("links", material.links, 2.0), ("dissociation", material.dissociation, 1.0)]
+    {
+        let key = format!("material.{key}");
+        match value {
+            None if chain => {
+                return Err(source.error(
+                    &key,
+                    "nothing",
+                    format!("a number of at least {least}: `{}` needs it", material.law.name()),
+                ));
+            }
+            Some(value) if !(value >= least && value.is_finite()) => {
+                return Err(source.error(&key, value, format!("at least {least}")));
+            }
+            Some(_) if !chain => {
+                return Err(source.error(
+                    &key,
+                    "a chain's parameter",
+                    format!("nothing: `{}` has no chains", material.law.name()),
+                ));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let solver = &scene.solver;
+    let within = |key: &str, value: f64, low: f64, high: f64| {
+        if (low..=high).contains(&value) {
+            Ok(())
+        } else {
+            Err(source.error(&format!("solver.{key}"), value, format!("{low:e} to {high}")))
+        }
+    };
+    within("tolerance", solver.tolerance, 1e-12, 0.1)?;
+    within("fit_bound", solver.fit_bound, 1e-12, 1e-2)?;
+    within("steps", solver.steps as f64, 1.0, 1e6)?;
+    within("max_iterations", solver.max_iterations as f64, 1.0, 1e9)?;
+    within("mass_safety", solver.mass_safety.unwrap_or(1.1), 1.0, 100.0)
+}
+
+/// The scene's own discretisation, or every combination that its studies list.
+fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+    let own = Study::default();
+    let mut variants: Vec<Variant> = Vec::new();
+    let studies: Vec<&Study> = if scene.study.is_empty() { vec![&own] } else { scene.study.iter().collect() };
+    for (index, study) in studies.iter().enumerate() {
+        if scene.body.points.is_some() && !(study.spacing.is_empty() && study.horizon_ratio.is_empty()) {
+            return Err(source.error(&format!("study[{index}]"), "spacings of a cloud", "corrections only"));
+        }
+        let is_quick = study.quick.unwrap_or(true);
+        if quick && !is_quick {
+            continue;
+        }
+        let spacings = if study.spacing.is_empty() {
+            scene.body.spacing.into_iter().collect()
+        } else {
+            study.spacing.clone()
+        };
+        let spacings: Vec<f64> =
+            if spacings.is_empty() { vec![0.0] } else { spacings.iter().map(|s| s.si()).collect() };
+        let or_own = |list: &[f64], own: f64| if list.is_empty() { vec![own] } else { list.to_vec() };
+        let ratios = or_own(&study.horizon_ratio, scene.body.horizon_ratio.unwrap_or(HORIZON_RATIO));
+        let surfaces = if study.surface_correction.is_empty() {
+            vec![scene.material.surface_correction]
+        } else {
+            study.surface_correction.clone()
+        };
+        let volumes = if study.volume_correction.is_empty() {
+            vec![scene.material.volume_correction]
+        } else {
+            study.volume_correction.clone()
+        };
+        for (k, &spacing) in spacings.iter().enumerate() {
+            if scene.body.points.is_none() {
+                positive(source, &format!("study[{index}].spacing[{k}]"), spacing, "m")?;
+            }
+            for (k, &horizon_ratio) in ratios.iter().enumerate() {
+                let key = if study.horizon_ratio.is_empty() {
+                    "body.horizon_ratio".to_owned()
+                } else {
+                    format!("study[{index}].horizon_ratio[{k}]")
+                };
+                ratio(source, &key, horizon_ratio)?;
+                for &surface in &surfaces {
+                    for &volume in &volumes {
+                        let variant = Variant { spacing, horizon_ratio, surface, volume, quick: is_quick };
+                        if !variants.contains(&variant) {
+                            variants.push(variant);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    Ok(variants)
+}

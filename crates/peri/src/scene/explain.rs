@@ -1,0 +1,72 @@
+//! What a scene will build, and what it leaves out.
+
+use super::build::Variant;
+use super::{Scene, SurfaceCorrection};
+use crate::bonds::{Bonds, VolumeCorrection};
+
+impl Variant {
+    /// Short name in tables, curves and expectations: `dx=4mm m=3.015`, corrections where there are any.
+    pub fn name(&self) -> String {
+        let mut name = if self.spacing > 0.0 {
+            format!("dx={}mm m={}", round(self.spacing * 1e3), self.horizon_ratio)
+        } else {
+            "cloud".to_owned()
+        };
+        if self.surface == SurfaceCorrection::Energy {
+            name += " surface=energy";
+        }
+        if self.volume == VolumeCorrection::Linear {
+            name += " volume=linear";
+        }
+        name
+    }
+}
+
+/// Twelve digits: what a user wrote, without the rounding of its conversion to SI.
+fn round(value: f64) -> f64 {
+    format!("{value:.12e}").parse().unwrap_or(value)
+}
+
+/// Lines for `peri check`.
+pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bonds<D>) -> Vec<String> {
+    let particles = bonds.particles().len();
+    let directed = bonds.directed_bonds();
+    let mut lines = vec![format!("variant {}", variant.name())];
+    let mut builds = |text: String| lines.push(format!("  builds     {text}"));
+    builds(format!(
+        "{particles} particles, {directed} directed bonds ({:.1} each)",
+        directed as f64 / particles.max(1) as f64
+    ));
+    match bonds.as_lattice() {
+        Some(lattice) => builds(format!(
+            "a lattice: one stencil of {} bonds, a bit mask per particle",
+            lattice.stencil().offsets.len()
+        )),
+        None => builds("a neighbour list: the points form no lattice".to_owned()),
+    }
+    builds(format!(
+        "bonds {:.1} MB, solver fields {:.1} MB",
+        bonds.bytes() as f64 / 1e6,
+        (bonds.slots() * (3 * D + 1) * 8) as f64 / 1e6
+    ));
+    if let Some(stress) = &scene.stress {
+        let names: Vec<&str> = stress.measures.iter().map(|m| m.name()).collect();
+        builds(format!("stress once per variant: {}", names.join(", ")));
+    }
+    let mut omits = |needed: bool, text: &str| {
+        if !needed {
+            lines.push(format!("  leaves out {text}"));
+        }
+    };
+    omits(bonds.as_lattice().is_none(), "neighbour lists");
+    omits(variant.surface == SurfaceCorrection::Energy, "surface-correction factors");
+    omits(variant.volume == VolumeCorrection::Linear, "volume correction");
+    omits(scene.stress.is_some(), "the stress pass");
+    omits(false, "damage and bond breaking (no fracture in this scene)");
+    let held = scene.boundary.iter().any(|b| b.displacement.is_some());
+    omits(held, "prescribed displacements");
+    omits(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), "body forces");
+    omits(scene.output.fields, "VTKHDF fields");
+    omits(scene.output.pictures, "pictures");
+    lines
+}

@@ -1,0 +1,373 @@
+//! The scene of a peridynamic problem, as written in TOML. Only what a scene names is built.
+
+mod build;
+mod check;
+mod explain;
+
+pub use build::{Body, Variant, body_of, loads_of};
+pub use check::check;
+pub use explain::explain;
+
+use crate::bonds::VolumeCorrection;
+use crate::calibrate::{Calibration, Space};
+use crate::critical::Critical;
+use crate::potential::Law;
+use crate::stress::{BallVolume, Measure};
+use polycore::report::Expect;
+use polycore::units::{Force, Length, Stress};
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// A whole scene.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// The program that runs it: `peri`.
+    pub program: Program,
+    /// One line for tables and pictures.
+    #[serde(default)]
+    pub title: String,
+    /// Geometry and discretisation.
+    pub body: BodySpec,
+    /// Bond law.
+    pub material: Material,
+    /// Loads and supports.
+    #[serde(default)]
+    pub boundary: Vec<Boundary>,
+    /// Solver settings.
+    #[serde(default)]
+    pub solver: Solver,
+    /// Stress output; without it no stress is computed.
+    pub stress: Option<StressSpec>,
+    /// A closed-form solution to compare with.
+    pub exact: Option<ExactSpec>,
+    /// Files to write.
+    #[serde(default)]
+    pub output: OutputSpec,
+    /// Variants to run instead of the scene's own discretisation.
+    #[serde(default)]
+    pub study: Vec<Study>,
+    /// What the results must be.
+    #[serde(default)]
+    pub expect: Vec<Expect>,
+}
+
+/// The only program that runs these scenes.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Program {
+    /// This crate.
+    Peri,
+}
+
+/// Geometry: shapes on a regular lattice, or points from a file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodySpec {
+    /// `plane-stress`, `plane-strain` or `solid`.
+    pub space: Space,
+    /// Thickness of a plane body.
+    pub thickness: Option<Length>,
+    /// Distance of neighbouring particles, with `shapes`.
+    pub spacing: Option<Length>,
+    /// Horizon over spacing, m = δ/Δx, with `shapes`.
+    pub horizon_ratio: Option<f64>,
+    /// Horizon, with `points`.
+    pub horizon: Option<Length>,
+    /// Shapes added and cut in order.
+    #[serde(default)]
+    pub shapes: Vec<ShapeSpec>,
+    /// CSV file with the columns x, y(, z) in m and volume in m³.
+    pub points: Option<PathBuf>,
+    /// Cracks of zero width.
+    #[serde(default)]
+    pub cracks: Vec<CrackSpec>,
+}
+
+/// Default horizon over spacing, as in the thesis.
+pub const HORIZON_RATIO: f64 = 3.015;
+
+/// One shape; which lengths it needs depends on its kind.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShapeSpec {
+    /// Kind of a shape put on.
+    pub add: Option<ShapeKind>,
+    /// Kind of a shape taken away.
+    pub cut: Option<ShapeKind>,
+    /// Lower corner of a box.
+    pub min: Option<Vec<Length>>,
+    /// Upper corner of a box.
+    pub max: Option<Vec<Length>>,
+    /// Centre of a disk, ball or cylinder.
+    pub centre: Option<Vec<Length>>,
+    /// Radius of a disk, ball or cylinder.
+    pub radius: Option<Length>,
+    /// Length of a cylinder.
+    pub length: Option<Length>,
+    /// Axis of a cylinder.
+    pub axis: Option<Axis>,
+}
+
+/// Kinds of shapes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ShapeKind {
+    /// Axis-parallel box (2D: rectangle).
+    Box,
+    /// Disk, in 2D.
+    Disk,
+    /// Ball, in 3D.
+    Ball,
+    /// Cylinder along an axis, in 3D.
+    Cylinder,
+}
+
+/// A coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// First.
+    X,
+    /// Second.
+    Y,
+    /// Third.
+    Z,
+}
+
+/// A crack of zero width: the segment `from`–`to` in 2D, the parallelogram `from`, `to`, `and` (two neighbouring
+/// corners of `from`) in 3D.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CrackSpec {
+    /// First corner.
+    pub from: Vec<Length>,
+    /// A neighbouring corner.
+    pub to: Vec<Length>,
+    /// The other neighbouring corner, in 3D.
+    pub and: Option<Vec<Length>>,
+}
+
+/// The bond law and its constants.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// Young's modulus E of the continuum; ν follows from the space.
+    pub youngs_modulus: Stress,
+    /// Bond law.
+    #[serde(default)]
+    pub law: Law,
+    /// Links per bond n̄, for the chain laws.
+    pub links: Option<f64>,
+    /// Dissociation energy over kθ, D̂, for the chain laws.
+    pub dissociation: Option<f64>,
+    /// Scale kθ so that the small-strain modulus is exact; default by law.
+    pub rescale: Option<bool>,
+    /// kθ from the continuum's integrals or from the lattice's sums.
+    #[serde(default)]
+    pub calibration: Calibration,
+    /// Volumes near the horizon.
+    #[serde(default)]
+    pub volume_correction: VolumeCorrection,
+    /// Bonds near free surfaces.
+    #[serde(default)]
+    pub surface_correction: SurfaceCorrection,
+    /// Critical stretch: reported, and the bound of the stretches a result may have.
+    pub critical: Option<Critical>,
+}
+
+/// Whether bonds near a free surface are stiffened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfaceCorrection {
+    /// As printed.
+    #[default]
+    None,
+    /// Until a homogeneous strain stores the continuum's energy (Madenci & Oterkus).
+    Energy,
+}
+
+/// A region and what holds there.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Boundary {
+    /// A side of the body's bounding box …
+    pub side: Option<Side>,
+    /// … to this depth in particles; default: the horizon, rounded down.
+    pub layers: Option<usize>,
+    /// Or a box: lower corner …
+    pub min: Option<Vec<Length>>,
+    /// … and upper corner.
+    pub max: Option<Vec<Length>>,
+    /// Traction on the side, applied as a uniform body force over its layers.
+    pub traction: Option<Vec<Stress>>,
+    /// Total force on the region, spread over its volume.
+    pub force: Option<Vec<Force>>,
+    /// Displacement at the end of the last step, component by component: a length or `"free"`.
+    pub displacement: Option<Vec<Held>>,
+}
+
+/// Sides of the bounding box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+pub enum Side {
+    /// Smallest x.
+    #[serde(rename = "x-")]
+    XLow,
+    /// Largest x.
+    #[serde(rename = "x+")]
+    XHigh,
+    /// Smallest y.
+    #[serde(rename = "y-")]
+    YLow,
+    /// Largest y.
+    #[serde(rename = "y+")]
+    YHigh,
+    /// Smallest z.
+    #[serde(rename = "z-")]
+    ZLow,
+    /// Largest z.
+    #[serde(rename = "z+")]
+    ZHigh,
+}
+
+impl Side {
+    /// Axis index, and whether the upper end is meant.
+    pub fn axis(self) -> (usize, bool) {
+        match self {
+            Self::XLow => (0, false),
+            Self::XHigh => (0, true),
+            Self::YLow => (1, false),
+            Self::YHigh => (1, true),
+            Self::ZLow => (2, false),
+            Self::ZHigh => (2, true),
+        }
+    }
+}
+
+/// A displacement component: prescribed or free.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Held {
+    /// Not prescribed.
+    Free,
+    /// Prescribed, m.
+    At(f64),
+}
+
+impl<'de> Deserialize<'de> for Held {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(from)?;
+        if text.trim() == "free" {
+            return Ok(Self::Free);
+        }
+        let length = text.parse::<Length>().map_err(|error| {
+            serde::de::Error::custom(format!("{error}; a component that is not prescribed is \"free\""))
+        })?;
+        Ok(Self::At(length.si()))
+    }
+}
+
+/// Solver settings.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Solver {
+    /// Method.
+    pub method: Method,
+    /// Out-of-balance force over reference force.
+    pub tolerance: f64,
+    /// Load steps from 0 to the full load.
+    pub steps: usize,
+    /// Iterations a step may take.
+    pub max_iterations: u64,
+    /// Largest relative error of the fitted bond law.
+    pub fit_bound: f64,
+    /// Factor on the fictitious mass; default by law.
+    pub mass_safety: Option<f64>,
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        Self {
+            method: Method::Adr,
+            tolerance: 1e-3,
+            steps: 1,
+            max_iterations: 200_000,
+            fit_bound: 1e-9,
+            mass_safety: None,
+        }
+    }
+}
+
+/// Quasi-static methods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Adaptive dynamic relaxation.
+    Adr,
+}
+
+/// Stress output.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StressSpec {
+    /// Measures to compute; the first is drawn.
+    pub measures: Vec<Measure>,
+    /// Volume of the averaging ball of the Hardy measure.
+    #[serde(default)]
+    pub ball: BallVolume,
+}
+
+/// Closed-form solutions.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "problem", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum ExactSpec {
+    /// Circular hole at the origin in a plate under remote tension along x, Eqs (2.81)–(2.83).
+    Kirsch {
+        /// Radius of the hole.
+        radius: Length,
+        /// Remote stress.
+        remote_stress: Stress,
+    },
+}
+
+/// Files to write beside the report.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OutputSpec {
+    /// Pictures (PNG).
+    pub pictures: bool,
+    /// Fields as VTKHDF.
+    pub fields: bool,
+}
+
+impl Default for OutputSpec {
+    fn default() -> Self {
+        Self { pictures: true, fields: true }
+    }
+}
+
+/// A set of variants: every combination of what is listed, the scene's own value where nothing is.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Study {
+    /// Spacings.
+    pub spacing: Vec<Length>,
+    /// Horizon ratios.
+    pub horizon_ratio: Vec<f64>,
+    /// Surface corrections.
+    pub surface_correction: Vec<SurfaceCorrection>,
+    /// Volume corrections.
+    pub volume_correction: Vec<VolumeCorrection>,
+    /// Part of `--quick` runs.
+    pub quick: Option<bool>,
+}
+
+impl Material {
+    /// The bond law of this material.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] where a chain parameter is out of its domain.
+    pub fn bond_law(&self) -> Result<Box<dyn crate::potential::BondPotential>, crate::Error> {
+        let rescale = self.rescale.unwrap_or(self.law.rescales());
+        self.law.build(self.links.unwrap_or(1.0), self.dissociation.unwrap_or(1.0), rescale)
+    }
+}

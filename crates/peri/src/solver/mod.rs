@@ -1,0 +1,7 @@
+//! Quasi-static solution: what is to be solved, and how.
+
+mod adr;
+mod load;
+
+pub use adr::{AdaptiveDynamicRelaxation, State, Status, System};
+pub use load::{Loads, Support};

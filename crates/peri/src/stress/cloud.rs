@@ -1,0 +1,88 @@
+//! In a cloud every particle looks for the bonds that cross its ball.
+
+use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, force_over_length, segment_fraction};
+use crate::bonds::{Bonds, CellGrid, CloudBonds};
+use rayon::prelude::*;
+
+pub fn piola<const D: usize>(
+    bonds: &CloudBonds<D>,
+    state: &Loaded<D>,
+    measure: Measure,
+    ball: BallVolume,
+) -> Vec<Tensor<D>> {
+    let points: Vec<[f64; D]> = bonds.particles().iter().map(|&s| bonds.position(s as usize)).collect();
+    let grid = CellGrid::new(&points, bonds.horizon());
+    let radius = bonds.horizon();
+    let square = radius * radius;
+    let whole = ball_volume(D, radius) * bonds.thickness();
+    let filled: Vec<f64> = match (measure, ball) {
+        (Measure::Hardy, BallVolume::Particles | BallVolume::Cells) => {
+            let inside: Vec<f64> = points
+                .par_iter()
+                .map(|&here| {
+                    let mut sum = 0.0;
+                    grid.near(here, radius, |other| {
+                        if distance_square(points[other], here) <= square {
+                            sum += bonds.volume(other);
+                        }
+                    });
+                    sum
+                })
+                .collect();
+            let most = inside.iter().copied().fold(0.0, f64::max);
+            inside.into_iter().map(|v| whole * v / most).collect()
+        }
+        _ => vec![whole; points.len()],
+    };
+    // a bond that crosses the ball has its nearer end within √(δ² + (δ/2)²) of the centre
+    let reach = radius * 1.25_f64.sqrt();
+    let one = |slot: usize| -> Tensor<D> {
+        let here = points[slot];
+        let mut sum = [[0.0; D]; D];
+        let mut add = |own: usize, weight_of: &dyn Fn([f64; D], [f64; D], usize) -> f64| {
+            bonds.neighbours(own, &mut |bond| {
+                let p = std::array::from_fn(|d| points[own][d] - here[d]);
+                let q: [f64; D] = std::array::from_fn(|d| p[d] + bond.bond[d]);
+                let weight = weight_of(p, q, bond.slot);
+                if weight > 0.0 {
+                    let (u, v) = (state.displacement.get(own), state.displacement.get(bond.slot));
+                    let eta: [f64; D] = std::array::from_fn(|d| v[d] - u[d]);
+                    let volume = bonds.volume(own);
+                    let scale = weight
+                        * force_over_length(state.fit, state.modulus, bond.weight, volume, bond.bond, eta);
+                    for a in 0..D {
+                        for b in 0..D {
+                            sum[a][b] += scale * (bond.bond[a] + eta[a]) * bond.bond[b];
+                        }
+                    }
+                }
+            });
+        };
+        let volume = if measure == Measure::OnePoint {
+            add(slot, &|_, _, _| 0.5);
+            bonds.volume(slot)
+        } else {
+            let norm = |x: [f64; D]| x.iter().map(|c| c * c).sum::<f64>();
+            grid.near(here, reach, |own| {
+                if distance_square(points[own], here) > reach * reach {
+                    return;
+                }
+                add(own, &|p, q, other| match measure {
+                    // either end finds such a bond: half of its ½ from each
+                    Measure::Printed if norm(p) < square && norm(q) < square => 0.25,
+                    Measure::Printed => 0.0,
+                    // only the nearer end counts it
+                    _ if (norm(p), own) < (norm(q), other) => segment_fraction(p, q, square),
+                    _ => 0.0,
+                });
+            });
+            filled[slot]
+        };
+        sum.map(|row| row.map(|x| x / volume))
+    };
+    (0..points.len()).into_par_iter().map(one).collect()
+}
+
+fn distance_square<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
+    (0..D).map(|d| (a[d] - b[d]).powi(2)).sum()
+}

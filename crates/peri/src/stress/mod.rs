@@ -1,0 +1,162 @@
+//! Stress of a bonded body: first Piola–Kirchhoff P from bond forces, Cauchy σ = P Fᵀ/J.
+//!
+//! With the dual force f = 2t and the bond function B_IJ(X) = (fraction of the segment IJ inside the ball of radius δ
+//! about X)/Ω, P = ½ Σ_I Σ_J f_IJ V_I V_J ⊗ ξ_IJ B_IJ over **all** bonds that cross the ball (Eq. (2.14) with f for t, and
+//! the exact B of the step window (2.29)); its divergence is the ball's average of the force density.
+
+mod ball;
+mod cloud;
+mod lattice;
+
+pub use ball::{ball_volume, cell_fractions, segment_fraction};
+
+use crate::bonds::{Bonds, CloudBonds, LatticeBonds};
+use crate::field::Field;
+use crate::potential::KernelFit;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// A second-order tensor of dimension `D`, rows first.
+pub type Tensor<const D: usize> = [[f64; D]; D];
+
+/// How stress is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Measure {
+    /// All bonds crossing the ball, weighted by the part of them inside; ball volume inside the body.
+    #[default]
+    Hardy,
+    /// P = ½ Σ_J f ⊗ ξ V_J: cheap, equals the lattice's stiffness.
+    OnePoint,
+    /// Eq. (2.31) as printed: t for f, bonds with both ends in the ball only, the whole ball's volume.
+    Printed,
+}
+
+impl Measure {
+    /// All measures.
+    pub const ALL: [Self; 3] = [Self::Hardy, Self::OnePoint, Self::Printed];
+
+    /// Name in scenes and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hardy => "hardy",
+            Self::OnePoint => "one-point",
+            Self::Printed => "printed",
+        }
+    }
+}
+
+/// Volume Ω of the averaging ball inside the body, for [`Measure::Hardy`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BallVolume {
+    /// The ball's volume times the share of its particles that exist.
+    #[default]
+    Particles,
+    /// The part of the ball that the particles' cells cover (lattices; a cloud has no cells and takes `Particles`).
+    Cells,
+    /// The whole ball.
+    Whole,
+}
+
+/// Bond law and state from which stresses follow.
+pub struct Loaded<'a, const D: usize> {
+    /// Displacement, m.
+    pub displacement: &'a Field<D>,
+    /// Fitted bond law, covering the stretches of `displacement`.
+    pub fit: &'a KernelFit,
+    /// kθ.
+    pub modulus: f64,
+}
+
+/// First Piola–Kirchhoff stress of every particle (in the order of [`Bonds::particles`]), Pa, on a lattice.
+pub fn piola_on_lattice<const D: usize>(
+    bonds: &LatticeBonds<D>,
+    state: &Loaded<D>,
+    measure: Measure,
+    ball: BallVolume,
+) -> Vec<Tensor<D>> {
+    lattice::piola(bonds, state, measure, ball)
+}
+
+/// First Piola–Kirchhoff stress of every particle (in the order of [`Bonds::particles`]), Pa, in a cloud.
+pub fn piola_in_cloud<const D: usize>(
+    bonds: &CloudBonds<D>,
+    state: &Loaded<D>,
+    measure: Measure,
+    ball: BallVolume,
+) -> Vec<Tensor<D>> {
+    cloud::piola(bonds, state, measure, ball)
+}
+
+/// Force f V_I V_J, N, along ζ per unit |ζ|: 2kθ w V_I V_J q(e)/|ξ|.
+fn force_over_length<const D: usize>(
+    fit: &KernelFit,
+    modulus: f64,
+    weight: f64,
+    own_volume: f64,
+    bond: [f64; D],
+    eta: [f64; D],
+) -> f64 {
+    let square: f64 = bond.iter().map(|x| x * x).sum();
+    let e = (0..D).map(|d| eta[d] * (2.0 * bond[d] + eta[d])).sum::<f64>() / square;
+    2.0 * modulus * weight * own_volume * fit.value(e) / square.sqrt()
+}
+
+/// Nonlocal deformation gradient F = (Σ w ζ ⊗ ξ)(Σ w ξ ⊗ ξ)⁻¹ over the intact bonds (Silling et al. 2007,
+/// doi:10.1007/s10659-007-9125-1); the identity where the bonds do not span space.
+pub fn deformation_gradients<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    displacement: &Field<D>,
+) -> Vec<Tensor<D>> {
+    let one = |&slot: &u32| {
+        let own = displacement.get(slot as usize);
+        let mut shape = nalgebra::SMatrix::<f64, D, D>::zeros();
+        let mut change = nalgebra::SMatrix::<f64, D, D>::zeros();
+        bonds.neighbours(slot as usize, &mut |bond| {
+            let other = displacement.get(bond.slot);
+            let unit = 1.0 / (bond.length * bond.length);
+            for a in 0..D {
+                for b in 0..D {
+                    shape[(a, b)] += bond.volume * unit * bond.bond[a] * bond.bond[b];
+                    change[(a, b)] += bond.volume * unit * (other[a] - own[a]) * bond.bond[b];
+                }
+            }
+        });
+        let mut gradient: Tensor<D> =
+            std::array::from_fn(|a| std::array::from_fn(|b| f64::from(u8::from(a == b))));
+        let size = shape.trace();
+        let singular = determinant::<D>(|a, b| shape[(a, b)]).abs() <= 1e-9 * size.powi(D as i32);
+        if let Some(inverse) = shape.try_inverse().filter(|_| !singular) {
+            let h = change * inverse;
+            for a in 0..D {
+                for b in 0..D {
+                    gradient[a][b] += h[(a, b)];
+                }
+            }
+        }
+        gradient
+    };
+    bonds.particles().par_iter().map(one).collect()
+}
+
+/// Cauchy stress σ = P Fᵀ/J, Eq. (2.32), particle by particle.
+pub fn cauchy<const D: usize>(piola: &[Tensor<D>], gradients: &[Tensor<D>]) -> Vec<Tensor<D>> {
+    let one = |(p, f): (&Tensor<D>, &Tensor<D>)| -> Tensor<D> {
+        let jacobian = determinant::<D>(|a, b| f[a][b]);
+        // a family turned inside out has no Cauchy stress; its nominal stress stands in
+        if jacobian <= 0.0 {
+            return *p;
+        }
+        std::array::from_fn(|a| {
+            std::array::from_fn(|b| (0..D).map(|c| p[a][c] * f[b][c]).sum::<f64>() / jacobian)
+        })
+    };
+    piola.par_iter().zip(gradients).map(one).collect()
+}
+
+/// Determinant of a D × D matrix, embedded in three dimensions.
+fn determinant<const D: usize>(entry: impl Fn(usize, usize) -> f64) -> f64 {
+    let identity = |a, b| f64::from(u8::from(a == b));
+    nalgebra::Matrix3::from_fn(|a, b| if a < D && b < D { entry(a, b) } else { identity(a, b) }).determinant()
+}
