@@ -1,7 +1,7 @@
 //! The Langevin function 𝓛(β) = coth β − 1/β of chain statistics, its inverse, and what they give to energies.
 //!
 //! A chain of n rigid links at relative extension x = r/(n b) ∈ (−1, 1) carries the dimensionless force
-//! β = 𝓛⁻¹(x) (thesis (2.40); Kuhn and Grün 1942, doi:10.1007/BF01793684). Everything here is in dimensionless numbers.
+//! β = 𝓛⁻¹(x) (thesis (2.36); Kuhn and Grün 1942, doi:10.1007/BF01793684). Everything here is in dimensionless numbers.
 //!
 //! Near the locking point x = 1 the digits are in the complement c = 1 − |x|, not in x: a caller who knows c
 //! should use [`inverse_from_complement`].
@@ -16,9 +16,11 @@
 //! | [`complement`] | 1.6 | [`ln_beta_over_sinh`] | 3.3 |
 //! | | | [`free_energy`] | 8.5 |
 
+mod approximant;
 mod inverse;
 mod table;
 
+pub use approximant::Inverse;
 pub use inverse::{inverse, inverse_derivative, inverse_derivative_from_complement, inverse_from_complement};
 
 /// Below this |β| the functions are ratios of power series with positive terms; above, exponentials.
@@ -59,7 +61,7 @@ const fn factorial(n: usize) -> f64 {
     product
 }
 
-/// 𝓛(β) = coth β − 1/β (thesis Eq. (2.40)); odd, 𝓛(±∞) = ±1.
+/// 𝓛(β) = coth β − 1/β (thesis Eqs. (1.26), (2.37)); odd, 𝓛(±∞) = ±1.
 pub fn langevin(beta: f64) -> f64 {
     let magnitude = beta.abs();
     if magnitude < SERIES_BELOW {
