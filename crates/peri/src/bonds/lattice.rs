@@ -90,12 +90,13 @@ impl<const D: usize> LatticeBonds<D> {
         if stencil.offsets.is_empty() {
             return Err(Error::geometry(format!("a horizon of {ratio} spacings reaches no neighbour")));
         }
-        // odd strides: rows of a power of two would fall into the same cache sets
+        // empty cells between rows, so that nothing within twice the horizon wraps into the next row: stress measures
+        // look that far; odd strides, or rows of a power of two would fall into the same cache sets
+        let far = ratio.floor() as usize;
         let mut strides = [1; D];
         for d in 1..D {
-            strides[d] = (strides[d - 1] * lattice.cells[d - 1]) | 1;
+            strides[d] = (strides[d - 1] * (lattice.cells[d - 1] + 2 * far)) | 1;
         }
-        let far = ratio.floor() as usize;
         let guard = strides.iter().map(|s| s * far).sum::<usize>().next_multiple_of(TILE);
         let slots = (2 * guard + strides[D - 1] * lattice.cells[D - 1]).next_multiple_of(TILE);
         let mut bonds = Self {
