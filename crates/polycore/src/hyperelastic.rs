@@ -32,7 +32,7 @@ pub mod homogeneous;
 
 pub use chain::{EightChain, EightChainRootI2, ThreeChain};
 pub use compressible::{Compressible, Coupling, Volumetric};
-pub use family::{Domain, FAMILIES, Family, Parameter, all, family};
+pub use family::{Domain, FAMILIES, Family, Kind, Parameter, all, family};
 pub use gent::Gent;
 pub use homogeneous::{PlaneStress, plane_stress};
 pub use ogden::{Ogden, OgdenConvention};

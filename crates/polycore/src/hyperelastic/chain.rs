@@ -1,6 +1,6 @@
 //! Langevin chain networks: three chains, eight chains, and eight chains with a √I₂ term.
 
-use super::family::{Domain, Family, Parameter};
+use super::family::{Domain, Family, Kind, Parameter};
 use super::polynomial::{first_invariant_excess, second_invariant_excess};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
@@ -36,6 +36,7 @@ const LINKS: &str = "links";
 
 pub(super) const THREE_CHAIN: Family = Family {
     key: "three-chain",
+    kind: Kind::Micromechanical,
     parameters: &[MODULUS, Parameter { name: LINKS, unit: "1", domain: Domain::Above(largest_square) }],
     build: |p| Ok(Box::new(ThreeChain::new(p[0], p[1])?)),
     example: &[0.3e6, 60.0],
@@ -44,6 +45,7 @@ pub(super) const THREE_CHAIN: Family = Family {
 
 pub(super) const EIGHT_CHAIN: Family = Family {
     key: "eight-chain",
+    kind: Kind::Micromechanical,
     parameters: &[MODULUS, Parameter { name: LINKS, unit: "1", domain: Domain::Above(chain_square) }],
     build: |p| Ok(Box::new(EightChain::new(p[0], p[1])?)),
     example: &[0.27e6, 25.0],
@@ -52,6 +54,7 @@ pub(super) const EIGHT_CHAIN: Family = Family {
 
 pub(super) const EIGHT_CHAIN_ROOT_I2: Family = Family {
     key: "eight-chain-root-i2",
+    kind: Kind::Micromechanical,
     parameters: &[
         MODULUS,
         Parameter { name: LINKS, unit: "1", domain: Domain::Above(chain_square) },

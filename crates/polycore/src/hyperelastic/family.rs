@@ -9,6 +9,8 @@ type Build = fn(&[f64]) -> Result<Box<dyn Hyperelastic>, Error>;
 pub struct Family {
     /// The name in scenes and reports.
     pub key: &'static str,
+    /// Where it comes from.
+    pub kind: Kind,
     /// Names, units and domains of the parameters.
     pub parameters: &'static [Parameter],
     /// The law with the given parameters, as many as [`Family::parameters`]; see [`Family::law`].
@@ -17,6 +19,15 @@ pub struct Family {
     pub example: &'static [f64],
     /// Where fits start, given the lower limit of each parameter and the best neo-Hookean modulus.
     pub(super) starts: fn(&[f64], f64) -> Vec<Vec<f64>>,
+}
+
+/// The thesis' two categories of laws (§1.1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// In invariants or stretches, chosen to fit.
+    Phenomenological,
+    /// From the statistics of a network of chains.
+    Micromechanical,
 }
 
 /// A material parameter.

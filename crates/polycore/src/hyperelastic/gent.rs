@@ -1,6 +1,6 @@
 //! Gent's law of limited chain extensibility.
 
-use super::family::{Domain, Family, Parameter};
+use super::family::{Domain, Family, Kind, Parameter};
 use super::polynomial::first_invariant_excess;
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, positive};
@@ -15,6 +15,7 @@ pub struct Gent {
 
 pub(super) const GENT: Family = Family {
     key: "gent",
+    kind: Kind::Phenomenological,
     parameters: &[
         Parameter { name: "shear_modulus", unit: "Pa", domain: Domain::Positive },
         Parameter { name: "J_m", unit: "1", domain: Domain::Above(first_invariant_excess) },

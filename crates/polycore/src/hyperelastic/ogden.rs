@@ -1,6 +1,6 @@
 //! Ogden's law in powers of the principal stretches.
 
-use super::family::{Domain, Family, Parameter};
+use super::family::{Domain, Family, Kind, Parameter};
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
 
 /// W = Σᵢ cᵢ (λ₁^αᵢ + λ₂^αᵢ + λ₃^αᵢ − 3) (1.24); doi:10.1098/rspa.1972.0026.
@@ -48,6 +48,7 @@ fn build(p: &[f64]) -> Result<Box<dyn Hyperelastic>, Error> {
 
 pub(super) const OGDEN_1: Family = Family {
     key: "ogden-1",
+    kind: Kind::Phenomenological,
     parameters: PARAMETERS.as_flattened().split_at(2).0,
     build,
     example: &[0.4e6, 2.2],
@@ -56,6 +57,7 @@ pub(super) const OGDEN_1: Family = Family {
 
 pub(super) const OGDEN_2: Family = Family {
     key: "ogden-2",
+    kind: Kind::Phenomenological,
     parameters: PARAMETERS.as_flattened().split_at(4).0,
     build,
     example: &[0.4e6, 1.3, 2e3, 5.0],
@@ -67,6 +69,7 @@ pub(super) const OGDEN_2: Family = Family {
 
 pub(super) const OGDEN_3: Family = Family {
     key: "ogden-3",
+    kind: Kind::Phenomenological,
     parameters: PARAMETERS.as_flattened(),
     build,
     // Ogden's own values for Treloar's rubber (1.3, 5.0, −2.0; 0.63, 0.0012, −0.01 MPa), as μᵢαᵢ/2

@@ -1,6 +1,6 @@
 //! Neo-Hookean and Mooney–Rivlin: linear in the invariants.
 
-use super::family::{Domain, Family, Parameter};
+use super::family::{Domain, Family, Kind, Parameter};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
 
@@ -19,6 +19,7 @@ pub struct MooneyRivlin {
 
 pub(super) const NEO_HOOKEAN: Family = Family {
     key: "neo-hookean",
+    kind: Kind::Phenomenological,
     parameters: &[Parameter { name: "shear_modulus", unit: "Pa", domain: Domain::Positive }],
     build: |p| Ok(Box::new(NeoHookean::new(p[0])?)),
     example: &[0.4e6],
@@ -27,6 +28,7 @@ pub(super) const NEO_HOOKEAN: Family = Family {
 
 pub(super) const MOONEY_RIVLIN: Family = Family {
     key: "mooney-rivlin",
+    kind: Kind::Phenomenological,
     parameters: &[
         // fits keep to the polyconvex quadrant: the best fit to Treloar's bar, 0.39 and −0.72 MPa, has a negative
         // shear modulus

@@ -1,0 +1,116 @@
+//! Pictures of fits: curves over the data for each kind of test in a table, and model against measurement.
+
+use std::path::Path;
+
+use polycore::Error;
+use polycore::hyperelastic::data::{State, Table};
+use polycore::hyperelastic::fit::{self, Fit};
+use polycore::hyperelastic::{Hyperelastic, Kind, homogeneous};
+use polycore::output::picture::{LinePlot, Series};
+
+use super::fits::MPA;
+
+/// A kind of homogeneous test that may be found among general biaxial states.
+struct Test {
+    key: &'static str,
+    title: &'static str,
+    holds: fn(&State) -> bool,
+    nominal: fn(&dyn Hyperelastic, f64) -> Result<f64, polycore::hyperelastic::Error>,
+}
+
+const TESTS: [Test; 3] = [
+    Test {
+        key: "uniaxial",
+        title: "uniaxial tension",
+        holds: |state| state.nominal[1] == 0.0,
+        nominal: |law, stretch| homogeneous::uniaxial(law, stretch),
+    },
+    Test {
+        key: "pure-shear",
+        title: "pure shear",
+        holds: |state| state.stretches[1] == 1.0 && state.nominal[1] != 0.0,
+        nominal: |law, stretch| Ok(homogeneous::pure_shear(law, stretch)?[0]),
+    },
+    Test {
+        key: "equibiaxial",
+        title: "equibiaxial tension",
+        holds: |state| state.stretches[0] == state.stretches[1] && state.nominal[1] != 0.0,
+        nominal: |law, stretch| homogeneous::equibiaxial(law, stretch),
+    },
+];
+
+/// Points of a drawn curve.
+const POINTS: usize = 200;
+
+/// The thesis' two categories have pictures of their own: together they would be more curves than colours.
+const KINDS: [(Kind, &str); 2] =
+    [(Kind::Phenomenological, "phenomenological"), (Kind::Micromechanical, "chains")];
+
+/// `<data>_<test>_<kind>.png` for every kind of test with at least three states, and `<data>_parity_<kind>.png` for
+/// biaxial tables.
+pub fn pictures(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Result<(), Error> {
+    for (kind, suffix) in KINDS {
+        let fits: Vec<&Fit> = fits.iter().filter(|fit| fit.family.kind == kind).collect();
+        if fits.is_empty() {
+            continue;
+        }
+        for test in &TESTS {
+            let states: Vec<&State> = table.states.iter().filter(|state| (test.holds)(state)).collect();
+            if states.len() >= 3 {
+                let path = directory.join(format!("{name}_{}_{suffix}.png", test.key));
+                curves(name, test, &states, &fits).write(path)?;
+            }
+        }
+        if table.states.iter().any(|state| state.nominal[1] != 0.0) {
+            parity(name, table, &fits)?.write(directory.join(format!("{name}_parity_{suffix}.png")))?;
+        }
+    }
+    Ok(())
+}
+
+/// Nominal stress over stretch.
+fn curves(name: &str, test: &Test, states: &[&State], fits: &[&Fit]) -> LinePlot {
+    let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
+    let y: Vec<f64> = states.iter().map(|state| state.nominal[0] / MPA).collect();
+    let longest = 1.0 + 1.03 * x.iter().map(|l| l - 1.0).fold(0.0, f64::max);
+    let highest = 1.1 * y.iter().copied().fold(0.0, f64::max);
+    let stretches: Vec<f64> =
+        (0..=POINTS).map(|i| 1.0 + (longest - 1.0) * i as f64 / POINTS as f64).collect();
+    let mut plot = LinePlot::new(&format!("{name}: {}", test.title))
+        .axes("stretch", "nominal stress, MPa")
+        .x_range(1.0, longest)
+        .y_range(0.0, highest)
+        .series(Series::markers("measured", &x, &y));
+    for fit in fits {
+        // beyond locking a curve just ends
+        let nominal: Vec<f64> = stretches
+            .iter()
+            .map(|l| (test.nominal)(&fit.law, *l).map_or(f64::NAN, |nominal| nominal / MPA))
+            .collect();
+        plot = plot.series(Series::line(fit.family.key, &stretches, &nominal));
+    }
+    plot
+}
+
+/// Every stress of the table, model over measurement.
+fn parity(name: &str, table: &Table, fits: &[&Fit]) -> Result<LinePlot, Error> {
+    let measured: Vec<f64> = table
+        .states
+        .iter()
+        .flat_map(|state| state.nominal)
+        .filter(|nominal| *nominal != 0.0)
+        .map(|nominal| nominal / MPA)
+        .collect();
+    let highest = 1.1 * measured.iter().copied().fold(0.0, f64::max);
+    let mut plot = LinePlot::new(&format!("{name}: all measured stresses"))
+        .axes("measured nominal stress, MPa", "nominal stress of the law, MPa")
+        .x_range(0.0, highest)
+        .y_range(0.0, highest)
+        .series(Series::reference("equal", &[0.0, highest], &[0.0, highest]));
+    for fit in fits {
+        let residuals = fit::residuals(&fit.law, table)?;
+        let model: Vec<f64> = residuals.iter().zip(&measured).map(|(r, data)| r / MPA + data).collect();
+        plot = plot.series(Series::markers(fit.family.key, &measured, &model));
+    }
+    Ok(plot)
+}
