@@ -58,9 +58,20 @@ impl<const D: usize> Loads<D> {
         self.held.get(slot).copied().unwrap_or(0)
     }
 
-    /// The affine field u_d = a_d + Σ_e B_de X_e closest (least squares, least norm) to the prescribed displacements:
-    /// a predictor that moves the whole body with its grips. Zero where nothing is prescribed.
-    pub fn affine_predictor(&self, bonds: &dyn Bonds<D>) -> [[f64; 4]; D] {
+    /// An affine field u_d = a_d + Σ_e B_de X_e to start from: closest to the prescribed displacements where there are
+    /// any, in balance with the body forces otherwise. One row (a_d, B_d1, …) per component, at load factor 1.
+    pub fn affine_predictor(&self, bonds: &dyn Bonds<D>, stiffness: f64) -> [[f64; 4]; D] {
+        if self.displacement.is_some() {
+            self.affine_closest(bonds)
+        } else if self.body_force.is_some() {
+            self.affine_balance(bonds, stiffness)
+        } else {
+            [[0.0; 4]; D]
+        }
+    }
+
+    /// Least squares, of least norm, over the prescribed displacements: moves the whole body with its grips.
+    fn affine_closest(&self, bonds: &dyn Bonds<D>) -> [[f64; 4]; D] {
         let mut result = [[0.0; 4]; D];
         let Some(field) = &self.displacement else { return result };
         for d in 0..D {
@@ -73,8 +84,7 @@ impl<const D: usize> Loads<D> {
             let mut normal = nalgebra::Matrix4::<f64>::zeros();
             let mut right = nalgebra::Vector4::<f64>::zeros();
             // lengths in units of the body, so that the pseudo-inverse's threshold means something
-            let scale =
-                held.iter().flat_map(|&s| bonds.position(s)).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+            let scale = held.iter().flat_map(|&s| bonds.position(s)).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
             for &slot in &held {
                 let position = bonds.position(slot);
                 let mut row = nalgebra::Vector4::zeros();
@@ -92,6 +102,45 @@ impl<const D: usize> Loads<D> {
                 for e in 0..D {
                     result[d][e + 1] = solution[e + 1] / scale;
                 }
+            }
+        }
+        result
+    }
+
+    /// The homogeneous strain H whose bond forces do the same virtual work as the body forces in every homogeneous
+    /// strain: Σ_I V_I Σ_J kθK w V_J |ξ| (n·Hn) n_a n_b = Σ_I V_I b_a X_b (Galerkin's projection; no rotation).
+    /// `stiffness` is kθK.
+    fn affine_balance(&self, bonds: &dyn Bonds<D>, stiffness: f64) -> [[f64; 4]; D] {
+        let mut result = [[0.0; 4]; D];
+        let Some(body_force) = &self.body_force else { return result };
+        let mut matrix = nalgebra::DMatrix::<f64>::zeros(D * D, D * D);
+        let mut right = nalgebra::DVector::<f64>::zeros(D * D);
+        for &slot in bonds.particles() {
+            let slot = slot as usize;
+            let volume = bonds.volume(slot);
+            bonds.neighbours(slot, &mut |bond| {
+                let dyad = |k: usize| bond.bond[k / D] * bond.bond[k % D] / (bond.length * bond.length);
+                let factor = stiffness * volume * bond.weight * bond.length;
+                for row in 0..D * D {
+                    for column in 0..D * D {
+                        matrix[(row, column)] += factor * dyad(row) * dyad(column);
+                    }
+                }
+            });
+            let (force, position) = (body_force.get(slot), bonds.position(slot));
+            for k in 0..D * D {
+                // the symmetric part: a couple does no work in a strain
+                let (a, b) = (k / D, k % D);
+                right[k] += 0.5 * volume * (force[a] * position[b] + force[b] * position[a]);
+            }
+        }
+        let size = matrix.trace();
+        if size > 0.0
+            && let Ok(inverse) = (matrix / size).pseudo_inverse(1e-10)
+        {
+            let strain = inverse * right / size;
+            for k in 0..D * D {
+                result[k / D][k % D + 1] = strain[k];
             }
         }
         result
