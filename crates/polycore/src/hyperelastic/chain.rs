@@ -1,6 +1,6 @@
 //! Langevin chain networks: three chains, eight chains, and eight chains with a √I₂ term.
 
-use super::family::{Domain, Family, Kind, Parameter};
+use super::family::{Domain, Family, Kind, Parameter, Start};
 use super::polynomial::{first_invariant_excess, second_invariant_excess};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
@@ -62,13 +62,11 @@ pub(super) const EIGHT_CHAIN_ROOT_I2: Family = Family {
     ],
     build: |p| Ok(Box::new(EightChainRootI2::new(p[0], p[1], p[2])?)),
     example: &[0.25e6, 26.0, 0.1e6],
-    starts: |limits, modulus| {
-        starts(limits, modulus).into_iter().map(|p| vec![p[0], p[1], 0.3 * modulus]).collect()
-    },
+    starts: |start| starts(start).into_iter().map(|p| vec![p[0], p[1], 0.3 * start.modulus]).collect(),
 };
 
-fn starts(limits: &[f64], modulus: f64) -> Vec<Vec<f64>> {
-    [1.02, 1.3, 3.0].map(|r| vec![0.8 * modulus, r * limits[1]]).to_vec()
+fn starts(start: &Start<'_>) -> Vec<Vec<f64>> {
+    [1.02, 1.3, 3.0].map(|r| vec![0.8 * start.modulus, r * start.limits[1]]).to_vec()
 }
 
 /// n must exceed λ² of the longest chain.

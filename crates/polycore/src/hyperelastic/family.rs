@@ -1,5 +1,6 @@
 //! The list of laws: how each is named, built from numbers, and started in a fit.
 
+use super::data::Table;
 use super::{Compressible, Coupling, Error, Hyperelastic, Volumetric, chain, gent, ogden, polynomial};
 
 type Build = fn(&[f64]) -> Result<Box<dyn Hyperelastic>, Error>;
@@ -17,8 +18,8 @@ pub struct Family {
     pub(super) build: Build,
     /// Plausible values for a rubber.
     pub example: &'static [f64],
-    /// Where fits start, given the lower limit of each parameter and the best neo-Hookean modulus.
-    pub(super) starts: fn(&[f64], f64) -> Vec<Vec<f64>>,
+    /// Where fits start.
+    pub(super) starts: fn(&Start<'_>) -> Vec<Vec<f64>>,
 }
 
 /// The thesis' two categories of laws (§1.1).
@@ -28,6 +29,16 @@ pub enum Kind {
     Phenomenological,
     /// From the statistics of a network of chains.
     Micromechanical,
+}
+
+/// What is known before a fit.
+pub(super) struct Start<'a> {
+    /// Lower limit of each parameter.
+    pub limits: &'a [f64],
+    /// The best neo-Hookean modulus, Pa.
+    pub modulus: f64,
+    /// The data.
+    pub table: &'a Table,
 }
 
 /// A material parameter.

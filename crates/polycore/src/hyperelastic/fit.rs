@@ -11,6 +11,7 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 
 use super::data::Table;
+use super::family::Start;
 use super::{Domain, Error, Family, Hyperelastic, homogeneous};
 
 /// A fitted law.
@@ -86,7 +87,7 @@ pub fn fit(family: &'static Family, table: &Table) -> Result<Fit, Error> {
     let solver = LevenbergMarquardt::new().with_patience(200);
     let mut ends: Vec<(f64, DVector<f64>)> = Vec::new();
     let mut iterations = 0;
-    let starts = (family.starts)(&map.limits, modulus);
+    let starts = (family.starts)(&Start { limits: &map.limits, modulus, table });
     for start in &starts {
         let problem = Problem { map: &map, table, at: map.inverse(start), evaluations: Cell::new(0) };
         let (problem, report) = solver.minimize(problem);
@@ -328,6 +329,20 @@ mod tests {
         assert!((found - 0.0748).abs() < 0.00005, "{found}");
         let found = of("eight-chain-root-i2", &kawabata());
         assert!(found > 0.0252 && found < 0.02545, "{found}");
+    }
+
+    /// Upper bounds: an exhaustive scan in numpy, exponents on grids of 0.7 (Treloar) and 0.23 (Kawabata), moduli ≥ 0
+    /// solved exactly.
+    #[test]
+    fn ogden_fits_find_the_global_minimum() {
+        for (table, bounds) in
+            [(treloar(), [0.30940, 0.07791, 0.06714]), (kawabata(), [0.04385, 0.01180, 0.00861])]
+        {
+            for (key, bound) in ["ogden-1", "ogden-2", "ogden-3"].into_iter().zip(bounds) {
+                let found = fit(family(key).unwrap(), &table).unwrap().rms / 1e6;
+                assert!(found < bound, "{key} {found} {bound}");
+            }
+        }
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub(super) const GENT: Family = Family {
     ],
     build: |p| Ok(Box::new(Gent::new(p[0], p[1])?)),
     example: &[0.3e6, 75.0],
-    starts: |limits, modulus| [1.02, 1.3, 3.0].map(|r| vec![0.8 * modulus, r * limits[1]]).to_vec(),
+    starts: |start| [1.02, 1.3, 3.0].map(|r| vec![0.8 * start.modulus, r * start.limits[1]]).to_vec(),
 };
 
 impl Gent {

@@ -3,6 +3,8 @@
 use super::family::{Domain, Family, Kind, Parameter};
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
 
+mod starts;
+
 /// W = Σᵢ cᵢ (λ₁^αᵢ + λ₂^αᵢ + λ₃^αᵢ − 3) (1.24); doi:10.1098/rspa.1972.0026.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ogden {
@@ -52,7 +54,7 @@ pub(super) const OGDEN_1: Family = Family {
     parameters: PARAMETERS.as_flattened().split_at(2).0,
     build,
     example: &[0.4e6, 2.2],
-    starts: |_, modulus| [1.5, 2.5, 4.0, -2.0].map(|a| vec![modulus, a]).to_vec(),
+    starts: starts::starts::<1>,
 };
 
 pub(super) const OGDEN_2: Family = Family {
@@ -61,10 +63,7 @@ pub(super) const OGDEN_2: Family = Family {
     parameters: PARAMETERS.as_flattened().split_at(4).0,
     build,
     example: &[0.4e6, 1.3, 2e3, 5.0],
-    starts: |_, modulus| {
-        let pairs = [(1.5, 6.0), (1.5, 10.0), (1.5, -2.0), (2.0, -4.0), (3.0, -1.0), (0.8, 4.0)];
-        pairs.map(|(a, b)| vec![modulus, a, 1e-3 * modulus, b]).to_vec()
-    },
+    starts: starts::starts::<2>,
 };
 
 pub(super) const OGDEN_3: Family = Family {
@@ -74,11 +73,7 @@ pub(super) const OGDEN_3: Family = Family {
     build,
     // Ogden's own values for Treloar's rubber (1.3, 5.0, −2.0; 0.63, 0.0012, −0.01 MPa), as μᵢαᵢ/2
     example: &[0.4095e6, 1.3, 0.003e6, 5.0, 0.01e6, -2.0],
-    starts: |_, modulus| {
-        let triples =
-            [(1.3, 5.0, -2.0), (1.5, 8.0, -1.0), (1.5, 12.0, 4.0), (2.0, -2.0, -6.0), (0.8, 3.0, 10.0)];
-        triples.map(|(a, b, c)| vec![modulus, a, 1e-2 * modulus, b, 1e-3 * modulus, c]).to_vec()
-    },
+    starts: starts::starts::<3>,
 };
 
 impl Ogden {

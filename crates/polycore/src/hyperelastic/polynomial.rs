@@ -23,7 +23,7 @@ pub(super) const NEO_HOOKEAN: Family = Family {
     parameters: &[Parameter { name: "shear_modulus", unit: "Pa", domain: Domain::Positive }],
     build: |p| Ok(Box::new(NeoHookean::new(p[0])?)),
     example: &[0.4e6],
-    starts: |_, modulus| vec![vec![modulus]],
+    starts: |start| vec![vec![start.modulus]],
 };
 
 pub(super) const MOONEY_RIVLIN: Family = Family {
@@ -37,7 +37,7 @@ pub(super) const MOONEY_RIVLIN: Family = Family {
     ],
     build: |p| Ok(Box::new(MooneyRivlin::new(p[0], p[1])?)),
     example: &[0.15e6, 0.02e6],
-    starts: |_, modulus| vec![vec![0.45 * modulus, 0.05 * modulus]],
+    starts: |start| vec![vec![0.45 * start.modulus, 0.05 * start.modulus]],
 };
 
 impl NeoHookean {
