@@ -30,10 +30,10 @@ pub(super) fn starts<const TERMS: usize>(start: &Start<'_>) -> Vec<Vec<f64>> {
     loop {
         let normal = DMatrix::from_fn(TERMS, TERMS, |i, j| gram[(chosen[i], chosen[j])]);
         let right = DVector::from_fn(TERMS, |i, _| onto[chosen[i]]);
-        if let Some(moduli) = normal.cholesky().map(|factor| factor.solve(&right)) {
-            if moduli.iter().all(|modulus| *modulus > 0.0) {
-                found.push((-moduli.dot(&right), chosen, moduli));
-            }
+        if let Some(moduli) = normal.cholesky().map(|factor| factor.solve(&right))
+            && moduli.iter().all(|modulus| *modulus > 0.0)
+        {
+            found.push((-moduli.dot(&right), chosen, moduli));
         }
         if !next_subset(&mut chosen, exponents.len()) {
             break;
