@@ -208,11 +208,11 @@ fn solve(
         interrupted: &|| STOP.load(Ordering::Relaxed),
         progress: &mut progress,
     };
-    let report = peri::run::run(source, scene, &mut options)?;
+    let finished = peri::run::run(source, scene, &mut options)?;
     bar.finish_and_clear();
-    report.print_table();
+    print!("{}", finished.summary());
     println!("results in {}", output.display());
-    Ok(report.passed())
+    Ok(finished.report.passed())
 }
 
 fn check(path: &Path, quick: bool) -> Result<bool, Failure> {

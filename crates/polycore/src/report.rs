@@ -177,7 +177,7 @@ impl Report {
         })
     }
 
-    /// The judged expectations, scalars, work and times as text.
+    /// The scalars, work, times and judged expectations as text.
     pub fn table(&self) -> String {
         let mut text = String::new();
         let mut rows = Vec::new();
@@ -192,13 +192,19 @@ impl Report {
             });
         }
         align(&mut text, &rows);
-        align(&mut text, &self.expect.iter().map(Judgement::row).collect::<Vec<_>>());
         let work = self.work.iter().map(|(name, count)| format!("{name} {count}"));
         let seconds = self.seconds.iter().map(|(phase, seconds)| format!("{phase} {seconds:.3} s"));
         let line = work.chain(seconds).collect::<Vec<_>>().join(", ");
         if !line.is_empty() {
             let _ = writeln!(text, "{line}");
         }
+        text + &self.verdict()
+    }
+
+    /// The judged expectations and what is not finite, as text.
+    pub fn verdict(&self) -> String {
+        let mut text = String::new();
+        align(&mut text, &self.expect.iter().map(Judgement::row).collect::<Vec<_>>());
         for name in &self.non_finite {
             let _ = writeln!(text, "FAIL  {name} is not finite");
         }

@@ -166,6 +166,46 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
     report
 }
 
+/// Variants as lines of a table: size, work, time, then the results that all of them share.
+pub fn table(outcomes: &[Outcome]) -> String {
+    use std::fmt::Write;
+    let shared: Vec<&str> =
+        outcomes.first().map(|o| o.values.iter().map(|v| v.0.as_str()).collect()).unwrap_or_default();
+    let shown: Vec<&str> = shared
+        .into_iter()
+        .filter(|name| {
+            ["_peak", "_rmse", "_rmse_inner", "largest_displacement", "reaction_x", "reaction_y"]
+                .iter()
+                .any(|end| name.ends_with(end))
+        })
+        .filter(|name| !name.starts_with("printed"))
+        .collect();
+    let width = outcomes.iter().map(|o| o.name.len()).max().unwrap_or(0);
+    let mut text = String::new();
+    let _ = write!(text, "{:<width$} {:>10} {:>10} {:>9}", "variant", "particles", "iterations", "solve (s)");
+    for name in &shown {
+        let _ = write!(text, "  {name}");
+    }
+    text.push('\n');
+    for outcome in outcomes {
+        let work = |name: &str| outcome.work.iter().find(|w| w.0 == name).map_or(0, |w| w.1);
+        let (particles, iterations) = (work("particles"), work("iterations"));
+        let _ = write!(
+            text,
+            "{:<width$} {particles:>10} {iterations:>10} {:>9.2}",
+            outcome.name,
+            outcome.seconds_of("solve")
+        );
+        for name in &shown {
+            let value = outcome.get(name).unwrap_or(f64::NAN);
+            let column = name.len();
+            let _ = write!(text, "  {value:>column$.5}");
+        }
+        text.push('\n');
+    }
+    text
+}
+
 /// Width of the plate across the load, from the added boxes.
 pub fn plate_width(scene: &Scene) -> Option<f64> {
     let edges = |get: fn(&crate::scene::ShapeSpec) -> &Option<Vec<polycore::units::Length>>| {

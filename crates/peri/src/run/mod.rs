@@ -52,18 +52,41 @@ impl From<polycore::Error> for Failure {
     }
 }
 
+/// A finished run.
+pub struct Finished {
+    /// As written to `report.json`.
+    pub report: Report,
+    /// The variants, in the order they ran.
+    pub outcomes: Vec<Outcome>,
+}
+
+impl Finished {
+    /// For the terminal: all values of a single variant, a line for each of several, then the judged expectations.
+    pub fn summary(&self) -> String {
+        if self.outcomes.len() == 1 {
+            self.report.table()
+        } else {
+            compare::table(&self.outcomes) + &self.report.verdict()
+        }
+    }
+}
+
 /// Runs a scene in its dimension.
 ///
 /// # Errors
 /// [`Failure`]; nothing half-written remains, and an interrupted run can be resumed.
-pub fn run(source: &Source, scene: &Scene, options: &mut Options) -> Result<Report, Failure> {
+pub fn run(source: &Source, scene: &Scene, options: &mut Options) -> Result<Finished, Failure> {
     match scene.body.space {
         Space::Solid => run_in::<3>(source, scene, options),
         _ => run_in::<2>(source, scene, options),
     }
 }
 
-fn run_in<const D: usize>(source: &Source, scene: &Scene, options: &mut Options) -> Result<Report, Failure> {
+fn run_in<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    options: &mut Options,
+) -> Result<Finished, Failure> {
     let variants = scene::check(source, scene, options.quick)?;
     // every body is built once before anything is computed or written: faults show at once
     if !options.resume {
@@ -91,7 +114,7 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, options: &mut Options)
     report.write(options.output)?;
     // the report is the last file: a checkpoint without it is an unfinished run
     let _ = std::fs::remove_file(options.output.join(checkpoint::FILE_NAME));
-    Ok(report)
+    Ok(Finished { report, outcomes: finished })
 }
 
 fn run_variant<const D: usize>(

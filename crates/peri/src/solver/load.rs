@@ -84,7 +84,8 @@ impl<const D: usize> Loads<D> {
             let mut normal = nalgebra::Matrix4::<f64>::zeros();
             let mut right = nalgebra::Vector4::<f64>::zeros();
             // lengths in units of the body, so that the pseudo-inverse's threshold means something
-            let scale = held.iter().flat_map(|&s| bonds.position(s)).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+            let scale =
+                held.iter().flat_map(|&s| bonds.position(s)).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
             for &slot in &held {
                 let position = bonds.position(slot);
                 let mut row = nalgebra::Vector4::zeros();
