@@ -9,6 +9,7 @@ const CASE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/ch1/rubber-
 
 const SCENE: &str = r#"
 version = 1
+program = "polycore"
 [fit]
 laws = ["neo-hookean"]
 [[fit.data]]

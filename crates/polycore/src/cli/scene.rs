@@ -12,11 +12,21 @@ use serde::Deserialize;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Scene {
+    /// Checked by its type only.
+    #[serde(rename = "program")]
+    _program: Program,
     #[serde(default)]
     title: String,
     fit: Fit,
     #[serde(default)]
     expect: Vec<Expect>,
+}
+
+/// The program that runs these scenes; `cargo xtask validate` chooses by it.
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Program {
+    Polycore,
 }
 
 /// What to fit to what.
@@ -51,7 +61,7 @@ impl Case {
     /// Reads and checks a scene and the tables that it names.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let source = Source::read(path)?;
-        let Scene { title, fit, expect } = source.parse()?;
+        let Scene { _program: Program::Polycore, title, fit, expect } = source.parse()?;
         let laws = match &fit.laws {
             None => FAMILIES.iter().collect(),
             Some(names) => selected(&source, names)?,
