@@ -1,2 +1,60 @@
-//! Project tasks: validate, bench, test.
-fn main() {}
+//! Project tasks, as `cargo xtask TASK`. They run the released command lines: what users run is what is judged and timed.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod bench;
+mod table;
+mod tidy;
+mod validate;
+mod workspace;
+
+use workspace::Workspace;
+
+/// Tasks of the polymer-mechanics workspace.
+#[derive(Parser)]
+#[command(about, after_help = "Exit codes: 0 done, 1 something failed, 2 wrong usage.")]
+struct Cli {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Run all tests: the command of the README.
+    Test {
+        /// Passed on to `cargo test`, for example a test's name.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<String>,
+    },
+    /// Run the cases and judge everything that they expect; results go to target/validate.
+    Validate(validate::Options),
+    /// Measure: `langevin`, or a program that has a `bench --json` of its own (`peri`).
+    Bench(bench::Options),
+    /// Check the tree: lengths of source files, sizes of files in git.
+    Tidy,
+}
+
+fn main() -> ExitCode {
+    let workspace = Workspace::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
+    let passed = match Cli::parse().task {
+        Task::Test { arguments } => test(&workspace, &arguments),
+        Task::Validate(options) => validate::run(&workspace, &options),
+        Task::Bench(options) => bench::run(&workspace, &options),
+        Task::Tidy => tidy::run(&workspace),
+    };
+    match passed {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(report) => {
+            eprintln!("{report:?}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn test(workspace: &Workspace, arguments: &[String]) -> miette::Result<bool> {
+    workspace.cargo(&["test", "--release", "--workspace"], arguments)
+}

@@ -11,10 +11,10 @@
 //!
 //! | function | max error | function | max error |
 //! |---|---|---|---|
-//! | [`langevin`] | 3.5 | [`inverse`], [`inverse_from_complement`] | 1.5 |
+//! | [`langevin`] | 3.9 | [`inverse`], [`inverse_from_complement`] | 1.6 |
 //! | [`derivative`] | 3.7 | [`inverse_derivative`] and its complement form | 4.6 |
 //! | [`complement`] | 1.6 | [`ln_beta_over_sinh`] | 3.3 |
-//! | | | [`free_energy`] | 8.5 |
+//! | | | [`free_energy`] | 9.2 |
 
 mod approximant;
 mod inverse;
@@ -26,14 +26,14 @@ pub use inverse::{inverse, inverse_derivative, inverse_derivative_from_complemen
 /// Below this |β| the functions are ratios of power series with positive terms; above, exponentials.
 const SERIES_BELOW: f64 = 3.0;
 
-/// Terms that the series need at `SERIES_BELOW`: the first one left out is 3²⁶/29! of the sum, 3e-19.
-const SERIES_TERMS: usize = 13;
+/// Terms of every series and polynomial. The series need 13 of them at `SERIES_BELOW`; four chains of four are fast.
+const TERMS: usize = 16;
 
 /// (sinh β − β)/β³ = Σ β²ᵏ/(2k+3)!
-const SINH_EXCESS: [f64; SERIES_TERMS] = {
-    let mut terms = [0.0; SERIES_TERMS];
+const SINH_EXCESS: [f64; TERMS] = {
+    let mut terms = [0.0; TERMS];
     let mut k = 0;
-    while k < SERIES_TERMS {
+    while k < TERMS {
         terms[k] = 1.0 / factorial(2 * k + 3);
         k += 1;
     }
@@ -41,10 +41,10 @@ const SINH_EXCESS: [f64; SERIES_TERMS] = {
 };
 
 /// (β cosh β − sinh β)/β³ = Σ (2k+2) β²ᵏ/(2k+3)!
-const COSH_EXCESS: [f64; SERIES_TERMS] = {
-    let mut terms = [0.0; SERIES_TERMS];
+const COSH_EXCESS: [f64; TERMS] = {
+    let mut terms = [0.0; TERMS];
     let mut k = 0;
-    while k < SERIES_TERMS {
+    while k < TERMS {
         terms[k] = (2 * k + 2) as f64 / factorial(2 * k + 3);
         k += 1;
     }
@@ -155,17 +155,14 @@ fn beta_over_sinh_squared(beta: f64) -> f64 {
     ratio * ratio
 }
 
-/// Σ cₖ tᵏ in blocks of four (Estrin), so that a processor works on several terms at once.
+/// Σ cₖ tᵏ as four interleaved Horner schemes in t⁴, which run side by side: half the time of a single one.
 #[inline]
-fn polynomial<const N: usize>(at: f64, coefficients: &[f64; N]) -> f64 {
+fn polynomial(at: f64, coefficients: &[f64; TERMS]) -> f64 {
     let square = at * at;
     let fourth = square * square;
-    let mut sum = 0.0;
-    for block in coefficients.chunks(4).rev() {
-        let term = |k: usize| block.get(k).copied().unwrap_or(0.0);
-        sum = sum * fourth + ((term(0) + term(1) * at) + (term(2) + term(3) * at) * square);
-    }
-    sum
+    let c = coefficients;
+    let chain = |k: usize| ((c[k + 12] * fourth + c[k + 8]) * fourth + c[k + 4]) * fourth + c[k];
+    (chain(0) + chain(1) * at) + (chain(2) + chain(3) * at) * square
 }
 
 #[cfg(test)]

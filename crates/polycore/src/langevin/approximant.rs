@@ -10,7 +10,7 @@ use super::inverse;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Inverse {
-    /// [`inverse()`], within 1.5 ulp.
+    /// [`inverse()`], within 1.6 ulp.
     #[default]
     Exact,
     /// x(3 − x²)/(1 − x²): the rounded \[3/2\] Padé approximant, used by the thesis (text after (2.47)).

@@ -1,0 +1,113 @@
+//! Measurements: a table on the terminal and rows in target/bench/NAME.json.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use miette::{IntoDiagnostic, Result, WrapErr, miette};
+use polycore::output::atomic_write;
+use serde::{Deserialize, Serialize};
+
+use crate::table::{Table, print};
+use crate::workspace::Workspace;
+
+mod langevin;
+
+/// What to measure.
+#[derive(clap::Args)]
+pub struct Options {
+    /// `langevin`, or a program with a `bench --json` of its own.
+    name: String,
+    /// Passed on to that program after `bench --json`.
+    #[arg(last = true)]
+    arguments: Vec<String>,
+}
+
+/// One number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// What was measured.
+    pub what: String,
+    /// Of how many things: points, particles.
+    pub size: u64,
+    /// On how many threads.
+    pub threads: usize,
+    /// The number; absent where there is none.
+    pub value: Option<f64>,
+    /// Its unit, empty for a ratio.
+    pub unit: String,
+}
+
+/// Measures, prints and writes.
+pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
+    let folder = workspace.results("bench")?;
+    let (rows, table) = match options.name.as_str() {
+        "langevin" if options.arguments.is_empty() => langevin::run(&folder)?,
+        "langevin" => return Err(miette!("`bench langevin` takes no arguments")),
+        program => {
+            let rows = external(&workspace.release(program)?, &options.arguments)?;
+            let table = text(&rows);
+            (rows, table)
+        }
+    };
+    print(&table);
+    let path = folder.join(format!("{}.json", options.name));
+    write(&path, &rows)?;
+    print(&format!("written: {}\n", workspace.short(&path)));
+    Ok(true)
+}
+
+/// Runs `PROGRAM bench --json ARGUMENTS`, which prints the rows as a JSON list.
+fn external(program: &Path, arguments: &[String]) -> Result<Vec<Row>> {
+    let output = Command::new(program)
+        .args(["bench", "--json"])
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stderr(Stdio::inherit())
+        .output()
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot start {}", program.display()))?;
+    if !output.status.success() {
+        return Err(miette!("{} bench --json: {}", program.display(), output.status));
+    }
+    serde_json::from_slice(&output.stdout)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("{} bench --json printed no list of rows", program.display()))
+}
+
+fn text(rows: &[Row]) -> String {
+    let mut table = Table::new(["what", "size", "threads", "value", "unit"]);
+    for row in rows {
+        let value = row.value.map_or_else(|| "-".to_owned(), |value| format!("{value:.4e}"));
+        table.push([
+            row.what.clone(),
+            row.size.to_string(),
+            row.threads.to_string(),
+            value,
+            row.unit.clone(),
+        ]);
+    }
+    table.text()
+}
+
+fn write(path: &Path, rows: &[Row]) -> Result<()> {
+    atomic_write(path, |file| {
+        serde_json::to_writer_pretty(&mut *file, rows)?;
+        file.write_all(b"\n")
+    })
+    .into_diagnostic()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_of_another_program() {
+        let json = r#"[{"what": "lattice", "size": 1000, "threads": 2, "value": 1.5e9, "unit": "bonds/s"},
+                       {"what": "lattice", "size": 1000, "threads": 4, "value": null, "unit": "bonds/s"}]"#;
+        let rows: Vec<Row> = serde_json::from_str(json).expect("rows");
+        assert!(text(&rows).contains("lattice  1000  2        1.5000e9  bonds/s"), "{}", text(&rows));
+        assert_eq!(rows[1].value, None);
+    }
+}

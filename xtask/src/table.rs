@@ -1,0 +1,70 @@
+//! Rows of text, aligned for a terminal or written as Markdown.
+
+use std::io::Write as _;
+
+/// To standard output; a closed pipe is no reason to fail.
+pub fn print(text: &str) {
+    let _ = std::io::stdout().write_all(text.as_bytes());
+}
+
+/// A heading and rows of as many cells.
+pub struct Table<const N: usize> {
+    heading: [&'static str; N],
+    rows: Vec<[String; N]>,
+}
+
+impl<const N: usize> Table<N> {
+    /// Without rows.
+    pub fn new(heading: [&'static str; N]) -> Self {
+        Self { heading, rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, row: [String; N]) {
+        self.rows.push(row);
+    }
+
+    /// Whether there is a row.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Columns padded to their widest cell.
+    pub fn text(&self) -> String {
+        let heading = self.heading.map(str::to_owned);
+        let all = || std::iter::once(&heading).chain(&self.rows);
+        let widths: [usize; N] =
+            std::array::from_fn(|k| all().map(|row| row[k].chars().count()).max().unwrap_or(0));
+        let line = |row: &[String; N]| {
+            let cells = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}"));
+            let line = cells.collect::<Vec<_>>().join("  ");
+            line.trim_end().to_owned() + "\n"
+        };
+        all().map(line).collect()
+    }
+
+    /// A table of GitHub's Markdown.
+    pub fn markdown(&self) -> String {
+        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+        let escape = |cell: &String| cell.replace('|', "\\|").replace('\n', " ");
+        let mut text = line(&self.heading.map(str::to_owned));
+        text += &format!("|{}\n", "---|".repeat(N));
+        for row in &self.rows {
+            text += &line(&row.iter().map(escape).collect::<Vec<_>>());
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_aligned_and_markdown_escaped() {
+        let mut table = Table::new(["λ", "name"]);
+        table.push(["12".into(), "a|b".into()]);
+        assert_eq!(table.text(), "λ   name\n12  a|b\n");
+        assert_eq!(table.markdown(), "| λ | name |\n|---|---|\n| 12 | a\\|b |\n");
+    }
+}

@@ -1,0 +1,80 @@
+//! Where things are, and how cargo is called.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use miette::{IntoDiagnostic, Result, WrapErr, miette};
+
+/// The workspace that this xtask was built in.
+pub struct Workspace {
+    root: PathBuf,
+    target: PathBuf,
+}
+
+impl Workspace {
+    /// With build products where cargo puts them.
+    pub fn new(root: PathBuf) -> Self {
+        let root = root.canonicalize().unwrap_or(root);
+        let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
+        let target = root.join(target);
+        Self { root, target }
+    }
+
+    /// The folder of the workspace's Cargo.toml.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// A folder for results under target/, created if needed.
+    pub fn results(&self, name: &str) -> Result<PathBuf> {
+        let folder = self.target.join(name);
+        std::fs::create_dir_all(&folder)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("cannot create {}", folder.display()))?;
+        Ok(folder)
+    }
+
+    /// Relative to the root where possible: for messages.
+    pub fn short<'a>(&self, path: &'a Path) -> std::path::Display<'a> {
+        path.strip_prefix(&self.root).unwrap_or(path).display()
+    }
+
+    /// Runs cargo, and tells whether it succeeded.
+    pub fn cargo(&self, arguments: &[&str], more: &[String]) -> Result<bool> {
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo"));
+        let status = Command::new(cargo)
+            .args(arguments)
+            .args(more)
+            .current_dir(&self.root)
+            .status()
+            .into_diagnostic()
+            .wrap_err("cannot start cargo")?;
+        Ok(status.success())
+    }
+
+    /// Builds one of our programs and gives the path of its executable.
+    pub fn release(&self, program: &str) -> Result<PathBuf> {
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if program.is_empty() || !program.chars().all(plain) || !self.has_program(program) {
+            let known = self.programs().join(", ");
+            return Err(miette!("there is no program `{program}` in crates/ (there are: {known})"));
+        }
+        if !self.cargo(&["build", "--release", "--quiet", "--package", program], &[])? {
+            return Err(miette!("`cargo build --release --package {program}` failed"));
+        }
+        Ok(self.target.join("release").join(program).with_extension(std::env::consts::EXE_EXTENSION))
+    }
+
+    fn has_program(&self, name: &str) -> bool {
+        self.root.join("crates").join(name).join("src/main.rs").is_file()
+    }
+
+    fn programs(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.root.join("crates")).into_iter().flatten().flatten();
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        let mut names: Vec<String> = names.filter(|name| self.has_program(name)).collect();
+        names.sort();
+        names
+    }
+}
