@@ -102,11 +102,7 @@ pub fn fracture_energy(context: &Context, stretch: f64) -> f64 {
 /// The stretch at which a bond has stored its share of G, by bisection: energy grows with stretch in tension.
 fn stretch_of_energy(context: &Context, energy: f64) -> Result<f64, Error> {
     let fault = |allowed: &str| {
-        Err(Error::Parameter {
-            name: "critical.fracture_energy (N/m)",
-            found: energy,
-            allowed: allowed.to_owned(),
-        })
+        Err(Error::Parameter { name: "critical.fracture_energy", found: energy, allowed: allowed.to_owned() })
     };
     if !(energy > 0.0 && energy.is_finite()) {
         return fault("above 0");

@@ -16,7 +16,7 @@ use std::path::Path;
 pub fn fields<const D: usize>(
     bonds: &dyn Bonds<D>,
     state: &State<D>,
-    fields: &[(Measure, Vec<Tensor<D>>)],
+    kinds: &[(&str, &[(Measure, Vec<Tensor<D>>)])],
     path: &Path,
 ) -> Result<(), Error> {
     let in_space = |v: [f64; D]| -> [f64; 3] { std::array::from_fn(|d| v.get(d).copied().unwrap_or(0.0)) };
@@ -27,13 +27,14 @@ pub fn fields<const D: usize>(
         points.push(in_space(std::array::from_fn(|d| x[d] + u[d])));
         displacement.extend(in_space(u));
     }
-    let tensors: Vec<(String, Vec<f64>)> = fields
+    let full = |t: &Tensor<D>| -> [f64; 9] {
+        std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
+    };
+    let tensors: Vec<(String, Vec<f64>)> = kinds
         .iter()
-        .map(|(measure, field)| {
-            let full = |t: &Tensor<D>| -> [f64; 9] {
-                std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
-            };
-            (format!("cauchy_{}", measure.name()), field.iter().flat_map(full).collect())
+        .flat_map(|(kind, fields)| fields.iter().map(move |(measure, field)| (kind, measure, field)))
+        .map(|(kind, measure, field)| {
+            (format!("{kind}_{}", measure.name()), field.iter().flat_map(full).collect())
         })
         .collect();
     let mut data: Vec<(&str, usize, &[f64])> = vec![("displacement", 3, &displacement)];

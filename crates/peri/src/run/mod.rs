@@ -1,17 +1,20 @@
 //! A whole scene: every variant solved, measured, compared, drawn and judged; restartable at any moment.
 
+mod bonded;
 mod compare;
 mod draw;
 mod outcome;
 
 pub use outcome::{Outcome, Profile};
 
+use bonded::Bonded;
+
 use crate::bonds::{Bonds, stretch_range};
-use crate::calibrate::{self, Space};
+use crate::calibrate::Space;
 use crate::checkpoint;
 use crate::error::Error;
 use crate::potential::{BondPotential, KernelFit};
-use crate::scene::{self, Scene, SurfaceCorrection, Variant, body_of, loads_of};
+use crate::scene::{self, Scene, Variant, body_of, loads_of};
 use crate::solver::{AdaptiveDynamicRelaxation, Loads, State, Status, System};
 use crate::stress::{Loaded, Tensor, cauchy, deformation_gradients, piola_in_cloud, piola_on_lattice};
 use polycore::report::{Phases, Report};
@@ -93,9 +96,16 @@ fn run_in<const D: usize>(
         for variant in &variants {
             let body = body_of::<D>(source, scene, variant)?;
             loads_of(source, scene, &body)?;
+            Bonded::new(source, scene, variant, body)?;
         }
     }
     polycore::output::prepare_directory(options.output)?;
+    if !options.resume {
+        // what an earlier run left must not pass for this one's
+        for old in [checkpoint::FILE_NAME, polycore::report::FILE_NAME] {
+            let _ = std::fs::remove_file(options.output.join(old));
+        }
+    }
     let (mut finished, mut state) = (Vec::new(), None);
     if options.resume {
         let read = checkpoint::read::<D>(options.output)?;
@@ -127,18 +137,9 @@ fn run_variant<const D: usize>(
 ) -> Result<Outcome, Failure> {
     let mut phases = Phases::new();
     phases.start("build");
-    let mut body = body_of::<D>(source, scene, variant)?;
+    let body = body_of::<D>(source, scene, variant)?;
     let (loads, loaded) = loads_of(source, scene, &body)?;
-    let law = scene.material.bond_law().map_err(Failure::Run)?;
-    let youngs_modulus = scene.material.youngs_modulus.si();
-    let horizon = body.bonds.horizon();
-    let mut modulus = calibrate::modulus(scene.body.space, youngs_modulus, horizon, body.thickness);
-    if let Some(lattice) = body.bonds.as_lattice() {
-        modulus *= calibrate::lattice_factor::<D>(scene.material.calibration, lattice);
-    }
-    if variant.surface == SurfaceCorrection::Energy {
-        body.correct_surface(modulus, calibrate::stiffness_1111(scene.body.space, youngs_modulus));
-    }
+    let Bonded { mut body, law, modulus, critical_stretch } = Bonded::new(source, scene, variant, body)?;
     phases.stop();
     let mut state = state.unwrap_or_else(|| State::new(body.bonds.slots()));
     phases.start("solve");
@@ -148,10 +149,12 @@ fn run_variant<const D: usize>(
     solved?;
     let mut outcome = Outcome::new(variant.name(), variant);
     outcome.work_of(&*body.bonds, &state);
-    let fit =
-        KernelFit::new(&*law, covering(&*body.bonds, &state), scene.solver.fit_bound).map_err(Error::from)?;
+    let fit = KernelFit::new(&*law, covering(&*body.bonds, &state), scene.solver.fit_bound)?;
     outcome.value("fit_error", fit.max_error, "");
-    let mut fields = Vec::new();
+    if let Some(critical) = critical_stretch {
+        outcome.value("critical_stretch", critical, "");
+    }
+    let (mut fields, mut piola_fields) = (Vec::new(), Vec::new());
     if let Some(spec) = &scene.stress {
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(&*body.bonds, &state.displacement));
@@ -162,7 +165,9 @@ fn run_variant<const D: usize>(
             let field = cauchy(&piola, &gradients);
             let seconds = started.elapsed().as_secs_f64();
             phases.add(&format!("stress {}", measure.name()), seconds);
-            outcome.value(&format!("seconds_{}", measure.name()), seconds, "s");
+            if scene.output.fields {
+                piola_fields.push((measure, piola));
+            }
             fields.push((measure, field));
         }
     }
@@ -177,7 +182,7 @@ fn run_variant<const D: usize>(
         draw::fields(
             &*body.bonds,
             &state,
-            &fields,
+            &[("cauchy", &fields), ("piola", &piola_fields)],
             &options.output.join(format!("{}.vtkhdf", outcome.file_name())),
         )?;
     }
@@ -271,7 +276,8 @@ fn explanation_in<const D: usize>(
     for variant in scene::check(source, scene, quick)? {
         let body = body_of::<D>(source, scene, &variant)?;
         loads_of(source, scene, &body)?;
-        lines.extend(scene::explain(scene, &variant, &*body.bonds));
+        let bonded = Bonded::new(source, scene, &variant, body)?;
+        lines.extend(scene::explain(scene, &variant, &*bonded.body.bonds));
     }
     Ok(lines)
 }

@@ -1,0 +1,58 @@
+//! A body with its bond law, as a variant of a scene asks for them.
+
+use crate::calibrate;
+use crate::critical::{Context, Critical};
+use crate::error::Error;
+use crate::potential::BondPotential;
+use crate::run::Failure;
+use crate::scene::{Body, Scene, SurfaceCorrection, Variant};
+use polycore::scene::Source;
+
+/// A body, its law and their constants.
+pub struct Bonded<const D: usize> {
+    /// The body; its bonds do not have their law yet.
+    pub body: Body<D>,
+    /// The bond law.
+    pub law: Box<dyn BondPotential>,
+    /// kθ.
+    pub modulus: f64,
+    /// Where the scene names one.
+    pub critical_stretch: Option<f64>,
+}
+
+impl<const D: usize> Bonded<D> {
+    /// Calibrates and corrects a body.
+    ///
+    /// # Errors
+    /// A fault of the material.
+    pub fn new(
+        source: &Source,
+        scene: &Scene,
+        variant: &Variant,
+        mut body: Body<D>,
+    ) -> Result<Self, Failure> {
+        let (space, material) = (scene.body.space, &scene.material);
+        let law = material.bond_law()?;
+        let youngs_modulus = material.youngs_modulus.si();
+        let (horizon, thickness) = (body.bonds.horizon(), body.thickness);
+        let mut modulus = calibrate::modulus(space, youngs_modulus, horizon, thickness);
+        if let Some(lattice) = body.bonds.as_lattice() {
+            modulus *= calibrate::lattice_factor::<D>(material.calibration, lattice);
+        }
+        if variant.surface == SurfaceCorrection::Energy {
+            body.correct_surface(modulus, calibrate::stiffness_1111(space, youngs_modulus));
+        }
+        let context = Context { law: &*law, links: material.links, space, modulus, horizon, thickness };
+        let resolve = |critical: Critical| critical.resolve(&context);
+        let fault = |error| match error {
+            Error::Parameter { name, found, allowed } => {
+                let found =
+                    if found.is_nan() { "none or several of them".to_owned() } else { found.to_string() };
+                source.error(&format!("material.{name}"), found, allowed)
+            }
+            other => source.error("material.critical", other, "a critical stretch"),
+        };
+        let critical_stretch = material.critical.map(resolve).transpose().map_err(fault)?;
+        Ok(Self { body, law, modulus, critical_stretch })
+    }
+}
