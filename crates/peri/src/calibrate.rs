@@ -145,7 +145,7 @@ mod tests {
             }
         };
         use VolumeCorrection::{Linear, None};
-        check(LatticeModuli::new::<2>(3.015, None), [1.037, 0.990, 1.0486, 1.0017, 0.318, 0.934], "2D none");
+        check(LatticeModuli::new::<2>(3.015, None), [1.037, 0.990, 1.0486, 1.0017, 0.3182, 0.934], "2D none");
         check(
             LatticeModuli::new::<2>(3.015, Linear),
             [0.861, 0.867, 0.859, 0.865, 0.336, 1.010],

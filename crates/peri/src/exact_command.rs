@@ -120,7 +120,7 @@ fn print_law(name: LawName, links: f64, dissociation: f64, to: f64) -> Result<()
         built.tangent()
     );
     println!("{:>8} {:>14} {:>14} {:>14}", "l", "t/kθ", "t′/kθ", "φ/kθ");
-    let from = (0.5 / to).max(0.05).min(0.5);
+    let from = (0.5 / to).clamp(0.05, 0.5);
     for k in 0..=12 {
         let l = from + (to - from) * f64::from(k) / 12.0;
         println!(

@@ -12,11 +12,14 @@ use polycore::output::picture::{FieldMap, LegendPlace, LinePlot, Panel, Series};
 use polycore::output::{csv, vtkhdf::ParticleSeries};
 use std::path::Path;
 
+/// A stress field of each measure.
+type Fields<const D: usize> = [(Measure, Vec<Tensor<D>>)];
+
 /// Displacement and stresses as one VTKHDF file.
 pub fn fields<const D: usize>(
     bonds: &dyn Bonds<D>,
     state: &State<D>,
-    kinds: &[(&str, &[(Measure, Vec<Tensor<D>>)])],
+    kinds: &[(&str, &Fields<D>)],
     path: &Path,
 ) -> Result<(), Error> {
     let in_space = |v: [f64; D]| -> [f64; 3] { std::array::from_fn(|d| v.get(d).copied().unwrap_or(0.0)) };
@@ -49,7 +52,7 @@ pub fn maps<const D: usize>(
     scene: &Scene,
     bonds: &dyn Bonds<D>,
     state: &State<D>,
-    fields: &[(Measure, Vec<Tensor<D>>)],
+    fields: &Fields<D>,
     outcome: &Outcome,
     output: &Path,
 ) -> Result<(), Error> {
