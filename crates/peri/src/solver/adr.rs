@@ -13,6 +13,8 @@ use serde::{Deserialize, Serialize};
 
 /// Iterations between looks at the stretches.
 const LOOK: u64 = 10;
+/// Stretches below this are not fitted.
+const SMALLEST_STRETCH: f64 = 1e-3;
 
 /// Settings of the method.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -184,8 +186,9 @@ impl AdaptiveDynamicRelaxation {
             return Err(not_finite(&*system.bonds, state));
         }
         state.met = state.met.join(met);
-        if look && self.widen(system, state)? {
-            // the law was refitted: this force belongs to the old fit, to within its error bound; go on
+        if look {
+            // after a refit this force still belongs to the old fit, whose range it left by little: go on
+            self.widen(system, state)?;
         }
         let reference = sums.held.sqrt().max(sums.external.sqrt());
         state.reference = state.reference.max(reference);
@@ -239,12 +242,14 @@ impl AdaptiveDynamicRelaxation {
 
     /// Widens the fitted range where stretches have left it, and the mass where the tangent grew.
     fn widen<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>) -> Result<bool, Error> {
-        let (low, high) = ((1.0 + state.met.low).max(0.0).sqrt(), (1.0 + state.met.high).sqrt());
+        // bonds crushed below that are extrapolated: no fit covers l → 0
+        let low = (1.0 + state.met.low).max(0.0).sqrt().max(SMALLEST_STRETCH);
+        let high = (1.0 + state.met.high).sqrt();
         if low >= state.fitted[0] && high <= state.fitted[1] {
             return Ok(false);
         }
         // twice the strain met, so that a growing load does not refit at every look
-        state.fitted[0] = state.fitted[0].min((1.0 - 2.0 * (1.0 - low)).max(0.5 * low)).max(1e-3);
+        state.fitted[0] = state.fitted[0].min((1.0 - 2.0 * (1.0 - low)).max(0.5 * low)).max(SMALLEST_STRETCH);
         state.fitted[1] = state.fitted[1].max(1.0 + 2.0 * (high - 1.0));
         self.fit(system, state)?;
         Ok(true)
