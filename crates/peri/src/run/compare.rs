@@ -96,6 +96,14 @@ pub fn families(outcomes: &[Outcome]) -> Vec<(String, Vec<&Outcome>)> {
     families
 }
 
+/// Seconds that a stress field of one measure takes from the scene on.
+pub fn run_time(outcome: &Outcome, measure: &str) -> f64 {
+    ["build", "solve", "deformation gradient", &format!("stress {measure}")]
+        .map(|phase| outcome.seconds_of(phase))
+        .iter()
+        .sum()
+}
+
 /// Observed order: slope of ln(error) over ln(spacing) by least squares.
 pub fn observed_order(spacing: &[f64], error: &[f64]) -> f64 {
     let points: Vec<(f64, f64)> = spacing.iter().zip(error).map(|(h, e)| (h.ln(), e.ln())).collect();
@@ -145,14 +153,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
                         report.value(&format!("{name}_{kind}_order[{family}]"), order, "");
                     }
                 }
-                let seconds: Vec<f64> = members
-                    .iter()
-                    .map(|o| {
-                        o.seconds_of("build")
-                            + o.seconds_of("solve")
-                            + o.seconds_of(&format!("stress {name}"))
-                    })
-                    .collect();
+                let seconds: Vec<f64> = members.iter().map(|o| run_time(o, name)).collect();
                 let errors: Vec<f64> =
                     members.iter().filter_map(|o| o.get(&format!("{name}_rmse"))).collect();
                 report.curve(

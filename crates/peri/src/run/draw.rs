@@ -1,6 +1,6 @@
 //! Pictures and field files of a run.
 
-use super::compare::{families, plate_width};
+use super::compare::{families, plate_width, run_time};
 use super::outcome::Outcome;
 use crate::bonds::Bonds;
 use crate::exact;
@@ -91,34 +91,29 @@ pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), 
     if families.is_empty() {
         return Ok(());
     }
-    let mut convergence = LinePlot::new("Stress error of the plate with a hole").log_x().log_y();
-    convergence = convergence.axes("spacing Δx (mm)", "RMSE of σ₁₁/σ∞ (2.84)");
-    let mut cost = LinePlot::new("Error against run time").log_x().log_y();
+    let mut cost = LinePlot::new("Error against run time").log_x().log_y().size(1000.0, 560.0);
     cost = cost.axes("build + solve + stress (s)", "RMSE of σ₁₁/σ∞ (2.84)");
     let mut rows: Vec<Vec<f64>> = vec![Vec::new(); 5];
-    for (family, members) in &families {
-        for (index, measure) in stress.measures.iter().enumerate().filter(|(_, m)| **m != Measure::Printed) {
-            let name = measure.name();
-            let label = format!("{name} {family}");
+    for (index, measure) in stress.measures.iter().enumerate().filter(|(_, m)| **m != Measure::Printed) {
+        let name = measure.name();
+        let mut convergence = LinePlot::new(&format!("Stress error of the plate with a hole, {name}"));
+        convergence = convergence.log_x().log_y().size(900.0, 500.0);
+        convergence = convergence.axes("spacing Δx (mm)", "RMSE of σ₁₁/σ∞ (2.84)");
+        for (family, members) in &families {
             let error: Vec<f64> = members.iter().filter_map(|o| o.get(&format!("{name}_rmse"))).collect();
             let spacing: Vec<f64> = members.iter().map(|o| o.spacing * 1e3).collect();
-            let seconds: Vec<f64> = members
-                .iter()
-                .map(|o| {
-                    o.seconds_of("build") + o.seconds_of("solve") + o.seconds_of(&format!("stress {name}"))
-                })
-                .collect();
+            let seconds: Vec<f64> = members.iter().map(|o| run_time(o, name)).collect();
             for (row, outcome) in members.iter().enumerate() {
                 let values = [spacing[row], outcome.horizon_ratio, index as f64, seconds[row], error[row]];
                 for (column, value) in rows.iter_mut().zip(values) {
                     column.push(value);
                 }
             }
-            convergence = convergence.series(Series::marked_line(&label, &spacing, &error));
-            cost = cost.series(Series::marked_line(&label, &seconds, &error));
+            convergence = convergence.series(Series::marked_line(family, &spacing, &error));
+            cost = cost.series(Series::marked_line(&format!("{name} {family}"), &seconds, &error));
         }
+        convergence.write(output.join(format!("convergence_{name}.png")))?;
     }
-    convergence.write(output.join("convergence.png"))?;
     cost.write(output.join("error_against_time.png"))?;
     let names = [("spacing", "mm"), ("horizon_ratio", ""), ("measure", ""), ("run_time", "s"), ("rmse", "")];
     let columns: Vec<_> =
