@@ -43,10 +43,15 @@ struct Case {
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let cases = find(workspace, options)?;
     let folder = workspace.results("validate")?;
-    let mut programs = BTreeMap::new();
+    let mut built = BTreeMap::new();
+    let mut release = |program: &str| {
+        let build = || workspace.release(program).map_err(|error| error.to_string());
+        let executable = built.entry(program.to_owned()).or_insert_with(build).clone();
+        executable.map_err(|reason| miette!("{reason}"))
+    };
     let mut outcomes = Vec::new();
     for case in &cases {
-        let outcome = run_case(workspace, &folder, case, options.quick, &mut programs);
+        let outcome = run_case(&folder, case, options.quick, &mut release);
         let verdict = if outcome.passed() { "passed" } else { "FAILED" };
         eprintln!("{verdict}  {:<40} {:8.1} s", outcome.case, outcome.seconds);
         if !outcome.passed() {
@@ -107,20 +112,15 @@ fn name(cases: &Path, file: &Path) -> String {
 
 /// Never an error: whatever goes wrong is the outcome of this case.
 fn run_case(
-    workspace: &Workspace,
     folder: &Path,
     case: &Case,
     quick: bool,
-    programs: &mut BTreeMap<String, std::result::Result<PathBuf, String>>,
+    release: &mut dyn FnMut(&str) -> Result<PathBuf>,
 ) -> Outcome {
     let mut outcome = Outcome::new(&case.name);
     let result = (|| {
         outcome.program = program_of(&case.file)?;
-        let program = outcome.program.clone();
-        let built = programs
-            .entry(program.clone())
-            .or_insert_with(|| workspace.release(&program).map_err(|error| error.to_string()));
-        let executable = built.clone().map_err(|reason| miette!("{reason}"))?;
+        let executable = release(&outcome.program)?;
         let output = folder.join(&case.name);
         let since = Instant::now();
         let status = start(&executable, case, folder, &output, quick);
@@ -199,5 +199,34 @@ mod tests {
         let cases = Path::new("/p/cases");
         assert_eq!(name(cases, Path::new("/p/cases/ch2/plate/case.toml")), "ch2/plate");
         assert_eq!(name(cases, Path::new("/elsewhere/mine/case.toml")), "mine");
+    }
+
+    /// A case run by a shell script in place of a program.
+    #[cfg(unix)]
+    fn outcome(case: &str, script: &str) -> Outcome {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().expect("a folder");
+        let (file, program) = (folder.path().join("case.toml"), folder.path().join("program"));
+        fs::write(&file, case).expect("a case");
+        fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("a script");
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("permissions");
+        let case = Case { name: "ch9/it".to_owned(), file };
+        run_case(folder.path(), &case, true, &mut |_| Ok(program.clone()))
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn whatever_a_program_does_is_an_outcome() {
+        let case = "program = \"peri\"";
+        let failure = |case: &str, script: &str| outcome(case, script).failure.unwrap_or_default();
+        assert_eq!(failure(case, "kill -9 $$"), "killed by signal 9");
+        assert_eq!(failure(case, "exit 101"), "exit code 101");
+        assert!(failure(case, "exit 0").contains("report.json"));
+        assert!(failure(case, "echo '{' > $4/report.json").contains("not a valid report"));
+        assert!(failure("program = 3", "exit 0").contains("names no program"));
+        assert!(!failure("program = ", "exit 0").is_empty());
+        let report = serde_json::to_string(&Report::new("peri", "0", "")).expect("JSON");
+        let good = format!("[ $1$3$5 = run--output--quick ] && echo '{report}' > $4/report.json");
+        assert!(outcome(case, &good).passed());
     }
 }

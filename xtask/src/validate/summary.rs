@@ -81,17 +81,17 @@ impl Outcome {
 /// Every expectation of every case, seconds by case, and a last line of sums.
 pub fn text(outcomes: &[Outcome]) -> String {
     let mut table = Table::new(["case", "quantity", "value", "asked for", "verdict"]);
-    let mut times = Table::new(["case", "program", "seconds", "work"]);
+    let mut times = Table::new(["case", "program", "seconds", "expectations", "not met"]);
     for outcome in outcomes {
         for [verdict, quantity, value, asked, _] in outcome.rows() {
             table.push([outcome.case.clone(), quantity, value, asked, verdict]);
         }
-        let work = outcome.work.iter().map(|(name, count)| format!("{name} {count}"));
         times.push([
             outcome.case.clone(),
             outcome.program.clone(),
             format!("{:.1}", outcome.seconds),
-            work.collect::<Vec<_>>().join(", "),
+            outcome.expect.len().to_string(),
+            outcome.expect.iter().filter(|judgement| !judgement.pass).count().to_string(),
         ]);
     }
     let mut text = String::new();
