@@ -1,7 +1,8 @@
 //! Loads and supports: body forces and prescribed displacement components, proportional to one load factor.
 
 use crate::bonds::Bonds;
-use crate::field::Field;
+use crate::field::{CHUNK, Field};
+use rayon::prelude::*;
 
 /// What is prescribed in a region at load factor 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,39 +110,53 @@ impl<const D: usize> Loads<D> {
     }
 
     /// The homogeneous strain H whose bond forces do the same virtual work as the body forces in every homogeneous
-    /// strain: Σ_I V_I Σ_J kθK w V_J |ξ| (n·Hn) n_a n_b = Σ_I V_I b_a X_b (Galerkin's projection; no rotation).
+    /// strain: Σ_I V_I Σ_J kθK w V_J |ξ| (n·Hn)(n·Gn) = Σ_I V_I b·G X for all symmetric G (Galerkin's projection).
     /// `stiffness` is kθK.
     fn affine_balance(&self, bonds: &dyn Bonds<D>, stiffness: f64) -> [[f64; 4]; D] {
         let mut result = [[0.0; 4]; D];
         let Some(body_force) = &self.body_force else { return result };
-        let mut matrix = nalgebra::DMatrix::<f64>::zeros(D * D, D * D);
-        let mut right = nalgebra::DVector::<f64>::zeros(D * D);
-        for &slot in bonds.particles() {
-            let slot = slot as usize;
-            let volume = bonds.volume(slot);
-            bonds.neighbours(slot, &mut |bond| {
-                let dyad = |k: usize| bond.bond[k / D] * bond.bond[k % D] / (bond.length * bond.length);
-                let factor = stiffness * volume * bond.weight * bond.length;
-                for row in 0..D * D {
-                    for column in 0..D * D {
-                        matrix[(row, column)] += factor * dyad(row) * dyad(column);
+        // components (a, b) of H, a ≤ b; off the diagonal each stands for two
+        let pairs: Vec<(usize, usize)> = (0..D).flat_map(|a| (a..D).map(move |b| (a, b))).collect();
+        let twice = |(a, b): (usize, usize)| if a == b { 1.0 } else { 2.0 };
+        let part = |slots: &[u32]| {
+            let mut matrix = [[0.0; 6]; 6];
+            let mut right = [0.0; 6];
+            for &slot in slots {
+                let slot = slot as usize;
+                let volume = bonds.volume(slot);
+                bonds.neighbours(slot, &mut |bond| {
+                    let mut dyad = [0.0; 6];
+                    for (value, &(a, b)) in dyad.iter_mut().zip(&pairs) {
+                        *value = twice((a, b)) * bond.bond[a] * bond.bond[b] / (bond.length * bond.length);
                     }
+                    let factor = stiffness * volume * bond.weight * bond.length;
+                    for row in 0..pairs.len() {
+                        for column in 0..pairs.len() {
+                            matrix[row][column] += factor * dyad[row] * dyad[column];
+                        }
+                    }
+                });
+                let (force, position) = (body_force.get(slot), bonds.position(slot));
+                for (value, &(a, b)) in right.iter_mut().zip(&pairs) {
+                    *value +=
+                        0.5 * twice((a, b)) * volume * (force[a] * position[b] + force[b] * position[a]);
                 }
-            });
-            let (force, position) = (body_force.get(slot), bonds.position(slot));
-            for k in 0..D * D {
-                // the symmetric part: a couple does no work in a strain
-                let (a, b) = (k / D, k % D);
-                right[k] += 0.5 * volume * (force[a] * position[b] + force[b] * position[a]);
             }
-        }
+            (matrix, right)
+        };
+        let parts: Vec<([[f64; 6]; 6], [f64; 6])> = bonds.particles().par_chunks(CHUNK).map(part).collect();
+        let count = pairs.len();
+        let matrix =
+            nalgebra::DMatrix::from_fn(count, count, |i, j| parts.iter().map(|p| p.0[i][j]).sum::<f64>());
+        let right = nalgebra::DVector::from_fn(count, |i, _| parts.iter().map(|p| p.1[i]).sum::<f64>());
         let size = matrix.trace();
         if size > 0.0
             && let Ok(inverse) = (matrix / size).pseudo_inverse(1e-10)
         {
             let strain = inverse * right / size;
-            for k in 0..D * D {
-                result[k / D][k % D + 1] = strain[k];
+            for (&(a, b), &value) in pairs.iter().zip(strain.iter()) {
+                result[a][b + 1] = value;
+                result[b][a + 1] = value;
             }
         }
         result
