@@ -10,6 +10,7 @@ pub mod exact;
 pub mod field;
 pub mod geometry;
 pub mod potential;
+mod quadrature;
 pub mod solver;
 pub mod stress;
 

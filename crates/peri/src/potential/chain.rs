@@ -4,7 +4,10 @@
 //! one scalar root; nothing implicit is left in a bond.
 
 use crate::error::Error;
-use polycore::langevin::{derivative, free_energy, langevin};
+use polycore::langevin::{complement, derivative, free_energy, inverse, langevin};
+
+/// Newton's method needs 3 to 8 steps; its fallback, bisection, more for absurd parameters only.
+const MOST_STEPS: usize = 400;
 
 /// A chain of n̄ links whose bonds have the energy ½ D (ln λ_b)².
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,21 +46,29 @@ impl Chain {
         Ok(Self { links, dissociation })
     }
 
-    /// The state at parameter β ≥ 0.
+    /// The state at parameter β ≥ 0; at ∞ the torn chain: no force, no stiffness.
     pub fn at(&self, beta: f64) -> ChainPoint {
+        if beta == f64::INFINITY {
+            return ChainPoint {
+                stretch: beta,
+                link_stretch: beta,
+                force: 0.0,
+                stiffness: 0.0,
+                energy: beta,
+            };
+        }
         let (x, slope) = (langevin(beta), derivative(beta));
         let root = self.links.sqrt();
-        let link_stretch = (beta * x / self.dissociation).exp();
+        let work = beta * (x / self.dissociation);
+        let link_stretch = work.exp();
         // q = d ln λ_b/dβ
         let q = (x + beta * slope) / self.dissociation;
-        let stretch_slope = root * link_stretch * (slope + x * q);
-        let force_slope = root / link_stretch * (1.0 - beta * q);
         ChainPoint {
             stretch: root * x * link_stretch,
             link_stretch,
             force: root * beta / link_stretch,
-            stiffness: force_slope / stretch_slope,
-            energy: self.links * (free_energy(beta) + 0.5 * (beta * x).powi(2) / self.dissociation),
+            stiffness: (1.0 - beta * q) / (slope + x * q) / link_stretch / link_stretch,
+            energy: self.links * (free_energy(beta) + 0.5 * beta * x * work),
         }
     }
 
@@ -66,56 +77,54 @@ impl Chain {
         self.at(self.beta(stretch))
     }
 
-    /// β at a chain stretch: root of ln x + βx/D̂ = ln(λ̄/√n̄) by bisection-guarded Newton in ln β, in which the left
-    /// side is nearly linear for small and for large β alike.
+    /// β at a chain stretch λ̄ (its magnitude is taken): x λ_b = λ̄/√n̄. A few ulp of the exact value for the given λ̄, also
+    /// at λ̄ ≈ √n̄, where the curve is nearly vertical; ∞ at ∞.
     pub fn beta(&self, stretch: f64) -> f64 {
         let ratio = stretch.abs() / self.links.sqrt();
-        if ratio == 0.0 || ratio.is_nan() {
-            return ratio;
+        // also the limits: 0, ∞, and NaN for NaN
+        if ratio == 0.0 || !ratio.is_finite() {
+            ratio
+        } else if ratio < 0.5 {
+            self.slack(ratio)
+        } else {
+            self.taut(self.logarithm(stretch.abs()))
         }
-        let target = ratio.ln();
-        let excess = |beta: f64| {
-            let x = langevin(beta);
-            x.ln() + beta * x / self.dissociation - target
-        };
-        // x ≤ β/3 and λ_b ≥ 1 bound β from below only where λ_b ≈ 1; walk from there in factors of four
-        let (mut low, mut high) = (3.0 * ratio, 3.0 * ratio);
-        for _ in 0..600 {
-            if excess(low) <= 0.0 || low < 1e-300 {
-                break;
-            }
-            high = low;
-            low *= 0.25;
-        }
-        for _ in 0..600 {
-            if excess(high) >= 0.0 || high > 1e300 {
-                break;
-            }
-            low = high;
-            high *= 4.0;
-        }
-        let mut beta = (low * high).sqrt();
-        for _ in 0..100 {
-            let value = excess(beta);
-            if value == 0.0 {
-                break;
-            }
-            if value < 0.0 {
-                low = beta
-            } else {
-                high = beta
-            }
+    }
+
+    /// x λ_b = r for r < 1/2. The rigid chain gives an upper bound.
+    fn slack(&self, ratio: f64) -> f64 {
+        let start = inverse(ratio);
+        newton(start, start, |beta| {
             let (x, slope) = (langevin(beta), derivative(beta));
-            let rate = beta * (slope / x + (x + beta * slope) / self.dissociation);
-            let newton = beta * (-value / rate).exp();
-            let next = if newton > low && newton < high { newton } else { (low * high).sqrt() };
-            let moved = (next - beta).abs();
-            beta = next;
-            if moved <= 2e-16 * beta {
-                break;
-            }
+            let link_stretch = (beta * (x / self.dissociation)).exp();
+            let q = (x + beta * slope) / self.dissociation;
+            (x * link_stretch - ratio, link_stretch * (slope + x * q))
+        })
+    }
+
+    /// ln x + βx/D̂ = ln r for r ≥ 1/2: both terms keep their digits where x → 1.
+    fn taut(&self, logarithm: f64) -> f64 {
+        // with ln x ≈ −1/β and βx ≈ β − 1: β² − D̂bβ − D̂ = 0
+        let b = logarithm + 1.0 / self.dissociation;
+        let half = 0.5 * self.dissociation * b.abs();
+        let larger = half + (half * half + self.dissociation).sqrt();
+        let start = if b >= 0.0 { larger } else { self.dissociation / larger };
+        newton(start, f64::INFINITY, |beta| {
+            let (x, slope, missing) = (langevin(beta), derivative(beta), complement(beta));
+            let work = beta * (x / self.dissociation);
+            ((-missing).ln_1p() + (work - logarithm), slope / x + (x + beta * slope) / self.dissociation)
+        })
+    }
+
+    /// ln(λ̄/√n̄), with λ̄² − n̄ in doubled precision near locking.
+    fn logarithm(&self, stretch: f64) -> f64 {
+        let ratio = stretch / self.links.sqrt();
+        if !(0.8..1.25).contains(&ratio) {
+            return ratio.ln();
         }
-        beta
+        let square = stretch * stretch;
+        let excess = (square - self.links) + stretch.mul_add(stretch, -square);
+        0.5 * (excess / self.links).ln_1p()
     }
 
     /// The greatest force, at β = D̂ up to terms e^{−2D̂}: where d(β/λ_b)/dβ = 0.
@@ -128,5 +137,137 @@ impl Chain {
             if excess(middle) < 0.0 { low = middle } else { high = middle }
         }
         self.at(0.5 * (low + high))
+    }
+}
+
+/// The positive root of an increasing function, from its value and slope: Newton's method kept inside a shrinking bracket.
+fn newton(start: f64, upper: f64, value_and_slope: impl Fn(f64) -> (f64, f64)) -> f64 {
+    let (mut low, mut high) = (0.0, upper);
+    let mut at = start;
+    for _ in 0..MOST_STEPS {
+        let (value, slope) = value_and_slope(at);
+        if value > 0.0 {
+            high = at;
+        } else {
+            low = at;
+        }
+        let step = value / slope;
+        let next = at - step;
+        // the step after this one would be its square
+        if step.abs() <= 1e-9 * at {
+            return next.clamp(low, upper);
+        }
+        let inside = next > low && next < high;
+        at = match (inside, high.is_finite()) {
+            (true, _) => next,
+            (false, true) if low > 0.0 => (low * high).sqrt(),
+            (false, true) => 0.1 * high,
+            (false, false) => 2.0 * at,
+        };
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn nothing_pulls_harder_than_the_strongest() {
+        for dissociation in [1.0, 1.5, 4.0, 19.9, 20.1, 1200.0, 1e9] {
+            for links in [2.0, 720.0, 1e6] {
+                let chain = Chain::new(links, dissociation).unwrap();
+                let top = chain.strongest();
+                assert!((chain.stretched(top.stretch).force / top.force - 1.0).abs() < 1e-13);
+                assert!(chain.stretched(0.999 * top.stretch).stiffness > 0.0);
+                assert!(chain.stretched(1.001 * top.stretch).stiffness < 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn limits() {
+        for (links, dissociation) in [(1.0, 1e-30), (2.0, 1.0), (720.0, 1200.0), (1e6, 1e9), (1e12, 1e12)] {
+            let chain = Chain::new(links, dissociation).unwrap();
+            let rest = chain.stretched(0.0);
+            assert_eq!((rest.force, rest.energy, rest.stiffness, rest.link_stretch), (0.0, 0.0, 3.0, 1.0));
+            let torn = chain.stretched(f64::INFINITY);
+            assert_eq!((torn.force, torn.stiffness, torn.energy), (0.0, 0.0, f64::INFINITY));
+            assert!(chain.stretched(f64::NAN).force.is_nan());
+            for small in [1e-300, 1e-150, 1e-20, 1e-9] {
+                // 3λ̄(1 + O(λ̄²(1/n̄ + 1/(n̄D̂))))
+                let force = chain.stretched(small).force;
+                assert!(dissociation < 1.0 || (force / (3.0 * small) - 1.0).abs() < 1e-14);
+            }
+            // far beyond the maximum λ_b → λ̄/√n̄, so that Tλ̄ = n̄βx = n̄D̂ ln(λ̄/√n̄)
+            for large in [1e100, 1e200, f64::MAX] {
+                let asymptote = dissociation * (large.ln() - 0.5 * links.ln()) * (links / large);
+                let force = chain.stretched(large).force;
+                assert!(force.is_finite());
+                // ln x ~ −1/β is left out, β ~ 200 D̂; exp of up to 700
+                let bound = 1e-2 / dissociation + 1e-12;
+                assert!(
+                    dissociation < 1.0 || (force / asymptote - 1.0).abs() < bound,
+                    "{large} {dissociation}"
+                );
+            }
+        }
+    }
+
+    /// The implicit relation (2.41) solved directly for λ_b by bisection.
+    #[test]
+    fn agrees_with_the_implicit_relation_solved_directly() {
+        for dissociation in [1200.0, 2300.0] {
+            for links in [720.0f64, 90.0, 100.0, 12.5] {
+                let chain = Chain::new(links, dissociation).unwrap();
+                for ratio in [0.05, 0.3, 0.7, 0.95, 1.0, 1.05, 1.1, 1.2, 1.5] {
+                    let (mut low, mut high) = (f64::max(ratio, 1.0), 3.0 * ratio + 1.0);
+                    for _ in 0..200 {
+                        let middle = 0.5 * (low + high);
+                        let less = middle.ln() * middle * dissociation < ratio * inverse(ratio / middle);
+                        *(if less { &mut low } else { &mut high }) = middle;
+                    }
+                    let force = links.sqrt() * inverse(ratio / low) / low;
+                    let found = chain.stretched(ratio * links.sqrt());
+                    // the bisection resolves λ_b to ε, and β = 1/(1 − x) loses a factor 1/(1 − x) < 1e3 of it
+                    assert!((found.link_stretch / low - 1.0).abs() < 1e-14, "{links} {ratio}");
+                    assert!((found.force / force - 1.0).abs() < 1e-12, "{links} {ratio}");
+                }
+            }
+        }
+    }
+
+    proptest! {
+        /// λ̄(β) back to β: what is lost is the rounding of λ̄ times the condition number of the inversion, which is
+        /// up to √D̂ at locking.
+        #[test]
+        fn inversion(exponent in -8.0..9.0f64, links in 0.0..6.0f64, dissociation in 0.0..9.0f64) {
+            let chain = Chain::new(10f64.powf(links), 10f64.powf(dissociation)).unwrap();
+            let beta = 10f64.powf(exponent);
+            let (x, slope) = (langevin(beta), derivative(beta));
+            let work = beta * x / chain.dissociation;
+            prop_assume!(work < 600.0);
+            let sensitivity = beta * (slope / x + (x + beta * slope) / chain.dissociation);
+            // λ̄ itself: 𝓛 3.5 ulp, the exponent 4 ulp, two roundings and √n̄
+            let rounding = (6.0 + 4.0 * work) * f64::EPSILON / sensitivity;
+            let error = (chain.beta(chain.at(beta).stretch) / beta - 1.0).abs();
+            prop_assert!(error < rounding + 8.0 * f64::EPSILON, "{} {}", error, rounding);
+        }
+
+        /// φ → T → dT/dλ̄ on both sides of locking and of the maximum.
+        #[test]
+        fn differences(ratio in 0.01..4.0f64, links in 0.31..5.0f64, dissociation in 0.0..3.5f64) {
+            let chain = Chain::new(10f64.powf(links), 10f64.powf(dissociation)).unwrap();
+            let stretch = ratio * chain.links.sqrt();
+            // the curve bends over √n̄/√D̂ > 0.017 λ̄: truncation (2e-6/0.017)²/6, cancellation ε/2e-6
+            let (left, right) = (chain.stretched(stretch * (1.0 - 2e-6)), chain.stretched(stretch * (1.0 + 2e-6)));
+            let (width, here) = (4e-6 * stretch, chain.stretched(stretch));
+            let force = (right.energy - left.energy) / width;
+            prop_assert!((force - here.force).abs() < 1e-6 * here.force.max(1e-3 * here.energy / stretch));
+            let stiffness = (right.force - left.force) / width;
+            let scale = here.stiffness.abs() + here.force / stretch;
+            prop_assert!((stiffness - here.stiffness).abs() < 1e-6 * scale, "{} {}", stiffness, here.stiffness);
+        }
     }
 }

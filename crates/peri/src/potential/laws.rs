@@ -1,20 +1,50 @@
 //! The chain force with four reference states, and the linear bond.
 
 use super::{BondPotential, Chain};
+use crate::quadrature::mean;
+
+/// Strains below which T(l) − T(1) is an integral of T′, which does not cancel.
+const SMALL_DIFFERENCE: f64 = 0.03;
+
+/// Strains below which an energy is an integral of the tension, which does not cancel.
+const SMALL_ENERGY: f64 = 0.05;
 
 /// `subtract`: t = T(l) − T(1).
-pub struct BondStretch(pub Chain);
+///
+/// K = T′(1) = 3 + 27/(5n̄) − 36/(n̄D̂) + O(n̄⁻²). Far beyond the greatest force of the chain t turns negative again and tends
+/// to −T(1); bonds break long before.
+pub struct BondStretch {
+    chain: Chain,
+    force_at_rest: f64,
+}
+
+impl BondStretch {
+    /// The law of a chain.
+    pub fn new(chain: Chain) -> Self {
+        Self { chain, force_at_rest: chain.stretched(1.0).force }
+    }
+}
 
 impl BondPotential for BondStretch {
     fn tension(&self, stretch: f64) -> f64 {
-        self.0.stretched(stretch).force - self.0.stretched(1.0).force
+        self.tension_at_strain(stretch - 1.0)
+    }
+    fn tension_at_strain(&self, strain: f64) -> f64 {
+        if strain.abs() < SMALL_DIFFERENCE {
+            strain * mean(0.0, strain, |part| self.chain.stretched(1.0 + part).stiffness)
+        } else {
+            self.chain.stretched(1.0 + strain).force - self.force_at_rest
+        }
     }
     fn tension_derivative(&self, stretch: f64) -> f64 {
-        self.0.stretched(stretch).stiffness
+        self.chain.stretched(stretch).stiffness
     }
     fn energy(&self, stretch: f64) -> f64 {
-        let rest = self.0.stretched(1.0);
-        self.0.stretched(stretch).energy - rest.energy - rest.force * (stretch - 1.0)
+        if stretch == f64::INFINITY {
+            return f64::NEG_INFINITY;
+        }
+        energy_near_rest(self, stretch)
+            .unwrap_or_else(|| energy_from_rest(&self.chain, stretch) - self.force_at_rest * (stretch - 1.0))
     }
 }
 
@@ -23,12 +53,13 @@ pub struct Shifted(pub Chain);
 
 impl BondPotential for Shifted {
     fn tension(&self, stretch: f64) -> f64 {
-        let strain = stretch - 1.0;
+        self.tension_at_strain(stretch - 1.0)
+    }
+    fn tension_at_strain(&self, strain: f64) -> f64 {
         self.0.stretched(strain).force.copysign(strain)
     }
     fn tension_derivative(&self, stretch: f64) -> f64 {
-        // the derivative at β → 0 is a quotient of zeros: start just beside it
-        self.0.stretched((stretch - 1.0).abs().max(1e-12)).stiffness
+        self.0.stretched(stretch - 1.0).stiffness
     }
     fn energy(&self, stretch: f64) -> f64 {
         self.0.stretched(stretch - 1.0).energy
@@ -40,31 +71,68 @@ pub struct NetworkStretch(pub Chain);
 
 impl NetworkStretch {
     /// g(l) of Eq. (2.38): stretch of a chain in a network of which one direction is stretched by l at constant volume.
+    /// Least at l = 1, where it is 1; ∞ at 0 and at ∞.
     pub fn chain_stretch(stretch: f64) -> f64 {
-        ((stretch.powf(4.0 / 3.0) + 2.0 * stretch.powf(-2.0 / 3.0)) / 3.0).sqrt()
+        if stretch == f64::INFINITY {
+            return f64::INFINITY;
+        }
+        // g = l^{−1/3}√((l² + 2)/3), l² kept from overflow
+        let scale = if stretch > 1.0 { stretch } else { 1.0 };
+        let reduced = stretch / scale;
+        ((reduced * reduced + 2.0 / scale / scale) / 3.0).sqrt() * scale / stretch.cbrt()
     }
 
-    /// g′(l).
+    /// g′(l) = g·(2/3)(l² − 1)/(l(l² + 2)).
     pub fn chain_stretch_derivative(stretch: f64) -> f64 {
-        // l^{1/3} − l^{−5/3} = l^{−5/3}(l − 1)(l + 1), without cancellation near l = 1
-        let difference = stretch.powf(-5.0 / 3.0) * (stretch - 1.0) * (stretch + 1.0);
-        2.0 / 9.0 * difference / Self::chain_stretch(stretch)
+        Self::chain_stretch(stretch) * Self::rate(stretch, stretch - 1.0) / stretch
+    }
+
+    /// l g′/g = (2/3)(l² − 1)/(l² + 2), l = 1 + s given twice: each as exact as it can be.
+    fn rate(stretch: f64, strain: f64) -> f64 {
+        if stretch > 1e100 {
+            2.0 / 3.0
+        } else {
+            2.0 / 3.0 * (strain * (2.0 + strain)) / (stretch * stretch + 2.0)
+        }
+    }
+
+    fn force(&self, stretch: f64, strain: f64) -> f64 {
+        if stretch == 0.0 {
+            return f64::NEG_INFINITY;
+        }
+        if stretch == f64::INFINITY {
+            return 0.0;
+        }
+        let g = Self::chain_stretch(stretch);
+        self.0.stretched(g).force * g * Self::rate(stretch, strain) / stretch
     }
 }
 
 impl BondPotential for NetworkStretch {
     fn tension(&self, stretch: f64) -> f64 {
-        self.0.stretched(Self::chain_stretch(stretch)).force * Self::chain_stretch_derivative(stretch)
+        self.force(stretch, stretch - 1.0)
+    }
+    fn tension_at_strain(&self, strain: f64) -> f64 {
+        self.force(1.0 + strain, strain)
     }
     fn tension_derivative(&self, stretch: f64) -> f64 {
-        let (g, slope) = (Self::chain_stretch(stretch), Self::chain_stretch_derivative(stretch));
-        let outer = 2.0 / 9.0 * (stretch.powf(-2.0 / 3.0) + 5.0 * stretch.powf(-8.0 / 3.0)) / 3.0;
-        let curvature = (outer - slope * slope) / g;
+        if stretch == 0.0 {
+            return f64::INFINITY;
+        }
+        if stretch > 1e75 {
+            return 0.0;
+        }
+        // t = T g y with y = g′/g, so t′ = (T′g + T) g y² + T g y′, y′ = (2/3)(2 + 5l² − l⁴)/(l²(l² + 2)²)
+        let square = stretch * stretch;
+        let y = Self::rate(stretch, stretch - 1.0) / stretch;
+        let slope = 2.0 / 3.0 * (2.0 + square * (5.0 - square)) / (square * (square + 2.0) * (square + 2.0));
+        let g = Self::chain_stretch(stretch);
         let point = self.0.stretched(g);
-        point.stiffness * slope * slope + point.force * curvature
+        (point.stiffness * g + point.force) * g * y * y + point.force * g * slope
     }
     fn energy(&self, stretch: f64) -> f64 {
-        self.0.stretched(Self::chain_stretch(stretch)).energy - self.0.stretched(1.0).energy
+        energy_near_rest(self, stretch)
+            .unwrap_or_else(|| energy_from_rest(&self.0, Self::chain_stretch(stretch)))
     }
 }
 
@@ -79,7 +147,7 @@ impl BondPotential for Printed {
         self.0.stretched(stretch).stiffness
     }
     fn energy(&self, stretch: f64) -> f64 {
-        self.0.stretched(stretch).energy - self.0.stretched(1.0).energy
+        energy_near_rest(self, stretch).unwrap_or_else(|| energy_from_rest(&self.0, stretch))
     }
     fn is_stress_free(&self) -> bool {
         false
@@ -92,6 +160,9 @@ pub struct LinearBond;
 impl BondPotential for LinearBond {
     fn tension(&self, stretch: f64) -> f64 {
         3.0 * (stretch - 1.0)
+    }
+    fn tension_at_strain(&self, strain: f64) -> f64 {
+        3.0 * strain
     }
     fn tension_derivative(&self, _stretch: f64) -> f64 {
         3.0
@@ -113,6 +184,9 @@ impl<L: BondPotential> BondPotential for Scaled<L> {
     fn tension(&self, stretch: f64) -> f64 {
         self.factor * self.law.tension(stretch)
     }
+    fn tension_at_strain(&self, strain: f64) -> f64 {
+        self.factor * self.law.tension_at_strain(strain)
+    }
     fn tension_derivative(&self, stretch: f64) -> f64 {
         self.factor * self.law.tension_derivative(stretch)
     }
@@ -122,4 +196,15 @@ impl<L: BondPotential> BondPotential for Scaled<L> {
     fn is_stress_free(&self) -> bool {
         self.law.is_stress_free()
     }
+}
+
+/// φ(λ̄) − φ(1) of a chain.
+fn energy_from_rest(chain: &Chain, stretch: f64) -> f64 {
+    chain.stretched(stretch).energy - chain.stretched(1.0).energy
+}
+
+/// The energy by quadrature of the tension, where a difference of energies would cancel.
+fn energy_near_rest(law: &impl BondPotential, stretch: f64) -> Option<f64> {
+    let strain = stretch - 1.0;
+    (strain.abs() < SMALL_ENERGY).then(|| strain * mean(0.0, strain, |part| law.tension_at_strain(part)))
 }

@@ -14,9 +14,15 @@ use crate::error::Error;
 use serde::Deserialize;
 
 /// A law on bond stretches. Laws are sampled when a kernel is fitted, never in a hot loop.
+///
+/// Stretches are ≥ 0; at 0 and ∞ laws have their limits, NaN gives NaN.
 pub trait BondPotential: Send + Sync {
     /// Force density t/kθ, Eq. (2.47) with the reference state of the law.
     fn tension(&self, stretch: f64) -> f64;
+    /// t/kθ at the strain s = l − 1 ≥ −1: keeps the digits of small strains.
+    fn tension_at_strain(&self, strain: f64) -> f64 {
+        self.tension(1.0 + strain)
+    }
     /// dt/dl/kθ.
     fn tension_derivative(&self, stretch: f64) -> f64;
     /// Energy φ/kθ per unit reference length of the bond, Eq. (2.39); zero at l = 1.
@@ -90,7 +96,7 @@ impl Law {
     ) -> Result<Box<dyn BondPotential>, Error> {
         let chain = || Chain::new(links, dissociation);
         Ok(match self {
-            Self::Subtract => scaled(BondStretch(chain()?), rescale),
+            Self::Subtract => scaled(BondStretch::new(chain()?), rescale),
             Self::Shift => scaled(Shifted(chain()?), rescale),
             Self::Chain => scaled(NetworkStretch(chain()?), rescale),
             Self::Printed => scaled(Printed(chain()?), rescale),

@@ -37,6 +37,104 @@ fn every_law() {
     }
 }
 
+#[test]
+fn signs_and_small_strains() {
+    for (links, dissociation) in [(720.0, 1200.0), (100.0, 2300.0), (2.0, 20.0), (2.0, 1e9), (1e6, 1e9)] {
+        for (name, law) in laws(links, dissociation).iter().filter(|(_, law)| law.is_stress_free()) {
+            // below the greatest force of the softest chain, λ̄* = 3.3
+            for stretch in [0.2, 0.5, 0.9, 0.999, 1.001, 1.1, 2.0, 3.0] {
+                assert!(law.tension(stretch) * (stretch - 1.0) > 0.0, "{name} {stretch}");
+                assert!(law.energy(stretch) > 0.0, "{name} {stretch}");
+            }
+            // t = K s(1 + O(s)) and ∫t = K s²/2 (1 + O(s)), coefficients below 10
+            let tangent = law.tangent();
+            for strain in [1e-9, -1e-9] {
+                assert!((law.tension_at_strain(strain) / (tangent * strain) - 1.0).abs() < 1e-8, "{name}");
+                let rounded = 1.0 + strain - 1.0;
+                let energy = 0.5 * tangent * rounded * rounded;
+                assert!((law.energy(1.0 + strain) / energy - 1.0).abs() < 1e-8, "{name}");
+            }
+            // the same law by strain and by stretch
+            for stretch in [0.3, 0.97, 1.002, 1.2, 2.9] {
+                let (a, b) = (law.tension(stretch), law.tension_at_strain(stretch - 1.0));
+                assert!((a - b).abs() <= 1e-14 * a.abs(), "{name} {stretch}");
+            }
+        }
+    }
+}
+
+#[test]
+fn limits_at_zero_and_infinity() {
+    for (links, dissociation) in [(1.0, 1.0), (2.0, 1.0), (720.0, 1200.0), (2.0, 1e9), (1e6, 1e9)] {
+        for (name, law) in laws(links, dissociation) {
+            for stretch in
+                [0.0, 5e-324, 1e-300, 1e-200, 1e-100, 1e-20, 1e10, 1e76, 1e101, 1e160, 1e300, f64::MAX]
+            {
+                let values = [law.tension(stretch), law.tension_derivative(stretch), law.energy(stretch)];
+                assert!(values.iter().all(|value| !value.is_nan()), "{name} {stretch}: {values:?}");
+            }
+            assert!(law.tension(f64::NAN).is_nan() && law.energy(f64::NAN).is_nan(), "{name}");
+            assert!(
+                !law.tension(f64::INFINITY).is_nan() && law.energy(f64::INFINITY).is_infinite(),
+                "{name}"
+            );
+        }
+        let get = |law: Law| law.build(links, dissociation, false).unwrap();
+        let at_rest = Chain::new(links, dissociation).unwrap().stretched(1.0).force;
+        assert_eq!(get(Law::Subtract).tension(0.0), -at_rest);
+        assert_eq!(get(Law::Shift).tension(0.0), -at_rest);
+        assert_eq!(get(Law::Shift).tangent(), 3.0);
+        assert_eq!(get(Law::Chain).tension(0.0), f64::NEG_INFINITY);
+        assert_eq!(get(Law::Printed).tension(0.0), 0.0);
+        assert_eq!(get(Law::Pmb).tension(0.0), -3.0);
+        // the scission of a chain in the end: no force is left
+        assert_eq!(get(Law::Chain).tension(f64::INFINITY), 0.0);
+        assert_eq!(get(Law::Printed).tension(f64::INFINITY), 0.0);
+    }
+}
+
+/// The reference state of (2.47) is in tension at every stretch down to a point, against the limit (2.70).
+#[test]
+fn printed_law_never_rests() {
+    let printed = Law::Printed.build(720.0, 1200.0, false).unwrap();
+    assert!(!printed.is_stress_free());
+    assert!((1..=100).all(|k| printed.tension(0.01 * f64::from(k)) > 0.0));
+}
+
+/// (2.61)–(2.65) with the second derivatives of (2.39), n̄ kept where (2.67) and (2.69) lose it, against the closed form; and
+/// the value that (2.72) takes from λ̄ = λ_b = 1, β → 0: 3 − 9/(n̄D̂ + 3), where 3 − 9/(D̂ + 3) is printed.
+#[test]
+fn tangent_with_the_links_on_the_bond_energy() {
+    use polycore::langevin;
+    let (n, d) = (720.0f64, 1200.0);
+    // with β′ = ∂β/∂x: ∂β/∂λ̄ = β′/(√n̄ λ_b), ∂β/∂λ_b = −β′x/λ_b
+    let tangent = |stretch: f64, link: f64, beta: f64, slope: f64, links_on_bond_energy: f64| {
+        let root = n.sqrt();
+        let x = stretch / (link * root);
+        let mixed = -root / (link * link) * (beta + x * slope);
+        let own = links_on_bond_energy * d * (1.0 - link.ln()) / (link * link)
+            + root * stretch * (slope * x + 2.0 * beta) / link.powi(3);
+        slope / (link * link) - mixed * mixed / own
+    };
+    let chain = Chain::new(n, d).unwrap();
+    for stretch in [0.5, 1.0, 3.0, 20.0, 26.8, 27.5, 40.0] {
+        let (point, beta) = (chain.stretched(stretch), chain.beta(stretch));
+        let full = tangent(stretch, point.link_stretch, beta, 1.0 / langevin::derivative(beta), n);
+        // rounding, amplified by β′ = 1/(1 − x)² near locking
+        assert!((full / point.stiffness - 1.0).abs() < 1e-9, "{stretch}");
+    }
+    assert!((tangent(1.0, 1.0, 0.0, 3.0, n) - (3.0 - 9.0 / (n * d + 3.0))).abs() < 1e-14);
+    assert!((tangent(1.0, 1.0, 0.0, 3.0, 1.0) - (3.0 - 9.0 / (d + 3.0))).abs() < 1e-14);
+}
+
+/// 𝓛⁻¹(x) ≈ x(3 − x²)/(1 − x²) (Cohen 1991, doi:10.1007/BF00366640), as the thesis uses it: 4.9 %.
+#[test]
+fn error_of_cohens_approximant() {
+    let error = |x: f64| (x * (3.0 - x * x) / (1.0 - x * x) / polycore::langevin::inverse(x) - 1.0).abs();
+    let largest = (1..10_000).map(|k| error(1e-4 * f64::from(k))).fold(0.0, f64::max);
+    assert!((largest - 0.049).abs() < 0.0005, "{largest}");
+}
+
 /// The stiffest and softest parameters give finite forces from stretch 1e-3 to 1e6.
 #[test]
 fn extreme_parameters_stay_finite() {
