@@ -3,7 +3,7 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use peri::run::{Failure, Options};
 use peri::scene::Scene;
-use polycore::scene::{EXIT_BAD_INPUT, SceneError, Source};
+use polycore::scene::{EXIT_BAD_INPUT, Source};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -113,9 +113,8 @@ fn main() -> ExitCode {
 fn complain(failure: Failure) -> ExitCode {
     match failure {
         Failure::Scene(error) => {
-            let message: SceneError = error;
-            eprintln!("{:?}", miette::Report::new(message));
-            ExitCode::from(EXIT_BAD_INPUT)
+            eprint!("{}", error.render());
+            ExitCode::from(error.exit_code())
         }
         Failure::Run(error) => {
             eprintln!("error: {error}");

@@ -1,7 +1,8 @@
 //! From a scene to a body and its loads. Every rule that spans several keys is checked here, once.
 
+use super::cloud::cloud;
 use super::{Axis, Boundary, Held, Scene, ShapeKind, ShapeSpec, SurfaceCorrection};
-use crate::bonds::{Bonds, CloudBonds, LatticeBonds, VolumeCorrection};
+use crate::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use crate::calibrate::Space;
 use crate::correction::surface_factors;
 use crate::geometry::{Cut, Operation, Shape, bounds, cell_counts, lattice};
@@ -58,13 +59,30 @@ pub fn body_of<const D: usize>(
     let (low, high) = bounds(&operations)
         .ok_or_else(|| source.error("body.shapes", "no shape is added", "at least one shape with `add`"))?;
     let counts = cell_counts(low, high, variant.spacing);
-    refuse_too_large(source, counts.iter().product(), D)?;
+    refuse_too_large(source, scene, counts.iter().product(), D)?;
     check_shapes(source, &operations, low, high)?;
     let lattice = lattice(&operations, variant.spacing, thickness).map_err(|error| {
         source.error("body.shapes", error, "a body that contains at least one particle of the lattice")
     })?;
+    let volume = variant.spacing.powi(D as i32) * thickness;
+    if !(volume.is_normal()) {
+        let found = format!("{} m, with which the volume of a particle is {volume} m³", variant.spacing);
+        return Err(source.error(spacing_key(scene), found, "a spacing whose cells have a volume"));
+    }
     let bonds = LatticeBonds::new(lattice, variant.horizon_ratio, variant.volume, &cuts)
         .map_err(|error| source.error("body.horizon_ratio", error, "a horizon that reaches a neighbour"))?;
+    if bonds.directed_bonds() == 0 {
+        let found = format!(
+            "{} m, which leaves {} particles without any bond",
+            variant.spacing,
+            bonds.particles().len()
+        );
+        return Err(source.error(
+            spacing_key(scene),
+            found,
+            "smaller: a body of at least two bonded particles",
+        ));
+    }
     Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
 }
 
@@ -92,7 +110,7 @@ fn thickness(source: &Source, scene: &Scene) -> Result<f64, SceneError> {
     }
 }
 
-fn refuse_too_large(source: &Source, cells: f64, dimension: usize) -> Result<(), SceneError> {
+fn refuse_too_large(source: &Source, scene: &Scene, cells: f64, dimension: usize) -> Result<(), SceneError> {
     let needed = cells * BYTES_PER_PARTICLE[dimension - 2];
     let available = available_memory();
     if cells > MOST_PARTICLES || needed > available {
@@ -101,15 +119,20 @@ fn refuse_too_large(source: &Source, cells: f64, dimension: usize) -> Result<(),
             "at most {MOST_PARTICLES:.0e} cells and {:.1} GiB (the memory available); take a larger spacing",
             available / GIB
         );
-        return Err(source.error("body.spacing", found, allowed));
+        return Err(source.error(spacing_key(scene), found, allowed));
     }
     Ok(())
 }
 
-const GIB: f64 = (1_u64 << 30) as f64;
+/// Where the spacings stand.
+fn spacing_key(scene: &Scene) -> &'static str {
+    if scene.study.iter().any(|study| !study.spacing.is_empty()) { "study" } else { "body.spacing" }
+}
+
+pub(super) const GIB: f64 = (1_u64 << 30) as f64;
 
 /// `MemAvailable` of Linux, or 16 GiB where it is not told.
-fn available_memory() -> f64 {
+pub(super) fn available_memory() -> f64 {
     let told = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
         let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?.to_owned();
         line.split_whitespace().nth(1)?.parse::<f64>().ok()
@@ -123,7 +146,28 @@ fn vector<const D: usize>(source: &Source, key: &str, value: &[Length]) -> Resul
         .map_err(|_| source.error(key, format!("{} components", value.len()), format!("{D} components")))
 }
 
-fn needed<T: Copy>(source: &Source, key: &str, value: Option<T>, what: &str) -> Result<T, SceneError> {
+/// The corners of a box must span one.
+fn ordered<const D: usize>(
+    source: &Source,
+    key: &str,
+    min: [f64; D],
+    max: [f64; D],
+) -> Result<(), SceneError> {
+    match (0..D).find(|&d| min[d] >= max[d]) {
+        Some(d) => {
+            let found = format!("{} m, not below `max` {} m in component {d}", min[d], max[d]);
+            Err(source.error(&format!("{key}.min[{d}]"), found, "below `max`"))
+        }
+        None => Ok(()),
+    }
+}
+
+pub(super) fn needed<T: Copy>(
+    source: &Source,
+    key: &str,
+    value: Option<T>,
+    what: &str,
+) -> Result<T, SceneError> {
     value.ok_or_else(|| source.error(key, "nothing", what))
 }
 
@@ -182,10 +226,7 @@ fn shape<const D: usize>(
     match kind {
         ShapeKind::Box => {
             let (min, max) = (point("min", &spec.min)?, point("max", &spec.max)?);
-            if let Some(d) = (0..D).find(|&d| min[d] >= max[d]) {
-                let found = format!("{} m, not below `max` {} m in component {d}", min[d], max[d]);
-                return Err(source.error(&format!("{key}.min[{d}]"), found, "below `max`"));
-            }
+            ordered(source, key, min, max)?;
             Ok(Shape::Box { min, max })
         }
         ShapeKind::Disk | ShapeKind::Ball => {
@@ -261,68 +302,19 @@ fn cracks<const D: usize>(source: &Source, scene: &Scene) -> Result<Vec<Cut<D>>,
         if edges.iter().take(D - 1).any(|e| e.iter().all(|&x| x == 0.0)) {
             return Err(source.error(&key("to"), "the same point as `from`", "another point"));
         }
+        if D == 3 && parallel(edges[0], edges[1]) {
+            return Err(source.error(&key("and"), "a corner on the line `from`–`to`", "a corner beside it"));
+        }
         Ok(Cut { corner: from, edges })
     });
     each.collect()
 }
 
-fn cloud<const D: usize>(
-    source: &Source,
-    scene: &Scene,
-    variant: &Variant,
-    points: &std::path::Path,
-    thickness: f64,
-    cuts: &[Cut<D>],
-) -> Result<Body<D>, SceneError> {
-    let path = source.path.parent().unwrap_or(std::path::Path::new("")).join(points);
-    let bad = |found: String, allowed: &str| source.error("body.points", found, allowed);
-    let columns = if D == 2 { "columns x, y, volume (m, m³)" } else { "columns x, y, z, volume (m, m³)" };
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_path(&path)
-        .map_err(|error| bad(format!("{}: {error}", path.display()), "a readable CSV file"))?;
-    let (mut positions, mut volumes) = (Vec::new(), Vec::new());
-    for record in reader.records() {
-        let record = record.map_err(|error| bad(format!("{}: {error}", path.display()), columns))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let values: Vec<f64> = record.iter().map_while(|field| field.parse().ok()).collect();
-        if values.len() != D + 1 || values.len() != record.len() {
-            return Err(bad(format!("{}, line {line}: {record:?}", path.display()), columns));
-        }
-        if let Some(value) = values.iter().find(|v| !v.is_finite()) {
-            return Err(bad(format!("{}, line {line}: {value}", path.display()), "finite numbers"));
-        }
-        if values[D] <= 0.0 {
-            return Err(bad(
-                format!("{}, line {line}: volume {}", path.display(), values[D]),
-                "a volume above 0",
-            ));
-        }
-        positions.push(std::array::from_fn(|d| values[d]));
-        volumes.push(values[D]);
-    }
-    let horizon =
-        needed(source, "body.horizon", scene.body.horizon, "a length; a cloud needs its `horizon`")?.si();
-    if horizon.is_nan() || horizon <= 0.0 {
-        return Err(source.error("body.horizon", format!("{horizon} m"), "above 0"));
-    }
-    let bonds =
-        CloudBonds::new(&positions, &volumes, thickness, horizon, variant.volume, cuts).map_err(|error| {
-            bad(format!("{}: {error}", path.display()), "distinct points with volumes above 0")
-        })?;
-    if bonds.directed_bonds() == 0 && positions.len() > 1 {
-        return Err(source.error(
-            "body.horizon",
-            format!("{horizon} m, which reaches no neighbour"),
-            "larger",
-        ));
-    }
-    let half = 0.5 * bonds.spacing();
-    let low = std::array::from_fn(|d| positions.iter().map(|p| p[d]).fold(f64::INFINITY, f64::min) - half);
-    let high =
-        std::array::from_fn(|d| positions.iter().map(|p| p[d]).fold(f64::NEG_INFINITY, f64::max) + half);
-    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
+/// Whether |a × b| vanishes to rounding.
+fn parallel<const D: usize>(a: [f64; D], b: [f64; D]) -> bool {
+    let dot = |a: [f64; D], b: [f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
+    let (aa, bb, ab) = (dot(a, a), dot(b, b), dot(a, b));
+    aa * bb - ab * ab <= 1e-12 * aa * bb
 }
 
 /// Loads and supports of a body, and the slots in any loading layer.
@@ -349,6 +341,7 @@ pub fn loads_of<const D: usize>(
         regions.push((members, support));
     }
     let loads = Loads::new(body.bonds.slots(), &regions);
+    balanced(source, scene, body, &loads)?;
     let all = (1_u8 << D) - 1;
     if body.bonds.particles().iter().all(|&slot| loads.held(slot as usize) == all) {
         return Err(source.error(
@@ -358,6 +351,32 @@ pub fn loads_of<const D: usize>(
         ));
     }
     Ok((loads, loaded))
+}
+
+/// A body that nothing holds is never at rest under forces that do not balance.
+fn balanced<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+    loads: &Loads<D>,
+) -> Result<(), SceneError> {
+    let Some(field) = &loads.body_force else { return Ok(()) };
+    for d in 0..D {
+        let (mut sum, mut size, mut held) = (0.0, 0.0, false);
+        for &slot in body.bonds.particles() {
+            let force = field.get(slot as usize)[d] * body.bonds.volume(slot as usize);
+            sum += force;
+            size += force.abs();
+            held |= loads.held(slot as usize) >> d & 1 == 1;
+        }
+        if !held && sum.abs() > scene.solver.tolerance * size {
+            let axis = ["x", "y", "z"][d];
+            let found = format!("a total force of {sum:.3e} N along {axis}, along which nothing is held");
+            let allowed = "forces in balance, or a `displacement` that holds some region";
+            return Err(source.error("boundary", found, allowed));
+        }
+    }
+    Ok(())
 }
 
 fn region<const D: usize>(
@@ -373,9 +392,12 @@ fn region<const D: usize>(
             if axis >= D {
                 return Err(source.error(
                     &format!("{key}.side"),
-                    format!("{side:?}"),
+                    side,
                     "a side along x or y of a plane body",
                 ));
+            }
+            if boundary.layers == Some(0) {
+                return Err(source.error(&format!("{key}.layers"), 0, "at least 1"));
             }
             let layers = boundary.layers.unwrap_or((body.bonds.horizon() / spacing).floor() as usize).max(1);
             let depth = layers as f64 * spacing;
@@ -404,8 +426,10 @@ fn region<const D: usize>(
                     "nothing: the box has its own depth",
                 ));
             }
-            let min = vector(source, &format!("{key}.min"), min)?;
-            (min, vector(source, &format!("{key}.max"), max)?, None)
+            let (min, max) =
+                (vector(source, &format!("{key}.min"), min)?, vector(source, &format!("{key}.max"), max)?);
+            ordered(source, key, min, max)?;
+            (min, max, None)
         }
         _ => return Err(source.error(key, "no region", "either `side`, or `min` and `max`")),
     };

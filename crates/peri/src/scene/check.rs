@@ -49,7 +49,7 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
     Ok(variants)
 }
 
-fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
+pub(super) fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
     if value > 0.0 && value.is_finite() {
         Ok(())
     } else {
@@ -104,11 +104,24 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     Ok(())
 }
 
+/// A number as a user would write it.
+fn plain(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() || (1e-3..1e5).contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
 fn ratio(source: &Source, key: &str, ratio: f64) -> Result<(), SceneError> {
     if (1.0..=LARGEST_RATIO).contains(&ratio) {
         Ok(())
     } else {
-        Err(source.error(key, ratio, format!("1 to {LARGEST_RATIO}: the horizon must reach a neighbour")))
+        Err(source.error(
+            key,
+            plain(ratio),
+            format!("1 to {LARGEST_RATIO}: the horizon must reach a neighbour"),
+        ))
     }
 }
 
@@ -116,6 +129,8 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let material = &scene.material;
     positive(source, "material.youngs_modulus", material.youngs_modulus.si(), "Pa")?;
     let chain = material.law.is_chain();
+    // far beyond any polymer, and far from where the chain's force overflows
+    let most = 1e9;
     for (key, value, least) in [("links", material.links, 2.0), ("dissociation", material.dissociation, 1.0)]
     {
         let key = format!("material.{key}");
@@ -127,8 +142,8 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                     format!("a number of at least {least}: `{}` needs it", material.law.name()),
                 ));
             }
-            Some(value) if !(value >= least && value.is_finite()) => {
-                return Err(source.error(&key, value, format!("at least {least}")));
+            Some(value) if !(least..=most).contains(&value) => {
+                return Err(source.error(&key, plain(value), format!("{least} to {most:e}")));
             }
             Some(_) if !chain => {
                 return Err(source.error(
@@ -149,7 +164,8 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         if (low..=high).contains(&value) {
             Ok(())
         } else {
-            Err(source.error(&format!("solver.{key}"), value, format!("{low:e} to {high}")))
+            let allowed = format!("{} to {}", plain(low), plain(high));
+            Err(source.error(&format!("solver.{key}"), plain(value), allowed))
         }
     };
     within("tolerance", solver.tolerance, 1e-12, 0.1)?;

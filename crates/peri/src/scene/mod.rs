@@ -2,6 +2,7 @@
 
 mod build;
 mod check;
+mod cloud;
 mod explain;
 
 pub use build::{Body, Variant, body_of, loads_of};
@@ -228,6 +229,13 @@ pub enum Side {
     /// Largest z.
     #[serde(rename = "z+")]
     ZHigh,
+}
+
+impl std::fmt::Display for Side {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (axis, upper) = self.axis();
+        write!(f, "{}{}", ["x", "y", "z"][axis], if upper { "+" } else { "-" })
+    }
 }
 
 impl Side {

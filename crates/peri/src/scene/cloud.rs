@@ -1,0 +1,124 @@
+//! Bodies from a CSV file of points.
+
+use super::build::{Body, GIB, Variant, available_memory, needed};
+use super::{Scene, check};
+use crate::bonds::{Bonds, CloudBonds};
+use crate::geometry::Cut;
+use polycore::scene::{SceneError, Source};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Positions (m) and volumes (m³).
+type Points<const D: usize> = (Vec<[f64; D]>, Vec<f64>);
+
+/// Bytes per directed bond of a cloud: neighbour, stiffness, inverse square, and the lists while they are built.
+const BYTES_PER_BOND: f64 = 28.0;
+
+/// Builds the body of a cloud.
+///
+/// # Errors
+/// A [`SceneError`] that names the file and the line, or the key.
+pub fn cloud<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    variant: &Variant,
+    points: &Path,
+    thickness: f64,
+    cuts: &[Cut<D>],
+) -> Result<Body<D>, SceneError> {
+    let path = source.path.parent().unwrap_or(Path::new("")).join(points);
+    let horizon =
+        needed(source, "body.horizon", scene.body.horizon, "a length; a cloud needs its `horizon`")?.si();
+    check::positive(source, "body.horizon", horizon, "m")?;
+    let (positions, volumes) = read::<D>(source, &path)?;
+    refuse_too_many_bonds(source, &positions, horizon)?;
+    let bonds =
+        CloudBonds::new(&positions, &volumes, thickness, horizon, variant.volume, cuts).map_err(|error| {
+            let found = format!("{}: {error}", path.display());
+            source.error("body.points", found, "distinct points with volumes above 0")
+        })?;
+    if bonds.directed_bonds() == 0 {
+        let found = format!("{horizon} m, which reaches no neighbour");
+        return Err(source.error("body.horizon", found, "larger"));
+    }
+    let half = 0.5 * bonds.spacing();
+    let extreme = |pick: fn(f64, f64) -> f64, from: f64| -> [f64; D] {
+        std::array::from_fn(|d| positions.iter().map(|p| p[d]).fold(from, pick))
+    };
+    let low = extreme(f64::min, f64::INFINITY).map(|x| x - half);
+    let high = extreme(f64::max, f64::NEG_INFINITY).map(|x| x + half);
+    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
+}
+
+fn read<const D: usize>(source: &Source, path: &Path) -> Result<Points<D>, SceneError> {
+    let bad = |found: String, allowed: &str| {
+        source.error("body.points", format!("{}{found}", path.display()), allowed)
+    };
+    let names: &[&str] = if D == 2 { &["x", "y", "volume"] } else { &["x", "y", "z", "volume"] };
+    let columns = format!("columns {} (m, m³)", names.join(", "));
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .map_err(|error| bad(format!(": {error}"), "a readable CSV file"))?;
+    let headers = reader.headers().map_err(|error| bad(format!(": {error}"), &columns))?;
+    if headers.iter().ne(names.iter().copied()) {
+        let found = headers.iter().collect::<Vec<_>>().join(", ");
+        return Err(bad(format!(", first line: `{found}`"), &columns));
+    }
+    let (mut positions, mut volumes) = (Vec::new(), Vec::new());
+    for record in reader.records() {
+        let record = record.map_err(|error| bad(format!(": {error}"), &columns))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let mut values = [0.0_f64; 4];
+        for (value, field) in values.iter_mut().zip(&record) {
+            *value =
+                field.parse().map_err(|_| bad(format!(", line {line}: `{field}` is no number"), &columns))?;
+        }
+        if let Some(value) = values.iter().find(|v| !v.is_finite()) {
+            return Err(bad(format!(", line {line}: {value}"), "finite numbers"));
+        }
+        if values[D] <= 0.0 {
+            return Err(bad(format!(", line {line}: volume {}", values[D]), "a volume above 0"));
+        }
+        positions.push(std::array::from_fn(|d| values[d]));
+        volumes.push(values[D]);
+    }
+    if positions.len() < 2 {
+        let found = format!(": {} points", positions.len());
+        return Err(bad(found, "at least two points, so that there is a bond"));
+    }
+    Ok((positions, volumes))
+}
+
+/// A horizon that holds the whole cloud asks for N² bonds. Counts points in cells as wide as the horizon: a block of
+/// 3^D cells around a point holds its ball, and about (block/ball) times its neighbours.
+fn refuse_too_many_bonds<const D: usize>(
+    source: &Source,
+    positions: &[[f64; D]],
+    horizon: f64,
+) -> Result<(), SceneError> {
+    let mut cells: HashMap<[i64; D], f64> = HashMap::new();
+    for position in positions {
+        *cells.entry(position.map(|x| (x / horizon).floor() as i64)).or_default() += 1.0;
+    }
+    let around = |cell: &[i64; D]| -> f64 {
+        let neighbour = |k: usize| -> [i64; D] {
+            std::array::from_fn(|d| cell[d].saturating_add((k / 3_usize.pow(d as u32) % 3) as i64 - 1))
+        };
+        (0..3_usize.pow(D as u32)).filter_map(|k| cells.get(&neighbour(k))).sum()
+    };
+    let pairs: f64 = cells.iter().map(|(cell, count)| count * around(cell)).sum();
+    let share = if D == 2 { std::f64::consts::PI / 9.0 } else { 4.0 / 3.0 * std::f64::consts::PI / 27.0 };
+    let (bonds, available) = (pairs * share, available_memory());
+    if bonds * BYTES_PER_BOND > available {
+        let found = format!(
+            "{horizon} m, which makes about {bonds:.1e} bonds that need {:.1} GiB",
+            bonds * BYTES_PER_BOND / GIB
+        );
+        let allowed =
+            format!("at most {:.1} GiB (the memory available); take a smaller horizon", available / GIB);
+        return Err(source.error("body.horizon", found, allowed));
+    }
+    Ok(())
+}
