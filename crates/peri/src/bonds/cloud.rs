@@ -1,7 +1,8 @@
 //! A cloud of particles of any position and volume: neighbour lists in compressed rows, sorted for locality.
 
-use super::kernel::{GROUP, StretchRange};
-use super::rows::{CloudData, CloudKernel, cloud_kernel};
+use super::cloud_kernel::{CloudData, GROUP};
+use super::kernel::StretchRange;
+use super::rows::{CloudKernel, cloud_kernel};
 use super::{Bonds, Neighbour, VolumeCorrection, surface_weight};
 use crate::error::Error;
 use crate::field::{Field, chunk_range};

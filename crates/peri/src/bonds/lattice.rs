@@ -1,6 +1,7 @@
 //! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
 
-use super::kernel::{Class, StretchRange, TILE, Tiles};
+use super::kernel::StretchRange;
+use super::lattice_kernel::{Class, TILE, Tiles};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::{Bonds, Neighbour, VolumeCorrection, surface_weight};
 use crate::error::Error;

@@ -1,13 +1,17 @@
 //! Who is bonded to whom, and the forces that follow: a regular lattice without a neighbour list, or a cloud with one.
 
 mod cloud;
+mod cloud_kernel;
 mod kernel;
 mod lattice;
+mod lattice_kernel;
 mod rows;
 
 pub use cloud::{CellGrid, CloudBonds};
-pub use kernel::{GROUP, StretchRange, TILE};
+pub use cloud_kernel::GROUP;
+pub use kernel::StretchRange;
 pub use lattice::{Lattice, LatticeBonds, Stencil};
+pub use lattice_kernel::TILE;
 
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;

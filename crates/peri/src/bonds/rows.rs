@@ -1,8 +1,9 @@
 //! From a fitted law to kernel rows of a fixed size, chosen once per scene.
 
-use super::kernel::{CloudPass, LatticePass, Row, StretchRange, Tiles};
+use super::cloud_kernel::{CloudData, CloudPass};
+use super::kernel::{StretchRange, dispatch};
+use super::lattice_kernel::{LatticePass, Row, Tiles};
 use crate::potential::KernelFit;
-use pulp::{Arch, Simd, WithSimd};
 
 /// One bond of the stencil: its distance in slots, ξ, and its stiffness 2kθ w V/|ξ|.
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +18,7 @@ pub struct StencilBond<const D: usize> {
 
 /// A lattice kernel with its law in place.
 pub trait LatticeKernel<const D: usize>: Send + Sync {
-    /// See [`LatticePass::run`].
+    /// See [`super::kernel::Pass::run`].
     fn run(
         &self,
         tiles: &Tiles<D>,
@@ -27,19 +28,9 @@ pub trait LatticeKernel<const D: usize>: Send + Sync {
     );
 }
 
-/// What a cloud kernel reads, beside its law; the fields are those of [`CloudPass`].
-pub struct CloudData<'a, const D: usize> {
-    pub position: [&'a [f64]; D],
-    pub displacement: [&'a [f64]; D],
-    pub starts: &'a [usize],
-    pub neighbours: &'a [u32],
-    pub stiffness: &'a [f64],
-    pub inverse_square: &'a [f64],
-}
-
 /// A cloud kernel with its law in place.
 pub trait CloudKernel<const D: usize>: Send + Sync {
-    /// See [`CloudPass::run`].
+    /// See [`super::kernel::Pass::run`].
     fn run(
         &self,
         data: &CloudData<D>,
@@ -51,21 +42,6 @@ pub trait CloudKernel<const D: usize>: Send + Sync {
 
 struct LatticeRows<const D: usize, const P: usize, const Q: usize>(Vec<Row<D, P, Q>>);
 
-struct LatticeCall<'a, 'b, const D: usize, const P: usize, const Q: usize> {
-    pass: LatticePass<'a, D, P, Q>,
-    start: usize,
-    force: &'a mut [&'b mut [f64]; D],
-    track: Option<&'a mut StretchRange>,
-}
-
-impl<const D: usize, const P: usize, const Q: usize> WithSimd for LatticeCall<'_, '_, D, P, Q> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        self.pass.run(simd, self.start, self.force, self.track);
-    }
-}
-
 impl<const D: usize, const P: usize, const Q: usize> LatticeKernel<D> for LatticeRows<D, P, Q> {
     fn run(
         &self,
@@ -74,26 +50,11 @@ impl<const D: usize, const P: usize, const Q: usize> LatticeKernel<D> for Lattic
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        Arch::new().dispatch(LatticeCall { pass: LatticePass { rows: &self.0, tiles }, start, force, track });
+        dispatch(LatticePass { rows: &self.0, tiles }, start, force, track);
     }
 }
 
 struct CloudLaw<const P: usize, const Q: usize>(f64, [f64; P], [f64; Q]);
-
-struct CloudCall<'a, 'b, const D: usize, const P: usize, const Q: usize> {
-    pass: CloudPass<'a, D, P, Q>,
-    start: usize,
-    force: &'a mut [&'b mut [f64]; D],
-    track: Option<&'a mut StretchRange>,
-}
-
-impl<const D: usize, const P: usize, const Q: usize> WithSimd for CloudCall<'_, '_, D, P, Q> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        self.pass.run(simd, self.start, self.force, self.track);
-    }
-}
 
 impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CloudLaw<P, Q> {
     fn run(
@@ -103,10 +64,7 @@ impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CloudLaw
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        let CloudData { position, displacement, starts, neighbours, stiffness, inverse_square } = *data;
-        let law = (self.0, self.1, self.2);
-        let pass = CloudPass { position, displacement, starts, neighbours, stiffness, inverse_square, law };
-        Arch::new().dispatch(CloudCall { pass, start, force, track });
+        dispatch(CloudPass { data, law: (self.0, self.1, self.2) }, start, force, track);
     }
 }
 
