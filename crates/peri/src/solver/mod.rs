@@ -2,6 +2,7 @@
 
 mod adr;
 mod load;
+mod passes;
 
 pub use adr::{AdaptiveDynamicRelaxation, State, Status, System};
 pub use load::{Loads, Support};

@@ -1,0 +1,148 @@
+//! The two passes of an iteration over all slots: new forces with every sum over them, and the move.
+
+use super::adr::{State, System};
+use super::load::Loads;
+use crate::bonds::StretchRange;
+use crate::field::{CHUNK, chunk_range};
+use rayon::prelude::*;
+
+/// Sums over all slots, item by item in a fixed order.
+#[derive(Clone, Copy, Default)]
+pub struct Sums {
+    /// Σ v·ΔF over free components.
+    pub quotient_top: f64,
+    /// Σ M v² over free components.
+    pub quotient_bottom: f64,
+    /// Σ F² over free components.
+    pub free: f64,
+    /// Σ F² over held components.
+    pub held: f64,
+    /// Σ b² of the body forces.
+    pub external: f64,
+}
+
+impl Sums {
+    fn add(mut self, other: Self) -> Self {
+        self.quotient_top += other.quotient_top;
+        self.quotient_bottom += other.quotient_bottom;
+        self.free += other.free;
+        self.held += other.held;
+        self.external += other.external;
+        self
+    }
+}
+
+/// New forces and, in the same pass, all sums over them.
+pub fn force_pass<const D: usize>(
+    system: &System<D>,
+    state: &mut State<D>,
+    unit_mass: &[f64],
+    mass: f64,
+    factor: f64,
+    look: bool,
+) -> (Sums, StretchRange) {
+    let slots = system.bonds.slots();
+    let (bonds, loads) = (&*system.bonds, system.loads);
+    let (displacement, velocity) = (&state.displacement, state.velocity.components());
+    let results: Vec<(Sums, StretchRange)> = state
+        .force
+        .chunks_mut()
+        .into_par_iter()
+        .enumerate()
+        .map_init(
+            || vec![0.0; D * CHUNK],
+            |scratch, (chunk, old)| {
+                let range = chunk_range(chunk, slots);
+                let mut parts = scratch.chunks_mut(CHUNK);
+                let mut new: [&mut [f64]; D] =
+                    std::array::from_fn(|_| &mut parts.next().unwrap_or_default()[..range.len()]);
+                let mut met = StretchRange::REST;
+                bonds.force(displacement, chunk, &mut new, look.then_some(&mut met));
+                let mut sums = Sums::default();
+                let held = loads.held.get(range.clone()).unwrap_or_default();
+                for d in 0..D {
+                    if let Some(body) = &loads.body_force {
+                        for (f, b) in new[d].iter_mut().zip(&body.components()[d][range.clone()]) {
+                            *f += factor * b;
+                            sums.external += (factor * b) * (factor * b);
+                        }
+                    }
+                    let (v, m) = (&velocity[d][range.clone()], &unit_mass[range.clone()]);
+                    if held.iter().all(|h| h >> d & 1 == 0) {
+                        sums = sums.add(free_sums(&new[d][..], old[d], v, m, mass));
+                        old[d].copy_from_slice(new[d]);
+                        continue;
+                    }
+                    for k in 0..v.len() {
+                        let f = new[d][k];
+                        if held[k] >> d & 1 == 1 {
+                            sums.held += f * f;
+                        } else {
+                            sums.quotient_top += v[k] * (f - old[d][k]);
+                            sums.quotient_bottom += v[k] * v[k] * m[k] * mass;
+                            sums.free += f * f;
+                        }
+                        old[d][k] = f;
+                    }
+                }
+                (sums, met)
+            },
+        )
+        .collect();
+    results
+        .into_iter()
+        .fold((Sums::default(), StretchRange::REST), |(sums, met), (s, m)| (sums.add(s), met.join(m)))
+}
+
+/// The sums over components that are all free, in eight interleaved parts so that they vectorise.
+fn free_sums(new: &[f64], old: &[f64], v: &[f64], m: &[f64], mass: f64) -> Sums {
+    const LANES: usize = 8;
+    let (mut top, mut bottom, mut square) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    let parts = new.chunks(LANES).zip(old.chunks(LANES)).zip(v.chunks(LANES).zip(m.chunks(LANES)));
+    for ((new, old), (v, m)) in parts {
+        for lane in 0..new.len() {
+            top[lane] += v[lane] * (new[lane] - old[lane]);
+            bottom[lane] += v[lane] * v[lane] * m[lane];
+            square[lane] += new[lane] * new[lane];
+        }
+    }
+    Sums {
+        quotient_top: top.iter().sum(),
+        quotient_bottom: bottom.iter().sum::<f64>() * mass,
+        free: square.iter().sum(),
+        ..Sums::default()
+    }
+}
+
+/// v ← ((2 − c)v + 2F/M)/(2 + c), at rest v ← F/2M; u ← u + v; held components stay.
+pub fn move_pass<const D: usize>(
+    loads: &Loads<D>,
+    state: &mut State<D>,
+    unit_mass: &[f64],
+    mass: f64,
+    damping: f64,
+) {
+    let slots = unit_mass.len();
+    let (keep, push) = if state.iteration == 0 {
+        (0.0, 0.5 / mass)
+    } else {
+        ((2.0 - damping) / (2.0 + damping), 2.0 / (2.0 + damping) / mass)
+    };
+    let force = state.force.components();
+    let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
+    displacement.into_par_iter().zip(velocity).enumerate().for_each(|(chunk, (u, v))| {
+        let range = chunk_range(chunk, slots);
+        let held = loads.held.get(range.clone()).unwrap_or_default();
+        for d in 0..D {
+            let (f, m) = (&force[d][range.clone()], &unit_mass[range.clone()]);
+            let (u, v) = (&mut *u[d], &mut *v[d]);
+            let free = held.iter().all(|h| h >> d & 1 == 0);
+            for k in 0..f.len() {
+                if free || held[k] >> d & 1 == 0 {
+                    v[k] = keep * v[k] + push * f[k] / m[k];
+                    u[k] += v[k];
+                }
+            }
+        }
+    });
+}
