@@ -3,7 +3,7 @@
 use super::cloud_kernel::{CloudData, GROUP};
 use super::kernel::StretchRange;
 use super::rows::{CloudKernel, cloud_kernel};
-use super::{Bonds, Neighbour, VolumeCorrection, surface_weight};
+use super::{Bonds, Neighbour, VolumeCorrection, plain_force, surface_weight};
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use crate::geometry::Cut;
@@ -104,7 +104,8 @@ pub struct CloudBonds<const D: usize> {
     inverse_square: Vec<f64>,
     factors: Option<Field<D>>,
     kernel: Option<Box<dyn CloudKernel<D>>>,
-    table: Option<KernelFit>,
+    /// A law that only a table represents, and kθ.
+    table: Option<(KernelFit, f64)>,
     directed_bonds: u64,
 }
 
@@ -266,7 +267,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         }
         (self.stiffness, self.inverse_square) = (stiffness, inverse_square);
         self.kernel = cloud_kernel(fit);
-        self.table = self.kernel.is_none().then(|| fit.clone());
+        self.table = self.kernel.is_none().then(|| (fit.clone(), modulus));
     }
 
     fn set_factors(&mut self, factors: Field<D>) {
@@ -291,8 +292,8 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
                 inverse_square: &self.inverse_square,
             };
             kernel.run(&data, start, force, track);
-        } else if let Some(fit) = &self.table {
-            self.force_by_table(fit, displacement, start, force, track);
+        } else if let Some((fit, modulus)) = &self.table {
+            plain_force(self, fit, *modulus, displacement, start, force, track);
         }
     }
 
@@ -309,44 +310,5 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
 
     fn as_cloud(&self) -> Option<&CloudBonds<D>> {
         Some(self)
-    }
-}
-
-impl<const D: usize> CloudBonds<D> {
-    /// The plain loop, for laws that only a table represents.
-    fn force_by_table(
-        &self,
-        fit: &KernelFit,
-        displacement: &Field<D>,
-        start: usize,
-        force: &mut [&mut [f64]; D],
-        mut track: Option<&mut StretchRange>,
-    ) {
-        for offset in 0..force[0].len() {
-            let slot = start + offset;
-            let own = displacement.get(slot);
-            let mut sum = [0.0; D];
-            for k in self.starts[slot]..self.starts[slot + 1] {
-                let other = self.neighbours[k] as usize;
-                if other == slot {
-                    continue;
-                }
-                let (here, there, moved) =
-                    (self.position.get(slot), self.position.get(other), displacement.get(other));
-                let xi: [f64; D] = std::array::from_fn(|d| there[d] - here[d]);
-                let eta: [f64; D] = std::array::from_fn(|d| moved[d] - own[d]);
-                let e = (0..D).map(|d| eta[d] * (2.0 * xi[d] + eta[d])).sum::<f64>() * self.inverse_square[k];
-                let q = fit.value(e) * self.stiffness[k];
-                for d in 0..D {
-                    sum[d] += q * (xi[d] + eta[d]);
-                }
-                if let Some(range) = track.as_deref_mut() {
-                    *range = range.join(StretchRange { low: e, high: e });
-                }
-            }
-            for d in 0..D {
-                force[d][offset] = sum[d];
-            }
-        }
     }
 }

@@ -3,7 +3,7 @@
 use super::kernel::StretchRange;
 use super::lattice_kernel::{Class, TILE, Tiles};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
-use super::{Bonds, Neighbour, VolumeCorrection, surface_weight};
+use super::{Bonds, Neighbour, VolumeCorrection, plain_force, surface_weight};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::geometry::Cut;
@@ -72,7 +72,8 @@ pub struct LatticeBonds<const D: usize> {
     /// Interior value of the factors, a part of every stencil bond's weight; the stored factors are relative to it.
     interior_factor: f64,
     kernel: Option<Box<dyn LatticeKernel<D>>>,
-    table: Option<(KernelFit, Vec<StencilBond<D>>)>,
+    /// A law that only a table represents, and kθ.
+    table: Option<(KernelFit, f64)>,
     directed_bonds: u64,
 }
 
@@ -352,7 +353,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
             })
             .collect();
         self.kernel = lattice_kernel(fit, &stencil);
-        self.table = self.kernel.is_none().then(|| (fit.clone(), stencil));
+        self.table = self.kernel.is_none().then(|| (fit.clone(), modulus));
     }
 
     fn set_factors(&mut self, mut factors: Field<D>) {
@@ -392,8 +393,8 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
                 guard: self.guard,
             };
             kernel.run(&tiles, start, force, track);
-        } else if let Some((fit, stencil)) = &self.table {
-            self.force_by_table(fit, stencil, displacement, start, force, track);
+        } else if let Some((fit, modulus)) = &self.table {
+            plain_force(self, fit, *modulus, displacement, start, force, track);
         }
     }
 
@@ -408,51 +409,5 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
 
     fn as_lattice(&self) -> Option<&LatticeBonds<D>> {
         Some(self)
-    }
-}
-
-impl<const D: usize> LatticeBonds<D> {
-    /// The plain loop, for laws that only a table represents.
-    fn force_by_table(
-        &self,
-        fit: &KernelFit,
-        stencil: &[StencilBond<D>],
-        displacement: &Field<D>,
-        start: usize,
-        force: &mut [&mut [f64]; D],
-        mut track: Option<&mut StretchRange>,
-    ) {
-        for offset in 0..force[0].len() {
-            let slot = start + offset;
-            let mut sum = [0.0; D];
-            if self.classes[slot / TILE] != Class::Empty {
-                let own = displacement.get(slot);
-                for (k, bond) in stencil.iter().enumerate().filter(|(k, _)| self.is_intact(slot, *k)) {
-                    let other_slot = slot.wrapping_add_signed(bond.shift);
-                    let other = displacement.get(other_slot);
-                    let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
-                    let square: f64 = bond.bond.iter().map(|x| x * x).sum();
-                    let e = (0..D).map(|d| eta[d] * (2.0 * bond.bond[d] + eta[d])).sum::<f64>() / square;
-                    let surface = self.factors.as_ref().map_or(1.0, |g| {
-                        surface_weight(
-                            bond.bond,
-                            self.stencil.length(k) * self.lattice.spacing,
-                            g.get(slot),
-                            g.get(other_slot),
-                        )
-                    });
-                    let q = fit.value(e) * bond.stiffness * surface;
-                    for d in 0..D {
-                        sum[d] += q * (bond.bond[d] + eta[d]);
-                    }
-                    if let Some(range) = track.as_deref_mut() {
-                        *range = range.join(StretchRange { low: e, high: e });
-                    }
-                }
-            }
-            for d in 0..D {
-                force[d][offset] = sum[d];
-            }
-        }
     }
 }
