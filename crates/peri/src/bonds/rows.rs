@@ -102,8 +102,8 @@ fn padded<const N: usize>(values: &[f64], scale: impl Fn(usize) -> f64) -> [f64;
 macro_rules! for_size {
     ($rational:expr, $make:ident $arguments:tt) => {
         for_size!(@try $rational, $make $arguments;
-            (3, 0) (4, 0) (5, 0) (6, 0) (7, 0) (8, 0) (10, 0) (12, 0) (16, 0) (25, 0)
-            (3, 2) (4, 3) (5, 4) (6, 5) (8, 7) (11, 10))
+            (3, 0) (4, 0) (5, 0) (6, 0) (7, 0) (8, 0) (9, 0) (10, 0) (12, 0)
+            (3, 3) (4, 4) (5, 5) (7, 6) (8, 7) (9, 8) (11, 10))
     };
     (@try $rational:expr, $make:ident $arguments:tt; $(($p:literal, $q:literal))*) => {{
         $(if $rational.numerator.len() <= $p && $rational.denominator.len() <= $q {

@@ -3,33 +3,39 @@
 //! A stress-free law is q(e) = e·N(e)/D(e), exact at rest; any other N(e)/D(e). The cheapest polynomial or rational fit
 //! whose measured error meets the bound is taken, a cubic Hermite table where none does.
 
-use super::BondPotential;
+use super::{BondPotential, ratio};
 use crate::error::Error;
-use nalgebra::{DMatrix, DVector};
 
-/// Points at which a candidate is judged.
-const DENSE: usize = 4000;
-/// Points at which it is judged first.
-const SPARSE: usize = 200;
+/// Intervals between the points at which a candidate is judged.
+const DENSE: usize = 4096;
+/// One in so many of these points is fitted.
+const STRIDE: usize = 32;
+/// Fewest pieces of a table, and most nodes.
+const LEAST_PIECES: usize = 64;
+const MOST_NODES: usize = 1 << 17;
 /// Cost of a division in multiply-adds, for choosing between candidates.
 const DIVISION: usize = 5;
-/// Numerator and denominator sizes worth trying (those that the kernels are compiled for), cheapest first.
-const CANDIDATES: [(usize, usize); 16] = [
+/// Sizes of numerator and denominator (beyond its 1): those that the kernels are compiled for, cheapest first. On stretch
+/// ranges that scenes meet, all the laws need nearly the same, whence the choice of ratios.
+///
+/// (10, 9) is padded to (11, 10): a size more than needed may have a pole and its zero in the same place.
+const CANDIDATES: [(usize, usize); 17] = [
     (3, 0),
     (4, 0),
     (5, 0),
     (6, 0),
     (7, 0),
     (8, 0),
+    (9, 0),
     (10, 0),
-    (3, 2),
+    (3, 3),
     (12, 0),
-    (4, 3),
-    (5, 4),
-    (16, 0),
-    (6, 5),
+    (4, 4),
+    (5, 5),
+    (7, 6),
     (8, 7),
-    (25, 0),
+    (9, 8),
+    (10, 9),
     (11, 10),
 ];
 
@@ -46,6 +52,7 @@ pub struct KernelFit {
     pub range: [f64; 2],
     /// Largest relative error of q over the range, measured.
     pub max_error: f64,
+    /// Strain l − 1, tension and its derivative at the nodes.
     table: Vec<[f64; 3]>,
 }
 
@@ -65,36 +72,28 @@ impl KernelFit {
         }
         let target =
             Target { law, low: low * low - 1.0, high: high * high - 1.0, stress_free: law.is_stress_free() };
-        let (sparse, dense) = (target.samples(SPARSE), target.samples(DENSE));
+        let dense = target.samples(DENSE)?;
+        let sparse: Vec<(f64, f64)> = dense.iter().step_by(STRIDE).copied().collect();
         for (p, q) in CANDIDATES {
-            let Some(mut fit) = target.rational(p, q, range) else { continue };
-            if fit.error(&sparse) > bound {
-                continue;
-            }
+            // a little less, for what lies between the sparse points
+            let Some(ratio) = ratio::fit(&sparse, p, q, 0.97 * bound) else { continue };
+            let safe = ratio.has_no_pole(target.low, target.high);
+            let ratio::Ratio { numerator, denominator, .. } = ratio;
+            let (stress_free, table) = (target.stress_free, Vec::new());
+            let mut fit = Self { numerator, denominator, stress_free, range, max_error: 0.0, table };
             fit.max_error = fit.error(&dense);
-            if fit.max_error <= bound && fit.denominator_is_safe(&dense) {
+            if fit.max_error <= bound && safe {
                 return Ok(fit);
             }
         }
-        for nodes in [500, 2_000, 8_000, 32_000, 128_000] {
-            let mut fit = target.table(nodes, range);
-            fit.max_error = fit.error(&dense);
-            if fit.max_error <= bound {
-                return Ok(fit);
-            }
-        }
-        Err(Error::Parameter {
-            name: "bound of the fitted law",
-            found: bound,
-            allowed: format!("larger: no fit over the stretches {low} to {high} reaches it"),
-        })
+        target.table(range, bound, &dense)
     }
 
     /// q(e).
     pub fn value(&self, e: f64) -> f64 {
         if !self.table.is_empty() {
             let stretch = (1.0 + e).max(0.0).sqrt();
-            return self.interpolate(stretch) / stretch.max(f64::MIN_POSITIVE);
+            return self.interpolate(e / (1.0 + stretch)) / stretch.max(f64::MIN_POSITIVE);
         }
         let ratio = horner(&self.numerator, e) / (1.0 + e * horner(&self.denominator, e));
         if self.stress_free { e * ratio } else { ratio }
@@ -121,6 +120,9 @@ impl KernelFit {
         samples
             .iter()
             .map(|&(e, exact)| {
+                if self.stress_free && e == 0.0 {
+                    return 0.0;
+                }
                 let q = self.value(e);
                 let found = if self.stress_free { q / e } else { q };
                 let error = ((found - exact) / exact).abs();
@@ -129,26 +131,26 @@ impl KernelFit {
             .fold(0.0, f64::max)
     }
 
-    /// No pole within the range or near it.
-    fn denominator_is_safe(&self, samples: &[(f64, f64)]) -> bool {
-        samples.iter().all(|&(e, _)| 1.0 + e * horner(&self.denominator, e) > 1e-3)
-    }
-
-    fn interpolate(&self, stretch: f64) -> f64 {
+    fn interpolate(&self, strain: f64) -> f64 {
         let last = self.table.len() - 2;
-        let k = self.table.partition_point(|node| node[0] <= stretch).saturating_sub(1).min(last);
-        let ([x0, t0, d0], [x1, t1, d1]) = (self.table[k], self.table[k + 1]);
-        let width = x1 - x0;
-        let s = (stretch - x0) / width;
-        if !(0.0..=1.0).contains(&s) {
+        let k = self.table.partition_point(|node| node[0] <= strain).saturating_sub(1).min(last);
+        let (left, right) = (&self.table[k], &self.table[k + 1]);
+        match strain {
             // beyond the table: the tangent at its end
-            let (x, t, d) = if s < 0.0 { (x0, t0, d0) } else { (x1, t1, d1) };
-            return t + d * (stretch - x);
+            below if below < left[0] => left[1] + left[2] * (below - left[0]),
+            above if above > right[0] => right[1] + right[2] * (above - right[0]),
+            _ => hermite(left, right, strain),
         }
-        let r = 1.0 - s;
-        (1.0 + 2.0 * s) * r * r * t0 + s * r * r * width * d0 + s * s * (3.0 - 2.0 * s) * t1
-            - s * s * r * width * d1
     }
+}
+
+/// The cubic through two nodes with their slopes.
+fn hermite([x0, t0, d0]: &[f64; 3], [x1, t1, d1]: &[f64; 3], strain: f64) -> f64 {
+    let width = x1 - x0;
+    // both differences, so that neither cancels beside the node at rest
+    let (s, r) = ((strain - x0) / width, (x1 - strain) / width);
+    (1.0 + 2.0 * s) * r * r * t0 + s * r * r * width * d0 + s * s * (3.0 - 2.0 * s) * t1
+        - s * s * r * width * d1
 }
 
 fn horner(coefficients: &[f64], x: f64) -> f64 {
@@ -167,124 +169,85 @@ impl Target<'_> {
     /// q/e, or q.
     fn exact(&self, e: f64) -> f64 {
         let stretch = (1.0 + e).sqrt();
-        let q = self.law.tension(stretch) / stretch;
-        if self.stress_free { q / e } else { q }
-    }
-
-    /// Samples graded towards both ends; those near rest, where q/e is a quotient of roundings, are left out.
-    fn samples(&self, count: usize) -> Vec<(f64, f64)> {
-        let least = if self.stress_free { 1e-4 } else { 0.0 };
-        (0..=count)
-            .map(|k| {
-                let angle = std::f64::consts::PI * k as f64 / count as f64;
-                0.5 * (self.low + self.high) - 0.5 * (self.high - self.low) * angle.cos()
-            })
-            .filter(|e| e.abs() >= least)
-            .map(|e| (e, self.exact(e)))
-            .collect()
-    }
-
-    /// Least squares for N − R·D = 0, relative to R and reweighted by the last D (Sanathanan & Koerner 1963,
-    /// doi:10.1109/TAC.1963.1105517), in Chebyshev polynomials of the range, converted to powers of e.
-    fn rational(&self, p: usize, q: usize, range: [f64; 2]) -> Option<KernelFit> {
-        let samples = self.samples(8 * (p + q) + 16);
-        let (centre, half) = (0.5 * (self.low + self.high), 0.5 * (self.high - self.low));
-        // the extra point keeps the ends from being extrapolated by rounding
-        let basis = |e: f64, k: usize| (k as f64 * ((e - centre) / half).clamp(-1.0, 1.0).acos()).cos();
-        let mut weights = vec![1.0; samples.len()];
-        let mut solution = DVector::zeros(p + q);
-        for _ in 0..if q == 0 { 1 } else { 6 } {
-            let matrix = DMatrix::from_fn(samples.len(), p + q, |row, column| {
-                let (e, exact) = samples[row];
-                let value = if column < p { basis(e, column) / exact } else { -basis(e, column - p + 1) };
-                value * weights[row]
-            });
-            let right = DVector::from_fn(samples.len(), |row, _| weights[row]);
-            solution = matrix.svd(true, true).solve(&right, 1e-15).ok()?;
-            for (weight, &(e, _)) in weights.iter_mut().zip(&samples) {
-                let d = 1.0 + (0..q).map(|k| solution[p + k] * basis(e, k + 1)).sum::<f64>();
-                *weight = 1.0 / d.abs().max(1e-6);
-            }
+        // l − 1 = e/(1 + l), without cancellation
+        let q = self.law.tension_at_strain(e / (1.0 + stretch)) / stretch;
+        match self.stress_free {
+            true if e == 0.0 => 0.5 * self.law.tangent(),
+            true => q / e,
+            false => q,
         }
-        let numerator = powers(&solution.as_slice()[..p], centre, half);
-        let mut tail = vec![1.0];
-        tail.extend_from_slice(&solution.as_slice()[p..]);
-        let denominator = powers(&tail, centre, half);
-        // D(0) = 1
-        let lead = denominator[0];
-        let fit = KernelFit {
-            numerator: numerator.iter().map(|c| c / lead).collect(),
-            denominator: denominator[1..].iter().map(|c| c / lead).collect(),
-            stress_free: self.stress_free,
-            range,
-            max_error: f64::INFINITY,
-            table: Vec::new(),
+    }
+
+    /// Samples graded towards both ends.
+    fn samples(&self, count: usize) -> Result<Vec<(f64, f64)>, Error> {
+        let point = |k: usize| {
+            let sine = (0.5 * std::f64::consts::PI * k as f64 / count as f64).sin();
+            let e = self.low + (self.high - self.low) * sine * sine;
+            (e, self.exact(e))
         };
-        fit.numerator.iter().chain(&fit.denominator).all(|c| c.is_finite()).then_some(fit)
+        let samples: Vec<(f64, f64)> = (0..=count).map(point).collect();
+        match samples.iter().find(|(_, exact)| !exact.is_finite() || *exact == 0.0) {
+            Some((e, exact)) => Err(Error::Parameter {
+                name: "force of the bond law over its stretch",
+                found: *exact,
+                allowed: format!("finite values other than 0; at the stretch {}", (1.0 + e).sqrt()),
+            }),
+            None => Ok(samples),
+        }
     }
 
-    /// Cubic Hermite in l, nodes dense where the force is steep: equal steps of ∫ √(1 + |t′|) dl.
-    fn table(&self, nodes: usize, range: [f64; 2]) -> KernelFit {
-        let [low, high] = range;
-        let fine = 4 * nodes;
-        let at = |k: usize| low + (high - low) * k as f64 / fine as f64;
-        let density = |l: f64| (1.0 + self.law.tension_derivative(l).abs()).powf(0.25);
-        let mut total = vec![0.0];
-        for k in 0..fine {
-            let step = 0.5 * (density(at(k)) + density(at(k + 1)));
-            total.push(total[k] + step);
-        }
-        let whole = total[fine];
-        let mut table: Vec<[f64; 3]> = (0..=nodes)
-            .map(|node| {
-                let aim = whole * node as f64 / nodes as f64;
-                let k = total.partition_point(|&t| t < aim).clamp(1, fine) - 1;
-                let l = at(k)
-                    + (at(k + 1) - at(k)) * ((aim - total[k]) / (total[k + 1] - total[k])).clamp(0.0, 1.0);
-                [l, self.law.tension(l), self.law.tension_derivative(l)]
-            })
+    /// Cubic Hermite pieces of t over the strain, halved until each meets the bound at its quarter points.
+    fn table(&self, range: [f64; 2], bound: f64, dense: &[(f64, f64)]) -> Result<KernelFit, Error> {
+        let [low, high] = range.map(|stretch| stretch - 1.0);
+        let node = |strain: f64| {
+            [strain, self.law.tension_at_strain(strain), self.law.tension_derivative(1.0 + strain)]
+        };
+        let mut pending: Vec<[f64; 3]> = (1..=LEAST_PIECES)
+            .rev()
+            .map(|k| node(low + (high - low) * k as f64 / LEAST_PIECES as f64))
             .collect();
-        if self.stress_free && low < 1.0 && high > 1.0 {
+        if low < 0.0 && high > 0.0 {
             // rest is a node: the error relative to t must not blow up beside its zero
-            table.push([1.0, 0.0, self.law.tangent()]);
-            table.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            table.dedup_by(|a, b| a[0] - b[0] < 1e-12);
+            pending.retain(|[strain, ..]| strain.abs() > 1e-12);
+            let after = pending.partition_point(|[strain, ..]| *strain > 0.0);
+            pending.insert(after, node(0.0));
         }
-        KernelFit {
+        let mut fit = KernelFit {
             numerator: Vec::new(),
             denominator: Vec::new(),
             stress_free: self.stress_free,
             range,
-            max_error: f64::INFINITY,
-            table,
-        }
-    }
-}
-
-/// Powers of e of Σ c_k T_k((e − centre)/half).
-fn powers(chebyshev: &[f64], centre: f64, half: f64) -> Vec<f64> {
-    let length = chebyshev.len();
-    let (slope, shift) = (1.0 / half, -centre / half);
-    let times_x = |poly: &[f64]| {
-        let mut product = vec![0.0; length];
-        for (k, &c) in poly.iter().enumerate() {
-            product[k] += shift * c;
-            if k + 1 < length {
-                product[k + 1] += slope * c;
+            max_error: 0.0,
+            table: vec![node(low)],
+        };
+        while let (Some(&right), Some(&left)) = (pending.last(), fit.table.last()) {
+            let error = [0.25, 0.5, 0.75].into_iter().fold(0.0, |largest: f64, part| {
+                let strain = left[0] + part * (right[0] - left[0]);
+                let exact = self.law.tension_at_strain(strain);
+                if exact == 0.0 {
+                    largest
+                } else {
+                    largest.max((hermite(&left, &right, strain) / exact - 1.0).abs())
+                }
+            });
+            if error <= 0.7 * bound {
+                fit.max_error = fit.max_error.max(error);
+                fit.table.push(right);
+                pending.pop();
+            } else if fit.table.len() + pending.len() < MOST_NODES {
+                pending.push(node(0.5 * (left[0] + right[0])));
+            } else {
+                break;
             }
         }
-        product
-    };
-    let mut previous = vec![0.0; length];
-    previous[0] = 1.0;
-    let mut sum: Vec<f64> = previous.iter().map(|t| t * chebyshev[0]).collect();
-    let mut current = times_x(&previous);
-    for &coefficient in &chebyshev[1..] {
-        for (s, t) in sum.iter_mut().zip(&current) {
-            *s += coefficient * t;
+        fit.max_error = fit.max_error.max(fit.error(dense));
+        if pending.is_empty() && fit.max_error <= bound {
+            return Ok(fit);
         }
-        let next = times_x(&current).iter().zip(&previous).map(|(a, b)| 2.0 * a - b).collect();
-        previous = std::mem::replace(&mut current, next);
+        Err(Error::Parameter {
+            name: "bound of the fitted law",
+            found: bound,
+            allowed: format!("larger: no fit over the stretches {} to {} reaches it", range[0], range[1]),
+        })
     }
-    sum
 }

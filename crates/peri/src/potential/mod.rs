@@ -3,6 +3,7 @@
 mod chain;
 mod fit;
 mod laws;
+mod ratio;
 #[cfg(test)]
 mod tests;
 

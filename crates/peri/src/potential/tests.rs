@@ -277,32 +277,99 @@ fn interpolation_errors_of_the_formulation() {
     }
 }
 
-/// Every law on every range a scene is likely to need meets the default bound; the fit is what it says it is.
+/// Every law on every range a scene is likely to need meets the default bound, by a form no dearer than stated; the fit is
+/// what it says it is.
 #[test]
 fn fits_meet_their_bound() {
     for (name, law) in laws(720.0, 1200.0) {
-        for range in
-            [[0.98, 1.02], [0.95, 1.05], [0.9, 1.1], [0.8, 1.25], [0.5, 2.0], [0.5, 3.0], [0.05, 6.0]]
-        {
+        for (range, cost) in [
+            ([0.98, 1.02], 6),
+            ([0.95, 1.05], 8),
+            ([0.9, 1.1], 10),
+            ([0.8, 1.25], 13),
+            ([0.7, 1.5], 15),
+            ([0.5, 2.0], 18),
+            ([0.5, 3.0], 20),
+            ([0.4, 3.0], 22),
+            ([0.3, 3.0], 22),
+            ([0.3, 4.0], 26),
+            ([0.05, 6.0], 26),
+        ] {
+            let start = std::time::Instant::now();
             let fit = KernelFit::new(&*law, range, 1e-9).unwrap();
-            println!("{name:28} {range:?} {} cost {} error {:.1e}", fit.kind(), fit.cost(), fit.max_error);
-            assert!(fit.max_error <= 1e-9, "{name} {range:?}");
-            let mut worst = 0.0_f64;
-            for k in 0..1000 {
-                let stretch = range[0] + (range[1] - range[0]) * (f64::from(k) + 0.37) / 1000.0;
-                let e = stretch * stretch - 1.0;
-                let exact = law.tension(stretch) / stretch;
-                // near rest the exact value itself carries a relative rounding of about ε/e
-                if e.abs() > 1e-4 || !law.is_stress_free() {
-                    worst = worst.max((fit.value(e) / exact - 1.0).abs());
-                }
-            }
-            assert!(worst <= 1.5e-9, "{name} {range:?}: {worst:e} by {}", fit.kind());
-            if law.is_stress_free() {
-                assert_eq!(fit.value(0.0), 0.0, "{name} {range:?}");
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            let kind = fit.kind();
+            println!(
+                "{name:28} {range:?} {kind} cost {} error {:.1e}, {ms:.1} ms",
+                fit.cost(),
+                fit.max_error
+            );
+            assert!(fit.cost() <= cost, "{name} {range:?} {kind}");
+            // only where bonds are crushed to a twentieth no ratio of this size suffices
+            assert!(range[0] < 0.3 || fit.cost() > 0, "{name} {range:?} {kind}");
+            check_fit(&fit, &*law, 1e-9, &format!("{name} {range:?} {kind}"));
+        }
+    }
+}
+
+/// Between the points at which the fit measured itself.
+fn check_fit(fit: &KernelFit, law: &dyn BondPotential, bound: f64, name: &str) {
+    let [low, high] = fit.range;
+    assert!(fit.max_error <= bound, "{name}: {:e}", fit.max_error);
+    for k in 0..1000 {
+        let stretch = low + (high - low) * (f64::from(k) + 0.37) / 1000.0;
+        let e = (stretch - 1.0) * (stretch + 1.0);
+        let exact = law.tension(stretch) / stretch;
+        // 4097 points do not hit every extremum, and the law itself carries some roundings
+        let limit = (1.05 * fit.max_error + 5e-14) * exact.abs();
+        assert!(
+            (fit.value(e) - exact).abs() <= limit,
+            "{name} at {stretch}: {:e}",
+            fit.value(e) / exact - 1.0
+        );
+    }
+    if law.is_stress_free() && low < 1.0 && high > 1.0 {
+        assert_eq!(fit.value(0.0), 0.0, "{name}");
+        // relative, also where the force vanishes
+        for e in [1e-15_f64, -1e-12, 1e-9, -1e-6] {
+            let exact = law.tension_at_strain(e / (1.0 + (1.0 + e).sqrt())) / (1.0 + e).sqrt();
+            assert!((fit.value(e) / exact - 1.0).abs() <= 1.05 * fit.max_error + 5e-14, "{name} at e = {e}");
+        }
+    }
+}
+
+#[test]
+fn extreme_laws_are_fitted() {
+    for (links, dissociation) in [(2.0, 20.0), (2.0, 1e9), (12.5, 1200.0), (1e6, 1e9)] {
+        for (name, law) in laws(links, dissociation) {
+            for (range, bound) in
+                [([0.98, 1.02], 1e-12), ([0.5, 3.0], 1e-6), ([0.05, 1.5], 1e-9), ([1.5, 2.5], 1e-9)]
+            {
+                let name = format!("{name}, n̄ = {links}, D̂ = {dissociation}, {range:?}");
+                let fit =
+                    KernelFit::new(&*law, range, bound).unwrap_or_else(|error| panic!("{name}: {error}"));
+                check_fit(&fit, &*law, bound, &format!("{name}: {}", fit.kind()));
             }
         }
     }
+}
+
+/// A bond that carries nothing has no force to be fitted relative to.
+#[test]
+fn a_slack_law_is_refused() {
+    struct Slack;
+    impl BondPotential for Slack {
+        fn tension(&self, _: f64) -> f64 {
+            0.0
+        }
+        fn tension_derivative(&self, _: f64) -> f64 {
+            0.0
+        }
+        fn energy(&self, _: f64) -> f64 {
+            0.0
+        }
+    }
+    assert!(KernelFit::new(&Slack, [0.9, 1.1], 1e-9).is_err());
 }
 
 #[test]
