@@ -100,8 +100,12 @@ pub struct CloudBonds<const D: usize> {
     volume_correction: VolumeCorrection,
     starts: Vec<usize>,
     neighbours: Vec<u32>,
-    stiffness: Vec<f64>,
-    inverse_square: Vec<f64>,
+    /// 1/|ξ| of each bond; 0 for the padding.
+    inverse_length: Vec<f64>,
+    /// w V_J of each bond, where bonds differ in it.
+    weights: Vec<f64>,
+    /// 2kθ, times the common w V_J.
+    stiffness: f64,
     factors: Option<Field<D>>,
     kernel: Option<Box<dyn CloudKernel<D>>>,
     /// A law that only a table represents, and kθ.
@@ -175,9 +179,15 @@ impl<const D: usize> CloudBonds<D> {
         for (slot, &point) in sorted.iter().enumerate() {
             position.set(slot, point);
         }
+        let mut inverse_length = Vec::with_capacity(neighbours.len());
+        for own in 0..sorted.len() {
+            for &other in &neighbours[starts[own]..starts[own + 1]] {
+                let square: f64 = (0..D).map(|d| (sorted[other as usize][d] - sorted[own][d]).powi(2)).sum();
+                inverse_length.push(if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 });
+            }
+        }
         let volumes: Vec<f64> = order.iter().map(|&i| volumes[i as usize]).collect();
         let mean = volumes.iter().sum::<f64>() / volumes.len() as f64 / thickness;
-        let bonds = neighbours.len();
         Ok(Self {
             particles: (0..sorted.len() as u32).collect(),
             position,
@@ -189,8 +199,9 @@ impl<const D: usize> CloudBonds<D> {
             volume_correction,
             starts,
             neighbours,
-            stiffness: vec![0.0; bonds],
-            inverse_square: vec![0.0; bonds],
+            inverse_length,
+            weights: Vec::new(),
+            stiffness: 0.0,
             factors: None,
             kernel: None,
             table: None,
@@ -254,18 +265,20 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     }
 
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
-        let mut stiffness = std::mem::take(&mut self.stiffness);
-        let mut inverse_square = std::mem::take(&mut self.inverse_square);
-        for slot in 0..self.volumes.len() {
-            for k in self.starts[slot]..self.starts[slot + 1] {
-                if self.neighbours[k] as usize != slot {
-                    let bond = self.bond(slot, k);
-                    stiffness[k] = 2.0 * modulus * bond.weight / bond.length;
-                    inverse_square[k] = 1.0 / (bond.length * bond.length);
-                }
-            }
+        let common = self.volumes[0];
+        let alike = self.factors.is_none()
+            && self.volume_correction == VolumeCorrection::None
+            && self.volumes.iter().all(|&v| v == common);
+        self.stiffness = 2.0 * modulus * if alike { common } else { 1.0 };
+        self.weights = Vec::new();
+        if !alike {
+            let weight = |slot: usize, k: usize| {
+                if self.neighbours[k] as usize == slot { 0.0 } else { self.bond(slot, k).weight }
+            };
+            let of_slot = |slot: usize| (self.starts[slot]..self.starts[slot + 1]).map(move |k| (slot, k));
+            self.weights =
+                (0..self.volumes.len()).flat_map(of_slot).map(|(slot, k)| weight(slot, k)).collect();
         }
-        (self.stiffness, self.inverse_square) = (stiffness, inverse_square);
         self.kernel = cloud_kernel(fit);
         self.table = self.kernel.is_none().then(|| (fit.clone(), modulus));
     }
@@ -288,8 +301,9 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
                 displacement: displacement.components(),
                 starts: &self.starts,
                 neighbours: &self.neighbours,
-                stiffness: &self.stiffness,
-                inverse_square: &self.inverse_square,
+                inverse_length: &self.inverse_length,
+                weights: &self.weights,
+                stiffness: self.stiffness,
             };
             kernel.run(&data, start, force, track);
         } else if let Some((fit, modulus)) = &self.table {
@@ -302,7 +316,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     }
 
     fn bytes(&self) -> usize {
-        let bonds = self.neighbours.len() * (4 + 8 + 8);
+        let bonds = self.neighbours.len() * (4 + 8) + self.weights.len() * 8;
         bonds
             + self.volumes.len() * (8 * D + 8 + 4 + 4 + 8)
             + self.factors.as_ref().map_or(0, |f| 8 * D * f.slots())

@@ -16,10 +16,12 @@ pub struct CloudData<'a, const D: usize> {
     pub starts: &'a [usize],
     /// Neighbour of each bond.
     pub neighbours: &'a [u32],
-    /// 2kθ w V_J/|ξ| of each bond; 0 where broken.
-    pub stiffness: &'a [f64],
-    /// 1/|ξ|² of each bond; 0 where broken.
-    pub inverse_square: &'a [f64],
+    /// 1/|ξ| of each bond; 0 where broken.
+    pub inverse_length: &'a [f64],
+    /// w V_J of each bond; empty where all bonds have the same, which is then part of `stiffness`.
+    pub weights: &'a [f64],
+    /// 2kθ, times the common w V_J.
+    pub stiffness: f64,
 }
 
 /// The cloud kernel: lists under a law.
@@ -42,45 +44,48 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
         let zero = simd.splat_f64s(0.0);
         let (mut low, mut high) = (zero, zero);
         let tracking = track.is_some();
+        let CloudData { position, displacement, starts, neighbours, inverse_length, weights, stiffness } =
+            *self.data;
         // closures and `array::from_fn` would not inherit the target features, and so not be inlined
         for offset in 0..force[0].len() {
             let own = start + offset;
             let (mut here, mut moved) = ([0.0; D], [0.0; D]);
             for d in 0..D {
-                here[d] = self.data.position[d][own];
-                moved[d] = self.data.displacement[d][own];
+                here[d] = position[d][own];
+                moved[d] = displacement[d][own];
             }
             let mut sum = [zero; D];
-            for first in (self.data.starts[own]..self.data.starts[own + 1]).step_by(GROUP) {
+            for first in (starts[own]..starts[own + 1]).step_by(GROUP) {
                 let (mut bond, mut change) = ([[0.0; GROUP]; D], [[0.0; GROUP]; D]);
-                let group = &self.data.neighbours[first..first + GROUP];
+                let group = &neighbours[first..first + GROUP];
                 for lane in 0..GROUP {
                     let j = group[lane] as usize;
                     for d in 0..D {
                         // SAFETY: every neighbour is a particle of the cloud (checked where the lists are built)
                         unsafe {
-                            bond[d][lane] = self.data.position[d].get_unchecked(j) - here[d];
-                            change[d][lane] = self.data.displacement[d].get_unchecked(j) - moved[d];
+                            bond[d][lane] = position[d].get_unchecked(j) - here[d];
+                            change[d][lane] = displacement[d].get_unchecked(j) - moved[d];
                         }
                     }
                 }
                 for sub in (0..GROUP).step_by(S::F64_LANES) {
                     // SAFETY: sub + lanes ≤ GROUP, the length of the arrays and of the slices cut here
-                    let (scale, stiffness) = unsafe {
-                        (
-                            load::<S>(&self.data.inverse_square[first..first + GROUP], sub),
-                            load::<S>(&self.data.stiffness[first..first + GROUP], sub),
-                        )
-                    };
+                    let inverse = unsafe { load::<S>(&inverse_length[first..first + GROUP], sub) };
+                    let mut factor = simd.mul_f64s(inverse, simd.splat_f64s(stiffness));
+                    if !weights.is_empty() {
+                        // SAFETY: as above
+                        let weight = unsafe { load::<S>(&weights[first..first + GROUP], sub) };
+                        factor = simd.mul_f64s(factor, weight);
+                    }
                     let (mut zeta, mut e) = ([zero; D], zero);
                     for d in 0..D {
                         let (xi, eta) = unsafe { (load::<S>(&bond[d], sub), load::<S>(&change[d], sub)) };
                         zeta[d] = simd.add_f64s(xi, eta);
                         e = simd.mul_add_f64s(eta, simd.add_f64s(zeta[d], xi), e);
                     }
-                    e = simd.mul_f64s(e, scale);
+                    e = simd.mul_f64s(e, simd.mul_f64s(inverse, inverse));
                     let q = law::<S, P, Q>(simd, e, self.law.0, &self.law.1, &self.law.2);
-                    let q = simd.mul_f64s(q, stiffness);
+                    let q = simd.mul_f64s(q, factor);
                     for d in 0..D {
                         sum[d] = simd.mul_add_f64s(q, zeta[d], sum[d]);
                     }
