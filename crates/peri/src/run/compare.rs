@@ -116,7 +116,8 @@ pub fn observed_order(spacing: &[f64], error: &[f64]) -> f64 {
 
 /// The report of all variants; with one variant its values keep their plain names.
 pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -> Report {
-    let mut report = Report::new("peri", env!("CARGO_PKG_VERSION"), &source.text);
+    let mut report =
+        Report::new("peri", env!("CARGO_PKG_VERSION"), &resolved(source, scene, outcomes, quick));
     report.threads(rayon::current_num_threads());
     let several = outcomes.len() > 1;
     let full = |name: &str, outcome: &Outcome| {
@@ -165,6 +166,20 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
     }
     report.judge(&scene.expect, quick);
     report
+}
+
+/// The scene with everything that it left to defaults, as comments behind its text.
+fn resolved(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -> String {
+    let Scene { material, solver, stress, output, .. } = scene;
+    let mut text = format!("{}\n# as run, with defaults (quick = {quick}):\n", source.text.trim_end());
+    for line in [format!("{material:?}"), format!("{solver:?}"), format!("{stress:?}"), format!("{output:?}")]
+    {
+        text += &format!("# {line}\n");
+    }
+    for outcome in outcomes {
+        text += &format!("# variant {}\n", outcome.name);
+    }
+    text
 }
 
 /// Variants as lines of a table: size, work, time, then the results that all of them share.
