@@ -207,4 +207,66 @@ mod tests {
         let found = integral(&ball) * (4.0 / 3.0 * PI).powi(2);
         assert!((found - 64.0 * PI * PI / 35.0).abs() < 1e-5, "{found}");
     }
+
+    /// `reference/ch2/lattice_moduli.csv`, rows of other horizons: C₁₁₁₁, C₁₁₂₂, E along \[100\], ν, E along \[110\], Zener's
+    /// ratio and the isotropic mean.
+    #[test]
+    #[rustfmt::skip]
+    fn lattice_moduli_at_other_horizons() {
+        use VolumeCorrection::{Linear, None};
+        let near = |m: LatticeModuli, expected: [f64; 7]| {
+            let found = [m.c1111, m.c1122, m.e100, m.nu, m.e110, m.zener, m.dilatation];
+            // eight digits are copied from the file
+            assert!(
+                found.iter().zip(expected).all(|(f, e)| (f / e - 1.0).abs() < 3e-8),
+                "{found:?} {expected:?}"
+            );
+        };
+        let rows = [
+            (3.015, None, [1.03713356, 0.99019733, 1.04860210, 0.31824809, 1.00165972, 0.93361849, 1.02539950]),
+            (3.015, Linear, [0.86076051, 0.86664499, 0.85928436, 0.33561212, 0.86516885, 1.01028973, 0.86223163]),
+            (6.015, None, [0.98313429, 1.01630059, 0.97470286, 0.34457842, 1.00787147, 1.05147110, 0.99142587]),
+            (8.015, Linear, [0.92282413, 0.94124460, 0.91817305, 0.33998699, 0.93659398, 1.03024331, 0.92742925]),
+        ];
+        for (ratio, correction, expected) in rows {
+            near(LatticeModuli::new::<2>(ratio, correction), expected);
+        }
+        let rows = [
+            (3.015, None, [1.03554537, 1.19345703, 0.97766676, 0.27754213, 1.11960848, 1.24761663, 1.09871003]),
+            (3.015, Linear, [0.85400927, 0.94294951, 0.82186459, 0.26903156, 0.90292221, 1.16479791, 0.88958537]),
+            (6.015, None, [0.99836783, 1.05133156, 0.97951856, 0.25981674, 1.02847399, 1.08174375, 1.01955332]),
+            (8.015, Linear, [0.92156207, 0.93127787, 0.91815004, 0.25197157, 0.92723336, 1.01589794, 0.92544839]),
+        ];
+        for (ratio, correction, expected) in rows {
+            near(LatticeModuli::new::<3>(ratio, correction), expected);
+        }
+    }
+
+    /// What (A.18) and (A.38) print are 2Ω times the single-point integrals of (2.77) and (2.73): ∫ ξξξξ/|ξ|³ dV has the
+    /// coefficients tπR³/12 and πR⁴/15 that the calibration needs, by quadrature of its components.
+    #[test]
+    fn single_point_integrals() {
+        let n = 2000;
+        let middle = |k: i32, width: f64| (f64::from(k) + 0.5) * width / f64::from(n);
+        // disk: ∫ r·r dr = 1/3 times the mean of c⁴ and c²s² over the circle; ball: 1/4, with c from −1 to 1
+        let (mut disk, mut ball) = ([0.0; 2], [0.0; 2]);
+        for k in 0..n {
+            let (s, c) = middle(k, 2.0 * PI).sin_cos();
+            disk[0] += c.powi(4) * 2.0 * PI / f64::from(n) / 3.0;
+            disk[1] += c * c * s * s * 2.0 * PI / f64::from(n) / 3.0;
+            let z = middle(k, 2.0) - 1.0;
+            ball[0] += z.powi(4) * 2.0 / f64::from(n) * 2.0 * PI / 4.0;
+            ball[1] += z * z * (1.0 - z * z) * 2.0 / f64::from(n) * PI / 4.0;
+        }
+        // δδ + δδ + δδ is 3 for 1111 and 1 for 1122; the midpoint rule in z is of second order
+        for (found, coefficient, bound) in [(disk, PI / 12.0, 1e-12), (ball, PI / 15.0, 1e-5)] {
+            assert!((found[0] / (3.0 * coefficient) - 1.0).abs() < bound, "{found:?}");
+            assert!((found[1] / coefficient - 1.0).abs() < bound, "{found:?}");
+        }
+        // the printed values are those with the factor 2Ω, not the double integrals of the test above
+        assert!((PI * PI / 6.0 / (2.0 * PI) - PI / 12.0).abs() < 1e-15);
+        assert!((8.0 * PI * PI / 45.0 / (8.0 / 3.0 * PI) - PI / 15.0).abs() < 1e-15);
+        assert!((8.0 * PI * PI / 6.0 / (128.0 * PI / 45.0) - 1.473).abs() < 5e-4);
+        assert!((15.0 * 8.0 * PI * PI / 45.0 / (64.0 * PI * PI / 35.0) - 1.458).abs() < 5e-4);
+    }
 }

@@ -78,8 +78,22 @@ impl Critical {
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
         match (self.percent_over_contour, self.stretch, self.fracture_energy) {
             (Some(factor), None, None) => match context.links {
-                Some(links) if factor > 0.0 => Ok(self.reading.unwrap_or_default().stretch(factor, links)),
-                Some(_) => fault("critical.percent_over_contour", factor, "above 0"),
+                Some(links) => {
+                    // below the contour of which (2.38) makes 1, its left branch compresses
+                    let contour = match self.reading.unwrap_or_default() {
+                        Reading::R1 | Reading::R3 => factor * links.sqrt(),
+                        Reading::R2 | Reading::R4 => factor * (links / 8.0).sqrt(),
+                    };
+                    if contour > 1.0 && contour.is_finite() {
+                        Ok(self.reading.unwrap_or_default().stretch(factor, links))
+                    } else {
+                        fault(
+                            "critical.percent_over_contour",
+                            factor,
+                            "finite and above the contour 1 of the chains",
+                        )
+                    }
+                }
                 None => fault("critical.percent_over_contour", factor, "a chain law: `pmb` has no links"),
             },
             (None, Some(stretch), None) if stretch > 1.0 => Ok(stretch),
@@ -182,5 +196,66 @@ mod tests {
         // G₀ = (π/10) c s₀² δ⁵ with c = 6kθ (Silling & Askari 2005, Eq. (24): πcs₀²δ⁵/10)
         let exact = PI / 10.0 * 6.0 * kt * s * s * horizon.powi(5);
         assert!((fracture_energy(&context, 1.0 + s) / exact - 1.0).abs() < 1e-12);
+    }
+
+    /// formulation.md: lattice over continuum G is 1.006 (2D) and 1.12 (3D) at m = 3.015: the energy of the bonds that cross
+    /// a plane, 2kθΦ|ξ| each pair, summed over the rows |ξ_y| from which they start.
+    #[test]
+    fn fracture_energy_of_a_lattice() {
+        let ratio: f64 = 3.015;
+        let (mut sheet, mut solid) = (0.0, 0.0);
+        for x in -3..=3 {
+            for y in 1..=3 {
+                for z in -3..=3 {
+                    let [x, y, z] = [x, y, z].map(f64::from);
+                    let length = (x * x + y * y + z * z).sqrt();
+                    if length <= ratio {
+                        solid += 2.0 * length * y;
+                        sheet += if z == 0.0 { 2.0 * length * y } else { 0.0 };
+                    }
+                }
+            }
+        }
+        assert!((sheet / ratio.powi(4) - 1.006).abs() < 5e-4);
+        assert!((solid / (2.0 * PI / 5.0 * ratio.powi(5)) - 1.12).abs() < 5e-3);
+    }
+
+    /// `reference/ch2/s8_G.py`: G = 2.67 N/mm, E = 0.6 N/mm², δ = 6.03 mm give Φ = 2πG/(3Eδ), and a linear bond breaks at
+    /// 1 + √(2Φ/3).
+    #[test]
+    fn critical_stretch_of_a_fracture_energy() {
+        let (e, horizon, thickness) = (0.6e6, 6.03e-3, 3e-3);
+        let energy = 2.67e3;
+        let phi = 2.0 * PI * energy / (3.0 * e * horizon);
+        let law = Law::Pmb.build(0.0, 0.0, false).unwrap();
+        let (space, modulus) = (Space::PlaneStress, modulus(Space::PlaneStress, e, horizon, thickness));
+        let context = Context { law: &*law, links: None, space, modulus, horizon, thickness };
+        let critical =
+            Critical { fracture_energy: Some(EnergyPerArea::from_si(energy)), ..Critical::default() };
+        let found = critical.resolve(&context).unwrap();
+        assert!((found - (1.0 + (2.0 * phi / 3.0).sqrt())).abs() < 1e-12, "{found}");
+    }
+
+    #[test]
+    fn readings_that_break_at_rest_are_refused() {
+        let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+        let context = Context {
+            law: &*law,
+            links: Some(720.0),
+            space: Space::PlaneStress,
+            modulus: 1.0,
+            horizon: 1.0,
+            thickness: 1.0,
+        };
+        for (factor, reading) in
+            [(0.03, Reading::R1), (0.1, Reading::R2), (0.05, Reading::R4), (f64::INFINITY, Reading::R4)]
+        {
+            let critical = Critical {
+                percent_over_contour: Some(factor),
+                reading: Some(reading),
+                ..Critical::default()
+            };
+            assert!(critical.resolve(&context).is_err(), "{factor} {reading:?}");
+        }
     }
 }

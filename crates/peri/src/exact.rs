@@ -2,6 +2,7 @@
 
 use crate::bonds::Stencil;
 use crate::potential::BondPotential;
+use crate::quadrature::mean;
 
 /// Kirsch's stresses [σ_xx, σ_yy, σ_xy] at (x, y) around a hole of `radius` at the origin of an infinite plate under
 /// remote tension `remote` along x, Eqs (2.81)–(2.83); continued as printed inside the hole.
@@ -41,17 +42,69 @@ pub fn lattice_nominal_stress(law: &dyn BondPotential, ratio: f64, stretches: [f
 }
 
 /// Uniaxial response of the plane lattice: lateral stretch at which the lateral stress vanishes, and the nominal
-/// stress over kθ along the pull.
+/// stress over kθ along the pull. Both NaN where no lateral stretch between 0.02 and 3 is free of stress.
 pub fn lattice_uniaxial(law: &dyn BondPotential, ratio: f64, stretch: f64) -> (f64, f64) {
-    let lateral = |l: f64| lattice_nominal_stress(law, ratio, [stretch, l])[1];
-    // between strong contraction and slight extension the lateral stress changes sign once
-    let (mut low, mut high) = (0.02, 3.0);
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if lateral(middle) < 0.0 { low = middle } else { high = middle }
+    uniaxial(stretch, |lateral| lattice_nominal_stress(law, ratio, [stretch, lateral]))
+}
+
+/// Nominal stress [along, across] over kθ of the continuum of `D` dimensions (2: sheet of thickness 1, 3: solid) with a
+/// horizon of 1, F = diag(pull, lateral, …): P = ∫ t n ⊗ ξ dV over directions, r integrated in closed form.
+pub fn continuum_nominal_stress<const D: usize>(law: &dyn BondPotential, stretches: [f64; 2]) -> [f64; 2] {
+    let [pull, lateral] = stretches;
+    // (F n)·e n·e/|F n| of a bond at an angle of cosine c to the pull
+    let along = |c: f64| {
+        let across = 1.0 - c * c;
+        let length = (pull * pull * c * c + lateral * lateral * across).sqrt();
+        let scale = law.tension(length) / length;
+        [scale * pull * c * c, scale * lateral * across]
+    };
+    let part = |axis: usize| {
+        if D == 2 {
+            // ∫ r r dr = 1/3; the mean over a period converges faster than any power
+            (0..ANGLES)
+                .map(|k| along((std::f64::consts::PI * (k as f64 + 0.5) / ANGLES as f64).cos())[axis])
+                .sum::<f64>()
+                / ANGLES as f64
+                * (2.0 * std::f64::consts::PI / 3.0)
+        } else {
+            // ∫ r r² dr = 1/4, two lateral directions
+            let piece =
+                |k: usize| mean(k as f64 / PIECES as f64, (k + 1) as f64 / PIECES as f64, |c| along(c)[axis]);
+            let directions = if axis == 0 { 1.0 } else { 2.0 };
+            (0..PIECES).map(piece).sum::<f64>() / PIECES as f64 * (std::f64::consts::PI / directions)
+        }
+    };
+    [part(0), part(1)]
+}
+
+/// [`lattice_uniaxial`] of the continuum of [`continuum_nominal_stress`].
+pub fn continuum_uniaxial<const D: usize>(law: &dyn BondPotential, stretch: f64) -> (f64, f64) {
+    uniaxial(stretch, |lateral| continuum_nominal_stress::<D>(law, [stretch, lateral]))
+}
+
+/// Directions in a half plane; pieces of the cosine in a half space, of eight directions each. What they must resolve is
+/// the turn of bonds into the pull, over an angle of lateral/pull stretch: below 1e-9 as long as that exceeds 0.01.
+const ANGLES: usize = 1024;
+const PIECES: usize = 128;
+
+/// The lateral stretch free of stress nearest to 1, and the stress along the pull.
+fn uniaxial(stretch: f64, stress: impl Fn(f64) -> [f64; 2]) -> (f64, f64) {
+    // a body contracts when pulled: strong contraction has its own, unphysical, free states
+    let end: f64 = if stretch >= 1.0 { 0.02 } else { 3.0 };
+    let at = |k: u32| end.powf(f64::from(k) / 96.0);
+    let sign = |lateral: f64| stress(lateral)[1] < 0.0;
+    let start = sign(at(0));
+    if stress(1.0)[1] == 0.0 {
+        return (1.0, stress(1.0)[0]);
     }
-    let l = 0.5 * (low + high);
-    (l, lattice_nominal_stress(law, ratio, [stretch, l])[0])
+    let Some(k) = (1..=96).find(|k| sign(at(*k)) != start) else { return (f64::NAN, f64::NAN) };
+    let (mut near, mut far) = (at(k - 1), at(k));
+    for _ in 0..60 {
+        let middle = 0.5 * (near + far);
+        if sign(middle) == start { near = middle } else { far = middle }
+    }
+    let lateral = 0.5 * (near + far);
+    (lateral, stress(lateral)[0])
 }
 
 #[cfg(test)]
@@ -103,5 +156,77 @@ mod tests {
             let found = lattice_uniaxial(&*law, 3.015, stretch).1 * kt;
             assert!((found / expected - 1.0).abs() < 1e-4, "{stretch}: {found} against {expected}");
         }
+    }
+    /// `reference/ch2/uniaxial.csv`: P11/E and lateral stretch of the continuum with K rescaled to 3, n̄ = 720, D̂ = 1200
+    /// (25 where said), sheet then solid. Its tables and quadratures are good to about 1e-5.
+    #[test]
+    fn continuum_uniaxial_response() {
+        let table = [
+            (Law::Subtract, 720.0, 1.08, [0.082056, 0.973343, 0.083324, 0.979868]),
+            (Law::Subtract, 720.0, 1.98, [1.190601, 0.688686, 1.343329, 0.750009]),
+            (Law::Subtract, 720.0, 2.94, [2.555969, 0.443533, 3.041127, 0.530434]),
+            (Law::Subtract, 25.0, 2.94, [3.199784, 0.403714, 3.644650, 0.500326]),
+            (Law::Chain, 720.0, 1.08, [0.076509, 0.974396, 0.078615, 0.980515]),
+            (Law::Chain, 720.0, 1.98, [0.639180, 0.783667, 0.782105, 0.817777]),
+            (Law::Pmb, 720.0, 1.5, [0.565310, 0.835811, 0.610012, 0.872009]),
+        ];
+        for (law, links, stretch, expected) in table {
+            let built = law.build(links, 1200.0, true).unwrap();
+            let sheet = continuum_uniaxial::<2>(&*built, stretch);
+            let solid = continuum_uniaxial::<3>(&*built, stretch);
+            let found = [
+                sheet.1 * modulus(Space::PlaneStress, 1.0, 1.0, 1.0),
+                sheet.0,
+                solid.1 * modulus(Space::Solid, 1.0, 1.0, 1.0),
+                solid.0,
+            ];
+            for (f, e) in found.iter().zip(expected) {
+                assert!(
+                    (f / e - 1.0).abs() < 2e-5,
+                    "{law:?} {links} {stretch}: {found:?} against {expected:?}"
+                );
+            }
+        }
+    }
+
+    /// The continuum's small-strain response is E and ν of the calibration; a lattice of long horizon tends to it.
+    #[test]
+    fn small_strain_and_long_horizon() {
+        let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+        for strain in [1e-6, -1e-6] {
+            let (lateral, stress) = continuum_uniaxial::<2>(&*law, 1.0 + strain);
+            let sheet = modulus(Space::PlaneStress, 1.0, 1.0, 1.0);
+            // second-order terms of about the strain
+            assert!(
+                (stress * sheet / strain - 1.0).abs() < 1e-5
+                    && ((1.0 - lateral) / strain - 1.0 / 3.0).abs() < 1e-5
+            );
+            let (lateral, stress) = continuum_uniaxial::<3>(&*law, 1.0 + strain);
+            let solid = modulus(Space::Solid, 1.0, 1.0, 1.0);
+            assert!(
+                (stress * solid / strain - 1.0).abs() < 1e-5
+                    && ((1.0 - lateral) / strain - 0.25).abs() < 1e-5
+            );
+        }
+        let exact = continuum_uniaxial::<2>(&*law, 1.6).1 * modulus(Space::PlaneStress, 1.0, 1.0, 1.0);
+        let far = lattice_uniaxial(&*law, 40.015, 1.6).1 * modulus(Space::PlaneStress, 1.0, 40.015, 1.0);
+        // bonds at the rim of the horizon: a relative area of about m^{-3/2}, stiffness r³
+        assert!((far / exact - 1.0).abs() < 0.01, "{far} {exact}");
+    }
+
+    /// Beyond l ≈ 8 the reference finds no lateral stretch free of stress; at rest nothing moves.
+    #[test]
+    fn limits_of_the_uniaxial_response() {
+        let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+        for stretch in [9.2615, 12.0] {
+            let (lateral, stress) = continuum_uniaxial::<2>(&*law, stretch);
+            assert!(lateral.is_nan() && stress.is_nan());
+        }
+        let (lateral, stress) = continuum_uniaxial::<2>(&*law, 4.6974);
+        assert!((lateral - 0.170884).abs() < 2e-5, "{lateral}");
+        let expected = 5.224564;
+        assert!((stress * modulus(Space::PlaneStress, 1.0, 1.0, 1.0) / expected - 1.0).abs() < 2e-5);
+        let (lateral, stress) = lattice_uniaxial(&*law, 3.015, 1.0);
+        assert!((lateral - 1.0).abs() < 1e-12 && stress.abs() < 1e-12);
     }
 }
