@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// File name inside an output directory.
 pub const FILE_NAME: &str = "checkpoint.bin";
 /// First bytes of the file: name and version of the format.
-const MAGIC: &[u8; 8] = b"peri-ck1";
+const MAGIC: &[u8; 8] = b"peri-ck2";
 
 /// The state of a run.
 #[derive(Debug, Serialize, Deserialize)]
@@ -61,12 +61,15 @@ pub fn write<const D: usize>(
     finished: &[Outcome],
     state: Option<&State<D>>,
 ) -> Result<(), Error> {
-    let written = Written { scene: &scene.text, scene_path: &scene.path, quick, finished, state };
+    // files that a scene names lie beside it, from wherever the run is resumed
+    let scene_path = std::path::absolute(&scene.path).unwrap_or_else(|_| scene.path.clone());
+    let written = Written { scene: &scene.text, scene_path: &scene_path, quick, finished, state };
     let path = directory.join(FILE_NAME);
     let bytes = postcard::to_stdvec(&written)
         .map_err(|error| Error::Checkpoint { path: path.clone(), why: error.to_string() })?;
     polycore::output::atomic_write(&path, |file| {
         file.write_all(MAGIC)?;
+        file.write_all(&checksum(&bytes).to_le_bytes())?;
         file.write_all(&bytes)
     })?;
     Ok(())
@@ -74,10 +77,26 @@ pub fn write<const D: usize>(
 
 fn bytes(path: &Path) -> Result<Vec<u8>, Error> {
     let bytes = std::fs::read(path).map_err(polycore::Error::io("read", path))?;
-    match bytes.strip_prefix(MAGIC) {
-        Some(rest) => Ok(rest.to_vec()),
-        None => Err(Error::Checkpoint { path: path.into(), why: "not a checkpoint of this version".into() }),
+    let fail = |why: &str| Err(Error::Checkpoint { path: path.into(), why: why.into() });
+    let Some((sum, rest)) = bytes.strip_prefix(MAGIC).and_then(|rest| rest.split_first_chunk()) else {
+        return fail("not a checkpoint of this version");
+    };
+    if u64::from_le_bytes(*sum) != checksum(rest) {
+        return fail("damaged or cut short: its checksum does not fit; run the scene again");
     }
+    Ok(rest.to_vec())
+}
+
+/// FNV-1a over words of 8 bytes, with the length: finds cuts and changed bytes, not forgeries.
+fn checksum(bytes: &[u8]) -> u64 {
+    const PRIME: u64 = 0x0000_0100_0000_01b3;
+    let start = 0xcbf2_9ce4_8422_2325 ^ bytes.len() as u64;
+    bytes.chunks(8).fold(start, |sum, chunk| {
+        let mut word = [0; 8];
+        word[..chunk.len()].copy_from_slice(chunk);
+        // the rotation carries the high bytes, which the product alone would only move up, back down
+        (sum ^ u64::from_le_bytes(word)).wrapping_mul(PRIME).rotate_left(23)
+    })
 }
 
 /// Reads which scene a directory's checkpoint belongs to.

@@ -3,7 +3,7 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use peri::run::{Failure, Options};
 use peri::scene::Scene;
-use polycore::scene::{EXIT_BAD_INPUT, Source};
+use polycore::scene::Source;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -24,8 +24,8 @@ struct Cli {
     #[command(subcommand)]
     command: Command,
     /// Threads to compute on; default: all. The results are the same bits on any number.
-    #[arg(long, global = true)]
-    threads: Option<usize>,
+    #[arg(long, global = true, value_parser = clap::value_parser!(u16).range(1..=4096))]
+    threads: Option<u16>,
 }
 
 #[derive(Subcommand)]
@@ -82,11 +82,12 @@ fn seconds(text: &str) -> Result<f64, String> {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    if let Some(threads) = cli.threads
-        && (threads == 0 || rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().is_err())
-    {
-        eprintln!("error: --threads {threads}: at least 1 is needed");
-        return ExitCode::from(EXIT_BAD_INPUT);
+    if let Some(threads) = cli.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+        if let Err(error) = pool.build_global() {
+            eprintln!("error: --threads {threads}: {error}");
+            return ExitCode::FAILURE;
+        }
     }
     let result = match cli.command {
         Command::Run { scene, output, quick, explain, checkpoint_every } => {

@@ -106,10 +106,14 @@ fn run_in<const D: usize>(
             let _ = std::fs::remove_file(options.output.join(old));
         }
     }
+    remove_unfinished_files(options.output);
     let (mut finished, mut state) = (Vec::new(), None);
     if options.resume {
         let read = checkpoint::read::<D>(options.output)?;
         (finished, state) = (read.finished, read.state);
+    } else {
+        // a run can be resumed from its first moment on
+        checkpoint::write::<D>(options.output, source, options.quick, &finished, None)?;
     }
     for variant in &variants[finished.len().min(variants.len())..] {
         let state = state.take();
@@ -127,6 +131,17 @@ fn run_in<const D: usize>(
     Ok(Finished { report, outcomes: finished })
 }
 
+/// A killed run leaves files that it had begun to write under their temporary names.
+fn remove_unfinished_files(directory: &Path) {
+    for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.starts_with('.') && name.ends_with(".part") {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
 fn run_variant<const D: usize>(
     source: &Source,
     scene: &Scene,
@@ -141,7 +156,13 @@ fn run_variant<const D: usize>(
     let (loads, loaded) = loads_of(source, scene, &body)?;
     let Bonded { mut body, law, modulus, critical_stretch } = Bonded::new(source, scene, variant, body)?;
     phases.stop();
-    let mut state = state.unwrap_or_else(|| State::new(body.bonds.slots()));
+    let slots = body.bonds.slots();
+    let mut state = state.unwrap_or_else(|| State::new(slots));
+    if state.displacement.slots() != slots {
+        let why = format!("it has {} particles' slots, the body now has {slots}", state.displacement.slots());
+        let path = options.output.join(checkpoint::FILE_NAME);
+        return Err(Error::Checkpoint { path, why }.into());
+    }
     phases.start("solve");
     let solved =
         solve(source, scene, variant, options, finished, &mut body, &*law, modulus, &loads, &mut state);

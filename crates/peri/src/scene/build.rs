@@ -1,12 +1,11 @@
-//! From a scene to a body and its loads. Every rule that spans several keys is checked here, once.
+//! From a scene to a body. Every rule that spans several keys is checked here, once.
 
 use super::cloud::cloud;
-use super::{Axis, Boundary, Held, Scene, ShapeKind, ShapeSpec, SurfaceCorrection};
+use super::{Axis, Scene, ShapeKind, ShapeSpec, SurfaceCorrection};
 use crate::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use crate::calibrate::Space;
 use crate::correction::surface_factors;
 use crate::geometry::{Cut, Operation, Shape, bounds, cell_counts, lattice};
-use crate::solver::{Loads, Support};
 use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
 
@@ -140,14 +139,18 @@ pub(super) fn available_memory() -> f64 {
     told.map_or(16.0 * GIB, |kib| kib * 1024.0)
 }
 
-fn vector<const D: usize>(source: &Source, key: &str, value: &[Length]) -> Result<[f64; D], SceneError> {
+pub(super) fn vector<const D: usize>(
+    source: &Source,
+    key: &str,
+    value: &[Length],
+) -> Result<[f64; D], SceneError> {
     let values: Vec<f64> = value.iter().map(|l| l.si()).collect();
     <[f64; D]>::try_from(values.as_slice())
         .map_err(|_| source.error(key, format!("{} components", value.len()), format!("{D} components")))
 }
 
 /// The corners of a box must span one.
-fn ordered<const D: usize>(
+pub(super) fn ordered<const D: usize>(
     source: &Source,
     key: &str,
     min: [f64; D],
@@ -315,178 +318,4 @@ fn parallel<const D: usize>(a: [f64; D], b: [f64; D]) -> bool {
     let dot = |a: [f64; D], b: [f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
     let (aa, bb, ab) = (dot(a, a), dot(b, b), dot(a, b));
     aa * bb - ab * ab <= 1e-12 * aa * bb
-}
-
-/// Loads and supports of a body, and the slots in any loading layer.
-///
-/// # Errors
-/// As [`body_of`].
-pub fn loads_of<const D: usize>(
-    source: &Source,
-    scene: &Scene,
-    body: &Body<D>,
-) -> Result<(Loads<D>, Vec<bool>), SceneError> {
-    let mut regions = Vec::new();
-    let mut loaded = vec![false; body.bonds.slots()];
-    for (index, boundary) in scene.boundary.iter().enumerate() {
-        let key = format!("boundary[{index}]");
-        let (members, depth) = region(source, &key, boundary, body)?;
-        if members.is_empty() {
-            return Err(source.error(&key, "a region without particles", "a region that holds at least one"));
-        }
-        for &slot in &members {
-            loaded[slot as usize] = true;
-        }
-        let support = support(source, &key, boundary, body, &members, depth)?;
-        regions.push((members, support));
-    }
-    let loads = Loads::new(body.bonds.slots(), &regions);
-    balanced(source, scene, body, &loads)?;
-    let all = (1_u8 << D) - 1;
-    if body.bonds.particles().iter().all(|&slot| loads.held(slot as usize) == all) {
-        return Err(source.error(
-            "boundary",
-            "every component of every particle is held",
-            "at least one free",
-        ));
-    }
-    Ok((loads, loaded))
-}
-
-/// A body that nothing holds is never at rest under forces that do not balance.
-fn balanced<const D: usize>(
-    source: &Source,
-    scene: &Scene,
-    body: &Body<D>,
-    loads: &Loads<D>,
-) -> Result<(), SceneError> {
-    let Some(field) = &loads.body_force else { return Ok(()) };
-    for d in 0..D {
-        let (mut sum, mut size, mut held) = (0.0, 0.0, false);
-        for &slot in body.bonds.particles() {
-            let force = field.get(slot as usize)[d] * body.bonds.volume(slot as usize);
-            sum += force;
-            size += force.abs();
-            held |= loads.held(slot as usize) >> d & 1 == 1;
-        }
-        if !held && sum.abs() > scene.solver.tolerance * size {
-            let axis = ["x", "y", "z"][d];
-            let found = format!("a total force of {sum:.3e} N along {axis}, along which nothing is held");
-            let allowed = "forces in balance, or a `displacement` that holds some region";
-            return Err(source.error("boundary", found, allowed));
-        }
-    }
-    Ok(())
-}
-
-fn region<const D: usize>(
-    source: &Source,
-    key: &str,
-    boundary: &Boundary,
-    body: &Body<D>,
-) -> Result<(Vec<u32>, Option<f64>), SceneError> {
-    let spacing = body.bonds.spacing();
-    let (low, high, depth) = match (boundary.side, &boundary.min, &boundary.max) {
-        (Some(side), None, None) => {
-            let (axis, upper) = side.axis();
-            if axis >= D {
-                return Err(source.error(
-                    &format!("{key}.side"),
-                    side,
-                    "a side along x or y of a plane body",
-                ));
-            }
-            if boundary.layers == Some(0) {
-                return Err(source.error(&format!("{key}.layers"), 0, "at least 1"));
-            }
-            let layers = boundary.layers.unwrap_or((body.bonds.horizon() / spacing).floor() as usize).max(1);
-            let depth = layers as f64 * spacing;
-            let extent = body.bounds.1[axis] - body.bounds.0[axis];
-            if depth > extent * (1.0 + 1e-9) {
-                let found = format!("{layers} layers, {depth} m deep");
-                return Err(source.error(
-                    &format!("{key}.layers"),
-                    found,
-                    format!("at most the body, {extent} m"),
-                ));
-            }
-            let (mut low, mut high) = ([f64::NEG_INFINITY; D], [f64::INFINITY; D]);
-            if upper {
-                low[axis] = body.bounds.1[axis] - depth;
-            } else {
-                high[axis] = body.bounds.0[axis] + depth;
-            }
-            (low, high, Some(depth))
-        }
-        (None, Some(min), Some(max)) => {
-            if boundary.layers.is_some() {
-                return Err(source.error(
-                    &format!("{key}.layers"),
-                    "`layers`",
-                    "nothing: the box has its own depth",
-                ));
-            }
-            let (min, max) =
-                (vector(source, &format!("{key}.min"), min)?, vector(source, &format!("{key}.max"), max)?);
-            ordered(source, key, min, max)?;
-            (min, max, None)
-        }
-        _ => return Err(source.error(key, "no region", "either `side`, or `min` and `max`")),
-    };
-    let inside = |&slot: &u32| {
-        let position = body.bonds.position(slot as usize);
-        (0..D).all(|d| low[d] <= position[d] && position[d] <= high[d])
-    };
-    Ok((body.bonds.particles().iter().copied().filter(inside).collect(), depth))
-}
-
-fn support<const D: usize>(
-    source: &Source,
-    key: &str,
-    boundary: &Boundary,
-    body: &Body<D>,
-    members: &[u32],
-    depth: Option<f64>,
-) -> Result<Support<D>, SceneError> {
-    let count = |name: &str, found: usize| {
-        if found == D {
-            Ok(())
-        } else {
-            Err(source.error(
-                &format!("{key}.{name}"),
-                format!("{found} components"),
-                format!("{D} components"),
-            ))
-        }
-    };
-    let mut support = Support { displacement: [None; D], body_force: [0.0; D] };
-    if let Some(traction) = &boundary.traction {
-        count("traction", traction.len())?;
-        let depth = depth.ok_or_else(|| {
-            source.error(&format!("{key}.traction"), "a traction on a box", "`side`, or `force` on the box")
-        })?;
-        support.body_force = std::array::from_fn(|d| traction[d].si() / depth);
-    }
-    if let Some(force) = &boundary.force {
-        count("force", force.len())?;
-        let volume: f64 = members.iter().map(|&slot| body.bonds.volume(slot as usize)).sum();
-        for d in 0..D {
-            support.body_force[d] += force[d].si() / volume;
-        }
-    }
-    if let Some(displacement) = &boundary.displacement {
-        count("displacement", displacement.len())?;
-        support.displacement = std::array::from_fn(|d| match displacement[d] {
-            Held::Free => None,
-            Held::At(value) => Some(value),
-        });
-    }
-    if boundary.traction.is_none() && boundary.force.is_none() && boundary.displacement.is_none() {
-        return Err(source.error(
-            key,
-            "a region without a condition",
-            "`traction`, `force` or `displacement`",
-        ));
-    }
-    Ok(support)
 }

@@ -4,10 +4,12 @@ mod build;
 mod check;
 mod cloud;
 mod explain;
+mod loads;
 
-pub use build::{Body, Variant, body_of, loads_of};
+pub use build::{Body, Variant, body_of};
 pub use check::check;
 pub use explain::explain;
+pub use loads::loads_of;
 
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
