@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::run::Outcome;
 use crate::solver::State;
 use serde::{Deserialize, Serialize};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// File name inside an output directory.
@@ -76,8 +76,14 @@ pub fn write<const D: usize>(
 }
 
 fn bytes(path: &Path) -> Result<Vec<u8>, Error> {
-    let bytes = std::fs::read(path).map_err(polycore::Error::io("read", path))?;
     let fail = |why: &str| Err(Error::Checkpoint { path: path.into(), why: why.into() });
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) => {
+            return fail("there is none; a run begins with `peri run`");
+        }
+        Err(error) => return Err(polycore::Error::io("read", path)(error).into()),
+    };
     let Some((sum, rest)) = bytes.strip_prefix(MAGIC).and_then(|rest| rest.split_first_chunk()) else {
         return fail("not a checkpoint of this version");
     };

@@ -87,7 +87,7 @@ fn main() -> ExitCode {
         Ok(code) => code,
         Err(Failure::Scene(error)) => {
             let code = error.exit_code();
-            eprintln!("{:?}", miette::Report::new(error));
+            eprint!("{}", error.render());
             code.into()
         }
         Err(Failure::Run(error)) => {

@@ -26,11 +26,16 @@ struct Inside {
 
 #[derive(Debug)]
 struct Place {
+    /// Bytes in the longest line that the picture would show.
+    longest_line: usize,
     label: String,
     span: Range<usize>,
     line: usize,
     text: NamedSource<String>,
 }
+
+/// Longer lines are not shown: nobody reads them.
+const LONGEST_LINE: usize = 2000;
 
 impl SceneError {
     /// The whole message in one line, without the picture of the source.
@@ -60,6 +65,14 @@ impl SceneError {
         let theme = if colors { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
         let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false);
         let mut text = String::new();
+        if let Some(place) = self.0.place.as_ref().filter(|place| place.longest_line > LONGEST_LINE) {
+            // the picture would be as wide, and the handler panics beyond 65535 columns
+            let (code, name) = (self.0.code, place.text.name());
+            return format!(
+                "{code}\n\n  × {self}\n    [{name}:{}] (in a line too long to show)\n",
+                place.line
+            );
+        }
         // the handler fails only if the label lies outside of the text, which `at` excludes
         if handler.render_report(&mut text, self).is_err() {
             text = format!("{self}\n");
@@ -85,7 +98,11 @@ impl SceneError {
         let line = 1 + source.text[..start].matches('\n').count();
         let text =
             NamedSource::new(source.path.display().to_string(), source.text.clone()).with_language("toml");
-        let place = Place { label: String::new(), span: start..end, line, text };
+        // a picture shows the lines of the span, one before and one after
+        let from = source.text[..start].rmatch_indices('\n').nth(1).map_or(0, |(at, _)| at);
+        let to = source.text[end..].match_indices('\n').nth(1).map_or(length, |(at, _)| end + at);
+        let longest_line = source.text[from..to].lines().map(str::len).max().unwrap_or(0);
+        let place = Place { longest_line, label: String::new(), span: start..end, line, text };
         Self(Box::new(Inside { code, message, key, help: None, place: Some(place) }))
     }
 
