@@ -117,7 +117,8 @@ impl<const D: usize> CloudBonds<D> {
     /// Bonds of all pairs within `horizon`, less those that cross a cut.
     ///
     /// # Errors
-    /// [`Error::Geometry`] for an empty cloud, a volume that is not positive, or two particles in one place.
+    /// [`Error::Geometry`] for an empty cloud, positions that are not finite, volumes too few, too many or not positive,
+    /// two particles in one place, or a horizon that is not positive.
     pub fn new(
         points: &[[f64; D]],
         volumes: &[f64],
@@ -129,28 +130,39 @@ impl<const D: usize> CloudBonds<D> {
         if points.is_empty() {
             return Err(Error::geometry("the body holds no particle".to_owned()));
         }
+        if points.len() != volumes.len() {
+            return Err(Error::geometry(format!("{} points with {} volumes", points.len(), volumes.len())));
+        }
+        if let Some(bad) = points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            return Err(Error::geometry(format!("point {bad}: found {:?} m; allowed: finite", points[bad])));
+        }
+        if !(horizon > 0.0 && horizon.is_finite()) {
+            return Err(Error::geometry(format!("horizon: found {horizon} m; allowed: above 0, finite")));
+        }
         if let Some(bad) = volumes.iter().position(|&v| !(v > 0.0 && v.is_finite())) {
             return Err(Error::geometry(format!(
                 "volume of point {bad}: found {}; allowed: above 0",
                 volumes[bad]
             )));
         }
+        // bonds as long as the horizon are bonds, whatever the rounding of positions
+        let reach = horizon * (1.0 + 1e-9);
         let order = CellGrid::new(points, horizon).order().to_vec();
         let sorted: Vec<[f64; D]> = order.iter().map(|&i| points[i as usize]).collect();
-        let grid = CellGrid::new(&sorted, horizon);
+        let grid = CellGrid::new(&sorted, reach);
         let lists: Vec<Result<Vec<u32>, Error>> = sorted
             .par_iter()
             .enumerate()
             .map(|(own, &here)| {
                 let mut list = Vec::new();
                 let mut twin = None;
-                grid.near(here, horizon, |other| {
+                grid.near(here, reach, |other| {
                     let square: f64 = (0..D).map(|d| (sorted[other][d] - here[d]).powi(2)).sum();
                     if other != own && square == 0.0 {
                         twin = Some(other);
                     }
                     if other != own
-                        && square <= horizon * horizon
+                        && square <= reach * reach
                         && !cuts.iter().any(|cut| cut.severs(here, sorted[other]))
                     {
                         list.push(other as u32);

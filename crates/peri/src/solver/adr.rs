@@ -135,6 +135,8 @@ impl AdaptiveDynamicRelaxation {
             if state.iteration == 0 {
                 let before = state.step.checked_sub(1).map_or(0.0, |s| system.factors[s]);
                 predict(system, state, &predictor, system.factors[state.step] - before);
+                // the step may leap out of the fitted range: its first force and mass must know
+                self.covers_stretches(system, state)?;
             }
             loop {
                 let done = self.iterate(system, state, &unit_mass, watch)?;
@@ -157,7 +159,8 @@ impl AdaptiveDynamicRelaxation {
         unit_mass: &[f64],
         watch: &mut dyn FnMut(&Status, &State<D>) -> Result<(), Error>,
     ) -> Result<bool, Error> {
-        let look = state.iteration.is_multiple_of(LOOK);
+        // a step's first iterations move farthest: beyond its range a fit must not be followed for long
+        let look = state.iteration < LOOK || state.iteration.is_multiple_of(LOOK);
         let factor = system.factors[state.step];
         let mass = 0.5 * self.mass_safety * state.tangent;
         let (sums, met) = force_pass(system, state, unit_mass, mass, factor, look);
@@ -318,11 +321,14 @@ fn not_finite<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Error {
             };
         }
     }
-    // every entry is finite, their squares are not
+    // every entry is finite, their squares are not: the greatest force is to blame
+    let size = |slot: u32| state.force.get(slot as usize).iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+    let particles = bonds.particles().iter().enumerate();
+    let greatest = particles.max_by(|a, b| size(*a.1).total_cmp(&size(*b.1)));
     Error::NotFinite {
         quantity: "sum of squared forces",
-        particle: 0,
-        position: vec![],
+        particle: greatest.map_or(0, |(particle, _)| particle),
+        position: greatest.map_or_else(Vec::new, |(_, &slot)| bonds.position(slot as usize).to_vec()),
         step: state.step,
         iteration: state.iteration,
     }

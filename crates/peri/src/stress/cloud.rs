@@ -42,7 +42,8 @@ pub fn piola<const D: usize>(
         let mut add = |own: usize, weight_of: &dyn Fn([f64; D], [f64; D], usize) -> f64| {
             bonds.neighbours(own, &mut |bond| {
                 let p = std::array::from_fn(|d| points[own][d] - here[d]);
-                let q: [f64; D] = std::array::from_fn(|d| p[d] + bond.bond[d]);
+                // not p + ξ: seen from the other end, both must be the same numbers or ties are counted twice or never
+                let q = std::array::from_fn(|d| points[bond.slot][d] - here[d]);
                 let weight = weight_of(p, q, bond.slot);
                 if weight > 0.0 {
                     let (u, v) = (state.displacement.get(own), state.displacement.get(bond.slot));
