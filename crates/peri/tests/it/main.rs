@@ -1,0 +1,12 @@
+//! Tests of the public interface against plain sums, closed forms and the independent tables of `formulation.md`
+//! (chapter 2), whose scripts wrote `stress_patch.csv` and `stress_surface.csv`.
+
+mod balance;
+mod bodies;
+mod forces;
+mod homogeneous;
+mod limits;
+mod relaxation;
+mod stress;
+mod surface;
+mod work;
