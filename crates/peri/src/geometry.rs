@@ -100,12 +100,15 @@ pub fn cell_counts<const D: usize>(low: [f64; D], high: [f64; D], spacing: f64) 
 /// inside the lower corner of the bounding box.
 ///
 /// # Errors
-/// [`Error::Geometry`] where nothing is added or no centre is inside.
+/// [`Error::Geometry`] where the spacing is not positive, nothing is added or no centre is inside.
 pub fn lattice<const D: usize>(
     operations: &[Operation<D>],
     spacing: f64,
     thickness: f64,
 ) -> Result<Lattice<D>, Error> {
+    if !(spacing > 0.0 && spacing.is_finite()) {
+        return Err(Error::geometry(format!("spacing: found {spacing} m; allowed: above 0, finite")));
+    }
     let (low, high) = bounds(operations).ok_or_else(|| Error::geometry("no shape is added".to_owned()))?;
     let cells = cell_counts(low, high, spacing).map(|c| c as usize);
     // the box keeps its centre where its edges are no multiple of the spacing

@@ -81,13 +81,25 @@ impl<const D: usize> LatticeBonds<D> {
     /// Bonds of all occupied cells within `ratio` spacings, less those that cross a cut.
     ///
     /// # Errors
-    /// [`Error::Geometry`] where no cell is occupied or the horizon reaches no neighbour.
+    /// [`Error::Geometry`] where no cell is occupied, the list of occupied cells does not fit the box, the spacing is not
+    /// positive, or the horizon is not finite or reaches no neighbour.
     pub fn new(
         lattice: Lattice<D>,
         ratio: f64,
         volume_correction: VolumeCorrection,
         cuts: &[Cut<D>],
     ) -> Result<Self, Error> {
+        let (listed, cells) = (lattice.occupied.len(), lattice.cells);
+        if listed == 0 || listed != cells.iter().product::<usize>() {
+            return Err(Error::geometry(format!("a box of {cells:?} cells with {listed} listed")));
+        }
+        for (name, value) in
+            [("spacing, m", lattice.spacing), ("volume, m³", lattice.volume), ("horizon", ratio)]
+        {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(Error::geometry(format!("{name}: found {value}; allowed: above 0, finite")));
+            }
+        }
         let stencil = Stencil::<D>::new(ratio);
         if stencil.offsets.is_empty() {
             return Err(Error::geometry(format!("a horizon of {ratio} spacings reaches no neighbour")));

@@ -1,7 +1,7 @@
 //! In a cloud every particle looks for the bonds that cross its ball.
 
 use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, force_over_length, segment_fraction};
-use crate::bonds::{Bonds, CellGrid, CloudBonds};
+use crate::bonds::{Bonds, CellGrid, CloudBonds, Stencil};
 use rayon::prelude::*;
 
 pub fn piola<const D: usize>(
@@ -17,20 +17,24 @@ pub fn piola<const D: usize>(
     let whole = ball_volume(D, radius) * bonds.thickness();
     let filled: Vec<f64> = match (measure, ball) {
         (Measure::Hardy, BallVolume::Particles | BallVolume::Cells) => {
+            // as for bonds: a distance equal to the horizon counts, whatever the rounding
+            let reach = radius * (1.0 + 1e-9);
             let inside: Vec<f64> = points
                 .par_iter()
                 .map(|&here| {
                     let mut sum = 0.0;
-                    grid.near(here, radius, |other| {
-                        if distance_square(points[other], here) <= square {
+                    grid.near(here, reach, |other| {
+                        if distance_square(points[other], here) <= reach * reach {
                             sum += bonds.volume(other);
                         }
                     });
                     sum
                 })
                 .collect();
-            let most = inside.iter().copied().fold(0.0, f64::max);
-            inside.into_iter().map(|v| whole * v / most).collect()
+            // what a lattice of the same mean spacing has in a whole ball: bodies thinner than that have no such ball
+            let full = (Stencil::<D>::new(reach / bonds.spacing()).offsets.len() + 1) as f64;
+            let full = full * bonds.spacing().powi(D as i32) * bonds.thickness();
+            inside.into_iter().map(|v| whole * v / full).collect()
         }
         _ => vec![whole; points.len()],
     };
