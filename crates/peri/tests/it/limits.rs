@@ -2,7 +2,7 @@
 
 use crate::bodies::{Body, MODULUS, Random, distance, forces, hold, norm, relax, rms};
 use peri::Error;
-use peri::bonds::{Bonds, CloudBonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{Bonds, CloudBonds, Lattice, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
@@ -90,6 +90,34 @@ fn clouds_out_of_their_domain_are_refused() {
     for horizon in [f64::NAN, -1.0, 0.0] {
         assert!(build(&points, &[1.0; 3], horizon).is_err(), "horizon {horizon}");
     }
+}
+
+#[test]
+fn lattices_out_of_their_domain_are_refused() {
+    let build = |spacing: f64, cells: usize, listed: usize, ratio: f64| {
+        let occupied = vec![true; listed];
+        let lattice = Lattice { spacing, origin: [0.0; 2], cells: [cells; 2], occupied, volume: 1.0 };
+        LatticeBonds::new(lattice, ratio, VolumeCorrection::None, &[]).map(|bonds| bonds.directed_bonds())
+    };
+    assert_eq!(build(1.0, 5, 25, 1.0).unwrap(), 80);
+    let bad = [
+        ("no cells", build(1.0, 0, 0, 3.0)),
+        ("fewer cells than listed", build(1.0, 5, 26, 3.0)),
+        ("more cells than listed", build(1.0, 5, 24, 3.0)),
+        ("no spacing", build(0.0, 5, 25, 3.0)),
+        ("NaN spacing", build(f64::NAN, 5, 25, 3.0)),
+        ("horizon below the spacing", build(1.0, 5, 25, 0.99)),
+        ("NaN horizon", build(1.0, 5, 25, f64::NAN)),
+        ("infinite horizon", build(1.0, 5, 25, f64::INFINITY)),
+    ];
+    for (name, result) in bad {
+        assert!(matches!(result, Err(Error::Geometry(_))), "{name}: {result:?}");
+    }
+    let square = [Operation::Add(Shape::Box { min: [0.0; 2], max: [1.0; 2] })];
+    for spacing in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+        assert!(matches!(lattice(&square, spacing, 1.0), Err(Error::Geometry(_))), "{spacing}");
+    }
+    assert!(matches!(lattice::<2>(&[], 0.1, 1.0), Err(Error::Geometry(_))));
 }
 
 /// Bonds as long as the horizon are bonds on a cloud too, whatever the rounding of positions.

@@ -211,6 +211,29 @@ fn free_surface_in_space() {
     check_surface::<3>(3.015, 7, 1e-4, &rows);
 }
 
+/// The ball's volume inside the body by its share of particles: the same on both paths, in bodies of any thickness.
+#[test]
+fn ball_inside_thin_bodies() {
+    for width in [1, 3, 6, 20] {
+        for ratio in [3.0, 3.015, 4.5] {
+            let built = Body::<2>::solid([30, width], 0.1, ratio).build();
+            // half way along, at the edge and in the middle
+            for row in [0, width / 2] {
+                let particle = 15 + 30 * row;
+                let found =
+                    measured(&built, ratio * 0.1, particle, Measure::Hardy, BallVolume::Particles, true);
+                let [(_, lattice), (_, cloud)] = found[..] else { panic!("two paths") };
+                // roundings of the same sums, in units of Eε ≈ 1; at ratio 3 a particle lies on the ball's surface and
+                // bonds touch it, whose fraction is rounded to √ε
+                assert!(
+                    (lattice[0] - cloud[0]).abs() < 1e-7,
+                    "width {width}, m = {ratio}, row {row}: {lattice:?} {cloud:?}"
+                );
+            }
+        }
+    }
+}
+
 /// P by definition: over all pairs, force ⊗ ξ × fraction of the bond inside the ball about `at`, over the ball's volume.
 fn hardy_sum<const D: usize>(
     body: &Body<D>,
