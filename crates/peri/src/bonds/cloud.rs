@@ -20,7 +20,7 @@ pub struct CellGrid<const D: usize> {
 }
 
 impl<const D: usize> CellGrid<D> {
-    /// Sorts points into cells of at least `edge`; no more cells than points in any case.
+    /// Sorts points into cells of at least `edge`; at most four per point and axis in any case.
     pub fn new(points: &[[f64; D]], edge: f64) -> Self {
         let extreme = |pick: fn(f64, f64) -> f64, start: f64| -> [f64; D] {
             std::array::from_fn(|d| points.iter().map(|p| p[d]).fold(start, pick))

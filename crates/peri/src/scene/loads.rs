@@ -8,7 +8,7 @@ use polycore::scene::{SceneError, Source};
 /// Loads and supports of a body, and the slots in any loading layer.
 ///
 /// # Errors
-/// As [`body_of`].
+/// As [`super::body_of`].
 pub fn loads_of<const D: usize>(
     source: &Source,
     scene: &Scene,

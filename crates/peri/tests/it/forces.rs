@@ -86,8 +86,8 @@ fn paths_agree_on_a_tabulated_law() {
 }
 
 /// In place of Miri, which cannot run the vector kernels: bodies whose particles touch every edge of the storage, at
-/// sizes that no tile of 16 slots or group of 8 neighbours divides. (By hand, valgrind 3.19 runs this test in 45 s without
-/// a complaint; it hides AVX-512 from the dispatcher, so that the 256-bit kernels run.)
+/// sizes that no tile of 16 slots or group of 8 neighbours divides. (By hand, valgrind 3.19 runs this test
+/// without a complaint; it does not know AVX-512, so probably on the 256-bit kernels.)
 #[test]
 fn thin_bodies_of_any_length() {
     let law = peri::potential::Law::Subtract.build(720.0, 1200.0, false).unwrap();
