@@ -53,11 +53,23 @@ pub enum LawName {
     Pmb,
 }
 
+/// Far beyond any rubber.
+const LARGEST_STRETCH: f64 = 1000.0;
+
 impl Exact {
     /// Prints it.
     pub fn print(self) -> Result<bool, Failure> {
         match self {
             Self::Kirsch { width_ratio } => {
+                if !(0.0..1.0).contains(&width_ratio) {
+                    let allowed = "0 to 1, less than 1".into();
+                    return Err(peri::Error::Parameter {
+                        name: "--width-ratio",
+                        found: width_ratio,
+                        allowed,
+                    }
+                    .into());
+                }
                 println!("{:>8} {:>12} {:>12}", "y/a", "σxx/σ∞", "σyy/σ∞");
                 for k in 0..=16 {
                     let y = 1.0 + f64::from(k) * 0.25;
@@ -110,8 +122,9 @@ fn print_law(name: LawName, links: f64, dissociation: f64, to: f64) -> Result<()
         LawName::Printed => Law::Printed,
         LawName::Pmb => Law::Pmb,
     };
-    if !(to > 1.0 && to.is_finite()) {
-        return Err(peri::Error::Parameter { name: "--to", found: to, allowed: "above 1".into() }.into());
+    if !(1.0 < to && to <= LARGEST_STRETCH) {
+        let allowed = format!("above 1, at most {LARGEST_STRETCH}");
+        return Err(peri::Error::Parameter { name: "--to", found: to, allowed }.into());
     }
     let built = law.build(links, dissociation, false)?;
     println!(
