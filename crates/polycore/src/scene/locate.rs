@@ -32,6 +32,10 @@ pub(super) fn span(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
 
 /// The path of the innermost key or value around `place`.
 pub(super) fn path(root: &DeTable<'_>, place: &Range<usize>) -> Option<String> {
+    // what is missing from the file as a whole has no place, not the first key's
+    if place.is_empty() {
+        return None;
+    }
     let mut found = None;
     visit(root, "", &mut |path, key, value| {
         let covers = |span: Range<usize>| span.start <= place.start && place.end <= span.end;

@@ -1,0 +1,62 @@
+//! The results are the same bits on any number of threads.
+
+use crate::program::peri;
+use crate::results::{assert_same, report};
+use crate::scenes;
+use std::fs;
+use std::path::Path;
+
+/// Runs the scene in `here` on 1, 2 and 3 threads; everything but times must be equal, byte for byte.
+fn on_any_number_of_threads(here: &Path) {
+    for threads in 1..=3 {
+        peri(&format!("run scene.toml --output out{threads} --threads {threads}"), here).with_code(0);
+        let out = here.join(format!("out{threads}"));
+        assert_eq!(report(&out)["provenance"]["host"]["threads"], threads);
+        assert_same(&here.join("out1"), &out);
+    }
+}
+
+#[test]
+fn plate_on_a_lattice() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    fs::write(here.join("scene.toml"), scenes::plate("\"20 mm\", \"10 mm\"", "1e-6")).unwrap();
+    on_any_number_of_threads(here);
+}
+
+#[test]
+fn cracked_bar_in_three_dimensions() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    fs::write(here.join("scene.toml"), scenes::bar()).unwrap();
+    on_any_number_of_threads(here);
+    let work = &report(&here.join("out1"))["work"];
+    assert_eq!((&work["particles"], &work["steps"]), (&320.into(), &3.into()));
+}
+
+#[test]
+fn strip_of_scattered_points() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    fs::write(here.join("scene.toml"), scenes::strip()).unwrap();
+    fs::write(here.join("points.csv"), scenes::points()).unwrap();
+    on_any_number_of_threads(here);
+}
+
+/// Whether the same scene is run twice, or the directory held other results before, makes no difference.
+#[test]
+fn a_second_run_into_the_same_directory() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let scene = scenes::plate("\"50 mm\"", "1e-4");
+    fs::write(here.join("scene.toml"), &scene).unwrap();
+    peri("run scene.toml --output first", here).with_code(0);
+    fs::create_dir(here.join("second")).unwrap();
+    for rubbish in ["report.json", "checkpoint.bin", ".left.part"] {
+        fs::write(here.join("second").join(rubbish), "rubbish").unwrap();
+    }
+    for _ in 0..2 {
+        peri("run scene.toml --output second", here).with_code(0);
+        assert_same(&here.join("first"), &here.join("second"));
+    }
+}

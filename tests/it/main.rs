@@ -1,0 +1,16 @@
+//! Whole-program tests: they run the released command lines as a user does, and know nothing of their insides.
+//!
+//! * [`bad`]: malformed and absurd scenes in `tests/bad/`, each with the message it must get;
+//! * [`commands`]: exit codes, help, closed forms, reports and files;
+//! * [`bits`]: the same bits on any number of threads;
+//! * [`killed`]: the same bits after `kill -9`, Ctrl-C and `peri resume`;
+//! * [`documents`]: the commands and links that README and docs show.
+
+mod bad;
+mod bits;
+mod commands;
+mod documents;
+mod killed;
+mod program;
+mod results;
+mod scenes;

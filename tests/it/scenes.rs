@@ -1,0 +1,137 @@
+//! Small valid scenes.
+
+/// A plate with a hole on a lattice of `spacing` ("20 mm" has 2468 particles), under tension, against Kirsch.
+pub fn plate(spacing: &str, tolerance: &str) -> String {
+    format!(
+        r#"version = 1
+program = "peri"
+title = "Small plate"
+
+[body]
+space = "plane-stress"
+thickness = "10 mm"
+shapes = [
+  {{ add = "box", min = ["-500 mm", "-500 mm"], max = ["500 mm", "500 mm"] }},
+  {{ cut = "disk", centre = ["0 mm", "0 mm"], radius = "60 mm" }},
+]
+
+[material]
+youngs_modulus = "1 MPa"
+law = "subtract"
+links = 720
+dissociation = 1200
+
+[[boundary]]
+side = "x+"
+traction = ["1 kPa", "0 Pa"]
+
+[[boundary]]
+side = "x-"
+traction = ["-1 kPa", "0 Pa"]
+
+[solver]
+tolerance = {tolerance}
+
+[stress]
+measures = ["hardy", "one-point"]
+
+[exact]
+problem = "kirsch"
+radius = "60 mm"
+remote_stress = "1 kPa"
+
+[[study]]
+spacing = [{spacing}]
+"#
+    )
+}
+
+/// A bar 200 × 40 × 40 mm with a crack across a part of it, stretched by 10 % in three steps.
+pub fn bar() -> &'static str {
+    r#"version = 1
+program = "peri"
+
+[body]
+space = "solid"
+spacing = "10 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm", "0 mm"], max = ["200 mm", "40 mm", "40 mm"] }]
+cracks = [{ from = ["100 mm", "0 mm", "0 mm"], to = ["100 mm", "20 mm", "0 mm"], and = ["100 mm", "0 mm", "40 mm"] }]
+
+[material]
+youngs_modulus = "1 MPa"
+law = "chain"
+links = 100
+dissociation = 1200
+volume_correction = "linear"
+surface_correction = "energy"
+
+[[boundary]]
+side = "x-"
+displacement = ["0 mm", "0 mm", "0 mm"]
+
+[[boundary]]
+side = "x+"
+displacement = ["20 mm", "free", "free"]
+
+[solver]
+tolerance = 1e-4
+steps = 3
+
+[stress]
+measures = ["one-point"]
+"#
+}
+
+/// A strip of scattered points, `points.csv` beside the scene, pulled to the right.
+pub fn strip() -> &'static str {
+    r#"version = 1
+program = "peri"
+
+[body]
+space = "plane-strain"
+thickness = "1 mm"
+horizon = "3.2 mm"
+points = "points.csv"
+
+[material]
+youngs_modulus = "1 MPa"
+law = "pmb"
+
+[[boundary]]
+side = "x-"
+displacement = ["0 mm", "0 mm"]
+
+[[boundary]]
+side = "x+"
+force = ["0.1 N", "0 N"]
+
+[solver]
+tolerance = 1e-6
+
+[stress]
+measures = ["hardy"]
+"#
+}
+
+/// The points of [`strip`]: 80 × 20 of them, 1 mm apart, each moved by up to 0.2 mm.
+pub fn points() -> String {
+    let mut random = Random(1);
+    let mut text = String::from("# m and m³\nx,y,volume\n");
+    for index in 0..80 * 20 {
+        let at = |cell: i32, shift: f64| (f64::from(cell) + 0.4 * (shift - 0.5)) * 1e-3;
+        let (x, y) = (at(index % 80, random.next()), at(index / 80, random.next()));
+        text += &format!("{x},{y},1e-9\n");
+    }
+    text
+}
+
+/// A small generator of numbers in [0, 1) (Knuth's MMIX constants), the same in every run.
+pub struct Random(pub u64);
+
+impl Random {
+    /// The next number.
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
