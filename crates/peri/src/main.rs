@@ -18,7 +18,7 @@ mod exact_command;
 #[command(
     version,
     about,
-    after_help = "Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input."
+    after_help = "Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted."
 )]
 struct Cli {
     #[command(subcommand)]

@@ -41,6 +41,10 @@ pub fn fields<const D: usize>(
         })
         .collect();
     let mut data: Vec<(&str, usize, &[f64])> = vec![("displacement", 3, &displacement)];
+    // a cloud's particles are sorted for locality: this is the line of each in the user's file, from 0
+    let lines: Option<Vec<f64>> =
+        bonds.as_cloud().map(|cloud| cloud.input_order().iter().map(|&line| f64::from(line)).collect());
+    data.extend(lines.iter().map(|lines| ("input_index", 1, lines.as_slice())));
     data.extend(tensors.iter().map(|(name, values)| (name.as_str(), 9, values.as_slice())));
     series.step(1.0, &points, &data)?;
     series.finish()?;

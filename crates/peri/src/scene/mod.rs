@@ -175,7 +175,7 @@ pub struct Material {
     /// Bonds near free surfaces.
     #[serde(default)]
     pub surface_correction: SurfaceCorrection,
-    /// Critical stretch: reported, and the bound of the stretches a result may have.
+    /// Critical stretch: reported; bonds do not break yet.
     pub critical: Option<Critical>,
 }
 
