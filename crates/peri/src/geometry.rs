@@ -134,6 +134,52 @@ pub fn lattice<const D: usize>(
     Ok(Lattice { spacing, origin, cells, occupied, volume: spacing.powi(D as i32) * thickness })
 }
 
+/// The regular lattice that points of one volume lie on; `None` where they lie on none.
+///
+/// The spacing is the edge of a particle's cube (plane bodies: square). Every coordinate must be within 1e-9 spacings of
+/// the lattice, no cell may hold two points, and along every axis at least half of the points have a next neighbour.
+pub fn recognise<const D: usize>(points: &[[f64; D]], volumes: &[f64], thickness: f64) -> Option<Lattice<D>> {
+    let volume = *volumes.first()?;
+    if volumes.iter().any(|&v| v != volume) {
+        return None;
+    }
+    let spacing = (volume / thickness).powf(1.0 / D as f64);
+    let low: [f64; D] = std::array::from_fn(|d| points.iter().map(|p| p[d]).fold(f64::INFINITY, f64::min));
+    let high: [f64; D] =
+        std::array::from_fn(|d| points.iter().map(|p| p[d]).fold(f64::NEG_INFINITY, f64::max));
+    let extent: [f64; D] = std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round() + 1.0);
+    // a sparse box would waste more than a neighbour list
+    if extent.iter().product::<f64>() > 8.0 * points.len() as f64 {
+        return None;
+    }
+    let cells = extent.map(|e| e as usize);
+    let mut occupied = vec![false; cells.iter().product()];
+    let mut places = Vec::with_capacity(points.len());
+    for point in points {
+        let mut index = 0;
+        for d in (0..D).rev() {
+            let place = (point[d] - low[d]) / spacing;
+            if (place - place.round()).abs() > 1e-9 {
+                return None;
+            }
+            index = index * cells[d] + place.round() as usize;
+        }
+        if std::mem::replace(&mut occupied[index], true) {
+            return None;
+        }
+        places.push(index);
+    }
+    let mut stride = 1;
+    for d in 0..D {
+        let next = |&index: &usize| index / stride % cells[d] + 1 < cells[d] && occupied[index + stride];
+        if cells[d] > 1 && 2 * places.iter().copied().filter(next).count() < points.len() {
+            return None;
+        }
+        stride *= cells[d];
+    }
+    Some(Lattice { spacing, origin: low, cells, occupied, volume })
+}
+
 /// A crack of zero width that severs the bonds crossing it: a segment in 2D, a parallelogram in 3D.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cut<const D: usize> {
@@ -184,6 +230,33 @@ mod tests {
         assert_eq!(lattice.origin, [-4.5, 0.5]);
         assert_eq!(lattice.volume, 0.5);
         assert!(lattice.occupied.iter().all(|&o| o));
+    }
+
+    #[test]
+    fn regular_points_are_a_lattice() {
+        let points: Vec<[f64; 2]> = (0..20)
+            .filter(|i| *i != 7)
+            .map(|i| [0.3 + 0.1 * f64::from(i % 5), -0.2 + 0.1 * f64::from(i / 5)])
+            .collect();
+        let volumes = vec![0.1 * 0.1 * 0.5; 19];
+        let lattice = recognise(&points, &volumes, 0.5).unwrap();
+        assert_eq!(lattice.cells, [5, 4]);
+        assert!(
+            (lattice.spacing - 0.1).abs() < 1e-15
+                && !lattice.occupied[7]
+                && places[0] == 0
+                && places[18] == 19
+        );
+        let mut moved = points.clone();
+        moved[3][0] += 1e-6;
+        assert!(recognise(&moved, &volumes, 0.5).is_none(), "off the lattice");
+        moved[3] = points[4];
+        assert!(recognise(&moved, &volumes, 0.5).is_none(), "two in one cell");
+        let mut uneven = volumes.clone();
+        uneven[5] *= 2.0;
+        assert!(recognise(&points, &uneven, 0.5).is_none(), "unequal volumes");
+        let apart: Vec<[f64; 2]> = points.iter().map(|p| p.map(|x| 2.0 * x)).collect();
+        assert!(recognise(&apart, &volumes, 0.5).is_none(), "no next neighbours");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use crate::calibrate::{Calibration, Space};
 use polycore::scene::{SceneError, Source};
 
 /// Largest horizon ratio: a stencil beyond it has more bonds than any use.
-const LARGEST_RATIO: f64 = 20.0;
+pub const LARGEST_RATIO: f64 = 20.0;
 
 /// Checks a scene and lists its variants; `quick` leaves out those that a `--quick` run leaves out.
 ///

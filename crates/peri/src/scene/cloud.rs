@@ -2,8 +2,8 @@
 
 use super::build::{Body, GIB, Variant, available_memory, needed};
 use super::{Scene, check};
-use crate::bonds::{Bonds, CloudBonds};
-use crate::geometry::Cut;
+use crate::bonds::{Bonds, CloudBonds, LatticeBonds};
+use crate::geometry::{Cut, recognise};
 use polycore::scene::{SceneError, Source};
 use std::collections::HashMap;
 use std::path::Path;
@@ -31,6 +31,9 @@ pub fn cloud<const D: usize>(
         needed(source, "body.horizon", scene.body.horizon, "a length; a cloud needs its `horizon`")?.si();
     check::positive(source, "body.horizon", horizon, "m")?;
     let (positions, volumes) = read::<D>(source, &path)?;
+    if let Some(body) = regular(&positions, &volumes, thickness, horizon, variant, cuts) {
+        return Ok(body);
+    }
     refuse_too_many_bonds(source, &positions, horizon)?;
     let bonds =
         CloudBonds::new(&positions, &volumes, thickness, horizon, variant.volume, cuts).map_err(|error| {
@@ -48,6 +51,28 @@ pub fn cloud<const D: usize>(
     let low = extreme(f64::min, f64::INFINITY).map(|x| x - half);
     let high = extreme(f64::max, f64::NEG_INFINITY).map(|x| x + half);
     Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
+}
+
+/// The body where the points lie on a regular lattice: then it needs no neighbour list.
+fn regular<const D: usize>(
+    positions: &[[f64; D]],
+    volumes: &[f64],
+    thickness: f64,
+    horizon: f64,
+    variant: &Variant,
+    cuts: &[Cut<D>],
+) -> Option<Body<D>> {
+    let lattice = recognise(positions, volumes, thickness)?;
+    // bonds as long as the horizon count, whatever the rounding, as in a cloud
+    let ratio = horizon / lattice.spacing * (1.0 + 1e-9);
+    // longer stencils are refused for lattices: a list takes what it gets
+    if !(1.0..=check::LARGEST_RATIO).contains(&ratio) {
+        return None;
+    }
+    let low = lattice.origin.map(|x| x - 0.5 * lattice.spacing);
+    let high: [f64; D] = std::array::from_fn(|d| low[d] + lattice.cells[d] as f64 * lattice.spacing);
+    let bonds = LatticeBonds::new(lattice, ratio, variant.volume, cuts).ok()?;
+    (bonds.directed_bonds() > 0).then(|| Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
 }
 
 fn read<const D: usize>(source: &Source, path: &Path) -> Result<Points<D>, SceneError> {
