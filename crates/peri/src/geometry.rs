@@ -241,12 +241,7 @@ mod tests {
         let volumes = vec![0.1 * 0.1 * 0.5; 19];
         let lattice = recognise(&points, &volumes, 0.5).unwrap();
         assert_eq!(lattice.cells, [5, 4]);
-        assert!(
-            (lattice.spacing - 0.1).abs() < 1e-15
-                && !lattice.occupied[7]
-                && places[0] == 0
-                && places[18] == 19
-        );
+        assert!((lattice.spacing - 0.1).abs() < 1e-15 && !lattice.occupied[7] && lattice.occupied[19]);
         let mut moved = points.clone();
         moved[3][0] += 1e-6;
         assert!(recognise(&moved, &volumes, 0.5).is_none(), "off the lattice");
