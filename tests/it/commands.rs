@@ -12,7 +12,7 @@ fn help_of_every_command() {
     let here = workspace();
     peri("", here).with_code(2).tells("Usage: peri");
     let help = peri("--help", here).with_code(0);
-    help.shows("Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input.");
+    help.shows("Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted.");
     let listed = help.stdout.lines().skip_while(|line| !line.starts_with("Commands:")).skip(1);
     let names: Vec<&str> = listed
         .take_while(|line| !line.is_empty())
