@@ -27,7 +27,7 @@
 //! let loads = Loads::new(bonds.slots(), &[(end(0.0, 3e-3), held(0.0)), (end(37e-3, 40e-3), held(2e-3))]);
 //!
 //! let mut state = State::new(bonds.slots());
-//! let mut system = System { bonds: &mut bonds, law: &*law, modulus, loads: &loads, factors: &[1.0] };
+//! let mut system = System::new(&mut bonds, &*law, modulus, &loads, &[1.0]);
 //! AdaptiveDynamicRelaxation::default().solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
 //!
 //! // σ₁₁ in the middle: about E times 2 mm over the free 34 mm

@@ -3,7 +3,7 @@
 use super::cloud_kernel::{CloudData, GROUP};
 use super::kernel::StretchRange;
 use super::rows::{CloudKernel, cloud_kernel};
-use super::{Bonds, Neighbour, VolumeCorrection, plain_force, surface_weight};
+use super::{Bonds, Neighbour, Overstretched, VolumeCorrection, plain_force, surface_weight};
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use crate::geometry::Cut;
@@ -239,7 +239,8 @@ impl<const D: usize> CloudBonds<D> {
         let volume = self.volumes[other] * self.volume_correction.factor(length, self.horizon, self.spacing);
         let surface =
             self.factors.as_ref().map_or(1.0, |g| surface_weight(bond, length, g.get(slot), g.get(other)));
-        Neighbour { slot: other, bond, length, volume, weight: volume * surface }
+        let index = (k - self.starts[slot]) as u32;
+        Neighbour { slot: other, index, bond, length, volume, weight: volume * surface }
     }
 }
 
@@ -321,6 +322,39 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         } else if let Some((fit, modulus)) = &self.table {
             plain_force(self, fit, *modulus, displacement, start, force, track);
         }
+    }
+
+    fn sever(&mut self, bonds: &[Overstretched]) {
+        for bond in bonds {
+            // as the padding of the lists: a bond of no stiffness to itself
+            let k = self.starts[bond.slot as usize] + bond.index as usize;
+            self.neighbours[k] = bond.slot;
+            self.inverse_length[k] = 0.0;
+        }
+        self.directed_bonds -= bonds.len() as u64;
+    }
+
+    fn intact(&self) -> Vec<u64> {
+        let bits = |part: &[f64]| {
+            part.iter().enumerate().fold(0, |word, (k, inverse)| word | u64::from(*inverse > 0.0) << k)
+        };
+        self.inverse_length.chunks(64).map(bits).collect()
+    }
+
+    fn restore(&mut self, words: &[u64]) -> bool {
+        if words.len() != self.inverse_length.len().div_ceil(64) {
+            return false;
+        }
+        for slot in 0..self.volumes.len() {
+            for k in self.starts[slot]..self.starts[slot + 1] {
+                if self.inverse_length[k] > 0.0 && words[k / 64] >> (k % 64) & 1 == 0 {
+                    self.neighbours[k] = slot as u32;
+                    self.inverse_length[k] = 0.0;
+                    self.directed_bonds -= 1;
+                }
+            }
+        }
+        true
     }
 
     fn directed_bonds(&self) -> u64 {

@@ -3,7 +3,7 @@
 use super::kernel::StretchRange;
 use super::lattice_kernel::{Class, TILE, Tiles};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
-use super::{Bonds, Neighbour, VolumeCorrection, plain_force, surface_weight};
+use super::{Bonds, Neighbour, Overstretched, VolumeCorrection, plain_force, surface_weight};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::geometry::Cut;
@@ -339,6 +339,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
                 let volume =
                     self.lattice.volume * self.volume_correction.factor(length, self.horizon(), spacing);
                 visit(Neighbour {
+                    index: k as u32,
                     slot: slot.wrapping_add_signed(self.shift(offset)),
                     bond: offset.map(|o| f64::from(o) * spacing),
                     length,
@@ -408,6 +409,38 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         } else if let Some((fit, modulus)) = &self.table {
             plain_force(self, fit, *modulus, displacement, start, force, track);
         }
+    }
+
+    fn sever(&mut self, bonds: &[Overstretched]) {
+        for bond in bonds {
+            let (slot, k) = (bond.slot as usize, bond.index as usize);
+            self.intact[k / 64][slot] &= !(1 << (k % 64));
+        }
+        self.directed_bonds -= bonds.len() as u64;
+        let mut tiles: Vec<usize> = bonds.iter().map(|bond| bond.slot as usize / TILE).collect();
+        tiles.dedup();
+        for tile in tiles {
+            let empty = (tile * TILE..(tile + 1) * TILE).all(|s| self.intact.iter().all(|w| w[s] == 0));
+            self.classes[tile] = if empty { Class::Empty } else { Class::Partial };
+        }
+    }
+
+    fn intact(&self) -> Vec<u64> {
+        self.intact.concat()
+    }
+
+    fn restore(&mut self, words: &[u64]) -> bool {
+        if words.len() != self.intact.len() * self.slots {
+            return false;
+        }
+        for (own, saved) in self.intact.iter_mut().zip(words.chunks(self.slots)) {
+            for (own, saved) in own.iter_mut().zip(saved) {
+                *own &= saved;
+            }
+        }
+        self.directed_bonds = self.intact.iter().flatten().map(|word| u64::from(word.count_ones())).sum();
+        self.classify();
+        true
     }
 
     fn directed_bonds(&self) -> u64 {

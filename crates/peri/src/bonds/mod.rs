@@ -1,5 +1,6 @@
 //! Who is bonded to whom, and the forces that follow: a regular lattice without a neighbour list, or a cloud with one.
 
+mod breaking;
 mod cloud;
 mod cloud_kernel;
 mod kernel;
@@ -7,6 +8,7 @@ mod lattice;
 mod lattice_kernel;
 mod rows;
 
+pub use breaking::{Overstretched, overstretched};
 pub use cloud::{CellGrid, CloudBonds};
 pub use cloud_kernel::GROUP;
 pub use kernel::StretchRange;
@@ -22,6 +24,8 @@ use rayon::prelude::*;
 pub struct Neighbour<const D: usize> {
     /// Slot of J.
     pub slot: usize,
+    /// Number of this bond among those of I, intact or not.
+    pub index: u32,
     /// Reference bond ξ = X_J − X_I, m.
     pub bond: [f64; D],
     /// |ξ|, m.
@@ -63,6 +67,12 @@ pub trait Bonds<const D: usize>: Send + Sync {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     );
+    /// Severs bonds, each named from both of its ends.
+    fn sever(&mut self, bonds: &[Overstretched]);
+    /// Which bonds are intact, for checkpoints: as many words as [`Bonds::restore`] takes.
+    fn intact(&self) -> Vec<u64>;
+    /// Severs what is not intact in `words`; false where their number does not fit these bonds.
+    fn restore(&mut self, words: &[u64]) -> bool;
     /// Intact bonds, each counted from both ends: the work of one force evaluation.
     fn directed_bonds(&self) -> u64;
     /// Bytes this representation holds for bonds and particles.

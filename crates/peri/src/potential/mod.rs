@@ -1,6 +1,7 @@
 //! Bond laws: tension t and energy φ of a bond of stretch l = |ζ|/|ξ|, in units of kθ.
 
 mod chain;
+mod energy;
 mod fit;
 mod laws;
 mod ratio;
@@ -8,6 +9,7 @@ mod ratio;
 mod tests;
 
 pub use chain::{Chain, ChainPoint};
+pub use energy::EnergyTable;
 pub use fit::KernelFit;
 pub use laws::{BondStretch, LinearBond, NetworkStretch, Printed, Scaled, Shifted};
 

@@ -233,7 +233,6 @@ fn solve<const D: usize>(
         tolerance: scene.solver.tolerance,
         max_iterations: scene.solver.max_iterations,
         mass_safety: scene.solver.mass_safety.unwrap_or(scene.material.law.mass_safety()),
-        fit_bound: scene.solver.fit_bound,
     };
     let steps = scene.solver.steps;
     let factors: Vec<f64> = (1..=steps).map(|s| s as f64 / steps as f64).collect();
@@ -251,7 +250,8 @@ fn solve<const D: usize>(
         }
         if stop { Err(Error::Interrupted(output.to_path_buf())) } else { Ok(()) }
     };
-    let mut system = System { bonds: &mut *body.bonds, law, modulus, loads, factors: &factors };
+    let mut system = System::new(&mut *body.bonds, law, modulus, loads, &factors);
+    system.fit_bound = scene.solver.fit_bound;
     solver.solve(&mut system, state, &mut watch, &mut |_, _| Ok(()))?;
     Ok(())
 }

@@ -78,7 +78,7 @@ impl Outcome {
             ("steps", state.step as u64),
             ("iterations", state.total_iterations),
             ("force_evaluations", state.evaluations),
-            ("bond_evaluations", directed * state.evaluations),
+            ("bond_evaluations", state.bond_evaluations),
             ("bytes_bonds", bonds.bytes() as u64),
         ] {
             self.work.push((name.to_owned(), count));

@@ -22,12 +22,14 @@ pub struct Loads<const D: usize> {
     pub displacement: Option<Field<D>>,
     /// Bit d of a slot: component d is held. Empty where nothing is.
     pub held: Vec<u8>,
+    /// Slots of each region of prescribed displacement, in the order given.
+    pub held_regions: Vec<Vec<u32>>,
 }
 
 impl<const D: usize> Loads<D> {
     /// Collects regions, each given as its slots and what holds there; body forces add up, the last displacement wins.
     pub fn new(slots: usize, regions: &[(Vec<u32>, Support<D>)]) -> Self {
-        let mut loads = Self { body_force: None, displacement: None, held: Vec::new() };
+        let mut loads = Self::default();
         for (members, support) in regions {
             if support.body_force.iter().any(|&b| b != 0.0) {
                 let field = loads.body_force.get_or_insert_with(|| Field::zeros(slots));
@@ -37,6 +39,7 @@ impl<const D: usize> Loads<D> {
                 }
             }
             if support.displacement.iter().any(Option::is_some) {
+                loads.held_regions.push(members.clone());
                 let field = loads.displacement.get_or_insert_with(|| Field::zeros(slots));
                 loads.held.resize(slots, 0);
                 for &slot in members {
@@ -57,6 +60,76 @@ impl<const D: usize> Loads<D> {
     /// Bits of the held components of a slot.
     pub fn held(&self, slot: usize) -> u8 {
         self.held.get(slot).copied().unwrap_or(0)
+    }
+
+    /// Takes the body force off a slot.
+    pub fn unload(&mut self, slot: usize) {
+        if let Some(field) = &mut self.body_force {
+            field.set(slot, [0.0; D]);
+        }
+    }
+
+    /// What the loads pull, N·m: Σ −F V·d over held components with d their displacement at factor 1, and
+    /// Σ b V·u with b the body force at factor 1. `force` holds out-of-balance force densities.
+    pub fn conjugates(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, force: &Field<D>) -> (f64, f64) {
+        let (mut pull, mut push) = (0.0, 0.0);
+        for &slot in bonds.particles() {
+            let slot = slot as usize;
+            let (held, volume) = (self.held(slot), bonds.volume(slot));
+            if let Some(prescribed) = self.displacement.as_ref().filter(|_| held != 0) {
+                let (full, force) = (prescribed.get(slot), force.get(slot));
+                pull -=
+                    (0..D).filter(|d| held >> d & 1 == 1).map(|d| full[d] * force[d]).sum::<f64>() * volume;
+            }
+            if let Some(body) = &self.body_force {
+                let (body, moved) = (body.get(slot), displacement.get(slot));
+                push += (0..D).map(|d| body[d] * moved[d]).sum::<f64>() * volume;
+            }
+        }
+        (pull, push)
+    }
+
+    /// How far apart the prescribed displacements are at factor 1, m: √Σ_d (max − min)².
+    pub fn reach(&self, bonds: &dyn Bonds<D>) -> f64 {
+        let Some(prescribed) = &self.displacement else { return 0.0 };
+        let span = |d: usize| {
+            let held = bonds.particles().iter().map(|&s| s as usize).filter(|&s| self.held(s) >> d & 1 == 1);
+            let (low, high) = held
+                .map(|s| prescribed.get(s)[d])
+                .fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
+            high - low
+        };
+        (0..D).map(|d| span(d).powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// Total body force at factor 1 along each axis and direction, the largest of them, N.
+    pub fn applied(&self, bonds: &dyn Bonds<D>) -> f64 {
+        let Some(body) = &self.body_force else { return 0.0 };
+        let sum = |d: usize, sign: f64| {
+            let each = bonds
+                .particles()
+                .iter()
+                .map(|&s| (sign * body.get(s as usize)[d]).max(0.0) * bonds.volume(s as usize));
+            each.sum::<f64>()
+        };
+        (0..D).flat_map(|d| [sum(d, 1.0), sum(d, -1.0)]).fold(0.0, f64::max)
+    }
+
+    /// Reaction on each region of prescribed displacement, N; components that are not held give none.
+    pub fn reactions(&self, bonds: &dyn Bonds<D>, force: &Field<D>) -> Vec<[f64; 3]> {
+        let of_region = |slots: &Vec<u32>| {
+            let mut sum = [0.0; 3];
+            for &slot in slots {
+                let (force, volume) = (force.get(slot as usize), bonds.volume(slot as usize));
+                for d in 0..D {
+                    if self.held(slot as usize) >> d & 1 == 1 {
+                        sum[d] -= force[d] * volume;
+                    }
+                }
+            }
+            sum
+        };
+        self.held_regions.iter().map(of_region).collect()
     }
 
     /// An affine field u_d = a_d + Σ_e B_de X_e to start from: closest to the prescribed displacements where there are

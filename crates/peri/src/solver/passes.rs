@@ -1,7 +1,7 @@
 //! The two passes of an iteration over all slots: new forces with every sum over them, and the move.
 
-use super::adr::{State, System};
 use super::load::Loads;
+use super::system::{State, System};
 use crate::bonds::StretchRange;
 use crate::field::{CHUNK, chunk_range};
 use rayon::prelude::*;
@@ -42,7 +42,7 @@ pub fn force_pass<const D: usize>(
     look: bool,
 ) -> (Sums, StretchRange) {
     let slots = system.bonds.slots();
-    let (bonds, loads) = (&*system.bonds, system.loads);
+    let loads = &*system.loads;
     let (displacement, velocity) = (&state.displacement, state.velocity.components());
     let results: Vec<(Sums, StretchRange)> = state
         .force
@@ -57,7 +57,7 @@ pub fn force_pass<const D: usize>(
                 let mut new: [&mut [f64]; D] =
                     std::array::from_fn(|_| &mut parts.next().unwrap_or_default()[..range.len()]);
                 let mut met = StretchRange::REST;
-                bonds.force(displacement, chunk, &mut new, look.then_some(&mut met));
+                system.internal_force(displacement, chunk, &mut new, look.then_some(&mut met));
                 let mut sums = Sums::default();
                 let held = loads.held.get(range.clone()).unwrap_or_default();
                 for d in 0..D {

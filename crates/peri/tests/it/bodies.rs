@@ -252,7 +252,7 @@ pub fn relax<const D: usize>(
     state: &mut State<D>,
 ) -> Result<(), peri::Error> {
     let (law, modulus) = law;
-    let mut system = System { bonds, law, modulus, loads, factors };
+    let mut system = System::new(bonds, law, modulus, loads, factors);
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
@@ -269,7 +269,7 @@ pub fn hold<const D: usize>(
             displacement.set(slot as usize, value);
         }
     }
-    Loads { body_force: None, displacement: Some(displacement), held }
+    Loads { displacement: Some(displacement), held, ..Loads::default() }
 }
 
 /// A fit at the scenes' default bound.
