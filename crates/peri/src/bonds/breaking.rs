@@ -1,0 +1,68 @@
+//! Which bonds are stretched beyond what they bear.
+
+use super::{Bonds, StretchRange};
+use crate::field::{CHUNK, Field, chunk_range};
+use rayon::prelude::*;
+
+/// A bond, seen from one of its ends, that is to be severed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Overstretched {
+    /// Slot of the particle.
+    pub slot: u32,
+    /// Its number among the particle's bonds, see [`super::Neighbour::index`].
+    pub index: u32,
+    /// λ² − 1.
+    pub elongation: f64,
+    /// |ξ|, m.
+    pub length: f64,
+    /// w V_J, m³.
+    pub weight: f64,
+}
+
+/// All intact bonds with λ² − 1 > `elongation`, each from both of its ends: λ² − 1 = η·(2ξ + η)/|ξ|² has the same bits
+/// from either.
+pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
+    bonds: &B,
+    displacement: &Field<D>,
+    elongation: f64,
+) -> Vec<Overstretched> {
+    let slots = bonds.slots();
+    let of_chunk = |chunk: usize| {
+        let range = chunk_range(chunk, slots);
+        // the vectorised kernel finds the items to look into
+        let mut scratch = vec![0.0; D * range.len()];
+        let mut parts = scratch.chunks_mut(range.len());
+        let mut out: [&mut [f64]; D] = std::array::from_fn(|_| parts.next().unwrap_or_default());
+        let mut met = StretchRange::REST;
+        bonds.force(displacement, chunk, &mut out, Some(&mut met));
+        let mut found = Vec::new();
+        // its last bits may differ from those below
+        if met.high * (1.0 + 1e-9) < elongation {
+            return found;
+        }
+        for slot in range {
+            let own = displacement.get(slot);
+            bonds.neighbours(slot, &mut |bond| {
+                let other = displacement.get(bond.slot);
+                let mut e = 0.0;
+                for d in 0..D {
+                    let eta = other[d] - own[d];
+                    e += eta * (2.0 * bond.bond[d] + eta);
+                }
+                let e = e / (bond.length * bond.length);
+                if e > elongation {
+                    found.push(Overstretched {
+                        slot: slot as u32,
+                        index: bond.index,
+                        elongation: e,
+                        length: bond.length,
+                        weight: bond.weight,
+                    });
+                }
+            });
+        }
+        found
+    };
+    let parts: Vec<Vec<Overstretched>> = (0..slots.div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect();
+    parts.concat()
+}

@@ -1,0 +1,190 @@
+//! Load step after load step: a first guess, an equilibrium, the bonds that break in it, the next equilibrium.
+
+use super::system::{Policy, Record, State, Status, System};
+use crate::bonds::{Bonds, StretchRange};
+use crate::error::Error;
+use crate::field::CHUNK;
+use crate::potential::EnergyTable;
+use rayon::prelude::*;
+
+/// Sees every iteration, and may stop the run by an error.
+pub type Watch<'a, const D: usize> = dyn FnMut(&Status, &State<D>) -> Result<(), Error> + 'a;
+
+/// A method that finds the equilibrium of a state at the load factor of its step.
+pub trait Equilibrium<const D: usize> {
+    /// Moves the free components until the forces balance; leaves the force of the final displacement in
+    /// [`State::force`], counts iterations in [`State::iteration`] (reset by the caller) and the others.
+    ///
+    /// # Errors
+    /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` returns.
+    fn equilibrate(
+        &mut self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        watch: &mut Watch<D>,
+    ) -> Result<(), Error>;
+
+    /// Is told the slots whose bonds have broken since the last equilibrium.
+    fn broke(&mut self, system: &System<D>, slots: &[u32]);
+}
+
+/// Solves the remaining load steps of `state`; `finished` sees every finished step.
+///
+/// # Errors
+/// As [`Equilibrium::equilibrate`], and whatever `finished` returns.
+pub fn march<const D: usize>(
+    method: &mut dyn Equilibrium<D>,
+    system: &mut System<D>,
+    state: &mut State<D>,
+    watch: &mut Watch<D>,
+    finished: &mut dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let stiffness = system.modulus * system.law.tangent();
+    // of the body as it was built: an interrupted run must guess as if it had not been
+    let predictor = system.loads.affine_predictor(&*system.bonds, stiffness);
+    system.restore(state)?;
+    while state.step < system.factors.len() {
+        if !state.predicted {
+            let before = state.step.checked_sub(1).map_or(0.0, |s| system.factors[s]);
+            predict(system, state, &predictor, system.factors[state.step] - before);
+            state.predicted = true;
+            // the step may leap out of the fitted range: its first force and mass must know
+            system.covers_stretches(state)?;
+        }
+        loop {
+            loop {
+                method.equilibrate(system, state, watch)?;
+                if system.covers_stretches(state)? {
+                    break;
+                }
+            }
+            work_of_loads(system, state);
+            let slots = if system.is_overstretched(state.balanced_stretches) {
+                system.break_bonds(state)
+            } else {
+                Vec::new()
+            };
+            state.round += 1;
+            state.iteration = 0;
+            if slots.is_empty() {
+                break;
+            }
+            method.broke(system, &slots);
+            let particles = system.bonds.particles();
+            particles.iter().for_each(|&slot| state.velocity.set(slot as usize, [0.0; D]));
+        }
+        record(system, state);
+        state.step += 1;
+        state.predicted = false;
+        state.round = 0;
+        state.step_iterations = 0;
+        finished(&*system.bonds, state)?;
+        if severed(system, state) {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Moves the body with its grips and lets it start from rest.
+fn predict<const D: usize>(
+    system: &System<D>,
+    state: &mut State<D>,
+    predictor: &[[f64; 4]; D],
+    increment: f64,
+) {
+    let factor = system.factors[state.step];
+    for &slot in system.bonds.particles() {
+        let slot = slot as usize;
+        let position = system.bonds.position(slot);
+        let mut value = state.displacement.get(slot);
+        let held = system.loads.held(slot);
+        for d in 0..D {
+            if held >> d & 1 == 1 {
+                value[d] =
+                    factor * system.loads.displacement.as_ref().map_or(0.0, |field| field.get(slot)[d]);
+            } else {
+                let affine: f64 = (0..D).map(|e| predictor[d][e + 1] * position[e]).sum();
+                value[d] += increment * (predictor[d][0] + affine);
+            }
+        }
+        state.displacement.set(slot, value);
+        state.velocity.set(slot, [0.0; D]);
+    }
+}
+
+/// Adds the work of the loads since the last equilibrium, by the trapezoidal rule.
+fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
+    let factor = system.factors[state.step];
+    let (pull, push) = system.loads.conjugates(&*system.bonds, &state.displacement, &state.force);
+    let [old_factor, old_pull, old_push] = state.balanced;
+    state.work += 0.5 * (pull + old_pull) * (factor - old_factor);
+    state.work += 0.5 * (factor + old_factor) * (push - old_push);
+    state.balanced = [factor, pull, push];
+}
+
+fn record<const D: usize>(system: &System<D>, state: &mut State<D>) {
+    let [factor, pull, _] = state.balanced;
+    let met = state.balanced_stretches;
+    let table = EnergyTable::new(system.law, met);
+    let reach = system.loads.reach(&*system.bonds);
+    let load = if reach > 0.0 { pull / reach } else { factor * system.loads.applied(&*system.bonds) };
+    let record = Record {
+        factor,
+        load,
+        reactions: system.loads.reactions(&*system.bonds, &state.force),
+        residual: state.residual,
+        iterations: state.step_iterations,
+        rounds: state.round,
+        broken: state.broken,
+        detached: state.detached,
+        stored: stored_energy(system, state, &table),
+        work: state.work,
+        released: state.released,
+        largest_stretch: (1.0 + met.high).sqrt(),
+    };
+    state.history.push(record);
+}
+
+/// Σ_I V_I Σ_J w V_J kθ |ξ| φ: the energy of all bonds, J.
+pub fn stored_energy<const D: usize>(system: &System<D>, state: &State<D>, table: &EnergyTable) -> f64 {
+    let of = |slots: &[u32]| {
+        let mut sum = 0.0;
+        for &slot in slots {
+            let own = state.displacement.get(slot as usize);
+            let mut energy = 0.0;
+            system.bonds.neighbours(slot as usize, &mut |bond| {
+                let other = state.displacement.get(bond.slot);
+                let mut e = 0.0;
+                for d in 0..D {
+                    let eta = other[d] - own[d];
+                    e += eta * (2.0 * bond.bond[d] + eta);
+                }
+                energy += bond.weight * bond.length * table.value(e / (bond.length * bond.length));
+            });
+            sum += system.bonds.volume(slot as usize) * energy;
+        }
+        sum
+    };
+    let parts: Vec<f64> = system.bonds.particles().par_chunks(CHUNK).map(of).collect();
+    system.modulus * parts.iter().sum::<f64>()
+}
+
+/// Whether the load has fallen below the part of its largest at which the run is to stop.
+fn severed<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
+    let largest = state.history.iter().map(|r| r.load.abs()).fold(0.0, f64::max);
+    let last = state.history.last().map_or(0.0, |r| r.load.abs());
+    system.stop_below > 0.0 && state.broken > 0 && last < system.stop_below * largest
+}
+
+impl<const D: usize> System<'_, D> {
+    /// Whether bonds break on the way to equilibrium.
+    pub(super) fn breaks_on_the_way(&self) -> bool {
+        self.breaking.is_some_and(|b| b.policy == Policy::EachIteration)
+    }
+
+    /// Whether stretches reach the critical one.
+    pub(super) fn is_overstretched(&self, met: StretchRange) -> bool {
+        self.breaking.is_some_and(|b| met.high > b.stretch * b.stretch - 1.0)
+    }
+}
