@@ -333,7 +333,6 @@ fn strong_compression_of_the_network_law() {
             tolerance: 1e-5,
             mass_safety: Law::Chain.mass_safety(),
             max_iterations: most,
-            ..Default::default()
         };
         let mut state = State::new(built.lattice.slots());
         let steps = [0.25, 0.5, 0.75, 1.0];

@@ -140,7 +140,6 @@ fn every_stress_free_law_converges() {
                 tolerance: 1e-6,
                 mass_safety: law.mass_safety(),
                 max_iterations: 2000,
-                ..Default::default()
             };
             let mut state = State::new(bonds.slots());
             relax(&solver, bonds, (&*potential, 1.0), &loads, &[0.5, 1.0], &mut state)
