@@ -66,3 +66,28 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
     let parts: Vec<Vec<Overstretched>> = (0..slots.div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect();
     parts.concat()
 }
+
+/// Parts of the body that hang together by intact bonds, single particles not counted.
+pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> usize {
+    let mut root: Vec<u32> = (0..bonds.slots() as u32).collect();
+    let mut size = vec![1_u32; bonds.slots()];
+    let find = |root: &mut Vec<u32>, mut slot: u32| {
+        while root[slot as usize] != slot {
+            root[slot as usize] = root[root[slot as usize] as usize];
+            slot = root[slot as usize];
+        }
+        slot
+    };
+    for &slot in bonds.particles() {
+        bonds.neighbours(slot as usize, &mut |bond| {
+            let (a, b) = (find(&mut root, slot), find(&mut root, bond.slot as u32));
+            if a != b {
+                let (small, large) = (a.max(b), a.min(b));
+                root[small as usize] = large;
+                size[large as usize] += size[small as usize];
+            }
+        });
+    }
+    let is_part = |&&slot: &&u32| root[slot as usize] == slot && size[slot as usize] > 1;
+    bonds.particles().iter().filter(is_part).count()
+}

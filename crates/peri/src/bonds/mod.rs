@@ -8,7 +8,7 @@ mod lattice;
 mod lattice_kernel;
 mod rows;
 
-pub use breaking::{Overstretched, overstretched};
+pub use breaking::{Overstretched, fragments, overstretched};
 pub use cloud::{CellGrid, CloudBonds};
 pub use cloud_kernel::GROUP;
 pub use kernel::StretchRange;

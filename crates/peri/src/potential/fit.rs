@@ -52,6 +52,8 @@ pub struct KernelFit {
     pub range: [f64; 2],
     /// Largest relative error of q over the range, measured.
     pub max_error: f64,
+    /// Beyond this e, q stays what it is there; infinite unless set.
+    pub limit: f64,
     /// Strain l − 1, tension and its derivative at the nodes.
     table: Vec<[f64; 3]>,
 }
@@ -80,7 +82,15 @@ impl KernelFit {
             let safe = ratio.has_no_pole(target.low, target.high);
             let ratio::Ratio { numerator, denominator, .. } = ratio;
             let (stress_free, table) = (target.stress_free, Vec::new());
-            let mut fit = Self { numerator, denominator, stress_free, range, max_error: 0.0, table };
+            let mut fit = Self {
+                numerator,
+                denominator,
+                stress_free,
+                range,
+                max_error: 0.0,
+                limit: f64::INFINITY,
+                table,
+            };
             fit.max_error = fit.error(&dense);
             if fit.max_error <= bound && safe {
                 return Ok(fit);
@@ -89,8 +99,17 @@ impl KernelFit {
         target.table(range, bound, &dense)
     }
 
+    /// Holds q beyond the largest stretch of the range, for bonds that are about to break: their law does not matter,
+    /// but a fit must not be followed out of its range.
+    #[must_use]
+    pub fn held(mut self) -> Self {
+        self.limit = self.range[1] * self.range[1] - 1.0;
+        self
+    }
+
     /// q(e).
     pub fn value(&self, e: f64) -> f64 {
+        let e = e.min(self.limit);
         if !self.table.is_empty() {
             let stretch = (1.0 + e).max(0.0).sqrt();
             return self.interpolate(e / (1.0 + stretch)) / stretch.max(f64::MIN_POSITIVE);
@@ -218,6 +237,7 @@ impl Target<'_> {
             stress_free: self.stress_free,
             range,
             max_error: 0.0,
+            limit: f64::INFINITY,
             table: vec![node(low)],
         };
         while let (Some(&right), Some(&left)) = (pending.last(), fit.table.last()) {

@@ -1,11 +1,12 @@
 //! A body with its bond law, as a variant of a scene asks for them.
 
 use crate::calibrate;
+use crate::correction::surface_factors;
 use crate::critical::{Context, Critical};
 use crate::error::Error;
 use crate::potential::BondPotential;
 use crate::run::Failure;
-use crate::scene::{Body, Scene, SurfaceCorrection, Variant};
+use crate::scene::{Body, Scene, SurfaceCorrection, Variant, with_inclusions};
 use polycore::scene::Source;
 
 /// A body, its law and their constants.
@@ -39,8 +40,11 @@ impl<const D: usize> Bonded<D> {
         if let Some(lattice) = body.bonds.as_lattice() {
             modulus *= calibrate::lattice_factor::<D>(material.calibration, lattice);
         }
-        if variant.surface == SurfaceCorrection::Energy {
-            body.correct_surface(modulus, calibrate::stiffness_1111(space, youngs_modulus));
+        let surface = (variant.surface == SurfaceCorrection::Energy).then(|| {
+            surface_factors(&*body.bonds, modulus, calibrate::stiffness_1111(space, youngs_modulus))
+        });
+        if let Some(factors) = with_inclusions(source, scene, &body, surface)? {
+            body.bonds.set_factors(factors);
         }
         let context = Context { law: &*law, links: material.links, space, modulus, horizon, thickness };
         let resolve = |critical: Critical| critical.resolve(&context);

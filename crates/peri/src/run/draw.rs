@@ -8,55 +8,16 @@ use crate::scene::{ExactSpec, Scene};
 use crate::solver::State;
 use crate::stress::{Measure, Tensor};
 use polycore::Error;
+use polycore::output::csv;
 use polycore::output::picture::{FieldMap, LegendPlace, LinePlot, Panel, Series};
-use polycore::output::{csv, vtkhdf::ParticleSeries};
 use std::path::Path;
-
-/// A stress field of each measure.
-type Fields<const D: usize> = [(Measure, Vec<Tensor<D>>)];
-
-/// Displacement and stresses as one VTKHDF file.
-pub fn fields<const D: usize>(
-    bonds: &dyn Bonds<D>,
-    state: &State<D>,
-    kinds: &[(&str, &Fields<D>)],
-    path: &Path,
-) -> Result<(), Error> {
-    let in_space = |v: [f64; D]| -> [f64; 3] { std::array::from_fn(|d| v.get(d).copied().unwrap_or(0.0)) };
-    let mut series = ParticleSeries::create(path)?;
-    let (mut points, mut displacement) = (Vec::new(), Vec::new());
-    for &slot in bonds.particles() {
-        let (x, u) = (bonds.position(slot as usize), state.displacement.get(slot as usize));
-        points.push(in_space(std::array::from_fn(|d| x[d] + u[d])));
-        displacement.extend(in_space(u));
-    }
-    let full = |t: &Tensor<D>| -> [f64; 9] {
-        std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
-    };
-    let tensors: Vec<(String, Vec<f64>)> = kinds
-        .iter()
-        .flat_map(|(kind, fields)| fields.iter().map(move |(measure, field)| (kind, measure, field)))
-        .map(|(kind, measure, field)| {
-            (format!("{kind}_{}", measure.name()), field.iter().flat_map(full).collect())
-        })
-        .collect();
-    let mut data: Vec<(&str, usize, &[f64])> = vec![("displacement", 3, &displacement)];
-    // a cloud's particles are sorted for locality: this is the line of each in the user's file, from 0
-    let lines: Option<Vec<f64>> =
-        bonds.as_cloud().map(|cloud| cloud.input_order().iter().map(|&line| f64::from(line)).collect());
-    data.extend(lines.iter().map(|lines| ("input_index", 1, lines.as_slice())));
-    data.extend(tensors.iter().map(|(name, values)| (name.as_str(), 9, values.as_slice())));
-    series.step(1.0, &points, &data)?;
-    series.finish()?;
-    Ok(())
-}
 
 /// Maps of the stress components of the first measure (Fig. 2.6); plane bodies only.
 pub fn maps<const D: usize>(
     scene: &Scene,
     bonds: &dyn Bonds<D>,
     state: &State<D>,
-    fields: &Fields<D>,
+    fields: &[(Measure, Vec<Tensor<D>>)],
     outcome: &Outcome,
     output: &Path,
 ) -> Result<(), Error> {

@@ -3,20 +3,23 @@
 mod bonded;
 mod compare;
 mod draw;
+mod frames;
+mod history;
 mod outcome;
 
 pub use outcome::{Outcome, Profile};
 
 use bonded::Bonded;
+use frames::Frames;
 
-use crate::bonds::{Bonds, stretch_range};
+use crate::bonds::{Bonds, fragments, stretch_range};
 use crate::calibrate::Space;
 use crate::checkpoint;
 use crate::error::Error;
 use crate::potential::{BondPotential, KernelFit};
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
-use crate::solver::{AdaptiveDynamicRelaxation, Loads, State, Status, System};
-use crate::stress::{Loaded, Tensor, cauchy, deformation_gradients, piola_in_cloud, piola_on_lattice};
+use crate::solver::{AdaptiveDynamicRelaxation, Breaking, Loads, State, Status, System};
+use crate::stress::{Loaded, Tensor, piola_in_cloud, piola_on_lattice};
 use polycore::report::{Phases, Report};
 use polycore::scene::{SceneError, Source};
 use std::path::Path;
@@ -94,9 +97,10 @@ fn run_in<const D: usize>(
     // every body is built once before anything is computed or written: faults show at once
     if !options.resume {
         for variant in &variants {
-            let body = body_of::<D>(source, scene, variant)?;
-            loads_of(source, scene, &body)?;
-            Bonded::new(source, scene, variant, body)?;
+            let (source, scene) = variant.resolve(source, scene);
+            let body = body_of::<D>(&source, &scene, variant)?;
+            loads_of(&source, &scene, &body)?;
+            Bonded::new(&source, &scene, variant, body)?;
         }
     }
     polycore::output::prepare_directory(options.output)?;
@@ -117,11 +121,27 @@ fn run_in<const D: usize>(
     }
     for variant in &variants[finished.len().min(variants.len())..] {
         let state = state.take();
-        let outcome = run_variant::<D>(source, scene, variant, options, &finished, state)?;
+        let (own_source, own_scene) = variant.resolve(source, scene);
+        let study = variant.study.and_then(|index| scene.study.get(index));
+        let expected = study.and_then(|study| study.fails.as_deref());
+        let mut outcome = match run_variant::<D>(&own_source, &own_scene, variant, options, &finished, state)
+        {
+            Err(failure) if expected.is_some_and(|text| failure.to_string().contains(text)) => {
+                let mut outcome = Outcome::new(variant.name(), variant);
+                outcome.error = Some(failure.to_string());
+                outcome
+            }
+            other => other?,
+        };
+        if expected.is_some() {
+            outcome.value("failed_as_it_must", f64::from(u8::from(outcome.error.is_some())), "");
+        }
+        outcome.must = study.and_then(|study| study.must.clone());
         finished.push(outcome);
         checkpoint::write::<D>(options.output, source, options.quick, &finished, None)?;
     }
     let report = compare::report(source, scene, &finished, options.quick);
+    history::write(scene, &finished, options.output)?;
     if scene.output.pictures {
         draw::curves(scene, &finished, options.output)?;
     }
@@ -163,72 +183,63 @@ fn run_variant<const D: usize>(
         let path = options.output.join(checkpoint::FILE_NAME);
         return Err(Error::Checkpoint { path, why }.into());
     }
-    phases.start("solve");
-    let solved =
-        solve(source, scene, variant, options, finished, &mut body, &*law, modulus, &loads, &mut state);
-    phases.stop();
-    solved?;
     let mut outcome = Outcome::new(variant.name(), variant);
+    let path = options.output.join(format!("{}.vtkhdf", outcome.file_name()));
+    let mut frames = Frames::new(scene, &*law, modulus, &*body.bonds, &state, path)?;
+    let solution = Solution { variant, finished, law: &*law, modulus, loads: &loads, critical_stretch };
+    solve(source, scene, &solution, options, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
     let fit = KernelFit::new(&*law, covering(&*body.bonds, &state), scene.solver.fit_bound)?;
     outcome.value("fit_error", fit.max_error, "");
     if let Some(critical) = critical_stretch {
         outcome.value("critical_stretch", critical, "");
+        outcome.value("fragments", fragments(&*body.bonds) as f64, "");
     }
-    let (mut fields, mut piola_fields) = (Vec::new(), Vec::new());
-    if let Some(spec) = &scene.stress {
-        let gradients =
-            phases.time("deformation gradient", || deformation_gradients(&*body.bonds, &state.displacement));
-        for &measure in &spec.measures {
-            let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus };
-            let started = Instant::now();
-            let piola = stress(&*body.bonds, &loaded, measure, spec.ball);
-            let field = cauchy(&piola, &gradients);
-            let seconds = started.elapsed().as_secs_f64();
-            phases.add(&format!("stress {}", measure.name()), seconds);
-            if scene.output.fields {
-                piola_fields.push((measure, piola));
-            }
-            fields.push((measure, field));
-        }
-    }
+    let stresses = frames.stresses(&*body.bonds, &state, &mut phases)?;
+    outcome.history.clone_from(&state.history);
+    outcome.reach = loads.reach(&*body.bonds);
+    outcome.regions = scene::region_names(scene);
     phases.time("compare", || {
         outcome.responses(&*body.bonds, &loads, &state);
+        outcome.values_of_history(scene);
         if let Some(exact) = &scene.exact {
-            compare::kirsch(&*body.bonds, exact, &fields, &loaded, &mut outcome);
+            compare::kirsch(&*body.bonds, exact, &stresses.cauchy, &loaded, &mut outcome);
         }
     });
     outcome.seconds(&phases);
-    if scene.output.fields {
-        draw::fields(
-            &*body.bonds,
-            &state,
-            &[("cauchy", &fields), ("piola", &piola_fields)],
-            &options.output.join(format!("{}.vtkhdf", outcome.file_name())),
-        )?;
-    }
+    let path = frames.path().to_path_buf();
+    frames.finish(&*body.bonds, &state, &stresses)?;
     if scene.output.pictures {
-        draw::maps(scene, &*body.bonds, &state, &fields, &outcome, options.output)?;
+        draw::maps(scene, &*body.bonds, &state, &stresses.cauchy, &outcome, options.output)?;
+        if scene.output.fields && scene.output.every.is_some() && critical_stretch.is_some() {
+            frames::stages(scene, &outcome, body.bonds.spacing(), &path, options.output)?;
+        }
     }
     Ok(outcome)
 }
 
-#[expect(
-    clippy::too_many_arguments,
-    reason = "one call, and a struct for it would only rename the arguments"
-)]
+/// What is solved and does not change.
+struct Solution<'a, const D: usize> {
+    variant: &'a Variant,
+    finished: &'a [Outcome],
+    law: &'a dyn BondPotential,
+    modulus: f64,
+    loads: &'a Loads<D>,
+    critical_stretch: Option<f64>,
+}
+
+#[expect(clippy::too_many_arguments, reason = "one call, of what changes and what does not")]
 fn solve<const D: usize>(
     source: &Source,
     scene: &Scene,
-    variant: &Variant,
+    solution: &Solution<D>,
     options: &mut Options,
-    finished: &[Outcome],
     body: &mut scene::Body<D>,
-    law: &dyn BondPotential,
-    modulus: f64,
-    loads: &Loads<D>,
     state: &mut State<D>,
+    phases: &mut Phases,
+    frames: &mut Frames,
 ) -> Result<(), Failure> {
+    let Solution { variant, finished, law, modulus, loads, critical_stretch } = *solution;
     let solver = AdaptiveDynamicRelaxation {
         tolerance: scene.solver.tolerance,
         max_iterations: scene.solver.max_iterations,
@@ -252,8 +263,17 @@ fn solve<const D: usize>(
     };
     let mut system = System::new(&mut *body.bonds, law, modulus, loads, &factors);
     system.fit_bound = scene.solver.fit_bound;
-    solver.solve(&mut system, state, &mut watch, &mut |_, _| Ok(()))?;
-    Ok(())
+    system.breaking = critical_stretch.map(|stretch| Breaking { stretch, policy: scene.solver.breaking });
+    system.stop_below = scene.solver.stop_below.unwrap_or(0.0);
+    phases.start("solve");
+    let solved = solver.solve(&mut system, state, &mut watch, &mut |bonds, state| {
+        phases.stop();
+        frames.step(bonds, state, phases)?;
+        phases.start("solve");
+        Ok(())
+    });
+    phases.stop();
+    Ok(solved?)
 }
 
 /// The stretches of a state, with a margin for rounding.
@@ -295,10 +315,11 @@ fn explanation_in<const D: usize>(
 ) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
     for variant in scene::check(source, scene, quick)? {
-        let body = body_of::<D>(source, scene, &variant)?;
-        loads_of(source, scene, &body)?;
-        let bonded = Bonded::new(source, scene, &variant, body)?;
-        lines.extend(scene::explain(scene, &variant, &*bonded.body.bonds));
+        let (source, scene) = variant.resolve(source, scene);
+        let body = body_of::<D>(&source, &scene, &variant)?;
+        loads_of(&source, &scene, &body)?;
+        let bonded = Bonded::new(&source, &scene, &variant, body)?;
+        lines.extend(scene::explain(&scene, &variant, &*bonded.body.bonds));
     }
     Ok(lines)
 }

@@ -2,7 +2,7 @@
 
 use crate::bonds::Bonds;
 use crate::scene::Variant;
-use crate::solver::{Loads, State};
+use crate::solver::{Loads, Record, State};
 use polycore::report::Phases;
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +21,16 @@ pub struct Outcome {
     pub values: Vec<(String, f64, String)>,
     /// Named profiles.
     pub profiles: Vec<Profile>,
+    /// The load steps.
+    pub history: Vec<Record>,
+    /// Relative displacement of the grips at factor 1, m; 0 where nothing is prescribed.
+    pub reach: f64,
+    /// Names of the regions of prescribed displacement.
+    pub regions: Vec<String>,
+    /// What must happen, where the scene says so.
+    pub must: Option<String>,
+    /// The error with which it ended, where the scene expects one.
+    pub error: Option<String>,
     /// Work done.
     pub work: Vec<(String, u64)>,
     /// Seconds by phase.
@@ -49,6 +59,11 @@ impl Outcome {
             family,
             values: Vec::new(),
             profiles: Vec::new(),
+            history: Vec::new(),
+            reach: 0.0,
+            regions: Vec::new(),
+            must: None,
+            error: None,
             work: Vec::new(),
             seconds: Vec::new(),
         }

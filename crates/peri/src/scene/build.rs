@@ -1,10 +1,10 @@
 //! From a scene to a body. Every rule that spans several keys is checked here, once.
 
 use super::cloud::cloud;
-use super::{Axis, Scene, ShapeKind, ShapeSpec, SurfaceCorrection};
-use crate::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use super::variant::Variant;
+use super::{Axis, Scene, ShapeKind, ShapeSpec};
+use crate::bonds::{Bonds, LatticeBonds};
 use crate::calibrate::Space;
-use crate::correction::surface_factors;
 use crate::geometry::{Cut, Operation, Shape, bounds, cell_counts, lattice};
 use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
@@ -17,21 +17,6 @@ pub struct Body<const D: usize> {
     pub bounds: ([f64; D], [f64; D]),
     /// Thickness (1 in 3D), m.
     pub thickness: f64,
-}
-
-/// The part of a variant that a study may change.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Variant {
-    /// Spacing, m (0 for a cloud).
-    pub spacing: f64,
-    /// Horizon over spacing.
-    pub horizon_ratio: f64,
-    /// Surface correction.
-    pub surface: SurfaceCorrection,
-    /// Volume correction.
-    pub volume: VolumeCorrection,
-    /// Part of `--quick` runs.
-    pub quick: bool,
 }
 
 /// Particles a body may have at most, whatever memory there is: slots are counted in 32 bits.
@@ -83,14 +68,6 @@ pub fn body_of<const D: usize>(
         ));
     }
     Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
-}
-
-impl<const D: usize> Body<D> {
-    /// Stiffens the bonds near free surfaces.
-    pub fn correct_surface(&mut self, modulus: f64, stiffness_1111: f64) {
-        let factors = surface_factors(&*self.bonds, modulus, stiffness_1111);
-        self.bonds.set_factors(factors);
-    }
 }
 
 fn thickness(source: &Source, scene: &Scene) -> Result<f64, SceneError> {
@@ -190,7 +167,7 @@ fn operations<const D: usize>(source: &Source, scene: &Scene) -> Result<Vec<Oper
     each.collect()
 }
 
-fn shape<const D: usize>(
+pub(super) fn shape<const D: usize>(
     source: &Source,
     key: &str,
     kind: ShapeKind,

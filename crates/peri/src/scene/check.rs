@@ -1,7 +1,7 @@
 //! Values that can be judged without building anything, and the list of variants to run.
 
-use super::build::Variant;
-use super::{HORIZON_RATIO, Scene, Study};
+use super::Scene;
+use super::variant::{Variant, variants};
 use crate::calibrate::{Calibration, Space};
 use polycore::scene::{SceneError, Source};
 
@@ -13,6 +13,22 @@ pub const LARGEST_RATIO: f64 = 20.0;
 /// # Errors
 /// A [`SceneError`] that names the key, the value found and what is allowed.
 pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+    let variants = variants(source, scene, quick)?;
+    for variant in &variants {
+        let (source, scene) = variant.resolve(source, scene);
+        check_one(&source, &scene)?;
+    }
+    if variants.is_empty() {
+        return Err(source.error(
+            "study",
+            "no variant left in a --quick run",
+            "at least one without `quick = false`",
+        ));
+    }
+    Ok(variants)
+}
+
+fn check_one(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     body(source, scene)?;
     material(source, scene)?;
     solver(source, scene)?;
@@ -38,15 +54,17 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
             ));
         }
     }
-    let variants = variants(source, scene, quick)?;
-    if variants.is_empty() {
-        return Err(source.error(
-            "study",
-            "no variant left in a --quick run",
-            "at least one without `quick = false`",
-        ));
+    output(source, scene)
+}
+
+fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    if scene.output.every == Some(0) {
+        return Err(source.error("output.every", 0, "at least 1 step"));
     }
-    Ok(variants)
+    if !(1..=12).contains(&scene.output.stages) {
+        return Err(source.error("output.stages", scene.output.stages, "1 to 12"));
+    }
+    Ok(())
 }
 
 pub(super) fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
@@ -113,7 +131,7 @@ fn plain(value: f64) -> String {
     }
 }
 
-fn ratio(source: &Source, key: &str, ratio: f64) -> Result<(), SceneError> {
+pub(super) fn ratio(source: &Source, key: &str, ratio: f64) -> Result<(), SceneError> {
     if (1.0..=LARGEST_RATIO).contains(&ratio) {
         Ok(())
     } else {
@@ -155,6 +173,10 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             _ => {}
         }
     }
+    for (index, inclusion) in material.inclusions.iter().enumerate() {
+        let key = format!("material.inclusions[{index}].stiffness");
+        positive(source, &key, inclusion.stiffness, "")?;
+    }
     Ok(())
 }
 
@@ -172,62 +194,6 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     within("fit_bound", solver.fit_bound, 1e-12, 1e-2)?;
     within("steps", solver.steps as f64, 1.0, 1e6)?;
     within("max_iterations", solver.max_iterations as f64, 1.0, 1e9)?;
-    within("mass_safety", solver.mass_safety.unwrap_or(1.1), 1.0, 100.0)
-}
-
-/// The scene's own discretisation, or every combination that its studies list.
-fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
-    let own = Study::default();
-    let mut variants: Vec<Variant> = Vec::new();
-    let studies: Vec<&Study> = if scene.study.is_empty() { vec![&own] } else { scene.study.iter().collect() };
-    for (index, study) in studies.iter().enumerate() {
-        if scene.body.points.is_some() && !(study.spacing.is_empty() && study.horizon_ratio.is_empty()) {
-            return Err(source.error(&format!("study[{index}]"), "spacings of a cloud", "corrections only"));
-        }
-        let is_quick = study.quick.unwrap_or(true);
-        if quick && !is_quick {
-            continue;
-        }
-        let spacings = if study.spacing.is_empty() {
-            scene.body.spacing.into_iter().collect()
-        } else {
-            study.spacing.clone()
-        };
-        let spacings: Vec<f64> =
-            if spacings.is_empty() { vec![0.0] } else { spacings.iter().map(|s| s.si()).collect() };
-        let or_own = |list: &[f64], own: f64| if list.is_empty() { vec![own] } else { list.to_vec() };
-        let ratios = or_own(&study.horizon_ratio, scene.body.horizon_ratio.unwrap_or(HORIZON_RATIO));
-        let surfaces = if study.surface_correction.is_empty() {
-            vec![scene.material.surface_correction]
-        } else {
-            study.surface_correction.clone()
-        };
-        let volumes = if study.volume_correction.is_empty() {
-            vec![scene.material.volume_correction]
-        } else {
-            study.volume_correction.clone()
-        };
-        for (k, &spacing) in spacings.iter().enumerate() {
-            if scene.body.points.is_none() {
-                positive(source, &format!("study[{index}].spacing[{k}]"), spacing, "m")?;
-            }
-            for (k, &horizon_ratio) in ratios.iter().enumerate() {
-                let key = if study.horizon_ratio.is_empty() {
-                    "body.horizon_ratio".to_owned()
-                } else {
-                    format!("study[{index}].horizon_ratio[{k}]")
-                };
-                ratio(source, &key, horizon_ratio)?;
-                for &surface in &surfaces {
-                    for &volume in &volumes {
-                        let variant = Variant { spacing, horizon_ratio, surface, volume, quick: is_quick };
-                        if !variants.contains(&variant) {
-                            variants.push(variant);
-                        }
-                    }
-                }
-            }
-        }
-    }
-    Ok(variants)
+    within("mass_safety", solver.mass_safety.unwrap_or(1.1), 1.0, 100.0)?;
+    within("stop_below", solver.stop_below.unwrap_or(0.0), 0.0, 1.0)
 }

@@ -1,6 +1,7 @@
 //! Bodies from a CSV file of points.
 
-use super::build::{Body, GIB, Variant, available_memory, needed};
+use super::build::{Body, GIB, available_memory, needed};
+use super::variant::Variant;
 use super::{Scene, check};
 use crate::bonds::{Bonds, CloudBonds, LatticeBonds};
 use crate::geometry::{Cut, recognise};

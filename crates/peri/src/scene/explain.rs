@@ -1,31 +1,8 @@
 //! What a scene will build, and what it leaves out.
 
-use super::build::Variant;
+use super::variant::Variant;
 use super::{Scene, SurfaceCorrection};
 use crate::bonds::{Bonds, VolumeCorrection};
-
-impl Variant {
-    /// Short name in tables, curves and expectations: `dx=4mm m=3.015`, corrections where there are any.
-    pub fn name(&self) -> String {
-        let mut name = if self.spacing > 0.0 {
-            format!("dx={}mm m={}", round(self.spacing * 1e3), self.horizon_ratio)
-        } else {
-            "cloud".to_owned()
-        };
-        if self.surface == SurfaceCorrection::Energy {
-            name += " surface=energy";
-        }
-        if self.volume == VolumeCorrection::Linear {
-            name += " volume=linear";
-        }
-        name
-    }
-}
-
-/// Twelve digits: what a user wrote, without the rounding of its conversion to SI.
-fn round(value: f64) -> f64 {
-    format!("{value:.12e}").parse().unwrap_or(value)
-}
 
 /// Lines for `peri check`.
 pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bonds<D>) -> Vec<String> {
@@ -62,7 +39,8 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bon
     omits(variant.surface == SurfaceCorrection::Energy, "surface-correction factors");
     omits(variant.volume == VolumeCorrection::Linear, "volume correction");
     omits(scene.stress.is_some(), "the stress pass");
-    omits(false, "damage and bond breaking (no fracture in this scene)");
+    omits(scene.material.critical.is_some(), "damage and bond breaking (no `critical` in this scene)");
+    omits(scene.output.every.is_some(), "fields of the steps before the last");
     let held = scene.boundary.iter().any(|b| b.displacement.is_some());
     omits(held, "prescribed displacements");
     omits(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), "body forces");

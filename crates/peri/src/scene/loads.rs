@@ -67,6 +67,17 @@ fn balanced<const D: usize>(
     Ok(())
 }
 
+/// What the regions of prescribed displacement are called, in their order.
+pub fn region_names(scene: &Scene) -> Vec<String> {
+    let held = scene.boundary.iter().enumerate().filter(|(_, b)| b.displacement.is_some());
+    let name = |(index, boundary): (usize, &Boundary)| match (&boundary.name, boundary.side) {
+        (Some(name), _) => name.clone(),
+        (None, Some(side)) => side.to_string(),
+        (None, None) => format!("box{}", index + 1),
+    };
+    held.map(name).collect()
+}
+
 fn region<const D: usize>(
     source: &Source,
     key: &str,

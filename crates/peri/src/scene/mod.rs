@@ -4,17 +4,22 @@ mod build;
 mod check;
 mod cloud;
 mod explain;
+mod inclusion;
 mod loads;
+mod variant;
 
-pub use build::{Body, Variant, body_of};
+pub use build::{Body, body_of};
 pub use check::check;
 pub use explain::explain;
-pub use loads::loads_of;
+pub use inclusion::with_inclusions;
+pub use loads::{loads_of, region_names};
+pub use variant::Variant;
 
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::critical::Critical;
 use crate::potential::Law;
+use crate::solver::Policy;
 use crate::stress::{BallVolume, Measure};
 use polycore::report::Expect;
 use polycore::units::{Force, Length, Stress};
@@ -175,8 +180,21 @@ pub struct Material {
     /// Bonds near free surfaces.
     #[serde(default)]
     pub surface_correction: SurfaceCorrection,
-    /// Critical stretch: reported; bonds do not break yet.
+    /// Critical stretch: bonds break beyond it; without it none does, and nothing of breaking is computed.
     pub critical: Option<Critical>,
+    /// Parts of the body that are stiffer or softer.
+    #[serde(default)]
+    pub inclusions: Vec<Inclusion>,
+}
+
+/// A part of the body whose bonds are stiffer or softer; a bond across its border has the mean of both.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Inclusion {
+    /// Where: a shape to `add`.
+    pub shape: ShapeSpec,
+    /// Its stiffness over that of the rest.
+    pub stiffness: f64,
 }
 
 /// Whether bonds near a free surface are stiffened.
@@ -194,6 +212,8 @@ pub enum SurfaceCorrection {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Boundary {
+    /// Its name in curves and values; default: the side, or `box` and its number.
+    pub name: Option<String>,
     /// A side of the body's bounding box …
     pub side: Option<Side>,
     /// … to this depth in particles; default: the horizon, rounded down.
@@ -292,6 +312,10 @@ pub struct Solver {
     pub fit_bound: f64,
     /// Factor on the fictitious mass; default by law.
     pub mass_safety: Option<f64>,
+    /// When bonds are looked at that may break.
+    pub breaking: Policy,
+    /// Skip what is left of the load once it has fallen below this part of its peak.
+    pub stop_below: Option<f64>,
 }
 
 impl Default for Solver {
@@ -303,6 +327,8 @@ impl Default for Solver {
             max_iterations: 200_000,
             fit_bound: 1e-9,
             mass_safety: None,
+            breaking: Policy::default(),
+            stop_below: None,
         }
     }
 }
@@ -347,18 +373,43 @@ pub struct OutputSpec {
     pub pictures: bool,
     /// Fields as VTKHDF.
     pub fields: bool,
+    /// Write the fields every so many steps, and in every step in which bonds break; default: at the end only.
+    pub every: Option<usize>,
+    /// Pictures of so many stages from the last whole state to the end, of what is written with `every`.
+    pub stages: usize,
+    /// Displacements at which the load becomes a value of the report: `load_at_20mm`.
+    pub load_at: Vec<Length>,
 }
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { pictures: true, fields: true }
+        Self { pictures: true, fields: true, every: None, stages: 5, load_at: Vec::new() }
     }
 }
 
-/// A set of variants: every combination of what is listed, the scene's own value where nothing is.
+/// A set of variants: every combination of what is listed, the scene's own value where nothing is. What replaces a part
+/// of the scene replaces it whole.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Study {
+    /// What its variants are called, after their spacing and horizon.
+    pub name: Option<String>,
+    /// What must happen, for the table of a suite.
+    pub must: Option<String>,
+    /// The run must end with an error that contains this.
+    pub fails: Option<String>,
+    /// Instead of `body.shapes`.
+    pub shapes: Option<Vec<ShapeSpec>>,
+    /// Instead of `body.cracks`.
+    pub cracks: Option<Vec<CrackSpec>>,
+    /// Instead of `material`.
+    pub material: Option<Material>,
+    /// Instead of `material.critical`.
+    pub critical: Option<Critical>,
+    /// Instead of `boundary`.
+    pub boundary: Option<Vec<Boundary>>,
+    /// Instead of `solver`.
+    pub solver: Option<Solver>,
     /// Spacings.
     pub spacing: Vec<Length>,
     /// Horizon ratios.

@@ -28,7 +28,8 @@ pub trait Equilibrium<const D: usize> {
     fn broke(&mut self, system: &System<D>, slots: &[u32]);
 }
 
-/// Solves the remaining load steps of `state`; `finished` sees every finished step.
+/// Solves the remaining load steps of `state`; `finished` sees every finished step and, with [`State::round`] above 0,
+/// every equilibrium in which bonds have just broken.
 ///
 /// # Errors
 /// As [`Equilibrium::equilibrate`], and whatever `finished` returns.
@@ -70,6 +71,7 @@ pub fn march<const D: usize>(
                 break;
             }
             method.broke(system, &slots);
+            finished(&*system.bonds, state)?;
             let particles = system.bonds.particles();
             particles.iter().for_each(|&slot| state.velocity.set(slot as usize, [0.0; D]));
         }

@@ -217,6 +217,7 @@ impl<'a, const D: usize> System<'a, D> {
             let particles = self.bonds.particles().to_vec();
             self.release(particles.iter().copied());
         }
+        state.fitted[1] = state.fitted[1].min(self.most());
         self.fit(state)
     }
 
@@ -248,8 +249,14 @@ impl<'a, const D: usize> System<'a, D> {
         }
         // half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end
         let energy = |bond: &Overstretched| {
-            let stretch = (1.0 + bond.elongation).sqrt();
-            self.bonds.volume(bond.slot as usize) * bond.weight * bond.length * self.law.energy(stretch)
+            // beyond what is fitted q is held: the energy grows with half of it
+            let (stretch, most) = ((1.0 + bond.elongation).sqrt(), self.most());
+            let mut energy = self.law.energy(stretch.min(most));
+            if stretch > most {
+                let beyond = bond.elongation - (most * most - 1.0);
+                energy += 0.5 * beyond * self.law.tension(most) / most;
+            }
+            self.bonds.volume(bond.slot as usize) * bond.weight * bond.length * energy
         };
         state.released += self.modulus * list.iter().map(energy).sum::<f64>();
         state.broken += list.len() as u64 / 2;
@@ -290,19 +297,27 @@ impl<'a, const D: usize> System<'a, D> {
     pub(super) fn widen(&mut self, state: &mut State<D>) -> Result<bool, Error> {
         // bonds crushed below that are extrapolated: no fit covers l → 0
         let low = (1.0 + state.met.low).max(0.0).sqrt().max(SMALLEST_STRETCH);
-        let high = (1.0 + state.met.high).sqrt();
+        let high = (1.0 + state.met.high).sqrt().min(self.most());
         if low >= state.fitted[0] && high <= state.fitted[1] {
             return Ok(false);
         }
         // twice the strain met, so that a growing load does not refit at every look
         state.fitted[0] = state.fitted[0].min((1.0 - 2.0 * (1.0 - low)).max(0.5 * low)).max(SMALLEST_STRETCH);
-        state.fitted[1] = state.fitted[1].max(1.0 + 2.0 * (high - 1.0));
+        state.fitted[1] = state.fitted[1].max(1.0 + 2.0 * (high - 1.0)).min(self.most());
         self.fit(state)?;
         Ok(true)
     }
 
+    /// The largest stretch that is fitted: bonds beyond it are about to break, however long they are.
+    fn most(&self) -> f64 {
+        self.breaking.map_or(f64::INFINITY, |b| b.stretch + 0.25 * (b.stretch - 1.0))
+    }
+
     fn fit(&mut self, state: &mut State<D>) -> Result<(), Error> {
-        let fit = KernelFit::new(self.law, state.fitted, self.fit_bound)?;
+        let mut fit = KernelFit::new(self.law, state.fitted, self.fit_bound)?;
+        if state.fitted[1] >= self.most() {
+            fit = fit.held();
+        }
         self.bonds.set_law(&fit, self.modulus);
         let [low, high] = state.fitted;
         let samples = 200;

@@ -1,0 +1,375 @@
+//! Fields of single steps: what is written while a run goes on, and the pictures of its stages.
+
+use super::outcome::Outcome;
+use crate::bonds::Bonds;
+use crate::error::Error;
+use crate::potential::{BondPotential, KernelFit};
+use crate::scene::Scene;
+use crate::solver::{Record, State};
+use crate::stress::{Loaded, Measure, Tensor, cauchy, deformation_gradients};
+use polycore::output::picture::{FieldMap, Panel};
+use polycore::output::vtkhdf::{self, ParticleSeries};
+use polycore::report::Phases;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// A stress field of each measure.
+pub type Fields<const D: usize> = Vec<(Measure, Vec<Tensor<D>>)>;
+
+/// What stays the same over the steps of a variant.
+pub struct Frames<'a> {
+    scene: &'a Scene,
+    law: &'a dyn BondPotential,
+    modulus: f64,
+    /// Intact bonds of each particle as the body was built, cracks taken off; only where bonds break.
+    whole: Option<Vec<u32>>,
+    series: Option<ParticleSeries>,
+    path: PathBuf,
+    /// The last step written.
+    written: Option<usize>,
+}
+
+/// Stresses of a state by every measure that the scene names.
+pub struct Stresses<const D: usize> {
+    /// First Piola–Kirchhoff.
+    pub piola: Fields<D>,
+    /// Cauchy.
+    pub cauchy: Fields<D>,
+}
+
+fn intact<const D: usize>(bonds: &dyn Bonds<D>) -> Vec<u32> {
+    let count = |&slot: &u32| {
+        let mut count = 0;
+        bonds.neighbours(slot as usize, &mut |_| count += 1);
+        count
+    };
+    bonds.particles().iter().map(count).collect()
+}
+
+/// Whether the fields of the last step of a history are written while the run goes on.
+fn wanted(every: usize, history: &[Record]) -> bool {
+    let step = history.len();
+    let before = step.checked_sub(2).map_or(0, |k| history[k].broken);
+    step > 0 && (step.is_multiple_of(every) || history[step - 1].broken > before)
+}
+
+/// Whether an equilibrium within a step is written: the 1st, 2nd, 3rd, 4th, 6th, 8th, 12th, 16th, 24th, …
+fn is_stage(equilibrium: u64) -> bool {
+    equilibrium.is_power_of_two() || (equilibrium.is_multiple_of(3) && (equilibrium / 3).is_power_of_two())
+}
+
+/// How many of the first equilibria are written.
+fn in_between(equilibria: u64) -> usize {
+    let powers = |n: u64| (u64::BITS - n.leading_zeros()) as usize;
+    powers(equilibria) + powers(equilibria / 3)
+}
+
+/// Frames written up to a state.
+fn frames_of<const D: usize>(every: usize, state: &State<D>) -> usize {
+    let of_step = |step: usize| {
+        let last = wanted(every, &state.history[..=step]);
+        in_between(state.history[step].rounds.saturating_sub(1)) + usize::from(last)
+    };
+    (0..state.history.len()).map(of_step).sum::<usize>() + in_between(state.round)
+}
+
+impl<'a> Frames<'a> {
+    /// Begins, or continues after the steps in `state`. `bonds` are those of the body as it was built.
+    ///
+    /// # Errors
+    /// Files that cannot be written or read.
+    pub fn new<const D: usize>(
+        scene: &'a Scene,
+        law: &'a dyn BondPotential,
+        modulus: f64,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        path: PathBuf,
+    ) -> Result<Self, Error> {
+        let whole = scene.material.critical.is_some().then(|| intact(bonds));
+        let every = scene.output.every;
+        let done = every.map_or(0, |every| frames_of(every, state));
+        let series = match (scene.output.fields, done) {
+            (false, _) => None,
+            (true, 0) => Some(ParticleSeries::create(&path)?),
+            (true, done) => Some(ParticleSeries::resume(&path, done)?),
+        };
+        let last = |every| (1..=state.history.len()).rev().find(|&k| wanted(every, &state.history[..k]));
+        let written = every.and_then(last);
+        Ok(Self { scene, law, modulus, whole, series, path, written })
+    }
+
+    /// After a step, or an equilibrium in which bonds broke: writes its fields if the scene wants them.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn step<const D: usize>(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        phases: &mut Phases,
+    ) -> Result<(), Error> {
+        let Some(every) = self.scene.output.every.filter(|_| self.scene.output.fields) else { return Ok(()) };
+        if is_stage(state.round) {
+            let stresses = self.stresses(bonds, state, phases)?;
+            let equilibrium = state.round as f64;
+            self.write(bonds, state, &stresses, state.step as f64 + equilibrium / (equilibrium + 1.0))?;
+        } else if state.round == 0 && wanted(every, &state.history) {
+            let stresses = self.stresses(bonds, state, phases)?;
+            self.write(bonds, state, &stresses, state.step as f64)?;
+            self.written = Some(state.step);
+        }
+        Ok(())
+    }
+
+    /// Closes the series with the last step.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn finish<const D: usize>(
+        mut self,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        stresses: &Stresses<D>,
+    ) -> Result<(), Error> {
+        if self.series.is_some() && self.written != Some(state.history.len()) {
+            self.write(bonds, state, stresses, state.step as f64)?;
+        }
+        if let Some(series) = self.series {
+            series.finish()?;
+        }
+        Ok(())
+    }
+
+    /// Broken bonds over those that the body was built with, particle by particle; cracks are no damage.
+    pub fn damage<const D: usize>(&self, bonds: &dyn Bonds<D>) -> Option<Vec<f64>> {
+        let whole = self.whole.as_ref()?;
+        let now = intact(bonds);
+        let part = |(&whole, &now): (&u32, &u32)| {
+            if whole == 0 { 0.0 } else { 1.0 - f64::from(now) / f64::from(whole) }
+        };
+        Some(whole.iter().zip(&now).map(part).collect())
+    }
+
+    /// Stresses of a state.
+    ///
+    /// # Errors
+    /// As [`KernelFit::new`].
+    pub fn stresses<const D: usize>(
+        &self,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        phases: &mut Phases,
+    ) -> Result<Stresses<D>, Error> {
+        let mut stresses = Stresses { piola: Vec::new(), cauchy: Vec::new() };
+        let Some(spec) = &self.scene.stress else { return Ok(stresses) };
+        let fit = KernelFit::new(self.law, super::covering(bonds, state), self.scene.solver.fit_bound)?;
+        let gradients =
+            phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
+        for &measure in &spec.measures {
+            let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus: self.modulus };
+            let started = Instant::now();
+            let piola = super::stress(bonds, &loaded, measure, spec.ball);
+            stresses.cauchy.push((measure, cauchy(&piola, &gradients)));
+            phases.add(&format!("stress {}", measure.name()), started.elapsed().as_secs_f64());
+            if self.scene.output.fields {
+                stresses.piola.push((measure, piola));
+            }
+        }
+        Ok(stresses)
+    }
+
+    fn write<const D: usize>(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        stresses: &Stresses<D>,
+        time: f64,
+    ) -> Result<(), Error> {
+        let damage = self.damage(bonds);
+        let Some(series) = &mut self.series else { return Ok(()) };
+        let in_space =
+            |v: [f64; D]| -> [f64; 3] { std::array::from_fn(|d| v.get(d).copied().unwrap_or(0.0)) };
+        let (mut points, mut displacement) = (Vec::new(), Vec::new());
+        for &slot in bonds.particles() {
+            let (x, u) = (bonds.position(slot as usize), state.displacement.get(slot as usize));
+            points.push(in_space(std::array::from_fn(|d| x[d] + u[d])));
+            displacement.extend(in_space(u));
+        }
+        let full = |t: &Tensor<D>| -> [f64; 9] {
+            std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
+        };
+        let kinds = [("cauchy", &stresses.cauchy), ("piola", &stresses.piola)];
+        let tensors: Vec<(String, Vec<f64>)> = kinds
+            .iter()
+            .flat_map(|(kind, fields)| fields.iter().map(move |(measure, field)| (kind, measure, field)))
+            .map(|(kind, measure, field)| {
+                (format!("{kind}_{}", measure.name()), field.iter().flat_map(full).collect())
+            })
+            .collect();
+        let mut data: Vec<(&str, usize, &[f64])> = vec![("displacement", 3, &displacement)];
+        // a cloud's particles are sorted for locality: this is the line of each in the user's file, from 0
+        let lines: Option<Vec<f64>> =
+            bonds.as_cloud().map(|cloud| cloud.input_order().iter().map(|&line| f64::from(line)).collect());
+        data.extend(lines.iter().map(|lines| ("input_index", 1, lines.as_slice())));
+        data.extend(damage.iter().map(|damage| ("damage", 1, damage.as_slice())));
+        data.extend(tensors.iter().map(|(name, values)| (name.as_str(), 9, values.as_slice())));
+        series.step(time, &points, &data)?;
+        Ok(())
+    }
+
+    /// Where the series ends up.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// Largest principal stress of a plane tensor in a row-major 3 × 3.
+fn principal(t: &[f64]) -> f64 {
+    let (mean, half) = (0.5 * (t[0] + t[4]), 0.5 * (t[0] - t[4]));
+    mean + half.hypot(0.5 * (t[1] + t[3]))
+}
+
+/// Largest principal stress and damage at some stages from the last whole state on, of a plane body or of the middle
+/// plane y = const of a solid.
+///
+/// # Errors
+/// Files that cannot be read or written.
+pub fn stages(
+    scene: &Scene,
+    outcome: &Outcome,
+    spacing: f64,
+    series: &Path,
+    output: &Path,
+) -> Result<(), Error> {
+    let frames = vtkhdf::read(series)?;
+    let damages: Vec<f64> = (0..frames.len())
+        .map(|k| Ok(frames.data(k, "damage")?.iter().sum()))
+        .collect::<Result<_, Error>>()?;
+    let chosen = choose(&damages, scene.output.stages);
+    let Some(measure) = scene.stress.as_ref().map(|s| format!("cauchy_{}", s.measures[0].name())) else {
+        return Ok(());
+    };
+    let flat = scene.body.space != crate::calibrate::Space::Solid;
+    struct Stage {
+        places: Vec<[f64; 2]>,
+        stress: Vec<f64>,
+        damage: Vec<f64>,
+        title: String,
+    }
+    let mut stages = Vec::new();
+    for frame in chosen {
+        let points = frames.points(frame)?;
+        let (moved, tensors, damage) = (
+            frames.data(frame, "displacement")?,
+            frames.data(frame, &measure)?,
+            frames.data(frame, "damage")?,
+        );
+        let rest = |k: usize| points[k][1] - moved[3 * k + 1];
+        let middle = {
+            let (low, high) =
+                (0..points.len()).map(rest).fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
+            0.5 * (low + high)
+        };
+        let keep: Vec<usize> = (0..points.len())
+            .filter(|&k| flat || (0.0..spacing).contains(&(rest(k) - middle + 0.01 * spacing)))
+            .collect();
+        let place =
+            |&k: &usize| if flat { [points[k][0], points[k][1]] } else { [points[k][0], points[k][2]] };
+        let plane = |k: usize| {
+            let t = &tensors[9 * k..9 * k + 9];
+            if flat { principal(t) } else { principal(&[t[0], t[2], 0.0, t[6], t[8]]) }
+        };
+        let title = title(outcome, frames.times()[frame]);
+        stages.push(Stage {
+            places: keep.iter().map(place).collect(),
+            stress: keep.iter().map(|&k| plane(k) * 1e-6).collect(),
+            damage: keep.iter().map(|&k| damage[k]).collect(),
+            title,
+        });
+    }
+    // the longest bond in the picture is as long as the critical stretch lets it be
+    let bridge = 1.6 * outcome.get("critical_stretch").unwrap_or(1.0);
+    let mut map = FieldMap::new().lengths("mm", 1e-3).columns(stages.len()).size(420);
+    let all = || stages.iter().flat_map(|stage| stage.stress.iter().copied());
+    let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
+    for stage in &stages {
+        let panel =
+            Panel::new(&stage.title, "σ₁ (MPa)", &stage.places, &stage.stress, spacing).bridge(bridge);
+        map = map.panel(if high > low { panel.range(low, high) } else { panel });
+    }
+    for stage in &stages {
+        map = map.panel(
+            Panel::new("", "damage", &stage.places, &stage.damage, spacing).range(0.0, 0.6).bridge(bridge),
+        );
+    }
+    map.write(output.join(format!("stages_{}.png", outcome.file_name())))?;
+    Ok(())
+}
+
+/// What a moment of a run is called: a load step's displacement and load, or a place within a step.
+fn title(outcome: &Outcome, time: f64) -> String {
+    let step = time.ceil() as usize;
+    let Some(record) = step.checked_sub(1).and_then(|k| outcome.history.get(k)) else { return String::new() };
+    let place = if outcome.reach > 0.0 {
+        format!("U = {} mm", short(record.factor * outcome.reach * 1e3))
+    } else {
+        format!("load factor {}", short(record.factor))
+    };
+    let part = time - time.floor();
+    if part > 0.0 {
+        format!("{place}, equilibrium {:.0}", part / (1.0 - part))
+    } else {
+        format!("{place}, F = {} N", short(record.load))
+    }
+}
+
+/// Four digits.
+fn short(value: f64) -> String {
+    let digits = if value == 0.0 { 0 } else { (3 - value.abs().log10().floor() as i32).clamp(0, 6) };
+    let text = format!("{value:.*}", digits as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// The last frame before the first break, then frames at even parts of all damage, then the last.
+fn choose(damage: &[f64], count: usize) -> Vec<usize> {
+    let last = damage.len() - 1;
+    let whole = damage.iter().rposition(|&d| d == 0.0).unwrap_or(0);
+    let mut chosen = vec![whole];
+    for part in 1..count.saturating_sub(1) {
+        let target = damage[last] * part as f64 / (count - 1) as f64;
+        let off = |k: usize| (damage[k] - target).abs();
+        chosen.extend((whole..=last).min_by(|&a, &b| off(a).total_cmp(&off(b))));
+    }
+    chosen.push(last);
+    chosen.sort_unstable();
+    chosen.dedup();
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_are_counted() {
+        for n in 0..200 {
+            assert_eq!(in_between(n), (1..=n).filter(|&k| is_stage(k)).count(), "{n}");
+        }
+    }
+
+    #[test]
+    fn stages_are_chosen_by_damage() {
+        assert_eq!(choose(&[0.0, 0.0, 1.0, 5.0, 6.0, 9.0], 4), [1, 2, 4, 5]);
+        assert_eq!(choose(&[0.0, 0.0], 4), [1]);
+        assert_eq!(choose(&[3.0], 4), [0]);
+    }
+
+    #[test]
+    fn four_digits() {
+        assert_eq!(
+            [116.0, 0.021234, 89.57346, 0.0, 12345.6].map(short),
+            ["116", "0.02123", "89.57", "0", "12346"]
+        );
+    }
+}

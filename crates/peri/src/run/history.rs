@@ -1,0 +1,142 @@
+//! The history of loading: values, tables and curves of load against displacement and of energies.
+
+use super::outcome::Outcome;
+use crate::scene::Scene;
+use polycore::Error;
+use polycore::output::csv;
+use polycore::output::picture::{LegendPlace, LinePlot, Series};
+use std::path::Path;
+
+/// A column: name, unit, values.
+type Column = (String, &'static str, Vec<f64>);
+
+impl Outcome {
+    /// Displacement of the grips at a step, m, or the load factor where nothing is prescribed.
+    fn abscissa(&self, factor: f64) -> f64 {
+        if self.reach > 0.0 { factor * self.reach } else { factor }
+    }
+
+    /// The steps as columns.
+    pub fn columns(&self) -> Vec<Column> {
+        let each = |get: &dyn Fn(&crate::solver::Record) -> f64| self.history.iter().map(get).collect();
+        let (name, unit) = if self.reach > 0.0 { ("displacement", "m") } else { ("load_factor", "") };
+        let mut columns: Vec<Column> = vec![
+            (name.to_owned(), unit, each(&|r| self.abscissa(r.factor))),
+            ("load".to_owned(), "N", each(&|r| r.load)),
+        ];
+        for (index, region) in self.regions.iter().enumerate() {
+            for (d, axis) in ["x", "y", "z"].iter().enumerate() {
+                let values: Vec<f64> =
+                    self.history.iter().filter_map(|r| Some(r.reactions.get(index)?[d])).collect();
+                if values.len() == self.history.len() && values.iter().any(|&v| v != 0.0) {
+                    columns.push((format!("reaction_{axis} {region}"), "N", values));
+                }
+            }
+        }
+        columns.extend([
+            ("out_of_balance".to_owned(), "", each(&|r| r.residual)),
+            ("iterations".to_owned(), "", each(&|r| r.iterations as f64)),
+            ("equilibria".to_owned(), "", each(&|r| r.rounds as f64)),
+            ("broken_bonds".to_owned(), "", each(&|r| r.broken as f64)),
+            ("detached_particles".to_owned(), "", each(&|r| r.detached as f64)),
+            ("largest_stretch".to_owned(), "", each(&|r| r.largest_stretch)),
+            ("work".to_owned(), "J", each(&|r| r.work)),
+            ("stored".to_owned(), "J", each(&|r| r.stored)),
+            ("released".to_owned(), "J", each(&|r| r.released)),
+            ("damped".to_owned(), "J", each(&|r| r.work - r.stored - r.released)),
+        ]);
+        columns
+    }
+
+    /// Peak, first break, energies at the end.
+    pub fn values_of_history(&mut self, scene: &Scene) {
+        let Some(last) = self.history.last().cloned() else { return };
+        let peak = self.history.iter().max_by(|a, b| a.load.total_cmp(&b.load)).map(|r| (r.load, r.factor));
+        if let Some((load, factor)) = peak.filter(|_| self.history.len() > 1) {
+            self.value("peak_load", load, "N");
+            self.value("displacement_at_peak", self.abscissa(factor), "m");
+        }
+        for at in &scene.output.load_at {
+            let name = format!("load_at_{}mm", (at.si() * 1e9).round() / 1e6);
+            if let Some(load) = self.load_at(at.si()) {
+                self.value(&name, load, "N");
+            }
+        }
+        if scene.material.critical.is_some() {
+            let first = self.history.iter().find(|r| r.broken > 0).cloned();
+            if let Some(first) = first {
+                self.value("first_break", self.abscissa(first.factor), "m");
+                self.value("load_at_first_break", first.load, "N");
+            }
+            self.value("broken_bonds", last.broken as f64, "");
+            self.value("detached_particles", last.detached as f64, "");
+            self.value("last_load", last.load, "N");
+            self.value("last_displacement", self.abscissa(last.factor), "m");
+        }
+        self.value("work_of_loads", last.work, "J");
+        self.value("stored_energy", last.stored, "J");
+        if scene.material.critical.is_some() {
+            self.value("released_energy", last.released, "J");
+        }
+        self.value("damped_energy", last.work - last.stored - last.released, "J");
+        let residual = self.history.iter().map(|r| r.residual).fold(0.0, f64::max);
+        self.value("largest_residual", residual, "");
+    }
+
+    /// Load at a displacement between two steps, linearly; from the undeformed body on.
+    fn load_at(&self, displacement: f64) -> Option<f64> {
+        let mut before = (0.0, 0.0);
+        for record in &self.history {
+            let here = (self.abscissa(record.factor), record.load);
+            if here.0 >= displacement * (1.0 - 1e-12) {
+                let part = (displacement - before.0) / (here.0 - before.0);
+                return Some(before.1 + part.min(1.0) * (here.1 - before.1));
+            }
+            before = here;
+        }
+        None
+    }
+}
+
+/// Tables of every variant, one plot of all loads, and a plot of energies for each variant whose bonds break.
+pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+    let several: Vec<&Outcome> = outcomes.iter().filter(|o| o.history.len() > 1).collect();
+    for outcome in &several {
+        let columns = outcome.columns();
+        let views: Vec<_> = columns.iter().map(|(n, u, v)| (n.as_str(), *u, v.as_slice())).collect();
+        csv::write(output.join(format!("history_{}.csv", outcome.file_name())), &views)?;
+    }
+    if several.is_empty() || !scene.output.pictures {
+        return Ok(());
+    }
+    let displacement = several.iter().all(|o| o.reach > 0.0);
+    let (label, scale) = if displacement { ("displacement (mm)", 1e3) } else { ("load factor", 1.0) };
+    let mut plot = LinePlot::new(if scene.title.is_empty() { "Load" } else { &scene.title })
+        .size(900.0, 560.0)
+        .axes(label, "load (N)")
+        .legend(LegendPlace::TopLeft);
+    let from_rest = |values: &[f64], scale: f64| -> Vec<f64> {
+        std::iter::once(0.0).chain(values.iter().map(|v| v * scale)).collect()
+    };
+    for outcome in &several {
+        let columns = outcome.columns();
+        let (x, y) = (from_rest(&columns[0].2, scale), from_rest(&columns[1].2, 1.0));
+        plot = plot.series(Series::line(&outcome.name, &x, &y));
+    }
+    plot.write(output.join("load_displacement.png"))?;
+    for outcome in several.iter().filter(|o| o.history.iter().any(|r| r.broken > 0)) {
+        let columns = outcome.columns();
+        let x = from_rest(&columns[0].2, scale);
+        let mut plot = LinePlot::new(&format!("Energies, {}", outcome.name))
+            .size(900.0, 560.0)
+            .axes(label, "energy (J)")
+            .legend(LegendPlace::TopLeft);
+        for name in ["work", "stored", "released", "damped"] {
+            if let Some(column) = columns.iter().find(|c| c.0 == name) {
+                plot = plot.series(Series::line(name, &x, &from_rest(&column.2, 1.0)));
+            }
+        }
+        plot.write(output.join(format!("energy_{}.png", outcome.file_name())))?;
+    }
+    Ok(())
+}
