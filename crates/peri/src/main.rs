@@ -8,7 +8,10 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+/// Time between lines of progress where there is no terminal.
+const LOG_EVERY: Duration = Duration::from_secs(10);
 
 mod bench;
 mod exact_command;
@@ -179,25 +182,37 @@ fn solve(
         indicatif::ProgressStyle::with_template("{spinner} {bar:30} {elapsed} (about {eta} left) {wide_msg}");
     bar.set_style(style.unwrap_or_else(|_| indicatif::ProgressStyle::default_bar()));
     let mut last = String::new();
+    // a log file gets a line now and then
+    let mut logged = Instant::now();
     let mut progress = |variant: &str, status: &peri::solver::Status| {
         if last != variant {
             variant.clone_into(&mut last);
             bar.reset();
         }
-        if !bar.is_hidden() && status.iteration.is_multiple_of(20) {
-            // residuals fall by powers of ten: progress is the share of the decades done
-            let decades = (1.0 / status.tolerance).log10();
-            let done = (-status.residual.log10()).clamp(0.0, decades) / decades;
-            let position = 1000.0 * (status.step as f64 + done) / status.steps as f64;
-            bar.set_position(position as u64);
-            bar.set_message(format!(
-                "{variant}  step {}/{}  iteration {}  residual {:.2e}  reaction {:.3e}",
+        if !status.iteration.is_multiple_of(20) {
+            return;
+        }
+        let broken = if status.broken > 0 { format!("  broken {}", status.broken) } else { String::new() };
+        let message = || {
+            format!(
+                "{variant}  step {}/{}{broken}  iteration {}  residual {:.2e}  reaction {:.3e}",
                 status.step + 1,
                 status.steps,
                 status.iteration,
                 status.residual,
                 status.reaction
-            ));
+            )
+        };
+        if !bar.is_hidden() {
+            // residuals fall by powers of ten: progress is the share of the decades done
+            let decades = (1.0 / status.tolerance).log10();
+            let done = (-status.residual.log10()).clamp(0.0, decades) / decades;
+            let position = 1000.0 * (status.step as f64 + done) / status.steps as f64;
+            bar.set_position(position as u64);
+            bar.set_message(message());
+        } else if logged.elapsed() >= LOG_EVERY {
+            logged = Instant::now();
+            eprintln!("{}", message());
         }
     };
     let mut options = Options {

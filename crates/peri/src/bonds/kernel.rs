@@ -62,17 +62,17 @@ pub fn dispatch<const D: usize>(
     Arch::new().dispatch(Call { pass, start, force, track });
 }
 
-/// constant + E·N(E)/D(E) by Horner's rule, E no larger than `limit`.
+/// constant + E·N(E)/D(E) by Horner's rule, E held within two ends.
 #[inline(always)]
 pub fn law<S: Simd, const P: usize, const Q: usize>(
     simd: S,
     e: S::f64s,
-    limit: f64,
+    held: [f64; 2],
     constant: f64,
     numerator: &[f64; P],
     denominator: &[f64; Q],
 ) -> S::f64s {
-    let e = simd.min_f64s(e, simd.splat_f64s(limit));
+    let e = simd.max_f64s(simd.splat_f64s(held[0]), simd.min_f64s(e, simd.splat_f64s(held[1])));
     let mut n = simd.splat_f64s(numerator[P - 1]);
     for k in (0..P - 1).rev() {
         n = simd.mul_add_f64s(n, e, simd.splat_f64s(numerator[k]));

@@ -16,8 +16,8 @@ pub struct Row<const D: usize, const P: usize, const Q: usize> {
     pub bond: [f64; D],
     /// 1/|ξ|².
     pub inverse_square: f64,
-    /// Largest E of the law; beyond it q stays what it is there.
-    pub limit: f64,
+    /// Ends of the law in E; outside of them q stays what it is there.
+    pub held: [f64; 2],
     /// Value at E = 0 (0 for stress-free laws).
     pub constant: f64,
     /// Scaled numerator.
@@ -151,7 +151,7 @@ impl<const D: usize, const P: usize, const Q: usize> LatticePass<'_, D, P, Q> {
                     zeta[d] = simd.add_f64s(eta[d], simd.splat_f64s(row.bond[d]));
                 }
                 let e = elongation::<S, D>(simd, &eta, &zeta, &row.bond);
-                let q = law::<S, P, Q>(simd, e, row.limit, row.constant, &row.numerator, &row.denominator);
+                let q = law::<S, P, Q>(simd, e, row.held, row.constant, &row.numerator, &row.denominator);
                 for d in 0..D {
                     sum[d][v] = simd.mul_add_f64s(q, zeta[d], sum[d][v]);
                 }
@@ -198,8 +198,7 @@ impl<const D: usize, const P: usize, const Q: usize> LatticePass<'_, D, P, Q> {
                     zeta[d] = simd.add_f64s(eta[d], simd.splat_f64s(row.bond[d]));
                 }
                 let e = elongation::<S, D>(simd, &eta, &zeta, &row.bond);
-                let mut q =
-                    law::<S, P, Q>(simd, e, row.limit, row.constant, &row.numerator, &row.denominator);
+                let mut q = law::<S, P, Q>(simd, e, row.held, row.constant, &row.numerator, &row.denominator);
                 if let Some(factors) = self.tiles.factors {
                     let weight = unsafe {
                         directional_weight::<S, D>(simd, factors, base, there, &row.bond, row.inverse_square)

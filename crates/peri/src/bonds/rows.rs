@@ -54,7 +54,7 @@ impl<const D: usize, const P: usize, const Q: usize> LatticeKernel<D> for Lattic
     }
 }
 
-struct CloudLaw<const P: usize, const Q: usize>((f64, [f64; P], [f64; Q]), f64);
+struct CloudLaw<const P: usize, const Q: usize>((f64, [f64; P], [f64; Q]), [f64; 2]);
 
 impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CloudLaw<P, Q> {
     fn run(
@@ -64,13 +64,13 @@ impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CloudLaw
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        dispatch(CloudPass { data, law: self.0, limit: self.1 }, start, force, track);
+        dispatch(CloudPass { data, law: self.0, held: self.1 }, start, force, track);
     }
 }
 
 /// q(e) = constant + e·M(e)/(1 + Σ bₖ eᵏ⁺¹), the one form the kernels know.
 struct Rational {
-    limit: f64,
+    held: [f64; 2],
     constant: f64,
     numerator: Vec<f64>,
     denominator: Vec<f64>,
@@ -84,14 +84,14 @@ impl Rational {
         }
         let denominator = denominator.clone();
         if *stress_free {
-            return Some(Self { limit: fit.limit, constant: 0.0, numerator: numerator.clone(), denominator });
+            return Some(Self { held: fit.held, constant: 0.0, numerator: numerator.clone(), denominator });
         }
         // N/D = q₀ + e·M/D with M = (N − q₀ D)/e
         let constant = numerator[0];
         let length = (numerator.len() - 1).max(denominator.len()).max(1);
         let at = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(0.0);
         let numerator = (0..length).map(|k| at(numerator, k + 1) - constant * at(&denominator, k)).collect();
-        Some(Self { limit: fit.limit, constant, numerator, denominator })
+        Some(Self { held: fit.held, constant, numerator, denominator })
     }
 }
 
@@ -134,7 +134,7 @@ fn lattice_rows<const D: usize, const P: usize, const Q: usize>(
             shift: bond.shift,
             bond: bond.bond,
             inverse_square,
-            limit: law.limit / inverse_square,
+            held: law.held.map(|e| e / inverse_square),
             constant: law.constant * bond.stiffness,
             numerator: padded(&law.numerator, |k| bond.stiffness * scale(k)),
             denominator: padded(&law.denominator, scale),
@@ -151,5 +151,5 @@ pub fn cloud_kernel<const D: usize>(fit: &KernelFit) -> Option<Box<dyn CloudKern
 
 fn cloud_law<const D: usize, const P: usize, const Q: usize>(law: &Rational) -> Box<dyn CloudKernel<D>> {
     let coefficients = (law.constant, padded(&law.numerator, |_| 1.0), padded(&law.denominator, |_| 1.0));
-    Box::new(CloudLaw::<P, Q>(coefficients, law.limit))
+    Box::new(CloudLaw::<P, Q>(coefficients, law.held))
 }

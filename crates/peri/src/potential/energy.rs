@@ -1,4 +1,4 @@
-//! Bond energies as a table over e = λ² − 1.
+//! Bond energies and tangents as tables over e = λ² − 1.
 
 use super::BondPotential;
 use crate::bonds::StretchRange;
@@ -39,6 +39,33 @@ impl EnergyTable {
         }
         let (a, b) = (1.0 - x, x);
         a * a * (1.0 + 2.0 * b) * y0 + b * b * (1.0 + 2.0 * a) * y1 + self.step * a * b * (a * s0 - b * s1)
+    }
+}
+
+/// max(|t′|, |t|/λ)/kθ by the larger of two neighbouring nodes: a bound, not an interpolation.
+pub struct TangentTable {
+    low: f64,
+    step: f64,
+    nodes: Vec<f64>,
+}
+
+impl TangentTable {
+    /// The tangents of the stretches met.
+    pub fn new(law: &dyn BondPotential, met: StretchRange) -> Self {
+        let low = met.low.max(-1.0 + 1e-6);
+        let high = met.high.max(low + 1e-9);
+        let step = (high - low) / PIECES as f64;
+        let node = |k: usize| {
+            let stretch = (1.0 + low + step * k as f64).sqrt();
+            law.tension_derivative(stretch).abs().max(law.tension(stretch).abs() / stretch)
+        };
+        Self { low, step, nodes: (0..=PIECES).map(node).collect() }
+    }
+
+    /// The bound at e; beyond the table that of its end.
+    pub fn value(&self, e: f64) -> f64 {
+        let k = (((e - self.low) / self.step).max(0.0) as usize).min(PIECES - 1);
+        self.nodes[k].max(self.nodes[k + 1])
     }
 }
 

@@ -52,8 +52,8 @@ pub struct KernelFit {
     pub range: [f64; 2],
     /// Largest relative error of q over the range, measured.
     pub max_error: f64,
-    /// Beyond this e, q stays what it is there; infinite unless set.
-    pub limit: f64,
+    /// Outside of these e, q stays what it is at their ends; infinite unless set.
+    pub held: [f64; 2],
     /// Strain l − 1, tension and its derivative at the nodes.
     table: Vec<[f64; 3]>,
 }
@@ -88,7 +88,7 @@ impl KernelFit {
                 stress_free,
                 range,
                 max_error: 0.0,
-                limit: f64::INFINITY,
+                held: [f64::NEG_INFINITY, f64::INFINITY],
                 table,
             };
             fit.max_error = fit.error(&dense);
@@ -99,17 +99,17 @@ impl KernelFit {
         target.table(range, bound, &dense)
     }
 
-    /// Holds q beyond the largest stretch of the range, for bonds that are about to break: their law does not matter,
-    /// but a fit must not be followed out of its range.
+    /// Holds q outside of the range, where a fit must not be followed: bonds beyond it are about to break, and bonds
+    /// crushed below it push along ζ with a bounded stiffness, where the law's direction jumps as ζ passes through 0.
     #[must_use]
     pub fn held(mut self) -> Self {
-        self.limit = self.range[1] * self.range[1] - 1.0;
+        self.held = self.range.map(|stretch| stretch * stretch - 1.0);
         self
     }
 
     /// q(e).
     pub fn value(&self, e: f64) -> f64 {
-        let e = e.min(self.limit);
+        let e = e.clamp(self.held[0], self.held[1]);
         if !self.table.is_empty() {
             let stretch = (1.0 + e).max(0.0).sqrt();
             return self.interpolate(e / (1.0 + stretch)) / stretch.max(f64::MIN_POSITIVE);
@@ -237,7 +237,7 @@ impl Target<'_> {
             stress_free: self.stress_free,
             range,
             max_error: 0.0,
-            limit: f64::INFINITY,
+            held: [f64::NEG_INFINITY, f64::INFINITY],
             table: vec![node(low)],
         };
         while let (Some(&right), Some(&left)) = (pending.last(), fit.table.last()) {

@@ -9,7 +9,7 @@ mod ratio;
 mod tests;
 
 pub use chain::{Chain, ChainPoint};
-pub use energy::EnergyTable;
+pub use energy::{EnergyTable, TangentTable};
 pub use fit::KernelFit;
 pub use laws::{BondStretch, LinearBond, NetworkStretch, Printed, Scaled, Shifted};
 

@@ -163,7 +163,7 @@ impl<'a> Frames<'a> {
     ) -> Result<Stresses<D>, Error> {
         let mut stresses = Stresses { piola: Vec::new(), cauchy: Vec::new() };
         let Some(spec) = &self.scene.stress else { return Ok(stresses) };
-        let fit = KernelFit::new(self.law, super::covering(bonds, state), self.scene.solver.fit_bound)?;
+        let fit = KernelFit::new(self.law, super::covering(bonds, state), self.scene.fit_bound())?;
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
         for &measure in &spec.measures {
@@ -247,8 +247,16 @@ pub fn stages(
         .map(|k| Ok(frames.data(k, "damage")?.iter().sum()))
         .collect::<Result<_, Error>>()?;
     let chosen = choose(&damages, scene.output.stages);
-    let Some(measure) = scene.stress.as_ref().map(|s| format!("cauchy_{}", s.measures[0].name())) else {
-        return Ok(());
+    let Some(spec) = &scene.stress else { return Ok(()) };
+    let measure = format!("cauchy_{}", spec.measures[0].name());
+    let component = spec.component();
+    let label = match (&spec.component, component) {
+        (Some(name), Some(_)) => {
+            let index: String =
+                name.chars().filter_map(|c| "₀₁₂₃".chars().nth(c.to_digit(10)? as usize)).collect();
+            format!("σ{index} (MPa)")
+        }
+        _ => "σ₁ (MPa)".to_owned(),
     };
     let flat = scene.body.space != crate::calibrate::Space::Solid;
     struct Stage {
@@ -278,6 +286,9 @@ pub fn stages(
             |&k: &usize| if flat { [points[k][0], points[k][1]] } else { [points[k][0], points[k][2]] };
         let plane = |k: usize| {
             let t = &tensors[9 * k..9 * k + 9];
+            if let Some([a, b]) = component {
+                return t[3 * a + b];
+            }
             if flat { principal(t) } else { principal(&[t[0], t[2], 0.0, t[6], t[8]]) }
         };
         let title = title(outcome, frames.times()[frame]);
@@ -294,8 +305,7 @@ pub fn stages(
     let all = || stages.iter().flat_map(|stage| stage.stress.iter().copied());
     let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
     for stage in &stages {
-        let panel =
-            Panel::new(&stage.title, "σ₁ (MPa)", &stage.places, &stage.stress, spacing).bridge(bridge);
+        let panel = Panel::new(&stage.title, &label, &stage.places, &stage.stress, spacing).bridge(bridge);
         map = map.panel(if high > low { panel.range(low, high) } else { panel });
     }
     for stage in &stages {

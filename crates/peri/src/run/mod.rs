@@ -189,7 +189,7 @@ fn run_variant<const D: usize>(
     let solution = Solution { variant, finished, law: &*law, modulus, loads: &loads, critical_stretch };
     solve(source, scene, &solution, options, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
-    let fit = KernelFit::new(&*law, covering(&*body.bonds, &state), scene.solver.fit_bound)?;
+    let fit = KernelFit::new(&*law, covering(&*body.bonds, &state), scene.fit_bound())?;
     outcome.value("fit_error", fit.max_error, "");
     if let Some(critical) = critical_stretch {
         outcome.value("critical_stretch", critical, "");
@@ -243,6 +243,7 @@ fn solve<const D: usize>(
     let solver = AdaptiveDynamicRelaxation {
         tolerance: scene.solver.tolerance,
         max_iterations: scene.solver.max_iterations,
+        accept: scene.solver.accept.unwrap_or(0.0),
         mass_safety: scene.solver.mass_safety.unwrap_or(scene.material.law.mass_safety()),
     };
     let steps = scene.solver.steps;
@@ -254,15 +255,15 @@ fn solve<const D: usize>(
     let progress = &mut *options.progress;
     let mut watch = |status: &Status, state: &State<D>| -> Result<(), Error> {
         progress(&name, status);
-        let stop = interrupted();
-        if stop || written.elapsed() >= every {
+        let stop = interrupted() && status.restartable;
+        if stop || (status.restartable && written.elapsed() >= every) {
             checkpoint::write(output, source, quick, finished, Some(state))?;
             written = Instant::now();
         }
         if stop { Err(Error::Interrupted(output.to_path_buf())) } else { Ok(()) }
     };
     let mut system = System::new(&mut *body.bonds, law, modulus, loads, &factors);
-    system.fit_bound = scene.solver.fit_bound;
+    system.fit_bound = scene.fit_bound();
     system.breaking = critical_stretch.map(|stretch| Breaking { stretch, policy: scene.solver.breaking });
     system.stop_below = scene.solver.stop_below.unwrap_or(0.0);
     phases.start("solve");

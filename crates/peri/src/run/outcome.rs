@@ -92,6 +92,7 @@ impl Outcome {
             ("directed_bonds", directed),
             ("steps", state.step as u64),
             ("iterations", state.total_iterations),
+            ("unconverged_searches", state.unconverged),
             ("force_evaluations", state.evaluations),
             ("bond_evaluations", state.bond_evaluations),
             ("bytes_bonds", bonds.bytes() as u64),

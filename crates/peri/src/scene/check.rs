@@ -40,6 +40,15 @@ fn check_one(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     {
         return Err(source.error("stress.measures", "an empty list", "at least one measure, or no [stress]"));
     }
+    if let Some(stress) = &scene.stress
+        && let Some(found) = &stress.component
+    {
+        let most = if scene.body.space == Space::Solid { 2 } else { 1 };
+        if stress.component().is_none_or(|[a, b]| a.max(b) > most) {
+            let allowed = if most == 1 { "`11`, `22` or `12`" } else { "two digits of 1 to 3, e.g. `33`" };
+            return Err(source.error("stress.component", format!("`{found}`"), allowed));
+        }
+    }
     if let Some(super::ExactSpec::Kirsch { radius, remote_stress }) = &scene.exact {
         positive(source, "exact.radius", radius.si(), "m")?;
         positive(source, "exact.remote_stress", remote_stress.si(), "Pa")?;
@@ -191,9 +200,10 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     };
     within("tolerance", solver.tolerance, 1e-12, 0.1)?;
-    within("fit_bound", solver.fit_bound, 1e-12, 1e-2)?;
+    within("fit_bound", scene.fit_bound(), 1e-12, 1e-2)?;
     within("steps", solver.steps as f64, 1.0, 1e6)?;
     within("max_iterations", solver.max_iterations as f64, 1.0, 1e9)?;
     within("mass_safety", solver.mass_safety.unwrap_or(1.1), 1.0, 100.0)?;
+    within("accept", solver.accept.unwrap_or(0.0), 0.0, 1.0)?;
     within("stop_below", solver.stop_below.unwrap_or(0.0), 0.0, 1.0)
 }

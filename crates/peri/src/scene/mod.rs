@@ -308,10 +308,12 @@ pub struct Solver {
     pub steps: usize,
     /// Iterations a step may take.
     pub max_iterations: u64,
-    /// Largest relative error of the fitted bond law.
-    pub fit_bound: f64,
+    /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break.
+    pub fit_bound: Option<f64>,
     /// Factor on the fictitious mass; default by law.
     pub mass_safety: Option<f64>,
+    /// Go on from a search that has used all its iterations if its residual is below this; default: that is an error.
+    pub accept: Option<f64>,
     /// When bonds are looked at that may break.
     pub breaking: Policy,
     /// Skip what is left of the load once it has fallen below this part of its peak.
@@ -325,8 +327,9 @@ impl Default for Solver {
             tolerance: 1e-3,
             steps: 1,
             max_iterations: 200_000,
-            fit_bound: 1e-9,
+            fit_bound: None,
             mass_safety: None,
+            accept: None,
             breaking: Policy::default(),
             stop_below: None,
         }
@@ -350,6 +353,20 @@ pub struct StressSpec {
     /// Volume of the averaging ball of the Hardy measure.
     #[serde(default)]
     pub ball: BallVolume,
+    /// The component that pictures of stages show, e.g. `22`; default: the largest principal stress in the plane.
+    pub component: Option<String>,
+}
+
+impl StressSpec {
+    /// Row and column of the component, from 0.
+    pub fn component(&self) -> Option<[usize; 2]> {
+        let digits: Vec<usize> =
+            self.component.as_ref()?.chars().map(|c| c.to_digit(10).map_or(9, |d| d as usize)).collect();
+        match digits[..] {
+            [a @ 1..=3, b @ 1..=3] => Some([a - 1, b - 1]),
+            _ => None,
+        }
+    }
 }
 
 /// Closed-form solutions.
@@ -420,6 +437,13 @@ pub struct Study {
     pub volume_correction: Vec<VolumeCorrection>,
     /// Part of `--quick` runs.
     pub quick: Option<bool>,
+}
+
+impl Scene {
+    /// Largest relative error of the fitted bond law.
+    pub fn fit_bound(&self) -> f64 {
+        self.solver.fit_bound.unwrap_or(if self.material.critical.is_some() { 1e-6 } else { 1e-9 })
+    }
 }
 
 impl Material {

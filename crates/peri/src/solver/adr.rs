@@ -6,8 +6,9 @@
 use super::march::{Equilibrium, Watch, march};
 use super::passes::{force_pass, move_pass};
 use super::system::{State, Status, System};
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, StretchRange};
 use crate::error::Error;
+use crate::potential::TangentTable;
 use rayon::prelude::*;
 
 /// Iterations between looks at the stretches.
@@ -22,11 +23,14 @@ pub struct AdaptiveDynamicRelaxation {
     pub max_iterations: u64,
     /// Factor S on the fictitious mass above the Gershgorin bound.
     pub mass_safety: f64,
+    /// A search that has used all its iterations goes on all the same if its residual is below this; its residual stays
+    /// in the history.
+    pub accept: f64,
 }
 
 impl Default for AdaptiveDynamicRelaxation {
     fn default() -> Self {
-        Self { tolerance: 1e-3, max_iterations: 100_000, mass_safety: 1.1 }
+        Self { tolerance: 1e-3, max_iterations: 100_000, mass_safety: 1.1, accept: 0.0 }
     }
 }
 
@@ -47,17 +51,24 @@ impl AdaptiveDynamicRelaxation {
     }
 }
 
+/// Iterations between looks at the masses, where bonds differ much in their tangent.
+const REFRESH: u64 = 10;
+/// From this ratio of the largest tangent to that at rest on, every particle has the mass of its own bonds.
+const MUCH: f64 = 1.2;
+
 /// The method at work.
 pub struct Relaxation {
     settings: AdaptiveDynamicRelaxation,
-    /// Gershgorin sums for a unit bond tangent; made when first needed.
+    /// Gershgorin sums of the undeformed body for a unit bond tangent; made when first needed.
     unit_mass: Vec<f64>,
+    /// Gershgorin sums of the deformed body with each bond's own tangent, where bonds differ much in it.
+    own_mass: Vec<f64>,
 }
 
 impl Relaxation {
     /// Nothing is computed yet.
     pub fn new(settings: AdaptiveDynamicRelaxation) -> Self {
-        Self { settings, unit_mass: Vec::new() }
+        Self { settings, unit_mass: Vec::new(), own_mass: Vec::new() }
     }
 
     /// One iteration; true where the forces balance (the displacement is then left as it is).
@@ -72,8 +83,14 @@ impl Relaxation {
         let look =
             system.breaks_on_the_way() || state.iteration < LOOK || state.iteration.is_multiple_of(LOOK);
         let factor = system.factors[state.step];
-        let mass = 0.5 * settings.mass_safety * state.tangent;
-        let (sums, met) = force_pass(system, state, &self.unit_mass, mass, factor, look);
+        let own = state.tangent > MUCH * system.modulus * system.law.tangent().abs();
+        if own && (state.iteration.is_multiple_of(REFRESH) || self.own_mass.is_empty()) {
+            own_mass(system, state, &mut self.own_mass);
+        }
+        let (masses, tangent) =
+            if own { (&self.own_mass, system.modulus) } else { (&self.unit_mass, state.tangent) };
+        let mass = 0.5 * settings.mass_safety * tangent;
+        let (sums, met) = force_pass(system, state, masses, mass, factor, look);
         system.count_evaluation(state);
         if ![sums.free, sums.held, sums.quotient_top, sums.quotient_bottom].iter().all(|x| x.is_finite()) {
             return Err(system.not_finite(state));
@@ -104,6 +121,10 @@ impl Relaxation {
         if residual <= settings.tolerance && !broken {
             return Ok(true);
         }
+        if state.iteration >= settings.max_iterations && residual <= settings.accept && !broken {
+            state.unconverged += 1;
+            return Ok(true);
+        }
         if state.iteration >= settings.max_iterations {
             return Err(Error::NotConverged {
                 step: state.step,
@@ -112,7 +133,8 @@ impl Relaxation {
                 needed: settings.tolerance,
             });
         }
-        move_pass(&system.loads, state, &self.unit_mass, mass, damping);
+        let masses = if own { &self.own_mass } else { &self.unit_mass };
+        move_pass(&system.loads, state, masses, mass, damping);
         state.iteration += 1;
         state.step_iterations += 1;
         state.total_iterations += 1;
@@ -125,7 +147,8 @@ impl Relaxation {
             reaction: sums.held.sqrt(),
             damping,
             broken: state.broken,
-            restartable: true,
+            // masses are made anew from the state alone
+            restartable: state.iteration.is_multiple_of(REFRESH),
         };
         watch(&status, state)?;
         Ok(false)
@@ -144,6 +167,7 @@ impl<const D: usize> Equilibrium<D> for Relaxation {
             let particles = system.bonds.particles();
             update_unit_mass(&*system.bonds, particles, &mut self.unit_mass);
         }
+        self.own_mass.clear();
         while !self.iterate(system, state, watch)? {}
         Ok(())
     }
@@ -170,6 +194,46 @@ fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, slots: &[u32], mass: &
         })
         .collect();
     for (&slot, sum) in slots.iter().zip(sums) {
+        mass[slot as usize] = sum;
+    }
+}
+
+/// Σ_J (2 w V_J/|ξ|)·max(|t′|, |t|/λ)(1 + max_{d≠e} |n_d n_e|) with the directions of the deformed bonds.
+fn own_mass<const D: usize>(system: &System<D>, state: &State<D>, mass: &mut Vec<f64>) {
+    // bonds crushed to nothing have no bound: the law's own at a thousandth
+    let met = StretchRange { low: state.fitted[0].powi(2) - 1.0, high: state.fitted[1].powi(2) - 1.0 };
+    let table = TangentTable::new(system.law, met);
+    let sums: Vec<f64> = system
+        .bonds
+        .particles()
+        .par_iter()
+        .map(|&slot| {
+            let own = state.displacement.get(slot as usize);
+            let mut sum = 0.0;
+            system.bonds.neighbours(slot as usize, &mut |bond| {
+                let other = state.displacement.get(bond.slot);
+                let mut zeta = [0.0; D];
+                let mut square = 0.0;
+                for d in 0..D {
+                    zeta[d] = bond.bond[d] + other[d] - own[d];
+                    square += zeta[d] * zeta[d];
+                }
+                let mut mixed = 0.0_f64;
+                for d in 0..D {
+                    for e in 0..d {
+                        mixed = mixed.max((zeta[d] * zeta[e]).abs());
+                    }
+                }
+                let e = square / (bond.length * bond.length) - 1.0;
+                let tangent = table.value(e);
+                sum +=
+                    2.0 * bond.weight / bond.length * tangent * (1.0 + mixed / square.max(f64::MIN_POSITIVE));
+            });
+            if sum > 0.0 { sum } else { 1.0 }
+        })
+        .collect();
+    mass.resize(system.bonds.slots(), 1.0);
+    for (&slot, sum) in system.bonds.particles().iter().zip(sums) {
         mass[slot as usize] = sum;
     }
 }

@@ -128,7 +128,7 @@ fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
 fn record<const D: usize>(system: &System<D>, state: &mut State<D>) {
     let [factor, pull, _] = state.balanced;
     let met = state.balanced_stretches;
-    let table = EnergyTable::new(system.law, met);
+    let table = EnergyTable::new(system.law, system.fitted_part(met));
     let reach = system.loads.reach(&*system.bonds);
     let load = if reach > 0.0 { pull / reach } else { factor * system.loads.applied(&*system.bonds) };
     let record = Record {

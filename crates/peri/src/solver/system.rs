@@ -8,8 +8,10 @@ use crate::potential::{BondPotential, KernelFit};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
-/// Stretches below this are not fitted.
+/// Stretches below this are not fitted …
 const SMALLEST_STRETCH: f64 = 1e-3;
+/// … nor below this where bonds break: beside a crack without contact bonds are crushed to nothing.
+const CRUSHED: f64 = 0.1;
 
 /// When bonds break: in tension only, for good.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,6 +122,8 @@ pub struct State<const D: usize> {
     pub(super) reference: f64,
     /// Residual of the last iteration.
     pub residual: f64,
+    /// Searches for equilibrium that ended above the tolerance.
+    pub unconverged: u64,
     /// Bonds broken so far.
     pub broken: u64,
     /// Particles that have lost all their bonds so far.
@@ -157,6 +161,7 @@ impl<const D: usize> State<D> {
             tangent: 0.0,
             reference: 0.0,
             residual: 0.0,
+            unconverged: 0,
             broken: 0,
             detached: 0,
             released: 0.0,
@@ -296,16 +301,21 @@ impl<'a, const D: usize> System<'a, D> {
     /// Widens the fitted range where stretches have left it, and the tangent with it.
     pub(super) fn widen(&mut self, state: &mut State<D>) -> Result<bool, Error> {
         // bonds crushed below that are extrapolated: no fit covers l → 0
-        let low = (1.0 + state.met.low).max(0.0).sqrt().max(SMALLEST_STRETCH);
+        let low = (1.0 + state.met.low).max(0.0).sqrt().max(self.least());
         let high = (1.0 + state.met.high).sqrt().min(self.most());
         if low >= state.fitted[0] && high <= state.fitted[1] {
             return Ok(false);
         }
         // twice the strain met, so that a growing load does not refit at every look
-        state.fitted[0] = state.fitted[0].min((1.0 - 2.0 * (1.0 - low)).max(0.5 * low)).max(SMALLEST_STRETCH);
+        state.fitted[0] = state.fitted[0].min((1.0 - 2.0 * (1.0 - low)).max(0.5 * low)).max(self.least());
         state.fitted[1] = state.fitted[1].max(1.0 + 2.0 * (high - 1.0)).min(self.most());
         self.fit(state)?;
         Ok(true)
+    }
+
+    /// The smallest stretch that is fitted.
+    fn least(&self) -> f64 {
+        if self.breaking.is_some() { CRUSHED } else { SMALLEST_STRETCH }
     }
 
     /// The largest stretch that is fitted: bonds beyond it are about to break, however long they are.
@@ -313,9 +323,18 @@ impl<'a, const D: usize> System<'a, D> {
         self.breaking.map_or(f64::INFINITY, |b| b.stretch + 0.25 * (b.stretch - 1.0))
     }
 
+    /// The part of stretches that the law itself covers; beyond it q is held, and energies grow with e.
+    pub fn fitted_part(&self, met: StretchRange) -> StretchRange {
+        if self.breaking.is_none() {
+            return met;
+        }
+        let (least, most) = (self.least(), self.most());
+        StretchRange { low: met.low.max(least * least - 1.0), high: met.high.min(most * most - 1.0) }
+    }
+
     fn fit(&mut self, state: &mut State<D>) -> Result<(), Error> {
         let mut fit = KernelFit::new(self.law, state.fitted, self.fit_bound)?;
-        if state.fitted[1] >= self.most() {
+        if self.breaking.is_some() {
             fit = fit.held();
         }
         self.bonds.set_law(&fit, self.modulus);
