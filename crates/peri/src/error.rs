@@ -59,6 +59,14 @@ pub enum Error {
         /// Why not.
         why: String,
     },
+    /// One of several variants.
+    #[error("{variant}: {error}")]
+    Within {
+        /// Its name.
+        variant: String,
+        /// What went wrong.
+        error: Box<Self>,
+    },
     /// Files, output, scenes.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
@@ -71,6 +79,7 @@ impl Error {
             Self::Geometry(_) | Self::Parameter { .. } | Self::Checkpoint { .. } => 2,
             Self::Interrupted(_) => 130,
             Self::NotFinite { .. } | Self::NotConverged { .. } => 1,
+            Self::Within { error, .. } => error.exit_code(),
             Self::Shared(error) => error.exit_code(),
         }
     }

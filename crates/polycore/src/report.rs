@@ -201,6 +201,13 @@ impl Report {
         text + &self.verdict()
     }
 
+    /// Of the expectations whose quantity ends with `ending`: how many hold, and what the others missed.
+    pub fn verdict_on(&self, ending: &str) -> (usize, Vec<String>) {
+        let of_it = || self.expect.iter().filter(|j| j.expect.quantity.ends_with(ending));
+        let missed = of_it().filter(|j| !j.pass).map(|j| j.row()[..].join(" ")).collect();
+        (of_it().filter(|j| j.pass).count(), missed)
+    }
+
     /// The judged expectations and what is not finite, as text.
     pub fn verdict(&self) -> String {
         let mut text = String::new();

@@ -98,6 +98,44 @@ impl Outcome {
     }
 }
 
+/// The table of a suite: what each variant is, what must happen, what was seen, and at what cost.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn suite(report: &polycore::report::Report, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+    use std::fmt::Write;
+    if outcomes.iter().all(|o| o.must.is_none()) {
+        return Ok(());
+    }
+    let mut text = String::from("| case | must | seen | iterations | seconds |\n|---|---|---|---|---|\n");
+    for outcome in outcomes {
+        let work = |name: &str| outcome.work.iter().find(|w| w.0 == name).map_or(0, |w| w.1);
+        let (held, failed) = report.verdict_on(&format!("[{}]", outcome.name));
+        let seen = match (&outcome.error, failed.is_empty()) {
+            (Some(error), _) => format!("refused: {}", error.lines().next().unwrap_or_default()),
+            (None, true) => format!(
+                "stretches {:.3} to {:.3}, residual {:.1e}, {} bonds broken; {held} expectations hold",
+                outcome.get("smallest_stretch").unwrap_or(f64::NAN),
+                outcome.get("largest_stretch").unwrap_or(f64::NAN),
+                outcome.get("largest_residual").unwrap_or(f64::NAN),
+                outcome.history.last().map_or(0, |r| r.broken),
+            ),
+            (None, false) => format!("missed: {}", failed.join(", ")),
+        };
+        let _ = writeln!(
+            text,
+            "| {} | {} | {seen} | {} | {:.2} |",
+            outcome.name,
+            outcome.must.as_deref().unwrap_or_default(),
+            work("iterations"),
+            outcome.seconds_of("solve")
+        );
+    }
+    polycore::output::atomic_write(output.join("suite.md"), |file| {
+        std::io::Write::write_all(file, text.as_bytes())
+    })
+}
+
 /// Tables of every variant, one plot of all loads, and a plot of energies for each variant whose bonds break.
 pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
     let several: Vec<&Outcome> = outcomes.iter().filter(|o| o.history.len() > 1).collect();

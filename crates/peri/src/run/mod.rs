@@ -96,7 +96,7 @@ fn run_in<const D: usize>(
     let variants = scene::check(source, scene, options.quick)?;
     // every body is built once before anything is computed or written: faults show at once
     if !options.resume {
-        for variant in &variants {
+        for variant in variants.iter().filter(|variant| expected_error(scene, variant).is_none()) {
             let (source, scene) = variant.resolve(source, scene);
             let body = body_of::<D>(&source, &scene, variant)?;
             loads_of(&source, &scene, &body)?;
@@ -123,13 +123,18 @@ fn run_in<const D: usize>(
         let state = state.take();
         let (own_source, own_scene) = variant.resolve(source, scene);
         let study = variant.study.and_then(|index| scene.study.get(index));
-        let expected = study.and_then(|study| study.fails.as_deref());
-        let mut outcome = match run_variant::<D>(&own_source, &own_scene, variant, options, &finished, state)
+        let expected = expected_error(scene, variant);
+        let mut outcome = match scene::check_variant(&own_source, &own_scene)
+            .map_err(Failure::from)
+            .and_then(|()| run_variant::<D>(&own_source, &own_scene, variant, options, &finished, state))
         {
             Err(failure) if expected.is_some_and(|text| failure.to_string().contains(text)) => {
                 let mut outcome = Outcome::new(variant.name(), variant);
                 outcome.error = Some(failure.to_string());
                 outcome
+            }
+            Err(Failure::Run(error)) if variants.len() > 1 && !matches!(error, Error::Interrupted(_)) => {
+                return Err(Error::Within { variant: variant.name(), error: Box::new(error) }.into());
             }
             other => other?,
         };
@@ -142,6 +147,7 @@ fn run_in<const D: usize>(
     }
     let report = compare::report(source, scene, &finished, options.quick);
     history::write(scene, &finished, options.output)?;
+    history::suite(&report, &finished, options.output)?;
     if scene.output.pictures {
         draw::curves(scene, &finished, options.output)?;
     }
@@ -149,6 +155,11 @@ fn run_in<const D: usize>(
     // the report is the last file: a checkpoint without it is an unfinished run
     let _ = std::fs::remove_file(options.output.join(checkpoint::FILE_NAME));
     Ok(Finished { report, outcomes: finished })
+}
+
+/// What the error of a variant must contain, where one is expected.
+fn expected_error<'a>(scene: &'a Scene, variant: &Variant) -> Option<&'a str> {
+    variant.study.and_then(|index| scene.study.get(index)?.fails.as_deref())
 }
 
 /// A killed run leaves files that it had begun to write under their temporary names.

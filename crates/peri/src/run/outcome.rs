@@ -140,6 +140,6 @@ impl Outcome {
 
     /// Seconds of a phase.
     pub fn seconds_of(&self, phase: &str) -> f64 {
-        self.seconds.iter().filter(|(name, _)| name == phase).map(|s| s.1).sum()
+        self.seconds.iter().filter(|(name, _)| name == phase).map(|s| s.1).fold(0.0, |sum, s| sum + s)
     }
 }

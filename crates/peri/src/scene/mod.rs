@@ -9,7 +9,7 @@ mod loads;
 mod variant;
 
 pub use build::{Body, body_of};
-pub use check::check;
+pub use check::{check, check_variant};
 pub use explain::explain;
 pub use inclusion::with_inclusions;
 pub use loads::{loads_of, region_names};

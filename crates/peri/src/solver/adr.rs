@@ -55,6 +55,11 @@ impl AdaptiveDynamicRelaxation {
 const REFRESH: u64 = 10;
 /// From this ratio of the largest tangent to that at rest on, every particle has the mass of its own bonds.
 const MUCH: f64 = 1.2;
+/// Iterations after which a search is a long one, and the least damping towards twice as many.
+const LONG: u64 = 3000;
+const LATE_DAMPING: f64 = 0.05;
+/// Least tangent of a bond in its particles' masses, over that at rest.
+const LEAST_TANGENT: f64 = 0.25;
 
 /// The method at work.
 pub struct Relaxation {
@@ -116,7 +121,9 @@ impl Relaxation {
         } else {
             0.0
         };
-        let damping = (2.0 * quotient.max(0.0).sqrt()).clamp(0.0, 1.9);
+        // where bonds soften the quotient is negative and would leave them to swing for ever: a long search is damped
+        let late = state.iteration.saturating_sub(LONG) as f64 / LONG as f64;
+        let damping = (2.0 * quotient.max(0.0).sqrt()).clamp(LATE_DAMPING * late.min(1.0), 1.9);
         state.residual = residual;
         if residual <= settings.tolerance && !broken {
             return Ok(true);
@@ -203,6 +210,8 @@ fn own_mass<const D: usize>(system: &System<D>, state: &State<D>, mass: &mut Vec
     // bonds crushed to nothing have no bound: the law's own at a thousandth
     let met = StretchRange { low: state.fitted[0].powi(2) - 1.0, high: state.fitted[1].powi(2) - 1.0 };
     let table = TangentTable::new(system.law, met);
+    // a bond past its greatest force is soft, but a light particle would leap when it meets a stiff one
+    let least = LEAST_TANGENT * system.law.tangent().abs();
     let sums: Vec<f64> = system
         .bonds
         .particles()
@@ -225,7 +234,7 @@ fn own_mass<const D: usize>(system: &System<D>, state: &State<D>, mass: &mut Vec
                     }
                 }
                 let e = square / (bond.length * bond.length) - 1.0;
-                let tangent = table.value(e);
+                let tangent = table.value(e).max(least);
                 sum +=
                     2.0 * bond.weight / bond.length * tangent * (1.0 + mixed / square.max(f64::MIN_POSITIVE));
             });
