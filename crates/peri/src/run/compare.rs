@@ -119,7 +119,8 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
     let mut report =
         Report::new("peri", env!("CARGO_PKG_VERSION"), &resolved(source, scene, outcomes, quick));
     report.threads(rayon::current_num_threads());
-    let several = outcomes.len() > 1;
+    // names must not depend on how many of the variants run
+    let several = crate::scene::check(source, scene, false).map_or(outcomes.len(), |all| all.len()) > 1;
     let full = |name: &str, outcome: &Outcome| {
         if several { format!("{name}[{}]", outcome.name) } else { name.to_owned() }
     };
@@ -163,6 +164,9 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
                 );
             }
         }
+    }
+    for (family, change) in super::history::peak_changes(outcomes) {
+        report.value(&format!("peak_load_change[{family}]"), change, "");
     }
     report.judge(&scene.expect, quick);
     report

@@ -302,8 +302,11 @@ pub fn stages(
     // the longest bond in the picture is as long as the critical stretch lets it be
     let bridge = 1.6 * outcome.get("critical_stretch").unwrap_or(1.0);
     let mut map = FieldMap::new().lengths("mm", 1e-3).columns(stages.len()).size(420);
-    let all = || stages.iter().flat_map(|stage| stage.stress.iter().copied());
-    let (low, high) = (all().fold(0.0, f64::min), all().fold(0.0, f64::max));
+    // a crushed particle's Cauchy stress would take all the colours
+    let mut all: Vec<f64> = stages.iter().flat_map(|stage| stage.stress.iter().copied()).collect();
+    all.sort_by(f64::total_cmp);
+    let part = |share: f64| all.get((share * (all.len().max(1) - 1) as f64) as usize).copied().unwrap_or(0.0);
+    let (low, high) = (part(0.002).min(0.0), part(0.998).max(0.0));
     for stage in &stages {
         let panel = Panel::new(&stage.title, &label, &stage.places, &stage.stress, spacing).bridge(bridge);
         map = map.panel(if high > low { panel.range(low, high) } else { panel });

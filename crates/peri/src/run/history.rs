@@ -98,6 +98,31 @@ impl Outcome {
     }
 }
 
+/// How much the peak load still changes between the two finest spacings of each family, over the finest.
+pub fn peak_changes(outcomes: &[Outcome]) -> Vec<(String, f64)> {
+    let change = |(family, members): (String, Vec<&Outcome>)| {
+        let mut finest = members.iter().rev().map(|o| o.get("peak_load"));
+        let (last, before) = (finest.next()??, finest.next()??);
+        Some((family, ((last - before) / last).abs()))
+    };
+    super::compare::families(outcomes).into_iter().filter_map(change).collect()
+}
+
+/// Peak load over spacing, where variants differ in it.
+fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+    let mut plot = LinePlot::new("Peak load").size(900.0, 560.0).axes("spacing Δx (mm)", "peak load (N)");
+    let mut any = false;
+    for (family, members) in super::compare::families(outcomes) {
+        let peaks: Vec<f64> = members.iter().filter_map(|o| o.get("peak_load")).collect();
+        if peaks.len() == members.len() {
+            let spacing: Vec<f64> = members.iter().map(|o| o.spacing * 1e3).collect();
+            plot = plot.series(Series::marked_line(&family, &spacing, &peaks));
+            any = true;
+        }
+    }
+    if any { plot.write(output.join("peak_load.png")) } else { Ok(()) }
+}
+
 /// The table of a suite: what each variant is, what must happen, what was seen, and at what cost.
 ///
 /// # Errors
@@ -162,6 +187,7 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
         plot = plot.series(Series::line(&outcome.name, &x, &y));
     }
     plot.write(output.join("load_displacement.png"))?;
+    peaks(outcomes, output)?;
     for outcome in several.iter().filter(|o| o.history.iter().any(|r| r.broken > 0)) {
         let columns = outcome.columns();
         let x = from_rest(&columns[0].2, scale);

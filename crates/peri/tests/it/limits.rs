@@ -332,6 +332,7 @@ fn strong_compression_of_the_network_law() {
         let solver = AdaptiveDynamicRelaxation {
             tolerance: 1e-5,
             mass_safety: Law::Chain.mass_safety(),
+            accept: 0.0,
             max_iterations: most,
         };
         let mut state = State::new(built.lattice.slots());

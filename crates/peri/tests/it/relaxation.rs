@@ -139,6 +139,7 @@ fn every_stress_free_law_converges() {
             let solver = AdaptiveDynamicRelaxation {
                 tolerance: 1e-6,
                 mass_safety: law.mass_safety(),
+                accept: 0.0,
                 max_iterations: 2000,
             };
             let mut state = State::new(bonds.slots());
