@@ -48,6 +48,33 @@ pub enum Error {
         /// Relative residual asked for.
         needed: f64,
     },
+    /// The time step of explicit dynamics is beyond the critical one.
+    #[error("time step: found {found:.4e} s; allowed: up to the critical {critical:.4e} s")]
+    TimeStep {
+        /// The time step asked for, s.
+        found: f64,
+        /// The critical one 2/ω_max, s.
+        critical: f64,
+    },
+    /// Energy grows from nothing in explicit dynamics.
+    #[error(
+        "unstable at t = {time:.4e} s (time step {step}): kinetic energy {kinetic:.3e} J where {available:.3e} J are \
+         available; its time step is {time_step:.4e} s, the critical one for the stretches met {critical:.4e} s"
+    )]
+    Unstable {
+        /// Time, s.
+        time: f64,
+        /// Steps taken.
+        step: u64,
+        /// Kinetic energy, J.
+        kinetic: f64,
+        /// Energy that the loads have brought and that has not gone, J.
+        available: f64,
+        /// The time step, s.
+        time_step: f64,
+        /// Estimate of the critical one for all stretches met, s.
+        critical: f64,
+    },
     /// The run was asked to stop; its checkpoint is written.
     #[error("interrupted; resume with `peri resume {}`", .0.display())]
     Interrupted(PathBuf),
@@ -76,9 +103,9 @@ impl Error {
     /// Exit code of the command line: 2 for bad input, 130 for an interrupted run, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Geometry(_) | Self::Parameter { .. } | Self::Checkpoint { .. } => 2,
+            Self::Geometry(_) | Self::Parameter { .. } | Self::Checkpoint { .. } | Self::TimeStep { .. } => 2,
             Self::Interrupted(_) => 130,
-            Self::NotFinite { .. } | Self::NotConverged { .. } => 1,
+            Self::NotFinite { .. } | Self::NotConverged { .. } | Self::Unstable { .. } => 1,
             Self::Within { error, .. } => error.exit_code(),
             Self::Shared(error) => error.exit_code(),
         }

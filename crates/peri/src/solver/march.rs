@@ -144,6 +144,9 @@ fn record<const D: usize>(system: &System<D>, state: &mut State<D>) {
         work: state.work,
         released: state.released,
         largest_stretch: (1.0 + met.high).sqrt(),
+        time: 0.0,
+        kinetic: 0.0,
+        damped: 0.0,
     };
     state.history.push(record);
 }

@@ -1,6 +1,7 @@
 //! What is solved: a body under its law and loads, bonds that may break, and everything a checkpoint holds of it.
 
 use super::load::Loads;
+use super::verlet::Motion;
 use crate::bonds::{Bonds, Overstretched, StretchRange, overstretched, stretch_range};
 use crate::error::Error;
 use crate::field::Field;
@@ -82,6 +83,12 @@ pub struct Record {
     pub released: f64,
     /// Largest intact stretch.
     pub largest_stretch: f64,
+    /// Time, s; 0 without dynamics.
+    pub time: f64,
+    /// Kinetic energy, J.
+    pub kinetic: f64,
+    /// Energy that mass-proportional damping has taken so far, J.
+    pub damped: f64,
 }
 
 /// Everything an interrupted run needs to go on with the same bits.
@@ -136,6 +143,8 @@ pub struct State<const D: usize> {
     pub(super) balanced: [f64; 3],
     /// Intact bonds, once any has broken.
     pub(super) intact: Option<Vec<u64>>,
+    /// Time and energies of explicit dynamics.
+    pub motion: Motion,
     /// The finished steps.
     pub history: Vec<Record>,
 }
@@ -168,6 +177,7 @@ impl<const D: usize> State<D> {
             work: 0.0,
             balanced: [0.0; 3],
             intact: None,
+            motion: Motion::default(),
             history: Vec::new(),
         }
     }

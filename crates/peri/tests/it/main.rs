@@ -3,6 +3,7 @@
 
 mod balance;
 mod bodies;
+mod dynamics;
 mod forces;
 mod homogeneous;
 mod limits;

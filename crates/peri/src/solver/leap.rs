@@ -1,0 +1,291 @@
+//! The passes of a step of velocity Verlet over all slots: half a kick and the drift; forces; the other half.
+
+use super::load::Loads;
+use super::system::{State, System};
+use crate::bonds::StretchRange;
+use crate::field::{CHUNK, chunk_range};
+use rayon::prelude::*;
+
+/// Constants of one step from t to t + Δt.
+#[derive(Clone, Copy, Debug)]
+pub struct Leap {
+    /// Δt, s.
+    pub step: f64,
+    /// ρ, kg/m³.
+    pub density: f64,
+    /// c of the damping force −cρv, 1/s.
+    pub damping: f64,
+    /// Load factor before and after.
+    pub factors: [f64; 2],
+    /// Its rate after, 1/s.
+    pub rate: f64,
+}
+
+/// Sums over all slots, item by item in a fixed order.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Sums {
+    /// Kinetic energy Σ ½ρV v², J (only after the whole step).
+    pub kinetic: f64,
+    /// Work of body forces and supports in this half, J.
+    pub work: f64,
+    /// Work of the damping in this half, J.
+    pub damped: f64,
+    /// Largest component of an increment of displacement, m (only of the first half).
+    pub increment: f64,
+}
+
+impl Sums {
+    fn add(self, other: Self) -> Self {
+        Self {
+            kinetic: self.kinetic + other.kinetic,
+            work: self.work + other.work,
+            damped: self.damped + other.damped,
+            increment: self.increment.max(other.increment),
+        }
+    }
+}
+
+/// A work item of two fields.
+type Two<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
+
+/// v ← v + ½Δt a and u ← u + Δt v; held components go to F d.
+pub fn leap_pass<const D: usize>(
+    loads: &Loads<D>,
+    state: &mut State<D>,
+    volumes: &[f64],
+    leap: &Leap,
+) -> Sums {
+    let force = state.force.components();
+    let keep = 1.0 - 0.5 * leap.damping * leap.step;
+    let push = 0.5 * leap.step / leap.density;
+    let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
+    let of = |(chunk, (u, v)): (usize, Two<D>)| {
+        let range = chunk_range(chunk, volumes.len());
+        let mut sums = Sums::default();
+        for d in 0..D {
+            let at = Place::new(loads, volumes, range.clone(), d);
+            let (u, v, f) = (&mut *u[d], &mut *v[d], &force[d][range.clone()]);
+            if at.is_plain(leap) {
+                sums.increment = sums.increment.max(leap.step * free_leap(u, v, f, keep, push, leap.step));
+                continue;
+            }
+            for k in 0..f.len() {
+                let increment = if let Some(full) = at.held(k) {
+                    let increment = leap.factors[1] * full - u[k];
+                    u[k] = leap.factors[1] * full;
+                    sums.work -= 0.5 * f[k] * increment * at.volumes[k];
+                    increment
+                } else {
+                    let before = v[k];
+                    v[k] = keep * before + push * f[k];
+                    let increment = leap.step * v[k];
+                    u[k] += increment;
+                    sums.damped += 0.5 * leap.damping * leap.density * before * increment * at.volumes[k];
+                    increment
+                };
+                sums.work += 0.5 * leap.factors[0] * at.body(k) * increment * at.volumes[k];
+                sums.increment = sums.increment.max(increment.abs());
+            }
+        }
+        sums
+    };
+    let parts: Vec<Sums> = displacement.into_par_iter().zip(velocity).enumerate().map(of).collect();
+    parts.into_iter().fold(Sums::default(), Sums::add)
+}
+
+/// New forces and, unless stretches are looked at first, the second half of the kick in the same pass.
+pub fn force_pass<const D: usize>(
+    system: &System<D>,
+    state: &mut State<D>,
+    volumes: &[f64],
+    leap: &Leap,
+    look: bool,
+) -> (Sums, StretchRange) {
+    let loads = &*system.loads;
+    let displacement = &state.displacement;
+    let (force, velocity) = (state.force.chunks_mut(), state.velocity.chunks_mut());
+    let of = |(chunk, (mut f, mut v)): (usize, Two<D>)| {
+        let mut met = StretchRange::REST;
+        system.internal_force(displacement, chunk, &mut f, look.then_some(&mut met));
+        load(loads, chunk, volumes.len(), leap.factors[1], &mut f);
+        let f = f.map(|f| &*f);
+        (if look { Sums::default() } else { kick(loads, volumes, leap, chunk, f, &mut v) }, met)
+    };
+    let parts: Vec<_> = force.into_par_iter().zip(velocity).enumerate().map(of).collect();
+    parts
+        .into_iter()
+        .fold((Sums::default(), StretchRange::REST), |(sums, met), (s, m)| (sums.add(s), met.join(m)))
+}
+
+/// The second half of the kick: v ← v + ½Δt a with the new a; held components have the rate of F d.
+pub fn kick_pass<const D: usize>(
+    loads: &Loads<D>,
+    state: &mut State<D>,
+    volumes: &[f64],
+    leap: &Leap,
+) -> Sums {
+    let force = state.force.components();
+    let velocity = state.velocity.chunks_mut();
+    let of = |(chunk, mut v): (usize, [&mut [f64]; D])| {
+        let range = chunk_range(chunk, volumes.len());
+        kick(loads, volumes, leap, chunk, force.map(|f| &f[range.clone()]), &mut v)
+    };
+    let parts: Vec<Sums> = velocity.into_par_iter().enumerate().map(of).collect();
+    parts.into_iter().fold(Sums::default(), Sums::add)
+}
+
+/// Forces with loads of some work items, or of all.
+pub fn refresh<const D: usize>(
+    system: &System<D>,
+    state: &mut State<D>,
+    factor: f64,
+    chunks: Option<&[usize]>,
+) {
+    let (loads, displacement) = (&*system.loads, &state.displacement);
+    let slots = displacement.slots();
+    state.force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut f)| {
+        if chunks.is_none_or(|list| list.binary_search(&chunk).is_ok()) {
+            system.internal_force(displacement, chunk, &mut f, None);
+            load(loads, chunk, slots, factor, &mut f);
+        }
+    });
+}
+
+/// Adds the body forces.
+fn load<const D: usize>(
+    loads: &Loads<D>,
+    chunk: usize,
+    slots: usize,
+    factor: f64,
+    force: &mut [&mut [f64]; D],
+) {
+    let Some(body) = &loads.body_force else { return };
+    for d in 0..D {
+        for (f, b) in force[d].iter_mut().zip(&body.components()[d][chunk_range(chunk, slots)]) {
+            *f += factor * b;
+        }
+    }
+}
+
+fn kick<const D: usize>(
+    loads: &Loads<D>,
+    volumes: &[f64],
+    leap: &Leap,
+    chunk: usize,
+    force: [&[f64]; D],
+    velocity: &mut [&mut [f64]; D],
+) -> Sums {
+    let range = chunk_range(chunk, volumes.len());
+    let push = 0.5 * leap.step / leap.density;
+    let keep = 1.0 / (1.0 + 0.5 * leap.damping * leap.step);
+    let [before, after] = leap.factors;
+    let mut sums = Sums::default();
+    let mut square = 0.0;
+    for d in 0..D {
+        let at = Place::new(loads, volumes, range.clone(), d);
+        let (v, f) = (&mut *velocity[d], force[d]);
+        if at.is_plain(leap) {
+            square += free_kick(v, f, at.volumes, push);
+            continue;
+        }
+        for k in 0..f.len() {
+            let volume = at.volumes[k];
+            let increment = if let Some(full) = at.held(k) {
+                let increment = (after - before) * full;
+                let old = std::mem::replace(&mut v[k], leap.rate * full);
+                // the support moves the particle's mass, too
+                let gained = 0.5 * leap.density * (v[k] * v[k] - old * old);
+                sums.work += (gained - 0.5 * f[k] * increment) * volume;
+                increment
+            } else {
+                let increment = leap.step * v[k];
+                v[k] = keep * (v[k] + push * f[k]);
+                sums.damped += 0.5 * leap.damping * leap.density * v[k] * increment * volume;
+                increment
+            };
+            sums.work += 0.5 * after * at.body(k) * increment * volume;
+            square += v[k] * v[k] * volume;
+        }
+    }
+    sums.kinetic = 0.5 * leap.density * square;
+    sums
+}
+
+/// The loads on one axis of a work item.
+struct Place<'a> {
+    held: &'a [u8],
+    bit: usize,
+    prescribed: &'a [f64],
+    body: &'a [f64],
+    volumes: &'a [f64],
+}
+
+impl<'a> Place<'a> {
+    fn new<const D: usize>(
+        loads: &'a Loads<D>,
+        volumes: &'a [f64],
+        range: std::ops::Range<usize>,
+        axis: usize,
+    ) -> Self {
+        let held = loads.held.get(range.clone()).unwrap_or_default();
+        let held = if held.iter().any(|h| h >> axis & 1 == 1) { held } else { &[] };
+        let of = |field: &'a Option<crate::field::Field<D>>| {
+            field.as_ref().map_or(&[][..], |field| &field.components()[axis][range.clone()])
+        };
+        let (prescribed, body) = (of(&loads.displacement), of(&loads.body_force));
+        Self { held, bit: axis, prescribed, body, volumes: &volumes[range.clone()] }
+    }
+
+    /// Nothing held, nothing loaded, nothing damped.
+    fn is_plain(&self, leap: &Leap) -> bool {
+        self.held.is_empty() && self.body.is_empty() && leap.damping == 0.0
+    }
+
+    /// The prescribed displacement at factor 1 where held.
+    fn held(&self, k: usize) -> Option<f64> {
+        let held = self.held.get(k).is_some_and(|h| h >> self.bit & 1 == 1);
+        held.then(|| self.prescribed.get(k).copied().unwrap_or(0.0))
+    }
+
+    fn body(&self, k: usize) -> f64 {
+        self.body.get(k).copied().unwrap_or(0.0)
+    }
+}
+
+const LANES: usize = 8;
+
+/// The first half where nothing is special, in parts that vectorise; the largest |v|.
+fn free_leap(u: &mut [f64], v: &mut [f64], f: &[f64], keep: f64, push: f64, step: f64) -> f64 {
+    let mut largest = [0.0; LANES];
+    let parts = u.chunks_mut(LANES).zip(v.chunks_mut(LANES)).zip(f.chunks(LANES));
+    for ((u, v), f) in parts {
+        for lane in 0..f.len() {
+            v[lane] = keep * v[lane] + push * f[lane];
+            u[lane] += step * v[lane];
+            let size = v[lane].abs();
+            largest[lane] = if size > largest[lane] { size } else { largest[lane] };
+        }
+    }
+    largest.into_iter().fold(0.0, f64::max)
+}
+
+/// The second half likewise; Σ V v².
+fn free_kick(v: &mut [f64], f: &[f64], volumes: &[f64], push: f64) -> f64 {
+    let mut square = [0.0; LANES];
+    let parts = v.chunks_mut(LANES).zip(f.chunks(LANES)).zip(volumes.chunks(LANES));
+    for ((v, f), volumes) in parts {
+        for lane in 0..f.len() {
+            v[lane] += push * f[lane];
+            square[lane] += v[lane] * v[lane] * volumes[lane];
+        }
+    }
+    square.iter().sum()
+}
+
+/// Slots of the work items that hold some particles, ascending.
+pub fn chunks_of(slots: &[u32]) -> Vec<usize> {
+    let mut chunks: Vec<usize> = slots.iter().map(|&slot| slot as usize / CHUNK).collect();
+    chunks.sort_unstable();
+    chunks.dedup();
+    chunks
+}

@@ -1,0 +1,243 @@
+//! The critical time step Δt_c = 2/ω_max of explicit dynamics: a bound for every deformation within a range of stretches,
+//! and the sharp value of one deformation.
+
+use super::system::{State, System};
+use crate::field::{CHUNK, Field, chunk_range};
+use rayon::prelude::*;
+
+/// Displacement, in shortest bonds, by which the tangent's force differences are taken: truncation and rounding are both
+/// about 1e-10 of the force.
+const PROBE: f64 = 1e-5;
+/// Residual of the Ritz pair, over its value, at which the sharp frequency is good enough.
+const ENOUGH: f64 = 1e-4;
+/// Most steps of the Lanczos iteration.
+const MOST_STEPS: usize = 200;
+/// Samples of a law over a range of stretches.
+const SAMPLES: u32 = 200;
+
+/// What bounds the frequencies of a body, and what its bonds can store at most and least.
+#[derive(Clone, Copy, Debug)]
+pub struct Family {
+    /// max_I Σ_J 2 w V_J/|ξ|: the stiffness of a particle's bonds for a unit tangent kθ t′, m.
+    pub stiffness: f64,
+    /// Shortest bond, m; ∞ without bonds.
+    pub shortest: f64,
+    /// Σ_I V_I Σ_J w V_J |ξ|: the energy of all bonds for kθ φ = 1.
+    pub extent: f64,
+}
+
+impl Family {
+    /// One visit of all bonds.
+    pub fn new<const D: usize>(system: &System<D>) -> Self {
+        let of = |slots: &[u32]| {
+            let mut part = Self { stiffness: 0.0, shortest: f64::INFINITY, extent: 0.0 };
+            for &slot in slots {
+                let (mut stiffness, mut extent) = (0.0, 0.0);
+                system.bonds.neighbours(slot as usize, &mut |bond| {
+                    stiffness += 2.0 * bond.weight / bond.length;
+                    extent += bond.weight * bond.length;
+                    part.shortest = part.shortest.min(bond.length);
+                });
+                part.stiffness = part.stiffness.max(stiffness);
+                part.extent += system.bonds.volume(slot as usize) * extent;
+            }
+            part
+        };
+        let parts: Vec<Self> = system.bonds.particles().par_chunks(CHUNK).map(of).collect();
+        parts.into_iter().fold(Self { stiffness: 0.0, shortest: f64::INFINITY, extent: 0.0 }, |a, b| Self {
+            stiffness: a.stiffness.max(b.stiffness),
+            shortest: a.shortest.min(b.shortest),
+            extent: a.extent + b.extent,
+        })
+    }
+}
+
+/// What a bond law does over a range of stretches, all over kθ.
+#[derive(Clone, Copy, Debug)]
+pub struct LawRange {
+    /// max |t′| + (D − 1)·max(t/λ, 0): D times the mean tangent of bonds in all directions, where it is greatest.
+    pub mean_tangent: f64,
+    /// min |t′|.
+    pub least_tangent: f64,
+    /// min φ ≤ 0.
+    pub least_energy: f64,
+}
+
+impl LawRange {
+    /// Samples the law over the stretches [low, high].
+    pub fn new<const D: usize>(system: &System<D>, [low, high]: [f64; 2]) -> Self {
+        let (mut steepest, mut tension) = (0.0_f64, 0.0_f64);
+        let mut range = Self { mean_tangent: 0.0, least_tangent: f64::INFINITY, least_energy: 0.0 };
+        for k in 0..=SAMPLES {
+            let stretch = low + (high - low) * f64::from(k) / f64::from(SAMPLES);
+            let slope = system.law.tension_derivative(stretch).abs();
+            steepest = steepest.max(slope);
+            tension = tension.max(system.law.tension(stretch) / stretch);
+            range.least_tangent = range.least_tangent.min(slope);
+            range.least_energy = range.least_energy.min(system.law.energy(stretch));
+        }
+        range.mean_tangent = steepest + (D - 1) as f64 * tension;
+        range
+    }
+}
+
+/// 2/ω, ∞ where nothing oscillates.
+pub fn critical(frequency_squared: f64) -> f64 {
+    if frequency_squared > 0.0 { 2.0 / frequency_squared.sqrt() } else { f64::INFINITY }
+}
+
+/// ω_max² of the tangent −∂f/∂u/ρ at a state, 1/s², by the Lanczos iteration (1950, doi:10.6028/jres.045.026) on
+/// differences of forces, held components at rest; 0 where the greatest is not positive.
+///
+/// Volumes are the weights of the inner product in which the tangent is symmetric. The Ritz value is a lower bound, off by
+/// less than its residual, 1e-4 of it.
+pub fn largest_frequency_squared<const D: usize>(
+    system: &System<D>,
+    state: &mut State<D>,
+    volumes: &[f64],
+    density: f64,
+    shortest: f64,
+) -> f64 {
+    if !shortest.is_finite() {
+        return 0.0;
+    }
+    let mut now = start(system);
+    let mut before = Field::zeros(system.bonds.slots());
+    let mut product = before.clone();
+    let mut scratch = [before.clone(), before.clone()];
+    let size = product_of(&now, &now, volumes).sqrt();
+    if size == 0.0 {
+        return 0.0;
+    }
+    scale(&mut now, 1.0 / size);
+    let (mut diagonal, mut beside): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    let mut value = 0.0;
+    for step in 1..=MOST_STEPS {
+        tangent(system, state, &now, shortest, density, &mut scratch, &mut product);
+        diagonal.push(product_of(&now, &product, volumes));
+        let (alpha, beta) = (diagonal[step - 1], beside.last().copied().unwrap_or(0.0));
+        combine(&mut product, [(-alpha, &now), (-beta, &before)]);
+        let next = product_of(&product, &product, volumes).sqrt();
+        let exhausted = next.is_nan() || next <= 1e-12 * alpha.abs() || step == MOST_STEPS;
+        // the small problem costs as the cube of its size: not at every step
+        if exhausted || step.is_multiple_of(5) {
+            let (largest, last) = largest_pair(&diagonal, &beside);
+            value = largest;
+            if exhausted || next * last.abs() <= ENOUGH * value.abs() {
+                break;
+            }
+        }
+        scale(&mut product, 1.0 / next);
+        std::mem::swap(&mut before, &mut now);
+        std::mem::swap(&mut now, &mut product);
+        beside.push(next);
+    }
+    value.max(0.0)
+}
+
+/// Largest eigenvalue of the tridiagonal matrix, and the last component of its unit vector.
+fn largest_pair(diagonal: &[f64], beside: &[f64]) -> (f64, f64) {
+    let size = diagonal.len();
+    let matrix = nalgebra::DMatrix::from_fn(size, size, |i, j| match i.abs_diff(j) {
+        0 => diagonal[i],
+        1 => beside[i.min(j)],
+        _ => 0.0,
+    });
+    if matrix.iter().any(|x| !x.is_finite()) {
+        return (f64::INFINITY, 0.0);
+    }
+    let eigen = matrix.symmetric_eigen();
+    let (k, value) = eigen.eigenvalues.argmax();
+    (value, eigen.eigenvectors[(size - 1, k)])
+}
+
+/// −(∂f/∂u)x/ρ by a central difference.
+fn tangent<const D: usize>(
+    system: &System<D>,
+    state: &mut State<D>,
+    direction: &Field<D>,
+    shortest: f64,
+    density: f64,
+    scratch: &mut [Field<D>; 2],
+    product: &mut Field<D>,
+) {
+    let largest = direction.components().iter().flat_map(|c| c.iter()).fold(0.0_f64, |m, x| m.max(x.abs()));
+    let probe = PROBE * shortest / largest;
+    let [moved, force] = scratch;
+    for (sign, out) in [(1.0, &mut *product), (-1.0, force)] {
+        moved.clone_from(&state.displacement);
+        combine(moved, [(sign * probe, direction), (0.0, direction)]);
+        let moved = &*moved;
+        out.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
+            system.internal_force(moved, chunk, &mut out, None);
+        });
+        system.count_evaluation(state);
+    }
+    let factor = -0.5 / (probe * density);
+    combine(product, [(-1.0, &scratch[1]), (0.0, &scratch[1])]);
+    scale(product, factor);
+    if system.loads.held.is_empty() {
+        return;
+    }
+    for &slot in system.bonds.particles() {
+        let held = system.loads.held(slot as usize);
+        if held != 0 {
+            let value = product.get(slot as usize);
+            let value = std::array::from_fn(|d| if held >> d & 1 == 1 { 0.0 } else { value[d] });
+            product.set(slot as usize, value);
+        }
+    }
+}
+
+/// A start with a part of every mode: Knuth's linear congruential generator, free components only.
+fn start<const D: usize>(system: &System<D>) -> Field<D> {
+    let mut field = Field::zeros(system.bonds.slots());
+    let mut seed = 1_u64;
+    for &slot in system.bonds.particles() {
+        let held = system.loads.held(slot as usize);
+        let value = std::array::from_fn(|d| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            if held >> d & 1 == 1 { 0.0 } else { (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0 }
+        });
+        field.set(slot as usize, value);
+    }
+    field
+}
+
+/// Σ V x·y, work item by work item in order.
+fn product_of<const D: usize>(a: &Field<D>, b: &Field<D>, volumes: &[f64]) -> f64 {
+    let slots = volumes.len();
+    let (a, b) = (a.components(), b.components());
+    let of = |chunk: usize| {
+        let range = chunk_range(chunk, slots);
+        let of_axis = |d: usize| {
+            let parts = a[d][range.clone()].iter().zip(&b[d][range.clone()]).zip(&volumes[range.clone()]);
+            parts.map(|((x, y), v)| x * y * v).sum::<f64>()
+        };
+        (0..D).map(of_axis).sum()
+    };
+    let parts: Vec<f64> = (0..slots.div_ceil(CHUNK)).into_par_iter().map(of).collect();
+    parts.iter().sum()
+}
+
+fn scale<const D: usize>(field: &mut Field<D>, factor: f64) {
+    field
+        .chunks_mut()
+        .into_par_iter()
+        .for_each(|chunk| chunk.into_iter().flatten().for_each(|x| *x *= factor));
+}
+
+/// field += Σ factor·other.
+fn combine<const D: usize>(field: &mut Field<D>, others: [(f64, &Field<D>); 2]) {
+    let slots = field.slots();
+    let [(first, a), (second, b)] = others;
+    let (a, b) = (a.components(), b.components());
+    field.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, out)| {
+        let range = chunk_range(chunk, slots);
+        for (d, out) in out.into_iter().enumerate() {
+            for ((x, a), b) in out.iter_mut().zip(&a[d][range.clone()]).zip(&b[d][range.clone()]) {
+                *x += first * a + second * b;
+            }
+        }
+    });
+}

@@ -1,0 +1,417 @@
+//! Explicit dynamics: velocity Verlet, with every energy that the integrator exchanges.
+//!
+//! ρü = f + F(t)b − cρu̇ with the load factor F rising linearly over a ramp; held components follow F(t)d and its rate.
+//! v₊ = v + ½Δt a, u ← u + Δt v₊, v ← v₊ + ½Δt a, the new a = (f + Fb)/ρ − cv; Swope et al. (1982),
+//! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
+//! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
+
+use super::leap::{Leap, Sums, chunks_of, force_pass, kick_pass, leap_pass, refresh};
+use super::march::{Watch, stored_energy};
+use super::system::{Record, State, Status, System};
+use super::time_step::{Family, LawRange, critical, largest_frequency_squared};
+use crate::bonds::{Bonds, StretchRange, stretch_range};
+use crate::error::Error;
+use crate::potential::EnergyTable;
+use serde::{Deserialize, Serialize};
+
+/// Part of the energy turned over by which the kinetic energy may exceed what is available before the run is given up:
+/// far above the O(Δt²) error of steps below the critical one, passed within a few steps beyond it.
+const EXCESS: f64 = 0.25;
+/// Steps at the start in which a ramped load has not yet done work that the excess could be a part of: the kinetic energy
+/// exceeds the work by (3/n²)·¼ after n steps.
+const LENIENT: u64 = 8;
+
+/// Settings of explicit dynamics. [`State::velocity`] is the velocity at the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VelocityVerlet {
+    /// Mass density ρ, kg/m³.
+    pub density: f64,
+    /// Largest time step Δt, s; `None`: `safety` times the critical one, reduced where the law stiffens on the way.
+    pub time_step: Option<f64>,
+    /// Part of the critical time step taken where none is given.
+    pub safety: f64,
+    /// Mass-proportional damping c, 1/s, of components that are not held.
+    pub damping: f64,
+    /// Time over which the loads rise to their full value, s; 0: at once.
+    pub ramp: f64,
+    /// When to end, s.
+    pub end_time: f64,
+    /// Rows of history, equally far apart; steps are shortened evenly to fall on them.
+    pub records: usize,
+}
+
+/// Where the dynamics of a state are; all zero for a body at the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Motion {
+    /// Time, s.
+    pub time: f64,
+    /// Time step, s.
+    pub time_step: f64,
+    /// Critical time step 2/ω_max of the body at the start, s (sharp).
+    pub critical_step: f64,
+    /// Lower bound of the critical time step by Gershgorin's theorem for all stretches covered, s.
+    pub gershgorin_step: f64,
+    /// Estimate of the critical time step for all stretches covered, s: between the two.
+    pub covered_step: f64,
+    /// Kinetic energy, J.
+    pub kinetic: f64,
+    /// Energy that the damping has taken, J.
+    pub damped: f64,
+    begun: bool,
+    /// Longest step in use, s.
+    longest: f64,
+    /// Start of the run of equal steps under way, their number and how many are done.
+    origin: f64,
+    planned: u64,
+    taken: u64,
+    /// Σ-bounds of the unbroken body, see [`Family`].
+    stiffness: f64,
+    shortest: f64,
+    extent: f64,
+    /// ω_max² at the start over the law's tangent there.
+    frequency: f64,
+    /// Least energy that the bonds can hold.
+    floor: f64,
+    /// Largest of what was available and what has gone.
+    turnover: f64,
+    /// Stretches at the last look, and how much they may have changed since.
+    looked: [f64; 2],
+    slack: f64,
+}
+
+impl VelocityVerlet {
+    /// Steps of 0.9 of the critical one up to `end_time`, no damping, loads at once, 100 rows of history.
+    pub fn new(density: f64, end_time: f64) -> Self {
+        Self { density, time_step: None, safety: 0.9, damping: 0.0, ramp: 0.0, end_time, records: 100 }
+    }
+
+    /// Goes on from `state` to the end time. Bonds break in every step whose stretches ask for it. `watch` sees every step
+    /// and may stop the run by an error; `finished` sees every row of the history. [`System::factors`] and
+    /// [`System::stop_below`] are not used.
+    ///
+    /// A state that has not moved yet, or the equilibrium that another method found (its velocities set anew), is where
+    /// time begins: [`State::work`] is set to the energy that is there, so that kinetic + stored + released + damped = work
+    /// in every row but for O(Δt²).
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for settings out of their domain; [`Error::TimeStep`] for a time step beyond the critical one;
+    /// [`Error::Unstable`] where energy grows from nothing; [`Error::NotFinite`] for a state that is not finite at the
+    /// start; [`Error::Geometry`] as [`System::restore`]; whatever `watch` and `finished` return.
+    pub fn solve<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        watch: &mut Watch<D>,
+        finished: &mut dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        self.check()?;
+        let volumes = volumes(system);
+        if state.motion.begun {
+            system.restore(state)?;
+        } else {
+            self.begin(system, state, &volumes)?;
+        }
+        let mut table = None;
+        while state.step < self.records {
+            let end = self.end_time * (state.step + 1) as f64 / self.records as f64;
+            if state.motion.planned == 0 {
+                state.motion.plan(end);
+            }
+            while state.motion.taken < state.motion.planned {
+                self.advance(system, state, &volumes, end)?;
+                watch(&self.status(state), state)?;
+            }
+            self.record(system, state, &mut table);
+            state.step += 1;
+            (state.iteration, state.step_iterations, state.motion.planned) = (0, 0, 0);
+            finished(&*system.bonds, state)?;
+        }
+        Ok(())
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let step = self.time_step.unwrap_or(1.0);
+        let positive = "above 0, finite";
+        let checks = [
+            ("density", self.density, self.density > 0.0, positive),
+            ("time step", step, step > 0.0, positive),
+            (
+                "safety of the time step",
+                self.safety,
+                self.safety > 0.0 && self.safety <= 1.0,
+                "above 0, up to 1",
+            ),
+            ("damping", self.damping, self.damping >= 0.0, "0 or above, finite"),
+            ("ramp", self.ramp, self.ramp >= 0.0, "0 or above, finite"),
+            ("end time", self.end_time, self.end_time > 0.0, positive),
+            ("records", self.records as f64, self.records > 0, "1 or more"),
+        ];
+        match checks.into_iter().find(|(_, found, good, _)| !good || !found.is_finite()) {
+            Some((name, found, _, allowed)) => Err(Error::Parameter { name, found, allowed: allowed.into() }),
+            None => Ok(()),
+        }
+    }
+
+    /// Load factor at a time, and its rate from there on.
+    fn factor(&self, time: f64) -> (f64, f64) {
+        if time < self.ramp { (time / self.ramp, 1.0 / self.ramp) } else { (1.0, 0.0) }
+    }
+
+    /// Loads at time 0, forces, energies, the critical time step.
+    fn begin<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        volumes: &[f64],
+    ) -> Result<(), Error> {
+        let (factor, rate) = self.factor(0.0);
+        for &slot in system.bonds.particles() {
+            let slot = slot as usize;
+            let held = system.loads.held(slot);
+            let Some(full) = system.loads.displacement.as_ref().map(|field| field.get(slot)) else { break };
+            let (mut u, mut v) = (state.displacement.get(slot), state.velocity.get(slot));
+            for d in (0..D).filter(|d| held >> d & 1 == 1) {
+                (u[d], v[d]) = (factor * full[d], rate * full[d]);
+            }
+            state.displacement.set(slot, u);
+            state.velocity.set(slot, v);
+        }
+        if state.displacement.non_finite().is_some() || state.velocity.non_finite().is_some() {
+            return Err(system.not_finite(state));
+        }
+        system.restore(state)?;
+        system.covers_stretches(state)?;
+        refresh(system, state, factor, None);
+        system.count_evaluation(state);
+        let met = state.balanced_stretches;
+        let stored = stored_energy(system, state, &EnergyTable::new(system.law, met));
+        let square = |slot: u32| state.velocity.get(slot as usize).iter().map(|v| v * v).sum::<f64>();
+        let particles = system.bonds.particles().iter();
+        let kinetic = particles.map(|&slot| volumes[slot as usize] * square(slot)).sum::<f64>();
+        let kinetic = 0.5 * self.density * kinetic;
+        if state.force.non_finite().is_some() || !(kinetic + stored).is_finite() {
+            return Err(system.not_finite(state));
+        }
+        state.work = kinetic + stored + state.released;
+        (state.step, state.iteration, state.step_iterations) = (0, 0, 0);
+        let Family { stiffness, shortest, extent } = Family::new(system);
+        let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
+        let range = [met.low, met.high].map(|e| (1.0 + e).max(0.0).sqrt());
+        let tangent = LawRange::new(system, range).least_tangent;
+        state.motion = Motion {
+            critical_step: critical(frequency),
+            kinetic,
+            begun: true,
+            stiffness,
+            shortest,
+            extent,
+            frequency: if frequency > 0.0 { frequency / tangent } else { 0.0 },
+            turnover: state.work,
+            ..Motion::default()
+        };
+        if let Some(found) = self.time_step.filter(|&found| found > state.motion.critical_step) {
+            return Err(Error::TimeStep { found, critical: state.motion.critical_step });
+        }
+        self.cover(system, state);
+        state.motion.see(met);
+        self.sever(system, state, met, factor);
+        Ok(())
+    }
+
+    /// What follows from the stretches that the fitted law covers: bounds of the critical time step and of the energy.
+    fn cover<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
+        let law = LawRange::new(system, state.fitted);
+        let motion = &mut state.motion;
+        // blocks of the tangent's rows: ω² ≤ ‖A_II‖ + Σ‖A_IJ‖ with ‖t′nn + t/λ(1 − nn)‖ ≤ max(|t′|, |t|/λ);
+        // Feingold & Varga (1962), doi:10.2140/pjm.1962.12.1241
+        let bound = 2.0 * motion.stiffness * state.tangent / self.density;
+        let estimate = (motion.frequency * law.mean_tangent).min(bound);
+        motion.gershgorin_step = critical(bound);
+        motion.covered_step = critical(if estimate.is_nan() { bound } else { estimate });
+        motion.floor = law.least_energy * system.modulus * motion.extent;
+        motion.longest = self.time_step.unwrap_or(self.safety * motion.covered_step);
+    }
+
+    /// One step.
+    fn advance<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        volumes: &[f64],
+        end: f64,
+    ) -> Result<(), Error> {
+        let after = state.motion.time_after(end);
+        let (before, (factor, rate)) = (self.factor(state.motion.time).0, self.factor(after));
+        let (density, damping, step) = (self.density, self.damping, state.motion.time_step);
+        let leap = Leap { step, density, damping, factors: [before, factor], rate };
+        let first = leap_pass(&system.loads, state, volumes, &leap);
+        // two ends, √D components
+        state.motion.slack += 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
+        let look = state.motion.must_look(state.fitted, system.breaking.map(|b| b.stretch));
+        let (mut second, met) = force_pass(system, state, volumes, &leap, look);
+        system.count_evaluation(state);
+        if look {
+            state.met = state.met.join(met);
+            state.motion.see(met);
+            if state.met.high.is_finite() && system.widen(state)? {
+                refresh(system, state, factor, None);
+                system.count_evaluation(state);
+                self.cover(system, state);
+            }
+            second = kick_pass(&system.loads, state, volumes, &leap);
+        }
+        let motion = &mut state.motion;
+        motion.time = after;
+        motion.taken += 1;
+        state.iteration += 1;
+        state.step_iterations += 1;
+        state.total_iterations += 1;
+        self.account(state, first, second)?;
+        if look {
+            self.sever(system, state, met, factor);
+            if state.motion.longest < (1.0 - 1e-9) * state.motion.time_step
+                && state.motion.taken < state.motion.planned
+            {
+                state.motion.plan(end);
+            }
+        }
+        Ok(())
+    }
+
+    /// Energies of a step, and whether they may be.
+    fn account<const D: usize>(&self, state: &mut State<D>, first: Sums, second: Sums) -> Result<(), Error> {
+        let motion = &mut state.motion;
+        motion.kinetic = second.kinetic;
+        motion.damped += first.damped + second.damped;
+        state.work += first.work + second.work;
+        let gone = state.released + motion.damped;
+        let available = state.work - gone - motion.floor;
+        motion.turnover = motion.turnover.max(available).max(gone);
+        let most = available.max(0.0) + EXCESS * motion.turnover;
+        let grown = motion.kinetic > most && state.total_iterations > LENIENT;
+        if grown || !motion.kinetic.is_finite() || !available.is_finite() {
+            return Err(Error::Unstable {
+                time: motion.time,
+                step: state.total_iterations,
+                kinetic: motion.kinetic,
+                available,
+                time_step: motion.time_step,
+                critical: motion.covered_step,
+            });
+        }
+        Ok(())
+    }
+
+    /// Breaks what is overstretched; the forces are then those of what is left.
+    fn sever<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        met: StretchRange,
+        factor: f64,
+    ) {
+        if system.is_overstretched(met) {
+            let slots = system.break_bonds(state);
+            refresh(system, state, factor, Some(&chunks_of(&slots)));
+        }
+    }
+
+    fn status<const D: usize>(&self, state: &State<D>) -> Status {
+        Status {
+            step: state.step,
+            steps: self.records,
+            iteration: state.iteration,
+            residual: 1.0 - state.motion.taken as f64 / state.motion.planned as f64,
+            tolerance: 0.1,
+            reaction: 0.0,
+            damping: self.damping,
+            broken: state.broken,
+            restartable: true,
+        }
+    }
+
+    /// A row of history.
+    fn record<const D: usize>(&self, system: &System<D>, state: &mut State<D>, table: &mut Table) {
+        let met = stretch_range(&*system.bonds, &state.displacement);
+        system.count_evaluation(state);
+        let stored = stored(system, state, met, table);
+        let (factor, _) = self.factor(state.motion.time);
+        let (pull, _) = system.loads.conjugates(&*system.bonds, &state.displacement, &state.force);
+        let reach = system.loads.reach(&*system.bonds);
+        let load = if reach > 0.0 { pull / reach } else { factor * system.loads.applied(&*system.bonds) };
+        let record = Record {
+            factor,
+            load,
+            reactions: system.loads.reactions(&*system.bonds, &state.force),
+            residual: 0.0,
+            iterations: state.step_iterations,
+            rounds: 1,
+            broken: state.broken,
+            detached: state.detached,
+            stored,
+            work: state.work,
+            released: state.released,
+            largest_stretch: (1.0 + met.high).sqrt(),
+            time: state.motion.time,
+            kinetic: state.motion.kinetic,
+            damped: state.motion.damped,
+        };
+        state.history.push(record);
+    }
+}
+
+/// The energies of all stretches that a fit covers, once computed.
+type Table = Option<([f64; 2], EnergyTable)>;
+
+/// The energy of all bonds, J. A law costs more to sample than bonds to sum: the table is kept as long as the fit.
+fn stored<const D: usize>(system: &System<D>, state: &State<D>, met: StretchRange, table: &mut Table) -> f64 {
+    let [low, high] = state.fitted.map(|stretch| stretch * stretch - 1.0);
+    if met.low < low || met.high > high {
+        return stored_energy(system, state, &EnergyTable::new(system.law, met));
+    }
+    if table.as_ref().is_none_or(|(fitted, _)| *fitted != state.fitted) {
+        *table = Some((state.fitted, EnergyTable::new(system.law, StretchRange { low, high })));
+    }
+    table.as_ref().map_or(0.0, |(_, table)| stored_energy(system, state, table))
+}
+
+impl Motion {
+    /// Equal steps from now to `end`, none longer than allowed.
+    fn plan(&mut self, end: f64) {
+        let left = end - self.time;
+        self.origin = self.time;
+        self.planned = (left / self.longest - 1e-9).ceil().max(1.0) as u64;
+        self.taken = 0;
+        self.time_step = left / self.planned as f64;
+    }
+
+    /// The time at the end of the next step.
+    fn time_after(&self, end: f64) -> f64 {
+        let taken = self.taken + 1;
+        if taken == self.planned { end } else { self.origin + taken as f64 * self.time_step }
+    }
+
+    /// Notes the stretches of a look.
+    fn see(&mut self, met: StretchRange) {
+        self.looked = [met.low, met.high].map(|e| (1.0 + e).max(0.0).sqrt());
+        self.slack = 0.0;
+    }
+
+    /// Whether stretches may have left what is fitted, or reached the critical one. A bond's stretch changes by no more
+    /// than its ends' increments over its length.
+    fn must_look(&self, fitted: [f64; 2], critical: Option<f64>) -> bool {
+        let [low, high] = [self.looked[0] - self.slack, self.looked[1] + self.slack];
+        // NaN looks, too
+        let inside = low >= fitted[0] && high <= fitted[1] && critical.is_none_or(|c| high <= c);
+        !inside
+    }
+}
+
+/// Volumes of all slots, 0 where there is no particle.
+fn volumes<const D: usize>(system: &System<D>) -> Vec<f64> {
+    let mut volumes = vec![0.0; system.bonds.slots()];
+    for &slot in system.bonds.particles() {
+        volumes[slot as usize] = system.bonds.volume(slot as usize);
+    }
+    volumes
+}
