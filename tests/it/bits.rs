@@ -1,7 +1,7 @@
 //! The results are the same bits on any number of threads.
 
 use crate::program::peri;
-use crate::results::{assert_same, report};
+use crate::results::{assert_same, report, scalar};
 use crate::scenes;
 use std::fs;
 use std::path::Path;
@@ -32,6 +32,30 @@ fn cracked_bar_in_three_dimensions() {
     on_any_number_of_threads(here);
     let work = &report(&here.join("out1"))["work"];
     assert_eq!((&work["particles"], &work["steps"]), (&320.into(), &3.into()));
+}
+
+/// A sheet torn apart, its bonds looked at in equilibrium or in every iteration.
+#[test]
+fn fracture() {
+    for solver in ["", "breaking = \"each-iteration\""] {
+        let directory = tempfile::tempdir().unwrap();
+        let here = directory.path();
+        fs::write(here.join("scene.toml"), scenes::fracture("4 mm", solver)).unwrap();
+        on_any_number_of_threads(here);
+        let report = report(&here.join("out1"));
+        assert_eq!(scalar(&report, "fragments"), 2.0);
+        let [peak, last] = ["peak_load", "last_load"].map(|name| scalar(&report, name));
+        assert!(peak > 50.0 && last.abs() < 0.02 * peak, "{peak} N, {last} N");
+        // what the loads did is stored, was released by breaking, or was damped
+        let [work, stored, released, damped] =
+            ["work_of_loads", "stored_energy", "released_energy", "damped_energy"]
+                .map(|name| scalar(&report, name));
+        assert!((work - stored - released - damped).abs() < 1e-12 * work);
+        assert!(
+            released > 0.0 && damped > 0.0 && stored < 1e-3 * work,
+            "{stored} {released} {damped} of {work} J"
+        );
+    }
 }
 
 #[test]

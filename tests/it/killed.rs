@@ -54,9 +54,19 @@ fn interrupt(here: &Path, signal: &str) -> crate::program::Ended {
 
 #[test]
 fn killed_at_random_times() {
+    survives_kills(&scenes::plate(LONG.0, LONG.1));
+}
+
+/// Broken bonds, histories and the fields of stages come back with the rest.
+#[test]
+fn killed_while_it_breaks() {
+    survives_kills(&scenes::fracture("2 mm", ""));
+}
+
+fn survives_kills(scene: &str) {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    fs::write(here.join("plate.toml"), scenes::plate(LONG.0, LONG.1)).unwrap();
+    fs::write(here.join("plate.toml"), scene).unwrap();
     peri("run plate.toml --output undisturbed --threads 1", here).with_code(0);
     let mut random = Random(2026);
     let mut kills = 0;

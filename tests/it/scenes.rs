@@ -125,6 +125,50 @@ pub fn points() -> String {
     text
 }
 
+/// A cracked sheet that is pulled apart, with fields of its stages; `solver` adds lines to its settings.
+pub fn fracture(spacing: &str, solver: &str) -> String {
+    format!(
+        r#"version = 1
+program = "peri"
+
+[body]
+space = "plane-stress"
+thickness = "3 mm"
+spacing = "{spacing}"
+shapes = [{{ add = "box", min = ["-40 mm", "-100 mm"], max = ["40 mm", "100 mm"] }}]
+cracks = [{{ from = ["-41 mm", "0 mm"], to = ["-20 mm", "0 mm"] }}]
+
+[material]
+youngs_modulus = "0.6 MPa"
+law = "subtract"
+links = 720
+dissociation = 1200
+critical = {{ percent_over_contour = 1.2 }}
+
+[[boundary]]
+name = "grip"
+side = "y-"
+displacement = ["0 mm", "0 mm"]
+
+[[boundary]]
+side = "y+"
+displacement = ["0 mm", "240 mm"]
+
+[solver]
+steps = 60
+stop_below = 0.02
+{solver}
+
+[stress]
+measures = ["hardy"]
+
+[output]
+every = 10
+load_at = ["20 mm"]
+"#
+    )
+}
+
 /// A small generator of numbers in [0, 1) (Knuth's MMIX constants), the same in every run.
 pub struct Random(pub u64);
 

@@ -327,6 +327,10 @@ fn explanation_in<const D: usize>(
 ) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
     for variant in scene::check(source, scene, quick)? {
+        if let Some(error) = expected_error(scene, &variant) {
+            lines.push(format!("variant {}\n  must fail  with `{error}`", variant.name()));
+            continue;
+        }
         let (source, scene) = variant.resolve(source, scene);
         let body = body_of::<D>(&source, &scene, &variant)?;
         loads_of(&source, &scene, &body)?;

@@ -127,7 +127,7 @@ pub(super) fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Ve
             study.volume_correction.clone()
         };
         for (k, &spacing) in spacings.iter().enumerate() {
-            if scene.body.points.is_none() {
+            if !study.spacing.is_empty() {
                 positive(source, &format!("study[{index}].spacing[{k}]"), spacing, "m")?;
             }
             for (k, &horizon_ratio) in ratios.iter().enumerate() {
