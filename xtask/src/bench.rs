@@ -11,13 +11,19 @@ use serde::{Deserialize, Serialize};
 use crate::table::{Table, print};
 use crate::workspace::Workspace;
 
+mod forces;
+mod lammps;
 mod langevin;
+mod peri_peers;
 
 /// What to measure.
 #[derive(clap::Args)]
 pub struct Options {
-    /// `langevin`, or a program with a `bench --json` of its own.
+    /// `langevin`, `peri-peers` (beside LAMMPS), or a program with a `bench --json` of its own.
     name: String,
+    /// Print the rows as JSON.
+    #[arg(long)]
+    json: bool,
     /// Passed on to that program after `bench --json`.
     #[arg(last = true)]
     arguments: Vec<String>,
@@ -41,20 +47,29 @@ pub struct Row {
 /// Measures, prints and writes.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let folder = workspace.results("bench")?;
-    let (rows, table) = match options.name.as_str() {
-        "langevin" if options.arguments.is_empty() => langevin::run(&folder)?,
-        "langevin" => return Err(miette!("`bench langevin` takes no arguments")),
+    let (rows, table, passed) = match options.name.as_str() {
+        "langevin" | "peri-peers" if !options.arguments.is_empty() => {
+            return Err(miette!("`bench {}` takes no arguments", options.name));
+        }
+        "langevin" => {
+            let (rows, table) = langevin::run(&folder)?;
+            (rows, table, true)
+        }
+        "peri-peers" => peri_peers::run(workspace, &folder)?,
         program => {
             let rows = external(&workspace.release(program)?, &options.arguments)?;
             let table = text(&rows);
-            (rows, table)
+            (rows, table, true)
         }
     };
-    print(&table);
     let path = folder.join(format!("{}.json", options.name));
     write(&path, &rows)?;
-    print(&format!("written: {}\n", workspace.short(&path)));
-    Ok(true)
+    if options.json {
+        print(&(serde_json::to_string_pretty(&rows).into_diagnostic()? + "\n"));
+    } else {
+        print(&format!("{table}written: {}\n", workspace.short(&path)));
+    }
+    Ok(passed)
 }
 
 /// Runs `PROGRAM bench --json ARGUMENTS`, which prints the rows as a JSON list.

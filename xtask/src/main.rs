@@ -31,7 +31,7 @@ enum Task {
     },
     /// Run the cases and judge everything that they expect; results go to target/validate.
     Validate(validate::Options),
-    /// Measure: `langevin`, or a program that has a `bench --json` of its own (`peri`).
+    /// Measure: `langevin`, `peri-peers`, or a program that has a `bench --json` of its own (`peri`).
     Bench(bench::Options),
     /// Check the tree: lengths of source files, sizes of files in git.
     Tidy,

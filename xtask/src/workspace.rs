@@ -26,6 +26,11 @@ impl Workspace {
         &self.root
     }
 
+    /// Where cargo puts build products.
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
     /// A folder for results under target/, created if needed.
     pub fn results(&self, name: &str) -> Result<PathBuf> {
         let folder = self.target.join(name);

@@ -10,6 +10,8 @@ use serde::Serialize;
 use std::hint::black_box;
 use std::time::Instant;
 
+mod block;
+
 /// Horizon over spacing of every measurement.
 const RATIO: f64 = 3.015;
 /// Repetitions, of which the median counts.
@@ -22,11 +24,13 @@ pub struct Bench {
     #[arg(long)]
     json: bool,
     /// Largest number of particles.
-    #[arg(long, default_value_t = 1e7)]
+    #[arg(long, default_value_t = 1e7, conflicts_with = "block")]
     largest: f64,
     /// Thread counts.
-    #[arg(long, value_delimiter = ',', default_values_t = [1, 2])]
+    #[arg(long, value_delimiter = ',', default_values_t = [1, 2], conflicts_with = "block")]
     bench_threads: Vec<usize>,
+    #[command(flatten)]
+    block: block::Options,
 }
 
 #[derive(Serialize)]
@@ -41,17 +45,10 @@ struct Row {
 impl Bench {
     /// Measures and prints.
     pub fn print(self) -> Result<bool, Failure> {
-        let mut rows = Vec::new();
-        for &threads in &self.bench_threads {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
-                peri::Error::Parameter {
-                    name: "--bench-threads",
-                    found: threads as f64,
-                    allowed: error.to_string(),
-                }
-            })?;
-            pool.install(|| self.measure(threads, &mut rows))?;
-        }
+        let rows = match self.block.block {
+            Some(cells) => block::measure(cells, &self.block)?,
+            None => self.rates()?,
+        };
         if self.json {
             println!("{}", serde_json::to_string_pretty(&rows).unwrap_or_default());
         } else {
@@ -63,6 +60,21 @@ impl Bench {
             }
         }
         Ok(true)
+    }
+
+    fn rates(&self) -> Result<Vec<Row>, Failure> {
+        let mut rows = Vec::new();
+        for &threads in &self.bench_threads {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
+                peri::Error::Parameter {
+                    name: "--bench-threads",
+                    found: threads as f64,
+                    allowed: error.to_string(),
+                }
+            })?;
+            pool.install(|| self.measure(threads, &mut rows))?;
+        }
+        Ok(rows)
     }
 
     fn measure(&self, threads: usize, rows: &mut Vec<Row>) -> Result<(), Failure> {
