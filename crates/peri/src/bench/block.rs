@@ -65,7 +65,7 @@ fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
     if (least..=most).contains(&value) {
         Ok(value)
     } else {
-        Err(format!("{value} is not within {least} to {most}"))
+        Err(format!("{value} is not within {least:?} to {most:?}"))
     }
 }
 
