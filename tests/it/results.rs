@@ -49,11 +49,13 @@ fn without_times(mut report: Value) -> String {
     let report_map = report.as_object_mut().unwrap();
     report_map.remove("seconds").unwrap();
     report_map.remove("provenance").unwrap();
-    for value in report["values"].as_object_mut().unwrap().values_mut() {
+    for (name, value) in report["values"].as_object_mut().unwrap() {
         if let Some(columns) = value["columns"].as_array_mut() {
             columns.retain(|column| column["unit"] != "s");
         }
-        assert_ne!(value["unit"], "s", "times belong to `seconds`: {value}");
+        // the body's own times are results, those of the machine are not
+        let own = name.contains("time_step");
+        assert!(own || value["unit"] != "s", "times belong to `seconds`: {name}: {value}");
     }
     format!("{report:#}")
 }

@@ -2,6 +2,7 @@
 
 use super::outcome::Outcome;
 use crate::scene::Scene;
+use crate::solver::Record;
 use polycore::Error;
 use polycore::output::csv;
 use polycore::output::picture::{LegendPlace, LinePlot, Series};
@@ -16,14 +17,28 @@ impl Outcome {
         if self.reach > 0.0 { factor * self.reach } else { factor }
     }
 
+    fn is_dynamic(&self) -> bool {
+        self.history.iter().any(|r| r.time > 0.0)
+    }
+
+    /// Energy that damping has taken, J: in quasi-static runs all that is neither stored nor released.
+    fn damped(&self, record: &Record) -> f64 {
+        if self.is_dynamic() { record.damped } else { record.work - record.stored - record.released }
+    }
+
     /// The steps as columns.
     pub fn columns(&self) -> Vec<Column> {
-        let each = |get: &dyn Fn(&crate::solver::Record) -> f64| self.history.iter().map(get).collect();
+        let each = |get: &dyn Fn(&Record) -> f64| self.history.iter().map(get).collect();
         let (name, unit) = if self.reach > 0.0 { ("displacement", "m") } else { ("load_factor", "") };
-        let mut columns: Vec<Column> = vec![
+        let mut columns: Vec<Column> = Vec::new();
+        columns.extend([
             (name.to_owned(), unit, each(&|r| self.abscissa(r.factor))),
             ("load".to_owned(), "N", each(&|r| r.load)),
-        ];
+        ]);
+        if self.is_dynamic() {
+            columns.push(("time".to_owned(), "s", each(&|r| r.time)));
+            columns.push(("kinetic".to_owned(), "J", each(&|r| r.kinetic)));
+        }
         for (index, region) in self.regions.iter().enumerate() {
             for (d, axis) in ["x", "y", "z"].iter().enumerate() {
                 let values: Vec<f64> =
@@ -43,7 +58,7 @@ impl Outcome {
             ("work".to_owned(), "J", each(&|r| r.work)),
             ("stored".to_owned(), "J", each(&|r| r.stored)),
             ("released".to_owned(), "J", each(&|r| r.released)),
-            ("damped".to_owned(), "J", each(&|r| r.work - r.stored - r.released)),
+            ("damped".to_owned(), "J", each(&|r| self.damped(r))),
         ]);
         columns
     }
@@ -78,7 +93,15 @@ impl Outcome {
         if scene.material.critical.is_some() {
             self.value("released_energy", last.released, "J");
         }
-        self.value("damped_energy", last.work - last.stored - last.released, "J");
+        self.value("damped_energy", self.damped(&last), "J");
+        if self.is_dynamic() {
+            // largest difference of what came in and what is there, over what was turned over
+            let off = |r: &Record| (r.work - r.stored - r.released - r.damped - r.kinetic).abs();
+            let most =
+                self.history.iter().map(|r| r.work.abs().max(r.kinetic)).fold(f64::MIN_POSITIVE, f64::max);
+            let error = self.history.iter().map(off).fold(0.0, f64::max) / most;
+            self.value("energy_error", error, "");
+        }
         let residual = self.history.iter().map(|r| r.residual).fold(0.0, f64::max);
         self.value("largest_residual", residual, "");
     }
@@ -195,7 +218,7 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
             .size(900.0, 560.0)
             .axes(label, "energy (J)")
             .legend(LegendPlace::TopLeft);
-        for name in ["work", "stored", "released", "damped"] {
+        for name in ["work", "stored", "kinetic", "released", "damped"] {
             if let Some(column) = columns.iter().find(|c| c.0 == name) {
                 plot = plot.series(Series::line(name, &x, &from_rest(&column.2, 1.0)));
             }

@@ -188,7 +188,11 @@ fn run_variant<const D: usize>(
     let Bonded { mut body, law, modulus, critical_stretch } = Bonded::new(source, scene, variant, body)?;
     phases.stop();
     let slots = body.bonds.slots();
+    let fresh = state.is_none();
     let mut state = state.unwrap_or_else(|| State::new(slots));
+    if fresh && scene.dynamics.is_some() {
+        state.velocity = scene::velocities_of(source, scene, &body)?;
+    }
     if state.displacement.slots() != slots {
         let why = format!("it has {} particles' slots, the body now has {slots}", state.displacement.slots());
         let path = options.output.join(checkpoint::FILE_NAME);
@@ -205,6 +209,11 @@ fn run_variant<const D: usize>(
     if let Some(critical) = critical_stretch {
         outcome.value("critical_stretch", critical, "");
         outcome.value("fragments", fragments(&*body.bonds) as f64, "");
+    }
+    if scene.dynamics.is_some() {
+        outcome.value("critical_time_step", state.motion.critical_step, "s");
+        outcome.value("time_step", state.motion.time_step, "s");
+        outcome.value("kinetic_energy", state.motion.kinetic, "J");
     }
     let stresses = frames.stresses(&*body.bonds, &state, &mut phases)?;
     outcome.history.clone_from(&state.history);
@@ -278,12 +287,16 @@ fn solve<const D: usize>(
     system.breaking = critical_stretch.map(|stretch| Breaking { stretch, policy: scene.solver.breaking });
     system.stop_below = scene.solver.stop_below.unwrap_or(0.0);
     phases.start("solve");
-    let solved = solver.solve(&mut system, state, &mut watch, &mut |bonds, state| {
+    let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {
         phases.stop();
         frames.step(bonds, state, phases)?;
         phases.start("solve");
         Ok(())
-    });
+    };
+    let solved = match &scene.dynamics {
+        Some(dynamics) => dynamics.method().solve(&mut system, state, &mut watch, &mut finished),
+        None => solver.solve(&mut system, state, &mut watch, &mut finished),
+    };
     phases.stop();
     Ok(solved?)
 }

@@ -1,7 +1,7 @@
 //! Values that can be judged without building anything, and the list of variants to run.
 
-use super::Scene;
 use super::variant::{Variant, variants};
+use super::{Method, Scene};
 use crate::calibrate::{Calibration, Space};
 use polycore::scene::{SceneError, Source};
 
@@ -70,7 +70,52 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             ));
         }
     }
+    dynamics(source, scene)?;
     output(source, scene)
+}
+
+fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let explicit = scene.solver.method == Method::Verlet;
+    match &scene.dynamics {
+        None if explicit => {
+            let allowed = "a [dynamics] block with `density` and `end_time`: `verlet` needs it";
+            return Err(source.error("dynamics", "nothing", allowed));
+        }
+        Some(_) if !explicit => {
+            let allowed = "nothing, or `solver.method = \"verlet\"`";
+            return Err(source.error("dynamics", "a [dynamics] block of a quasi-static method", allowed));
+        }
+        Some(dynamics) => {
+            let method = dynamics.method();
+            positive(source, "dynamics.density", method.density, "kg/m³")?;
+            positive(source, "dynamics.end_time", method.end_time, "s")?;
+            positive(source, "dynamics.time_step", method.time_step.unwrap_or(1.0), "s")?;
+            positive(source, "dynamics.records", method.records as f64, "")?;
+            for (key, value, most) in [
+                ("safety", method.safety, 1.0),
+                ("damping", method.damping, 1e12),
+                ("ramp", method.ramp, 1e12),
+            ] {
+                if !(0.0..=most).contains(&value) || (key == "safety" && value == 0.0) {
+                    let allowed = format!("0 to {most:e}");
+                    return Err(source.error(&format!("dynamics.{key}"), plain(value), allowed));
+                }
+            }
+        }
+        None => {}
+    }
+    let moving = scene.boundary.iter().position(|b| b.velocity.is_some());
+    match moving.filter(|_| !explicit) {
+        Some(index) => {
+            let key = format!("boundary[{index}].velocity");
+            Err(source.error(
+                &key,
+                "`velocity` of a quasi-static method",
+                "nothing, or `solver.method = \"verlet\"`",
+            ))
+        }
+        None => Ok(()),
+    }
 }
 
 fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {

@@ -1,7 +1,8 @@
 //! From a scene's boundaries to the loads and supports of a body.
 
 use super::build::{Body, ordered, vector};
-use super::{Boundary, Held, Scene};
+use super::{Boundary, Held, Method, Scene};
+use crate::field::Field;
 use crate::solver::{Loads, Support};
 use polycore::scene::{SceneError, Source};
 
@@ -29,6 +30,10 @@ pub fn loads_of<const D: usize>(
         regions.push((members, support));
     }
     let loads = Loads::new(body.bonds.slots(), &regions);
+    if scene.solver.method == Method::Verlet {
+        // a body in motion needs neither balance nor hold
+        return Ok((loads, loaded));
+    }
     balanced(source, scene, body, &loads)?;
     let all = (1_u8 << D) - 1;
     if body.bonds.particles().iter().all(|&slot| loads.held(slot as usize) == all) {
@@ -39,6 +44,26 @@ pub fn loads_of<const D: usize>(
         ));
     }
     Ok((loads, loaded))
+}
+
+/// Velocities at the start, m/s; the last region wins.
+///
+/// # Errors
+/// As [`super::body_of`].
+pub fn velocities_of<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<Field<D>, SceneError> {
+    let mut field = Field::zeros(body.bonds.slots());
+    for (index, boundary) in scene.boundary.iter().enumerate() {
+        let Some(velocity) = &boundary.velocity else { continue };
+        let (members, _) = region(source, &format!("boundary[{index}]"), boundary, body)?;
+        for slot in members {
+            field.set(slot as usize, std::array::from_fn(|d| velocity.get(d).map_or(0.0, |v| v.si())));
+        }
+    }
+    Ok(field)
 }
 
 /// A body that nothing holds is never at rest under forces that do not balance.
@@ -180,11 +205,18 @@ fn support<const D: usize>(
             Held::At(value) => Some(value),
         });
     }
-    if boundary.traction.is_none() && boundary.force.is_none() && boundary.displacement.is_none() {
+    if let Some(velocity) = &boundary.velocity {
+        count("velocity", velocity.len())?;
+    }
+    if boundary.traction.is_none()
+        && boundary.force.is_none()
+        && boundary.displacement.is_none()
+        && boundary.velocity.is_none()
+    {
         return Err(source.error(
             key,
             "a region without a condition",
-            "`traction`, `force` or `displacement`",
+            "`traction`, `force`, `displacement` or, in explicit dynamics, `velocity`",
         ));
     }
     Ok(support)

@@ -12,17 +12,17 @@ pub use build::{Body, body_of};
 pub use check::{check, check_variant};
 pub use explain::explain;
 pub use inclusion::with_inclusions;
-pub use loads::{loads_of, region_names};
+pub use loads::{loads_of, region_names, velocities_of};
 pub use variant::Variant;
 
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::critical::Critical;
 use crate::potential::Law;
-use crate::solver::Policy;
+use crate::solver::{Policy, VelocityVerlet};
 use crate::stress::{BallVolume, Measure};
 use polycore::report::Expect;
-use polycore::units::{Force, Length, Stress};
+use polycore::units::{Density, Force, Length, Rate, Speed, Stress, Time};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -45,6 +45,8 @@ pub struct Scene {
     /// Solver settings.
     #[serde(default)]
     pub solver: Solver,
+    /// Density and times of explicit dynamics.
+    pub dynamics: Option<Dynamics>,
     /// Stress output; without it no stress is computed.
     pub stress: Option<StressSpec>,
     /// A closed-form solution to compare with.
@@ -226,6 +228,8 @@ pub struct Boundary {
     pub traction: Option<Vec<Stress>>,
     /// Total force on the region, spread over its volume.
     pub force: Option<Vec<Force>>,
+    /// Velocity at the start, in explicit dynamics.
+    pub velocity: Option<Vec<Speed>>,
     /// Displacement at the end of the last step, component by component: a length or `"free"`.
     pub displacement: Option<Vec<Held>>,
 }
@@ -336,12 +340,49 @@ impl Default for Solver {
     }
 }
 
-/// Quasi-static methods.
+/// Methods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Adaptive dynamic relaxation.
+    /// Adaptive dynamic relaxation, quasi-static.
     Adr,
+    /// Velocity Verlet: explicit dynamics, with a `[dynamics]` block.
+    Verlet,
+}
+
+/// Explicit dynamics: loads rise linearly over the ramp and then stay.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Dynamics {
+    /// Mass density ρ.
+    pub density: Density,
+    /// When to end.
+    pub end_time: Time,
+    /// Time over which the loads rise; default: at once.
+    pub ramp: Option<Time>,
+    /// Largest time step; default: `safety` times the critical one.
+    pub time_step: Option<Time>,
+    /// Part of the critical time step; default 0.9.
+    pub safety: Option<f64>,
+    /// Mass-proportional damping; default: none.
+    pub damping: Option<Rate>,
+    /// Rows of history, equally far apart; default 100.
+    pub records: Option<usize>,
+}
+
+impl Dynamics {
+    /// The method with these settings.
+    pub fn method(&self) -> VelocityVerlet {
+        let plain = VelocityVerlet::new(self.density.si(), self.end_time.si());
+        VelocityVerlet {
+            time_step: self.time_step.map(|t| t.si()),
+            safety: self.safety.unwrap_or(plain.safety),
+            damping: self.damping.map_or(0.0, |c| c.si()),
+            ramp: self.ramp.map_or(0.0, |t| t.si()),
+            records: self.records.unwrap_or(plain.records),
+            ..plain
+        }
+    }
 }
 
 /// Stress output.
@@ -427,6 +468,8 @@ pub struct Study {
     pub boundary: Option<Vec<Boundary>>,
     /// Instead of `solver`.
     pub solver: Option<Solver>,
+    /// Instead of `dynamics`.
+    pub dynamics: Option<Dynamics>,
     /// Spacings.
     pub spacing: Vec<Length>,
     /// Horizon ratios.

@@ -68,13 +68,16 @@ impl Variant {
         }
         replace(&mut scene.boundary, study.boundary);
         replace(&mut scene.solver, study.solver);
+        if study.dynamics.is_some() {
+            scene.dynamics = study.dynamics;
+        }
         (source, scene)
     }
 }
 
 impl Study {
     /// Which key of the scene each key of a study stands for, and whether it is given.
-    pub(super) fn replaced(&self) -> [(&'static str, &'static str, bool); 6] {
+    pub(super) fn replaced(&self) -> [(&'static str, &'static str, bool); 7] {
         // the longer key first: it would be found under the shorter one
         [
             ("material.critical", "critical", self.critical.is_some()),
@@ -83,6 +86,7 @@ impl Study {
             ("body.cracks", "cracks", self.cracks.is_some()),
             ("boundary", "boundary", self.boundary.is_some()),
             ("solver", "solver", self.solver.is_some()),
+            ("dynamics", "dynamics", self.dynamics.is_some()),
         ]
     }
 }
