@@ -72,6 +72,10 @@ impl KernelFit {
                 allowed: "0 < low < high".to_owned(),
             });
         }
+        if !(bound > 0.0) {
+            let allowed = "above 0".to_owned();
+            return Err(Error::Parameter { name: "bound of the fitted law", found: bound, allowed });
+        }
         let target =
             Target { law, low: low * low - 1.0, high: high * high - 1.0, stress_free: law.is_stress_free() };
         let dense = target.samples(DENSE)?;

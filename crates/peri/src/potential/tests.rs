@@ -382,4 +382,7 @@ fn absurd_ranges_and_bounds_are_refused() {
     assert!(
         Law::Subtract.build(0.5, 1200.0, false).is_err() && Law::Chain.build(720.0, f64::NAN, false).is_err()
     );
+    for bound in [0.0, -1e-9, f64::NAN] {
+        assert!(KernelFit::new(&*law, [0.9, 1.1], bound).is_err(), "{bound}");
+    }
 }
