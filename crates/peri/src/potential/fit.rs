@@ -72,7 +72,7 @@ impl KernelFit {
                 allowed: "0 < low < high".to_owned(),
             });
         }
-        if !(bound > 0.0) {
+        if bound.is_nan() || bound <= 0.0 {
             let allowed = "above 0".to_owned();
             return Err(Error::Parameter { name: "bound of the fitted law", found: bound, allowed });
         }

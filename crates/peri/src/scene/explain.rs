@@ -26,9 +26,17 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bon
         bonds.bytes() as f64 / 1e6,
         (bonds.slots() * (3 * D + 1) * 8) as f64 / 1e6
     ));
+    if scene.material.critical.is_some() {
+        builds("bonds that break, damage, a count of the bonds of each particle".to_owned());
+    }
+    if let Some(dynamics) = &scene.dynamics {
+        let method = dynamics.method();
+        builds(format!("explicit dynamics up to {} s, {} rows of history", method.end_time, method.records));
+    }
     if let Some(stress) = &scene.stress {
         let names: Vec<&str> = stress.measures.iter().map(|m| m.name()).collect();
-        builds(format!("stress once per variant: {}", names.join(", ")));
+        let when = if scene.output.every.is_some() { "in the steps written" } else { "once per variant" };
+        builds(format!("stress {when}: {}", names.join(", ")));
     }
     let mut omits = |needed: bool, text: &str| {
         if !needed {
@@ -39,6 +47,7 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bon
     omits(variant.surface == SurfaceCorrection::Energy, "surface-correction factors");
     omits(variant.volume == VolumeCorrection::Linear, "volume correction");
     omits(scene.stress.is_some(), "the stress pass");
+    omits(scene.dynamics.is_some(), "inertia");
     omits(scene.material.critical.is_some(), "damage and bond breaking (no `critical` in this scene)");
     omits(scene.output.every.is_some(), "fields of the steps before the last");
     let held = scene.boundary.iter().any(|b| b.displacement.is_some());
