@@ -1,9 +1,12 @@
-//! The passes of a step of velocity Verlet over all slots: half a kick and the drift; forces; the other half.
+//! The passes of a step of velocity Verlet over all slots: half a kick and the drift; forces; the other half; and
+//! what a row of history sums.
 
 use super::load::Loads;
+use super::march::stored_energy;
 use super::system::{State, System};
 use crate::bonds::StretchRange;
 use crate::field::{CHUNK, chunk_range};
+use crate::potential::EnergyTable;
 use rayon::prelude::*;
 
 /// Constants of one step from t to t + Δt.
@@ -288,4 +291,33 @@ pub fn chunks_of(slots: &[u32]) -> Vec<usize> {
     chunks.sort_unstable();
     chunks.dedup();
     chunks
+}
+
+/// The energies of all stretches that a fit covers, once computed.
+pub type Table = Option<([f64; 2], EnergyTable)>;
+
+/// The energy of all bonds, J. A law costs more to sample than bonds to sum: the table is kept as long as the fit.
+pub fn stored<const D: usize>(
+    system: &System<D>,
+    state: &State<D>,
+    met: StretchRange,
+    table: &mut Table,
+) -> f64 {
+    let [low, high] = state.fitted.map(|stretch| stretch * stretch - 1.0);
+    if met.low < low || met.high > high {
+        return stored_energy(system, state, &EnergyTable::new(system.law, met));
+    }
+    if table.as_ref().is_none_or(|(fitted, _)| *fitted != state.fitted) {
+        *table = Some((state.fitted, EnergyTable::new(system.law, StretchRange { low, high })));
+    }
+    table.as_ref().map_or(0.0, |(_, table)| stored_energy(system, state, table))
+}
+
+/// Volumes of all slots, 0 where there is no particle.
+pub fn volumes<const D: usize>(system: &System<D>) -> Vec<f64> {
+    let mut volumes = vec![0.0; system.bonds.slots()];
+    for &slot in system.bonds.particles() {
+        volumes[slot as usize] = system.bonds.volume(slot as usize);
+    }
+    volumes
 }

@@ -5,7 +5,7 @@
 //! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
 //! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
-use super::leap::{Leap, Sums, chunks_of, force_pass, kick_pass, leap_pass, refresh};
+use super::leap::{Leap, Sums, Table, chunks_of, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
 use super::march::{Watch, stored_energy};
 use super::system::{Record, State, Status, System};
 use super::time_step::{Family, LawRange, critical, largest_frequency_squared};
@@ -113,7 +113,8 @@ impl VelocityVerlet {
         }
         let mut table = None;
         while state.step < self.records {
-            let end = self.end_time * (state.step + 1) as f64 / self.records as f64;
+            // the last of them is the end time to the bit
+            let end = self.end_time * ((state.step + 1) as f64 / self.records as f64);
             if state.motion.planned == 0 {
                 state.motion.plan(end);
             }
@@ -360,21 +361,6 @@ impl VelocityVerlet {
     }
 }
 
-/// The energies of all stretches that a fit covers, once computed.
-type Table = Option<([f64; 2], EnergyTable)>;
-
-/// The energy of all bonds, J. A law costs more to sample than bonds to sum: the table is kept as long as the fit.
-fn stored<const D: usize>(system: &System<D>, state: &State<D>, met: StretchRange, table: &mut Table) -> f64 {
-    let [low, high] = state.fitted.map(|stretch| stretch * stretch - 1.0);
-    if met.low < low || met.high > high {
-        return stored_energy(system, state, &EnergyTable::new(system.law, met));
-    }
-    if table.as_ref().is_none_or(|(fitted, _)| *fitted != state.fitted) {
-        *table = Some((state.fitted, EnergyTable::new(system.law, StretchRange { low, high })));
-    }
-    table.as_ref().map_or(0.0, |(_, table)| stored_energy(system, state, table))
-}
-
 impl Motion {
     /// Equal steps from now to `end`, none longer than allowed.
     fn plan(&mut self, end: f64) {
@@ -405,13 +391,4 @@ impl Motion {
         let inside = low >= fitted[0] && high <= fitted[1] && critical.is_none_or(|c| high <= c);
         !inside
     }
-}
-
-/// Volumes of all slots, 0 where there is no particle.
-fn volumes<const D: usize>(system: &System<D>) -> Vec<f64> {
-    let mut volumes = vec![0.0; system.bonds.slots()];
-    for &slot in system.bonds.particles() {
-        volumes[slot as usize] = system.bonds.volume(slot as usize);
-    }
-    volumes
 }

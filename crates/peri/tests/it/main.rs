@@ -10,4 +10,6 @@ mod limits;
 mod relaxation;
 mod stress;
 mod surface;
+mod time_step;
+mod waves;
 mod work;
