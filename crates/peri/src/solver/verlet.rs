@@ -226,9 +226,10 @@ impl VelocityVerlet {
         // blocks of the tangent's rows: ω² ≤ ‖A_II‖ + Σ‖A_IJ‖ with ‖t′nn + t/λ(1 − nn)‖ ≤ max(|t′|, |t|/λ);
         // Feingold & Varga (1962), doi:10.2140/pjm.1962.12.1241
         let bound = 2.0 * motion.stiffness * state.tangent / self.density;
-        let estimate = (motion.frequency * law.mean_tangent).min(bound);
+        let estimate = motion.frequency * law.mean_tangent;
         motion.gershgorin_step = critical(bound);
-        motion.covered_step = critical(if estimate.is_nan() { bound } else { estimate });
+        // nothing free, or a tangent without a positive frequency: the bound alone
+        motion.covered_step = critical(if estimate > 0.0 { estimate.min(bound) } else { bound });
         motion.floor = law.least_energy * system.modulus * motion.extent;
         motion.longest = self.time_step.unwrap_or(self.safety * motion.covered_step);
     }

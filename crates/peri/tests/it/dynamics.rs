@@ -54,6 +54,51 @@ fn one_particle() {
     }
 }
 
+/// A particle that only damping slows: v = v₀(1 − ½cΔt)ⁿ/(1 + ½cΔt)ⁿ, to second order v₀e^(−ct), and what it loses is damped.
+#[test]
+fn damping_slows() {
+    let law = Law::Pmb.build(1.0, 1.0, false).unwrap();
+    let mut one = Body::<2>::solid([1, 1], 0.1, 3.015).build();
+    let bonds = &mut one.lattice;
+    let slot = bonds.particles()[0] as usize;
+    let errors = [16.0, 32.0, 64.0].map(|steps: f64| {
+        let mut state = State::new(bonds.slots());
+        state.velocity.set(slot, [0.7, 0.0]);
+        let step = 2.0 / steps;
+        let solver = VelocityVerlet { damping: 1.3, ..once(2.0, step) };
+        run(&solver, bonds, &*law, &Loads::default(), &mut state).unwrap();
+        let speed = state.velocity.get(slot)[0];
+        let ratio = (1.0 - 0.65 * step) / (1.0 + 0.65 * step);
+        assert!((speed / (0.7 * ratio.powf(steps)) - 1.0).abs() < 1e-13, "{speed}");
+        let last = &state.history[0];
+        [(speed / 0.7 - (-2.6_f64).exp()).abs(), ((last.kinetic + last.damped) / last.work - 1.0).abs()]
+    });
+    for pair in errors.windows(2) {
+        let orders = [0, 1].map(|k| (pair[0][k] / pair[1][k]).log2());
+        assert!(orders.iter().all(|order| (order - 2.0).abs() < 0.05), "{orders:?}");
+    }
+}
+
+/// A body of which every component is held: it follows the ramp, and the supports' work is what it stores.
+#[test]
+fn fully_held() {
+    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let mut built = Body::<2>::solid([9, 8], 0.1, 3.015).build();
+    let bonds = &mut built.lattice;
+    let loads = hold(bonds, |x| Some((3, [0.2 * x[0], -0.1 * x[1]])));
+    let mut state = State::new(bonds.slots());
+    let solver = VelocityVerlet { ramp: 1.0, records: 200, ..VelocityVerlet::new(DENSITY, 2.0) };
+    run(&solver, bonds, &*law, &loads, &mut state).unwrap();
+    let [half, last] = [&state.history[49], &state.history[199]];
+    assert_eq!((half.factor, last.factor, last.kinetic), (0.5, 1.0, 0.0));
+    assert!(half.kinetic > 0.0 && (last.largest_stretch - 1.2).abs() < 1e-6, "{}", last.largest_stretch);
+    // the trapezoidal rule over 100 steps of the ramp
+    for row in [half, last] {
+        let off = (row.kinetic + row.stored) / row.work - 1.0;
+        assert!(off.abs() < 1e-4, "{off}");
+    }
+}
+
 /// Two particles on a linear bond: ω² = 12kθV/(ρ|ξ|); the method's own oscillation is cos(2n asin(ωΔt/2)).
 #[test]
 fn two_particles() {
