@@ -3,6 +3,7 @@
 //! Underwood (1983), in Computational Methods for Transient Analysis; Kilic & Madenci (2010), doi:10.1016/j.tafmec.2010.08.001,
 //! with the quotient taken on increments (the displacement-weighted form has negative stiffness in many iterations).
 
+use super::balance::Goal;
 use super::march::{Equilibrium, Watch, march};
 use super::passes::{force_pass, move_pass};
 use super::system::{State, Status, System};
@@ -35,6 +36,10 @@ impl Default for AdaptiveDynamicRelaxation {
 }
 
 impl AdaptiveDynamicRelaxation {
+    fn goal(&self) -> Goal {
+        Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
+    }
+
     /// Solves the remaining load steps of `state`. `watch` sees every iteration and may stop the run by an error;
     /// `finished` sees every finished step.
     ///
@@ -88,7 +93,7 @@ impl Relaxation {
         let look =
             system.breaks_on_the_way() || state.iteration < LOOK || state.iteration.is_multiple_of(LOOK);
         let factor = system.factors[state.step];
-        let own = state.tangent > MUCH * system.modulus * system.law.tangent().abs();
+        let own = has_own_mass(system, state);
         if own && (state.iteration.is_multiple_of(REFRESH) || self.own_mass.is_empty()) {
             own_mass(system, state, &mut self.own_mass);
         }
@@ -97,7 +102,7 @@ impl Relaxation {
         let mass = 0.5 * settings.mass_safety * tangent;
         let (sums, met) = force_pass(system, state, masses, mass, factor, look);
         system.count_evaluation(state);
-        if ![sums.free, sums.held, sums.quotient_top, sums.quotient_bottom].iter().all(|x| x.is_finite()) {
+        if !sums.is_finite() {
             return Err(system.not_finite(state));
         }
         state.met = state.met.join(met);
@@ -111,11 +116,6 @@ impl Relaxation {
                 Equilibrium::broke(self, system, &slots);
             }
         }
-        let reference = sums.held.sqrt().max(sums.external.sqrt());
-        state.reference = state.reference.max(reference);
-        let reference = reference.max(0.05 * state.reference);
-        let residual =
-            if sums.free == 0.0 { 0.0 } else { sums.free.sqrt() / reference.max(f64::MIN_POSITIVE) };
         let quotient = if state.iteration > 0 && sums.quotient_bottom > 0.0 {
             -sums.quotient_top / sums.quotient_bottom
         } else {
@@ -124,21 +124,10 @@ impl Relaxation {
         // where bonds soften the quotient is negative and would leave them to swing for ever: a long search is damped
         let late = state.iteration.saturating_sub(LONG) as f64 / LONG as f64;
         let damping = (2.0 * quotient.max(0.0).sqrt()).clamp(LATE_DAMPING * late.min(1.0), 1.9);
-        state.residual = residual;
-        if residual <= settings.tolerance && !broken {
+        state.note(&sums);
+        let goal = settings.goal();
+        if state.is_balanced(&goal, broken)? {
             return Ok(true);
-        }
-        if state.iteration >= settings.max_iterations && residual <= settings.accept && !broken {
-            state.unconverged += 1;
-            return Ok(true);
-        }
-        if state.iteration >= settings.max_iterations {
-            return Err(Error::NotConverged {
-                step: state.step,
-                iterations: state.iteration,
-                residual,
-                needed: settings.tolerance,
-            });
         }
         let masses = if own { &self.own_mass } else { &self.unit_mass };
         move_pass(&system.loads, state, masses, mass, damping);
@@ -149,7 +138,7 @@ impl Relaxation {
             step: state.step,
             steps: system.factors.len(),
             iteration: state.iteration,
-            residual,
+            residual: state.residual,
             tolerance: settings.tolerance,
             reaction: sums.held.sqrt(),
             damping,
@@ -184,9 +173,14 @@ impl<const D: usize> Equilibrium<D> for Relaxation {
     }
 }
 
+/// Whether bonds differ so much in their tangent that every particle has the mass of its own.
+pub(super) fn has_own_mass<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
+    state.tangent > MUCH * system.modulus * system.law.tangent().abs()
+}
+
 /// Σ_J (2 w V_J/|ξ|)(1 + max_{d≠e} |n_d n_e|): the Gershgorin sum of a particle for a unit bond tangent.
 /// 1 where there is no bond, so that empty slots and detached particles stay at rest.
-fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, slots: &[u32], mass: &mut [f64]) {
+pub(super) fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, slots: &[u32], mass: &mut [f64]) {
     let sums: Vec<f64> = slots
         .par_iter()
         .map(|&slot| {
@@ -206,7 +200,7 @@ fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, slots: &[u32], mass: &
 }
 
 /// Σ_J (2 w V_J/|ξ|)·max(|t′|, |t|/λ)(1 + max_{d≠e} |n_d n_e|) with the directions of the deformed bonds.
-fn own_mass<const D: usize>(system: &System<D>, state: &State<D>, mass: &mut Vec<f64>) {
+pub(super) fn own_mass<const D: usize>(system: &System<D>, state: &State<D>, mass: &mut Vec<f64>) {
     // bonds crushed to nothing have no bound: the law's own at a thousandth
     let met = StretchRange { low: state.fitted[0].powi(2) - 1.0, high: state.fitted[1].powi(2) - 1.0 };
     let table = TangentTable::new(system.law, met);

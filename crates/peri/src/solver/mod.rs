@@ -1,15 +1,21 @@
 //! What is to be solved, and how: quasi-static equilibria or explicit dynamics.
 
 mod adr;
+mod balance;
+mod coarse;
+mod lbfgs;
 mod leap;
 mod load;
 mod march;
+mod memory;
 mod passes;
+mod preconditioner;
 mod system;
 mod time_step;
 mod verlet;
 
 pub use adr::{AdaptiveDynamicRelaxation, Relaxation};
+pub use lbfgs::{LimitedMemory, PreconditionedLbfgs};
 pub use load::{Loads, Support};
 pub use march::{Equilibrium, Watch, march, stored_energy};
 pub use system::{Breaking, Policy, Record, State, Status, System};

@@ -6,6 +6,7 @@ mod bodies;
 mod dynamics;
 mod forces;
 mod homogeneous;
+mod lbfgs;
 mod limits;
 mod relaxation;
 mod stress;

@@ -1,0 +1,210 @@
+//! The coarse level of a two-level preconditioner: P A_c⁻¹ Pᵀ with P the hat functions of [`space`], A_c their stiffness
+//! of [`stiffness`], factored by [`factor`].
+
+mod factor;
+mod space;
+mod stiffness;
+
+pub use stiffness::Survey;
+
+use crate::bonds::Bonds;
+use crate::field::Field;
+use crate::potential::BondPotential;
+use crate::solver::load::Loads;
+use factor::{Factor, Pattern};
+use rayon::prelude::*;
+use space::{CORNERS, NONE, Space};
+use stiffness::{Assembly, ElementMatrix, hat_values};
+
+/// Stiffness against rigid motion over that against the longest wave of the body: pieces that float free, and those that
+/// turn about one bond, have none of their own.
+const SHIFT: f64 = 0.01;
+/// Elements that are summed by one work item.
+const BATCH: usize = 64;
+
+/// What a coarse level is built for.
+pub struct Body<'a, const D: usize> {
+    /// The bonds.
+    pub bonds: &'a dyn Bonds<D>,
+    /// The loads, for what they hold.
+    pub loads: &'a Loads<D>,
+    /// Where the body is.
+    pub displacement: &'a Field<D>,
+    /// The law, kθ and the stretches it is fitted for.
+    pub law: (&'a dyn BondPotential, f64, [f64; 2]),
+    /// Stiffness density of each slot, N/m⁵, which holds what is held.
+    pub springs: &'a [f64],
+    /// The bonds' survey.
+    pub survey: &'a Survey,
+}
+
+/// A factored coarse level.
+pub struct Coarse<const D: usize> {
+    space: Space<D>,
+    factor: Factor,
+    /// Of each element: Pᵀg at its corners.
+    parts: Vec<f64>,
+    /// Coefficients of the functions, D each.
+    coefficients: Vec<f64>,
+}
+
+impl<const D: usize> Coarse<D> {
+    /// Functions with cells of about `edge` (m), `most` degrees of freedom; keeps the analysis of `old` where it can.
+    /// `None` where the body is too small or too broken for a coarse level.
+    pub fn new(body: &Body<D>, edge: f64, most: usize, old: Option<Self>) -> Option<Self> {
+        // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
+        let whole = if body.bonds.as_lattice().is_some() { body.survey.most } else { u32::MAX };
+        let space = Space::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
+        let assembly =
+            Assembly::new(body.bonds, body.loads, body.displacement, body.survey, body.law, body.springs);
+        let matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
+            space.elements.par_iter().map(|element| assembly.element(&space, element)).collect();
+        let extent = extent(body.bonds);
+        let shift = SHIFT * assembly.stiffness() * (std::f64::consts::PI / extent).powi(2);
+        let (pattern, blocks) = pattern::<D>(&space);
+        let entries = assemble::<D>(&space, &pattern, &blocks, &matrices, shift);
+        let factor = Factor::new(pattern, &entries, old.map(|old| old.factor))?;
+        let parts = vec![0.0; space.elements.len() * CORNERS * D];
+        let coefficients = vec![0.0; space.functions * D];
+        Some(Self { space, factor, parts, coefficients })
+    }
+
+    /// Solves A_c c = Pᵀg; g is zero where components are held.
+    pub fn solve(&mut self, gradient: &Field<D>) {
+        let (space, gradient) = (&self.space, gradient.components());
+        let corners = 1 << D;
+        self.parts.par_chunks_mut(BATCH * CORNERS * D).enumerate().for_each(|(batch, parts)| {
+            for (part, element) in parts.chunks_mut(CORNERS * D).zip(&space.elements[batch * BATCH..]) {
+                part.fill(0.0);
+                for &slot in &space.members[element.members[0]..element.members[1]] {
+                    let hats = hat_values(space.local.get(slot as usize));
+                    for d in 0..D {
+                        let g = gradient[d][slot as usize];
+                        for a in 0..corners {
+                            part[a * D + d] += hats[a] * g;
+                        }
+                    }
+                }
+            }
+        });
+        self.coefficients.fill(0.0);
+        for (part, element) in self.parts.chunks(CORNERS * D).zip(&space.elements) {
+            for a in 0..corners {
+                for d in 0..D {
+                    self.coefficients[element.functions[a] as usize * D + d] += part[a * D + d];
+                }
+            }
+        }
+        self.factor.solve(&mut self.coefficients);
+    }
+
+    /// (P c)_I with the coefficients of the last [`Self::solve`].
+    #[inline]
+    pub fn value(&self, slot: usize) -> [f64; D] {
+        let element = self.space.element_of[slot];
+        let mut value = [0.0; D];
+        if element != NONE {
+            let functions = &self.space.elements[element as usize].functions;
+            let hats = hat_values(self.space.local.get(slot));
+            for a in 0..1 << D {
+                let at = functions[a] as usize * D;
+                for d in 0..D {
+                    value[d] += hats[a] * self.coefficients[at + d];
+                }
+            }
+        }
+        value
+    }
+
+    /// Degrees of freedom, and entries of the factors.
+    pub fn size(&self) -> [usize; 2] {
+        [self.coefficients.len(), self.factor.entries()]
+    }
+}
+
+/// Diagonal of the bounding box, m.
+fn extent<const D: usize>(bonds: &dyn Bonds<D>) -> f64 {
+    let span = |d: usize| {
+        let places = bonds.particles().iter().map(|&slot| bonds.position(slot as usize)[d]);
+        let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        high - low + bonds.spacing()
+    };
+    (0..D).map(|d| span(d).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Functions that share an element with each function, up to itself.
+struct Blocks {
+    starts: Vec<usize>,
+    others: Vec<u32>,
+}
+
+fn pattern<const D: usize>(space: &Space<D>) -> (Pattern, Blocks) {
+    let mut pairs: Vec<u64> = Vec::with_capacity(space.elements.len() * (1 << (2 * D)));
+    for element in &space.elements {
+        for &column in &element.functions[..1 << D] {
+            for &row in element.functions[..1 << D].iter().filter(|&&row| row <= column) {
+                pairs.push(u64::from(column) << 32 | u64::from(row));
+            }
+        }
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut blocks = Blocks { starts: vec![0], others: Vec::with_capacity(pairs.len()) };
+    let mut pattern = Pattern { starts: vec![0], rows: Vec::with_capacity(pairs.len() * D * D) };
+    let mut next = 0;
+    for column in 0..space.functions {
+        while next < pairs.len() && (pairs[next] >> 32) as usize == column {
+            blocks.others.push(pairs[next] as u32);
+            next += 1;
+        }
+        let others = &blocks.others[blocks.starts[column]..];
+        blocks.starts.push(blocks.others.len());
+        for j in 0..D {
+            for &row in others {
+                let count = if row as usize == column { j + 1 } else { D };
+                pattern.rows.extend((0..count).map(|i| row as usize * D + i));
+            }
+            pattern.starts.push(pattern.rows.len());
+        }
+    }
+    (pattern, blocks)
+}
+
+/// The sum of the element matrices, and of the shift.
+fn assemble<const D: usize>(
+    space: &Space<D>,
+    pattern: &Pattern,
+    blocks: &Blocks,
+    matrices: &[(ElementMatrix, [f64; CORNERS])],
+    shift: f64,
+) -> Vec<f64> {
+    let mut entries = vec![0.0; pattern.rows.len()];
+    for (element, (matrix, measure)) in space.elements.iter().zip(matrices) {
+        let mut at = 0;
+        for a in 0..1 << D {
+            for b in a..1 << D {
+                let (f, g) = (element.functions[a], element.functions[b]);
+                let (row, column) = (f.min(g), f.max(g) as usize);
+                let others = &blocks.others[blocks.starts[column]..blocks.starts[column + 1]];
+                // every pair of an element's functions is in the pattern
+                let place = others.partition_point(|&other| other < row);
+                let mut pair = 0;
+                for i in 0..D {
+                    for j in i..D {
+                        let mut value = matrix[at][pair];
+                        if a == b && i == j {
+                            value += shift * measure[a];
+                        }
+                        entries[pattern.starts[column * D + j] + place * D + i] += value;
+                        if i != j && row as usize != column {
+                            entries[pattern.starts[column * D + i] + place * D + j] += value;
+                        }
+                        pair += 1;
+                    }
+                }
+                at += 1;
+            }
+        }
+    }
+    entries
+}

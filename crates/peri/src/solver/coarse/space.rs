@@ -1,0 +1,353 @@
+//! A few smooth displacement fields for a whole body: multilinear hats on a background grid, split where the body is.
+//!
+//! The hat of a node is cut into one function for each part of the body that hangs together by intact bonds within the
+//! hat's support, so that no function moves both flanks of a crack, or a fragment with what it has left.
+
+use crate::bonds::Bonds;
+use crate::field::Field;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Corners of a cell in three dimensions.
+pub const CORNERS: usize = 8;
+/// Marks a slot without element.
+pub const NONE: u32 = u32::MAX;
+
+/// Particles of one cell that share all functions.
+#[derive(Clone, Debug)]
+pub struct Element {
+    /// Function of each corner of the cell.
+    pub functions: [u32; CORNERS],
+    /// Where its particles begin and end in [`Space::members`].
+    pub members: [usize; 2],
+}
+
+/// The functions, and the particles they move.
+pub struct Space<const D: usize> {
+    /// Edges of a cell, m.
+    pub edge: [f64; D],
+    /// Number of functions, in an order of elimination with little fill (nested dissection of the grid).
+    pub functions: usize,
+    /// The elements.
+    pub elements: Vec<Element>,
+    /// Slots, element by element.
+    pub members: Vec<u32>,
+    /// Element of each slot; particles without bonds have none.
+    pub element_of: Vec<u32>,
+    /// Coordinates of each slot in its cell, 0 to 1.
+    pub local: Field<D>,
+}
+
+/// The cells over a body's bounding box.
+struct Grid<const D: usize> {
+    low: [f64; D],
+    edge: [f64; D],
+    cells: [usize; D],
+}
+
+impl<const D: usize> Grid<D> {
+    /// Cells of about `edge`, which the box holds a whole number of.
+    fn new(bonds: &dyn Bonds<D>, edge: f64) -> Self {
+        let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+        for &slot in bonds.particles() {
+            let position = bonds.position(slot as usize);
+            for d in 0..D {
+                low[d] = low[d].min(position[d]);
+                high[d] = high[d].max(position[d]);
+            }
+        }
+        let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / edge).ceil().max(1.0) as usize);
+        // a box without extent along an axis still has a cell there
+        let edge = std::array::from_fn(|d| {
+            let fitted = (high[d] - low[d]) / cells[d] as f64;
+            if fitted > 0.0 { fitted } else { edge }
+        });
+        Self { low, edge, cells }
+    }
+
+    /// Cell and coordinates in it.
+    fn locate(&self, position: [f64; D]) -> (usize, [f64; D]) {
+        let mut index = 0;
+        let mut local = [0.0; D];
+        for d in (0..D).rev() {
+            let place = (position[d] - self.low[d]) / self.edge[d];
+            let cell = (place.max(0.0) as usize).min(self.cells[d] - 1);
+            index = index * self.cells[d] + cell;
+            local[d] = (place - cell as f64).clamp(0.0, 1.0);
+        }
+        (index, local)
+    }
+
+    fn node_counts(&self) -> [usize; D] {
+        self.cells.map(|c| c + 1)
+    }
+
+    /// Node at corner `corner` of a cell.
+    fn node(&self, cell: usize, corner: usize) -> usize {
+        let (mut rest, mut index, mut stride) = (cell, 0, 1);
+        for d in 0..D {
+            index += stride * (rest % self.cells[d] + (corner >> d & 1));
+            rest /= self.cells[d];
+            stride *= self.cells[d] + 1;
+        }
+        index
+    }
+
+    /// The cells around a node.
+    fn cells_around(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
+        let counts = self.node_counts();
+        let mut rest = node;
+        let place: [usize; D] = std::array::from_fn(|d| {
+            let here = rest % counts[d];
+            rest /= counts[d];
+            here
+        });
+        (0..1_usize << D).filter_map(move |corner| {
+            let mut index = 0;
+            for d in (0..D).rev() {
+                let cell = place[d].checked_sub(corner >> d & 1).filter(|&c| c < self.cells[d])?;
+                index = index * self.cells[d] + cell;
+            }
+            Some(index)
+        })
+    }
+}
+
+/// Parts of a hat's support: the part of each slot in it, slots ascending.
+struct Split {
+    parts: u32,
+    part_of: Vec<(u32, u32)>,
+}
+
+impl<const D: usize> Space<D> {
+    /// Cells of about `edge`, more if there would be more than `most` functions; `None` where even that does not help.
+    /// `bonded` has the number of bonds of each slot, `whole` that from which on nothing is missing around a particle.
+    pub fn new(bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32, edge: f64, most: usize) -> Option<Self> {
+        let mut edge = edge;
+        for _ in 0..24 {
+            let grid = Grid::new(bonds, edge);
+            let nodes: f64 = grid.node_counts().iter().map(|&n| n as f64).product();
+            // bodies that fill little of their box may have more nodes than functions, but not without end
+            if nodes <= 64.0 * most as f64 {
+                let space = Self::on(&grid, bonds, bonded, whole);
+                if (1..=most).contains(&space.functions) {
+                    return Some(space);
+                }
+                if space.functions == 0 || grid.cells == [1; D] {
+                    return None;
+                }
+            }
+            edge *= 1.3;
+        }
+        None
+    }
+
+    fn on(grid: &Grid<D>, bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32) -> Self {
+        let slots = bonds.slots();
+        let mut local = Field::zeros(slots);
+        let cells: usize = grid.cells.iter().product();
+        // particles of each cell, slots ascending
+        let mut starts = vec![0_usize; cells + 1];
+        let mut cell_of = Vec::with_capacity(bonds.particles().len());
+        let mut is_whole = vec![true; cells];
+        for &slot in bonds.particles() {
+            let slot = slot as usize;
+            if bonded[slot] == 0 {
+                cell_of.push(NONE);
+                continue;
+            }
+            let (cell, at) = grid.locate(bonds.position(slot));
+            local.set(slot, at);
+            cell_of.push(cell as u32);
+            starts[cell + 1] += 1;
+            is_whole[cell] &= bonded[slot] >= whole;
+        }
+        for cell in 0..cells {
+            starts[cell + 1] += starts[cell];
+        }
+        let mut members = vec![0; starts[cells]];
+        let mut next = starts.clone();
+        for (&slot, &cell) in bonds.particles().iter().zip(&cell_of) {
+            if cell != NONE {
+                members[next[cell as usize]] = slot;
+                next[cell as usize] += 1;
+            }
+        }
+        let of_cell = |cell: usize| &members[starts[cell]..starts[cell + 1]];
+        // what hangs together around each node
+        let nodes: usize = grid.node_counts().iter().product();
+        let suspects: Vec<usize> =
+            (0..nodes).filter(|&node| !grid.cells_around(node).all(|cell| is_whole[cell])).collect();
+        // few batches: each looks slots up in a table of its own
+        let batch = suspects.len().div_ceil(4 * rayon::current_num_threads()).max(1);
+        let found: Vec<Vec<(usize, Split)>> = suspects
+            .par_chunks(batch)
+            .map(|batch| {
+                let mut place = vec![NONE; slots];
+                let window = |node: usize| -> Vec<u32> {
+                    grid.cells_around(node).flat_map(|cell| of_cell(cell).iter().copied()).collect()
+                };
+                let split = |&node: &usize| Some((node, split(bonds, window(node), &mut place)?));
+                batch.iter().filter_map(split).collect()
+            })
+            .collect();
+        let splits: BTreeMap<usize, Split> = found.into_iter().flatten().collect();
+        let mut first = vec![0_u32; nodes];
+        let mut functions = 0_u32;
+        for node in elimination_order(grid.node_counts()) {
+            if grid.cells_around(node).any(|cell| starts[cell] < starts[cell + 1]) {
+                first[node] = functions;
+                functions += splits.get(&node).map_or(1, |split| split.parts);
+            }
+        }
+        let mut space = Self {
+            edge: grid.edge,
+            functions: functions as usize,
+            elements: Vec::new(),
+            members: Vec::with_capacity(members.len()),
+            element_of: vec![NONE; slots],
+            local,
+        };
+        for cell in 0..cells {
+            if starts[cell] < starts[cell + 1] {
+                space.add_cell(grid, cell, of_cell(cell), &splits, &first);
+            }
+        }
+        space
+    }
+
+    /// Adds the elements of a cell: one, or one for each set of parts that its particles belong to.
+    fn add_cell(
+        &mut self,
+        grid: &Grid<D>,
+        cell: usize,
+        slots: &[u32],
+        splits: &BTreeMap<usize, Split>,
+        first: &[u32],
+    ) {
+        let mut groups: BTreeMap<[u32; CORNERS], Vec<u32>> = BTreeMap::new();
+        let mut plain = [0; CORNERS];
+        let mut cut = Vec::new();
+        for corner in 0..1 << D {
+            let node = grid.node(cell, corner);
+            plain[corner] = first[node];
+            if let Some(split) = splits.get(&node) {
+                cut.push((corner, split));
+            }
+        }
+        if cut.is_empty() {
+            groups.insert(plain, slots.to_vec());
+        } else {
+            for &slot in slots {
+                let mut functions = plain;
+                for (corner, split) in &cut {
+                    if let Ok(at) = split.part_of.binary_search_by_key(&slot, |pair| pair.0) {
+                        functions[*corner] += split.part_of[at].1;
+                    }
+                }
+                groups.entry(functions).or_default().push(slot);
+            }
+        }
+        for (functions, slots) in groups {
+            let start = self.members.len();
+            slots.iter().for_each(|&slot| self.element_of[slot as usize] = self.elements.len() as u32);
+            self.members.extend(slots);
+            self.elements.push(Element { functions, members: [start, self.members.len()] });
+        }
+    }
+}
+
+/// The parts of a window that hang together by bonds within it, numbered by their first slot; `None` for one part.
+/// `place` holds [`NONE`] for every slot, before and after.
+fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut [u32]) -> Option<Split> {
+    window.sort_unstable();
+    for (index, &slot) in window.iter().enumerate() {
+        place[slot as usize] = index as u32;
+    }
+    let mut parent: Vec<u32> = (0..window.len() as u32).collect();
+    let mut parts = window.len();
+    for (index, &slot) in window.iter().enumerate() {
+        if parts == 1 {
+            break;
+        }
+        bonds.neighbours(slot as usize, &mut |bond| {
+            let other = place[bond.slot];
+            if other != NONE {
+                let (a, b) = (root(&mut parent, index as u32), root(&mut parent, other));
+                if a != b {
+                    // the smaller index is the root, whatever the order of bonds
+                    parent[a.max(b) as usize] = a.min(b);
+                    parts -= 1;
+                }
+            }
+        });
+    }
+    window.iter().for_each(|&slot| place[slot as usize] = NONE);
+    if parts <= 1 {
+        return None;
+    }
+    let mut number = vec![NONE; window.len()];
+    let mut count = 0;
+    let mut part_of = Vec::with_capacity(window.len());
+    for index in 0..window.len() {
+        let root = root(&mut parent, index as u32) as usize;
+        if number[root] == NONE {
+            number[root] = count;
+            count += 1;
+        }
+        part_of.push((window[index], number[root]));
+    }
+    Some(Split { parts: count, part_of })
+}
+
+fn root(parent: &mut [u32], index: u32) -> u32 {
+    let mut at = index;
+    while parent[at as usize] != at {
+        parent[at as usize] = parent[parent[at as usize] as usize];
+        at = parent[at as usize];
+    }
+    at
+}
+
+/// Nodes of a grid in nested dissection: both halves first, the plane between them last.
+fn elimination_order<const D: usize>(counts: [usize; D]) -> Vec<usize> {
+    let mut order = Vec::with_capacity(counts.iter().product());
+    dissect([0; D], counts, counts, &mut order);
+    order
+}
+
+fn dissect<const D: usize>(low: [usize; D], high: [usize; D], counts: [usize; D], order: &mut Vec<usize>) {
+    let longest = (0..D).max_by_key(|&d| high[d] - low[d]).unwrap_or(0);
+    if (0..D).any(|d| low[d] >= high[d]) {
+        return;
+    }
+    // halves of less than two nodes are not worth a plane between them
+    if high[longest] - low[longest] < 5 {
+        let mut at = low;
+        loop {
+            order.push((0..D).rev().fold(0, |index, d| index * counts[d] + at[d]));
+            let mut d = 0;
+            loop {
+                at[d] += 1;
+                if at[d] < high[d] {
+                    break;
+                }
+                at[d] = low[d];
+                d += 1;
+                if d == D {
+                    return;
+                }
+            }
+        }
+    }
+    let middle = usize::midpoint(low[longest], high[longest]);
+    let part = |from: usize, to: usize| {
+        let (mut low, mut high) = (low, high);
+        (low[longest], high[longest]) = (from, to);
+        (low, high)
+    };
+    for (from, to) in [(low[longest], middle), (middle + 1, high[longest]), (middle, middle + 1)] {
+        let (low, high) = part(from, to);
+        dissect(low, high, counts, order);
+    }
+}

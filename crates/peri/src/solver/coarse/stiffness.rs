@@ -1,0 +1,275 @@
+//! Stiffness of the body as the coarse functions see it: its particles as quadrature points of
+//! Σ_I V_I ∇φ_a : C_I : ∇φ_b, C_I = Σ_J kθ w V_J/|ξ| T ⊗ ξ ⊗ ξ, with T = t′ m⊗m + (t/λ)(1 − m⊗m) the tangent of a bond
+//! of direction m; the Hessian of the bonds' energy where the functions are linear within a horizon.
+
+use super::space::{CORNERS, Element, Space};
+use crate::bonds::Bonds;
+use crate::field::Field;
+use crate::solver::load::Loads;
+use crate::potential::BondPotential;
+use rayon::prelude::*;
+
+/// Pairs i ≤ j in three dimensions, and pairs of corners a ≤ b.
+const SYMMETRIC: usize = 6;
+const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
+/// Nodes of the table of tangents.
+const NODES: usize = 1024;
+/// Least tangent of a bond, over that at rest: a matrix of soft bonds must stay positive definite.
+const LEAST: f64 = 0.05;
+/// Bonds that turn and stretch by less are taken as at rest.
+const SMALL: f64 = 0.1;
+
+/// C_I/kθ: pairs of components (i, j) by pairs of derivatives (k, l), off-diagonal pairs once.
+type Tangent = [[f64; SYMMETRIC]; SYMMETRIC];
+
+/// Element stiffness: for each pair of corners a ≤ b, the symmetric matrix of components.
+pub type ElementMatrix = [[f64; SYMMETRIC]; PAIRS];
+
+/// What is known of all bonds before anything is built.
+pub struct Survey {
+    /// Number of bonds of each slot.
+    pub bonded: Vec<u32>,
+    /// The most bonds of any particle.
+    pub most: u32,
+    /// Largest |η|/|ξ|: how much bonds have turned or stretched.
+    pub moved: f64,
+}
+
+impl Survey {
+    /// Looks at every bond.
+    pub fn new<const D: usize>(bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Self {
+        let of = |&slot: &u32| {
+            let own = displacement.get(slot as usize);
+            let (mut count, mut most) = (0_u32, 0.0_f64);
+            bonds.neighbours(slot as usize, &mut |bond| {
+                let other = displacement.get(bond.slot);
+                let eta: f64 = (0..D).map(|d| (other[d] - own[d]).powi(2)).sum();
+                count += 1;
+                most = most.max(eta / (bond.length * bond.length));
+            });
+            (count, most)
+        };
+        let each: Vec<(u32, f64)> = bonds.particles().par_iter().map(of).collect();
+        let mut bonded = vec![0; bonds.slots()];
+        let (mut most, mut moved) = (0, 0.0_f64);
+        for (&slot, (count, square)) in bonds.particles().iter().zip(each) {
+            bonded[slot as usize] = count;
+            most = most.max(count);
+            moved = moved.max(square);
+        }
+        Self { bonded, most, moved: moved.sqrt() }
+    }
+}
+
+/// t′ and t/λ over e = λ² − 1, both kept positive.
+struct Tangents {
+    low: f64,
+    step: f64,
+    nodes: Vec<[f64; 2]>,
+}
+
+impl Tangents {
+    fn new(law: &dyn BondPotential, stretches: [f64; 2]) -> Self {
+        let [low, high] = stretches.map(|l| l * l - 1.0);
+        let step = (high - low).max(1e-9) / (NODES - 1) as f64;
+        let least = LEAST * law.tangent().abs();
+        let node = |k: usize| {
+            let stretch = (1.0 + low + step * k as f64).max(1e-12).sqrt();
+            [law.tension_derivative(stretch).max(least), (law.tension(stretch) / stretch).max(0.0)]
+        };
+        Self { low, step, nodes: (0..NODES).map(node).collect() }
+    }
+
+    fn at(&self, e: f64) -> [f64; 2] {
+        self.nodes[(((e - self.low) / self.step).max(0.0).round() as usize).min(NODES - 1)]
+    }
+}
+
+/// What element matrices are made of.
+pub struct Assembly<'a, const D: usize> {
+    bonds: &'a dyn Bonds<D>,
+    loads: &'a Loads<D>,
+    displacement: &'a Field<D>,
+    survey: &'a Survey,
+    tangents: Tangents,
+    modulus: f64,
+    /// Stiffness density M_I at held components, N/m⁵.
+    springs: &'a [f64],
+    /// C of particles without a bond missing, where bonds are as at rest.
+    interior: Option<Tangent>,
+}
+
+impl<'a, const D: usize> Assembly<'a, D> {
+    /// `law` is fitted over `stretches`.
+    pub fn new(
+        bonds: &'a dyn Bonds<D>,
+        loads: &'a Loads<D>,
+        displacement: &'a Field<D>,
+        survey: &'a Survey,
+        law: (&dyn BondPotential, f64, [f64; 2]),
+        springs: &'a [f64],
+    ) -> Self {
+        let (law, modulus, stretches) = law;
+        let tangents = Tangents::new(law, stretches);
+        let mut assembly =
+            Self { bonds, loads, displacement, survey, tangents, modulus, springs, interior: None };
+        if bonds.as_lattice().is_some() && survey.moved < SMALL {
+            let whole = |&&slot: &&u32| survey.bonded[slot as usize] == survey.most;
+            let slot = bonds.particles().iter().find(whole);
+            assembly.interior = slot.map(|&slot| assembly.tangent(slot as usize));
+        }
+        assembly
+    }
+
+    /// C_I.
+    fn tangent(&self, slot: usize) -> Tangent {
+        let own = self.displacement.get(slot);
+        let mut result = [[0.0; SYMMETRIC]; SYMMETRIC];
+        self.bonds.neighbours(slot, &mut |bond| {
+            let other = self.displacement.get(bond.slot);
+            let mut zeta = [0.0; D];
+            let (mut square, mut e) = (0.0, 0.0);
+            for d in 0..D {
+                let eta = other[d] - own[d];
+                zeta[d] = bond.bond[d] + eta;
+                square += zeta[d] * zeta[d];
+                e += eta * (2.0 * bond.bond[d] + eta);
+            }
+            let [along, across] = self.tangents.at(e / (bond.length * bond.length));
+            let factor = self.modulus * bond.weight / bond.length;
+            let difference = (along - across) / square.max(f64::MIN_POSITIVE);
+            let mut pair = 0;
+            for i in 0..D {
+                for j in i..D {
+                    let own = if i == j { across } else { 0.0 };
+                    let t = factor * (own + difference * zeta[i] * zeta[j]);
+                    let mut other = 0;
+                    for k in 0..D {
+                        for l in k..D {
+                            result[pair][other] += t * bond.bond[k] * bond.bond[l];
+                            other += 1;
+                        }
+                    }
+                    pair += 1;
+                }
+            }
+        });
+        result
+    }
+
+    /// Stiffness of an element, and for each corner Σ V φ over its particles.
+    pub fn element(&self, space: &Space<D>, element: &Element) -> (ElementMatrix, [f64; CORNERS]) {
+        let corners = 1 << D;
+        let pairs = D * (D + 1) / 2;
+        let mut matrix = [[0.0; SYMMETRIC]; PAIRS];
+        let mut measure = [0.0; CORNERS];
+        // Σ V ∂φ_a ∂φ_b of the particles that share the interior's C
+        let mut shared = [[0.0; SYMMETRIC]; PAIRS];
+        for &slot in &space.members[element.members[0]..element.members[1]] {
+            let slot = slot as usize;
+            let volume = self.bonds.volume(slot);
+            let local = space.local.get(slot);
+            let (hats, slopes) = hats::<D>(local, space.edge);
+            let interior = self.interior.is_some() && self.survey.bonded[slot] == self.survey.most;
+            let own = if interior { None } else { Some(self.tangent(slot)) };
+            let held = self.loads.held(slot);
+            let mut at = 0;
+            for a in 0..corners {
+                measure[a] += volume * hats[a];
+                for b in a..corners {
+                    let mut products = [0.0; SYMMETRIC];
+                    let mut other = 0;
+                    for k in 0..D {
+                        for l in k..D {
+                            let twice = slopes[a][k] * slopes[b][l] + slopes[a][l] * slopes[b][k];
+                            products[other] = volume * if k == l { 0.5 * twice } else { twice };
+                            other += 1;
+                        }
+                    }
+                    if let Some(own) = &own {
+                        contract(&mut matrix[at], own, &products, pairs);
+                    } else {
+                        for (sum, product) in shared[at].iter_mut().zip(products) {
+                            *sum += product;
+                        }
+                    }
+                    if held != 0 {
+                        let spring = volume * self.springs[slot] * hats[a] * hats[b];
+                        let mut pair = 0;
+                        for i in 0..D {
+                            if held >> i & 1 == 1 {
+                                matrix[at][pair] += spring;
+                            }
+                            pair += D - i;
+                        }
+                    }
+                    at += 1;
+                }
+            }
+        }
+        if let Some(interior) = &self.interior {
+            for (entry, products) in matrix.iter_mut().zip(&shared) {
+                contract(entry, interior, products, pairs);
+            }
+        }
+        (matrix, measure)
+    }
+
+    /// Σ_I V_I C_1111 / Σ_I V_I, or so: how stiff the body is.
+    pub fn stiffness(&self) -> f64 {
+        let particles = self.bonds.particles();
+        let slot = particles.iter().max_by_key(|&&s| (self.survey.bonded[s as usize], u32::MAX - s));
+        slot.map_or(0.0, |&slot| {
+            let tangent = self.tangent(slot as usize);
+            tangent[0][0]
+        })
+    }
+}
+
+/// result += C : products.
+fn contract(result: &mut [f64; SYMMETRIC], tangent: &Tangent, products: &[f64; SYMMETRIC], pairs: usize) {
+    for pair in 0..pairs {
+        let mut sum = 0.0;
+        for other in 0..pairs {
+            sum += tangent[pair][other] * products[other];
+        }
+        result[pair] += sum;
+    }
+}
+
+/// The hats of a cell's corners and their derivatives.
+fn hats<const D: usize>(local: [f64; D], edge: [f64; D]) -> ([f64; CORNERS], [[f64; D]; CORNERS]) {
+    let mut values = [0.0; CORNERS];
+    let mut slopes = [[0.0; D]; CORNERS];
+    for corner in 0..1 << D {
+        let mut value = 1.0;
+        let mut slope = [1.0; D];
+        for d in 0..D {
+            let upper = corner >> d & 1 == 1;
+            let (hat, derivative) =
+                if upper { (local[d], 1.0 / edge[d]) } else { (1.0 - local[d], -1.0 / edge[d]) };
+            value *= hat;
+            for (e, slope) in slope.iter_mut().enumerate() {
+                *slope *= if e == d { derivative } else { hat };
+            }
+        }
+        (values[corner], slopes[corner]) = (value, slope);
+    }
+    (values, slopes)
+}
+
+/// The hats alone.
+pub fn hat_values<const D: usize>(local: [f64; D]) -> [f64; CORNERS] {
+    let mut values = [0.0; CORNERS];
+    values[0] = 1.0;
+    let mut count = 1;
+    for d in 0..D {
+        for corner in 0..count {
+            values[corner + count] = values[corner] * local[d];
+            values[corner] *= 1.0 - local[d];
+        }
+        count *= 2;
+    }
+    values
+}
+

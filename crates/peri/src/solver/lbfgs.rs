@@ -1,0 +1,403 @@
+//! Limited-memory BFGS on the body's energy, by gradients alone, with a two-level preconditioner: Nocedal & Wright, Numerical
+//! Optimization (2006), §7.2; the step is taken where the slope along the direction has fallen enough (its curvature
+//! condition), found by secants.
+
+use super::balance::Goal;
+use super::march::{Equilibrium, Watch, march};
+use super::memory::{Memory, product};
+use super::passes::{Sums, force_pass};
+use super::preconditioner::Preconditioner;
+use super::system::{State, Status, System};
+use crate::bonds::{Bonds, StretchRange};
+use crate::error::Error;
+use crate::field::{Field, chunk_range};
+use rayon::prelude::*;
+
+/// Rounds of breaking, and iterations of one search, after which the preconditioner is built anew.
+const ROUNDS: u64 = 25;
+const ITERATIONS: u64 = 200;
+/// σ: part of the first slope that may be left.
+const SLOPE: f64 = 0.9;
+/// Force evaluations of one line search.
+const TRIALS: usize = 12;
+/// Growth and decay of a trial step.
+const GROWTH: f64 = 4.0;
+const DECAY: f64 = 0.1;
+/// A pair's curvature s·y over the slope's share α|g·d|, at least.
+const CURVATURE: f64 = 1e-3;
+/// Largest growth of the greatest stretch in a step, and least part of the smallest that is left.
+const STRETCH: f64 = 0.3;
+const CRUSH: f64 = 0.6;
+
+/// Settings of the method.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PreconditionedLbfgs {
+    /// Out-of-balance force over reference force at which a step is converged.
+    pub tolerance: f64,
+    /// Iterations that a search for equilibrium may take.
+    pub max_iterations: u64,
+    /// Pairs of steps and gradient changes that are kept.
+    pub memory: usize,
+    /// Edge of a cell of the coarse level over the particles' distance, at least 2; grows where the coarse level would
+    /// become too large.
+    pub coarsening: f64,
+    /// Weight ω of the local part of the preconditioner.
+    pub weight: f64,
+    /// A search that has used all its iterations goes on all the same if its residual is below this; its residual stays
+    /// in the history.
+    pub accept: f64,
+}
+
+impl Default for PreconditionedLbfgs {
+    fn default() -> Self {
+        Self { tolerance: 1e-3, max_iterations: 20_000, memory: 10, coarsening: 6.0, weight: 1.0, accept: 0.0 }
+    }
+}
+
+impl PreconditionedLbfgs {
+    fn goal(&self) -> Goal {
+        Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
+    }
+
+    /// Solves the remaining load steps of `state`. `watch` sees every iteration and may stop the run by an error;
+    /// `finished` sees every finished step.
+    ///
+    /// # Errors
+    /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` and `finished` return.
+    pub fn solve<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        watch: &mut Watch<D>,
+        finished: &mut dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        march(&mut LimitedMemory::new(*self), system, state, watch, finished)
+    }
+}
+
+/// The method at work.
+pub struct LimitedMemory<const D: usize> {
+    settings: PreconditionedLbfgs,
+    preconditioner: Preconditioner<D>,
+    memory: Memory<D>,
+    /// Gradients −V F of the energy at the iterate and at the trial, 0 where held.
+    gradient: Field<D>,
+    trial: Field<D>,
+    /// z = B g at both.
+    image: Field<D>,
+    trial_image: Field<D>,
+    direction: Field<D>,
+    /// Whether the coarse level is left out: it has failed to give a descent.
+    local_only: bool,
+}
+
+/// A point along a direction.
+#[derive(Clone, Copy)]
+struct Point {
+    sums: Sums,
+    met: StretchRange,
+    /// Derivative of the energy along the direction.
+    slope: f64,
+}
+
+/// How a line search ended.
+enum Search {
+    /// At a step that will do.
+    Found(f64, Point),
+    /// Nowhere: the iterate is where it was.
+    Failed,
+}
+
+impl<const D: usize> LimitedMemory<D> {
+    /// Nothing is computed yet.
+    pub fn new(settings: PreconditionedLbfgs) -> Self {
+        Self {
+            settings,
+            preconditioner: Preconditioner::new(),
+            memory: Memory::new(settings.memory),
+            gradient: Field::zeros(0),
+            trial: Field::zeros(0),
+            image: Field::zeros(0),
+            trial_image: Field::zeros(0),
+            direction: Field::zeros(0),
+            local_only: false,
+        }
+    }
+
+    /// Degrees of freedom of the coarse level and entries of its factors.
+    pub fn coarse_size(&self) -> [usize; 2] {
+        self.preconditioner.coarse_size()
+    }
+
+    /// Builds the preconditioner for the present state and forgets everything else: from here a run that begins with
+    /// this state takes the same way.
+    fn begin(&mut self, system: &System<D>, state: &State<D>, watch: &mut Watch<D>) -> Result<(), Error> {
+        watch(&self.status(system, state, 0.0, true), state)?;
+        let slots = system.bonds.slots();
+        let fields = [
+            &mut self.gradient,
+            &mut self.trial,
+            &mut self.image,
+            &mut self.trial_image,
+            &mut self.direction,
+        ];
+        if fields[0].slots() != slots {
+            fields.into_iter().for_each(|field| *field = Field::zeros(slots));
+        }
+        self.memory.clear(true);
+        self.local_only = false;
+        self.preconditioner.build(system, state, self.settings.weight, self.settings.coarsening.max(2.0));
+        Ok(())
+    }
+
+    fn status(&self, system: &System<D>, state: &State<D>, reaction: f64, restartable: bool) -> Status {
+        Status {
+            step: state.step,
+            steps: system.factors.len(),
+            iteration: state.iteration,
+            residual: state.residual,
+            tolerance: self.settings.tolerance,
+            reaction,
+            damping: 0.0,
+            broken: state.broken,
+            restartable,
+        }
+    }
+
+    /// New forces at the present displacement; their gradient goes to `self.trial`.
+    fn evaluate(&mut self, system: &System<D>, state: &mut State<D>) -> Point {
+        let factor = system.factors[state.step];
+        // at rest the velocity leaves the pass' quotients at 0
+        let (sums, met) = force_pass(system, state, self.preconditioner.local(), 1.0, factor, true);
+        system.count_evaluation(state);
+        let (slots, volumes) = (system.bonds.slots(), self.preconditioner.volumes());
+        let (force, direction) = (state.force.components(), self.direction.components());
+        let loads = &*system.loads;
+        let parts: Vec<f64> = self
+            .trial
+            .chunks_mut()
+            .into_par_iter()
+            .enumerate()
+            .map(|(chunk, gradient)| {
+                let range = chunk_range(chunk, slots);
+                let held = loads.held.get(range.clone()).unwrap_or_default();
+                let volumes = &volumes[range.clone()];
+                let mut slope = 0.0;
+                for d in 0..D {
+                    let (g, f) = (&mut *gradient[d], &force[d][range.clone()]);
+                    for k in 0..f.len() {
+                        g[k] = -volumes[k] * f[k];
+                    }
+                    for (g, held) in g.iter_mut().zip(held) {
+                        if held >> d & 1 == 1 {
+                            *g = 0.0;
+                        }
+                    }
+                    slope += product(g, &direction[d][range.clone()]);
+                }
+                slope
+            })
+            .collect();
+        Point { sums, met, slope: parts.iter().sum() }
+    }
+
+    /// Evaluates, and once more where the fitted law had to be widened.
+    fn look(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<Point, Error> {
+        let point = self.evaluate(system, state);
+        if !point.sums.is_finite() {
+            return Ok(point);
+        }
+        state.met = state.met.join(point.met);
+        Ok(if system.widen(state)? { self.evaluate(system, state) } else { point })
+    }
+
+    /// u += step·d.
+    fn step(&self, state: &mut State<D>, step: f64) {
+        let slots = state.displacement.slots();
+        let direction = self.direction.components();
+        state.displacement.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, u)| {
+            let range = chunk_range(chunk, slots);
+            for d in 0..D {
+                u[d].iter_mut().zip(&direction[d][range.clone()]).for_each(|(u, d)| *u += step * d);
+            }
+        });
+    }
+
+    /// z = B g of the trial, then the direction from it; the slope along it. The steepest of what is left where the
+    /// memory gives no descent.
+    fn direct(&mut self, system: &System<D>) -> f64 {
+        let slope = self.memory.direction(&self.gradient, &self.image, &mut self.direction);
+        if slope < 0.0 && slope.is_finite() {
+            return slope;
+        }
+        self.memory.clear(true);
+        self.preconditioner.apply(&system.loads, &self.gradient, &mut self.image, self.local_only);
+        self.memory.direction(&self.gradient, &self.image, &mut self.direction)
+    }
+
+    /// Along the direction from `start`, whose slope is `slope`, to where the slope has fallen enough.
+    fn search(
+        &mut self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        start: &Point,
+        slope: f64,
+    ) -> Result<Search, Error> {
+        let [least, most] = allowed(start.met);
+        // the slope is too steep below `low` and has turned, or the body is torn, above `high`
+        let (mut low, mut low_slope, mut high) = (0.0, slope, f64::INFINITY);
+        let (mut at, mut step) = (0.0, 1.0);
+        for trial in 0..TRIALS {
+            self.step(state, step - at);
+            at = step;
+            let rough = self.evaluate(system, state);
+            let torn = !rough.sums.is_finite() || rough.met.low < least || rough.met.high > most;
+            if torn {
+                high = step;
+                let excess = excess(start.met, rough.met);
+                step = low + (high - low) * (1.0 / excess).clamp(1e-6, 0.5);
+                continue;
+            }
+            state.met = state.met.join(rough.met);
+            let point = if system.widen(state)? { self.evaluate(system, state) } else { rough };
+            if point.sums.residual(state.reference) <= self.settings.tolerance
+                || point.slope.abs() <= SLOPE * slope.abs()
+            {
+                return Ok(Search::Found(step, point));
+            }
+            let change = point.slope - low_slope;
+            let secant = if change > 0.0 { low - low_slope * (step - low) / change } else { f64::INFINITY };
+            if point.slope > 0.0 {
+                high = step;
+                step = secant.clamp(low + DECAY * (high - low), high - DECAY * (high - low));
+            } else {
+                // hardly any curvature so far: farther, unless the way is barred or long enough
+                if high.is_finite() || trial > 2 {
+                    return Ok(Search::Found(step, point));
+                }
+                (low, low_slope) = (step, point.slope);
+                step = secant.clamp(1.5 * step, GROWTH * step);
+            }
+        }
+        self.step(state, -at);
+        Ok(Search::Failed)
+    }
+
+    /// One iteration from `point`; the next iterate, `None` where no direction led anywhere.
+    fn iterate(
+        &mut self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        point: &Point,
+    ) -> Result<Option<Point>, Error> {
+        let slope = self.direct(system);
+        if slope == 0.0 || !slope.is_finite() {
+            return Ok(None);
+        }
+        match self.search(system, state, point, slope)? {
+            Search::Found(step, point) => {
+                std::mem::swap(&mut self.gradient, &mut self.trial);
+                self.preconditioner.apply(
+                    &system.loads,
+                    &self.gradient,
+                    &mut self.trial_image,
+                    self.local_only,
+                );
+                self.memory.add(
+                    step,
+                    &mut self.direction,
+                    (&self.trial, &mut self.image),
+                    (&self.gradient, &self.trial_image),
+                    CURVATURE * step * slope.abs(),
+                );
+                std::mem::swap(&mut self.image, &mut self.trial_image);
+                Ok(Some(point))
+            }
+            Search::Failed => Ok(None),
+        }
+    }
+
+    /// After a search that failed: no memory, and without any no coarse level; then all over again.
+    fn simplify(&mut self) {
+        self.local_only = self.memory.is_empty() && !self.local_only;
+        self.memory.clear(true);
+    }
+
+    /// Forces and gradient of an iterate reached otherwise than by a search.
+    fn arrive(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<Point, Error> {
+        let point = self.look(system, state)?;
+        if !point.sums.is_finite() {
+            return Err(system.not_finite(state));
+        }
+        std::mem::swap(&mut self.gradient, &mut self.trial);
+        self.preconditioner.apply(&system.loads, &self.gradient, &mut self.image, self.local_only);
+        Ok(point)
+    }
+}
+
+impl<const D: usize> Equilibrium<D> for LimitedMemory<D> {
+    fn equilibrate(
+        &mut self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        watch: &mut Watch<D>,
+    ) -> Result<(), Error> {
+        let goal = self.settings.goal();
+        self.memory.clear(false);
+        if !self.preconditioner.is_built()
+            || (state.iteration == 0 && state.round.is_multiple_of(ROUNDS))
+        {
+            self.begin(system, state, watch)?;
+        }
+        let mut point = self.arrive(system, state)?;
+        let mut broken = false;
+        loop {
+            state.note(&point.sums);
+            if state.is_balanced(&goal, broken)? {
+                return Ok(());
+            }
+            broken = false;
+            let next = self.iterate(system, state, &point)?;
+            state.iteration += 1;
+            state.step_iterations += 1;
+            state.total_iterations += 1;
+            if let Some(next) = next {
+                point = next;
+            } else {
+                self.simplify();
+                point = self.arrive(system, state)?;
+            }
+            if system.breaks_on_the_way() && system.is_overstretched(point.met) {
+                let slots = system.break_bonds(state);
+                broken = !slots.is_empty();
+                if broken {
+                    self.broke(system, &slots);
+                    point = self.arrive(system, state)?;
+                }
+            }
+            watch(&self.status(system, state, point.sums.held.sqrt(), false), state)?;
+            if state.iteration.is_multiple_of(ITERATIONS) {
+                self.begin(system, state, watch)?;
+                point = self.arrive(system, state)?;
+            }
+        }
+    }
+
+    fn broke(&mut self, system: &System<D>, slots: &[u32]) {
+        self.preconditioner.broke(&*system.bonds, slots);
+        self.memory.clear(false);
+    }
+}
+
+/// How far stretches may go in one step, as e = λ² − 1.
+fn allowed(met: StretchRange) -> [f64; 2] {
+    let [low, high] = [met.low, met.high].map(|e| (1.0 + e).max(0.0).sqrt());
+    [(CRUSH * low).powi(2) - 1.0, (high + STRETCH * high.max(1.0)).powi(2) - 1.0]
+}
+
+/// How many times as far as allowed stretches have gone.
+fn excess(start: StretchRange, met: StretchRange) -> f64 {
+    let root = |e: f64| (1.0 + e).max(0.0).sqrt();
+    let far = (root(met.high) - root(start.high)) / (STRETCH * root(start.high).max(1.0));
+    if far.is_finite() { far.max(2.0) } else { 10.0 }
+}

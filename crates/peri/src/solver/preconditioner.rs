@@ -1,0 +1,143 @@
+//! An approximate inverse of the body's stiffness, for gradients of its energy: B g = ω g/(V M) + P A_c⁻¹ Pᵀ g, with the
+//! Gershgorin mass M of dynamic relaxation and a coarse level.
+
+use super::adr::{has_own_mass, own_mass, update_unit_mass};
+use super::coarse::{Body, Coarse, Survey};
+use super::load::Loads;
+use super::system::{State, System};
+use crate::bonds::Bonds;
+use crate::field::{CHUNK, Field, chunk_range};
+use rayon::prelude::*;
+
+/// Degrees of freedom of the coarse level at most, in two and three dimensions.
+const MOST: [usize; 2] = [30_000, 8_000];
+
+/// The approximate inverse.
+pub struct Preconditioner<const D: usize> {
+    /// ω/(V M) of each slot.
+    local: Vec<f64>,
+    /// V of each slot.
+    volumes: Vec<f64>,
+    /// Gershgorin sums for a unit bond tangent.
+    unit_mass: Vec<f64>,
+    /// The smallest of `local`: that of particles without bonds.
+    least: f64,
+    coarse: Option<Coarse<D>>,
+}
+
+impl<const D: usize> Preconditioner<D> {
+    /// Nothing is known yet.
+    pub fn new() -> Self {
+        Self { local: Vec::new(), volumes: Vec::new(), unit_mass: Vec::new(), least: 0.0, coarse: None }
+    }
+
+    /// Whether it is built.
+    pub fn is_built(&self) -> bool {
+        !self.local.is_empty()
+    }
+
+    /// Builds it for the present state, and from nothing else: `weight` is ω, `coarsening` the edge of a coarse cell over
+    /// the particles' distance.
+    pub fn build(&mut self, system: &System<D>, state: &State<D>, weight: f64, coarsening: f64) {
+        let (bonds, slots) = (&*system.bonds, system.bonds.slots());
+        let survey = Survey::new(bonds, &state.displacement);
+        self.unit_mass.resize(slots, 1.0);
+        self.volumes.resize(slots, 0.0);
+        bonds.particles().iter().for_each(|&s| self.volumes[s as usize] = bonds.volume(s as usize));
+        update_unit_mass(bonds, bonds.particles(), &mut self.unit_mass);
+        // half the Gershgorin sum is about a particle's own stiffness
+        let mut springs = Vec::new();
+        let tangent = if has_own_mass(system, state) {
+            own_mass(system, state, &mut springs);
+            system.modulus
+        } else {
+            springs.clone_from(&self.unit_mass);
+            state.tangent
+        };
+        springs.iter_mut().for_each(|m| *m *= 0.5 * tangent);
+        self.local.clear();
+        self.local.resize(slots, 0.0);
+        self.least = f64::INFINITY;
+        for &slot in bonds.particles() {
+            let slot = slot as usize;
+            if survey.bonded[slot] > 0 && springs[slot] > 0.0 {
+                self.local[slot] = weight / (bonds.volume(slot) * springs[slot]);
+                self.least = self.least.min(self.local[slot]);
+            }
+        }
+        if !self.least.is_finite() {
+            self.least = 1.0;
+        }
+        for &slot in bonds.particles() {
+            let local = &mut self.local[slot as usize];
+            if *local == 0.0 {
+                *local = self.least;
+            }
+        }
+        let body = Body {
+            bonds,
+            loads: &system.loads,
+            displacement: &state.displacement,
+            law: (system.law, system.modulus, state.fitted),
+            springs: &springs,
+            survey: &survey,
+        };
+        let old = self.coarse.take();
+        self.coarse = Coarse::new(&body, coarsening * bonds.spacing(), MOST[D - 2], old);
+    }
+
+    /// Brings the local part up to date where bonds broke; the coarse one stays.
+    pub fn broke(&mut self, bonds: &dyn Bonds<D>, slots: &[u32]) {
+        let before: Vec<f64> = slots.iter().map(|&slot| self.unit_mass[slot as usize]).collect();
+        update_unit_mass(bonds, slots, &mut self.unit_mass);
+        for (&slot, before) in slots.iter().zip(before) {
+            let mut alone = true;
+            bonds.neighbours(slot as usize, &mut |_| alone = false);
+            let local = &mut self.local[slot as usize];
+            *local = if alone { self.least } else { *local * before / self.unit_mass[slot as usize] };
+        }
+    }
+
+    /// z = B g, or its local part alone; g is zero where components are held, and so is z.
+    pub fn apply(&mut self, loads: &Loads<D>, gradient: &Field<D>, result: &mut Field<D>, local_only: bool) {
+        if let Some(coarse) = self.coarse.as_mut().filter(|_| !local_only) {
+            coarse.solve(gradient);
+        }
+        let slots = gradient.slots();
+        let coarse = self.coarse.as_ref().filter(|_| !local_only);
+        let (g, local) = (gradient.components(), &self.local);
+        result.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, z)| {
+            let range = chunk_range(chunk, slots);
+            let start = chunk * CHUNK;
+            for d in 0..D {
+                let parts = z[d].iter_mut().zip(&g[d][range.clone()]).zip(&local[range.clone()]);
+                parts.for_each(|((z, g), local)| *z = g * local);
+            }
+            let Some(coarse) = coarse else { return };
+            for slot in range {
+                let value = coarse.value(slot);
+                let held = loads.held(slot);
+                for d in 0..D {
+                    if held >> d & 1 == 0 {
+                        z[d][slot - start] += value[d];
+                    }
+                }
+            }
+        });
+    }
+
+    /// The local part, slot by slot.
+    pub fn local(&self) -> &[f64] {
+        &self.local
+    }
+
+    /// Volume of each slot's particle, m³.
+    pub fn volumes(&self) -> &[f64] {
+        &self.volumes
+    }
+
+    /// Degrees of freedom of the coarse level and entries of its factors.
+    pub fn coarse_size(&self) -> [usize; 2] {
+        self.coarse.as_ref().map_or([0; 2], Coarse::size)
+    }
+}
