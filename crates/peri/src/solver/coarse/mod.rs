@@ -19,6 +19,8 @@ use stiffness::{Assembly, ElementMatrix, hat_values};
 /// Stiffness against rigid motion over that against the longest wave of the body: pieces that float free, and those that
 /// turn about one bond, have none of their own.
 const SHIFT: f64 = 0.01;
+/// Least diagonal entry over the mean one.
+const LEAST_DIAGONAL: f64 = 1e-9;
 /// Elements that are summed by one work item.
 const BATCH: usize = 64;
 
@@ -55,8 +57,8 @@ impl<const D: usize> Coarse<D> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
         let whole = if body.bonds.as_lattice().is_some() { body.survey.most } else { u32::MAX };
         let space = Space::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
-        let assembly =
-            Assembly::new(body.bonds, body.loads, body.displacement, body.survey, body.law, body.springs);
+        let Body { bonds, loads, displacement, law, springs, survey } = *body;
+        let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
         let matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
             space.elements.par_iter().map(|element| assembly.element(&space, element)).collect();
         let extent = extent(body.bonds);
@@ -205,6 +207,11 @@ fn assemble<const D: usize>(
                 at += 1;
             }
         }
+    }
+    // a function that its particles hardly see
+    let mean = (0..pattern.size()).map(|k| entries[pattern.starts[k + 1] - 1]).sum::<f64>() / pattern.size() as f64;
+    for k in 0..pattern.size() {
+        entries[pattern.starts[k + 1] - 1] += LEAST_DIAGONAL * mean;
     }
     entries
 }

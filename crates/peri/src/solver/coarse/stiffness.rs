@@ -16,6 +16,9 @@ const PAIRS: usize = CORNERS * (CORNERS + 1) / 2;
 const NODES: usize = 1024;
 /// Least tangent of a bond, over that at rest: a matrix of soft bonds must stay positive definite.
 const LEAST: f64 = 0.05;
+/// Part of the stiffness of its particles that the empty part of a cell has (the finite cell method of Parvizian, Düster &
+/// Rank 2007, doi:10.1007/s00466-007-0173-y): a few particles in a cell do not hold all its functions.
+const FICTITIOUS: f64 = 0.1;
 /// Bonds that turn and stretch by less are taken as at rest.
 const SMALL: f64 = 0.1;
 
@@ -97,6 +100,9 @@ pub struct Assembly<'a, const D: usize> {
     springs: &'a [f64],
     /// C of particles without a bond missing, where bonds are as at rest.
     interior: Option<Tangent>,
+    /// Volume of a cell (2D: times the thickness), m³, and Σ V ∂φ_a ∂φ_b over all of it.
+    cell: f64,
+    full: [[f64; SYMMETRIC]; PAIRS],
 }
 
 impl<'a, const D: usize> Assembly<'a, D> {
@@ -108,11 +114,23 @@ impl<'a, const D: usize> Assembly<'a, D> {
         survey: &'a Survey,
         law: (&dyn BondPotential, f64, [f64; 2]),
         springs: &'a [f64],
+        edge: [f64; D],
     ) -> Self {
         let (law, modulus, stretches) = law;
         let tangents = Tangents::new(law, stretches);
+        let volumes: f64 = bonds.particles().iter().map(|&slot| bonds.volume(slot as usize)).sum();
+        let thickness = volumes / bonds.particles().len().max(1) as f64 / bonds.spacing().powi(D as i32);
+        let cell = thickness * edge.iter().product::<f64>();
+        // Gauss' two points along each axis are exact
+        let mut full = [[0.0; SYMMETRIC]; PAIRS];
+        for point in 0..1 << D {
+            let local = std::array::from_fn(|d| 0.5 + [-0.5, 0.5][point >> d & 1] / 3.0_f64.sqrt());
+            let (_, slopes) = hats::<D>(local, edge);
+            add_products(&mut full, cell / f64::from(1 << D), &slopes);
+        }
+        let interior = None;
         let mut assembly =
-            Self { bonds, loads, displacement, survey, tangents, modulus, springs, interior: None };
+            Self { bonds, loads, displacement, survey, tangents, modulus, springs, interior, cell, full };
         if bonds.as_lattice().is_some() && survey.moved < SMALL {
             let whole = |&&slot: &&u32| survey.bonded[slot as usize] == survey.most;
             let slot = bonds.particles().iter().find(whole);
@@ -160,59 +178,67 @@ impl<'a, const D: usize> Assembly<'a, D> {
     /// Stiffness of an element, and for each corner Σ V φ over its particles.
     pub fn element(&self, space: &Space<D>, element: &Element) -> (ElementMatrix, [f64; CORNERS]) {
         let corners = 1 << D;
-        let pairs = D * (D + 1) / 2;
         let mut matrix = [[0.0; SYMMETRIC]; PAIRS];
         let mut measure = [0.0; CORNERS];
-        // Σ V ∂φ_a ∂φ_b of the particles that share the interior's C
+        // Σ V ∂φ_a ∂φ_b of the particles that share the interior's C, and Σ V C
         let mut shared = [[0.0; SYMMETRIC]; PAIRS];
+        let mut sum = [[0.0; SYMMETRIC]; SYMMETRIC];
+        let (mut filled, mut common) = (0.0, 0.0);
         for &slot in &space.members[element.members[0]..element.members[1]] {
             let slot = slot as usize;
             let volume = self.bonds.volume(slot);
-            let local = space.local.get(slot);
-            let (hats, slopes) = hats::<D>(local, space.edge);
-            let interior = self.interior.is_some() && self.survey.bonded[slot] == self.survey.most;
-            let own = if interior { None } else { Some(self.tangent(slot)) };
-            let held = self.loads.held(slot);
-            let mut at = 0;
+            let (values, slopes) = hats::<D>(space.local.get(slot), space.edge);
+            filled += volume;
             for a in 0..corners {
-                measure[a] += volume * hats[a];
-                for b in a..corners {
-                    let mut products = [0.0; SYMMETRIC];
-                    let mut other = 0;
-                    for k in 0..D {
-                        for l in k..D {
-                            let twice = slopes[a][k] * slopes[b][l] + slopes[a][l] * slopes[b][k];
-                            products[other] = volume * if k == l { 0.5 * twice } else { twice };
-                            other += 1;
-                        }
-                    }
-                    if let Some(own) = &own {
-                        contract(&mut matrix[at], own, &products, pairs);
-                    } else {
-                        for (sum, product) in shared[at].iter_mut().zip(products) {
-                            *sum += product;
-                        }
-                    }
-                    if held != 0 {
-                        let spring = volume * self.springs[slot] * hats[a] * hats[b];
-                        let mut pair = 0;
-                        for i in 0..D {
-                            if held >> i & 1 == 1 {
-                                matrix[at][pair] += spring;
-                            }
-                            pair += D - i;
-                        }
-                    }
-                    at += 1;
+                measure[a] += volume * values[a];
+            }
+            match &self.interior {
+                Some(_) if self.survey.bonded[slot] == self.survey.most => {
+                    add_products(&mut shared, volume, &slopes);
+                    common += volume;
+                }
+                _ => {
+                    let tangent = self.tangent(slot);
+                    let mut own = [[0.0; SYMMETRIC]; PAIRS];
+                    add_products(&mut own, volume, &slopes);
+                    contract::<D>(&mut matrix, &tangent, &own);
+                    add_tangent(&mut sum, &tangent, volume);
                 }
             }
+            self.hold(&mut matrix, slot, volume, &values);
         }
         if let Some(interior) = &self.interior {
-            for (entry, products) in matrix.iter_mut().zip(&shared) {
-                contract(entry, interior, products, pairs);
-            }
+            contract::<D>(&mut matrix, interior, &shared);
+            add_tangent(&mut sum, interior, common);
+        }
+        let empty = (1.0 - filled / self.cell).max(0.0);
+        if empty > 0.0 && filled > 0.0 {
+            let mean = sum.map(|row| row.map(|x| FICTITIOUS * empty * x / filled));
+            contract::<D>(&mut matrix, &mean, &self.full);
         }
         (matrix, measure)
+    }
+
+    /// Adds the springs that hold what is held.
+    fn hold(&self, matrix: &mut ElementMatrix, slot: usize, volume: f64, values: &[f64; CORNERS]) {
+        let held = self.loads.held(slot);
+        if held == 0 {
+            return;
+        }
+        let mut at = 0;
+        for a in 0..1 << D {
+            for b in a..1 << D {
+                let spring = volume * self.springs[slot] * values[a] * values[b];
+                let mut pair = 0;
+                for i in 0..D {
+                    if held >> i & 1 == 1 {
+                        matrix[at][pair] += spring;
+                    }
+                    pair += D - i;
+                }
+                at += 1;
+            }
+        }
     }
 
     /// Σ_I V_I C_1111 / Σ_I V_I, or so: how stiff the body is.
@@ -226,14 +252,45 @@ impl<'a, const D: usize> Assembly<'a, D> {
     }
 }
 
-/// result += C : products.
-fn contract(result: &mut [f64; SYMMETRIC], tangent: &Tangent, products: &[f64; SYMMETRIC], pairs: usize) {
-    for pair in 0..pairs {
-        let mut sum = 0.0;
-        for other in 0..pairs {
-            sum += tangent[pair][other] * products[other];
+/// matrix += C : products, corner pair by corner pair.
+fn contract<const D: usize>(matrix: &mut ElementMatrix, tangent: &Tangent, products: &ElementMatrix) {
+    let pairs = D * (D + 1) / 2;
+    let corners = 1 << D;
+    for (result, products) in matrix.iter_mut().zip(products).take(corners * (corners + 1) / 2) {
+        for pair in 0..pairs {
+            let mut sum = 0.0;
+            for other in 0..pairs {
+                sum += tangent[pair][other] * products[other];
+            }
+            result[pair] += sum;
         }
-        result[pair] += sum;
+    }
+}
+
+/// sum += volume·C.
+fn add_tangent(sum: &mut Tangent, tangent: &Tangent, volume: f64) {
+    for (sum, row) in sum.iter_mut().zip(tangent) {
+        sum.iter_mut().zip(row).for_each(|(sum, x)| *sum += volume * x);
+    }
+}
+
+/// products += V ∂φ_a ∂φ_b for each pair of corners a ≤ b; mixed pairs of derivatives both ways.
+fn add_products<const D: usize>(products: &mut ElementMatrix, volume: f64, slopes: &[[f64; D]; CORNERS]) {
+    let mut at = 0;
+    for a in 0..1 << D {
+        for b in a..1 << D {
+            let mut other = 0;
+            for k in 0..D {
+                products[at][other] += volume * slopes[a][k] * slopes[b][k];
+                other += 1;
+                for l in k + 1..D {
+                    let both = slopes[a][k] * slopes[b][l] + slopes[a][l] * slopes[b][k];
+                    products[at][other] += volume * both;
+                    other += 1;
+                }
+            }
+            at += 1;
+        }
     }
 }
 
