@@ -50,7 +50,14 @@ pub struct PreconditionedLbfgs {
 
 impl Default for PreconditionedLbfgs {
     fn default() -> Self {
-        Self { tolerance: 1e-3, max_iterations: 20_000, memory: 10, coarsening: 6.0, weight: 1.0, accept: 0.0 }
+        Self {
+            tolerance: 1e-3,
+            max_iterations: 20_000,
+            memory: 10,
+            coarsening: 4.0,
+            weight: 1.0,
+            accept: 0.0,
+        }
     }
 }
 
@@ -344,9 +351,7 @@ impl<const D: usize> Equilibrium<D> for LimitedMemory<D> {
     ) -> Result<(), Error> {
         let goal = self.settings.goal();
         self.memory.clear(false);
-        if !self.preconditioner.is_built()
-            || (state.iteration == 0 && state.round.is_multiple_of(ROUNDS))
-        {
+        if !self.preconditioner.is_built() || (state.iteration == 0 && state.round.is_multiple_of(ROUNDS)) {
             self.begin(system, state, watch)?;
         }
         let mut point = self.arrive(system, state)?;

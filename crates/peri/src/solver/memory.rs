@@ -136,7 +136,11 @@ impl<const D: usize> Memory<D> {
                 let change = &mut change[..range.len()];
                 for c in 0..D {
                     let (g, z) = (&g1[c][range.clone()], &z1[c][range.clone()]);
-                    change.iter_mut().zip(g).zip(&g0[c][range.clone()]).for_each(|((y, g), old)| *y = g - old);
+                    change
+                        .iter_mut()
+                        .zip(g)
+                        .zip(&g0[c][range.clone()])
+                        .for_each(|((y, g), old)| *y = g - old);
                     s[c].iter_mut().for_each(|s| *s *= step);
                     w[c].iter_mut().zip(z).for_each(|(w, z)| *w = z - *w);
                     add_products(&mut sums[..4], s[c], w[c], change, g);
@@ -170,8 +174,7 @@ impl<const D: usize> Memory<D> {
             self.spare.extend([oldest.step, oldest.image]);
         }
         let mut fresh = || self.spare.pop().unwrap_or_else(|| Field::zeros(slots));
-        let (step, image) =
-            (std::mem::replace(direction, fresh()), std::mem::replace(old_image, fresh()));
+        let (step, image) = (std::mem::replace(direction, fresh()), std::mem::replace(old_image, fresh()));
         let (later, gradient) = (VecDeque::new(), [sums[2], sums[3]]);
         self.pairs.push_back(Pair { step, image, curvature, size, later, gradient });
     }

@@ -27,7 +27,8 @@ impl Pattern {
     }
 
     /// Index of an entry.
-    pub fn find(&self, row: usize, column: usize) -> Option<usize> {
+    #[cfg(test)]
+    fn find(&self, row: usize, column: usize) -> Option<usize> {
         let range = self.starts[column]..self.starts[column + 1];
         self.rows[range.clone()].binary_search(&row).ok().map(|at| range.start + at)
     }
@@ -55,7 +56,8 @@ impl Factor {
         let parameters = Default::default();
         let needed = factor.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, parameters);
         let mut memory = MemBuffer::try_new(needed).ok()?;
-        let none = LltRegularization { dynamic_regularization_delta: 0.0, dynamic_regularization_epsilon: 0.0 };
+        let none =
+            LltRegularization { dynamic_regularization_delta: 0.0, dynamic_regularization_epsilon: 0.0 };
         factor
             .symbolic
             .factorize_numeric_llt(
@@ -113,12 +115,14 @@ mod tests {
     /// The five-point Laplacian of a 7 × 5 grid plus a shift, against its own product.
     #[test]
     fn solves_what_it_factors() {
-        let (width, height) = (7, 5);
+        let (width, height) = (7_usize, 5);
         let size = width * height;
         let mut pattern = Pattern { starts: vec![0], rows: Vec::new() };
         let mut entries = Vec::new();
         for column in 0..size {
-            for (row, value) in [(column.wrapping_sub(width), -1.0), (column.wrapping_sub(1), -1.0), (column, 4.1)] {
+            for (row, value) in
+                [(column.wrapping_sub(width), -1.0), (column.wrapping_sub(1), -1.0), (column, 4.1)]
+            {
                 if row < size && !(row + 1 == column && column % width == 0) {
                     pattern.rows.push(row);
                     entries.push(value);

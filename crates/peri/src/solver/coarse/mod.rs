@@ -209,7 +209,8 @@ fn assemble<const D: usize>(
         }
     }
     // a function that its particles hardly see
-    let mean = (0..pattern.size()).map(|k| entries[pattern.starts[k + 1] - 1]).sum::<f64>() / pattern.size() as f64;
+    let mean =
+        (0..pattern.size()).map(|k| entries[pattern.starts[k + 1] - 1]).sum::<f64>() / pattern.size() as f64;
     for k in 0..pattern.size() {
         entries[pattern.starts[k + 1] - 1] += LEAST_DIAGONAL * mean;
     }

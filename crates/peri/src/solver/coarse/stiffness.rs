@@ -5,8 +5,8 @@
 use super::space::{CORNERS, Element, Space};
 use crate::bonds::Bonds;
 use crate::field::Field;
-use crate::solver::load::Loads;
 use crate::potential::BondPotential;
+use crate::solver::load::Loads;
 use rayon::prelude::*;
 
 /// Pairs i ≤ j in three dimensions, and pairs of corners a ≤ b.
@@ -329,4 +329,3 @@ pub fn hat_values<const D: usize>(local: [f64; D]) -> [f64; CORNERS] {
     }
     values
 }
-
