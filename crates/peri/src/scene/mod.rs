@@ -1,28 +1,31 @@
 //! The scene of a peridynamic problem, as written in TOML. Only what a scene names is built.
 
+mod boundary;
 mod build;
 mod check;
 mod cloud;
 mod explain;
 mod inclusion;
 mod loads;
+mod method;
 mod variant;
 
+pub use boundary::{Boundary, Held, Side};
 pub use build::{Body, body_of};
 pub use check::{check, check_variant};
 pub use explain::explain;
 pub use inclusion::with_inclusions;
 pub use loads::{loads_of, region_names, velocities_of};
+pub use method::{Dynamics, Method, Solver};
 pub use variant::Variant;
 
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::critical::Critical;
 use crate::potential::Law;
-use crate::solver::{Policy, VelocityVerlet};
 use crate::stress::{BallVolume, Measure};
 use polycore::report::Expect;
-use polycore::units::{Density, Force, Length, Rate, Speed, Stress, Time};
+use polycore::units::{Length, Stress};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -208,181 +211,6 @@ pub enum SurfaceCorrection {
     None,
     /// Until a homogeneous strain stores the continuum's energy (Madenci & Oterkus).
     Energy,
-}
-
-/// A region and what holds there.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Boundary {
-    /// Its name in curves and values; default: the side, or `box` and its number.
-    pub name: Option<String>,
-    /// A side of the body's bounding box …
-    pub side: Option<Side>,
-    /// … to this depth in particles; default: the horizon, rounded down.
-    pub layers: Option<usize>,
-    /// Or a box: lower corner …
-    pub min: Option<Vec<Length>>,
-    /// … and upper corner.
-    pub max: Option<Vec<Length>>,
-    /// Traction on the side, applied as a uniform body force over its layers.
-    pub traction: Option<Vec<Stress>>,
-    /// Total force on the region, spread over its volume.
-    pub force: Option<Vec<Force>>,
-    /// Velocity at the start, in explicit dynamics.
-    pub velocity: Option<Vec<Speed>>,
-    /// Displacement at the end of the last step, component by component: a length or `"free"`.
-    pub displacement: Option<Vec<Held>>,
-}
-
-/// Sides of the bounding box.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-pub enum Side {
-    /// Smallest x.
-    #[serde(rename = "x-")]
-    XLow,
-    /// Largest x.
-    #[serde(rename = "x+")]
-    XHigh,
-    /// Smallest y.
-    #[serde(rename = "y-")]
-    YLow,
-    /// Largest y.
-    #[serde(rename = "y+")]
-    YHigh,
-    /// Smallest z.
-    #[serde(rename = "z-")]
-    ZLow,
-    /// Largest z.
-    #[serde(rename = "z+")]
-    ZHigh,
-}
-
-impl std::fmt::Display for Side {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (axis, upper) = self.axis();
-        write!(f, "{}{}", ["x", "y", "z"][axis], if upper { "+" } else { "-" })
-    }
-}
-
-impl Side {
-    /// Axis index, and whether the upper end is meant.
-    pub fn axis(self) -> (usize, bool) {
-        match self {
-            Self::XLow => (0, false),
-            Self::XHigh => (0, true),
-            Self::YLow => (1, false),
-            Self::YHigh => (1, true),
-            Self::ZLow => (2, false),
-            Self::ZHigh => (2, true),
-        }
-    }
-}
-
-/// A displacement component: prescribed or free.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Held {
-    /// Not prescribed.
-    Free,
-    /// Prescribed, m.
-    At(f64),
-}
-
-impl<'de> Deserialize<'de> for Held {
-    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(from)?;
-        if text.trim() == "free" {
-            return Ok(Self::Free);
-        }
-        let length = text.parse::<Length>().map_err(|error| {
-            serde::de::Error::custom(format!("{error}; a component that is not prescribed is \"free\""))
-        })?;
-        Ok(Self::At(length.si()))
-    }
-}
-
-/// Solver settings.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Solver {
-    /// Method.
-    pub method: Method,
-    /// Out-of-balance force over reference force.
-    pub tolerance: f64,
-    /// Load steps from 0 to the full load.
-    pub steps: usize,
-    /// Iterations a step may take.
-    pub max_iterations: u64,
-    /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break.
-    pub fit_bound: Option<f64>,
-    /// Factor on the fictitious mass; default by law.
-    pub mass_safety: Option<f64>,
-    /// Go on from a search that has used all its iterations if its residual is below this; default: that is an error.
-    pub accept: Option<f64>,
-    /// When bonds are looked at that may break.
-    pub breaking: Policy,
-    /// Skip what is left of the load once it has fallen below this part of its peak.
-    pub stop_below: Option<f64>,
-}
-
-impl Default for Solver {
-    fn default() -> Self {
-        Self {
-            method: Method::Adr,
-            tolerance: 1e-3,
-            steps: 1,
-            max_iterations: 200_000,
-            fit_bound: None,
-            mass_safety: None,
-            accept: None,
-            breaking: Policy::default(),
-            stop_below: None,
-        }
-    }
-}
-
-/// Methods.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// Adaptive dynamic relaxation, quasi-static.
-    Adr,
-    /// Velocity Verlet: explicit dynamics, with a `[dynamics]` block.
-    Verlet,
-}
-
-/// Explicit dynamics: loads rise linearly over the ramp and then stay.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Dynamics {
-    /// Mass density ρ.
-    pub density: Density,
-    /// When to end.
-    pub end_time: Time,
-    /// Time over which the loads rise; default: at once.
-    pub ramp: Option<Time>,
-    /// Largest time step; default: `safety` times the critical one.
-    pub time_step: Option<Time>,
-    /// Part of the critical time step; default 0.9.
-    pub safety: Option<f64>,
-    /// Mass-proportional damping; default: none.
-    pub damping: Option<Rate>,
-    /// Rows of history, equally far apart; default 100.
-    pub records: Option<usize>,
-}
-
-impl Dynamics {
-    /// The method with these settings.
-    pub fn method(&self) -> VelocityVerlet {
-        let plain = VelocityVerlet::new(self.density.si(), self.end_time.si());
-        VelocityVerlet {
-            time_step: self.time_step.map(|t| t.si()),
-            safety: self.safety.unwrap_or(plain.safety),
-            damping: self.damping.map_or(0.0, |c| c.si()),
-            ramp: self.ramp.map_or(0.0, |t| t.si()),
-            records: self.records.unwrap_or(plain.records),
-            ..plain
-        }
-    }
 }
 
 /// Stress output.

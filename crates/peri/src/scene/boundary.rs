@@ -1,0 +1,94 @@
+//! Regions of a body and what holds there.
+
+use polycore::units::{Force, Length, Speed, Stress};
+use serde::Deserialize;
+
+/// A region and what holds there.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Boundary {
+    /// Its name in curves and values; default: the side, or `box` and its number.
+    pub name: Option<String>,
+    /// A side of the body's bounding box …
+    pub side: Option<Side>,
+    /// … to this depth in particles; default: the horizon, rounded down.
+    pub layers: Option<usize>,
+    /// Or a box: lower corner …
+    pub min: Option<Vec<Length>>,
+    /// … and upper corner.
+    pub max: Option<Vec<Length>>,
+    /// Traction on the side, applied as a uniform body force over its layers.
+    pub traction: Option<Vec<Stress>>,
+    /// Total force on the region, spread over its volume.
+    pub force: Option<Vec<Force>>,
+    /// Velocity at the start, in explicit dynamics.
+    pub velocity: Option<Vec<Speed>>,
+    /// Displacement at the end of the last step, component by component: a length or `"free"`.
+    pub displacement: Option<Vec<Held>>,
+}
+
+/// Sides of the bounding box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+pub enum Side {
+    /// Smallest x.
+    #[serde(rename = "x-")]
+    XLow,
+    /// Largest x.
+    #[serde(rename = "x+")]
+    XHigh,
+    /// Smallest y.
+    #[serde(rename = "y-")]
+    YLow,
+    /// Largest y.
+    #[serde(rename = "y+")]
+    YHigh,
+    /// Smallest z.
+    #[serde(rename = "z-")]
+    ZLow,
+    /// Largest z.
+    #[serde(rename = "z+")]
+    ZHigh,
+}
+
+impl std::fmt::Display for Side {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (axis, upper) = self.axis();
+        write!(f, "{}{}", ["x", "y", "z"][axis], if upper { "+" } else { "-" })
+    }
+}
+
+impl Side {
+    /// Axis index, and whether the upper end is meant.
+    pub fn axis(self) -> (usize, bool) {
+        match self {
+            Self::XLow => (0, false),
+            Self::XHigh => (0, true),
+            Self::YLow => (1, false),
+            Self::YHigh => (1, true),
+            Self::ZLow => (2, false),
+            Self::ZHigh => (2, true),
+        }
+    }
+}
+
+/// A displacement component: prescribed or free.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Held {
+    /// Not prescribed.
+    Free,
+    /// Prescribed, m.
+    At(f64),
+}
+
+impl<'de> Deserialize<'de> for Held {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(from)?;
+        if text.trim() == "free" {
+            return Ok(Self::Free);
+        }
+        let length = text.parse::<Length>().map_err(|error| {
+            serde::de::Error::custom(format!("{error}; a component that is not prescribed is \"free\""))
+        })?;
+        Ok(Self::At(length.si()))
+    }
+}

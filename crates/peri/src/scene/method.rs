@@ -1,0 +1,90 @@
+//! What a scene says of its solver: quasi-static methods and explicit dynamics.
+
+use crate::solver::{Policy, VelocityVerlet};
+use polycore::units::{Density, Rate, Time};
+use serde::Deserialize;
+
+/// Solver settings.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Solver {
+    /// Method.
+    pub method: Method,
+    /// Out-of-balance force over reference force.
+    pub tolerance: f64,
+    /// Load steps from 0 to the full load.
+    pub steps: usize,
+    /// Iterations a step may take.
+    pub max_iterations: u64,
+    /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break.
+    pub fit_bound: Option<f64>,
+    /// Factor on the fictitious mass; default by law.
+    pub mass_safety: Option<f64>,
+    /// Go on from a search that has used all its iterations if its residual is below this; default: that is an error.
+    pub accept: Option<f64>,
+    /// When bonds are looked at that may break.
+    pub breaking: Policy,
+    /// Skip what is left of the load once it has fallen below this part of its peak.
+    pub stop_below: Option<f64>,
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        Self {
+            method: Method::Adr,
+            tolerance: 1e-3,
+            steps: 1,
+            max_iterations: 200_000,
+            fit_bound: None,
+            mass_safety: None,
+            accept: None,
+            breaking: Policy::default(),
+            stop_below: None,
+        }
+    }
+}
+
+/// Methods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Adaptive dynamic relaxation, quasi-static.
+    Adr,
+    /// Velocity Verlet: explicit dynamics, with a `[dynamics]` block.
+    Verlet,
+}
+
+/// Explicit dynamics: loads rise linearly over the ramp and then stay.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Dynamics {
+    /// Mass density ρ.
+    pub density: Density,
+    /// When to end.
+    pub end_time: Time,
+    /// Time over which the loads rise; default: at once.
+    pub ramp: Option<Time>,
+    /// Largest time step; default: `safety` times the critical one.
+    pub time_step: Option<Time>,
+    /// Part of the critical time step; default 0.9.
+    pub safety: Option<f64>,
+    /// Mass-proportional damping; default: none.
+    pub damping: Option<Rate>,
+    /// Rows of history, equally far apart; default 100.
+    pub records: Option<usize>,
+}
+
+impl Dynamics {
+    /// The method with these settings.
+    pub fn method(&self) -> VelocityVerlet {
+        let plain = VelocityVerlet::new(self.density.si(), self.end_time.si());
+        VelocityVerlet {
+            time_step: self.time_step.map(|t| t.si()),
+            safety: self.safety.unwrap_or(plain.safety),
+            damping: self.damping.map_or(0.0, |c| c.si()),
+            ramp: self.ramp.map_or(0.0, |t| t.si()),
+            records: self.records.unwrap_or(plain.records),
+            ..plain
+        }
+    }
+}
