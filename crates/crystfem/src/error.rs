@@ -1,0 +1,59 @@
+//! What can go wrong in this crate.
+
+use std::path::PathBuf;
+
+/// Errors of the heat and crystallization crate.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A mesh cannot be used.
+    #[error("mesh: {0}")]
+    Mesh(String),
+    /// A parameter is out of its domain.
+    #[error("{name}: found {found}; allowed: {allowed}")]
+    Parameter {
+        /// What.
+        name: &'static str,
+        /// The value found.
+        found: f64,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// A line of a data or mesh file cannot be used.
+    #[error("{}:{line}: {what}: found {found:?}; allowed: {allowed}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column, key or section.
+        what: String,
+        /// What is there.
+        found: String,
+        /// What may be there.
+        allowed: String,
+    },
+    /// A result is not finite.
+    #[error("{quantity} is not finite at {place}, t = {time} s")]
+    NotFinite {
+        /// The quantity.
+        quantity: &'static str,
+        /// Node or integration point, with its position.
+        place: String,
+        /// Time, s.
+        time: f64,
+    },
+    /// Files, output, scenes.
+    #[error(transparent)]
+    Shared(#[from] polycore::Error),
+}
+
+impl Error {
+    /// Exit code of the command line: 2 for bad input, 1 otherwise.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Mesh(_) | Self::Parameter { .. } | Self::File { .. } => 2,
+            Self::NotFinite { .. } => 1,
+            Self::Shared(error) => error.exit_code(),
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Heat conduction and crystallization of semicrystalline polymers printed layer by layer.
+
+pub mod error;
+pub mod material;
+pub mod mesh;
+
+pub use error::Error;

@@ -1,0 +1,54 @@
+//! Materials: Abaqus' UMATHT without side effects. (Input, old state) → (response, new state); the old state is never
+//! changed.
+
+use crate::error::Error;
+use nalgebra::{Matrix3, Vector3};
+
+/// Where a material is asked, at one integration point. Temperatures in K.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Temperature at the start of the increment, K.
+    pub temperature: f64,
+    /// Increment of temperature, K: the end is `temperature + increment`.
+    pub increment: f64,
+    /// ∇T at the end of the increment, K/m.
+    pub gradient: Vector3<f64>,
+    /// Time increment, s.
+    pub dt: f64,
+}
+
+/// What a material answers, at the end of the increment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Response {
+    /// Internal energy per mass U, J/kg, from a fixed reference.
+    pub energy: f64,
+    /// ∂U/∂T at fixed Δt, the consistent tangent with ∂α/∂T, J/(kg K).
+    pub d_energy_d_temperature: f64,
+    /// Heat flux f = −k ∇T, W/m².
+    pub flux: Vector3<f64>,
+    /// ∂f/∂T, W/(m² K).
+    pub d_flux_d_temperature: Vector3<f64>,
+    /// ∂f/∂(∇T), W/(m K).
+    pub d_flux_d_gradient: Matrix3<f64>,
+    /// Suggested next increment over this one (PNEWDT); `None`: no wish.
+    pub step_ratio: Option<f64>,
+}
+
+/// A material of heat conduction, Eq. (4.16)–(4.17).
+pub trait ThermalMaterial: Send + Sync {
+    /// Mass density ρ, kg/m³.
+    fn density(&self) -> f64;
+    /// Names of the state variables (SDV), in order; empty for a plain conductor.
+    fn state_names(&self) -> &'static [&'static str];
+    /// State of fresh material at temperature T, K (SDVINI).
+    fn initial_state(&self, temperature: f64, state: &mut [f64]);
+    /// U of material at rest at a temperature with a given state, J/kg: what birth brings in.
+    fn energy(&self, temperature: f64, state: &[f64]) -> f64;
+    /// Whether U is linear in T and the flux in ∇T, without state: no Newton iteration is needed.
+    fn is_linear(&self) -> bool;
+    /// The response to an increment; `new` is the state at its end.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] for temperatures that are none.
+    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error>;
+}
