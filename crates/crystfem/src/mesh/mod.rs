@@ -1,0 +1,267 @@
+//! Meshes of hexahedra and tetrahedra: structured ones, files, quality, outer surfaces, layers.
+
+mod bar;
+pub mod quality;
+mod split;
+mod structured;
+pub mod surface;
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use crate::error::Error;
+
+pub use bar::{Bar, Substrate};
+pub use split::Split;
+pub use structured::{Block, Grid, graded};
+
+/// A face of an element: the element's number and the side, 0–5 of a hexahedron or 0–3 of a tetrahedron, numbered as in
+/// Abaqus (S1 is side 0).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Face {
+    /// Element: hexahedra first, tetrahedra after them.
+    pub element: u32,
+    /// Side.
+    pub side: u8,
+}
+
+/// A mesh. Elements are numbered hexahedra first, then tetrahedra; nodes of an element in the order of Abaqus and VTK.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Positions of the nodes, m.
+    pub points: Vec<[f64; 3]>,
+    /// Nodes of 8-node hexahedra.
+    pub hexahedra: Vec<[u32; 8]>,
+    /// Nodes of 4-node tetrahedra.
+    pub tetrahedra: Vec<[u32; 4]>,
+    /// Named sets of nodes, each sorted.
+    pub node_sets: BTreeMap<String, Vec<u32>>,
+    /// Named sets of elements, each sorted.
+    pub element_sets: BTreeMap<String, Vec<u32>>,
+    /// Named surfaces.
+    pub surfaces: BTreeMap<String, Vec<Face>>,
+}
+
+/// Local nodes of the sides S1 … S6 of a hexahedron, anticlockwise seen from outside.
+pub const HEXAHEDRON_SIDES: [[usize; 4]; 6] =
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+
+/// Local nodes of the sides S1 … S4 of a tetrahedron, anticlockwise seen from outside.
+pub const TETRAHEDRON_SIDES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+
+/// Sides of a box that bounds a mesh and the names of the surfaces on them: x−, x+, y−, y+, z−, z+.
+pub const BOX_SIDES: [&str; 6] = ["left", "right", "front", "back", "bottom", "top"];
+
+/// Nodes of a face: three or four, anticlockwise seen from outside. Dereferences to a slice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaceNodes {
+    nodes: [u32; 4],
+    count: u8,
+}
+
+impl std::ops::Deref for FaceNodes {
+    type Target = [u32];
+
+    fn deref(&self) -> &[u32] {
+        &self.nodes[..usize::from(self.count)]
+    }
+}
+
+/// Elements that are axis-parallel bricks, by their shape: elements of one shape share their matrices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bricks {
+    /// Edge lengths along x, y, z of each shape, m, in order of first use.
+    pub sizes: Vec<[f64; 3]>,
+    /// Shape of each element.
+    pub shape: Vec<u32>,
+}
+
+impl Mesh {
+    /// Number of elements.
+    pub fn element_count(&self) -> usize {
+        self.hexahedra.len() + self.tetrahedra.len()
+    }
+
+    /// Nodes of an element; empty where there is no such element.
+    pub fn nodes(&self, element: u32) -> &[u32] {
+        let element = element as usize;
+        match self.hexahedra.get(element) {
+            Some(nodes) => nodes,
+            None => self.tetrahedra.get(element - self.hexahedra.len()).map_or(&[], |nodes| nodes.as_slice()),
+        }
+    }
+
+    /// Number of sides of an element: 6 or 4.
+    pub fn side_count(&self, element: u32) -> u8 {
+        if (element as usize) < self.hexahedra.len() { 6 } else { 4 }
+    }
+
+    /// Nodes of a face, anticlockwise seen from outside; empty where there is no such face.
+    pub fn face_nodes(&self, face: Face) -> FaceNodes {
+        let (element, side) = (face.element as usize, usize::from(face.side));
+        let mut nodes = [0; 4];
+        let mut count = 0;
+        if let Some(all) = self.hexahedra.get(element) {
+            if let Some(side) = HEXAHEDRON_SIDES.get(side) {
+                nodes = side.map(|n| all[n]);
+                count = 4;
+            }
+        } else if let Some(all) = self.tetrahedra.get(element - self.hexahedra.len())
+            && let Some(side) = TETRAHEDRON_SIDES.get(side)
+        {
+            for (node, local) in nodes.iter_mut().zip(side) {
+                *node = all[*local];
+            }
+            count = 3;
+        }
+        FaceNodes { nodes, count }
+    }
+
+    /// Mean of an element's nodes, m.
+    pub fn centre(&self, element: u32) -> [f64; 3] {
+        let nodes = self.nodes(element);
+        let sum = nodes.iter().fold(Vector3::zeros(), |sum, node| sum + self.point(*node));
+        (sum / nodes.len() as f64).into()
+    }
+
+    /// Corners of the smallest box around all nodes, m; `None` without nodes.
+    pub fn bounds(&self) -> Option<[[f64; 3]; 2]> {
+        let first = *self.points.first()?;
+        Some(self.points.iter().fold([first, first], |[mut lower, mut upper], point| {
+            for d in 0..3 {
+                lower[d] = lower[d].min(point[d]);
+                upper[d] = upper[d].max(point[d]);
+            }
+            [lower, upper]
+        }))
+    }
+
+    /// Nodes on faces, sorted, each once.
+    pub fn nodes_of(&self, faces: &[Face]) -> Vec<u32> {
+        let mut nodes: Vec<u32> = faces.iter().flat_map(|face| self.face_nodes(*face).to_vec()).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
+    /// The shapes of the elements if all are axis-parallel bricks, numbered from the corner with the least coordinates;
+    /// `None` otherwise. Edges count as parallel, and shapes as one, within 1e-9 of the shortest edge: element matrices
+    /// then agree to that, far below a discretisation error.
+    pub fn bricks(&self) -> Option<Bricks> {
+        if !self.tetrahedra.is_empty() {
+            return None;
+        }
+        let mut sizes: Vec<[f64; 3]> = Vec::new();
+        let mut shape = Vec::with_capacity(self.hexahedra.len());
+        // shapes by their size in units that differ by 1e-9 between neighbours: most elements repeat the last shape
+        let mut known: BTreeMap<[i64; 3], u32> = BTreeMap::new();
+        let mut last = u32::MAX;
+        for element in 0..self.hexahedra.len() as u32 {
+            let size = self.brick(element)?;
+            let close = |other: &[f64; 3]| (0..3).all(|d| (size[d] - other[d]).abs() <= 1e-9 * other[d]);
+            if !sizes.get(last as usize).is_some_and(close) {
+                let key = size.map(|length| (length.ln() * 1e9).round() as i64);
+                let found = (0..27)
+                    .map(|k| [key[0] + k % 3 - 1, key[1] + k / 3 % 3 - 1, key[2] + k / 9 - 1])
+                    .find_map(|near| known.get(&near).copied());
+                last = found.unwrap_or_else(|| {
+                    sizes.push(size);
+                    known.insert(key, sizes.len() as u32 - 1);
+                    sizes.len() as u32 - 1
+                });
+            }
+            shape.push(last);
+        }
+        Some(Bricks { sizes, shape })
+    }
+
+    /// Edge lengths of a hexahedron that is an axis-parallel brick, see [`Self::bricks`].
+    fn brick(&self, element: u32) -> Option<[f64; 3]> {
+        let nodes = self.hexahedra.get(element as usize)?.map(|node| self.point(node));
+        let size = nodes[6] - nodes[0];
+        let tolerance = 1e-9 * size.min();
+        let fits = size.min() > 0.0
+            && (0..8).all(|corner| {
+                // corners 0 1 2 3 go round the lower face, 4 5 6 7 round the upper one
+                let at = [corner & 1 ^ corner >> 1 & 1, corner >> 1 & 1, corner >> 2];
+                (0..3).all(|d| (nodes[corner][d] - nodes[0][d] - size[d] * at[d] as f64).abs() <= tolerance)
+            });
+        fits.then(|| size.into())
+    }
+
+    /// The same mesh with its inner nodes moved, for patch tests: by `amplitude` times the box along x, −0.7 of that
+    /// along y and 0.5 along z, times ∏ sin(π ξ_d) with ξ from 0 to 1 through the box; the box keeps its shape.
+    ///
+    /// # Errors
+    /// An amplitude whose deformation could invert an element: above 0.2 in size.
+    pub fn distorted(&self, amplitude: f64) -> Result<Self, Error> {
+        // det F = 1 + amplitude (1, −0.7, 0.5)·∇∏ in box units, |∇∏| ≤ π: positive below 0.24
+        if amplitude.is_nan() || amplitude.abs() > 0.2 {
+            let allowed = "−0.2 … 0.2".into();
+            return Err(Error::Parameter { name: "amplitude of the distortion", found: amplitude, allowed });
+        }
+        let mut mesh = self.clone();
+        let Some([lower, upper]) = self.bounds() else { return Ok(mesh) };
+        for point in &mut mesh.points {
+            let product: f64 = (0..3)
+                .map(|d| (std::f64::consts::PI * (point[d] - lower[d]) / (upper[d] - lower[d])).sin())
+                .product();
+            for (d, part) in [1.0, -0.7, 0.5].into_iter().enumerate() {
+                point[d] += amplitude * part * (upper[d] - lower[d]) * product;
+            }
+        }
+        Ok(mesh)
+    }
+
+    /// Position of a node.
+    pub(crate) fn point(&self, node: u32) -> Vector3<f64> {
+        Vector3::from(self.points[node as usize])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_point_outwards() {
+        let mesh = Grid::uniform([0.0; 3], [1.0, 2.0, 3.0], [1, 1, 1]).unwrap().mesh("brick").unwrap();
+        let mut tetrahedron = Mesh { points: mesh.points.clone(), ..Mesh::default() };
+        tetrahedron.tetrahedra.push([0, 1, 3, 4]);
+        for mesh in [mesh, tetrahedron] {
+            let centre = Vector3::from(mesh.centre(0));
+            for side in 0..mesh.side_count(0) {
+                let nodes = mesh.face_nodes(Face { element: 0, side });
+                let corner = mesh.point(nodes[0]);
+                let normal = (mesh.point(nodes[1]) - corner).cross(&(mesh.point(nodes[2]) - corner));
+                assert!(normal.dot(&(corner - centre)) > 0.0, "side {side}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_exist_has_no_nodes() {
+        let mesh = Grid::uniform([0.0; 3], [1.0; 3], [1, 1, 1]).unwrap().mesh("brick").unwrap();
+        assert!(mesh.nodes(1).is_empty());
+        assert!(mesh.face_nodes(Face { element: 0, side: 6 }).is_empty());
+        assert!(mesh.face_nodes(Face { element: 7, side: 0 }).is_empty());
+        assert_eq!(Mesh::default().bounds(), None);
+    }
+
+    #[test]
+    fn bricks_are_told_by_shape() {
+        // lines at k/7 differ in their last bits; the second half along x is twice as long
+        let mut grid = Grid::uniform([0.0; 3], [1.0; 3], [7, 7, 7]).unwrap();
+        for x in &mut grid.lines[0] {
+            *x = x.max(2.0 * *x - 4.0 / 7.0);
+        }
+        let mesh = grid.mesh("brick").unwrap();
+        let bricks = mesh.bricks().unwrap();
+        assert_eq!(bricks.sizes.len(), 2);
+        assert!((bricks.sizes[1][0] - 2.0 / 7.0).abs() < 1e-12);
+        assert_eq!(bricks.shape.iter().filter(|shape| **shape == 1).count(), 3 * 49);
+        assert_eq!(mesh.distorted(0.1).unwrap().bricks(), None);
+        assert!(mesh.distorted(0.3).is_err() && mesh.distorted(f64::NAN).is_err());
+    }
+}

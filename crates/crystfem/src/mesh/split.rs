@@ -1,0 +1,89 @@
+//! Hexahedra of a structured mesh split into tetrahedra.
+
+use crate::mesh::{Face, HEXAHEDRON_SIDES, Mesh, TETRAHEDRON_SIDES};
+
+/// What fills the cells of a grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Split {
+    /// One hexahedron.
+    #[default]
+    Hexahedra,
+    /// Five tetrahedra, mirrored from cell to cell so that diagonals meet.
+    FiveTetrahedra,
+    /// Six tetrahedra around the diagonal from the first corner to the opposite one (Kuhn's division).
+    SixTetrahedra,
+}
+
+const SIX: [[usize; 4]; 6] =
+    [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
+/// One in the middle, four at corners; the second list is for cells of odd parity.
+const FIVE: [[[usize; 4]; 5]; 2] = [
+    [[0, 1, 2, 5], [0, 2, 3, 7], [0, 5, 7, 4], [2, 7, 5, 6], [0, 2, 7, 5]],
+    [[1, 2, 3, 6], [0, 1, 3, 4], [1, 6, 4, 5], [3, 4, 6, 7], [1, 3, 4, 6]],
+];
+
+/// Splits each hexahedron; sets and surfaces follow. `odd` tells the parity of each cell.
+pub(super) fn split(mesh: Mesh, odd: &[bool], into: Split) -> Mesh {
+    let count = match into {
+        Split::Hexahedra => return mesh,
+        Split::FiveTetrahedra => 5,
+        Split::SixTetrahedra => 6,
+    };
+    let parts = |element: usize| match into {
+        Split::SixTetrahedra => &SIX[..],
+        _ => &FIVE[usize::from(odd[element])][..],
+    };
+    let tetrahedra = (mesh.hexahedra.iter().enumerate())
+        .flat_map(|(element, nodes)| parts(element).iter().map(|part| part.map(|n| nodes[n])))
+        .collect();
+    let of_set = |set: &Vec<u32>| set.iter().flat_map(|e| e * count..(e + 1) * count).collect();
+    let of_surface = |faces: &Vec<Face>| {
+        let mut split: Vec<Face> = Vec::with_capacity(2 * faces.len());
+        for face in faces {
+            let whole = HEXAHEDRON_SIDES[usize::from(face.side)];
+            for (k, part) in parts(face.element as usize).iter().enumerate() {
+                let on = (0..4u8).filter(|side| {
+                    TETRAHEDRON_SIDES[usize::from(*side)].iter().all(|n| whole.contains(&part[*n]))
+                });
+                split.extend(on.map(|side| Face { element: face.element * count + k as u32, side }));
+            }
+        }
+        split.sort_unstable();
+        split
+    };
+    Mesh {
+        tetrahedra,
+        hexahedra: Vec::new(),
+        element_sets: mesh.element_sets.iter().map(|(name, set)| (name.clone(), of_set(set))).collect(),
+        surfaces: mesh.surfaces.iter().map(|(name, faces)| (name.clone(), of_surface(faces))).collect(),
+        points: mesh.points,
+        node_sets: mesh.node_sets,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::surface::Surface;
+    use crate::mesh::{Block, Grid, quality};
+
+    #[test]
+    fn tetrahedra_fill_the_brick_and_meet() {
+        let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 2.0], [3, 2, 2]).unwrap();
+        let blocks = [Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 2.0] }];
+        for (into, count) in [(Split::FiveTetrahedra, 5), (Split::SixTetrahedra, 6)] {
+            let mesh = grid.blocks(&blocks, into).unwrap();
+            assert_eq!(mesh.tetrahedra.len(), 12 * count);
+            assert_eq!(mesh.element_sets["brick"].len(), 12 * count);
+            let quality = quality::check(&mesh, None).unwrap();
+            assert!((quality.volume - 12.0).abs() < 1e-13);
+            assert!(quality.notes.is_empty(), "{:?}", quality.notes);
+            // conforming: nothing but the box's sides is outside, two triangles a square
+            let surface = Surface::of_all(&mesh).unwrap();
+            assert_eq!(surface.faces().count(), 2 * 2 * (6 + 6 + 4));
+            let mut named: Vec<Face> = mesh.surfaces.values().flatten().copied().collect();
+            named.sort_unstable();
+            assert_eq!(named, surface.faces().collect::<Vec<_>>());
+        }
+    }
+}

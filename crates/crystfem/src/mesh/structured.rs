@@ -1,0 +1,371 @@
+//! Structured meshes: grid lines along the axes, and the boxes that are filled.
+
+use crate::error::Error;
+use crate::mesh::split::{Split, split};
+use crate::mesh::{BOX_SIDES, Face, Mesh};
+
+/// Coordinates within this fraction of the extent are one.
+const SAME: f64 = 1e-9;
+
+/// Nodes of the largest mesh: 2²⁸, 15 GB of mesh alone; a slip in a size ends with a message instead of the machine.
+pub(crate) const MAX_NODES: usize = 1 << 28;
+
+/// A named box, filled with elements.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Block {
+    /// Name of its element set.
+    pub name: String,
+    /// Least coordinates, m.
+    pub lower: [f64; 3],
+    /// Greatest coordinates, m.
+    pub upper: [f64; 3],
+}
+
+/// Grid lines along x, y and z, m, ascending: conforming hexahedra lie between them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    /// Coordinates of the lines.
+    pub lines: [Vec<f64>; 3],
+}
+
+impl Grid {
+    /// Equal elements through a box.
+    ///
+    /// # Errors
+    /// A box without volume, no elements, or more nodes than 2²⁸.
+    pub fn uniform(lower: [f64; 3], upper: [f64; 3], elements: [usize; 3]) -> Result<Self, Error> {
+        let mut lines = [const { Vec::new() }; 3];
+        for d in 0..3 {
+            let [low, high, count] = [lower[d], upper[d], elements[d] as f64];
+            if !(low.is_finite() && high.is_finite() && high > low) {
+                let axis = ["x", "y", "z"][d];
+                return Err(Error::Mesh(format!(
+                    "the box from {low} to {high} m along {axis} has no extent"
+                )));
+            }
+            if !(1..MAX_NODES).contains(&elements[d]) {
+                let allowed = format!("1 … {}", MAX_NODES - 1);
+                return Err(Error::Parameter { name: "elements along an axis", found: count, allowed });
+            }
+            lines[d] = (0..=elements[d])
+                .map(|k| if k == elements[d] { high } else { low + (high - low) * (k as f64 / count) })
+                .collect();
+        }
+        let grid = Self { lines };
+        grid.check()?;
+        Ok(grid)
+    }
+
+    /// Lines through all faces of the blocks, and between them equal elements no longer than `size`.
+    ///
+    /// # Errors
+    /// No blocks, one without volume, a size that is not positive, or more nodes than 2²⁸.
+    pub fn through(blocks: &[Block], size: [f64; 3]) -> Result<Self, Error> {
+        let mut lines = [const { Vec::new() }; 3];
+        for (d, line) in lines.iter_mut().enumerate() {
+            for block in blocks {
+                block.check()?;
+                line.extend([block.lower[d], block.upper[d]]);
+            }
+            let faces = unique(std::mem::take(line));
+            line.extend(faces.first());
+            for ends in faces.windows(2) {
+                let lengths = graded(ends[1] - ends[0], size[d], 1.0)?;
+                let count = lengths.len() as f64;
+                let inner = (1..lengths.len()).map(|k| ends[0] + (ends[1] - ends[0]) * (k as f64 / count));
+                line.extend(inner.chain([ends[1]]));
+            }
+        }
+        let grid = Self { lines };
+        grid.check()?;
+        Ok(grid)
+    }
+
+    /// One block through the whole grid: hexahedra, an element set `name`, and surfaces and node sets on the sides of
+    /// the box, [`BOX_SIDES`].
+    ///
+    /// # Errors
+    /// Lines that do not ascend, or more nodes than 2²⁸.
+    pub fn mesh(&self, name: &str) -> Result<Mesh, Error> {
+        self.check()?;
+        let end = |line: &Vec<f64>, first: bool| if first { line[0] } else { line[line.len() - 1] };
+        let [lower, upper] = [true, false].map(|first| self.lines.each_ref().map(|line| end(line, first)));
+        self.blocks(&[Block { name: name.to_owned(), lower, upper }], Split::Hexahedra)
+    }
+
+    /// Elements between the lines inside any block, sets of the elements in each block (blocks may overlap: an element
+    /// is in the set of each), and surfaces and node sets on the sides of the box around all, [`BOX_SIDES`].
+    ///
+    /// # Errors
+    /// Lines that do not ascend, a block without volume or without an element, or more nodes than 2²⁸.
+    pub fn blocks(&self, blocks: &[Block], cells: Split) -> Result<Mesh, Error> {
+        self.check()?;
+        let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);
+        let mut ranges = Vec::with_capacity(blocks.len());
+        for block in blocks {
+            block.check()?;
+            // a cell is inside by its middle
+            let range: [_; 3] = std::array::from_fn(|d| {
+                let line = &self.lines[d];
+                let middle = |k: usize| 0.5 * (line[k] + line[k + 1]);
+                let cells = line.len() - 1;
+                let first = (0..cells).position(|k| middle(k) > block.lower[d]).unwrap_or(cells);
+                let end = (first..cells).find(|k| middle(*k) > block.upper[d]).unwrap_or(cells);
+                first..end
+            });
+            if range.iter().any(std::ops::Range::is_empty) {
+                return Err(Error::Mesh(format!("block `{}` holds no element of the grid", block.name)));
+            }
+            ranges.push((&block.name, range));
+        }
+        let cell = |i: usize, j: usize, k: usize| i + nx * (j + ny * k);
+        let mut element_of = vec![u32::MAX; nx * ny * nz];
+        for (_, [x, y, z]) in &ranges {
+            for (k, j) in z.clone().flat_map(|k| y.clone().map(move |j| (k, j))) {
+                element_of[cell(x.start, j, k)..cell(x.end - 1, j, k) + 1].fill(0);
+            }
+        }
+        let mut mesh = Mesh::default();
+        let mut odd = Vec::new();
+        self.number(&mut element_of, &mut mesh, &mut odd);
+        for (name, [x, y, z]) in &ranges {
+            let set = mesh.element_sets.entry((*name).clone()).or_default();
+            for (k, j) in z.clone().flat_map(|k| y.clone().map(move |j| (k, j))) {
+                set.extend(&element_of[cell(x.start, j, k)..cell(x.end - 1, j, k) + 1]);
+            }
+            // cells ascend; blocks of one name may not
+            set.sort_unstable();
+            set.dedup();
+        }
+        self.sides(&element_of, &mut mesh);
+        Ok(split(mesh, &odd, cells))
+    }
+
+    /// Numbers filled cells and their nodes, x fastest; `odd` tells the parity of i + j + k of each element.
+    fn number(&self, element_of: &mut [u32], mesh: &mut Mesh, odd: &mut Vec<bool>) {
+        let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);
+        // corners of two layers of nodes at a time: lower and upper
+        let mut layers = [vec![u32::MAX; (nx + 1) * (ny + 1)], vec![u32::MAX; (nx + 1) * (ny + 1)]];
+        let filled = |i: usize, j: usize, k: usize, element_of: &[u32]| {
+            i < nx && j < ny && k < nz && element_of[i + nx * (j + ny * k)] != u32::MAX
+        };
+        let mut count = 0;
+        for k in 0..=nz {
+            layers.swap(0, 1);
+            let [below, above] = &mut layers;
+            above.fill(u32::MAX);
+            for (j, i) in (0..=ny).flat_map(|j| (0..=nx).map(move |i| (j, i))) {
+                // node (i, j, k) is a corner of up to eight cells; wrapping makes −1 no cell
+                let used = (0..8).any(|c| {
+                    let [i, j, k] =
+                        [i.wrapping_sub(c & 1), j.wrapping_sub(c >> 1 & 1), k.wrapping_sub(c >> 2)];
+                    filled(i, j, k, element_of)
+                });
+                if used {
+                    above[i + (nx + 1) * j] = mesh.points.len() as u32;
+                    mesh.points.push([self.lines[0][i], self.lines[1][j], self.lines[2][k]]);
+                }
+            }
+            for (j, i) in (0..ny).flat_map(|j| (0..nx).map(move |i| (j, i))) {
+                if k > 0 && filled(i, j, k - 1, element_of) {
+                    element_of[i + nx * (j + ny * (k - 1))] = count;
+                    count += 1;
+                    let n = i + (nx + 1) * j;
+                    let round = [n, n + 1, n + nx + 2, n + nx + 1];
+                    let [a, b] = [round.map(|n| below[n]), round.map(|n| above[n])];
+                    mesh.hexahedra.push([a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]]);
+                    odd.push((i + j + k - 1) % 2 == 1);
+                }
+            }
+        }
+    }
+
+    /// Surfaces and node sets on the sides of the box around the filled cells.
+    fn sides(&self, element_of: &[u32], mesh: &mut Mesh) {
+        let n = self.lines.each_ref().map(|line| line.len() - 1);
+        let cell = |at: [usize; 3]| element_of[at[0] + n[0] * (at[1] + n[1] * at[2])];
+        for (number, name) in BOX_SIDES.into_iter().enumerate() {
+            let (d, last) = (number / 2, number % 2 == 1);
+            // sides of a hexahedron at x−, x+, y−, y+, z−, z+
+            let side = [5, 3, 2, 4, 0, 1][number];
+            let others = [(d + 1) % 3, (d + 2) % 3];
+            let plane = |layer: usize| {
+                let mut faces = Vec::new();
+                for b in 0..n[others[1]] {
+                    for a in 0..n[others[0]] {
+                        let mut at = [layer; 3];
+                        at[others[0]] = a;
+                        at[others[1]] = b;
+                        if cell(at) != u32::MAX {
+                            faces.push(Face { element: cell(at), side });
+                        }
+                    }
+                }
+                faces.sort_unstable();
+                faces
+            };
+            let mut order: Box<dyn Iterator<Item = usize>> =
+                if last { Box::new((0..n[d]).rev()) } else { Box::new(0..n[d]) };
+            let faces = order.find_map(|layer| Some(plane(layer)).filter(|faces| !faces.is_empty()));
+            let faces = faces.unwrap_or_default();
+            mesh.node_sets.insert(name.to_owned(), mesh.nodes_of(&faces));
+            mesh.surfaces.insert(name.to_owned(), faces);
+        }
+    }
+
+    /// Lines ascend and the nodes can be numbered.
+    fn check(&self) -> Result<(), Error> {
+        for (line, axis) in self.lines.iter().zip(["x", "y", "z"]) {
+            if line.len() < 2 {
+                return Err(Error::Mesh(format!(
+                    "{} grid lines along {axis}; allowed: 2 or more",
+                    line.len()
+                )));
+            }
+            if let Some(ends) = line.windows(2).find(|ends| !(ends[1] - ends[0] > 0.0 && ends[1].is_finite()))
+            {
+                let [a, b] = [ends[0], ends[1]];
+                return Err(Error::Mesh(format!("grid lines along {axis} do not ascend: {a} m, then {b} m")));
+            }
+        }
+        let nodes: f64 = self.lines.iter().map(|line| line.len() as f64).product();
+        if nodes > MAX_NODES as f64 {
+            let allowed = format!("at most {MAX_NODES}");
+            return Err(Error::Parameter { name: "nodes of a structured mesh", found: nodes, allowed });
+        }
+        Ok(())
+    }
+}
+
+impl Block {
+    fn check(&self) -> Result<(), Error> {
+        for (d, axis) in ["x", "y", "z"].into_iter().enumerate() {
+            let (lower, upper) = (self.lower[d], self.upper[d]);
+            if !(upper - lower > 0.0 && lower.is_finite() && upper.is_finite()) {
+                let name = &self.name;
+                return Err(Error::Mesh(format!(
+                    "block `{name}` has no extent along {axis}: from {lower} m to {upper} m"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Lengths of elements that fill `length`: the first is at most `first`, each `growth` times the one before.
+/// Their sum is `length` to rounding.
+///
+/// # Errors
+/// A length or first element that is not positive, a growth below 1, or more than 2²⁸ elements.
+pub fn graded(length: f64, first: f64, growth: f64) -> Result<Vec<f64>, Error> {
+    for (name, found) in [("length", length), ("element size", first)] {
+        if !(found > 0.0 && found.is_finite()) {
+            return Err(Error::Parameter { name, found, allowed: "positive and finite, m".into() });
+        }
+    }
+    if !(growth >= 1.0 && growth.is_finite()) {
+        return Err(Error::Parameter {
+            name: "growth of elements",
+            found: growth,
+            allowed: "1 or more".into(),
+        });
+    }
+    // a last element of less than a billionth is rounding
+    let ratio = length / first * (1.0 - SAME);
+    let count = if growth == 1.0 { ratio } else { (1.0 + ratio * (growth - 1.0)).ln() / growth.ln() };
+    if count.is_nan() || count.ceil() >= MAX_NODES as f64 {
+        let allowed = format!("at most {}", MAX_NODES - 1);
+        return Err(Error::Parameter { name: "elements along an axis", found: count.ceil(), allowed });
+    }
+    let relative: Vec<f64> = (0..count.ceil().max(1.0) as i32).map(|k| growth.powi(k)).collect();
+    let sum: f64 = relative.iter().sum();
+    Ok(relative.into_iter().map(|part| length * (part / sum)).collect())
+}
+
+/// Ascending coordinates, those closer than [`SAME`] of the extent taken as one.
+fn unique(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    let extent = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
+    values.dedup_by(|next, kept| *next - *kept <= SAME * extent);
+    values
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::quality;
+
+    #[test]
+    fn a_uniform_brick_has_its_counts_and_sides() {
+        let mesh = Grid::uniform([0.0; 3], [1.0, 2.0, 3.0], [2, 3, 4]).unwrap().mesh("brick").unwrap();
+        assert_eq!((mesh.points.len(), mesh.hexahedra.len()), (3 * 4 * 5, 24));
+        assert_eq!(mesh.element_sets["brick"].len(), 24);
+        let counts: Vec<_> = BOX_SIDES.iter().map(|side| mesh.surfaces[*side].len()).collect();
+        assert_eq!(counts, [12, 12, 8, 8, 6, 6]);
+        for (number, side) in BOX_SIDES.iter().enumerate() {
+            let (d, value) = (number / 2, if number % 2 == 0 { 0.0 } else { [1.0, 2.0, 3.0][number / 2] });
+            for face in &mesh.surfaces[*side] {
+                assert!(mesh.face_nodes(*face).iter().all(|node| mesh.points[*node as usize][d] == value));
+            }
+        }
+        let volume = quality::check(&mesh, None).unwrap().volume;
+        assert!((volume - 6.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn an_l_shape_of_blocks_has_no_nodes_in_its_gap() {
+        let block = |name: &str, lower, upper| Block { name: name.into(), lower, upper };
+        let blocks = [
+            block("foot", [0.0; 3], [3.0, 1.0, 1.0]),
+            block("leg", [0.0; 3], [1.0, 1.0, 3.0]),
+            block("head", [0.0, 0.0, 2.0], [1.0, 1.0, 3.0]),
+        ];
+        let grid = Grid::through(&blocks, [0.5, 1.0, 0.5]).unwrap();
+        assert_eq!(grid.lines[0].len(), 7);
+        let mesh = grid.blocks(&blocks, Split::Hexahedra).unwrap();
+        assert_eq!(mesh.hexahedra.len(), 12 + 8);
+        assert_eq!(mesh.element_sets["leg"].len(), 12);
+        assert!(mesh.element_sets["head"].iter().all(|e| mesh.element_sets["leg"].contains(e)));
+        // rows of y: foot 7 × 3 nodes in (x, z), leg 3 × 4 more
+        assert_eq!(mesh.points.len(), 2 * (21 + 12));
+        assert_eq!(mesh.surfaces["right"].len(), 2);
+        assert_eq!(mesh.surfaces["top"].len(), 2);
+        assert!((quality::check(&mesh, None).unwrap().volume - 5.0).abs() < 1e-13);
+    }
+
+    #[test]
+    fn what_cannot_be_a_grid_is_named() {
+        let text = |result: Result<Grid, Error>| result.unwrap_err().to_string();
+        assert!(text(Grid::uniform([0.0; 3], [1.0, 0.0, 1.0], [1; 3])).contains("along y has no extent"));
+        assert!(text(Grid::uniform([0.0; 3], [1.0; 3], [0, 1, 1])).contains("found 0; allowed: 1 …"));
+        assert!(text(Grid::uniform([0.0; 3], [1.0; 3], [10_000; 3])).contains("nodes of a structured mesh"));
+        let flat = Block { name: "flat".into(), lower: [0.0; 3], upper: [1.0, 1.0, 0.0] };
+        assert!(text(Grid::through(&[flat], [1.0; 3])).contains("block `flat` has no extent along z"));
+        assert!(text(Grid::through(&[], [1.0; 3])).contains("grid lines"));
+        let mut grid = Grid::uniform([0.0; 3], [1.0; 3], [2; 3]).unwrap();
+        let far = Block { name: "far".into(), lower: [2.0; 3], upper: [3.0; 3] };
+        let error = grid.blocks(&[far], Split::Hexahedra).unwrap_err().to_string();
+        assert!(error.contains("`far` holds no element"));
+        grid.lines[1].swap(0, 1);
+        assert!(
+            grid.mesh("brick").unwrap_err().to_string().contains("along y do not ascend: 0.5 m, then 0 m")
+        );
+        grid.lines[1][0] = f64::NAN;
+        assert!(grid.mesh("brick").is_err());
+    }
+
+    #[test]
+    fn graded_lengths_fill_and_grow() {
+        let lengths = graded(1.0, 0.1, 1.5).unwrap();
+        assert!((lengths.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        assert!(lengths[0] <= 0.1 && lengths.windows(2).all(|pair| (pair[1] / pair[0] - 1.5).abs() < 1e-12));
+        // ten tenths are ten elements in spite of rounding
+        assert_eq!(graded(1.0, 0.1, 1.0).unwrap().len(), 10);
+        assert_eq!(graded(0.3, 0.1, 1.0).unwrap().len(), 3);
+        for (length, first, growth) in
+            [(0.0, 1.0, 1.0), (1.0, f64::NAN, 1.0), (1.0, 1.0, 0.9), (1.0, 1e-300, 1.0), (1.0, -1.0, 2.0)]
+        {
+            assert!(graded(length, first, growth).is_err(), "{length} {first} {growth}");
+        }
+    }
+}

@@ -1,0 +1,391 @@
+//! Who borders on whom, and the outer surface of the elements that exist so far.
+
+use crate::error::Error;
+use crate::mesh::{BOX_SIDES, Face, Mesh};
+
+/// No neighbour.
+const NONE: u32 = u32::MAX;
+
+/// The outer surface of the active elements: faces with exactly one active element. Neighbours are found once; each
+/// activation touches only the faces of the new elements.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// Number of hexahedra and of elements.
+    hexahedra: usize,
+    elements: usize,
+    /// The face on the other side of each face, or [`NONE`]; faces numbered 6·element + side, then 4·… for tetrahedra.
+    opposite: Vec<u32>,
+    active: Vec<bool>,
+    outer: Vec<bool>,
+}
+
+/// What an activation did to the outer surface; faces sorted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Change {
+    /// Faces that are outer now.
+    pub appeared: Vec<Face>,
+    /// Faces that were outer before.
+    pub vanished: Vec<Face>,
+}
+
+/// A part of space in which faces may become outer ones; see [`Surface::region`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    /// Face numbers, sorted.
+    faces: Vec<u32>,
+}
+
+impl Surface {
+    /// Neighbours of a mesh; no element is active.
+    ///
+    /// # Errors
+    /// A node that is none, a face of three elements (named), or more than 2³² − 1 faces.
+    pub fn new(mesh: &Mesh) -> Result<Self, Error> {
+        let (hexahedra, elements) = (mesh.hexahedra.len(), mesh.element_count());
+        let count = 6 * hexahedra + 4 * mesh.tetrahedra.len();
+        if count >= NONE as usize {
+            let allowed = format!("below {NONE}");
+            return Err(Error::Parameter { name: "faces of a mesh", found: count as f64, allowed });
+        }
+        let mut surface = Self {
+            hexahedra,
+            elements,
+            opposite: Vec::new(),
+            active: vec![false; elements],
+            outer: vec![false; count],
+        };
+        surface.opposite = surface.neighbours(mesh)?;
+        Ok(surface)
+    }
+
+    /// The outer surface of the whole mesh.
+    ///
+    /// # Errors
+    /// See [`Self::new`].
+    pub fn of_all(mesh: &Mesh) -> Result<Self, Error> {
+        let mut surface = Self::new(mesh)?;
+        surface.active.fill(true);
+        for (outer, opposite) in surface.outer.iter_mut().zip(&surface.opposite) {
+            *outer = *opposite == NONE;
+        }
+        Ok(surface)
+    }
+
+    /// Activates elements; those active already are passed over.
+    ///
+    /// # Errors
+    /// An element that is none; nothing is changed then.
+    pub fn activate(&mut self, elements: &[u32]) -> Result<Change, Error> {
+        if let Some(element) = elements.iter().find(|element| **element as usize >= self.elements) {
+            let allowed = format!("below {}", self.elements);
+            return Err(Error::Parameter { name: "element", found: f64::from(*element), allowed });
+        }
+        let mut fresh: Vec<u32> =
+            elements.iter().copied().filter(|element| !self.active[*element as usize]).collect();
+        fresh.sort_unstable();
+        fresh.dedup();
+        for element in &fresh {
+            self.active[*element as usize] = true;
+        }
+        let mut change = Change::default();
+        for element in fresh {
+            for number in self.faces_of(element) {
+                let opposite = self.opposite[number];
+                if opposite == NONE || !self.active[self.face(opposite).element as usize] {
+                    self.outer[number] = true;
+                    change.appeared.push(self.face(number as u32));
+                } else if std::mem::take(&mut self.outer[opposite as usize]) {
+                    change.vanished.push(self.face(opposite));
+                }
+            }
+        }
+        change.vanished.sort_unstable();
+        Ok(change)
+    }
+
+    /// Faces of the outer surface, in ascending order.
+    pub fn faces(&self) -> impl Iterator<Item = Face> + '_ {
+        (0..self.outer.len() as u32)
+            .filter(|number| self.outer[*number as usize])
+            .map(|number| self.face(number))
+    }
+
+    /// Whether each element is active.
+    pub fn active(&self) -> &[bool] {
+        &self.active
+    }
+
+    /// Whether a face belongs to the outer surface.
+    pub fn is_outer(&self, face: Face) -> bool {
+        self.number(face).is_some_and(|number| self.outer[number as usize])
+    }
+
+    /// The same face seen from the other element that has it.
+    pub fn opposite(&self, face: Face) -> Option<Face> {
+        let opposite = self.opposite[self.number(face)? as usize];
+        (opposite != NONE).then(|| self.face(opposite))
+    }
+
+    /// Where a boundary condition acts: `outer` (everywhere), a named surface (from whichever side its faces are
+    /// given), the part of the surface of a named element set, or a side of the box around the mesh
+    /// ([`BOX_SIDES`]: faces within 1e-9 of its diagonal). A name of the mesh comes before our own.
+    ///
+    /// # Errors
+    /// A name that is none of them, or a named surface with a face that does not exist.
+    pub fn region(&self, mesh: &Mesh, name: &str) -> Result<Region, Error> {
+        let mut faces = Vec::new();
+        if let Some(named) = mesh.surfaces.get(name) {
+            for face in named {
+                let Some(number) = self.number(*face) else {
+                    return Err(Error::Mesh(format!(
+                        "surface `{name}`: element {} has no side {}",
+                        face.element, face.side
+                    )));
+                };
+                let opposite = self.opposite[number as usize];
+                faces.extend([number, opposite].iter().filter(|number| **number != NONE));
+            }
+        } else if let Some(set) = mesh.element_sets.get(name) {
+            let elements = set.iter().filter(|element| (**element as usize) < self.elements);
+            faces.extend(elements.flat_map(|element| self.faces_of(*element)).map(|number| number as u32));
+        } else if name == "outer" {
+            faces.extend(0..self.outer.len() as u32);
+        } else if let Some(side) = BOX_SIDES.iter().position(|side| *side == name) {
+            let d = side / 2;
+            let [lower, upper] = mesh.bounds().unwrap_or_default();
+            let near = 1e-9 * (0..3).map(|d| (upper[d] - lower[d]).powi(2)).sum::<f64>().sqrt();
+            let plane = if side % 2 == 0 { lower[d] } else { upper[d] };
+            faces.extend((0..self.outer.len() as u32).filter(|number| {
+                let nodes = mesh.face_nodes(self.face(*number));
+                nodes.iter().all(|node| (mesh.points[*node as usize][d] - plane).abs() <= near)
+            }));
+        } else {
+            let named = mesh.surfaces.keys().chain(mesh.element_sets.keys()).map(String::as_str);
+            let all: Vec<&str> = named.chain(["outer"]).chain(BOX_SIDES).collect();
+            return Err(Error::Mesh(format!("no surface `{name}`; allowed: {}", all.join(", "))));
+        }
+        faces.sort_unstable();
+        faces.dedup();
+        Ok(Region { faces })
+    }
+
+    /// The part of the outer surface in a region, ascending.
+    pub fn faces_in(&self, region: &Region) -> Vec<Face> {
+        let outer = |number: &&u32| self.outer.get(**number as usize) == Some(&true);
+        region.faces.iter().filter(outer).map(|number| self.face(*number)).collect()
+    }
+
+    fn number(&self, face: Face) -> Option<u32> {
+        let sides = if (face.element as usize) < self.hexahedra { 6 } else { 4 };
+        ((face.element as usize) < self.elements && face.side < sides)
+            .then(|| self.faces_of(face.element).start as u32 + u32::from(face.side))
+    }
+
+    fn face(&self, number: u32) -> Face {
+        let (number, first) = (number as usize, 6 * self.hexahedra);
+        if number < first {
+            Face { element: (number / 6) as u32, side: (number % 6) as u8 }
+        } else {
+            let rest = number - first;
+            Face { element: (self.hexahedra + rest / 4) as u32, side: (rest % 4) as u8 }
+        }
+    }
+
+    fn faces_of(&self, element: u32) -> std::ops::Range<usize> {
+        let element = element as usize;
+        if element < self.hexahedra {
+            6 * element..6 * element + 6
+        } else {
+            let first = 6 * self.hexahedra + 4 * (element - self.hexahedra);
+            first..first + 4
+        }
+    }
+
+    /// Sorts faces into buckets by their least node and pairs those of equal nodes: linear in the mesh, and the same
+    /// whatever the order of anything else.
+    fn neighbours(&self, mesh: &Mesh) -> Result<Vec<u32>, Error> {
+        let key = |number: u32| {
+            let nodes = mesh.face_nodes(self.face(number));
+            let mut key = [u32::MAX; 4];
+            key[..nodes.len()].copy_from_slice(&nodes);
+            key.sort_unstable();
+            key
+        };
+        let count = self.outer.len() as u32;
+        // starts of the buckets, shifted by one so that filling them leaves their ends
+        let mut start = vec![0u32; mesh.points.len() + 2];
+        for number in 0..count {
+            let node = key(number)[0] as usize;
+            if node >= mesh.points.len() {
+                return Err(Error::Mesh(format!(
+                    "element {}: node {node}; allowed: below {}",
+                    self.face(number).element,
+                    mesh.points.len()
+                )));
+            }
+            start[node + 2] += 1;
+        }
+        for node in 2..start.len() {
+            start[node] += start[node - 1];
+        }
+        let mut sorted = vec![0u32; count as usize];
+        for number in 0..count {
+            let place = &mut start[key(number)[0] as usize + 1];
+            sorted[*place as usize] = number;
+            *place += 1;
+        }
+        let mut bucket: Vec<([u32; 4], u32)> = Vec::new();
+        let mut opposite = vec![NONE; count as usize];
+        for node in 0..mesh.points.len() {
+            let numbers = &sorted[start[node] as usize..start[node + 1] as usize];
+            bucket.clear();
+            bucket.extend(numbers.iter().map(|number| (key(*number), *number)));
+            bucket.sort_unstable();
+            for same in bucket.chunk_by(|a, b| a.0 == b.0) {
+                match same {
+                    [_] => {}
+                    [a, b] => {
+                        opposite[a.1 as usize] = b.1;
+                        opposite[b.1 as usize] = a.1;
+                    }
+                    _ => {
+                        let elements: Vec<_> =
+                            same.iter().map(|face| self.face(face.1).element.to_string()).collect();
+                        return Err(Error::Mesh(format!(
+                            "elements {} share one face; allowed: 2 elements a face",
+                            elements.join(", ")
+                        )));
+                    }
+                }
+            }
+        }
+        Ok(opposite)
+    }
+}
+
+/// Area of a face, m²: exact for plane faces, by 2×2 Gauss points for warped ones.
+pub fn area(mesh: &Mesh, face: Face) -> f64 {
+    let nodes = mesh.face_nodes(face);
+    match nodes[..] {
+        [a, b, c] => {
+            let corner = mesh.point(a);
+            0.5 * (mesh.point(b) - corner).cross(&(mesh.point(c) - corner)).norm()
+        }
+        [a, b, c, d] => {
+            let [a, b, c, d] = [a, b, c, d].map(|node| mesh.point(node));
+            let point = 1.0 / 3f64.sqrt();
+            let jacobian = |s: f64, t: f64| {
+                let along = 0.25 * ((1.0 - t) * (b - a) + (1.0 + t) * (c - d));
+                let across = 0.25 * ((1.0 - s) * (d - a) + (1.0 + s) * (c - b));
+                along.cross(&across).norm()
+            };
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .iter()
+                .map(|(s, t)| jacobian(s * point, t * point))
+                .sum()
+        }
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Bar, Block, Grid, Split, Substrate};
+
+    fn total(mesh: &Mesh, faces: impl IntoIterator<Item = Face>) -> f64 {
+        faces.into_iter().map(|face| area(mesh, face)).sum()
+    }
+
+    #[test]
+    fn the_surface_follows_the_layers() {
+        let substrate = Substrate { size: [0.03, 0.01], thickness: 2e-3, growth: 1.5 };
+        let mesh = Bar {
+            size: [0.02, 0.004],
+            layers: 4,
+            layer_height: 2e-4,
+            elements_per_layer: 2,
+            element_size: 1e-3,
+            substrate: Some(substrate),
+        }
+        .mesh()
+        .unwrap();
+        let mut surface = Surface::new(&mesh).unwrap();
+        assert_eq!(surface.faces().count(), 0);
+        surface.activate(&mesh.element_sets["substrate"]).unwrap();
+        let glass = 2.0 * (0.03 * 0.01 + 0.04 * 2e-3);
+        assert!((total(&mesh, surface.faces()) / glass - 1.0).abs() < 1e-12);
+        for layer in 1..=4 {
+            let change = surface.activate(&mesh.element_sets[&format!("layer-{layer}")]).unwrap();
+            // the new layer covers as much as its own top shows; its sides are added
+            assert_eq!(change.vanished.len(), 20 * 4);
+            assert_eq!(change.appeared.len(), 20 * 4 + 2 * 2 * (20 + 4));
+            let exact = glass + 2.0 * 0.024 * 2e-4 * f64::from(layer);
+            assert!((total(&mesh, surface.faces()) / exact - 1.0).abs() < 1e-12);
+            assert!(change.vanished.iter().all(|face| !surface.is_outer(*face)));
+        }
+        // one by one or at once: the same surface
+        let whole: Vec<Face> = Surface::of_all(&mesh).unwrap().faces().collect();
+        assert_eq!(surface.faces().collect::<Vec<_>>(), whole);
+        let mut backwards = Surface::new(&mesh).unwrap();
+        for element in (0..mesh.element_count() as u32).rev() {
+            backwards.activate(&[element, element]).unwrap();
+        }
+        assert_eq!(backwards.faces().collect::<Vec<_>>(), whole);
+        assert_eq!(backwards.activate(&[0]).unwrap(), Change::default());
+        assert!(backwards.activate(&[u32::MAX]).is_err());
+    }
+
+    #[test]
+    fn regions_are_asked_by_name() {
+        let grid = Grid::uniform([0.0; 3], [1.0, 1.0, 2.0], [2, 2, 4]).unwrap();
+        let block =
+            |name: &str, z0, z1| Block { name: name.into(), lower: [0.0, 0.0, z0], upper: [1.0, 1.0, z1] };
+        let mut mesh =
+            grid.blocks(&[block("lower", 0.0, 1.0), block("upper", 1.0, 2.0)], Split::Hexahedra).unwrap();
+        // the interface, given from above
+        let above = mesh.element_sets["upper"][..4].iter().map(|element| Face { element: *element, side: 0 });
+        mesh.surfaces.insert("interface".into(), above.collect());
+        let mut surface = Surface::new(&mesh).unwrap();
+        surface.activate(&mesh.element_sets["lower"]).unwrap();
+        let interface = surface.region(&mesh, "interface").unwrap();
+        let faces = surface.faces_in(&interface);
+        assert_eq!(faces.len(), 4, "seen from below while nothing is above");
+        assert!(faces.iter().all(|face| face.side == 1));
+        surface.activate(&mesh.element_sets["upper"]).unwrap();
+        assert!(surface.faces_in(&interface).is_empty());
+        let outer = surface.region(&mesh, "outer").unwrap();
+        assert_eq!(surface.faces_in(&outer), surface.faces().collect::<Vec<_>>());
+        let upper = surface.faces_in(&surface.region(&mesh, "upper").unwrap());
+        assert!((total(&mesh, upper) - 5.0).abs() < 1e-14);
+        // by name and by place
+        let named = surface.faces_in(&surface.region(&mesh, "left").unwrap());
+        let mut bare = mesh.clone();
+        bare.surfaces.clear();
+        assert_eq!(surface.faces_in(&surface.region(&bare, "left").unwrap()), named);
+        let error = surface.region(&bare, "lid").unwrap_err().to_string();
+        assert!(error.contains("no surface `lid`; allowed: lower, upper, outer, left"), "{error}");
+        bare.surfaces.insert("odd".into(), vec![Face { element: 99, side: 0 }]);
+        assert!(surface.region(&bare, "odd").unwrap_err().to_string().contains("element 99 has no side 0"));
+    }
+
+    #[test]
+    fn three_elements_a_face_and_missing_nodes_are_refused() {
+        let mut mesh = Mesh { points: vec![[0.0; 3]; 6], ..Mesh::default() };
+        mesh.tetrahedra = vec![[0, 1, 2, 3], [0, 2, 1, 4], [0, 1, 2, 5]];
+        let error = Surface::new(&mesh).unwrap_err().to_string();
+        assert!(error.contains("elements 0, 1, 2 share one face"), "{error}");
+        mesh.tetrahedra = vec![[6, 7, 8, 9]];
+        assert!(Surface::new(&mesh).unwrap_err().to_string().contains("node 6; allowed: below 6"));
+        assert_eq!(Surface::of_all(&Mesh::default()).unwrap().faces().count(), 0);
+    }
+
+    #[test]
+    fn the_area_of_a_warped_face() {
+        // z = x y over the unit square: ∫∫ √(1 + x² + y²) = 1.2807893…, 2×2 points are right to 2e-4
+        let mut mesh = Grid::uniform([0.0; 3], [1.0; 3], [1, 1, 1]).unwrap().mesh("brick").unwrap();
+        mesh.points[7][2] = 2.0;
+        let top = area(&mesh, Face { element: 0, side: 1 });
+        assert!((top / 1.280_789_3 - 1.0).abs() < 5e-4, "{top}");
+    }
+}
