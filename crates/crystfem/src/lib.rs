@@ -1,7 +1,9 @@
 //! Heat conduction and crystallization of semicrystalline polymers printed layer by layer.
 
 pub mod error;
+pub mod kinetics;
 pub mod material;
+pub mod melting;
 pub mod mesh;
 
 pub use error::Error;

@@ -1,6 +1,18 @@
 //! Materials: Abaqus' UMATHT without side effects. (Input, old state) → (response, new state); the old state is never
 //! changed.
 
+mod conductor;
+mod crystallization;
+mod printed;
+mod property;
+mod semicrystalline;
+
+pub use conductor::Conductor;
+pub use crystallization::{Crystallization, Grown};
+pub use printed::{Printed, Sign};
+pub use property::{Property, REFERENCE_TEMPERATURE, Table};
+pub use semicrystalline::{LARGEST_CHANGE, Polymer, Semicrystalline};
+
 use crate::error::Error;
 use nalgebra::{Matrix3, Vector3};
 
@@ -42,13 +54,25 @@ pub trait ThermalMaterial: Send + Sync {
     fn state_names(&self) -> &'static [&'static str];
     /// State of fresh material at temperature T, K (SDVINI).
     fn initial_state(&self, temperature: f64, state: &mut [f64]);
+    /// Names of the quantities to show that follow from the state, in order; by default the state itself.
+    fn field_names(&self) -> &'static [&'static str] {
+        self.state_names()
+    }
+    /// These quantities.
+    fn fields(&self, state: &[f64], fields: &mut [f64]) {
+        fields.copy_from_slice(state);
+    }
     /// U of material at rest at a temperature with a given state, J/kg: what birth brings in.
     fn energy(&self, temperature: f64, state: &[f64]) -> f64;
-    /// Whether U is linear in T and the flux in ∇T, without state: no Newton iteration is needed.
+    /// Whether U is linear in T and the flux in ∇T whatever the state (which may evolve all the same): no Newton
+    /// iteration is needed.
     fn is_linear(&self) -> bool;
     /// The response to an increment; `new` is the state at its end.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] for temperatures that are none.
+    /// [`Error::Parameter`] for temperatures that are not finite and a Δt that is not finite or below 0.
     fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error>;
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,140 @@
+//! The increment Δz = ∫K(T(t)) dt of a temperature that runs linearly in time, with its derivative.
+
+use super::{Kinetics, LARGEST_Z};
+
+/// Panels into which (T∞, T₀) is divided; an increment is integrated panel by panel. The error in α of one panel
+/// of PA12 (5.4 K) is about 1e-5 at worst, and of steps of 1 K 3e-8.
+pub const PANELS: usize = 32;
+
+/// Increments below this part of a panel are integrated in one piece even across a border: K is smooth there, and the
+/// error of the rule is below 1e-13.
+const WHOLE: f64 = 0.01;
+
+/// Δz and ∂Δz/∂T at the end of the increment, at fixed Δt.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Growth {
+    /// Δz.
+    pub z: f64,
+    /// ∂Δz/∂T_end, 1/K.
+    pub slope: f64,
+}
+
+impl Kinetics {
+    /// Δz over an increment of temperature in the time `dt`, s: Gauss' rule of two points on each panel.
+    ///
+    /// The borders of the panels are fixed temperatures, so that Δz is a continuous function of the end.
+    pub fn growth(&self, start: f64, end: f64, dt: f64) -> Growth {
+        let mut sum = Growth::default();
+        for panel in Panels::new(self, start, end, PANELS) {
+            let growth = self.growth_over(&panel, dt);
+            sum.z = (sum.z + growth.z).min(LARGEST_Z);
+            sum.slope += growth.slope;
+        }
+        sum
+    }
+
+    /// The part of a panel.
+    pub fn growth_over(&self, panel: &Panel, dt: f64) -> Growth {
+        let half = 0.5 * panel.share * dt;
+        if !panel.inside || half == 0.0 {
+            return Growth::default();
+        }
+        let (middle, reach) = (0.5 * (panel.start + panel.end), 0.5 * (panel.end - panel.start) * NODE);
+        let [below, slope_below] = self.rate_and_slope(middle - reach);
+        let [above, slope_above] = self.rate_and_slope(middle + reach);
+        let sum = below + above;
+        let mut slope = 0.5 * dt * panel.share_slope * sum;
+        if panel.last {
+            slope += half * (slope_below * 0.5 * (1.0 - NODE) + slope_above * 0.5 * (1.0 + NODE));
+        }
+        Growth { z: half * sum, slope }
+    }
+}
+
+/// 1/√3, the node of Gauss' rule of two points on \[−1, 1\].
+const NODE: f64 = 0.577_350_269_189_625_8;
+
+/// A part of an increment within one panel, or outside (T∞, T₀).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Panel {
+    /// Temperature at its start, K.
+    pub start: f64,
+    /// Temperature at its end, K.
+    pub end: f64,
+    /// Whether it ends where the increment does, so that its end moves with it.
+    pub last: bool,
+    /// Whether it lies in (T∞, T₀).
+    inside: bool,
+    /// Its part of the time.
+    share: f64,
+    /// ∂share/∂T_end, 1/K.
+    share_slope: f64,
+}
+
+/// The panels of an increment, in the order in which they are passed.
+#[derive(Clone, Debug)]
+pub struct Panels {
+    start: f64,
+    end: f64,
+    at: f64,
+    /// T∞, width and number of the panels.
+    low: f64,
+    width: f64,
+    count: f64,
+    whole: bool,
+    done: bool,
+}
+
+impl Panels {
+    /// Of an increment; (T∞, T₀) is divided into `count` panels.
+    pub fn new(kinetics: &Kinetics, start: f64, end: f64, count: usize) -> Self {
+        let (low, high) = (kinetics.constants.frozen, kinetics.constants.equilibrium_melting);
+        let width = (high - low) / count as f64;
+        let whole = (end - start).abs() <= WHOLE * width;
+        Self { start, end, at: start, low, width, count: count as f64, whole, done: false }
+    }
+
+    /// The next border beyond `at` on the way to the end, or the end.
+    fn border(&self) -> f64 {
+        let place = (self.at - self.low) / self.width;
+        if self.end > self.at {
+            let next = if place < 0.0 { 0.0 } else { place.floor() + 1.0 };
+            let border = self.low + next * self.width;
+            if next > self.count { self.end } else { border.max(self.at).min(self.end) }
+        } else {
+            let next = if place > self.count { self.count } else { place.ceil() - 1.0 };
+            let border = self.low + next * self.width;
+            if next < 0.0 { self.end } else { border.min(self.at).max(self.end) }
+        }
+    }
+}
+
+impl Iterator for Panels {
+    type Item = Panel;
+
+    fn next(&mut self) -> Option<Panel> {
+        if self.done {
+            return None;
+        }
+        let start = self.at;
+        let mut border = if self.whole { self.end } else { self.border() };
+        if border == start && start != self.end {
+            // rounding has put `at` a little before a border: go on to the next
+            self.at = if self.end > start { start.next_up() } else { start.next_down() };
+            border = self.border();
+        }
+        self.at = border;
+        self.done = border == self.end;
+        let change = self.end - self.start;
+        let (share, share_slope) = if start == self.start && self.done {
+            (1.0, 0.0)
+        } else {
+            let width = border - start;
+            let grows = if self.done { change } else { 0.0 };
+            (width / change, (grows - width) / (change * change))
+        };
+        let middle = 0.5 * (start + border);
+        let inside = self.whole || (middle > self.low && middle < self.low + self.width * self.count);
+        Some(Panel { start, end: border, last: self.done, inside, share, share_slope })
+    }
+}

@@ -1,0 +1,92 @@
+//! A plain conductor: Fourier's law, with constant or tabulated properties.
+
+use super::{Point, Property, Response, ThermalMaterial};
+use crate::error::Error;
+use nalgebra::Matrix3;
+
+/// A conductor without state: U = ∫c dT, f = −k(T) ∇T.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Conductor {
+    density: f64,
+    conductivity: Property,
+    specific_heat: Property,
+}
+
+impl Conductor {
+    /// From density, kg/m³, conductivity, W/(m K), and specific heat, J/(kg K).
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] unless the density is above 0 and finite.
+    pub fn new(density: f64, conductivity: Property, specific_heat: Property) -> Result<Self, Error> {
+        if density > 0.0 && density.is_finite() {
+            return Ok(Self { density, conductivity, specific_heat });
+        }
+        let allowed = "above 0 and finite".to_owned();
+        Err(Error::Parameter { name: "density, kg/m³", found: density, allowed })
+    }
+
+    /// ∫c dT from the reference temperature, J/kg.
+    pub(super) fn sensible_heat(&self, temperature: f64) -> f64 {
+        self.specific_heat.integral(temperature)
+    }
+
+    /// Whether both properties are constant.
+    pub(super) fn is_constant(&self) -> bool {
+        self.conductivity.is_constant() && self.specific_heat.is_constant()
+    }
+
+    /// The response without any state.
+    pub(super) fn conduct(&self, at: &Point) -> Result<Response, Error> {
+        let temperature = checked(at)?;
+        let [conductivity, slope] = self.conductivity.with_slope(temperature);
+        Ok(Response {
+            energy: self.specific_heat.integral(temperature),
+            d_energy_d_temperature: self.specific_heat.at(temperature),
+            flux: -conductivity * at.gradient,
+            d_flux_d_temperature: -slope * at.gradient,
+            d_flux_d_gradient: Matrix3::from_diagonal_element(-conductivity),
+            step_ratio: None,
+        })
+    }
+}
+
+/// The temperature at the end of an increment, where the increment is one.
+pub(super) fn checked(at: &Point) -> Result<f64, Error> {
+    let end = at.temperature + at.increment;
+    let refuse =
+        |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
+    if !at.temperature.is_finite() {
+        return refuse("temperature, K", at.temperature, "a finite number");
+    }
+    if !end.is_finite() {
+        return refuse("increment of temperature, K", at.increment, "a finite number");
+    }
+    if !(at.dt >= 0.0 && at.dt.is_finite()) {
+        return refuse("time increment, s", at.dt, "0 or above, finite");
+    }
+    Ok(end)
+}
+
+impl ThermalMaterial for Conductor {
+    fn density(&self) -> f64 {
+        self.density
+    }
+
+    fn state_names(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    fn initial_state(&self, _temperature: f64, _state: &mut [f64]) {}
+
+    fn energy(&self, temperature: f64, _state: &[f64]) -> f64 {
+        self.sensible_heat(temperature)
+    }
+
+    fn is_linear(&self) -> bool {
+        self.is_constant()
+    }
+
+    fn respond(&self, at: &Point, _old: &[f64], _new: &mut [f64]) -> Result<Response, Error> {
+        self.conduct(at)
+    }
+}

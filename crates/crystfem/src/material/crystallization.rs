@@ -1,0 +1,83 @@
+//! Growth and melting of crystals over an increment, at one point.
+
+use crate::kinetics::{Kinetics, PANELS, Panels};
+use crate::melting::Melting;
+
+/// Panels of (T∞, T₀) on heating, where growth and melting alternate; PA12: 1.35 K.
+const HEATING_PANELS: usize = 4 * PANELS;
+
+/// A melting below this part of the crystals is none.
+const NOTHING: f64 = -1e-17;
+
+/// Kinetics and melting together: dz/dt = K(T) at every temperature, and on heating α falls in proportion to
+/// 1 − X_m(T).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crystallization {
+    /// Growth.
+    pub kinetics: Kinetics,
+    /// Melting; without it crystals never melt.
+    pub melting: Option<Melting>,
+}
+
+/// z at the end of an increment, and its derivative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grown {
+    /// z = \[−ln(1−α)\]^{1/n}.
+    pub z: f64,
+    /// ∂z/∂T at the end of the increment, at fixed Δt, 1/K.
+    pub slope: f64,
+}
+
+impl Crystallization {
+    /// From z at the start over an increment in which the temperature runs linearly from `start` to `end`, K, in the
+    /// time `dt`, s.
+    ///
+    /// On cooling and at a hold z grows by ∫K dt. On heating each panel of temperature takes half of its growth, then
+    /// α ← α (1−X_m(T₂))/(1−X_m(T₁)), then the other half: z and α stay within their bounds whatever the
+    /// increment, and the end is a continuous function of its temperature.
+    pub fn advance(&self, z: f64, start: f64, end: f64, dt: f64) -> Grown {
+        let kinetics = &self.kinetics;
+        let melting = match &self.melting {
+            Some(melting) if end > start && melting.survival(end)[0] < NOTHING => melting,
+            _ => {
+                let growth = kinetics.growth(start, end, dt);
+                return Grown { z: z + growth.z, slope: growth.slope };
+            }
+        };
+        let mut grown = Grown { z, slope: 0.0 };
+        let [mut before, _] = melting.survival(start);
+        for panel in Panels::new(kinetics, start, end, HEATING_PANELS) {
+            let growth = kinetics.growth_over(&panel, dt);
+            grown.z += 0.5 * growth.z;
+            grown.slope += 0.5 * growth.slope;
+            let [after, slope] = melting.survival(panel.end);
+            grown = self.melt(grown, after - before, if panel.last { slope } else { 0.0 });
+            before = after;
+            grown.z += 0.5 * growth.z;
+            grown.slope += 0.5 * growth.slope;
+        }
+        grown
+    }
+
+    /// α ← α e^L. Near α = 1 through 1 − α, so that no digit is lost on the way there and back.
+    fn melt(&self, grown: Grown, logarithm: f64, slope: f64) -> Grown {
+        let kinetics = &self.kinetics;
+        let Grown { z, slope: z_slope } = grown;
+        if z == 0.0 || logarithm > NOTHING {
+            return grown;
+        }
+        let (survivors, lost) = (logarithm.exp(), -logarithm.exp_m1());
+        let degree = kinetics.degree(z) * survivors;
+        let z_after = if degree < 0.5 {
+            kinetics.z_of_degree(degree)
+        } else {
+            kinetics.z_of_remainder(lost + survivors * kinetics.remainder(z))
+        };
+        if z_after == 0.0 {
+            return Grown { z: 0.0, slope: 0.0 };
+        }
+        let change = kinetics.logarithmic_degree_slope(z) * z_slope + slope;
+        let sensitivity = kinetics.logarithmic_degree_slope(z_after);
+        Grown { z: z_after, slope: if sensitivity > 0.0 { change / sensitivity } else { 0.0 } }
+    }
+}

@@ -1,0 +1,116 @@
+//! The subroutine of Appendix B as coded, for comparison: Algorithm 1 by Euler's method, from a seed of 1e-3.
+
+use super::{Conductor, Point, Response, ThermalMaterial};
+use crate::error::Error;
+
+/// Which sign of the increment crystallizes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// `DTEMP > 0`, as printed: heating crystallizes and cooling melts.
+    Printed,
+    /// `DTEMP < 0`.
+    Mended,
+}
+
+/// Appendix B after its three missing parentheses are put in. The arithmetic is the printed one, in single precision
+/// where the variables are `REAL`; temperatures are those at the start of the increment. Whatever it does with α, infinite
+/// and NaN included, stands in the state; energy and flux do not depend on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Printed {
+    conductor: Conductor,
+    sign: Sign,
+    guarded: bool,
+}
+
+const SEED: f32 = 1e-3;
+const ALPHA_MAX: f32 = 0.25;
+const T0: f32 = 466.0;
+const T_INF: f32 = 294.0;
+
+impl Printed {
+    /// With `guarded`, K = 0 outside (T∞, T₀), without which the exponential overflows above T₀.
+    pub fn new(conductor: Conductor, sign: Sign, guarded: bool) -> Self {
+        Self { conductor, sign, guarded }
+    }
+
+    /// α at the end of an increment from a temperature in K.
+    fn alpha(&self, old: f32, temperature: f64, increment: f64, dt: f64) -> f32 {
+        // TEMPK = TEMP + 273.D0, where TEMP is in °C
+        let kelvin = (temperature - 273.15 + 273.0) as f32;
+        let crystallizing = match self.sign {
+            Sign::Printed => increment,
+            Sign::Mended => -increment,
+        };
+        if crystallizing > 0.0 {
+            if self.guarded && !(kelvin > T_INF && kelvin < T0) {
+                return old;
+            }
+            return old_plus_growth(old, kelvin, dt);
+        }
+        if crystallizing == 0.0 {
+            return old;
+        }
+        if kelvin > 460.0 {
+            SEED
+        } else if kelvin > 420.0 {
+            let (k_m, d) = (0.965_f32, 8.58_f32);
+            let e = (-k_m * (kelvin - 450.0)).exp();
+            let d = f64::from(d);
+            let melt = (f64::from(k_m * e) * (1.0 + (d - 1.0) * f64::from(e)).powf(d / (1.0 - d))) as f32;
+            let molten = (f64::from(melt) * increment.abs()) as f32;
+            SEED.max(old - molten * ALPHA_MAX)
+        } else {
+            old
+        }
+    }
+}
+
+/// THALF, KT, DALPHADT and ALPHANEW.
+fn old_plus_growth(old: f32, kelvin: f32, dt: f64) -> f32 {
+    let (k0, kg, u, r, n) = (3.787e4_f32, 136_235.0_f32, 6270.0_f32, 8.314_f32, 2.678_f32);
+    let jump = k0 * (-u / (r * (kelvin - T_INF))).exp();
+    let wide = f64::from(kelvin);
+    let barrier = f64::from(-kg * (kelvin + T0)) / (2.0 * f64::from(T0 - kelvin) * wide.powi(2));
+    let half = (f64::from(jump) * barrier.exp()) as f32;
+    let exponent = f64::from(n);
+    let rate = (2.0_f64.ln().powf(1.0 / exponent) * f64::from(half)) as f32;
+    let left = 1.0 - f64::from(old);
+    let growth = (f64::from(n * rate) * left * (1.0 / left).ln().powf((exponent - 1.0) / exponent)) as f32;
+    (f64::from(old) + dt * f64::from(growth)) as f32
+}
+
+impl ThermalMaterial for Printed {
+    fn density(&self) -> f64 {
+        self.conductor.density()
+    }
+
+    fn state_names(&self) -> &'static [&'static str] {
+        &["alpha"]
+    }
+
+    fn initial_state(&self, _temperature: f64, state: &mut [f64]) {
+        state[0] = f64::from(SEED);
+    }
+
+    fn field_names(&self) -> &'static [&'static str] {
+        &["alpha", "crystallinity"]
+    }
+
+    fn fields(&self, state: &[f64], fields: &mut [f64]) {
+        (fields[0], fields[1]) = (state[0], state[0] * f64::from(ALPHA_MAX));
+    }
+
+    fn energy(&self, temperature: f64, _state: &[f64]) -> f64 {
+        self.conductor.sensible_heat(temperature)
+    }
+
+    fn is_linear(&self) -> bool {
+        self.conductor.is_constant()
+    }
+
+    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+        let response = self.conductor.conduct(at)?;
+        new[0] = f64::from(self.alpha(old[0] as f32, at.temperature, at.increment, at.dt));
+        Ok(response)
+    }
+}

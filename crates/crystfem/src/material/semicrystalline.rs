@@ -1,0 +1,133 @@
+//! A semicrystalline polymer: Fourier's law, crystallization and melting, latent heat where it is given.
+
+use super::{Conductor, Crystallization, Point, Property, Response, ThermalMaterial};
+use crate::error::Error;
+use crate::kinetics::Kinetics;
+use crate::melting::Melting;
+
+/// A change of α in one increment at which the suggested step is the one taken.
+pub const LARGEST_CHANGE: f64 = 0.1;
+
+/// What makes up a [`Semicrystalline`] material, SI.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Polymer {
+    /// Density ρ, kg/m³.
+    pub density: f64,
+    /// Conductivity k, W/(m K).
+    pub conductivity: Property,
+    /// Specific heat c, J/(kg K).
+    pub specific_heat: Property,
+    /// Kinetics of crystallization.
+    pub kinetics: Kinetics,
+    /// Melting on heating; without it crystals never melt.
+    pub melting: Option<Melting>,
+    /// Ultimate crystallinity X∞: the mass fraction of crystals at α = 1.
+    pub ultimate_crystallinity: f64,
+    /// Heat of fusion of crystal ΔH, J/kg; without it temperature and crystallinity are uncoupled, as in the thesis.
+    pub latent_heat: Option<f64>,
+    /// Relative crystallinity α of fresh material.
+    pub seed: f64,
+}
+
+/// The material. Its state is z = \[−ln(1−α)\]^{1/n}; with latent heat U = ∫c dT − ΔH X∞ α.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Semicrystalline {
+    conductor: Conductor,
+    crystallization: Crystallization,
+    ultimate_crystallinity: f64,
+    /// ΔH X∞, J/kg.
+    latent: Option<f64>,
+    initial: f64,
+}
+
+impl Semicrystalline {
+    /// From its parts.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a density ≤ 0, X∞ outside (0, 1], ΔH < 0, a seed outside \[0, 1), and for what is not
+    /// finite.
+    pub fn new(polymer: Polymer) -> Result<Self, Error> {
+        let Polymer { ultimate_crystallinity, latent_heat, seed, kinetics, melting, .. } = polymer;
+        let check = |name, found: f64, good: bool, allowed: &str| {
+            if good && found.is_finite() {
+                Ok(())
+            } else {
+                Err(Error::Parameter { name, found, allowed: allowed.to_owned() })
+            }
+        };
+        let whole = 0.0..=1.0;
+        let some = ultimate_crystallinity > 0.0 && whole.contains(&ultimate_crystallinity);
+        check("ultimate crystallinity", ultimate_crystallinity, some, "above 0, up to 1")?;
+        if let Some(latent) = latent_heat {
+            check("latent heat, J/kg", latent, latent >= 0.0, "0 or above")?;
+        }
+        check("initial relative crystallinity", seed, (0.0..1.0).contains(&seed), "0 or above, below 1")?;
+        Ok(Self {
+            conductor: Conductor::new(polymer.density, polymer.conductivity, polymer.specific_heat)?,
+            crystallization: Crystallization { kinetics, melting },
+            ultimate_crystallinity,
+            latent: latent_heat.map(|heat| heat * ultimate_crystallinity),
+            initial: kinetics.z_of_degree(seed),
+        })
+    }
+
+    /// Growth and melting.
+    pub fn crystallization(&self) -> &Crystallization {
+        &self.crystallization
+    }
+
+    /// Kinetics.
+    pub fn kinetics(&self) -> &Kinetics {
+        &self.crystallization.kinetics
+    }
+}
+
+impl ThermalMaterial for Semicrystalline {
+    fn density(&self) -> f64 {
+        self.conductor.density()
+    }
+
+    fn state_names(&self) -> &'static [&'static str] {
+        &["z"]
+    }
+
+    fn initial_state(&self, _temperature: f64, state: &mut [f64]) {
+        state[0] = self.initial;
+    }
+
+    fn field_names(&self) -> &'static [&'static str] {
+        &["alpha", "crystallinity"]
+    }
+
+    /// α and X = X∞ α.
+    fn fields(&self, state: &[f64], fields: &mut [f64]) {
+        fields[0] = self.kinetics().degree(state[0]);
+        fields[1] = self.ultimate_crystallinity * fields[0];
+    }
+
+    fn energy(&self, temperature: f64, state: &[f64]) -> f64 {
+        let sensible = self.conductor.sensible_heat(temperature);
+        self.latent.map_or(sensible, |latent| sensible - latent * self.kinetics().degree(state[0]))
+    }
+
+    fn is_linear(&self) -> bool {
+        self.latent.is_none() && self.conductor.is_constant()
+    }
+
+    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+        let mut response = self.conductor.conduct(at)?;
+        let grown =
+            self.crystallization.advance(old[0], at.temperature, at.temperature + at.increment, at.dt);
+        new[0] = grown.z;
+        let kinetics = self.kinetics();
+        // away from the ends of α the change of 1 − α is that of α
+        let (before, after) = (kinetics.degree(old[0]), kinetics.degree(grown.z));
+        let change = (after - before).abs();
+        response.step_ratio = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, 10.0));
+        if let Some(latent) = self.latent {
+            response.energy -= latent * after;
+            response.d_energy_d_temperature -= latent * kinetics.degree_slope(grown.z) * grown.slope;
+        }
+        Ok(response)
+    }
+}
