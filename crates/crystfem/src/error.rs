@@ -42,6 +42,22 @@ pub enum Error {
         /// Time, s.
         time: f64,
     },
+    /// An iteration did not end.
+    #[error(
+        "{method} did not converge at t = {time} s: error {error} K after {iterations} iterations, wanted {wanted} K"
+    )]
+    NotConverged {
+        /// The iteration.
+        method: &'static str,
+        /// Time at the end of the increment, s.
+        time: f64,
+        /// Iterations spent.
+        iterations: usize,
+        /// Error at the end, K.
+        error: f64,
+        /// Tolerance, K.
+        wanted: f64,
+    },
     /// Files, output, scenes.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
@@ -52,7 +68,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Mesh(_) | Self::Parameter { .. } | Self::File { .. } => 2,
-            Self::NotFinite { .. } => 1,
+            Self::NotFinite { .. } | Self::NotConverged { .. } => 1,
             Self::Shared(error) => error.exit_code(),
         }
     }

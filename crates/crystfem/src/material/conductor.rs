@@ -86,6 +86,10 @@ impl ThermalMaterial for Conductor {
         self.is_constant()
     }
 
+    fn constant_conductivity(&self) -> bool {
+        self.conductivity.is_constant()
+    }
+
     fn respond(&self, at: &Point, _old: &[f64], _new: &mut [f64]) -> Result<Response, Error> {
         self.conduct(at)
     }

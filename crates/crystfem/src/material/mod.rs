@@ -67,6 +67,11 @@ pub trait ThermalMaterial: Send + Sync {
     /// Whether U is linear in T and the flux in ∇T whatever the state (which may evolve all the same): no Newton
     /// iteration is needed.
     fn is_linear(&self) -> bool;
+    /// Whether the flux is −k ∇T with the same k at any temperature and state: conduction is then assembled once, and
+    /// with lumped capacity the energy is asked for at nodes only, with ∇T = 0.
+    fn constant_conductivity(&self) -> bool {
+        self.is_linear()
+    }
     /// The response to an increment; `new` is the state at its end.
     ///
     /// # Errors

@@ -114,6 +114,10 @@ impl ThermalMaterial for Semicrystalline {
         self.latent.is_none() && self.conductor.is_constant()
     }
 
+    fn constant_conductivity(&self) -> bool {
+        self.conductor.constant_conductivity()
+    }
+
     fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
         let mut response = self.conductor.conduct(at)?;
         let grown =

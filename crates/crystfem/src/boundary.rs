@@ -1,0 +1,285 @@
+//! What acts on a body: prescribed temperatures, flux, film, radiation, heat sources. Temperatures in K.
+
+use crate::error::Error;
+use crate::mesh::Face;
+use std::sync::Arc;
+
+/// Stefan–Boltzmann constant, W/(m² K⁴) (CODATA 2018).
+pub const STEFAN_BOLTZMANN: f64 = 5.670_374_419e-8;
+
+/// A value over time, linear between given times and constant outside of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schedule {
+    times: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Schedule {
+    /// The same value always.
+    pub fn constant(value: f64) -> Self {
+        Self { times: vec![0.0], values: vec![value] }
+    }
+
+    /// Through (time, value) pairs. Steps land on their times.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where there is none, where times do not ascend, and for values that are not finite.
+    pub fn linear(pairs: &[(f64, f64)]) -> Result<Self, Error> {
+        let wrong =
+            |found, allowed: &str| Error::Parameter { name: "schedule", found, allowed: allowed.into() };
+        if pairs.is_empty() {
+            return Err(wrong(0.0, "at least one pair of time and value"));
+        }
+        for (index, &(time, value)) in pairs.iter().enumerate() {
+            if !time.is_finite() || !value.is_finite() {
+                return Err(wrong(if time.is_finite() { value } else { time }, "finite numbers"));
+            }
+            if index > 0 && time <= pairs[index - 1].0 {
+                return Err(wrong(time, "a time above the one before"));
+            }
+        }
+        Ok(Self {
+            times: pairs.iter().map(|pair| pair.0).collect(),
+            values: pairs.iter().map(|pair| pair.1).collect(),
+        })
+    }
+
+    /// Value at a time, s.
+    pub fn at(&self, time: f64) -> f64 {
+        let next = self.times.partition_point(|&t| t <= time);
+        if next == 0 {
+            return self.values[0];
+        }
+        if next == self.times.len() {
+            return self.values[next - 1];
+        }
+        let part = (time - self.times[next - 1]) / (self.times[next] - self.times[next - 1]);
+        self.values[next - 1] + part * (self.values[next] - self.values[next - 1])
+    }
+
+    /// Times where the slope changes; none of a constant.
+    pub fn breaks(&self) -> &[f64] {
+        if self.times.len() > 1 { &self.times } else { &[] }
+    }
+
+    fn finite(&self) -> bool {
+        self.values.iter().all(|v| v.is_finite())
+    }
+}
+
+/// A function of position (m) and time (s).
+pub type Function = Arc<dyn Fn([f64; 3], f64) -> f64 + Send + Sync>;
+
+/// A value over space and time.
+#[derive(Clone)]
+pub enum Field {
+    /// The same everywhere.
+    Uniform(Schedule),
+    /// A function of position and time; it should be smooth in time.
+    Function(Function),
+}
+
+impl Field {
+    /// The same value everywhere and always.
+    pub fn constant(value: f64) -> Self {
+        Self::Uniform(Schedule::constant(value))
+    }
+
+    /// A function of position, m, and time, s.
+    pub fn function(function: impl Fn([f64; 3], f64) -> f64 + Send + Sync + 'static) -> Self {
+        Self::Function(Arc::new(function))
+    }
+
+    /// Value at a place and time.
+    pub fn at(&self, place: [f64; 3], time: f64) -> f64 {
+        match self {
+            Self::Uniform(schedule) => schedule.at(time),
+            Self::Function(function) => function(place, time),
+        }
+    }
+
+    /// Times where the slope changes.
+    pub fn breaks(&self) -> &[f64] {
+        match self {
+            Self::Uniform(schedule) => schedule.breaks(),
+            Self::Function(_) => &[],
+        }
+    }
+
+    fn check(&self, name: &'static str) -> Result<(), Error> {
+        match self {
+            Self::Uniform(schedule) if !schedule.finite() => {
+                let found = schedule.values.iter().copied().find(|v| !v.is_finite()).unwrap_or(f64::NAN);
+                Err(Error::Parameter { name, found, allowed: "a finite number".into() })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl std::fmt::Debug for Field {
+    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Uniform(schedule) => schedule.fmt(out),
+            Self::Function(_) => out.write_str("a function of position and time"),
+        }
+    }
+}
+
+/// Which faces a condition acts on. A face counts only while it is on the
+/// current outer surface: one element beside it exists and no other covers it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Where {
+    /// These faces, given from either side.
+    Faces(Vec<Face>),
+    /// The current outer surface, except these faces.
+    Outer {
+        /// Faces left out.
+        except: Vec<Face>,
+    },
+}
+
+/// A boundary condition. Several may act on one face; their heat adds up.
+#[derive(Clone, Debug)]
+pub enum Condition {
+    /// Prescribed temperature, K, of nodes. Where two name one node, the later one holds.
+    Temperature {
+        /// Nodes of the mesh.
+        nodes: Vec<u32>,
+        /// Temperature, K.
+        value: Field,
+    },
+    /// Heat flux into the body, W/m².
+    Flux {
+        /// Where.
+        surface: Where,
+        /// Heat into the body, W/m².
+        inward: Field,
+    },
+    /// Heat loss h (T − T_a), W/m².
+    Film {
+        /// Where.
+        surface: Where,
+        /// h, W/(m² K).
+        coefficient: f64,
+        /// T_a, K.
+        ambient: Schedule,
+    },
+    /// Heat loss ε σ (T⁴ − T_a⁴), W/m².
+    Radiation {
+        /// Where.
+        surface: Where,
+        /// ε, 0 to 1.
+        emissivity: f64,
+        /// T_a, K.
+        ambient: Schedule,
+    },
+}
+
+impl Condition {
+    /// The surface it acts on; `None` for prescribed temperatures.
+    pub fn surface(&self) -> Option<&Where> {
+        match self {
+            Self::Temperature { .. } => None,
+            Self::Flux { surface, .. } | Self::Film { surface, .. } | Self::Radiation { surface, .. } => {
+                Some(surface)
+            }
+        }
+    }
+
+    /// Times where a schedule's slope changes.
+    pub fn breaks(&self) -> &[f64] {
+        match self {
+            Self::Temperature { value, .. } => value.breaks(),
+            Self::Flux { inward, .. } => inward.breaks(),
+            Self::Film { ambient, .. } | Self::Radiation { ambient, .. } => ambient.breaks(),
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Parameter`] for values out of their domain.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let wrong =
+            |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.into() });
+        let not_below_zero =
+            |name, ambient: &Schedule| match ambient.values.iter().find(|v| v.is_nan() || **v < 0.0) {
+                Some(&found) => wrong(name, found, "an absolute temperature, 0 K or above"),
+                None => Ok(()),
+            };
+        match self {
+            Self::Temperature { value, .. } => match value {
+                Field::Uniform(schedule) => not_below_zero("prescribed temperature", schedule),
+                Field::Function(_) => Ok(()),
+            },
+            Self::Flux { inward, .. } => inward.check("flux"),
+            Self::Film { coefficient, ambient, .. } => {
+                if !(*coefficient >= 0.0 && coefficient.is_finite()) {
+                    return wrong("film coefficient", *coefficient, "0 or above, finite");
+                }
+                not_below_zero("ambient temperature", ambient)
+            }
+            Self::Radiation { emissivity, ambient, .. } => {
+                if !(0.0..=1.0).contains(emissivity) {
+                    return wrong("emissivity", *emissivity, "0 to 1");
+                }
+                not_below_zero("ambient temperature", ambient)
+            }
+        }
+    }
+}
+
+/// Heat released in a volume.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Elements.
+    pub elements: Vec<u32>,
+    /// Heat per volume, W/m³.
+    pub power: Field,
+}
+
+impl Source {
+    /// # Errors
+    /// [`Error::Parameter`] for a power that is not finite.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        self.power.check("heat source")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn schedules() {
+        let ramp = Schedule::linear(&[(0.0, 300.0), (10.0, 400.0), (20.0, 350.0)]).unwrap();
+        for (time, value) in
+            [(-1.0, 300.0), (0.0, 300.0), (5.0, 350.0), (10.0, 400.0), (15.0, 375.0), (99.0, 350.0)]
+        {
+            assert_eq!(ramp.at(time), value);
+        }
+        assert_eq!(ramp.breaks(), [0.0, 10.0, 20.0]);
+        assert!(Schedule::constant(3.0).breaks().is_empty());
+        for wrong in [&[][..], &[(0.0, f64::NAN)], &[(1.0, 2.0), (1.0, 3.0)], &[(f64::INFINITY, 1.0)]] {
+            assert!(Schedule::linear(wrong).is_err());
+        }
+    }
+
+    #[test]
+    fn values_out_of_their_domain_are_named() {
+        let surface = || Where::Outer { except: Vec::new() };
+        let film = |coefficient, ambient| Condition::Film {
+            surface: surface(),
+            coefficient,
+            ambient: Schedule::constant(ambient),
+        };
+        assert!(film(0.0, 0.0).check().is_ok());
+        assert!(film(-1.0, 300.0).check().unwrap_err().to_string().contains("found -1"));
+        assert!(film(1.0, -3.0).check().is_err() && film(1.0, f64::NAN).check().is_err());
+        let radiation =
+            Condition::Radiation { surface: surface(), emissivity: 1.1, ambient: Schedule::constant(0.0) };
+        assert!(radiation.check().unwrap_err().to_string().contains("0 to 1"));
+        let flux = Condition::Flux { surface: surface(), inward: Field::constant(f64::NAN) };
+        assert!(flux.check().is_err());
+        assert!(Source { elements: vec![0], power: Field::constant(f64::INFINITY) }.check().is_err());
+    }
+}

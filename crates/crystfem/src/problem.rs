@@ -1,0 +1,218 @@
+//! What is solved: a mesh with materials, what acts on it, and when its elements appear.
+
+use crate::boundary::{Condition, Field, Source, Where};
+use crate::element::{self, Geometry};
+use crate::error::Error;
+use crate::material::ThermalMaterial;
+use crate::mesh::{Face, Mesh};
+use std::sync::Arc;
+
+/// How heat capacity is represented.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Capacity {
+    /// At the nodes; so are film, radiation and the state of materials with constant conductivity. Temperatures do
+    /// not overshoot where a layer is born.
+    #[default]
+    Lumped,
+    /// By the shape functions, everything at Gauss points.
+    Consistent,
+}
+
+/// Elements that appear at a time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Birth {
+    /// Time, s.
+    pub time: f64,
+    /// Elements; an element in no birth exists from the start.
+    pub elements: Vec<u32>,
+    /// Their temperature when they appear, K.
+    pub temperature: f64,
+}
+
+/// A problem of heat conduction, Eq. (4.14)–(4.17).
+#[derive(Clone)]
+pub struct Problem {
+    /// The mesh, with all elements that ever exist.
+    pub mesh: Mesh,
+    /// Materials.
+    pub materials: Vec<Arc<dyn ThermalMaterial>>,
+    /// Material of each element, as an index into `materials`.
+    pub material_of: Vec<u16>,
+    /// Temperature at t = 0 of what exists then, K.
+    pub initial: Field,
+    /// What acts on nodes and faces.
+    pub conditions: Vec<Condition>,
+    /// Heat released in elements.
+    pub sources: Vec<Source>,
+    /// Elements that appear later, in the order of time.
+    pub births: Vec<Birth>,
+    /// Lumped or consistent.
+    pub capacity: Capacity,
+}
+
+impl Problem {
+    /// One material everywhere, one initial temperature, nothing acting on it.
+    pub fn new(mesh: Mesh, material: Arc<dyn ThermalMaterial>, temperature: f64) -> Self {
+        let elements = mesh.element_count();
+        Self {
+            mesh,
+            materials: vec![material],
+            material_of: vec![0; elements],
+            initial: Field::constant(temperature),
+            conditions: Vec::new(),
+            sources: Vec::new(),
+            births: Vec::new(),
+            capacity: Capacity::Lumped,
+        }
+    }
+
+    /// Times where something changes its slope or appears, sorted.
+    pub(crate) fn breaks(&self) -> Vec<f64> {
+        let mut times: Vec<f64> = self.conditions.iter().flat_map(|c| c.breaks().iter().copied()).collect();
+        times.extend(self.sources.iter().flat_map(|s| s.power.breaks().iter().copied()));
+        times.extend(self.births.iter().map(|birth| birth.time));
+        times.sort_unstable_by(f64::total_cmp);
+        times.dedup();
+        times
+    }
+
+    /// Checks everything that can be checked before a run.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] for elements, nodes, faces or materials that do not exist and for inverted elements;
+    /// [`Error::Parameter`] for values out of their domain.
+    pub fn check(&self) -> Result<(), Error> {
+        let count = self.mesh.element_count();
+        let points = self.mesh.points.len();
+        let mesh_error = |text: String| Err(Error::Mesh(text));
+        if count == 0 {
+            return mesh_error("found no element; allowed: at least one".into());
+        }
+        if count >= (1 << 28) || points >= (1 << 31) {
+            return mesh_error(format!("found {count} elements, {points} nodes; allowed: below 2²⁸ and 2³¹"));
+        }
+        if self.material_of.len() != count {
+            return mesh_error(format!(
+                "found materials for {} elements; allowed: one for each of the {count}",
+                self.material_of.len()
+            ));
+        }
+        for element in 0..count as u32 {
+            let material = usize::from(self.material_of[element as usize]);
+            if material >= self.materials.len() {
+                return mesh_error(format!(
+                    "element {element}: found material {material}; allowed: below {}",
+                    self.materials.len()
+                ));
+            }
+            if let Some(node) = self.mesh.nodes(element).iter().find(|&&n| n as usize >= points) {
+                return mesh_error(format!("element {element}: found node {node}; allowed: below {points}"));
+            }
+            let (corners, nodes) = element::corners(&self.mesh, element);
+            if Geometry::new(&corners[..nodes]).is_none() {
+                return mesh_error(format!(
+                    "element {element}, first node at {:?} m: inverted, flat or folded; \
+                     allowed: a positive Jacobian at each Gauss point",
+                    corners[0]
+                ));
+            }
+        }
+        for material in &self.materials {
+            let density = material.density();
+            if !(density > 0.0 && density.is_finite()) {
+                return Err(Error::Parameter {
+                    name: "density",
+                    found: density,
+                    allowed: "above 0 kg/m³, finite".into(),
+                });
+            }
+        }
+        self.check_actions(count, points)?;
+        self.check_births(count)
+    }
+
+    fn check_actions(&self, count: usize, points: usize) -> Result<(), Error> {
+        for condition in &self.conditions {
+            condition.check()?;
+            if let Condition::Temperature { nodes, .. } = condition
+                && let Some(node) = nodes.iter().find(|&&node| node as usize >= points)
+            {
+                return Err(Error::Mesh(format!(
+                    "prescribed temperature: found node {node}; allowed: below {points}"
+                )));
+            }
+            let faces: &[Face] = match condition.surface() {
+                Some(Where::Faces(faces)) => faces,
+                Some(Where::Outer { except }) => except,
+                None => &[],
+            };
+            if let Some(face) = faces.iter().find(|&&face| self.mesh.face_nodes(face).is_empty()) {
+                return Err(Error::Mesh(format!(
+                    "surface: found side {} of element {}; allowed: a side of one of the {count} elements",
+                    face.side, face.element
+                )));
+            }
+        }
+        for source in &self.sources {
+            source.check()?;
+            if let Some(element) = source.elements.iter().find(|&&element| element as usize >= count) {
+                return Err(Error::Mesh(format!(
+                    "heat source: found element {element}; allowed: below {count}"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_births(&self, count: usize) -> Result<(), Error> {
+        let linear = self.materials.iter().all(|material| material.is_linear());
+        if self.capacity == Capacity::Consistent && !self.births.is_empty() && !linear {
+            return Err(Error::Parameter {
+                name: "births with consistent capacity",
+                found: self.births.len() as f64,
+                allowed:
+                    "none where a material's energy or conductivity is not linear; lumped capacity conserves \
+                          their energy"
+                        .into(),
+            });
+        }
+        let mut born = vec![false; count];
+        let mut last = 0.0;
+        for birth in &self.births {
+            if !(birth.time >= last && birth.time.is_finite()) {
+                return Err(Error::Parameter {
+                    name: "birth time",
+                    found: birth.time,
+                    allowed: format!("{last} s (the birth before) or later, finite"),
+                });
+            }
+            last = birth.time;
+            if !(birth.temperature >= 0.0 && birth.temperature.is_finite()) {
+                return Err(Error::Parameter {
+                    name: "deposition temperature",
+                    found: birth.temperature,
+                    allowed: "an absolute temperature, 0 K or above".into(),
+                });
+            }
+            for &element in &birth.elements {
+                match born.get_mut(element as usize) {
+                    Some(born) if !*born => *born = true,
+                    Some(_) => {
+                        return Err(Error::Mesh(format!(
+                            "birth at {} s: element {element} is born twice; allowed: once",
+                            birth.time
+                        )));
+                    }
+                    None => {
+                        return Err(Error::Mesh(format!(
+                            "birth at {} s: found element {element}; allowed: below {count}",
+                            birth.time
+                        )));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,378 @@
+//! A problem in time: [`Simulation::advance`] goes from one time to the next, through births, in steps that land on
+//! every given time.
+
+use crate::error::Error;
+use crate::ledger::{Ledger, Record};
+use crate::problem::Problem;
+use crate::system::vector::{set, sum};
+use crate::system::{At, Behaviour, Exchange, NONE, System};
+pub use crate::system::{Memory, Points};
+use crate::time::{Attempt, Scheme, Stepper, Steps, Work};
+use std::ops::ControlFlow;
+
+/// Part of the step that the temporal error would allow, and growth of a step at most.
+const SAFETY: f64 = 0.9;
+const MOST_GROWTH: f64 = 4.0;
+
+/// How a problem is solved.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Settings {
+    /// Time integrator.
+    pub scheme: Scheme,
+    /// Lengths of steps.
+    pub steps: Steps,
+    /// Rms error of temperature that linear solves and Newton's iteration may leave, K.
+    pub tolerance: f64,
+}
+
+impl Settings {
+    /// TR-BDF2 with a temporal error of 0.1 K per step at most.
+    pub fn adaptive(first: f64) -> Self {
+        let steps = Steps::Adaptive { tolerance: 0.1, first, smallest: 1e-6 * first, largest: f64::INFINITY };
+        Self { scheme: Scheme::TrBdf2, steps, tolerance: 1e-7 }
+    }
+
+    /// Backward Euler with fixed steps.
+    pub fn backward_euler(dt: f64) -> Self {
+        Self { scheme: Scheme::BackwardEuler, steps: Steps::Fixed { dt }, tolerance: 1e-7 }
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let positive = |name, found: f64| {
+            if found > 0.0 {
+                return Ok(());
+            }
+            Err(Error::Parameter { name, found, allowed: "above 0".into() })
+        };
+        positive("tolerance", self.tolerance)?;
+        match self.steps {
+            Steps::Fixed { dt } => positive("time step", dt),
+            Steps::Adaptive { tolerance, first, smallest, largest } => {
+                positive("temporal tolerance", tolerance)?;
+                positive("first step", first)?;
+                positive("smallest step", smallest)?;
+                if largest >= smallest && first >= smallest {
+                    return Ok(());
+                }
+                let found = largest.min(first);
+                let allowed = format!("{smallest} s (the smallest step) or more");
+                Err(Error::Parameter { name: "largest step, first step", found, allowed })
+            }
+        }
+    }
+}
+
+/// Everything a run needs to go on, bit by bit.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct State {
+    /// Time, s.
+    pub time: f64,
+    /// Temperature of each equation, K.
+    pub temperature: Vec<f64>,
+    /// Its rate of change over the last step, K/s; empty after a jump.
+    pub slope: Vec<f64>,
+    /// Q of each equation, W; empty if not known.
+    pub rate: Vec<f64>,
+    /// Heat going in at this time, W.
+    pub exchange: Exchange,
+    /// Material points.
+    pub memory: Memory,
+    /// Birth of each element, from 1; 0 from the start, [`u32::MAX`] not yet.
+    pub born: Vec<u32>,
+    /// Births that have happened.
+    pub births: usize,
+    /// Length of the next step that the error control wants, s.
+    pub next_dt: f64,
+    /// Whether the last thing was a jump.
+    pub jump: bool,
+    /// Energy since the start.
+    pub ledger: Ledger,
+    /// Work since the start.
+    pub work: Work,
+}
+
+/// A problem being solved.
+pub struct Simulation {
+    pub(crate) problem: Problem,
+    pub(crate) settings: Settings,
+    pub(crate) behaviours: Vec<Behaviour>,
+    pub(crate) system: System,
+    pub(crate) state: State,
+    stepper: Stepper,
+    breaks: Vec<f64>,
+}
+
+impl Simulation {
+    /// At time 0, with what exists then.
+    ///
+    /// # Errors
+    /// Those of [`Problem::check`] and of the materials.
+    pub fn new(problem: Problem, settings: Settings) -> Result<Self, Error> {
+        let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
+        let mut state = State { born: vec![0; problem.material_of.len()], jump: true, ..State::default() };
+        for birth in &problem.births {
+            for &element in &birth.elements {
+                state.born[element as usize] = NONE;
+            }
+        }
+        if let Steps::Adaptive { first, .. } = settings.steps {
+            state.next_dt = first;
+        }
+        let system = System::build(&problem, &behaviours, &state.born, 0)?;
+        state.work.builds = 1;
+        state.temperature =
+            system.nodes.iter().map(|&n| problem.initial.at(problem.mesh.points[n as usize], 0.0)).collect();
+        if let Some(found) = state.temperature.iter().copied().find(|t| !(*t >= 0.0 && t.is_finite())) {
+            let allowed = "an absolute temperature, 0 K or above".into();
+            return Err(Error::Parameter { name: "initial temperature", found, allowed });
+        }
+        let mut simulation =
+            Self { problem, settings, behaviours, system, state, stepper: Stepper::default(), breaks };
+        // what is prescribed at the start is part of the initial state
+        simulation.system.prescribe(&simulation.problem, 0.0, &mut simulation.state.temperature);
+        simulation.fresh_points()?;
+        simulation.give_birth()?;
+        Ok(simulation)
+    }
+
+    /// Goes on from a state of the same problem.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; [`Error::Mesh`] where the state does not belong to the problem.
+    pub fn resume(problem: Problem, settings: Settings, state: State) -> Result<Self, Error> {
+        let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
+        if state.born.len() != problem.material_of.len() {
+            return Err(Error::Mesh(format!(
+                "state: found {} elements; allowed: the mesh's {}",
+                state.born.len(),
+                problem.material_of.len()
+            )));
+        }
+        let system = System::build(&problem, &behaviours, &state.born, 0)?;
+        let size = system.size();
+        let fits = |list: &[f64]| list.is_empty() || list.len() == size;
+        let memory = &state.memory;
+        if state.temperature.len() != size
+            || !fits(&state.slope)
+            || !fits(&state.rate)
+            || memory.nodal.energy.len() != system.nodal.material.len()
+            || memory.nodal.state.len() != system.nodal.material.len() * system.nodal.stride
+            || memory.general.energy.len() != system.general.points()
+            || memory.general.state.len() != system.general.points() * system.general.stride
+        {
+            return Err(Error::Mesh(format!(
+                "state: found {} temperatures and {} + {} points; allowed: {size} and {} + {} of this problem",
+                state.temperature.len(),
+                memory.nodal.energy.len(),
+                memory.general.energy.len(),
+                system.nodal.material.len(),
+                system.general.points()
+            )));
+        }
+        Ok(Self { problem, settings, behaviours, system, state, stepper: Stepper::default(), breaks })
+    }
+
+    fn prepare(problem: &Problem, settings: &Settings) -> Result<(Vec<Behaviour>, Vec<f64>), Error> {
+        settings.check()?;
+        problem.check()?;
+        let behaviours = problem
+            .materials
+            .iter()
+            .map(|material| Behaviour::of(&**material, problem.capacity))
+            .collect::<Result<_, _>>()?;
+        Ok((behaviours, problem.breaks()))
+    }
+
+    /// What is solved.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// Where it stands: serialise it to go on later with the same bits.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Time, s.
+    pub fn time(&self) -> f64 {
+        self.state.time
+    }
+
+    /// Whether a node of the mesh exists.
+    pub fn exists(&self, node: u32) -> bool {
+        self.system.equation.get(node as usize).is_some_and(|&equation| equation != NONE)
+    }
+
+    /// Whether an element exists.
+    pub fn is_born(&self, element: u32) -> bool {
+        self.state.born.get(element as usize).is_some_and(|&birth| birth != NONE)
+    }
+
+    /// Temperature of a node, K; `None` where it does not exist.
+    pub fn temperature(&self, node: u32) -> Option<f64> {
+        let equation = *self.system.equation.get(node as usize)?;
+        self.state.temperature.get(equation as usize).copied()
+    }
+
+    /// Temperatures of all nodes of the mesh, K; `missing` for those that do not exist.
+    pub fn temperatures(&self, missing: f64) -> Vec<f64> {
+        (0..self.problem.mesh.points.len() as u32).map(|n| self.temperature(n).unwrap_or(missing)).collect()
+    }
+
+    /// Goes to a time. `observe` sees every accepted step, and may stop there. Births at `until` itself are left to
+    /// the next call, so that outputs at that time show what was before them.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a time that has passed; those of the materials; [`Error::NotConverged`] where a
+    /// step as short as allowed has no solution.
+    pub fn advance(
+        &mut self,
+        until: f64,
+        observe: &mut (dyn FnMut(&Self, &Record) -> ControlFlow<()> + Send),
+    ) -> Result<ControlFlow<()>, Error> {
+        if !(until >= self.state.time && until.is_finite()) {
+            let allowed = format!("{} s (now) or later, finite", self.state.time);
+            return Err(Error::Parameter { name: "end time", found: until, allowed });
+        }
+        // one entry into the thread pool for all small parallel loops of a run
+        rayon::scope(|_| {
+            while self.state.time < until {
+                self.give_birth()?;
+                let record = self.step(until)?;
+                if observe(self, &record).is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            }
+            Ok(ControlFlow::Continue(()))
+        })
+    }
+
+    /// One accepted step.
+    fn step(&mut self, until: f64) -> Result<Record, Error> {
+        let time = self.state.time;
+        let next = self.breaks[self.breaks.partition_point(|&t| t <= time)..].first().copied();
+        let target = next.map_or(until, |next| next.min(until));
+        let jump = self.state.jump;
+        let scheme = if jump { Scheme::BackwardEuler } else { self.settings.scheme };
+        let adaptive = match self.settings.steps {
+            Steps::Adaptive { tolerance, smallest, largest, .. } => Some((tolerance, smallest, largest)),
+            Steps::Fixed { .. } => None,
+        };
+        if self.state.rate.is_empty() && (adaptive.is_some() || scheme == Scheme::TrBdf2) {
+            let (rate, exchange) = self.stepper.rate(&self.problem, &mut self.system, &self.state)?;
+            (self.state.rate, self.state.exchange) = (rate, exchange);
+        }
+        let mut wanted = match self.settings.steps {
+            Steps::Fixed { dt } => dt,
+            Steps::Adaptive { largest, .. } => self.state.next_dt.min(largest),
+        };
+        loop {
+            let left = target - time;
+            let lands = wanted >= left * (1.0 - 1e-9);
+            let end = if lands {
+                target
+            } else if adaptive.is_some() && wanted > 0.5 * left {
+                time + 0.5 * left
+            } else {
+                time + wanted
+            };
+            let dt = end - time;
+            if dt <= 0.0 {
+                let allowed = format!("steps that change the time {time} s");
+                return Err(Error::Parameter { name: "time step", found: wanted, allowed });
+            }
+            let accuracy = adaptive.map(|(tolerance, ..)| 0.05 * tolerance);
+            let mut work = self.state.work;
+            let attempt = self.stepper.attempt(
+                &self.problem,
+                &mut self.system,
+                &self.state,
+                scheme,
+                end,
+                self.settings.tolerance,
+                accuracy,
+                &mut work,
+            );
+            self.state.work = work;
+            let attempt = attempt.and_then(|mut attempt| {
+                let ratio = self.follow(dt)?;
+                attempt.step_ratio = ratio.into_iter().chain(attempt.step_ratio).reduce(f64::min);
+                Ok(attempt)
+            });
+            let Some((tolerance, smallest, largest)) = adaptive else {
+                return Ok(self.accept(end, &attempt?));
+            };
+            // a wish below this is not granted by a shorter next step only
+            const REFUSED: f64 = 0.5;
+            let factor = match &attempt {
+                Ok(attempt) => {
+                    let ratio = attempt.step_ratio.unwrap_or(f64::INFINITY);
+                    let error = attempt.error.unwrap_or(0.0) / tolerance;
+                    let grow = (SAFETY * error.powf(-1.0 / f64::from(attempt.order))).clamp(0.1, MOST_GROWTH);
+                    if (error <= 1.0 && ratio >= REFUSED) || dt <= smallest * (1.0 + 1e-9) {
+                        // a step cut short by a landing says little about the next
+                        let grown = (dt * grow).max(if lands { wanted } else { 0.0 });
+                        self.state.next_dt = grown.min(dt * ratio).clamp(smallest, largest);
+                        return Ok(self.accept(end, attempt));
+                    }
+                    grow.min(ratio.max(0.1)).min(0.9)
+                }
+                Err(_) => 0.25,
+            };
+            if dt <= smallest * (1.0 + 1e-9) {
+                return Ok(self.accept(end, &attempt?));
+            }
+            self.state.work.rejected += 1;
+            wanted = (dt * factor).max(smallest);
+        }
+    }
+
+    /// States of materials whose energy does not depend on them, at the end of an attempt.
+    fn follow(&mut self, dt: f64) -> Result<Option<f64>, Error> {
+        let Stepper { temperature, stages, .. } = &mut self.stepper;
+        let at =
+            At { temperature, start: &self.state.temperature, dt, time: self.state.time, tangent: false };
+        let old = &self.state.memory.nodal;
+        let out = &mut stages.evaluation;
+        out.responses = 0;
+        let ratio = self.system.nodal.follow(&self.problem, &at, old, out)?;
+        self.state.work.responses += out.responses;
+        Ok(ratio)
+    }
+
+    /// Takes the end of the attempt as the new state.
+    fn accept(&mut self, end: f64, attempt: &Attempt) -> Record {
+        let Self { state, stepper, system, .. } = self;
+        let dt = end - state.time;
+        let size = system.size();
+        let Stepper { temperature, stages, .. } = stepper;
+        let residual = &stages.residual;
+        let change = &stages.evaluation.change;
+        let record = Record {
+            time: end,
+            dt,
+            stored: sum(size, |k| change[k]),
+            moved: sum(size, |k| change[k].abs()),
+            exchange: attempt.exchange,
+            reaction: system.fixed.iter().map(|&(equation, _)| residual[equation as usize]).sum(),
+            error: attempt.error,
+            step_ratio: attempt.step_ratio,
+        };
+        state.slope.resize(size, 0.0);
+        set(&mut state.slope, |k| (temperature[k] - state.temperature[k]) / dt);
+        std::mem::swap(&mut state.temperature, temperature);
+        std::mem::swap(&mut state.rate, &mut stages.evaluation.rate);
+        state.exchange = stages.evaluation.exchange;
+        std::mem::swap(&mut state.memory, &mut stages.evaluation.memory);
+        state.time = end;
+        state.jump = false;
+        state.work.steps += 1;
+        state.ledger.add(&record);
+        record
+    }
+
+    /// Forgets what was made for other equations.
+    pub(crate) fn forget(&mut self) {
+        self.stepper.reset();
+    }
+}

@@ -1,0 +1,100 @@
+//! Elements of equal shape and material, whose matrices are made once.
+
+use super::Behaviour;
+use crate::element::{self, Geometry, MOST};
+use crate::mesh::Mesh;
+
+/// Classes at most; later shapes get matrices of their own.
+const MOST_CLASSES: usize = 256;
+
+/// The element's conduction is constant, and its matrix its own.
+pub const OWN: u16 = u16::MAX;
+/// The element's conduction depends on temperature or state.
+pub const VARYING: u16 = u16::MAX - 1;
+
+/// Matrices of elements that differ by a translation only, to 1e-10 of their size.
+pub struct Class {
+    material: u16,
+    nodes: usize,
+    shape: [[f64; 3]; MOST],
+    tolerance: f64,
+    /// ∫ ∇N·k∇N dV, W/K, row a at 8a.
+    pub conduction: [f64; 64],
+    /// ∫ ρ c N N dV, J/K; zero where the material is not linear.
+    pub capacity: [f64; 64],
+    /// ∫ N dV, m³.
+    pub volumes: [f64; MOST],
+}
+
+/// The class of each active element, or [`OWN`] or [`VARYING`].
+pub fn classify(
+    mesh: &Mesh,
+    active: &[u32],
+    material_of: &[u16],
+    behaviours: &[Behaviour],
+) -> (Vec<u16>, Vec<Class>) {
+    let mut classes: Vec<Class> = Vec::new();
+    let mut last = 0;
+    let kinds = active
+        .iter()
+        .map(|&element| {
+            let material = material_of[element as usize];
+            let behaviour = &behaviours[usize::from(material)];
+            if behaviour.conductivity.is_none() {
+                return VARYING;
+            }
+            let (corners, nodes) = element::corners(mesh, element);
+            let mut shape = [[0.0; 3]; MOST];
+            for k in 0..nodes {
+                for d in 0..3 {
+                    shape[k][d] = corners[k][d] - corners[0][d];
+                }
+            }
+            let fits = |class: &Class| {
+                class.material == material
+                    && class.nodes == nodes
+                    && (0..nodes)
+                        .all(|k| (0..3).all(|d| (class.shape[k][d] - shape[k][d]).abs() <= class.tolerance))
+            };
+            if classes.get(last).is_some_and(fits) {
+                return last as u16;
+            }
+            if let Some(found) = classes.iter().position(fits) {
+                last = found;
+                return found as u16;
+            }
+            if classes.len() == MOST_CLASSES {
+                return OWN;
+            }
+            // elements were checked before
+            let Some(geometry) = Geometry::new(&corners[..nodes]) else { return OWN };
+            last = classes.len();
+            classes.push(Class::new(material, shape, &geometry, behaviour));
+            last as u16
+        })
+        .collect();
+    (kinds, classes)
+}
+
+impl Class {
+    fn new(material: u16, shape: [[f64; 3]; MOST], geometry: &Geometry, behaviour: &Behaviour) -> Self {
+        let size = shape.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let (conduction, capacity) = matrices(geometry, behaviour);
+        Self {
+            material,
+            nodes: geometry.nodes,
+            shape,
+            tolerance: 1e-10 * size,
+            conduction,
+            capacity,
+            volumes: geometry.corner_volumes,
+        }
+    }
+}
+
+/// Conduction (W/K) and capacity (J/K) of an element; zero what is not constant.
+pub fn matrices(geometry: &Geometry, behaviour: &Behaviour) -> ([f64; 64], [f64; 64]) {
+    let conduction = behaviour.conductivity.map_or([0.0; 64], |k| geometry.conduction(&k));
+    let capacity = behaviour.capacity.map_or([0.0; 64], |c| geometry.mass().map(|m| c * m));
+    (conduction, capacity)
+}

@@ -1,0 +1,196 @@
+//! Material points in elements, for materials whose conductivity depends on temperature or state, and for all
+//! materials that are not linear when capacity is consistent.
+//!
+//! Point g has the temperature gradient of Gauss point g. With lumped capacity it has the temperature of corner g
+//! beside it, and its energy is counted there; with consistent capacity it has the temperature of the Gauss point.
+//! The matrix takes the symmetric part of −∂f/∂(∇T) and leaves ∂f/∂T out, so that it stays symmetric: Newton's
+//! iteration then converges linearly where k varies, with a rate of the relative change of k over the last iterate.
+
+use super::rows::Rows;
+use super::{At, Evaluation, Points};
+use crate::element::{self, Geometry, MOST};
+use crate::error::Error;
+use crate::material::Point;
+use crate::problem::Problem;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Elements of a work item, and work items evaluated before their sums are added.
+const ITEM: usize = 256;
+const BATCH: usize = 64 * ITEM;
+
+/// Elements with points.
+#[derive(Clone, Debug, Default)]
+pub struct General {
+    /// Elements of the mesh, ascending.
+    pub elements: Vec<u32>,
+    /// First point of each element, and the number of points.
+    pub starts: Vec<u32>,
+    /// Equations of each element's nodes.
+    pub equations: Vec<[u32; MOST]>,
+    /// State variables stored for each point.
+    pub stride: usize,
+}
+
+/// What an element adds.
+struct Part {
+    change: [f64; MOST],
+    rate: [f64; MOST],
+    capacity: [f64; MOST],
+    matrices: Option<Box<[[f64; 64]; 2]>>,
+    ratio: Option<f64>,
+}
+
+impl General {
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.elements.is_empty()
+    }
+
+    /// Number of points.
+    pub fn points(&self) -> usize {
+        self.starts.last().map_or(0, |&points| points as usize)
+    }
+
+    /// Adds to `change`, `rate`, `capacity` and, for tangents, to the rows; sets the new points.
+    pub fn evaluate(
+        &self,
+        problem: &Problem,
+        consistent: bool,
+        at: &At,
+        old: &Points,
+        rows: &mut Rows,
+        out: &mut Evaluation,
+    ) -> Result<(), Error> {
+        let mut memory = std::mem::take(&mut out.memory.general);
+        memory.state.resize(old.state.len(), 0.0);
+        memory.energy.resize(old.energy.len(), 0.0);
+        let (mut state, mut energy) = (memory.state.as_mut_slice(), memory.energy.as_mut_slice());
+        let mut first = 0;
+        while first < self.elements.len() {
+            let last = (first + BATCH).min(self.elements.len());
+            let mut work = Vec::new();
+            for start in (first..last).step_by(ITEM) {
+                let end = (start + ITEM).min(last);
+                let points = (self.starts[end] - self.starts[start]) as usize;
+                let (here, rest) = state.split_at_mut(points * self.stride);
+                let (energies, others) = energy.split_at_mut(points);
+                work.push((start..end, here, energies));
+                (state, energy) = (rest, others);
+            }
+            let parts: Vec<Vec<Part>> = work
+                .into_par_iter()
+                .map(|(range, state, energy)| {
+                    let offset = self.starts[range.start] as usize;
+                    range
+                        .map(|element| {
+                            let points = self.starts[element] as usize - offset
+                                ..self.starts[element + 1] as usize - offset;
+                            let state = &mut state[points.start * self.stride..points.end * self.stride];
+                            self.element(problem, consistent, at, old, element, state, &mut energy[points])
+                        })
+                        .collect::<Result<Vec<_>, _>>()
+                })
+                .collect::<Result<_, _>>()?;
+            for (element, part) in (first..).zip(parts.iter().flatten()) {
+                let equations = &self.equations[element];
+                let nodes = (self.starts[element + 1] - self.starts[element]) as usize;
+                for a in 0..nodes {
+                    let row = equations[a] as usize;
+                    out.change[row] += part.change[a];
+                    out.rate[row] += part.rate[a];
+                    out.capacity[row] += part.capacity[a];
+                    if let Some(matrices) = &part.matrices {
+                        for b in 0..nodes {
+                            let at = 8 * a + b;
+                            rows.add(row, equations[b] as usize, matrices[0][at], matrices[1][at]);
+                        }
+                    }
+                }
+                out.step_ratio = part.ratio.into_iter().chain(out.step_ratio).reduce(f64::min);
+            }
+            first = last;
+        }
+        out.responses += self.points() as u64;
+        out.memory.general = memory;
+        Ok(())
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn element(
+        &self,
+        problem: &Problem,
+        consistent: bool,
+        at: &At,
+        old: &Points,
+        index: usize,
+        state: &mut [f64],
+        energy: &mut [f64],
+    ) -> Result<Part, Error> {
+        let number = self.elements[index];
+        let (corners, nodes) = element::corners(&problem.mesh, number);
+        let material = &*problem.materials[usize::from(problem.material_of[number as usize])];
+        let Some(geometry) = Geometry::new(&corners[..nodes]) else {
+            return Err(Error::Mesh(format!("element {number}: inverted, flat or folded")));
+        };
+        let (density, count) = (material.density(), material.state_names().len());
+        let shapes = element::shapes(nodes);
+        let (mut start, mut end) = ([0.0; MOST], [0.0; MOST]);
+        for a in 0..nodes {
+            let equation = self.equations[index][a] as usize;
+            (start[a], end[a]) = (at.start[equation], at.temperature[equation]);
+        }
+        let mut part = Part {
+            change: [0.0; MOST],
+            rate: [0.0; MOST],
+            capacity: [0.0; MOST],
+            matrices: at.tangent.then(|| Box::new([[0.0; 64]; 2])),
+            ratio: None,
+        };
+        let first = self.starts[index] as usize;
+        for g in 0..nodes {
+            let gradients = &geometry.gradients[g];
+            let mut gradient = Vector3::zeros();
+            for a in 0..nodes {
+                gradient += Vector3::from(gradients[a]) * end[a];
+            }
+            let (mut from, mut to) = (start[g], end[g]);
+            if consistent {
+                from = (0..nodes).map(|a| shapes[g][a] * start[a]).sum();
+                to = (0..nodes).map(|a| shapes[g][a] * end[a]).sum();
+            }
+            let place = Point { temperature: from, increment: to - from, gradient, dt: at.dt };
+            let old_state = &old.state[(first + g) * self.stride..];
+            let new_state = &mut state[g * self.stride..];
+            let response = material.respond(&place, &old_state[..count], &mut new_state[..count])?;
+            energy[g] = response.energy;
+            part.ratio = response.step_ratio.into_iter().chain(part.ratio).reduce(f64::min);
+            let change = density * (response.energy - old.energy[first + g]);
+            let capacity = density * response.d_energy_d_temperature;
+            let weight = geometry.weights[g];
+            for a in 0..nodes {
+                part.rate[a] -= weight * Vector3::from(gradients[a]).dot(&response.flux);
+                if consistent {
+                    part.change[a] += weight * shapes[g][a] * change;
+                    part.capacity[a] += weight * shapes[g][a] * capacity;
+                }
+            }
+            if !consistent {
+                part.change[g] += geometry.corner_volumes[g] * change;
+                part.capacity[g] += geometry.corner_volumes[g] * capacity;
+            }
+            if let Some(matrices) = &mut part.matrices {
+                let tangent = -0.5 * (response.d_flux_d_gradient + response.d_flux_d_gradient.transpose());
+                geometry.add_conduction(g, &tangent, &mut matrices[0]);
+                if consistent {
+                    for a in 0..nodes {
+                        for b in 0..nodes {
+                            matrices[1][8 * a + b] += weight * capacity * shapes[g][a] * shapes[g][b];
+                        }
+                    }
+                }
+            }
+        }
+        Ok(part)
+    }
+}

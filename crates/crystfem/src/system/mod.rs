@@ -1,0 +1,241 @@
+//! The equations of the elements that exist: Eq. (4.16) in space, before any choice of a time integrator.
+//!
+//! dE_i/dt + Q_i = 0 at each node i, with the energy E_i = ∫ N_i ρU dV and the heat that leaves the node,
+//! Q_i = −∫ ∇N_i·f dV + ∮ N_i q dA − ∫ N_i r dV.
+//! A [`System`] is built when elements appear: nodes of elements that do not exist have no equation. It holds
+//! the pattern and constant coefficients; [`System::evaluate`] gives E, Q and their tangents at a temperature.
+//!
+//! Three kinds of material: linear ones have no points at all; ones whose conductivity alone is constant are asked at
+//! nodes (one point for each node, material and birth); all others at the integration points of each element.
+
+mod build;
+mod classes;
+mod general;
+mod nodal;
+mod rows;
+mod surfaces;
+pub mod vector;
+
+pub use general::General;
+pub use nodal::Nodal;
+pub use rows::Rows;
+pub use surfaces::{Exchange, FaceMatrix, Surfaces};
+
+use crate::error::Error;
+use crate::material::{Point, ThermalMaterial};
+use crate::problem::{Capacity, Problem};
+use nalgebra::{Matrix3, Vector3};
+
+/// No equation.
+pub const NONE: u32 = u32::MAX;
+
+/// What of a material is constant.
+#[derive(Clone, Copy, Debug)]
+pub struct Behaviour {
+    /// k, W/(m K), where it is.
+    pub conductivity: Option<Matrix3<f64>>,
+    /// ρc, J/(m³ K), where U is linear in T.
+    pub capacity: Option<f64>,
+    /// Length of the state.
+    pub states: usize,
+}
+
+impl Behaviour {
+    /// Whether it has points at nodes.
+    pub fn nodal(&self) -> bool {
+        self.conductivity.is_some() && (self.capacity.is_none() || self.states > 0)
+    }
+}
+
+impl Behaviour {
+    /// Asks the material once.
+    ///
+    /// # Errors
+    /// Those of the material; [`Error::Parameter`] for a conductivity or a capacity that is not positive.
+    pub fn of(material: &dyn ThermalMaterial, capacity: Capacity) -> Result<Self, Error> {
+        let states = material.state_names().len();
+        let linear = material.is_linear();
+        let mut behaviour = Self { conductivity: None, capacity: None, states };
+        if !linear && (capacity == Capacity::Consistent || !material.constant_conductivity()) {
+            return Ok(behaviour);
+        }
+        let at = Point { temperature: 300.0, increment: 0.0, gradient: Vector3::zeros(), dt: 1.0 };
+        let mut old = vec![0.0; states];
+        material.initial_state(at.temperature, &mut old);
+        let mut new = old.clone();
+        let response = material.respond(&at, &old, &mut new)?;
+        let conductivity = -response.d_flux_d_gradient;
+        let conductivity = 0.5 * (conductivity + conductivity.transpose());
+        if !conductivity.iter().all(|k| k.is_finite()) || conductivity.cholesky().is_none() {
+            return Err(Error::Parameter {
+                name: "conductivity",
+                found: conductivity[(0, 0)],
+                allowed: "above 0 W/(m K) in every direction, finite".into(),
+            });
+        }
+        behaviour.conductivity = Some(conductivity);
+        if linear {
+            let capacity = response.d_energy_d_temperature;
+            if !(capacity > 0.0 && capacity.is_finite()) {
+                return Err(Error::Parameter {
+                    name: "specific heat",
+                    found: capacity,
+                    allowed: "above 0 J/(kg K), finite".into(),
+                });
+            }
+            behaviour.capacity = Some(material.density() * capacity);
+        }
+        Ok(behaviour)
+    }
+}
+
+/// States and energies of material points.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Points {
+    /// State variables, point after point.
+    pub state: Vec<f64>,
+    /// U, J/kg.
+    pub energy: Vec<f64>,
+}
+
+/// Material points of both kinds.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Memory {
+    /// At nodes.
+    pub nodal: Points,
+    /// In elements.
+    pub general: Points,
+}
+
+/// Where and when a system is evaluated.
+#[derive(Clone, Copy)]
+pub struct At<'a> {
+    /// Temperatures of the nodes that exist, K.
+    pub temperature: &'a [f64],
+    /// Temperatures at the start of the increment, K.
+    pub start: &'a [f64],
+    /// Length of the increment, s.
+    pub dt: f64,
+    /// Time at its end, s.
+    pub time: f64,
+    /// Whether tangents are wanted.
+    pub tangent: bool,
+}
+
+/// E, Q and their tangents.
+#[derive(Clone, Debug, Default)]
+pub struct Evaluation {
+    /// E_i − E_i(start), J.
+    pub change: Vec<f64>,
+    /// Q_i, W.
+    pub rate: Vec<f64>,
+    /// ∂E_i/∂T_i, J/K; row sums with consistent capacity.
+    pub capacity: Vec<f64>,
+    /// ∂Q_i/∂T_i of surfaces, W/K; with consistent capacity see `faces`.
+    pub conductance: Vec<f64>,
+    /// ∂Q/∂T of surfaces with consistent capacity.
+    pub faces: Vec<FaceMatrix>,
+    /// Heat that goes through surfaces and sources, W.
+    pub exchange: Exchange,
+    /// The smallest wish of a material for the next increment over this one.
+    pub step_ratio: Option<f64>,
+    /// Points at the end of the increment.
+    pub memory: Memory,
+    /// Calls of `respond`.
+    pub responses: u64,
+    scratch: Vec<f64>,
+}
+
+/// The equations of what exists.
+pub struct System {
+    /// Elements, ascending.
+    pub elements: Vec<u32>,
+    /// Node of the mesh of each equation.
+    pub nodes: Vec<u32>,
+    /// Equation of each node of the mesh, or [`NONE`].
+    pub equation: Vec<u32>,
+    /// K, and M where it is consistent.
+    pub rows: Rows,
+    /// Capacity of linear materials, row sums, J/K.
+    pub capacity: Vec<f64>,
+    /// Points at nodes.
+    pub nodal: Nodal,
+    /// Points in elements.
+    pub general: General,
+    /// Faces and sources.
+    pub surfaces: Surfaces,
+    /// Equations with prescribed temperature and their conditions, ascending.
+    pub fixed: Vec<(u32, u32)>,
+    /// 0 where the temperature is prescribed, 1 elsewhere.
+    pub free: Vec<f64>,
+    /// Whether capacity is consistent.
+    pub consistent: bool,
+    /// Values of `rows` without the elements whose conduction or capacity varies.
+    base: Option<[Vec<f64>; 2]>,
+    /// Counts rebuilt tangents: a matrix is unchanged while this is.
+    pub generation: u64,
+}
+
+impl System {
+    /// Number of equations.
+    pub fn size(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether no Newton iteration is needed.
+    pub fn is_linear(&self) -> bool {
+        !self.nodal.coupled && self.general.is_empty() && !self.surfaces.radiates()
+    }
+
+    /// Sets prescribed temperatures for a time.
+    pub fn prescribe(&self, problem: &Problem, time: f64, temperature: &mut [f64]) {
+        for &(equation, condition) in &self.fixed {
+            if let crate::boundary::Condition::Temperature { value, .. } =
+                &problem.conditions[condition as usize]
+            {
+                let node = self.nodes[equation as usize];
+                temperature[equation as usize] = value.at(problem.mesh.points[node as usize], time);
+            }
+        }
+    }
+
+    /// E, Q and, if wanted, their tangents; `old` are the points at the start of the increment.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] of a material.
+    pub fn evaluate(
+        &mut self,
+        problem: &Problem,
+        at: &At,
+        old: &Memory,
+        out: &mut Evaluation,
+    ) -> Result<(), Error> {
+        let size = self.size();
+        for field in [&mut out.change, &mut out.rate, &mut out.capacity, &mut out.conductance] {
+            field.resize(size, 0.0);
+        }
+        out.step_ratio = None;
+        if let Some(base) = &self.base {
+            self.rows.restore(base);
+        }
+        // linear materials
+        self.rows.product(None, [0.0, 1.0], at.temperature, &mut out.rate);
+        if self.consistent {
+            out.scratch.resize(size, 0.0);
+            vector::set(&mut out.scratch, |k| at.temperature[k] - at.start[k]);
+            self.rows.product(None, [1.0, 0.0], &out.scratch, &mut out.change);
+        } else {
+            vector::set(&mut out.change, |k| self.capacity[k] * (at.temperature[k] - at.start[k]));
+        }
+        out.capacity.copy_from_slice(&self.capacity);
+        out.conductance.fill(0.0);
+        // the others
+        self.nodal.evaluate(problem, at, &old.nodal, out)?;
+        if !self.general.is_empty() {
+            self.general.evaluate(problem, self.consistent, at, &old.general, &mut self.rows, out)?;
+            self.generation += u64::from(at.tangent);
+        }
+        self.surfaces.evaluate(problem, &self.nodes, at, out);
+        Ok(())
+    }
+}

@@ -1,0 +1,158 @@
+//! Material points at nodes: one for each node, material and birth, for materials with constant conductivity.
+//!
+//! All corners of elements of one material that were born together have one temperature history at a node, hence one
+//! state; a mesh of hexahedra needs an eighth of the calls that its Gauss points would need.
+
+use super::vector::{CHUNK, items};
+use super::{At, Evaluation, Points};
+use crate::error::Error;
+use crate::material::{Point, ThermalMaterial};
+use crate::problem::Problem;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Points at nodes, in the order of the nodes.
+#[derive(Clone, Debug, Default)]
+pub struct Nodal {
+    /// First point of each node, and the number of points.
+    pub starts: Vec<u32>,
+    /// Material of each point.
+    pub material: Vec<u16>,
+    /// Birth of each point.
+    pub birth: Vec<u32>,
+    /// ρV, kg.
+    pub mass: Vec<f64>,
+    /// State variables stored for each point.
+    pub stride: usize,
+    /// Of each material: whether its energy is linear, so that its state only follows the temperature.
+    pub followers: Vec<bool>,
+    /// Whether some material's energy is not.
+    pub coupled: bool,
+}
+
+impl Nodal {
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.material.is_empty()
+    }
+
+    /// Points of a node.
+    pub fn of(&self, node: usize) -> std::ops::Range<usize> {
+        if self.is_empty() { 0..0 } else { self.starts[node] as usize..self.starts[node + 1] as usize }
+    }
+
+    /// Whether the state of a material only follows the temperature.
+    pub fn follows(&self, material: u16) -> bool {
+        self.followers.get(usize::from(material)).is_some_and(|&follows| follows)
+    }
+
+    /// Of materials whose energy is not linear: adds to `change`, `capacity`; sets the new points.
+    pub fn evaluate(
+        &self,
+        problem: &Problem,
+        at: &At,
+        old: &Points,
+        out: &mut Evaluation,
+    ) -> Result<(), Error> {
+        if self.coupled {
+            let ratio = self.respond(problem, at, old, out, false)?;
+            out.step_ratio = ratio.into_iter().chain(out.step_ratio).reduce(f64::min);
+        }
+        Ok(())
+    }
+
+    /// Of the others: sets the new points; returns their smallest wish for the next step over this one.
+    pub fn follow(
+        &self,
+        problem: &Problem,
+        at: &At,
+        old: &Points,
+        out: &mut Evaluation,
+    ) -> Result<Option<f64>, Error> {
+        if self.followers.contains(&true) && !self.is_empty() {
+            return self.respond(problem, at, old, out, true);
+        }
+        Ok(None)
+    }
+
+    fn respond(
+        &self,
+        problem: &Problem,
+        at: &At,
+        old: &Points,
+        out: &mut Evaluation,
+        follow: bool,
+    ) -> Result<Option<f64>, Error> {
+        let Evaluation { change, capacity, memory, .. } = out;
+        let new = &mut memory.nodal;
+        new.state.resize(old.state.len(), 0.0);
+        new.energy.resize(old.energy.len(), 0.0);
+        let nodes = change.len();
+        let mut work = Vec::with_capacity(items(nodes));
+        let (mut state, mut energy) = (new.state.as_mut_slice(), new.energy.as_mut_slice());
+        for (item, (change, capacity)) in change.chunks_mut(CHUNK).zip(capacity.chunks_mut(CHUNK)).enumerate()
+        {
+            let first = item * CHUNK;
+            let points = (self.starts[first + change.len()] - self.starts[first]) as usize;
+            let (here, rest) = state.split_at_mut(points * self.stride);
+            let (energies, others) = energy.split_at_mut(points);
+            work.push((first, change, capacity, here, energies));
+            (state, energy) = (rest, others);
+        }
+        let ratios: Vec<Option<f64>> = work
+            .into_par_iter()
+            .map(|(first, change, capacity, state, energy)| {
+                self.item(problem, at, old, first, change, capacity, state, energy, follow)
+            })
+            .collect::<Result<_, _>>()?;
+        out.responses += self.material.len() as u64;
+        Ok(ratios.into_iter().flatten().reduce(f64::min))
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn item(
+        &self,
+        problem: &Problem,
+        at: &At,
+        old: &Points,
+        first: usize,
+        change: &mut [f64],
+        capacity: &mut [f64],
+        state: &mut [f64],
+        energy: &mut [f64],
+        follow: bool,
+    ) -> Result<Option<f64>, Error> {
+        let mut ratio: Option<f64> = None;
+        let offset = self.starts[first] as usize;
+        for k in 0..change.len() {
+            let start = at.start[first + k];
+            let place = Point {
+                temperature: start,
+                increment: at.temperature[first + k] - start,
+                gradient: Vector3::zeros(),
+                dt: at.dt,
+            };
+            for point in self.of(first + k) {
+                if self.follows(self.material[point]) != follow {
+                    continue;
+                }
+                let material: &dyn ThermalMaterial = &*problem.materials[usize::from(self.material[point])];
+                let local = point - offset;
+                let (old_state, new_state) = (
+                    &old.state[point * self.stride..(point + 1) * self.stride],
+                    &mut state[local * self.stride..(local + 1) * self.stride],
+                );
+                let count = material.state_names().len();
+                let response = material.respond(&place, &old_state[..count], &mut new_state[..count])?;
+                ratio = response.step_ratio.into_iter().chain(ratio).reduce(f64::min);
+                energy[local] = response.energy;
+                if follow {
+                    continue;
+                }
+                change[k] += self.mass[point] * (response.energy - old.energy[point]);
+                capacity[k] += self.mass[point] * response.d_energy_d_temperature;
+            }
+        }
+        Ok(ratio)
+    }
+}

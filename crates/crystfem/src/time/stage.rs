@@ -1,0 +1,305 @@
+//! One stage: E(T) − E(start) + a Q(T) + known = 0 at the free nodes.
+
+use super::Work;
+use crate::error::Error;
+use crate::problem::Problem;
+use crate::solver::{ConjugateGradients, Operator, norm_squared};
+use crate::system::vector::{largest, set, sum};
+use crate::system::{At, Evaluation, Memory, System};
+
+/// Newton iterations at most.
+const MOST_ITERATIONS: usize = 60;
+/// Halvings of a Newton step at most.
+const MOST_HALVINGS: usize = 7;
+/// Sum of all residuals over the sum of all |ΔE_i| that counts as balanced; the audit promises 1e-10.
+const BALANCED: f64 = 1e-12;
+
+/// What a stage solves.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    /// Factor of Q, s.
+    pub weight: f64,
+    /// Length of the increment, s.
+    pub dt: f64,
+    /// Time at its end, s.
+    pub time: f64,
+    /// Heat of former stages, J; empty for none.
+    pub known: &'a [f64],
+    /// Temperatures at the start, K.
+    pub start: &'a [f64],
+    /// Points at the start.
+    pub old: &'a Memory,
+}
+
+/// Solves stages; keeps what does not change between them.
+#[derive(Default)]
+pub struct Stages {
+    /// E, Q and tangents at the last temperature.
+    pub evaluation: Evaluation,
+    /// E − E(start) + a Q + known at the last temperature, J, prescribed nodes included.
+    pub residual: Vec<f64>,
+    right: Vec<f64>,
+    correction: Vec<f64>,
+    trial: Vec<f64>,
+    diagonal: Vec<f64>,
+    inverse: Vec<f64>,
+    row_sums: Vec<f64>,
+    /// K·1 and M·1 over the free nodes.
+    free_sums: [Vec<f64>; 2],
+    cg: ConjugateGradients,
+    capacity: f64,
+    floor: f64,
+    /// For which generation and which weight the above was made.
+    made_for: Option<(u64, u64)>,
+    sums_for: Option<u64>,
+}
+
+impl Stages {
+    /// Solves a stage; `temperature` is the first guess and becomes the solution, at which `evaluation` and
+    /// `residual` stand.
+    ///
+    /// # Errors
+    /// [`Error::NotConverged`], [`Error::NotFinite`].
+    pub fn solve(
+        &mut self,
+        problem: &Problem,
+        system: &mut System,
+        stage: &Stage,
+        temperature: &mut Vec<f64>,
+        tolerance: f64,
+        work: &mut Work,
+    ) -> Result<(), Error> {
+        system.prescribe(problem, stage.time, temperature);
+        self.evaluate(problem, system, stage, temperature, work)?;
+        if system.is_linear() {
+            self.prepare(system, stage.weight);
+            self.correct(system, stage, tolerance, work)?;
+            for (t, correction) in temperature.iter_mut().zip(&self.correction) {
+                *t += correction;
+            }
+            self.evaluate(problem, system, stage, temperature, work)?;
+            return self.finite(problem, system, stage, temperature);
+        }
+        let mut error = f64::INFINITY;
+        for iteration in 0..MOST_ITERATIONS {
+            self.prepare(system, stage.weight);
+            let square = norm_squared(&self.residual, &self.inverse);
+            error = (square / self.capacity).sqrt();
+            if (error <= tolerance || square <= self.floor)
+                && (iteration > 0 || error == 0.0)
+                && self.balanced(system)
+            {
+                return self.finite(problem, system, stage, temperature);
+            }
+            work.newton_iterations += 1;
+            self.correct(system, stage, (1e-3 * error).max(0.3 * tolerance), work)?;
+            // line search along the correction, by the norm of this iterate's matrix
+            let inverse = std::mem::take(&mut self.inverse);
+            let mut part = 1.0;
+            let mut trial = std::mem::take(&mut self.trial);
+            trial.resize(temperature.len(), 0.0);
+            for halving in 0..=MOST_HALVINGS {
+                let correction = &self.correction;
+                set(&mut trial, |k| temperature[k] + part * correction[k]);
+                let evaluated = self.evaluate(problem, system, stage, &trial, work);
+                let reached = norm_squared(&self.residual, &inverse);
+                let better = reached <= (1.0 - 0.1 * part) * square || reached <= self.floor;
+                if evaluated.is_ok() && (better || (halving == MOST_HALVINGS && reached.is_finite())) {
+                    break;
+                }
+                if halving == MOST_HALVINGS {
+                    evaluated?;
+                    return Err(not_finite(problem, system, stage, &trial));
+                }
+                part *= 0.5;
+            }
+            std::mem::swap(temperature, &mut trial);
+            (self.trial, self.inverse) = (trial, inverse);
+            self.made_for = None;
+        }
+        Err(Error::NotConverged {
+            method: "Newton's iteration",
+            time: stage.time,
+            iterations: MOST_ITERATIONS,
+            error,
+            wanted: tolerance,
+        })
+    }
+
+    /// Solves A e = right with the matrix of the last stage, coarsely: the filter of the error estimate. The
+    /// result is the largest |e|, K.
+    pub fn filter(
+        &mut self,
+        system: &System,
+        weight: f64,
+        right: impl Fn(usize) -> f64 + Sync,
+        tolerance: f64,
+        work: &mut Work,
+    ) -> f64 {
+        self.prepare(system, weight);
+        let size = system.size();
+        self.right.resize(size, 0.0);
+        set(&mut self.right, |k| system.free[k] * right(k));
+        let operator = operator(system, &self.diagonal, weight, &self.evaluation);
+        let goal = [self.capacity, tolerance, 0.0];
+        self.correction.resize(size, 0.0);
+        let ended =
+            self.cg.solve(&operator, &self.inverse, &mut self.right, &mut self.correction, goal, limit(size));
+        work.cg_iterations += ended.iterations as u64;
+        largest(size, |k| self.correction[k].abs()).max(0.0)
+    }
+
+    fn evaluate(
+        &mut self,
+        problem: &Problem,
+        system: &mut System,
+        stage: &Stage,
+        temperature: &[f64],
+        work: &mut Work,
+    ) -> Result<(), Error> {
+        let at = At { temperature, start: stage.start, dt: stage.dt, time: stage.time, tangent: true };
+        self.evaluation.responses = 0;
+        system.evaluate(problem, &at, stage.old, &mut self.evaluation)?;
+        work.evaluations += 1;
+        work.responses += self.evaluation.responses;
+        self.residual.resize(system.size(), 0.0);
+        let Evaluation { change, rate, .. } = &self.evaluation;
+        if stage.known.is_empty() {
+            set(&mut self.residual, |k| change[k] + stage.weight * rate[k]);
+        } else {
+            set(&mut self.residual, |k| change[k] + stage.known[k] + stage.weight * rate[k]);
+        }
+        Ok(())
+    }
+
+    /// The diagonal of A and what follows from it.
+    fn prepare(&mut self, system: &System, weight: f64) {
+        let made_for = Some((system.generation, weight.to_bits()));
+        if self.made_for == made_for && system.is_linear() {
+            return;
+        }
+        let size = system.size();
+        let Evaluation { capacity, conductance, faces, .. } = &self.evaluation;
+        let mass = if system.consistent { 1.0 } else { 0.0 };
+        if self.sums_for != Some(system.generation) {
+            self.free_sums[0].resize(size, 0.0);
+            system.rows.product(None, [0.0, 1.0], &system.free, &mut self.free_sums[0]);
+            if system.consistent {
+                self.free_sums[1].resize(size, 0.0);
+                system.rows.product(None, [1.0, 0.0], &system.free, &mut self.free_sums[1]);
+            }
+            self.sums_for = Some(system.generation);
+        }
+        let mut whole = system.rows.diagonal([mass, weight]);
+        self.row_sums.resize(size, 0.0);
+        let [conduction, consistent] = &self.free_sums;
+        if system.consistent {
+            set(&mut self.row_sums, |k| consistent[k] + weight * conduction[k]);
+            for face in faces {
+                face.add_product(weight, &system.free, &mut self.row_sums);
+                for a in 0..face.nodes {
+                    whole[face.equations[a] as usize] += weight * face.values[5 * a];
+                }
+            }
+        } else {
+            self.diagonal.resize(size, 0.0);
+            set(&mut self.diagonal, |k| capacity[k] + weight * conductance[k]);
+            let diagonal = &self.diagonal;
+            for (whole, diagonal) in whole.iter_mut().zip(diagonal) {
+                *whole += diagonal;
+            }
+            set(&mut self.row_sums, |k| system.free[k] * diagonal[k] + weight * conduction[k]);
+        }
+        self.inverse.resize(size, 0.0);
+        set(&mut self.inverse, |k| system.free[k] / whole[k]);
+        self.capacity = sum(size, |k| system.free[k] * capacity[k]).max(f64::MIN_POSITIVE);
+        // rounding of the residual: 1e-14 of a temperature of 500 K, everywhere
+        let rounding = 5e-12_f64;
+        self.floor = rounding * rounding * sum(size, |k| system.free[k] * whole[k]);
+        self.made_for = made_for;
+    }
+
+    /// The correction of temperature: A δ = −residual, and Σ(residual + A δ) = 0 over the free nodes to rounding.
+    fn correct(
+        &mut self,
+        system: &System,
+        stage: &Stage,
+        tolerance: f64,
+        work: &mut Work,
+    ) -> Result<(), Error> {
+        let size = system.size();
+        self.right.resize(size, 0.0);
+        self.correction.resize(size, 0.0);
+        let residual = &self.residual;
+        set(&mut self.right, |k| -system.free[k] * residual[k]);
+        let operator = operator(system, &self.diagonal, stage.weight, &self.evaluation);
+        let goal = [self.capacity, tolerance, self.floor];
+        let limit = limit(size);
+        let ended =
+            self.cg.solve(&operator, &self.inverse, &mut self.right, &mut self.correction, goal, limit);
+        work.cg_iterations += ended.iterations as u64;
+        if !ended.converged {
+            return Err(Error::NotConverged {
+                method: "conjugate gradients",
+                time: stage.time,
+                iterations: ended.iterations,
+                error: ended.error,
+                wanted: tolerance,
+            });
+        }
+        // a uniform shift of the free nodes makes the balance of the whole body exact
+        let (right, row_sums) = (&self.right, &self.row_sums);
+        let total = sum(size, |k| system.free[k] * row_sums[k]);
+        let shift = sum(size, |k| system.free[k] * right[k]) / total;
+        if shift.is_finite() {
+            for (correction, free) in self.correction.iter_mut().zip(&system.free) {
+                *correction += shift * free;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the free nodes' residuals add up to nothing.
+    fn balanced(&self, system: &System) -> bool {
+        let size = system.size();
+        let total = sum(size, |k| system.free[k] * self.residual[k]);
+        let gross = sum(size, |k| self.evaluation.change[k].abs());
+        // rounding of the sum of terms as large as the stored heat of 1 mK
+        total.abs() <= BALANCED * gross + 1e-15 * self.capacity
+    }
+
+    fn finite(&self, problem: &Problem, system: &System, stage: &Stage, found: &[f64]) -> Result<(), Error> {
+        if sum(found.len(), |k| found[k]).is_finite() && sum(found.len(), |k| self.residual[k]).is_finite() {
+            return Ok(());
+        }
+        Err(not_finite(problem, system, stage, found))
+    }
+}
+
+fn limit(size: usize) -> usize {
+    (10 * size + 100).min(100_000)
+}
+
+fn operator<'a>(
+    system: &'a System,
+    diagonal: &'a [f64],
+    weight: f64,
+    evaluation: &'a Evaluation,
+) -> Operator<'a> {
+    if system.consistent {
+        Operator { rows: &system.rows, diagonal: None, weights: [1.0, weight], faces: &evaluation.faces }
+    } else {
+        Operator { rows: &system.rows, diagonal: Some(diagonal), weights: [0.0, weight], faces: &[] }
+    }
+}
+
+fn not_finite(problem: &Problem, system: &System, stage: &Stage, found: &[f64]) -> Error {
+    let place = match found.iter().position(|t| !t.is_finite()) {
+        Some(k) => {
+            let node = system.nodes[k];
+            format!("node {node} at {:?} m", problem.mesh.points[node as usize])
+        }
+        None => "some node".into(),
+    };
+    Error::NotFinite { quantity: "temperature", place, time: stage.time }
+}

@@ -1,0 +1,50 @@
+//! What several tests are made of.
+
+use crystfem::boundary::{Condition, Field, Schedule, Where};
+use crystfem::ledger::Record;
+use crystfem::material::{Conductor, Property, ThermalMaterial};
+use crystfem::mesh::{Grid, Mesh};
+use crystfem::simulation::Simulation;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// PA12 as in `reference/ch4/analytic.py`: k, ρ, c.
+pub const PA12: [f64; 3] = [0.25, 1010.0, 2200.0];
+
+pub fn conductor([k, density, c]: [f64; 3]) -> Arc<dyn ThermalMaterial> {
+    let property = |name, value| Property::constant(name, value).unwrap();
+    Arc::new(Conductor::new(density, property("k", k), property("c", c)).unwrap())
+}
+
+pub fn grid(lengths: [f64; 3], elements: [usize; 3]) -> Mesh {
+    Grid::uniform([0.0; 3], lengths, elements).unwrap().mesh("body").unwrap()
+}
+
+pub fn held(mesh: &Mesh, side: &str, value: Field) -> Condition {
+    Condition::Temperature { nodes: mesh.node_sets[side].clone(), value }
+}
+
+pub fn film(surface: Where, coefficient: f64, ambient: f64) -> Condition {
+    Condition::Film { surface, coefficient, ambient: Schedule::constant(ambient) }
+}
+
+pub fn radiation(surface: Where, emissivity: f64, ambient: f64) -> Condition {
+    Condition::Radiation { surface, emissivity, ambient: Schedule::constant(ambient) }
+}
+
+#[allow(dead_code)]
+pub fn everywhere() -> Where {
+    Where::Outer { except: Vec::new() }
+}
+
+/// Advances, and returns every step.
+pub fn run(simulation: &mut Simulation, until: f64) -> Vec<Record> {
+    let mut records = Vec::new();
+    let _ = simulation
+        .advance(until, &mut |_, record| {
+            records.push(*record);
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    records
+}

@@ -1,0 +1,76 @@
+//! The brick of `shared/peers/heat`: film and radiation on five sides, the bottom held, 20 steps of 0.5 s by backward
+//! Euler. Peers: scikit-fem 476.76311907 K (mean of the nodes at 26³ elements, consistent capacity), CalculiX
+//! 476.763087 K (printed to 1e-3 K).
+
+use crate::bodies::{PA12, conductor, film, grid, held, radiation, run};
+use crystfem::boundary::{Field, Where};
+use crystfem::problem::{Capacity, Problem};
+use crystfem::simulation::{Settings, Simulation};
+
+fn brick(elements: usize, capacity: Capacity) -> Simulation {
+    let mesh = grid([0.02; 3], [elements; 3]);
+    let bottom = mesh.surfaces["bottom"].clone();
+    let surface = || Where::Outer { except: bottom.clone() };
+    let conditions = vec![
+        held(&mesh, "bottom", Field::constant(353.15)),
+        film(surface(), 15.0, 353.15),
+        radiation(surface(), 0.9, 353.15),
+    ];
+    let problem = Problem { conditions, capacity, ..Problem::new(mesh, conductor(PA12), 493.15) };
+    Simulation::new(problem, Settings::backward_euler(0.5)).unwrap()
+}
+
+fn mean(simulation: &Simulation) -> f64 {
+    let all = simulation.temperatures(f64::NAN);
+    all.iter().sum::<f64>() / all.len() as f64
+}
+
+#[test]
+fn mean_temperature_is_that_of_the_peers() {
+    let mut simulation = brick(26, Capacity::Consistent);
+    let steps = run(&mut simulation, 10.0);
+    assert_eq!(steps.len(), 20);
+    assert!((mean(&simulation) - 476.763_119_07).abs() < 1e-7, "{}", mean(&simulation));
+    let work = simulation.state().work;
+    println!("{work:?}");
+    // three Newton iterations a step at most; formulation.md: 10 to 15 iterations for one linear solve
+    assert!(work.newton_iterations <= 60 && work.cg_iterations <= 20 * 25, "{work:?}");
+    assert!(simulation.state().ledger.worst < 1e-10, "{:?}", simulation.state().ledger);
+}
+
+/// Both capacities converge to one solution: their difference falls with h², by about 4 from 13 to 26 elements.
+#[test]
+fn lumped_capacity_comes_close() {
+    let difference = [13, 26].map(|elements| {
+        let [lumped, consistent] = [Capacity::Lumped, Capacity::Consistent].map(|capacity| {
+            let mut simulation = brick(elements, capacity);
+            run(&mut simulation, 10.0);
+            assert!(simulation.state().ledger.worst < 1e-10, "{:?}", simulation.state().ledger);
+            simulation.temperature(simulation.problem().mesh.points.len() as u32 / 2).unwrap()
+        });
+        lumped - consistent
+    });
+    assert!(difference[1].abs() < 0.35 * difference[0].abs(), "{difference:?}");
+}
+
+/// `cargo test --release -p crystfem --test it brick::times -- --ignored --nocapture`
+#[test]
+#[ignore = "times, for a quiet machine"]
+fn times() {
+    for elements in [26, 45, 66, 99] {
+        for capacity in [Capacity::Lumped, Capacity::Consistent] {
+            let start = std::time::Instant::now();
+            let mut simulation = brick(elements, capacity);
+            let built = start.elapsed();
+            let start = std::time::Instant::now();
+            run(&mut simulation, 10.0);
+            println!(
+                "{:7} dof {capacity:?}: build {:.3} s, step {:.5} s, {:?}",
+                (elements + 1_usize).pow(3),
+                built.as_secs_f64(),
+                start.elapsed().as_secs_f64() / 20.0,
+                simulation.state().work
+            );
+        }
+    }
+}
