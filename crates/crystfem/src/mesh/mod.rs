@@ -1,18 +1,23 @@
 //! Meshes of hexahedra and tetrahedra: structured ones, files, quality, outer surfaces, layers.
 
+pub mod abaqus;
 mod bar;
+pub mod gmsh;
+mod labelled;
 pub mod quality;
 mod split;
 mod structured;
 pub mod surface;
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use nalgebra::Vector3;
 
 use crate::error::Error;
 
 pub use bar::{Bar, Substrate};
+pub use labelled::ReadMesh;
 pub use split::Split;
 pub use structured::{Block, Grid, graded};
 
@@ -218,6 +223,29 @@ impl Mesh {
     pub(crate) fn point(&self, node: u32) -> Vector3<f64> {
         Vector3::from(self.points[node as usize])
     }
+}
+
+/// Reads a mesh file, `.msh` of Gmsh ([`gmsh::read`]) or `.inp` of Abaqus and CalculiX ([`abaqus::read`]), coordinates
+/// multiplied by `scale` (1e-3 for a file in mm), and checks it.
+///
+/// # Errors
+/// Another ending of the name, and what those functions refuse.
+pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    match ending.as_str() {
+        "msh" => gmsh::read(path, scale),
+        "inp" => abaqus::read(path, scale),
+        _ => {
+            Err(Error::Mesh(format!("{}: allowed: .msh (Gmsh 4.1), .inp (Abaqus, CalculiX)", path.display())))
+        }
+    }
+}
+
+/// The bytes of a mesh file.
+fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
+    std::fs::read(path).map_err(|source| {
+        Error::Shared(polycore::Error::Io { operation: "read", path: path.to_owned(), source })
+    })
 }
 
 #[cfg(test)]

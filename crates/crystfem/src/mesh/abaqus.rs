@@ -1,0 +1,295 @@
+//! Reads and writes input files of Abaqus and CalculiX (`.inp`): nodes, elements, sets and surfaces.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::error::Error;
+use crate::mesh::labelled::{Content, Element, Kind, Node, ReadMesh, line_error};
+
+mod cards;
+mod sets;
+mod write;
+
+use cards::{Card, Cards};
+use sets::{Entry, Of, Resolver, Set};
+pub use write::write;
+
+/// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm).
+///
+/// Understood, in any case of letters: `*NODE` (`NSET`), `*ELEMENT` (`TYPE`, `ELSET`), `*NSET` and `*ELSET`
+/// (`GENERATE`, names of other sets, `*NSET, ELSET=`), `*SURFACE` (of elements, with or without `Sn`, or of nodes), one
+/// `*PART` with one `*INSTANCE` in place, continuation lines, comments. Triangles and quadrangles of shells and membranes
+/// name surfaces, lines nothing. Other keywords are passed over, in the notes by name. A name keeps the letters of its
+/// first use.
+///
+/// # Errors
+/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line: other elements, numbers that do not
+/// fit, sets and nodes that do not exist, and what would change the mesh unseen (`*INCLUDE`, `*NGEN`, `*SYSTEM`, …);
+/// [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory follows the size of the file.
+pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
+    let bytes = super::read_bytes(path)?;
+    parse(path, &bytes, scale)
+}
+
+/// [`read`], of bytes; `path` is for messages only.
+///
+/// # Errors
+/// See [`read`].
+pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
+    let mut reader = Reader { path, content: Content::default(), sets: Vec::new(), single: BTreeMap::new() };
+    let mut skipped: BTreeMap<String, usize> = BTreeMap::new();
+    let mut cards = Cards::new(path, bytes);
+    while let Some(card) = cards.next()? {
+        match card.keyword.as_str() {
+            "NODE" => reader.nodes(&card, &mut cards)?,
+            "ELEMENT" => reader.elements(&card, &mut cards)?,
+            "NSET" => reader.set(card, Of::Nodes, "NSET", &mut cards)?,
+            "ELSET" => reader.set(card, Of::Elements, "ELSET", &mut cards)?,
+            "SURFACE" => reader.surface(card, &mut cards)?,
+            "PART" | "INSTANCE" => reader.once(&card, &mut cards)?,
+            "END PART" | "ASSEMBLY" | "END ASSEMBLY" | "END INSTANCE" | "HEADING" => {}
+            keyword if CHANGING.contains(&keyword) => {
+                let allowed = "a file that holds all its nodes and elements itself";
+                return Err(line_error(path, card.line, "keyword", format!("*{keyword}"), allowed));
+            }
+            keyword => *skipped.entry(keyword.to_owned()).or_default() += 1,
+        }
+    }
+    if !skipped.is_empty() {
+        let names: Vec<String> = skipped.iter().map(|(name, count)| format!("*{name} ({count})")).collect();
+        reader.content.notes.push(format!("keywords not used: {}", names.join(", ")));
+    }
+    let [nodes, elements] = reader.content.labels(path)?;
+    let budget = bytes.len().saturating_mul(16).saturating_add(1 << 16);
+    let sets = std::mem::take(&mut reader.sets);
+    Resolver { path, nodes: &nodes, elements: &elements, budget }.resolve(sets, &mut reader.content)?;
+    reader.content.into_mesh(path, &nodes, scale)
+}
+
+/// Keywords that make or move nodes and elements: passing them over would leave another mesh.
+const CHANGING: [&str; 11] = [
+    "INCLUDE",
+    "NGEN",
+    "NFILL",
+    "NCOPY",
+    "NMAP",
+    "ELGEN",
+    "ELCOPY",
+    "SYSTEM",
+    "ELEMENT RESPONSE",
+    "IMPORT",
+    "MODEL CHANGE",
+];
+
+/// Elements by name; those of flow, of reduced integration and of other physics have the same nodes.
+const TYPES: [(&str, Kind); 40] = [
+    ("C3D8", Kind::Hexahedron),
+    ("DC3D8", Kind::Hexahedron),
+    ("C3D8R", Kind::Hexahedron),
+    ("C3D8I", Kind::Hexahedron),
+    ("C3D8T", Kind::Hexahedron),
+    ("C3D8RT", Kind::Hexahedron),
+    ("C3D4", Kind::Tetrahedron),
+    ("DC3D4", Kind::Tetrahedron),
+    ("C3D4T", Kind::Tetrahedron),
+    ("CPS3", Kind::Triangle),
+    ("CPE3", Kind::Triangle),
+    ("CAX3", Kind::Triangle),
+    ("DC2D3", Kind::Triangle),
+    ("S3", Kind::Triangle),
+    ("S3R", Kind::Triangle),
+    ("STRI3", Kind::Triangle),
+    ("M3D3", Kind::Triangle),
+    ("DS3", Kind::Triangle),
+    ("SFM3D3", Kind::Triangle),
+    ("CPS4", Kind::Quadrangle),
+    ("CPS4R", Kind::Quadrangle),
+    ("CPE4", Kind::Quadrangle),
+    ("CPE4R", Kind::Quadrangle),
+    ("CAX4", Kind::Quadrangle),
+    ("DC2D4", Kind::Quadrangle),
+    ("S4", Kind::Quadrangle),
+    ("S4R", Kind::Quadrangle),
+    ("M3D4", Kind::Quadrangle),
+    ("M3D4R", Kind::Quadrangle),
+    ("DS4", Kind::Quadrangle),
+    ("SFM3D4", Kind::Quadrangle),
+    ("SFM3D4R", Kind::Quadrangle),
+    ("R3D4", Kind::Quadrangle),
+    ("R3D3", Kind::Triangle),
+    ("T3D2", Kind::Line),
+    ("T2D2", Kind::Line),
+    ("B31", Kind::Line),
+    ("DC1D2", Kind::Line),
+    ("MASS", Kind::Point),
+    ("HEATCAP", Kind::Point),
+];
+
+struct Reader<'a> {
+    path: &'a Path,
+    content: Content,
+    sets: Vec<Set>,
+    /// First lines of keywords that may come once.
+    single: BTreeMap<String, usize>,
+}
+
+impl Reader<'_> {
+    fn nodes(&mut self, card: &Card, cards: &mut Cards) -> Result<(), Error> {
+        let first = self.content.nodes.len();
+        while let Some(row) = cards.row() {
+            let words = row.words();
+            let label = row.label(words.first().copied().unwrap_or(""), "number of a node")?;
+            let mut point = [0.0; 3];
+            for (x, word) in point.iter_mut().zip(words.iter().skip(1)) {
+                *x = row.number(word, "coordinate")?;
+            }
+            // further columns are direction cosines
+            if words.len() < 2 {
+                return Err(row.error("node", row.text(), "number, x, y, z"));
+            }
+            self.content.nodes.push(Node { label, line: row.line as u32, point });
+        }
+        if let Some(name) = card.parameter("NSET") {
+            let labels = self.content.nodes[first..].iter();
+            let entries = labels.map(|node| (node.line as usize, Entry::Label(node.label))).collect();
+            self.sets.push(Set { name: name.to_owned(), of: Of::Nodes, entries });
+        }
+        Ok(())
+    }
+
+    fn elements(&mut self, card: &Card, cards: &mut Cards) -> Result<(), Error> {
+        let name = card.parameter("TYPE").unwrap_or("").to_uppercase();
+        let Some((_, kind)) = TYPES.iter().find(|known| known.0 == name) else {
+            let allowed = "C3D8, DC3D8, C3D8R, C3D8I, C3D8T, C3D8RT, C3D4, DC3D4, C3D4T; shells, membranes and trusses of \
+                           3, 4 and 2 nodes only name surfaces";
+            return Err(line_error(self.path, card.line, "element type", name, allowed));
+        };
+        let count = kind.node_count();
+        let first = self.content.elements.len();
+        while let Some(row) = cards.row() {
+            let (line, mut labels) = (row.line, [0u64; 9]);
+            let mut filled = 0;
+            let mut row = row;
+            loop {
+                for word in row.words() {
+                    if filled > count {
+                        return Err(row.error(
+                            "nodes of an element",
+                            row.text(),
+                            format!("{count} for {name}"),
+                        ));
+                    }
+                    labels[filled] = row.label(word, "element or node")?;
+                    filled += 1;
+                }
+                // an open line goes on in the next
+                let next = if filled <= count && row.is_open() { cards.row() } else { None };
+                match next {
+                    Some(next) => row = next,
+                    None => break,
+                }
+            }
+            if filled <= count {
+                let found = filled.saturating_sub(1);
+                return Err(row.error("nodes of an element", found, format!("{count} for {name}")));
+            }
+            let mut nodes = [0; 8];
+            nodes[..count].copy_from_slice(&labels[1..=count]);
+            self.content.elements.push(Element { label: labels[0], line: line as u32, kind: *kind, nodes });
+        }
+        if let Some(name) = card.parameter("ELSET") {
+            let labels = self.content.elements[first..].iter();
+            let entries =
+                labels.map(|element| (element.line as usize, Entry::Label(element.label))).collect();
+            self.sets.push(Set { name: name.to_owned(), of: Of::Elements, entries });
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, card: Card, of: Of, key: &'static str, cards: &mut Cards) -> Result<(), Error> {
+        let Some(name) = card.parameter(key) else {
+            let allowed = format!("*{key}, {key}=NAME");
+            return Err(line_error(self.path, card.line, "name of a set", "", allowed));
+        };
+        let mut entries = Vec::new();
+        let mut of = of;
+        if let (Of::Nodes, Some(elements)) = (of, card.parameter("ELSET")) {
+            of = Of::NodesOfElements;
+            entries.push((card.line, Entry::Set(elements.to_owned())));
+        }
+        let generate = card.parameter("GENERATE").is_some();
+        while let Some(row) = cards.row() {
+            let words = row.words();
+            if generate {
+                let mut range = [0, 0, 1];
+                if !(2..=3).contains(&words.len()) {
+                    return Err(row.error("range", row.text(), "first, last, step"));
+                }
+                for (number, word) in range.iter_mut().zip(&words) {
+                    *number = row.label(word, "range")?;
+                }
+                if range[2] == 0 || range[0] > range[1] {
+                    return Err(row.error("range", row.text(), "first ≤ last, step 1 or more"));
+                }
+                entries.push((row.line, Entry::Range(range)));
+            } else {
+                entries.extend(words.iter().map(|word| (row.line, Entry::of(word))));
+            }
+        }
+        self.sets.push(Set { name: name.to_owned(), of, entries });
+        Ok(())
+    }
+
+    fn surface(&mut self, card: Card, cards: &mut Cards) -> Result<(), Error> {
+        let Some(name) = card.parameter("NAME") else {
+            return Err(line_error(self.path, card.line, "name of a surface", "", "*SURFACE, NAME=NAME"));
+        };
+        let kind = card.parameter("TYPE").unwrap_or("ELEMENT").to_uppercase();
+        let nodes = match kind.as_str() {
+            "ELEMENT" => false,
+            "NODE" => true,
+            _ => return Err(line_error(self.path, card.line, "type of a surface", kind, "ELEMENT, NODE")),
+        };
+        let mut entries = Vec::new();
+        while let Some(row) = cards.row() {
+            let words = row.words();
+            let Some(first) = words.first() else { continue };
+            if nodes {
+                // the second column is an area
+                entries.push((row.line, Entry::of(first)));
+                continue;
+            }
+            let side = words.get(1).map_or("", |word| *word).to_uppercase();
+            let side = match side.strip_prefix('S').map(str::parse::<u8>) {
+                None if side.is_empty() => None,
+                Some(Ok(number @ 1..=6)) => Some(number - 1),
+                _ => {
+                    return Err(row.error(
+                        "side",
+                        side,
+                        "S1 … S6 of hexahedra, S1 … S4 of tetrahedra, or none",
+                    ));
+                }
+            };
+            entries.push((row.line, Entry::Side(Box::new(Entry::of(first)), side)));
+        }
+        let of = if nodes { Of::Nodes } else { Of::Faces };
+        self.sets.push(Set { name: name.to_owned(), of, entries });
+        Ok(())
+    }
+
+    /// One part and one instance of it, where it was drawn: numbers are then unique.
+    fn once(&mut self, card: &Card, cards: &mut Cards) -> Result<(), Error> {
+        if let Some(line) = self.single.insert(card.keyword.clone(), card.line) {
+            let allowed = format!("one; also on line {line}");
+            return Err(line_error(self.path, card.line, "keyword", format!("*{}", card.keyword), allowed));
+        }
+        match cards.row() {
+            Some(row) => Err(row.error("place of an instance", row.text(), "the place of its part")),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

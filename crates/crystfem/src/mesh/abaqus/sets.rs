@@ -1,0 +1,240 @@
+//! Sets and surfaces of an input file, by their members.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::error::Error;
+use crate::mesh::labelled::{Content, Element, Kind, Labels, line_error};
+use crate::mesh::surface::Surface;
+use crate::mesh::{Face, Mesh};
+
+/// What a set is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Of {
+    Nodes,
+    Elements,
+    /// Node set of the nodes of elements.
+    NodesOfElements,
+    /// Surface of the faces of elements.
+    Faces,
+}
+
+/// One data line of a set.
+#[derive(Debug)]
+pub(super) enum Entry {
+    Label(u64),
+    Range([u64; 3]),
+    Set(String),
+    /// A number or set of elements and a side, or `None`: those outside.
+    Side(Box<Entry>, Option<u8>),
+}
+
+/// A set as the file gives it.
+#[derive(Debug)]
+pub(super) struct Set {
+    pub name: String,
+    pub of: Of,
+    pub entries: Vec<(usize, Entry)>,
+}
+
+impl Entry {
+    pub fn of(word: &str) -> Self {
+        // Abaqus writes INSTANCE.SET for sets of a part
+        let name = || word.rsplit('.').next().unwrap_or(word).trim_matches('"').to_owned();
+        word.parse().map_or_else(|_| Self::Set(name()), Self::Label)
+    }
+}
+
+/// Sets by their members, once all are known.
+pub(super) struct Resolver<'a> {
+    pub path: &'a Path,
+    pub nodes: &'a Labels,
+    pub elements: &'a Labels,
+    /// Members that may still be visited, in proportion to the file: sets of sets and of ranges cannot run away.
+    pub budget: usize,
+}
+
+impl Resolver<'_> {
+    /// Names what the file names.
+    ///
+    /// # Errors
+    /// Members that do not exist or are too many.
+    pub fn resolve(&mut self, sets: Vec<Set>, content: &mut Content) -> Result<(), Error> {
+        // names in upper case, with the letters of their first use
+        let mut node_sets: BTreeMap<String, (String, Vec<u32>)> = BTreeMap::new();
+        let mut element_sets: BTreeMap<String, (String, Vec<u32>)> = BTreeMap::new();
+        let mut faces: BTreeMap<String, (String, Vec<Face>)> = BTreeMap::new();
+        let mut outer = None;
+        for set in sets {
+            let key = set.name.to_uppercase();
+            match set.of {
+                Of::Nodes => {
+                    let mut members = Vec::new();
+                    for (line, entry) in &set.entries {
+                        self.members(*line, entry, self.nodes, &node_sets, "node", &mut members)?;
+                    }
+                    node_sets.entry(key).or_insert((set.name, Vec::new())).1.append(&mut members);
+                }
+                Of::Elements => {
+                    let mut members = Vec::new();
+                    for (line, entry) in &set.entries {
+                        self.members(*line, entry, self.elements, &element_sets, "element", &mut members)?;
+                    }
+                    element_sets.entry(key).or_insert((set.name, Vec::new())).1.append(&mut members);
+                }
+                Of::NodesOfElements => {
+                    let mut members = Vec::new();
+                    for (line, entry) in &set.entries {
+                        self.members(*line, entry, self.elements, &element_sets, "element", &mut members)?;
+                    }
+                    self.spend(set.entries.first().map_or(0, |entry| entry.0), 8 * members.len())?;
+                    let of = members.iter().map(|place| &content.elements[*place as usize]);
+                    let nodes =
+                        of.flat_map(Element::nodes).filter_map(|label| self.nodes.get(*label)).collect();
+                    node_sets.entry(key).or_insert((set.name, Vec::new())).1.append(&mut { nodes });
+                }
+                Of::Faces => {
+                    let mut found = Vec::new();
+                    for (line, entry) in &set.entries {
+                        let Entry::Side(of, side) = entry else { continue };
+                        let mut members = Vec::new();
+                        self.members(*line, of, self.elements, &element_sets, "element", &mut members)?;
+                        self.sides(*line, &members, *side, content, &mut outer, &mut found)?;
+                    }
+                    faces.entry(key).or_insert((set.name, Vec::new())).1.append(&mut found);
+                }
+            }
+        }
+        content.node_sets = node_sets.into_values().collect();
+        content.element_sets = element_sets.into_values().collect();
+        content.surfaces = faces.into_values().collect();
+        Ok(())
+    }
+
+    fn spend(&mut self, line: usize, count: usize) -> Result<(), Error> {
+        match self.budget.checked_sub(count) {
+            Some(left) => {
+                self.budget = left;
+                Ok(())
+            }
+            None => {
+                let allowed = "16 a byte of the file in all";
+                Err(line_error(self.path, line, "members of sets", count, allowed))
+            }
+        }
+    }
+
+    /// Positions of the members of an entry.
+    fn members(
+        &mut self,
+        line: usize,
+        entry: &Entry,
+        labels: &Labels,
+        sets: &BTreeMap<String, (String, Vec<u32>)>,
+        kind: &str,
+        members: &mut Vec<u32>,
+    ) -> Result<(), Error> {
+        match entry {
+            Entry::Label(label) => {
+                self.spend(line, 1)?;
+                members.push(labels.get(*label).ok_or_else(|| {
+                    line_error(self.path, line, format!("member of a set of {kind}s"), label, "existing ones")
+                })?);
+            }
+            Entry::Range([first, last, step]) => {
+                let inside = labels.range(*first, *last);
+                self.spend(line, inside.len().saturating_add(1))?;
+                let on = inside.iter().filter(|entry| (entry.0 - first).is_multiple_of(*step));
+                members.extend(on.map(|entry| entry.1));
+            }
+            Entry::Set(name) => {
+                let Some((_, set)) = sets.get(&name.to_uppercase()) else {
+                    let mut names: Vec<&str> = sets.values().take(20).map(|set| set.0.as_str()).collect();
+                    if names.is_empty() {
+                        names.push("none so far");
+                    }
+                    let allowed = format!("numbers, and {kind} sets above: {}", names.join(", "));
+                    return Err(line_error(self.path, line, format!("{kind} set"), name, allowed));
+                };
+                self.spend(line, set.len().saturating_add(1))?;
+                members.extend_from_slice(set);
+            }
+            Entry::Side(of, _) => self.members(line, of, labels, sets, kind, members)?,
+        }
+        Ok(())
+    }
+
+    /// Sides of elements; without a side those that no other element shares.
+    fn sides(
+        &mut self,
+        line: usize,
+        members: &[u32],
+        side: Option<u8>,
+        content: &Content,
+        outer: &mut Option<BTreeMap<u32, Vec<u8>>>,
+        found: &mut Vec<Face>,
+    ) -> Result<(), Error> {
+        self.spend(line, 6 * members.len())?;
+        for place in members {
+            let element = &content.elements[*place as usize];
+            let sides = match element.kind {
+                Kind::Hexahedron => 6,
+                Kind::Tetrahedron => 4,
+                // shells and lines have no sides of their own
+                _ => 0,
+            };
+            match side {
+                Some(side) if side < sides => found.push(Face { element: *place, side }),
+                Some(side) => {
+                    let allowed = match sides {
+                        0 => "sides of hexahedra and tetrahedra".to_owned(),
+                        sides => format!("S1 … S{sides}"),
+                    };
+                    let what = format!("side of element {}", element.label);
+                    return Err(line_error(self.path, line, what, format!("S{}", side + 1), allowed));
+                }
+                None => {
+                    let outer = match outer {
+                        Some(outer) => outer,
+                        None => outer.insert(outer_sides(content, self.nodes)?),
+                    };
+                    let sides = outer.get(place).map_or(&[][..], Vec::as_slice);
+                    found.extend(sides.iter().map(|side| Face { element: *place, side: *side }));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Sides of hexahedra and tetrahedra that no other shares, by the element's position.
+fn outer_sides(content: &Content, nodes: &Labels) -> Result<BTreeMap<u32, Vec<u8>>, Error> {
+    let mut mesh = Mesh { points: vec![[0.0; 3]; content.nodes.len()], ..Mesh::default() };
+    let mut places = [Vec::new(), Vec::new()];
+    for (place, element) in (0u32..).zip(&content.elements) {
+        // nodes that do not exist are named when the mesh is made
+        let own: Vec<u32> = element.nodes().iter().filter_map(|label| nodes.get(*label)).collect();
+        match element.kind {
+            Kind::Hexahedron => {
+                if let Ok(own) = own.try_into() {
+                    mesh.hexahedra.push(own);
+                    places[0].push(place);
+                }
+            }
+            Kind::Tetrahedron => {
+                if let Ok(own) = own.try_into() {
+                    mesh.tetrahedra.push(own);
+                    places[1].push(place);
+                }
+            }
+            _ => {}
+        }
+    }
+    let [mut places, tetrahedra] = places;
+    places.extend(tetrahedra);
+    let mut outer: BTreeMap<u32, Vec<u8>> = BTreeMap::new();
+    for face in Surface::of_all(&mesh)?.faces() {
+        outer.entry(places[face.element as usize]).or_default().push(face.side);
+    }
+    Ok(outer)
+}

@@ -1,0 +1,121 @@
+use super::*;
+use crate::mesh::surface::{Surface, area};
+
+fn fixture(name: &str) -> (std::path::PathBuf, Vec<u8>) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
+    let bytes = std::fs::read(&path).unwrap();
+    (path, bytes)
+}
+
+fn refused(text: &str, words: &[&str]) {
+    let error = parse(Path::new("a.msh"), text.as_bytes(), 1.0).unwrap_err().to_string();
+    assert!(words.iter().all(|word| error.contains(word)), "{error}");
+}
+
+/// Two boxes of 3 × 1 × 1, one on the other, meshed by Gmsh 4.15.
+#[test]
+fn meshes_written_by_gmsh() {
+    for name in ["hexes_ascii.msh", "hexes_binary.msh", "tets_ascii.msh", "tets_binary.msh"] {
+        let (path, _) = fixture(name);
+        let read = read(&path, 1e-3).unwrap();
+        let mesh = &read.mesh;
+        assert!((read.quality.volume / 6e-9 - 1.0).abs() < 1e-12, "{name}");
+        assert_eq!(mesh.hexahedra.len(), if name.starts_with('h') { 16 } else { 0 });
+        let sets: Vec<&str> = mesh.element_sets.keys().map(String::as_str).collect();
+        assert_eq!(sets, ["printed bar", "substrate"]);
+        for element in &mesh.element_sets["printed bar"] {
+            assert!(mesh.centre(*element)[2] > 1e-3);
+        }
+        for (surface, z) in [("bottom", 0.0), ("interface", 1e-3)] {
+            let faces = &mesh.surfaces[surface];
+            let total: f64 = faces.iter().map(|face| area(mesh, *face)).sum();
+            assert!((total / 3e-6 - 1.0).abs() < 1e-12, "{name} {surface}");
+            assert_eq!(mesh.node_sets[surface], mesh.nodes_of(faces));
+            assert!(
+                mesh.node_sets[surface].iter().all(|node| (mesh.points[*node as usize][2] - z).abs() < 1e-12)
+            );
+        }
+        // the curve from the origin upwards
+        assert_eq!(mesh.node_sets["edge"].len(), if name.starts_with('h') { 3 } else { 4 }, "{name}");
+        assert_eq!(read.notes, Vec::<String>::new());
+        let outer = Surface::of_all(mesh).unwrap();
+        let total: f64 = outer.faces().map(|face| area(mesh, face)).sum();
+        assert!((total / 22e-6 - 1.0).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn text_and_bytes_are_one_mesh() {
+    for (text, binary) in [("hexes_ascii.msh", "hexes_binary.msh"), ("tets_ascii.msh", "tets_binary.msh")] {
+        let [text, binary] = [text, binary].map(|name| read(&fixture(name).0, 1.0).unwrap());
+        assert_eq!(text.element_labels, binary.element_labels);
+        assert_eq!(text.mesh.element_sets, binary.mesh.element_sets);
+        for (a, b) in text.mesh.points.iter().zip(&binary.mesh.points) {
+            // 16 digits in text
+            assert!((0..3).all(|d| (a[d] - b[d]).abs() < 1e-14));
+        }
+    }
+}
+
+const TETRAHEDRON: &str = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Comments\nby hand\n$EndComments\n\
+     $Entities\n0 0 0 1\n7 0 0 0 1 1 1 1 9 0\n$EndEntities\n\
+     $Nodes\n1 5 1 5\n3 7 0 5\n1\n2\n3\n4\n5\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n5 5 5\n$EndNodes\n\
+     $Elements\n1 1 1 1\n3 7 4 1\n11 1 2 3 4\n$EndElements\n";
+
+#[test]
+fn what_is_not_used_is_noted() {
+    let read = parse(Path::new("a.msh"), TETRAHEDRON.as_bytes(), 1.0).unwrap();
+    assert_eq!(read.mesh.element_sets["physical-9"], [0]);
+    assert_eq!((read.node_labels, read.element_labels), (vec![1, 2, 3, 4], vec![11]));
+    assert_eq!(read.notes.len(), 2);
+    assert!(read.notes[0].contains("1 × section $Comments: not used"));
+    assert!(read.notes[1].contains("1 nodes of no hexahedron"));
+    // parametric nodes
+    let parametric = TETRAHEDRON
+        .replace("3 7 0 5", "1 7 1 5")
+        .replace("0 0 0\n1 0 0\n0 1 0\n0 0 1\n5 5 5", "0 0 0 .1\n1 0 0 .2\n0 1 0 .3\n0 0 1 .4\n5 5 5 .5");
+    let again = parse(Path::new("a.msh"), parametric.as_bytes(), 1.0).unwrap();
+    assert_eq!(again.mesh.points, read.mesh.points);
+}
+
+#[test]
+fn what_is_wrong_is_named_with_its_line() {
+    let with = |from: &str, to: &str| {
+        assert!(TETRAHEDRON.contains(from));
+        TETRAHEDRON.replace(from, to)
+    };
+    refused("", &["a.msh:1: first line", "$MeshFormat"]);
+    refused(&with("4.1 0 8", "2.2 0 8"), &["a.msh:2:", "found \"2.2 0 8\"", "Mesh.MshFileVersion = 4.1"]);
+    refused(
+        &with("3 7 4 1\n11", "3 7 11 1\n11"),
+        &["a.msh:27: type of elements: found \"11\"", "4 (tetrahedron)"],
+    );
+    refused(&with("11 1 2 3 4", "11 1 2 3 9"), &["a.msh:28: node of element 11: found \"9\""]);
+    refused(&with("0 1 0\n0 0", "0 x 0\n0 0"), &["a.msh:21: coordinate: found \"x\"; allowed: a number"]);
+    refused(&with("0 1 0\n0 0", "0 nan 0\n0 0"), &["a.msh:21: coordinate", "finite"]);
+    refused(&with("2\n3\n4\n5", "2\n3\n3\n5"), &["number of a node: found \"3\"", "also on line 16"]);
+    refused(&with("1 5 1 5\n3 7 0 5", "1 5 1 5\n3 7 0 1000000000000"), &["a.msh:", "number of a node"]);
+    refused(&with("1 5 1 5", "1000000000000 5 1 5"), &["dimension of an entity: found \"$EndNodes\""]);
+    refused(&with("1 5 1 5", "1 6 1 5"), &["number of nodes: found \"5\"; allowed: 6, as announced"]);
+    refused(&with("$EndElements\n", ""), &["$EndElements"]);
+    refused(&with("$Comments\nby hand\n$EndComments", "$PartitionedEntities\n"), &["one partition"]);
+    refused(&with("0 0 1\n5", "0 0 -1\n5"), &["a.msh: tetrahedron 11 at", "inverted"]);
+    let (path, bytes) = fixture("hexes_binary.msh");
+    let error = parse(&path, &bytes[..bytes.len() - 500], 1.0).unwrap_err().to_string();
+    assert!(error.contains("hexes_binary.msh:") && error.contains("end of file"), "{error}");
+    assert!(parse(&path, &bytes, 0.0).unwrap_err().to_string().contains("scale of the mesh: found 0"));
+    assert!(
+        read(Path::new("/no/such.msh"), 1.0).unwrap_err().to_string().contains("cannot read /no/such.msh")
+    );
+}
+
+#[test]
+fn groups_cannot_multiply_beyond_the_file() {
+    // one entity in 3000 groups, its elements in 3000 blocks
+    let groups: String = (0..3000).map(|tag| format!("{tag} ")).collect();
+    let blocks: String = (0..3000).map(|label| format!("3 7 4 1\n{label} 1 2 3 4\n")).collect();
+    let text = TETRAHEDRON
+        .replace("1 9 0\n", &format!("3000 {groups}0\n"))
+        .replace("1 1 1 1\n3 7 4 1\n11 1 2 3 4\n", &format!("3000 3000 0 2999\n{blocks}"));
+    refused(&text, &["members of physical groups"]);
+}
