@@ -4,16 +4,24 @@ pub mod boundary;
 mod element;
 pub mod error;
 pub mod exact;
+pub mod history;
 pub mod kinetics;
 mod layers;
 pub mod ledger;
 pub mod material;
 pub mod melting;
 pub mod mesh;
+pub mod point;
 pub mod problem;
 pub mod simulation;
 mod solver;
 mod system;
+pub mod table;
 pub mod time;
+
+#[cfg(feature = "cli")]
+pub mod run;
+#[cfg(feature = "cli")]
+pub mod scene;
 
 pub use error::Error;

@@ -241,6 +241,12 @@ dimensions! {
     TemperatureDifference, TemperatureDifferenceDimension: of!(temperature_interval), "a temperature difference", "K", "5 K";
     /// A heating or cooling rate.
     TemperatureRate, TemperatureRateDimension: [0, 0, -1, 0, 1, 0, 0, 0], "a temperature rate", "K/s", "10 K/min";
+    /// A square of temperatures, as nucleation constants are.
+    SquaredTemperature, SquaredTemperatureDimension: [0, 0, 0, 0, 2, 0, 0, 0], "a squared temperature", "K^2", "136235 K^2";
+    /// A change per temperature.
+    PerTemperature, PerTemperatureDimension: [0, 0, 0, 0, -1, 0, 0, 0], "a number per temperature", "1/K", "0.965 1/K";
+    /// An energy per amount of substance.
+    MolarEnergy, MolarEnergyDimension: of!(molar_energy), "a molar energy", "J/mol", "6270 J/mol";
     /// An energy (a torque has the same dimension).
     Energy, EnergyDimension: of!(energy), "an energy", "J", "1 J";
     /// A power.

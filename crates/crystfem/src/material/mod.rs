@@ -62,6 +62,10 @@ pub trait ThermalMaterial: Send + Sync {
     fn fields(&self, state: &[f64], fields: &mut [f64]) {
         fields.copy_from_slice(state);
     }
+    /// dα/dt of crystals that grow at a temperature, 1/s; 0 for material without.
+    fn crystallization_rate(&self, _temperature: f64, _state: &[f64]) -> f64 {
+        0.0
+    }
     /// U of material at rest at a temperature with a given state, J/kg: what birth brings in.
     fn energy(&self, temperature: f64, state: &[f64]) -> f64;
     /// Whether U is linear in T and the flux in ∇T whatever the state (which may evolve all the same): no Newton

@@ -33,19 +33,31 @@ impl Printed {
         Self { conductor, sign, guarded }
     }
 
+    /// THALF, KT and DALPHADT.
+    fn rate(&self, old: f32, kelvin: f32) -> f32 {
+        if self.guarded && !(kelvin > T_INF && kelvin < T0) {
+            return 0.0;
+        }
+        let (k0, kg, u, r, n) = (3.787e4_f32, 136_235.0_f32, 6270.0_f32, 8.314_f32, 2.678_f32);
+        let jump = k0 * (-u / (r * (kelvin - T_INF))).exp();
+        let barrier =
+            f64::from(-kg * (kelvin + T0)) / (2.0 * f64::from(T0 - kelvin) * f64::from(kelvin).powi(2));
+        let half = (f64::from(jump) * barrier.exp()) as f32;
+        let exponent = f64::from(n);
+        let rate = (2.0_f64.ln().powf(1.0 / exponent) * f64::from(half)) as f32;
+        let left = 1.0 - f64::from(old);
+        (f64::from(n * rate) * left * (1.0 / left).ln().powf((exponent - 1.0) / exponent)) as f32
+    }
+
     /// α at the end of an increment from a temperature in K.
     fn alpha(&self, old: f32, temperature: f64, increment: f64, dt: f64) -> f32 {
-        // TEMPK = TEMP + 273.D0, where TEMP is in °C
-        let kelvin = (temperature - 273.15 + 273.0) as f32;
+        let kelvin = kelvin(temperature);
         let crystallizing = match self.sign {
             Sign::Printed => increment,
             Sign::Mended => -increment,
         };
         if crystallizing > 0.0 {
-            if self.guarded && !(kelvin > T_INF && kelvin < T0) {
-                return old;
-            }
-            return old_plus_growth(old, kelvin, dt);
+            return (f64::from(old) + dt * f64::from(self.rate(old, kelvin))) as f32;
         }
         if crystallizing == 0.0 {
             return old;
@@ -65,18 +77,9 @@ impl Printed {
     }
 }
 
-/// THALF, KT, DALPHADT and ALPHANEW.
-fn old_plus_growth(old: f32, kelvin: f32, dt: f64) -> f32 {
-    let (k0, kg, u, r, n) = (3.787e4_f32, 136_235.0_f32, 6270.0_f32, 8.314_f32, 2.678_f32);
-    let jump = k0 * (-u / (r * (kelvin - T_INF))).exp();
-    let wide = f64::from(kelvin);
-    let barrier = f64::from(-kg * (kelvin + T0)) / (2.0 * f64::from(T0 - kelvin) * wide.powi(2));
-    let half = (f64::from(jump) * barrier.exp()) as f32;
-    let exponent = f64::from(n);
-    let rate = (2.0_f64.ln().powf(1.0 / exponent) * f64::from(half)) as f32;
-    let left = 1.0 - f64::from(old);
-    let growth = (f64::from(n * rate) * left * (1.0 / left).ln().powf((exponent - 1.0) / exponent)) as f32;
-    (f64::from(old) + dt * f64::from(growth)) as f32
+/// TEMPK = TEMP + 273.D0, where TEMP is in °C.
+fn kelvin(temperature: f64) -> f32 {
+    (temperature - 273.15 + 273.0) as f32
 }
 
 impl ThermalMaterial for Printed {
@@ -98,6 +101,10 @@ impl ThermalMaterial for Printed {
 
     fn fields(&self, state: &[f64], fields: &mut [f64]) {
         (fields[0], fields[1]) = (state[0], state[0] * f64::from(ALPHA_MAX));
+    }
+
+    fn crystallization_rate(&self, temperature: f64, state: &[f64]) -> f64 {
+        f64::from(self.rate(state[0] as f32, kelvin(temperature)))
     }
 
     fn energy(&self, temperature: f64, _state: &[f64]) -> f64 {

@@ -105,6 +105,10 @@ impl ThermalMaterial for Semicrystalline {
         fields[1] = self.ultimate_crystallinity * fields[0];
     }
 
+    fn crystallization_rate(&self, temperature: f64, state: &[f64]) -> f64 {
+        self.kinetics().degree_slope(state[0]) * self.kinetics().rate(temperature)
+    }
+
     fn energy(&self, temperature: f64, state: &[f64]) -> f64 {
         let sensible = self.conductor.sensible_heat(temperature);
         self.latent.map_or(sensible, |latent| sensible - latent * self.kinetics().degree(state[0]))

@@ -41,6 +41,9 @@ fn definitions() {
     assert_eq!(si::<ConductivityDimension>("250 mW·m⁻¹·K⁻¹"), 0.25);
     assert_eq!(si::<HeatTransferDimension>("50 W/(m^2*K)"), 50.0);
     assert_eq!(si::<ForceDimension>("-2 kN"), -2000.0);
+    assert_eq!(si::<SquaredTemperatureDimension>("136235 K^2"), 136_235.0);
+    assert_eq!(si::<PerTemperatureDimension>("0.965 /K"), 0.965);
+    assert_eq!(si::<MolarEnergyDimension>("6.27 kJ/mol"), 6270.0);
     assert_eq!(si::<EnergyDimension>("1 N*m"), 1.0);
     assert_eq!(si::<EnergyDimension>("2 eV"), 2.0 * 1.602_176_634e-19);
     assert_eq!(si::<RatioDimension>("1 %"), 0.01);

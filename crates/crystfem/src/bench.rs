@@ -1,0 +1,137 @@
+//! `crystfem bench`: error against run time.
+
+use clap::Subcommand;
+use crystfem::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
+use crystfem::run::Failure;
+use serde::Serialize;
+use std::hint::black_box;
+use std::time::Instant;
+
+/// What to measure.
+#[derive(clap::Args)]
+pub struct Bench {
+    #[command(subcommand)]
+    what: What,
+    /// Print JSON rows {what, size, threads, value, unit}.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// Error in α against nanoseconds per step of the ways to integrate the kinetics.
+    Kinetics {
+        /// Cooling rate, K/min.
+        #[arg(long, default_value_t = 10.0)]
+        rate: f64,
+    },
+}
+
+#[derive(Serialize)]
+struct Row {
+    what: String,
+    /// Steps.
+    size: u64,
+    threads: usize,
+    value: f64,
+    unit: &'static str,
+}
+
+/// Steps that a timing covers.
+const STEPS: usize = 200_000;
+/// Timings, of which the median counts.
+const REPEATS: usize = 7;
+
+impl Bench {
+    /// Measures and prints.
+    ///
+    /// # Errors
+    /// A rate that is not above 0.
+    pub fn print(self) -> Result<bool, Failure> {
+        let rows = match self.what {
+            What::Kinetics { rate } => kinetics(rate)?,
+        };
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&rows).unwrap_or_default());
+        } else {
+            for row in &rows {
+                println!(
+                    "{:<44} {:>9} {:>2} threads {:>12.4e} {}",
+                    row.what, row.size, row.threads, row.value, row.unit
+                );
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// Column 1 of Table 4.1, 200 → 120 °C from a seed of 1e-3 (from which Euler's method can start at all).
+fn kinetics(rate: f64) -> Result<Vec<Row>, Failure> {
+    if !(rate > 0.0 && rate.is_finite()) {
+        let allowed = "above 0".to_owned();
+        return Err(crystfem::Error::Parameter { name: "--rate, K/min", found: rate, allowed }.into());
+    }
+    let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?;
+    let rate = rate / 60.0;
+    let exact = cooling_curve(&kinetics, rate, 473.15, 393.15, 1e-3, 2);
+    let mut rows = Vec::new();
+    for scheme in Scheme::ALL {
+        for kelvin in [0.001, 0.01, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0] {
+            let steps = (80.0_f64 / kelvin).round() as usize;
+            let mut push = |what: &str, value: f64, unit| {
+                let what = format!("{} {what} at {kelvin} K a step", scheme.name());
+                rows.push(Row { what, size: steps as u64, threads: 1, value, unit });
+            };
+            let error = error(&kinetics, scheme, rate, kelvin, steps, &exact);
+            // JSON knows no NaN: a scheme that leaves [0, 1] for good has no row of errors
+            if error.is_finite() {
+                push("largest error in alpha", error, "");
+            }
+            push("time", nanoseconds(&kinetics, scheme, rate, kelvin, steps), "ns/step");
+        }
+    }
+    Ok(rows)
+}
+
+fn error(
+    kinetics: &Kinetics,
+    scheme: Scheme,
+    rate: f64,
+    kelvin: f64,
+    steps: usize,
+    exact: &crystfem::kinetics::CoolingCurve,
+) -> f64 {
+    let mut state = scheme.state(kinetics, 1e-3);
+    let mut worst = 0.0_f64;
+    for k in 0..steps {
+        let (start, end) = (473.15 - k as f64 * kelvin, 473.15 - (k + 1) as f64 * kelvin);
+        state = scheme.advance(kinetics, state, start, end, kelvin / rate);
+        let error = (scheme.degree(kinetics, state) - kinetics.degree(exact.z_at(end))).abs();
+        if !error.is_finite() {
+            return f64::NAN;
+        }
+        worst = worst.max(error);
+    }
+    worst
+}
+
+/// The curve again and again, α at the end of each step included.
+fn nanoseconds(kinetics: &Kinetics, scheme: Scheme, rate: f64, kelvin: f64, steps: usize) -> f64 {
+    let repeats = (STEPS / steps).max(1);
+    let mut times: Vec<f64> = (0..REPEATS)
+        .map(|_| {
+            let start = Instant::now();
+            for _ in 0..repeats {
+                let mut state = scheme.state(kinetics, 1e-3);
+                for k in 0..steps {
+                    let (from, to) = (473.15 - k as f64 * kelvin, 473.15 - (k + 1) as f64 * kelvin);
+                    state = scheme.advance(kinetics, state, from, to, kelvin / rate);
+                    black_box(scheme.degree(kinetics, state));
+                }
+            }
+            start.elapsed().as_secs_f64() / (repeats * steps) as f64 * 1e9
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    times[REPEATS / 2]
+}

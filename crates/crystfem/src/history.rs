@@ -1,0 +1,193 @@
+//! Temperature histories: ramps and holds, or a table.
+
+use crate::error::Error;
+use crate::table::{Column, read};
+use polycore::units::dimension::{TemperatureDimension, TimeDimension};
+use std::path::Path;
+
+/// A temperature that runs linearly from point to point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct History {
+    /// Times, s; equal neighbours are a jump.
+    times: Vec<f64>,
+    /// Temperatures, K.
+    temperatures: Vec<f64>,
+}
+
+/// A part of a history.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Leg {
+    /// To a temperature, K, at a rate, K/s.
+    Rate {
+        /// K.
+        to: f64,
+        /// K/s, above 0 for heating and cooling alike.
+        rate: f64,
+    },
+    /// To a temperature, K, in a time, s; 0: a jump.
+    Time {
+        /// K.
+        to: f64,
+        /// s.
+        duration: f64,
+    },
+    /// The same temperature for a time, s.
+    Hold {
+        /// s.
+        duration: f64,
+    },
+}
+
+/// From here to there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Times, s.
+    pub times: [f64; 2],
+    /// Temperatures, K.
+    pub temperatures: [f64; 2],
+}
+
+impl Segment {
+    /// The temperature at a time within, K.
+    pub fn at(&self, time: f64) -> f64 {
+        let [from, to] = self.temperatures;
+        let duration = self.times[1] - self.times[0];
+        if time >= self.times[1] || duration == 0.0 {
+            return to;
+        }
+        from + (to - from) * ((time - self.times[0]) / duration)
+    }
+}
+
+impl History {
+    /// From points.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for no points, unequal columns, times that decrease, temperatures below 0 K, and what is not
+    /// finite.
+    pub fn new(times: Vec<f64>, temperatures: Vec<f64>) -> Result<Self, Error> {
+        let refuse = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
+        if times.is_empty() || times.len() != temperatures.len() {
+            let allowed = format!("{}, one for each time, at least one", times.len());
+            return refuse("temperatures of a history", temperatures.len() as f64, allowed);
+        }
+        for (index, &time) in times.iter().enumerate() {
+            let before = if index > 0 { times[index - 1] } else { f64::NEG_INFINITY };
+            if !(time >= before && time.is_finite()) {
+                return refuse("time of a history, s", time, format!("{before} or later, finite"));
+            }
+        }
+        if let Some(&bad) = temperatures.iter().find(|t| !(**t >= 0.0 && t.is_finite())) {
+            return refuse("temperature of a history, K", bad, "0 or above, finite".into());
+        }
+        Ok(Self { times, temperatures })
+    }
+
+    /// From time 0 and a temperature, K, by legs.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for rates that are not above 0, durations below 0, and as [`History::new`].
+    pub fn from_legs(start: f64, legs: &[Leg]) -> Result<Self, Error> {
+        let (mut times, mut temperatures) = (vec![0.0], vec![start]);
+        let (mut time, mut temperature) = (0.0, start);
+        for leg in legs {
+            let (to, duration) = match *leg {
+                Leg::Rate { to, rate } => {
+                    if !(rate > 0.0 && rate.is_finite()) {
+                        let allowed = "above 0, for heating and cooling alike".to_owned();
+                        return Err(Error::Parameter { name: "rate of a ramp, K/s", found: rate, allowed });
+                    }
+                    (to, (to - temperature).abs() / rate)
+                }
+                Leg::Time { to, duration } => (to, duration),
+                Leg::Hold { duration } => (temperature, duration),
+            };
+            if !(duration >= 0.0 && duration.is_finite()) {
+                let allowed = "0 or above, finite".to_owned();
+                return Err(Error::Parameter { name: "duration of a leg, s", found: duration, allowed });
+            }
+            (time, temperature) = (time + duration, to);
+            times.push(time);
+            temperatures.push(temperature);
+        }
+        Self::new(times, temperatures)
+    }
+
+    /// Reads a CSV file with the columns `time [unit]` and `temperature [unit]`.
+    ///
+    /// # Errors
+    /// As [`read`], and a [`Error::File`] with the line where times decrease.
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let columns =
+            [Column::of::<TimeDimension>("time"), Column::of::<TemperatureDimension>("temperature")];
+        let [times, temperatures] = read(path, columns)?;
+        Self::new(times, temperatures).map_err(|error| Error::File {
+            path: path.to_path_buf(),
+            line: 0,
+            what: "history".to_owned(),
+            found: error.to_string(),
+            allowed: "times that do not decrease".to_owned(),
+        })
+    }
+
+    /// The first temperature, K.
+    pub fn start(&self) -> f64 {
+        self.temperatures[0]
+    }
+
+    /// First and last time, s.
+    pub fn span(&self) -> [f64; 2] {
+        [self.times[0], self.times[self.times.len() - 1]]
+    }
+
+    /// Its segments, jumps included.
+    pub fn segments(&self) -> impl Iterator<Item = Segment> + '_ {
+        (1..self.times.len()).map(|i| Segment {
+            times: [self.times[i - 1], self.times[i]],
+            temperatures: [self.temperatures[i - 1], self.temperatures[i]],
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn legs() {
+        let legs = [
+            Leg::Rate { to: 390.0, rate: 0.5 },
+            Leg::Hold { duration: 60.0 },
+            Leg::Time { to: 450.0, duration: 0.0 },
+            Leg::Time { to: 400.0, duration: 100.0 },
+        ];
+        let history = History::from_legs(470.0, &legs).unwrap();
+        assert_eq!((history.start(), history.span()), (470.0, [0.0, 320.0]));
+        let segments: Vec<Segment> = history.segments().collect();
+        assert_eq!(segments[0].at(80.0), 430.0);
+        assert_eq!(
+            (segments[2].at(220.0), segments[3].at(320.0), segments[3].at(400.0)),
+            (450.0, 400.0, 400.0)
+        );
+    }
+
+    #[test]
+    fn refusals() {
+        let message = |legs: &[Leg]| History::from_legs(400.0, legs).unwrap_err().to_string();
+        assert!(message(&[Leg::Rate { to: 300.0, rate: -1.0 }]).contains("found -1; allowed: above 0"));
+        assert!(message(&[Leg::Rate { to: 300.0, rate: 1e-320 }]).contains("found inf"));
+        assert!(message(&[Leg::Hold { duration: f64::NAN }]).contains("found NaN"));
+        assert!(message(&[Leg::Time { to: -1.0, duration: 1.0 }]).contains("found -1; allowed: 0 or above"));
+        assert!(History::new(vec![], vec![]).is_err());
+        assert!(
+            History::new(vec![1.0, 0.0], vec![300.0, 300.0]).unwrap_err().to_string().contains("1 or later")
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("h.csv");
+        std::fs::write(&path, "time [s],temperature [degC]\n0,20\n10,30\n5,40\n").unwrap();
+        let error = History::read(&path).unwrap_err().to_string();
+        assert!(error.contains("h.csv") && error.contains("found 5"), "{error}");
+        std::fs::write(&path, "time [min],temperature [degC]\n0,20\n10,30\n").unwrap();
+        assert_eq!(History::read(&path).unwrap().span(), [0.0, 600.0]);
+    }
+}

@@ -1,0 +1,55 @@
+//! Whole scenes: run, compared, drawn and judged.
+
+mod draw;
+mod point;
+
+pub use point::explain;
+
+use crate::error::Error;
+use crate::scene::{self, Kind, PointScene};
+use polycore::report::Report;
+use polycore::scene::{SceneError, Source};
+use std::path::Path;
+
+/// How a run behaves towards its user.
+#[derive(Clone, Copy, Debug)]
+pub struct Options<'a> {
+    /// Where results go.
+    pub output: &'a Path,
+    /// Leave out what is marked `quick = false`.
+    pub quick: bool,
+}
+
+/// What stops a run: a fault in the scene, or one met on the way.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Anything else.
+    #[error(transparent)]
+    Run(#[from] Error),
+}
+
+impl From<polycore::Error> for Failure {
+    fn from(error: polycore::Error) -> Self {
+        Self::Run(error.into())
+    }
+}
+
+/// Runs a scene of any kind and writes its report.
+///
+/// # Errors
+/// [`Failure`].
+pub fn run(source: &Source, options: &Options) -> Result<Report, Failure> {
+    match scene::kind(source)? {
+        Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, options),
+    }
+}
+
+/// Makes the output directory, without the report of an earlier run, which must not pass for this one's.
+fn prepare(output: &Path) -> Result<(), Error> {
+    polycore::output::prepare_directory(output)?;
+    let _ = std::fs::remove_file(output.join(polycore::report::FILE_NAME));
+    Ok(())
+}

@@ -1,0 +1,191 @@
+//! The material alone: curves, events, pictures.
+
+use super::draw::{self, Run};
+use super::{Failure, Options, prepare};
+use crate::error::Error;
+use crate::point::{Course, Curves, Drive, Event, Stepping};
+use crate::scene::PointScene;
+use polycore::output::csv;
+use polycore::report::{Phases, Report};
+use polycore::scene::{SceneError, Source};
+use std::path::Path;
+
+/// Relative crystallinities whose temperature and time are values of the report.
+const DEGREES: [f64; 3] = [0.01, 0.5, 0.99];
+
+/// 0 °C in K.
+pub(super) const CELSIUS: f64 = 273.15;
+
+/// Runs every point with every of its materials.
+pub fn run(source: &Source, scene: &PointScene, options: &Options) -> Result<Report, Failure> {
+    let materials = scene.materials(source)?;
+    let mut built = Vec::new();
+    for (name, spec, key) in &materials {
+        built.push((name.as_str(), *spec, spec.build(source, key)?));
+    }
+    let courses = scene.courses(source)?;
+    prepare(options.output)?;
+    let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
+    let (mut phases, mut runs) = (Phases::new(), Vec::new());
+    for (point, (drive, stepping)) in scene.point.iter().zip(courses) {
+        if options.quick && !point.quick {
+            continue;
+        }
+        for (material_name, _, material) in &built {
+            if point.materials.as_ref().is_some_and(|names| !names.iter().any(|name| name == material_name)) {
+                continue;
+            }
+            let name = [point.name.as_str(), material_name].join(".");
+            let name = name.trim_end_matches('.').to_owned();
+            phases.start("integrate");
+            let course = Course { material: &**material, drive: drive.clone(), stepping };
+            let curves = course.run()?;
+            record(&mut report, &name, &course, &curves)?;
+            phases.start("write");
+            write(options.output, &name, &course, &curves)?;
+            runs.push(Run { name, fields: material.field_names(), curves });
+        }
+    }
+    compare(&mut report, scene);
+    if scene.output.pictures {
+        phases.start("draw");
+        draw::curves(&scene.title, &runs, options.output)?;
+        for (name, spec, key) in &materials {
+            if spec.law == crate::scene::Law::Semicrystalline {
+                let material = spec.semicrystalline(source, key)?;
+                draw::laws(name, &material, options.output)?;
+            }
+        }
+    }
+    phases.stop();
+    report.phases(&phases).threads(1).judge(&scene.expect, options.quick);
+    report.write(options.output)?;
+    Ok(report)
+}
+
+/// What a scene builds and leaves out.
+///
+/// # Errors
+/// A fault of the scene.
+pub fn explain(source: &Source, scene: &PointScene) -> Result<Vec<String>, SceneError> {
+    let mut lines = Vec::new();
+    for (name, spec, key) in scene.materials(source)? {
+        let material = spec.build(source, &key)?;
+        let coupled = if spec.latent_heat.is_some() { "latent heat" } else { "no latent heat" };
+        let melting = if spec.melting.is_some() { "melting" } else { "no melting" };
+        let linear = if material.is_linear() { "linear heat" } else { "non-linear heat" };
+        let name = if name.is_empty() { "" } else { &format!(" {name}") };
+        lines.push(format!("material{name}: {:?}, {linear}, {melting}, {coupled}", spec.law));
+    }
+    for (point, (drive, stepping)) in scene.point.iter().zip(scene.courses(source)?) {
+        let drive = match drive {
+            Drive::Prescribed(history) => {
+                let [from, to] = history.span();
+                format!("prescribed temperature, {} segments, {} s", history.segments().count(), to - from)
+            }
+            Drive::Lumped { exchange: None, duration, .. } => format!("adiabatic, {duration} s"),
+            Drive::Lumped { exchange: Some([ambient, constant]), duration, .. } => {
+                format!("lumped body, surroundings {ambient} K, time constant {constant} s, {duration} s")
+            }
+        };
+        let steps = match stepping {
+            Stepping::Adaptive { degree, kelvin } => {
+                format!("adaptive steps, at most {degree} in alpha and {kelvin} K")
+            }
+            Stepping::Kelvin(kelvin) => format!("steps of {kelvin} K"),
+            Stepping::Seconds(seconds) => format!("steps of {seconds} s"),
+        };
+        lines.push(format!("point {}: {drive}; {steps}", point.name));
+    }
+    Ok(lines)
+}
+
+/// The scalars of a run; temperatures in °C as the thesis has them.
+fn record(report: &mut Report, name: &str, course: &Course, curves: &Curves) -> Result<(), Error> {
+    let rows = curves.time.len();
+    let last = rows - 1;
+    let named = |quantity: &str| format!("{name}.{quantity}");
+    report.work(&named("steps"), last as u64).work(&named("rejected"), curves.rejected as u64);
+    let finite = |row: &usize| curves.fields[*row].iter().all(|x| x.is_finite());
+    let broken = rows - (0..rows).filter(finite).count();
+    report.value(&named("non_finite_rows"), broken as f64, "");
+    let span = |values: &[f64]| {
+        values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &x| [low.min(x), high.max(x)])
+    };
+    let [coldest, hottest] = span(&curves.temperature);
+    report.value(&named("lowest_temperature"), coldest - CELSIUS, "degC");
+    report.value(&named("highest_temperature"), hottest - CELSIUS, "degC");
+    report.value(&named("final_temperature"), curves.temperature[last] - CELSIUS, "degC");
+    report.value(&named("temperature_rise"), curves.temperature[last] - curves.temperature[0], "K");
+    report.value(&named("energy_change"), curves.energy[last] - curves.energy[0], "J/kg");
+    for (index, field) in course.material.field_names().iter().enumerate() {
+        let values: Vec<f64> = curves.fields.iter().map(|f| f[index]).filter(|x| x.is_finite()).collect();
+        let [least, most] = span(&values);
+        report.value(&named(&format!("lowest_{field}")), least, "");
+        report.value(&named(&format!("highest_{field}")), most, "");
+        if curves.fields[last][index].is_finite() {
+            report.value(&named(&format!("final_{field}")), curves.fields[last][index], "");
+        }
+        if rows > 1 && curves.fields[1][index].is_finite() {
+            report.value(&named(&format!("first_step_{field}")), curves.fields[1][index], "");
+        }
+    }
+    let mut event = |what: &str, event: Event| {
+        report.value(&named(&format!("temperature_at_{what}")), event.temperature - CELSIUS, "degC");
+        report.value(&named(&format!("time_to_{what}")), event.time - curves.time[0], "s");
+        event
+    };
+    for degree in DEGREES {
+        if let Some(found) = course.reaching(curves, degree)? {
+            event(&degree.to_string(), found);
+        }
+    }
+    if let Some(peak) = course.peak(curves)? {
+        let rate = event("peak", peak).rate;
+        report.value(&named("peak_rate"), rate, "1/s");
+    }
+    Ok(())
+}
+
+/// Shifts of temperature and of time between two materials, at all points that have both.
+fn compare(report: &mut Report, scene: &PointScene) {
+    for pair in &scene.compare {
+        for point in &scene.point {
+            for degree in DEGREES {
+                let name =
+                    |material: &str, event: &str| format!("{}.{material}.{event}_{degree}", point.name);
+                let both = |event: &str| {
+                    Some([
+                        report.scalar(&name(&pair.material, event))?,
+                        report.scalar(&name(&pair.with, event))?,
+                    ])
+                };
+                let (temperatures, times) = (both("temperature_at"), both("time_to"));
+                if let (Some([a, b]), Some([c, d])) = (temperatures, times) {
+                    report.value(&format!("{}.shift_at_{degree}", point.name), a - b, "K");
+                    report.value(&format!("{}.longer_to_{degree}", point.name), c / d - 1.0, "");
+                }
+            }
+        }
+    }
+}
+
+/// NAME.csv: every row.
+fn write(output: &Path, name: &str, course: &Course, curves: &Curves) -> Result<(), polycore::Error> {
+    let celsius: Vec<f64> = curves.temperature.iter().map(|t| t - CELSIUS).collect();
+    let mut columns: Vec<(&str, &str, Vec<f64>)> =
+        vec![("time", "s", curves.time.clone()), ("temperature", "degC", celsius)];
+    let material = course.material;
+    for (index, state) in material.state_names().iter().enumerate() {
+        if !material.field_names().contains(state) {
+            columns.push((state, "", curves.states.iter().map(|s| s[index]).collect()));
+        }
+    }
+    for (index, field) in material.field_names().iter().enumerate() {
+        columns.push((field, "", curves.fields.iter().map(|f| f[index]).collect()));
+    }
+    columns.push(("alpha_rate", "1/s", curves.rate.clone()));
+    columns.push(("energy", "J/kg", curves.energy.clone()));
+    let columns: Vec<csv::Column> = columns.iter().map(|(n, u, data)| (*n, *u, data.as_slice())).collect();
+    csv::write(output.join(format!("{name}.csv")), &columns)
+}

@@ -1,0 +1,389 @@
+//! The material block of a scene.
+
+use super::either::{self, TextOrTable};
+use crate::error::Error;
+use crate::kinetics::{Constants, Kinetics};
+use crate::material::{Conductor, Polymer, Printed, Property, Semicrystalline, Sign, ThermalMaterial};
+use crate::melting::Melting;
+use polycore::scene::{SceneError, Source};
+use polycore::units::dimension::{ConductivityDimension, SpecificHeatDimension};
+use polycore::units::{
+    Density, Dimension, MolarEnergy, PerTemperature, Quantity, Rate, Ratio, SpecificEnergy,
+    SquaredTemperature, Temperature,
+};
+use serde::{Deserialize, Deserializer};
+
+/// Laws of heat and crystallization.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Law {
+    /// [`Conductor`].
+    Conductor,
+    /// [`Semicrystalline`].
+    Semicrystalline,
+    /// [`Printed`]: Appendix B as coded.
+    Printed,
+}
+
+/// A material.
+///
+/// ```toml
+/// [material]
+/// law = "semicrystalline"
+/// density = "1010 kg/m^3"
+/// conductivity = "0.25 W/(m K)"
+/// specific_heat = { temperature = ["20 degC", "200 degC"], value = ["1500 J/(kg K)", "2600 J/(kg K)"] }
+/// kinetics = "table-4.1-column-1"
+/// melting = "pa12"          # without it crystals never melt
+/// crystallinity = 0.25
+/// latent_heat = "209 J/g"   # without it heat and crystallinity are uncoupled
+/// ```
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialSpec {
+    /// Law.
+    pub law: Law,
+    /// Density ρ.
+    pub density: Density,
+    /// Conductivity k.
+    pub conductivity: PropertySpec<ConductivityDimension>,
+    /// Specific heat c.
+    pub specific_heat: PropertySpec<SpecificHeatDimension>,
+    /// Kinetics, of `semicrystalline`.
+    pub kinetics: Option<KineticsSpec>,
+    /// Melting, of `semicrystalline`.
+    pub melting: Option<MeltingSpec>,
+    /// Ultimate crystallinity X∞, of `semicrystalline`.
+    pub crystallinity: Option<Ratio>,
+    /// Heat of fusion of crystal ΔH, of `semicrystalline`.
+    pub latent_heat: Option<SpecificEnergy>,
+    /// Relative crystallinity α of fresh material, of `semicrystalline`; default 0.
+    pub initial_alpha: Option<Ratio>,
+    /// Which sign of the increment crystallizes, of `printed`; default as printed.
+    pub sign: Option<SignSpec>,
+    /// Whether K = 0 outside (T∞, T₀), of `printed`; default no, as printed.
+    pub guarded: Option<bool>,
+}
+
+/// See [`Sign`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SignSpec {
+    /// Heating crystallizes.
+    Printed,
+    /// Cooling crystallizes.
+    Mended,
+}
+
+/// A constant (`"0.25 W/(m K)"`) or a table (`{ temperature = […], value = […] }`).
+#[derive(Clone, Debug)]
+pub enum PropertySpec<D> {
+    /// The same at every temperature.
+    Constant(Quantity<D>),
+    /// Linear between these, constant beyond.
+    Table(TableSpec<D>),
+}
+
+/// A table of a property.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, bound = "D: Dimension")]
+pub struct TableSpec<D> {
+    /// Increasing temperatures.
+    pub temperature: Vec<Temperature>,
+    /// A value for each.
+    pub value: Vec<Quantity<D>>,
+}
+
+/// Constants by name (`"table-4.1-column-1"`) or one by one.
+#[derive(Clone, Debug)]
+pub enum KineticsSpec {
+    /// Of the thesis.
+    Named(Constants),
+    /// One by one.
+    Given(GivenKinetics),
+}
+
+/// The constants of Eq. (4.7).
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GivenKinetics {
+    /// Growth rate constant K₀.
+    pub growth_rate: Rate,
+    /// Nucleation constant K_G.
+    pub nucleation: SquaredTemperature,
+    /// Activation energy U; default 6270 J/mol.
+    pub activation_energy: Option<MolarEnergy>,
+    /// Equilibrium melting temperature T₀.
+    pub equilibrium_melting: Temperature,
+    /// Temperature T∞ of frozen chains; or `glass_transition`.
+    pub frozen: Option<Temperature>,
+    /// Glass transition T_g: T∞ = T_g − 30 K.
+    pub glass_transition: Option<Temperature>,
+    /// Avrami exponent n.
+    pub avrami_exponent: f64,
+}
+
+/// Constants by name (`"pa12"`) or one by one.
+#[derive(Clone, Debug)]
+pub enum MeltingSpec {
+    /// Of the thesis.
+    Named(Melting),
+    /// One by one.
+    Given(GivenMelting),
+}
+
+/// The constants of Eq. (4.8).
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GivenMelting {
+    /// Sharpness k_m.
+    pub sharpness: PerTemperature,
+    /// Shape d.
+    pub shape: f64,
+    /// Most probable melting temperature T_p.
+    pub peak: Temperature,
+}
+
+const KINETICS_NAMES: [&str; 3] = ["table-4.1-column-1", "table-4.1-column-2", "appendix-b"];
+const KINETICS: [(&str, Constants); 3] = [
+    (KINETICS_NAMES[0], Constants::TABLE_4_1_COLUMN_1),
+    (KINETICS_NAMES[1], Constants::TABLE_4_1_COLUMN_2),
+    (KINETICS_NAMES[2], Constants::APPENDIX_B),
+];
+
+impl MaterialSpec {
+    /// The material; `key` is where the block stands, e.g. `material`.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for keys that the law does not have or lacks, and for constants out of their domain.
+    pub fn build(&self, source: &Source, key: &str) -> Result<Box<dyn ThermalMaterial>, SceneError> {
+        self.check_keys(source, key)?;
+        Ok(match self.law {
+            Law::Conductor => Box::new(self.conductor(source, key)?),
+            Law::Semicrystalline => Box::new(self.semicrystalline(source, key)?),
+            Law::Printed => {
+                let sign = match self.sign {
+                    Some(SignSpec::Mended) => Sign::Mended,
+                    _ => Sign::Printed,
+                };
+                Box::new(Printed::new(self.conductor(source, key)?, sign, self.guarded.unwrap_or(false)))
+            }
+        })
+    }
+
+    fn check_keys(&self, source: &Source, key: &str) -> Result<(), SceneError> {
+        let crystalline = [
+            ("kinetics", self.kinetics.is_some(), true),
+            ("crystallinity", self.crystallinity.is_some(), true),
+            ("melting", self.melting.is_some(), false),
+            ("latent_heat", self.latent_heat.is_some(), false),
+            ("initial_alpha", self.initial_alpha.is_some(), false),
+        ];
+        for (name, given, needed) in crystalline {
+            let at = format!("{key}.{name}");
+            match self.law {
+                Law::Semicrystalline if needed && !given => {
+                    return Err(source.error(
+                        &at,
+                        "nothing",
+                        format!("`{name}`: a semicrystalline material needs it"),
+                    ));
+                }
+                Law::Conductor | Law::Printed if given => {
+                    let found = format!("`{name}` of a material that has none");
+                    return Err(source.error(&at, found, "nothing, or `law = \"semicrystalline\"`"));
+                }
+                _ => {}
+            }
+        }
+        for (name, given) in [("sign", self.sign.is_some()), ("guarded", self.guarded.is_some())] {
+            if given && self.law != Law::Printed {
+                let found = format!("`{name}` of another law");
+                return Err(source.error(&format!("{key}.{name}"), found, "nothing, or `law = \"printed\"`"));
+            }
+        }
+        Ok(())
+    }
+
+    fn conductor(&self, source: &Source, key: &str) -> Result<Conductor, SceneError> {
+        let conductivity = self.conductivity.build("conductivity, W/(m K)");
+        let conductivity = at(source, &format!("{key}.conductivity"), conductivity)?;
+        let heat =
+            at(source, &format!("{key}.specific_heat"), self.specific_heat.build("specific heat, J/(kg K)"))?;
+        at(source, &format!("{key}.density"), Conductor::new(self.density.si(), conductivity, heat))
+    }
+
+    /// The polymer of a `semicrystalline` block.
+    ///
+    /// # Errors
+    /// As [`MaterialSpec::build`].
+    pub fn semicrystalline(&self, source: &Source, key: &str) -> Result<Semicrystalline, SceneError> {
+        self.check_keys(source, key)?;
+        let constants = match &self.kinetics {
+            Some(KineticsSpec::Named(constants)) => *constants,
+            Some(KineticsSpec::Given(given)) => given.constants(source, key)?,
+            None => return Err(source.error(&format!("{key}.kinetics"), "nothing", "kinetics")),
+        };
+        let melting = match &self.melting {
+            Some(MeltingSpec::Named(melting)) => Some(*melting),
+            Some(MeltingSpec::Given(given)) => {
+                let built = Melting::new(given.sharpness.si(), given.shape, given.peak.si());
+                Some(at(source, &format!("{key}.melting"), built)?)
+            }
+            None => None,
+        };
+        let property = |name: &str| format!("{key}.{name}");
+        // the density is checked here with the properties, so that the rest speaks of crystals
+        self.conductor(source, key)?;
+        let polymer = Polymer {
+            density: self.density.si(),
+            conductivity: at(
+                source,
+                &property("conductivity"),
+                self.conductivity.build("conductivity, W/(m K)"),
+            )?,
+            specific_heat: at(source, &property("specific_heat"), self.specific_heat.build("specific heat"))?,
+            kinetics: at(source, &property("kinetics"), Kinetics::new(constants))?,
+            melting,
+            ultimate_crystallinity: self.crystallinity.map_or(0.0, Quantity::si),
+            latent_heat: self.latent_heat.map(Quantity::si),
+            seed: self.initial_alpha.map_or(0.0, Quantity::si),
+        };
+        Semicrystalline::new(polymer).map_err(|error| {
+            let name = match &error {
+                Error::Parameter { name: "latent heat, J/kg", .. } => "latent_heat",
+                Error::Parameter { name: "initial relative crystallinity", .. } => "initial_alpha",
+                _ => "crystallinity",
+            };
+            located(source, &property(name), &error)
+        })
+    }
+}
+
+impl GivenKinetics {
+    fn constants(&self, source: &Source, key: &str) -> Result<Constants, SceneError> {
+        let frozen = match (self.frozen, self.glass_transition) {
+            (Some(frozen), None) => frozen.si(),
+            (None, Some(glass)) => glass.si() - 30.0,
+            (None, None) => {
+                let at = format!("{key}.kinetics.frozen");
+                return Err(source.error(
+                    &at,
+                    "nothing",
+                    "`frozen`, or `glass_transition` for T∞ = T_g − 30 K",
+                ));
+            }
+            (Some(_), Some(_)) => {
+                let at = format!("{key}.kinetics.glass_transition");
+                return Err(source.error(&at, "`glass_transition` beside `frozen`", "one of them"));
+            }
+        };
+        let energy = Constants::TABLE_4_1_COLUMN_1.activation_energy;
+        Ok(Constants {
+            growth_rate: self.growth_rate.si(),
+            nucleation: self.nucleation.si(),
+            activation_energy: self.activation_energy.map_or(energy, Quantity::si),
+            equilibrium_melting: self.equilibrium_melting.si(),
+            frozen,
+            avrami_exponent: self.avrami_exponent,
+        })
+    }
+}
+
+impl<D: Dimension + Copy> PropertySpec<D> {
+    fn build(&self, name: &'static str) -> Result<Property, Error> {
+        match self {
+            Self::Constant(value) => Property::constant(name, value.si()),
+            Self::Table(table) => Property::table(
+                name,
+                table.temperature.iter().map(|t| t.si()).collect(),
+                table.value.iter().map(|v| v.si()).collect(),
+            ),
+        }
+    }
+}
+
+/// Puts a parameter's error at its place in the scene.
+fn at<T>(source: &Source, key: &str, result: Result<T, Error>) -> Result<T, SceneError> {
+    result.map_err(|error| located(source, key, &error))
+}
+
+pub(super) fn located(source: &Source, key: &str, error: &Error) -> SceneError {
+    match error {
+        Error::Parameter { name, found, allowed } => source.error(key, format!("{name} = {found}"), allowed),
+        other => source.error(key, other, "a valid value"),
+    }
+}
+
+impl<D: Dimension> TextOrTable for PropertySpec<D> {
+    type Table = TableSpec<D>;
+
+    fn expected() -> String {
+        format!("{}, e.g. \"{}\", or {{ temperature = […], value = […] }}", D::NAME, D::EXAMPLE)
+    }
+
+    fn from_text<E: serde::de::Error>(text: &str) -> Result<Self, E> {
+        text.parse().map(Self::Constant).map_err(E::custom)
+    }
+
+    fn from_table(table: TableSpec<D>) -> Self {
+        Self::Table(table)
+    }
+}
+
+impl TextOrTable for KineticsSpec {
+    type Table = GivenKinetics;
+
+    fn expected() -> String {
+        let names = KINETICS_NAMES.map(|name| format!("\"{name}\"")).join(", ");
+        format!("{names}, or {{ growth_rate = …, nucleation = …, … }}")
+    }
+
+    fn from_text<E: serde::de::Error>(text: &str) -> Result<Self, E> {
+        let known = KINETICS.iter().find(|(name, _)| *name == text);
+        known
+            .map(|(_, constants)| Self::Named(*constants))
+            .ok_or_else(|| E::unknown_variant(text, &KINETICS_NAMES))
+    }
+
+    fn from_table(table: GivenKinetics) -> Self {
+        Self::Given(table)
+    }
+}
+
+impl TextOrTable for MeltingSpec {
+    type Table = GivenMelting;
+
+    fn expected() -> String {
+        "\"pa12\", or { sharpness = …, shape = …, peak = … }".to_owned()
+    }
+
+    fn from_text<E: serde::de::Error>(text: &str) -> Result<Self, E> {
+        match text {
+            "pa12" => Ok(Self::Named(Melting::PA12)),
+            _ => Err(E::unknown_variant(text, &["pa12"])),
+        }
+    }
+
+    fn from_table(table: GivenMelting) -> Self {
+        Self::Given(table)
+    }
+}
+
+impl<'de, D: Dimension> Deserialize<'de> for PropertySpec<D> {
+    fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
+        either::deserialize(deserializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for KineticsSpec {
+    fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
+        either::deserialize(deserializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for MeltingSpec {
+    fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
+        either::deserialize(deserializer)
+    }
+}

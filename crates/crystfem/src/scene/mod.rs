@@ -1,0 +1,69 @@
+//! Scenes, as written in TOML. Only what a scene names is built.
+
+mod either;
+mod material;
+mod point;
+
+pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
+pub use point::{CompareSpec, ExchangeSpec, LegSpec, PointScene, PointSpec};
+
+use polycore::scene::{SceneError, Source};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+/// The only program that runs these scenes.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Program {
+    /// This crate.
+    Crystfem,
+}
+
+/// Files to write beside the report.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct OutputSpec {
+    /// Pictures (PNG).
+    pub pictures: bool,
+}
+
+impl Default for OutputSpec {
+    fn default() -> Self {
+        Self { pictures: true }
+    }
+}
+
+/// What a scene asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The material alone: `[[point]]`.
+    Point,
+}
+
+/// Tells what a scene asks for by the blocks that it has.
+///
+/// # Errors
+/// What is no scene at all, another program, and a scene without any such block.
+pub fn kind(source: &Source) -> Result<Kind, SceneError> {
+    /// What tells kinds apart; the rest is read later.
+    #[derive(Deserialize)]
+    struct Outline {
+        #[serde(rename = "program")]
+        _program: Program,
+        point: Option<IgnoredAny>,
+    }
+    let outline: Outline = source.parse()?;
+    match outline.point {
+        Some(_) => Ok(Kind::Point),
+        None => Err(source.error("program", "a scene without a task", "a block `[[point]]`")),
+    }
+}
+
+/// A name that may be part of a file's name and of a value's.
+pub(crate) fn check_name(source: &Source, key: &str, name: &str) -> Result<(), SceneError> {
+    let valid = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if !name.is_empty() && name.chars().all(valid) {
+        return Ok(());
+    }
+    Err(source.error(key, format!("`{name}`"), "letters, digits, `-` and `_`: it names files"))
+}
