@@ -4,6 +4,8 @@ pub mod abaqus;
 mod bar;
 pub mod gmsh;
 mod labelled;
+pub mod layers;
+pub mod path;
 pub mod quality;
 mod split;
 mod structured;

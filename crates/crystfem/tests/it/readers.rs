@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use crystfem::mesh::{self, ReadMesh, abaqus, gmsh};
+use crystfem::mesh::path::{self, Bead};
+use crystfem::mesh::{self, Grid, ReadMesh, abaqus, gmsh};
 use proptest::prelude::*;
 
 type Parse = fn(&Path, &[u8], f64) -> Result<ReadMesh, crystfem::Error>;
@@ -54,6 +55,9 @@ const WORDS: [&str; 16] = [
     "*ELSET,ELSET=a,GENERATE\n1,18446744073709551615\n",
     "\0",
 ];
+
+const PATH: &str = "G28 ; home\nG1 X0 Y0.25 Z0.2 F600\nM83\nG1 X10 E1\nG0 Y0.75\nG1 X0 E1 (back)\nG4 P100\nG92 E0\nG91\n\
+                    G1 Z0.2\nG90\nM117 layer\n";
 
 #[derive(Clone, Debug)]
 enum Damage {
@@ -130,12 +134,33 @@ proptest! {
     }
 
     #[test]
+    fn damaged_paths(damages in prop::collection::vec(damage(), 1..6)) {
+        let mut bytes = PATH.repeat(20).into_bytes();
+        for damage in &damages {
+            apply(&mut bytes, damage);
+        }
+        let mesh = Grid::uniform([0.0; 3], [0.02, 0.02, 1e-3], [9, 9, 5]).unwrap().mesh("plate").unwrap();
+        let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
+        match path::parse(Path::new("a.gcode"), &bytes) {
+            Ok(path) => {
+                prop_assert!(path.moves.windows(2).all(|pair| pair[0].end <= pair[1].start && pair[0].start <= pair[0].end));
+                if let Ok(mut activation) = path.activation(&mesh, &all, Bead { width: 4e-4, height: 3e-4 }) {
+                    activation.fill(&mesh);
+                    prop_assert!(activation.times.iter().all(|time| *time >= 0.0));
+                }
+            }
+            Err(error) => prop_assert!(error.to_string().starts_with("a.gcode:"), "{error}"),
+        }
+    }
+
+    #[test]
     fn noise(bytes in prop::collection::vec(any::<u8>(), 0..300), binary in any::<bool>()) {
         let header = if binary { &b"$MeshFormat\n4.1 1 8\n\x01\0\0\0\n$EndMeshFormat\n$Nodes\n"[..] } else { b"*NODE\n" };
         let all = [header, &bytes].concat();
         judge("noise", if binary { gmsh::parse } else { abaqus::parse }, &all);
         judge("noise", abaqus::parse, &bytes);
         judge("noise", gmsh::parse, &bytes);
+        let _ = path::parse(Path::new("noise"), &bytes);
     }
 }
 

@@ -1,0 +1,177 @@
+//! Printing along a path: moves of a nozzle, and when each element is covered.
+
+use std::path::Path;
+
+use crate::error::Error;
+use crate::mesh::Mesh;
+
+mod cover;
+mod gcode;
+
+pub use cover::{Activation, Bead};
+pub use gcode::{parse, read_gcode};
+
+/// A straight move of the nozzle at constant velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Move {
+    /// Where it begins, m.
+    pub from: [f64; 3],
+    /// Where it ends, m: z is the upper face of what is laid down.
+    pub to: [f64; 3],
+    /// When it begins, s.
+    pub start: f64,
+    /// When it ends, s.
+    pub end: f64,
+    /// Whether material is laid down.
+    pub prints: bool,
+}
+
+/// Moves in the order of time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ToolPath {
+    /// The moves.
+    pub moves: Vec<Move>,
+    /// What was passed over.
+    pub notes: Vec<String>,
+}
+
+impl ToolPath {
+    /// A bar printed in lines along x, there and back: from `lower` to `upper` in x and y, lines of the bead's width (less
+    /// where they would not fill the bar evenly), `layers` of the bead's height upwards from z = 0, `velocity` while
+    /// printing and between lines, m/s; each layer begins `interval` s after the one before.
+    ///
+    /// # Errors
+    /// Extents, bead, velocity or number of layers that are not positive; an interval shorter than a layer takes; more
+    /// than 10⁸ lines.
+    pub fn raster(
+        [lower, upper]: [[f64; 2]; 2],
+        bead: Bead,
+        layers: usize,
+        velocity: f64,
+        interval: f64,
+    ) -> Result<Self, Error> {
+        let parameter =
+            |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
+        let extent = [upper[0] - lower[0], upper[1] - lower[1]];
+        let positive = [
+            ("extent along x", extent[0]),
+            ("extent along y", extent[1]),
+            ("width of the bead", bead.width),
+            ("height of the bead", bead.height),
+            ("velocity", velocity),
+            ("layers", layers as f64),
+        ];
+        for (name, found) in positive {
+            if !(found > 0.0 && found.is_finite()) {
+                return parameter(name, found, "positive and finite");
+            }
+        }
+        // lines that fit to a billionth fit
+        let lines = (extent[1] / bead.width - 1e-9).ceil().max(1.0);
+        let count = lines * layers as f64;
+        if count > 1e8 {
+            return parameter("lines of a path", count, "at most 1e8");
+        }
+        let spacing = extent[1] / lines;
+        let line = extent[0] / velocity;
+        let step = spacing / velocity;
+        let needed = lines * line + (lines - 1.0) * step;
+        if interval.is_nan() || interval < needed * (1.0 - 1e-12) {
+            let allowed = format!("{needed} s or more, what printing a layer takes");
+            return Err(Error::Parameter { name: "time from layer to layer", found: interval, allowed });
+        }
+        let mut moves = Vec::with_capacity(2 * count as usize);
+        let mut place = [lower[0], lower[1] + 0.5 * spacing, bead.height];
+        let mut time = 0.0;
+        for layer in 0..layers {
+            let z = (layer + 1) as f64 * bead.height;
+            for row in 0..lines as usize {
+                let y = lower[1] + (row as f64 + 0.5) * spacing;
+                // the nozzle waits, if it must, on its way to the layer
+                let start = layer as f64 * interval + row as f64 * (line + step);
+                let ends = if row % 2 == 0 { [lower[0], upper[0]] } else { [upper[0], lower[0]] };
+                let [from, to] = ends.map(|x| [x, y, z]);
+                if time > 0.0 {
+                    moves.push(Move {
+                        from: place,
+                        to: from,
+                        start: time,
+                        end: start.max(time),
+                        prints: false,
+                    });
+                }
+                time = start.max(time) + line;
+                place = to;
+                moves.push(Move { from, to, start: time - line, end: time, prints: true });
+            }
+        }
+        Ok(Self { moves, notes: Vec::new() })
+    }
+
+    /// The same path elsewhere: printers count from a corner of their bed.
+    pub fn shifted(mut self, by: [f64; 3]) -> Self {
+        for one in &mut self.moves {
+            for d in 0..3 {
+                one.from[d] += by[d];
+                one.to[d] += by[d];
+            }
+        }
+        self
+    }
+
+    /// When the last move ends, s; 0 without moves.
+    pub fn duration(&self) -> f64 {
+        self.moves.last().map_or(0.0, |last| last.end)
+    }
+
+    /// When each of the elements is covered by the bead, see [`Activation`].
+    ///
+    /// # Errors
+    /// A bead without width or height, an element that does not exist, a path that prints nothing, places or times that
+    /// are not finite.
+    pub fn activation(&self, mesh: &Mesh, elements: &[u32], bead: Bead) -> Result<Activation, Error> {
+        cover::activation(self, mesh, elements, bead)
+    }
+}
+
+/// Reads a path from a CSV table with columns `time` (s, not descending), `x`, `y`, `z` (multiplied by `scale`), and
+/// `print`: not 0 where the move that ends there lays material down. Units in brackets after a name are passed over.
+///
+/// # Errors
+/// What cannot be read as a table of numbers; a missing column; times that descend; what is not finite. Lines count from
+/// the header.
+pub fn read_csv(path: &Path, scale: f64) -> Result<ToolPath, Error> {
+    let table = polycore::output::csv::read(path)?;
+    let column = |name: &str| {
+        let named = |heading: &str| heading.split('[').next().unwrap_or("").trim() == name;
+        table.iter().find(|column| named(&column.0)).map(|column| column.1.as_slice()).ok_or_else(|| {
+            let found: Vec<&str> = table.iter().map(|column| column.0.as_str()).collect();
+            error(path, 1, "columns", found.join(", "), "time, x, y, z, print")
+        })
+    };
+    let [time, x, y, z, print] =
+        [column("time")?, column("x")?, column("y")?, column("z")?, column("print")?];
+    let mut moves = Vec::with_capacity(time.len());
+    for row in 0..time.len() {
+        let values = [time[row], x[row], y[row], z[row], print[row]];
+        if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+            return Err(error(path, row + 2, "value", value, "a finite number"));
+        }
+        if row > 0 && time[row] < time[row - 1] {
+            return Err(error(path, row + 2, "time", time[row], format!("{} or later", time[row - 1])));
+        }
+        if row > 0 {
+            let place = |row: usize| [scale * x[row], scale * y[row], scale * z[row]];
+            let (start, end) = (time[row - 1], time[row]);
+            moves.push(Move { from: place(row - 1), to: place(row), start, end, prints: print[row] != 0.0 });
+        }
+    }
+    Ok(ToolPath { moves, notes: Vec::new() })
+}
+
+fn error(path: &Path, line: usize, what: &str, found: impl ToString, allowed: impl Into<String>) -> Error {
+    crate::mesh::labelled::line_error(path, line, what, found, allowed)
+}
+
+#[cfg(test)]
+mod tests;

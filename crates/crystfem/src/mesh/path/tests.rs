@@ -1,0 +1,204 @@
+use super::*;
+use crate::mesh::{Grid, layers};
+
+fn parsed(text: &str) -> ToolPath {
+    parse(Path::new("a.gcode"), text.as_bytes()).unwrap()
+}
+
+fn refused(text: &str, words: &[&str]) {
+    let error = parse(Path::new("a.gcode"), text.as_bytes()).unwrap_err().to_string();
+    assert!(words.iter().all(|word| error.contains(word)), "{error}");
+}
+
+/// A plate of 20 × 10 × 2 elements of 0.5 mm, 0.2 mm high, and lines along x at the rows' middles, there and back,
+/// 10 mm/s.
+fn plate() -> (Mesh, ToolPath) {
+    let mesh = Grid::uniform([0.0; 3], [0.01, 0.005, 4e-4], [20, 10, 2]).unwrap().mesh("plate").unwrap();
+    let mut text = "G21\nG90\nM83\nG0 X0 Y0.25 Z0.2 F600\n".to_owned();
+    for layer in 0..2 {
+        for row in 0..10 {
+            let y = 0.25 + 0.5 * f64::from(row);
+            text += &format!(
+                "G0 Y{y} Z{}\nG1 X{} E1\n",
+                0.2 * f64::from(layer + 1),
+                if row % 2 == 0 { 10 } else { 0 }
+            );
+        }
+        text += "G0 X0\n";
+    }
+    (mesh, parsed(&text))
+}
+
+#[test]
+fn elements_appear_as_the_nozzle_passes() {
+    let (mesh, path) = plate();
+    let all: Vec<u32> = (0..400).collect();
+    let activation = path.activation(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
+    assert!(activation.missed.is_empty());
+    let begin = path.moves.iter().find(|one| one.prints).unwrap().start;
+    // a row lasts 1 s and the step to the next 0.05 s; centres lie at 0.25 mm, 0.75 mm, …
+    for (element, time) in activation.times.iter().enumerate() {
+        let (column, row, layer) = (element % 20, element / 20 % 10, element / 200);
+        let along = (column as f64 + 0.5) / 20.0;
+        let along = if row % 2 == 0 { along } else { 1.0 - along };
+        // from one layer to the next: 4.5 mm back and 0.2 mm up in one move
+        let back = (4.5f64.powi(2) + 0.04).sqrt() / 10.0;
+        let exact = begin + layer as f64 * (10.0 + 9.0 * 0.05 + back) + row as f64 * 1.05 + along;
+        assert!((time - exact).abs() < 1e-9, "{element}: {time} {exact}");
+    }
+    // in windows of a second: never early, at most a second late
+    let groups = layers::groups(&activation.times, 1.0).unwrap();
+    assert!(groups.len() <= 24);
+    for (time, elements) in groups {
+        assert!(elements.iter().all(|e| (0.0..1.0 + 1e-9).contains(&(time - activation.times[*e as usize]))));
+    }
+}
+
+#[test]
+fn every_centre_is_found_that_a_search_of_all_finds() {
+    // slanted, rising, standing and far moves, beside a double loop over moves and elements
+    let mesh = Grid::uniform([0.0; 3], [0.01, 0.007, 0.002], [23, 17, 5]).unwrap().mesh("plate").unwrap();
+    let line =
+        |from: [f64; 3], to: [f64; 3], start: f64| Move { from, to, start, end: start + 1.0, prints: true };
+    let moves = vec![
+        line([-0.5, -0.4, 4e-4], [0.9, 0.6, 4e-4], 3.0),
+        line([0.002, 0.001, 1e-3], [0.009, 0.006, 2e-3], 1.0),
+        line([0.005, 0.003, 8e-4], [0.005, 0.003, 8e-4], 0.0),
+        line([1e9, 0.003, 2e-3], [-1e9, 0.004, 2e-3], 5.0),
+        line([0.0, 0.1, 4e-4], [0.01, 0.1, 4e-4], 0.0),
+    ];
+    let path = ToolPath { moves, notes: Vec::new() };
+    let bead = Bead { width: 1.3e-3, height: 5e-4 };
+    let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
+    let activation = path.activation(&mesh, &all, bead).unwrap();
+    for element in all {
+        let [x, y, z] = mesh.centre(element);
+        let mut first = f64::INFINITY;
+        for one in &path.moves {
+            let along = [one.to[0] - one.from[0], one.to[1] - one.from[1]];
+            let square = along[0] * along[0] + along[1] * along[1];
+            let way = (x - one.from[0]) * along[0] + (y - one.from[1]) * along[1];
+            let share = if square > 0.0 { (way / square).clamp(0.0, 1.0) } else { 0.0 };
+            let away = (x - one.from[0] - share * along[0]).hypot(y - one.from[1] - share * along[1]);
+            let top = one.from[2] + share * (one.to[2] - one.from[2]);
+            if away <= 0.5 * bead.width && z <= top && z > top - bead.height {
+                first = first.min(one.start + share);
+            }
+        }
+        assert_eq!(activation.times[element as usize], first, "{element}");
+    }
+    assert!(!activation.missed.is_empty());
+}
+
+#[test]
+fn a_raster_fills_its_bar() {
+    let (mesh, _) = plate();
+    let all: Vec<u32> = (0..400).collect();
+    let bead = Bead { width: 5e-4, height: 2e-4 };
+    let area = [[0.0, 0.0], [0.01, 0.005]];
+    // ten lines of 1 s and nine steps of 0.05 s
+    let path = ToolPath::raster(area, bead, 2, 0.01, 12.0).unwrap();
+    assert_eq!(path.moves.len(), 20 + 19);
+    let activation = path.activation(&mesh, &all, bead).unwrap();
+    assert!(activation.missed.is_empty());
+    for (element, time) in activation.times.iter().enumerate() {
+        let (column, row, layer) = (element % 20, element / 20 % 10, element / 200);
+        let along = (column as f64 + 0.5) / 20.0;
+        let along = if row % 2 == 0 { along } else { 1.0 - along };
+        assert!((time - (layer as f64 * 12.0 + row as f64 * 1.05 + along)).abs() < 1e-9);
+    }
+    let text =
+        |velocity, interval| ToolPath::raster(area, bead, 2, velocity, interval).unwrap_err().to_string();
+    assert!(text(0.01, 10.0).contains("time from layer to layer: found 10; allowed: 10.45 s or more"));
+    assert!(text(0.0, 10.0).contains("velocity: found 0"));
+    let fine = ToolPath::raster(area, Bead { width: 1e-12, ..bead }, 2, 0.01, 1e12).unwrap_err().to_string();
+    assert!(fine.contains("lines of a path: found"), "{fine}");
+}
+
+#[test]
+fn gaps_can_be_filled() {
+    let (mesh, path) = plate();
+    let all: Vec<u32> = (0..400).collect();
+    // every other row only
+    let moves: Vec<Move> = (path.moves.iter().copied())
+        .map(|one| Move { prints: one.prints && one.to[0] > one.from[0] && one.to[2] < 3e-4, ..one })
+        .collect();
+    let path = ToolPath { moves, notes: Vec::new() };
+    let mut activation = path.activation(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
+    assert_eq!(activation.missed.len(), 300);
+    // the second layer was never printed
+    assert_eq!(activation.fill(&mesh), 200);
+    let last = path.moves.iter().filter(|one| one.prints).map(|one| one.end).fold(0.0, f64::max);
+    assert_eq!(activation.times[20], last);
+    assert_eq!(activation.times[399], f64::INFINITY);
+}
+
+#[test]
+fn codes_and_their_forms() {
+    let text = "; a comment\nN10 G21 ; mm*\nM104 S220\nM117 Printing... (1/2)\nG28\nG92 E0\nG1 F1200\nG1X10Y0E1\n\
+                g1 x10 y20 e1.5 (two) f600\nG4 P500\nG91\nG1 Z0.2 F60\nG90\nG92 X0 E0\nG1 X5 E1 F300*71\nG1 E0\nG1 E2\nG20\nG0 X1\n";
+    let path = parsed(text);
+    let places: Vec<[f64; 3]> = path.moves.iter().map(|one| one.to).collect();
+    let exact = [
+        [0.01, 0.0, 0.0],
+        [0.01, 0.02, 0.0],
+        [0.01, 0.02, 2e-4],
+        [0.015, 0.02, 2e-4],
+        [0.01 + 0.0254, 0.02, 2e-4],
+    ];
+    for (place, exact) in places.iter().zip(exact) {
+        assert!((0..3).all(|d| (place[d] - exact[d]).abs() < 1e-15), "{place:?} {exact:?}");
+    }
+    assert_eq!(path.moves.iter().map(|one| one.prints).collect::<Vec<_>>(), [true, true, false, true, false]);
+    // 10 mm at 20 mm/s, 20 at 10, a wait of 0.5 s, 0.2 at 1, 5 at 5, filament 1 and 2 at 5
+    let starts = [0.0, 0.5, 3.0, 3.2, 4.8];
+    for (one, start) in path.moves.iter().zip(starts) {
+        assert!((one.start - start).abs() < 1e-12, "{one:?} {start}");
+    }
+    assert_eq!(path.notes, ["commands not used: M104 (1), M117 (1)"]);
+    let moved = path.clone().shifted([1.0, 0.0, 0.0]);
+    assert_eq!(moved.moves[0].from, [1.0, 0.0, 0.0]);
+    assert_eq!(moved.duration(), path.duration());
+}
+
+#[test]
+fn what_is_wrong_is_named_with_its_line() {
+    refused("G21\nG1 X1\n", &["a.gcode:2: velocity F: found \"0\""]);
+    refused("G1 X1 F-5\n", &["a.gcode:1: velocity F: found \"-5\""]);
+    refused("G1 F100\nG2 X1 Y1 I1\n", &["a.gcode:2: command: found \"G2\"; allowed: straight moves"]);
+    refused("G1 X1.2.3 F100\n", &["a.gcode:1: word: found \"X1.2.3 F100\""]);
+    refused("G1 X?\n", &["a.gcode:1: word: found \"?\""]);
+    let (mesh, path) = plate();
+    let text = |result: Result<Activation, Error>| result.unwrap_err().to_string();
+    assert!(
+        text(path.activation(&mesh, &[0], Bead { width: 0.0, height: 1.0 }))
+            .contains("width of the bead: found 0")
+    );
+    let bead = Bead { width: 5e-4, height: 2e-4 };
+    assert!(text(path.activation(&mesh, &[400], bead)).contains("element: found 400; allowed: below 400"));
+    assert!(text(ToolPath::default().activation(&mesh, &[0], bead)).contains("lays nothing down"));
+    let mut bad = path.clone();
+    bad.moves[3].to[1] = f64::NAN;
+    assert!(text(bad.activation(&mesh, &[0], bead)).contains("move of the path: found NaN"));
+}
+
+#[test]
+fn a_table_of_moves() {
+    let folder = std::env::temp_dir().join(format!("crystfem-path-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let write = |text: &str| {
+        let file = folder.join("moves.csv");
+        std::fs::write(&file, text).unwrap();
+        read_csv(&file, 1e-3)
+    };
+    let path = write("time [s],x [mm],y,z,print\n0,0,0,0.2,0\n1,10,0,0.2,1\n1.5,10,5,0.2,0\n").unwrap();
+    assert_eq!(path.moves.len(), 2);
+    assert_eq!(path.moves[0].to, [0.01, 0.0, 0.2e-3]);
+    assert!(path.moves[0].prints && !path.moves[1].prints);
+    let text = |result: Result<ToolPath, Error>| result.unwrap_err().to_string();
+    assert!(text(write("time,x,y,z\n0,0,0,0\n")).contains("allowed: time, x, y, z, print"));
+    assert!(
+        text(write("time,x,y,z,print\n1,0,0,0,0\n0,0,0,0,0\n")).contains("moves.csv:3: time: found \"0\"")
+    );
+    std::fs::remove_dir_all(&folder).unwrap();
+}
