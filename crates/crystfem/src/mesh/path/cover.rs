@@ -126,7 +126,8 @@ pub(super) fn activation(
     let values = |one: &Move| {
         [one.from[0], one.from[1], one.from[2], one.to[0], one.to[1], one.to[2], one.start, one.end]
     };
-    if let Some(value) = path.moves.iter().flat_map(values).find(|value| !(value.abs() <= FAR)) {
+    if let Some(value) = path.moves.iter().flat_map(values).find(|value| value.is_nan() || value.abs() > FAR)
+    {
         let allowed = format!("places and times up to {FAR:e} m and s");
         return Err(Error::Parameter { name: "move of the path", found: value, allowed });
     }
