@@ -7,16 +7,18 @@ use rust_hdf5::{H5Dataset, H5File};
 use super::{Layout, format_error};
 use crate::Error;
 
-/// An open VTKHDF file of particles; steps are read on demand.
+/// An open VTKHDF file of particles or of a mesh; steps are read on demand.
 pub struct Series {
     path: PathBuf,
     file: H5File,
     times: Vec<f64>,
+    /// Where the points of each step begin.
     offsets: Vec<usize>,
+    moves: bool,
     layout: Layout,
 }
 
-/// Opens a file written by [`super::ParticleSeries`] (the merged one or a frame).
+/// Opens a file written by [`super::ParticleSeries`] or [`super::MeshSeries`] (the merged one or a frame).
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be read, [`Error::Format`] if it is not such a file.
@@ -29,9 +31,11 @@ pub fn read(path: impl AsRef<Path>) -> Result<Series, Error> {
     let file = H5File::open(path).map_err(hdf5)?;
     let group = file.root_group().group("VTKHDF").map_err(hdf5)?;
     let kind = group.attr_string("Type").map_err(hdf5)?;
-    if kind.trim_end_matches('\0') != "PolyData" {
-        return Err(fail(&format!("its type is `{kind}`, not `PolyData`")));
-    }
+    let moves = match kind.trim_end_matches('\0') {
+        "PolyData" => true,
+        "UnstructuredGrid" => false,
+        kind => return Err(fail(&format!("its type is `{kind}`, not `PolyData` or `UnstructuredGrid`"))),
+    };
     let dataset = |name: &str| file.dataset(&format!("VTKHDF/{name}")).map_err(hdf5);
     let integers = |name: &str| dataset(name)?.read_raw::<i64>().map_err(hdf5);
     let counts = integers("NumberOfPoints")?;
@@ -49,15 +53,28 @@ pub fn read(path: impl AsRef<Path>) -> Result<Series, Error> {
     {
         return Err(fail("its steps and points do not fit together"));
     }
-    let mut arrays = Vec::new();
-    for name in group.group("PointData").and_then(|group| group.dataset_names()).map_err(hdf5)? {
-        let shape = dataset(&format!("PointData/{name}"))?.shape();
-        if shape.first() != rows.first() || shape.len() > 2 {
-            return Err(fail(&format!("the array `{name}` does not fit the points")));
+    let cells = match moves {
+        true => 0,
+        false => match integers("NumberOfCells")?[..] {
+            [count] => usize::try_from(count).map_err(|_| fail("a negative number of cells"))?,
+            _ => return Err(fail("the number of cells changes from step to step")),
+        },
+    };
+    let arrays_of = |kind: &str, count: usize| -> Result<Vec<(String, usize)>, Error> {
+        let mut arrays = Vec::new();
+        for name in group.group(kind).and_then(|group| group.dataset_names()).map_err(hdf5)? {
+            let shape = dataset(&format!("{kind}/{name}"))?.shape();
+            if shape.first().copied() != count.checked_mul(times.len()) || shape.len() > 2 {
+                return Err(fail(&format!("the array `{name}` does not fit its {count} places")));
+            }
+            arrays.push((name, shape.get(1).copied().unwrap_or(1)));
         }
-        arrays.push((name, shape.get(1).copied().unwrap_or(1)));
-    }
-    Ok(Series { path: path.to_path_buf(), file, times, offsets, layout: Layout { points, arrays } })
+        Ok(arrays)
+    };
+    let arrays = arrays_of("PointData", points)?;
+    let cell_arrays = if moves { Vec::new() } else { arrays_of("CellData", cells)? };
+    let layout = Layout { points, arrays, cells, cell_arrays };
+    Ok(Series { path: path.to_path_buf(), file, times, offsets, moves, layout })
 }
 
 impl Series {
@@ -82,12 +99,23 @@ impl Series {
         &self.layout.arrays
     }
 
+    /// Names and numbers of components of the cell arrays; none of particles.
+    pub fn cell_arrays(&self) -> &[(String, usize)] {
+        &self.layout.cell_arrays
+    }
+
+    /// Whether points have a position for each step.
+    pub(super) fn moves(&self) -> bool {
+        self.moves
+    }
+
     /// The positions at a step.
     ///
     /// # Errors
     /// [`Error::Data`] beyond the last step, [`Error::Format`] for damaged data.
     pub fn points(&self, step: usize) -> Result<Vec<[f64; 3]>, Error> {
-        let flat = self.rows("Points", 3, step)?;
+        let start = self.offsets.get(step).copied();
+        let flat = self.rows("Points", 3, start.ok_or_else(|| self.beyond(step))?, self.layout.points)?;
         Ok(flat.chunks_exact(3).map(|point| [point[0], point[1], point[2]]).collect())
     }
 
@@ -96,24 +124,47 @@ impl Series {
     /// # Errors
     /// [`Error::Data`] beyond the last step or for an unknown name, [`Error::Format`] for damaged data.
     pub fn data(&self, step: usize, name: &str) -> Result<Vec<f64>, Error> {
-        let Some((_, components)) = self.layout.arrays.iter().find(|(other, _)| other == name) else {
-            let names: Vec<&str> = self.layout.arrays.iter().map(|(name, _)| name.as_str()).collect();
+        self.array("point", &self.layout.arrays, self.layout.points, step, name)
+    }
+
+    /// A cell array at a step, the components of a cell together.
+    ///
+    /// # Errors
+    /// As [`Series::data`].
+    pub fn cell_data(&self, step: usize, name: &str) -> Result<Vec<f64>, Error> {
+        self.array("cell", &self.layout.cell_arrays, self.layout.cells, step, name)
+    }
+
+    fn array(
+        &self,
+        kind: &str,
+        arrays: &[(String, usize)],
+        count: usize,
+        step: usize,
+        name: &str,
+    ) -> Result<Vec<f64>, Error> {
+        let Some((_, components)) = arrays.iter().find(|(other, _)| other == name) else {
+            let names: Vec<&str> = arrays.iter().map(|(name, _)| name.as_str()).collect();
             let reason = format!("there is no such array; there are {}", names.join(", "));
-            return Err(Error::Data { what: format!("point array `{name}`"), reason });
+            return Err(Error::Data { what: format!("{kind} array `{name}`"), reason });
         };
-        self.rows(&format!("PointData/{name}"), *components, step)
+        if step >= self.len() {
+            return Err(self.beyond(step));
+        }
+        let group = if kind == "cell" { "CellData" } else { "PointData" };
+        self.rows(&format!("{group}/{name}"), *components, step * count, count)
     }
 
     pub(super) fn layout(&self) -> Layout {
         self.layout.clone()
     }
 
-    fn rows(&self, name: &str, columns: usize, step: usize) -> Result<Vec<f64>, Error> {
-        let Some(&start) = self.offsets.get(step) else {
-            let reason = format!("there is no step {step}; there are {}", self.len());
-            return Err(Error::Data { what: self.path.display().to_string(), reason });
-        };
-        let count = self.layout.points;
+    fn beyond(&self, step: usize) -> Error {
+        let reason = format!("there is no step {step}; there are {}", self.len());
+        Error::Data { what: self.path.display().to_string(), reason }
+    }
+
+    fn rows(&self, name: &str, columns: usize, start: usize, count: usize) -> Result<Vec<f64>, Error> {
         let slice = |dataset: H5Dataset| match dataset.ndims() {
             1 => dataset.read_slice::<f64>(&[start], &[count]),
             _ => dataset.read_slice::<f64>(&[start, 0], &[count, columns]),

@@ -115,14 +115,14 @@ fn arrays_that_do_not_fit_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("body.vtkhdf");
     let points = [[0.0; 3], [1.0; 3]];
-    let fail = |time: f64, points: &[[f64; 3]], data: &[PointData<'_>]| {
+    let fail = |time: f64, points: &[[f64; 3]], data: &[Data<'_>]| {
         let mut series = ParticleSeries::create(&path).unwrap();
         series.step(0.0, &[[0.0; 3], [1.0; 3]], &[("a", 1, &[1.0, 2.0])]).unwrap();
         let error = series.step(time, points, data).unwrap_err().to_string();
         assert_eq!(series.steps(), 1);
         error
     };
-    let a: PointData<'_> = ("a", 1, &[1.0, 2.0]);
+    let a: Data<'_> = ("a", 1, &[1.0, 2.0]);
     assert!(fail(1.0, &[], &[a]).contains("no points"));
     assert!(fail(1.0, &[[0.0; 3], [f64::NAN; 3]], &[a]).contains("point 1 is"));
     assert!(fail(0.0, &points, &[a]).contains("greater than the last"));
@@ -167,4 +167,74 @@ fn damaged_files_are_errors() {
         let result = read(&path).and_then(|series| series.points(1).and(series.data(1, "damage")));
         assert!(matches!(result, Err(Error::Format { .. })), "{length} of {} bytes: {result:?}", bytes.len());
     }
+}
+
+fn grid(directory: &Path, steps: usize) -> (PathBuf, MeshSeries) {
+    let path = directory.join("part.vtkhdf");
+    let points: Vec<[f64; 3]> =
+        (0..12).map(|k| [f64::from(k % 2), f64::from(k / 2 % 2), f64::from(k / 4)]).collect();
+    let mut cells = Cells::default();
+    cells.push(12, &[0, 1, 3, 2, 4, 5, 7, 6]);
+    cells.push(10, &[4, 5, 6, 8]);
+    let mut series = MeshSeries::create(&path, points, cells).unwrap();
+    for step in 0..steps {
+        grid_step(&mut series, step);
+    }
+    (path, series)
+}
+
+fn grid_step(series: &mut MeshSeries, step: usize) {
+    let temperature: Vec<f64> = (0..12).map(|k| (100 * step + k) as f64).collect();
+    let exists = [1.0, (step > 1) as u8 as f64];
+    series.step(step as f64, &[("temperature", 1, &temperature)], &[("exists", 1, &exists)]).unwrap();
+}
+
+#[test]
+fn fields_on_a_mesh_come_back() {
+    let directory = tempfile::tempdir().unwrap();
+    let (path, series) = grid(directory.path(), STEPS);
+    series.finish().unwrap();
+    let read = super::read(&path).unwrap();
+    assert_eq!((read.len(), read.number_of_points()), (STEPS, 12));
+    assert_eq!(read.cell_arrays(), [("exists".to_owned(), 1)]);
+    for step in [3, 0, 2, 1] {
+        assert_eq!(read.points(step).unwrap()[11], [1.0, 1.0, 2.0]);
+        assert_eq!(read.data(step, "temperature").unwrap()[7], (100 * step + 7) as f64);
+        assert_eq!(read.cell_data(step, "exists").unwrap(), [1.0, if step > 1 { 1.0 } else { 0.0 }]);
+    }
+    assert!(read.cell_data(4, "exists").unwrap_err().to_string().contains("no step 4"));
+    assert!(read.cell_data(0, "temperature").unwrap_err().to_string().contains("there are exists"));
+    let whole = fs::read(&path).unwrap();
+    let (points, cells) = (read.points(0).unwrap(), {
+        let mut cells = Cells::default();
+        cells.push(12, &[0, 1, 3, 2, 4, 5, 7, 6]);
+        cells.push(10, &[4, 5, 6, 8]);
+        cells
+    });
+    drop(read);
+    let mut series = MeshSeries::resume(&path, points, cells, 2).unwrap();
+    (2..STEPS).for_each(|step| grid_step(&mut series, step));
+    series.finish().unwrap();
+    assert_eq!(fs::read(&path).unwrap(), whole);
+}
+
+#[test]
+fn meshes_that_do_not_fit_are_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("part.vtkhdf");
+    let refused = |points: &[[f64; 3]], cells: Cells, told: &str| {
+        let error = MeshSeries::create(&path, points.to_vec(), cells).unwrap_err().to_string();
+        assert!(error.contains(told), "{error}");
+    };
+    let points = [[0.0; 3], [1.0; 3]];
+    refused(&[], Cells::default(), "no points");
+    refused(&points, Cells::default(), "no cells");
+    let mut far = Cells::default();
+    far.push(10, &[0, 1, 1, 2]);
+    refused(&points, far.clone(), "point 2 of a mesh of 2 points");
+    far.ends[0] = 3;
+    refused(&points, far, "do not fit together");
+    let (_, mut series) = grid(directory.path(), 1);
+    let error = series.step(1.0, &[("temperature", 1, &[0.0; 12])], &[("exists", 1, &[0.0; 3])]);
+    assert!(error.unwrap_err().to_string().contains("3 values for 2 cells of 1 components"));
 }

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
 
+use super::frames::Step;
+use super::mesh::Cells;
 use super::{Layout, format_error};
 use crate::Error;
 
@@ -11,73 +13,81 @@ use crate::Error;
 const CHUNK_ROWS: usize = 1 << 16;
 const DEFLATE_LEVEL: u32 = 4;
 /// The four kinds of cells of `PolyData`; ours are vertices.
-const CELLS: [&str; 4] = ["Vertices", "Lines", "Polygons", "Strips"];
+const KINDS: [&str; 4] = ["Vertices", "Lines", "Polygons", "Strips"];
 
-pub(super) struct Writer {
+pub struct Writer {
     path: PathBuf,
     file: H5File,
     group: H5Group,
     layout: Layout,
-    points: H5Dataset,
+    /// Where points move.
+    points: Option<H5Dataset>,
     arrays: Vec<H5Dataset>,
+    cell_arrays: Vec<H5Dataset>,
     times: Vec<f64>,
     steps: usize,
 }
 
 type Hdf5<T> = Result<T, rust_hdf5::Hdf5Error>;
+type Mesh = (Vec<[f64; 3]>, Cells);
 
 impl Writer {
-    /// A file for exactly `steps` steps.
-    pub(super) fn create(path: &Path, layout: &Layout, steps: usize) -> Result<Self, Error> {
-        Self::begin(path, layout, steps).map_err(|error| format_error(path, error))
+    /// A file for exactly `steps` steps; of particles where there is no mesh.
+    pub fn create(path: &Path, layout: &Layout, mesh: Option<&Mesh>, steps: usize) -> Result<Self, Error> {
+        Self::begin(path, layout, mesh, steps).map_err(|error| format_error(path, error))
     }
 
-    fn begin(path: &Path, layout: &Layout, steps: usize) -> Hdf5<Self> {
+    fn begin(path: &Path, layout: &Layout, mesh: Option<&Mesh>, steps: usize) -> Hdf5<Self> {
         let file = H5File::create(path)?;
         let group = file.create_group("VTKHDF")?;
         group.set_attr_array_numeric("Version", &[2i64, 0])?;
-        let name = b"PolyData";
+        let name: &[u8] = if mesh.is_some() { b"UnstructuredGrid" } else { b"PolyData" };
         // VTK wants a fixed-length ASCII string, null-padded
         let ascii = DatatypeMessage::FixedString { size: name.len() as u32, padding: 1, charset: 0 };
         group.set_attr_typed("Type", ascii, name.to_vec())?;
         integers(&group, "NumberOfPoints", &[layout.points as i64])?;
-        for cells in CELLS {
-            let count = if cells == "Vertices" { layout.points } else { 0 };
-            let subgroup = group.create_group(cells)?;
-            integers(&subgroup, "NumberOfCells", &[count as i64])?;
-            integers(&subgroup, "NumberOfConnectivityIds", &[count as i64])?;
-            let ids: Vec<i64> = (0..=count as i64).collect();
-            table::<i64>(&subgroup, "Connectivity", 1, count.max(1))?.append(&ids[..count])?;
-            table::<i64>(&subgroup, "Offsets", 1, count + 1)?.append(&ids)?;
-        }
         let points = table::<f64>(&group, "Points", 3, layout.points)?;
-        let point_data = group.create_group("PointData")?;
-        let datasets =
-            layout.arrays.iter().map(|(name, n)| table::<f64>(&point_data, name, *n, layout.points));
-        let arrays = datasets.collect::<Hdf5<Vec<_>>>()?;
+        let points = match mesh {
+            Some((places, cells)) => {
+                points.append(places.as_flattened())?;
+                write_cells(&group, cells)?;
+                None
+            }
+            None => {
+                write_vertices(&group, layout.points)?;
+                Some(points)
+            }
+        };
+        let tables = |name: &str, arrays: &[(String, usize)], rows: usize| {
+            let group = group.create_group(name)?;
+            arrays.iter().map(|(name, n)| table::<f64>(&group, name, *n, rows)).collect::<Hdf5<Vec<_>>>()
+        };
+        let arrays = tables("PointData", &layout.arrays, layout.points)?;
+        let cell_arrays =
+            if mesh.is_some() { tables("CellData", &layout.cell_arrays, layout.cells)? } else { Vec::new() };
         let (path, layout) = (path.to_path_buf(), layout.clone());
-        Ok(Self { path, file, group, layout, points, arrays, times: Vec::new(), steps })
+        Ok(Self { path, file, group, layout, points, arrays, cell_arrays, times: Vec::new(), steps })
     }
 
-    pub(super) fn step<'a>(
-        &mut self,
-        time: f64,
-        points: &[f64],
-        arrays: impl Iterator<Item = &'a [f64]>,
-    ) -> Result<(), Error> {
+    pub fn step(&mut self, step: &Step<'_>) -> Result<(), Error> {
         let write = || -> Hdf5<()> {
-            self.points.append(points)?;
-            for (dataset, values) in self.arrays.iter().zip(arrays) {
+            if let (Some(dataset), Some(points)) = (&self.points, step.points) {
+                dataset.append(points)?;
+            }
+            for (dataset, values) in self.arrays.iter().zip(&step.arrays) {
+                dataset.append(values)?;
+            }
+            for (dataset, values) in self.cell_arrays.iter().zip(&step.cell_arrays) {
                 dataset.append(values)?;
             }
             Ok(())
         };
         write().map_err(|error| format_error(&self.path, error))?;
-        self.times.push(time);
+        self.times.push(step.time);
         Ok(())
     }
 
-    pub(super) fn close(self) -> Result<(), Error> {
+    pub fn close(self) -> Result<(), Error> {
         let path = self.path.clone();
         self.end().map_err(|error| format_error(&path, error))
     }
@@ -88,25 +98,60 @@ impl Writer {
         let group = self.group.create_group("Steps")?;
         group.set_attr_numeric("NSteps", &(n as i64))?;
         group.new_dataset::<f64>().shape([n]).create("Values")?.write_raw(&self.times)?;
-        let rows: Vec<i64> = (0..n).map(|step| (step * self.layout.points) as i64).collect();
-        integers(&group, "PointOffsets", &rows)?;
+        let rows = |count: usize| -> Vec<i64> { (0..n).map(|step| (step * count) as i64).collect() };
+        let zeros = vec![0; n];
         // all steps share the one part; counting parts up here makes VTK 9.3 fail
-        integers(&group, "PartOffsets", &vec![0; n])?;
+        integers(&group, "PartOffsets", &zeros)?;
         integers(&group, "NumberOfParts", &vec![1; n])?;
-        for name in ["CellOffsets", "ConnectivityIdOffsets"] {
-            group.new_dataset::<i64>().shape([n, CELLS.len()]).create(name)?.write_raw(&vec![
-                0i64;
-                n * CELLS
-                    .len()
-            ])?;
+        if self.points.is_some() {
+            integers(&group, "PointOffsets", &rows(self.layout.points))?;
+            for name in ["CellOffsets", "ConnectivityIdOffsets"] {
+                let zeros = vec![0i64; n * KINDS.len()];
+                group.new_dataset::<i64>().shape([n, KINDS.len()]).create(name)?.write_raw(&zeros)?;
+            }
+        } else {
+            for name in ["PointOffsets", "CellOffsets", "ConnectivityIdOffsets"] {
+                integers(&group, name, &zeros)?;
+            }
         }
-        let offsets = group.create_group("PointDataOffsets")?;
-        for (name, _) in &self.layout.arrays {
-            integers(&offsets, name, &rows)?;
+        for (name, arrays, count) in [
+            ("PointDataOffsets", &self.layout.arrays, self.layout.points),
+            ("CellDataOffsets", &self.layout.cell_arrays, self.layout.cells),
+        ] {
+            if name == "PointDataOffsets" || !arrays.is_empty() {
+                let offsets = group.create_group(name)?;
+                for (name, _) in arrays {
+                    integers(&offsets, name, &rows(count))?;
+                }
+            }
         }
         // finalises the file and synchronises it to disk
         self.file.close()
     }
+}
+
+/// Each particle a vertex.
+fn write_vertices(group: &H5Group, points: usize) -> Hdf5<()> {
+    for kind in KINDS {
+        let count = if kind == "Vertices" { points } else { 0 };
+        let subgroup = group.create_group(kind)?;
+        integers(&subgroup, "NumberOfCells", &[count as i64])?;
+        integers(&subgroup, "NumberOfConnectivityIds", &[count as i64])?;
+        let ids: Vec<i64> = (0..=count as i64).collect();
+        table::<i64>(&subgroup, "Connectivity", 1, count.max(1))?.append(&ids[..count])?;
+        table::<i64>(&subgroup, "Offsets", 1, count + 1)?.append(&ids)?;
+    }
+    Ok(())
+}
+
+fn write_cells(group: &H5Group, cells: &Cells) -> Hdf5<()> {
+    let ids: Vec<i64> = cells.connectivity.iter().map(|&point| i64::from(point)).collect();
+    let offsets: Vec<i64> = std::iter::once(0).chain(cells.ends.iter().map(|&end| end as i64)).collect();
+    integers(group, "NumberOfCells", &[cells.len() as i64])?;
+    integers(group, "NumberOfConnectivityIds", &[ids.len() as i64])?;
+    table::<i64>(group, "Connectivity", 1, ids.len())?.append(&ids)?;
+    table::<i64>(group, "Offsets", 1, offsets.len())?.append(&offsets)?;
+    table::<u8>(group, "Types", 1, cells.len())?.append(&cells.types)
 }
 
 fn integers(group: &H5Group, name: &str, values: &[i64]) -> Hdf5<()> {
