@@ -2,7 +2,7 @@
 
 use clap::{CommandFactory, Parser, Subcommand};
 use crystfem::run::{Failure, Options};
-use crystfem::scene::{Kind, PointScene};
+use crystfem::scene::Kind;
 use polycore::scene::Source;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -122,10 +122,7 @@ fn run(scene: &Scene, kind: Option<Kind>) -> Result<bool, Failure> {
 
 fn check(path: &Path) -> Result<bool, Failure> {
     let source = Source::read(path)?;
-    let lines = match crystfem::scene::kind(&source)? {
-        Kind::Point => crystfem::run::explain(&source, &source.parse::<PointScene>()?)?,
-    };
-    for line in lines {
+    for line in crystfem::run::explain(&source)? {
         println!("{line}");
     }
     println!("{}: the scene is valid", path.display());

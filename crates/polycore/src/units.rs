@@ -263,6 +263,8 @@ dimensions! {
     HeatTransfer, HeatTransferDimension: of!(heat_transfer), "a heat transfer coefficient", "W/(m^2 K)", "50 W/(m^2 K)";
     /// A heat flux.
     HeatFlux, HeatFluxDimension: of!(heat_flux_density), "a heat flux", "W/m^2", "500 W/m^2";
+    /// Heat released per volume and time.
+    PowerDensity, PowerDensityDimension: [-1, 1, -3, 0, 0, 0, 0, 0], "a power per volume", "W/m^3", "1 W/mm^3";
     /// A thermal diffusivity or kinematic viscosity.
     Diffusivity, DiffusivityDimension: of!(diffusion_coefficient), "a diffusivity", "m^2/s", "0.11 mm^2/s";
     /// A plane angle; needs its unit.

@@ -175,6 +175,11 @@ impl Surface {
         region.faces.iter().filter(outer).map(|number| self.face(*number)).collect()
     }
 
+    /// All faces of a region, outer or not, ascending.
+    pub fn all_in(&self, region: &Region) -> Vec<Face> {
+        region.faces.iter().map(|number| self.face(*number)).collect()
+    }
+
     fn number(&self, face: Face) -> Option<u32> {
         let sides = if (face.element as usize) < self.hexahedra { 6 } else { 4 };
         ((face.element as usize) < self.elements && face.side < sides)

@@ -1,12 +1,12 @@
 //! Whole scenes: run, compared, drawn and judged.
 
 mod draw;
+mod part;
 mod point;
-
-pub use point::explain;
+mod section;
 
 use crate::error::Error;
-use crate::scene::{self, Kind, PointScene};
+use crate::scene::{self, Kind, PartScene, PointScene};
 use polycore::report::Report;
 use polycore::scene::{SceneError, Source};
 use std::path::Path;
@@ -44,6 +44,18 @@ impl From<polycore::Error> for Failure {
 pub fn run(source: &Source, options: &Options) -> Result<Report, Failure> {
     match scene::kind(source)? {
         Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, options),
+        Kind::Part => self::part::run(source, &source.parse::<PartScene>()?, options),
+    }
+}
+
+/// What a scene builds and leaves out.
+///
+/// # Errors
+/// A fault of the scene.
+pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
+    match scene::kind(source)? {
+        Kind::Point => Ok(self::point::explain(source, &source.parse::<PointScene>()?)?),
+        Kind::Part => self::part::explain(source, &source.parse::<PartScene>()?),
     }
 }
 

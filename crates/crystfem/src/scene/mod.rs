@@ -2,10 +2,16 @@
 
 mod either;
 mod material;
+mod mesh;
+mod part;
 mod point;
+mod problem;
 
 pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
+pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec};
+pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, PointScene, PointSpec};
+pub use problem::Task;
 
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
@@ -38,6 +44,8 @@ impl Default for OutputSpec {
 pub enum Kind {
     /// The material alone: `[[point]]`.
     Point,
+    /// A body in time: `[mesh]`.
+    Part,
 }
 
 /// Tells what a scene asks for by the blocks that it has.
@@ -51,11 +59,18 @@ pub fn kind(source: &Source) -> Result<Kind, SceneError> {
         #[serde(rename = "program")]
         _program: Program,
         point: Option<IgnoredAny>,
+        mesh: Option<IgnoredAny>,
     }
     let outline: Outline = source.parse()?;
-    match outline.point {
-        Some(_) => Ok(Kind::Point),
-        None => Err(source.error("program", "a scene without a task", "a block `[[point]]`")),
+    match (outline.point, outline.mesh) {
+        (Some(_), None) => Ok(Kind::Point),
+        (None, Some(_)) => Ok(Kind::Part),
+        (Some(_), Some(_)) => {
+            Err(source.error("point", "`[[point]]` beside `[mesh]`", "one of them, in a scene each"))
+        }
+        (None, None) => {
+            Err(source.error("program", "a scene without a task", "a block `[[point]]` or `[mesh]`"))
+        }
     }
 }
 

@@ -1,0 +1,85 @@
+//! States of materials as fields over nodes.
+
+use crate::element::{self, Geometry, MOST};
+use crate::simulation::Simulation;
+use crate::system::Points;
+
+impl Simulation {
+    /// Names of the quantities that materials show, each once, in the order of the materials.
+    pub fn field_names(&self) -> Vec<&'static str> {
+        let mut names = Vec::new();
+        for material in &self.problem.materials {
+            for name in material.field_names() {
+                if !names.contains(name) {
+                    names.push(*name);
+                }
+            }
+        }
+        names
+    }
+
+    /// A quantity of the materials at all nodes of the mesh: the mean of the points there, weighted by mass; NaN where no
+    /// material has it or nothing exists.
+    pub fn field(&self, name: &str) -> Vec<f64> {
+        let (problem, system) = (&self.problem, &self.system);
+        let nodes = problem.mesh.points.len();
+        let (mut sum, mut mass) = (vec![0.0; nodes], vec![0.0; nodes]);
+        let place: Vec<Option<usize>> = problem
+            .materials
+            .iter()
+            .map(|material| material.field_names().iter().position(|other| *other == name))
+            .collect();
+        let mut values = [0.0; 16];
+        let mut value = |points: &Points, stride: usize, point: usize, material: usize| -> Option<f64> {
+            let law = &problem.materials[material];
+            let place = place[material]?;
+            let (states, fields) = (law.state_names().len(), law.field_names().len());
+            let values = values.get_mut(..fields)?;
+            law.fields(&points.state[point * stride..point * stride + states], values);
+            Some(values[place])
+        };
+        for equation in 0..system.size() {
+            let node = system.nodes[equation] as usize;
+            for point in system.nodal.of(equation) {
+                let material = usize::from(system.nodal.material[point]);
+                if let Some(value) = value(&self.state.memory.nodal, system.nodal.stride, point, material) {
+                    sum[node] += system.nodal.mass[point] * value;
+                    mass[node] += system.nodal.mass[point];
+                }
+            }
+        }
+        for (index, &number) in system.general.elements.iter().enumerate() {
+            let material = usize::from(problem.material_of[number as usize]);
+            if place[material].is_none() {
+                continue;
+            }
+            let (corners, count) = element::corners(&problem.mesh, number);
+            let volumes = Geometry::new(&corners[..count]).map_or([0.0; MOST], |g| g.corner_volumes);
+            let first = system.general.starts[index] as usize;
+            for (g, &node) in problem.mesh.nodes(number).iter().enumerate() {
+                let point = first + g;
+                if let Some(value) = value(&self.state.memory.general, system.general.stride, point, material)
+                {
+                    let weight = problem.materials[material].density() * volumes[g];
+                    sum[node as usize] += weight * value;
+                    mass[node as usize] += weight;
+                }
+            }
+        }
+        sum.iter().zip(&mass).map(|(sum, mass)| if *mass > 0.0 { sum / mass } else { f64::NAN }).collect()
+    }
+
+    /// Volume that each node has of the elements named that exist, m³: the weights of means over them.
+    pub fn volumes(&self, elements: &[u32]) -> Vec<f64> {
+        let mut volumes = vec![0.0; self.problem.mesh.points.len()];
+        for &number in elements.iter().filter(|&&element| self.is_born(element)) {
+            let (corners, count) = element::corners(&self.problem.mesh, number);
+            if let Some(geometry) = Geometry::new(&corners[..count]) {
+                for (g, &node) in self.problem.mesh.nodes(number).iter().enumerate() {
+                    volumes[node as usize] += geometry.corner_volumes[g];
+                }
+            }
+        }
+        volumes
+    }
+}

@@ -1,0 +1,140 @@
+//! The mesh block of a scene.
+
+use super::material::located;
+use crate::error::Error;
+use crate::mesh::{Bar, Grid, Mesh, Substrate, quality, read};
+use polycore::scene::{SceneError, Source};
+use polycore::units::Length;
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// One of a printed bar, a brick, and a file.
+///
+/// ```toml
+/// [mesh.bar]
+/// size = ["80 mm", "10 mm"]
+/// layers = 8
+/// layer_height = "0.5 mm"
+/// elements_per_layer = 2
+/// element_size = "1 mm"
+/// substrate = { size = ["120 mm", "40 mm"], thickness = "4 mm", growth = 1.4 }
+/// ```
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshSpec {
+    /// A bar in layers, with or without a substrate.
+    pub bar: Option<BarSpec>,
+    /// A box of equal elements.
+    pub brick: Option<BrickSpec>,
+    /// A Gmsh `.msh` (4.1) or an Abaqus or CalculiX `.inp`.
+    pub file: Option<PathBuf>,
+    /// Length of a unit of the file; default 1 m.
+    pub unit: Option<Length>,
+}
+
+/// See [`Bar`].
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BarSpec {
+    /// Extents along x and y.
+    pub size: [Length; 2],
+    /// Number of layers.
+    pub layers: usize,
+    /// Height of a layer.
+    pub layer_height: Length,
+    /// Elements through a layer; default 1.
+    pub elements_per_layer: Option<usize>,
+    /// Greatest element along x and y.
+    pub element_size: Length,
+    /// What it is printed on.
+    pub substrate: Option<SubstrateSpec>,
+}
+
+/// See [`Substrate`].
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SubstrateSpec {
+    /// Extents along x and y.
+    pub size: [Length; 2],
+    /// Thickness.
+    pub thickness: Length,
+    /// Growth of elements away from the bar; default 1.5.
+    pub growth: Option<f64>,
+}
+
+/// A box with its lower corner at the origin.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BrickSpec {
+    /// Extents.
+    pub size: [Length; 3],
+    /// Elements along each axis.
+    pub elements: [usize; 3],
+}
+
+/// A mesh, and what should be looked at.
+pub struct Built {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// Notes for the user.
+    pub notes: Vec<String>,
+    /// Volume of all elements, m³.
+    pub volume: f64,
+}
+
+impl MeshSpec {
+    /// The mesh, checked.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for none or several of the alternatives, and for what the mesh refuses.
+    pub fn build(&self, source: &Source) -> Result<Built, SceneError> {
+        let given = [self.bar.is_some(), self.brick.is_some(), self.file.is_some()]
+            .into_iter()
+            .filter(|&x| x)
+            .count();
+        if given != 1 {
+            let found = if given == 0 { "nothing".to_owned() } else { format!("{given} meshes") };
+            return Err(source.error("mesh", found, "one of `bar`, `brick`, `file`"));
+        }
+        if self.unit.is_some() && self.file.is_none() {
+            return Err(source.error("mesh.unit", "a unit without a file", "nothing"));
+        }
+        let at = |key: &str, error: Error| located(source, key, &error);
+        let mut notes = Vec::new();
+        let mesh = if let Some(bar) = &self.bar {
+            bar.build().mesh().map_err(|error| at("mesh.bar", error))?
+        } else if let Some(brick) = &self.brick {
+            let size = brick.size.map(|x| x.si());
+            let grid = Grid::uniform([0.0; 3], size, brick.elements);
+            grid.and_then(|grid| grid.mesh("brick")).map_err(|error| at("mesh.brick", error))?
+        } else {
+            let file = self.file.clone().unwrap_or_default();
+            let path = source.path.parent().map_or_else(|| file.clone(), |folder| folder.join(&file));
+            let unit = self.unit.map_or(1.0, |unit| unit.si());
+            let found = read(&path, unit).map_err(|error| at("mesh.file", error))?;
+            notes = found.notes;
+            notes.extend(found.quality.notes.clone());
+            return Ok(Built { volume: found.quality.volume, mesh: found.mesh, notes });
+        };
+        let found = quality::check(&mesh, None).map_err(|error| at("mesh", error))?;
+        notes.extend(found.notes);
+        Ok(Built { mesh, notes, volume: found.volume })
+    }
+}
+
+impl BarSpec {
+    fn build(&self) -> Bar {
+        Bar {
+            size: self.size.map(|x| x.si()),
+            layers: self.layers,
+            layer_height: self.layer_height.si(),
+            elements_per_layer: self.elements_per_layer.unwrap_or(1),
+            element_size: self.element_size.si(),
+            substrate: self.substrate.as_ref().map(|substrate| Substrate {
+                size: substrate.size.map(|x| x.si()),
+                thickness: substrate.thickness.si(),
+                growth: substrate.growth.unwrap_or(1.5),
+            }),
+        }
+    }
+}

@@ -1,0 +1,301 @@
+//! The scene of a body in time: mesh, materials, layers, what acts on it.
+
+use super::{MaterialSpec, MeshSpec, Program, check_name};
+use crate::problem::Capacity;
+use crate::time::Scheme;
+use polycore::report::Expect;
+use polycore::scene::{SceneError, Source};
+use polycore::units::{
+    HeatFlux, HeatTransfer, Length, PowerDensity, Temperature, TemperatureDifference, Time,
+};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A whole scene.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PartScene {
+    /// The program that runs it: `crystfem`.
+    pub program: Program,
+    /// One line for tables and pictures.
+    #[serde(default)]
+    pub title: String,
+    /// The mesh.
+    pub mesh: MeshSpec,
+    /// The materials, by name.
+    pub materials: BTreeMap<String, MaterialSpec>,
+    /// What is made of which material.
+    pub region: Vec<RegionSpec>,
+    /// Layers that appear one after another; without it everything exists from the start.
+    pub print: Option<PrintSpec>,
+    /// What acts on surfaces.
+    #[serde(default)]
+    pub boundary: Vec<BoundarySpec>,
+    /// Heat released in a volume.
+    #[serde(default)]
+    pub source: Vec<SourceSpec>,
+    /// Times and steps.
+    #[serde(default)]
+    pub time: TimeSpec,
+    /// Places whose temperature and state are recorded in every step.
+    #[serde(default)]
+    pub probe: Vec<ProbeSpec>,
+    /// Files to write.
+    #[serde(default)]
+    pub output: PartOutput,
+    /// What the results must be.
+    #[serde(default)]
+    pub expect: Vec<Expect>,
+}
+
+/// Elements of one material. Of two regions that name an element, the later one holds.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RegionSpec {
+    /// An element set of the mesh; default: all.
+    pub elements: Option<String>,
+    /// Name of its material.
+    pub material: String,
+    /// Temperature at the start, of what exists then.
+    pub temperature: Temperature,
+}
+
+/// Elements that appear while time goes on: in layers, or along a path.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PrintSpec {
+    /// Temperature of what is laid down.
+    pub temperature: Temperature,
+    /// Element sets `PREFIX1`, `PREFIX2`, …; default `layer-`.
+    pub layers: Option<String>,
+    /// Or an element set cut into layers of `layer_height`, or printed along a `path`.
+    pub elements: Option<String>,
+    /// Height of these layers.
+    pub layer_height: Option<Length>,
+    /// From one layer to the next.
+    pub layer_time: Option<Time>,
+    /// When the first layer, or the path, begins; default 0.
+    pub start: Option<Time>,
+    /// G-code (`.gcode`, `.g`, `.nc`) or a CSV table (`time`, `x`, `y`, `z`, `print`; m and s).
+    pub path: Option<PathBuf>,
+    /// Width of what the path lays down.
+    pub bead_width: Option<Length>,
+    /// Its height.
+    pub bead_height: Option<Length>,
+    /// Elements that the path reaches within this time appear together; default: a hundredth of the path's duration.
+    pub window: Option<Time>,
+}
+
+/// What acts on a surface: one of a temperature, a flux, or a film and radiation.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoundarySpec {
+    /// `outer` (the current outer surface), a surface of the mesh, an element set, or a side of the box around the mesh:
+    /// `left`, `right`, `front`, `back`, `bottom`, `top`.
+    pub surface: String,
+    /// Surfaces that are left out of `outer`.
+    #[serde(default)]
+    pub except: Vec<String>,
+    /// Prescribed temperature.
+    pub temperature: Option<Temperature>,
+    /// Heat flux into the body.
+    pub flux: Option<HeatFlux>,
+    /// Film coefficient h.
+    pub film: Option<HeatTransfer>,
+    /// Emissivity ε.
+    pub emissivity: Option<f64>,
+    /// Temperature of the surroundings, for film and radiation.
+    pub ambient: Option<Temperature>,
+}
+
+/// Heat released in elements.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SourceSpec {
+    /// An element set of the mesh; default: all.
+    pub elements: Option<String>,
+    /// Heat per volume.
+    pub power: PowerDensity,
+}
+
+/// Times and steps: of one length, or adaptive.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TimeSpec {
+    /// When to end; default: one layer time after the last layer, or when the path ends.
+    pub end: Option<Time>,
+    /// Time integrator.
+    pub scheme: Scheme,
+    /// Steps of this length; default: adaptive.
+    pub step: Option<Time>,
+    /// Largest temporal error in a step; default 0.1 K.
+    pub tolerance: Option<TemperatureDifference>,
+    /// First step, and first after a birth; default: a millionth of the end.
+    pub first_step: Option<Time>,
+    /// Longest step; default: none.
+    pub longest_step: Option<Time>,
+    /// Lumped or consistent capacity.
+    pub capacity: Capacity,
+    /// Rms error that solves may leave; default 1e-7 K.
+    pub solver_tolerance: Option<TemperatureDifference>,
+}
+
+/// A place: the nearest node.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeSpec {
+    /// Its name: values are `NAME.temperature` and so on.
+    pub name: String,
+    /// Where.
+    pub at: [Length; 3],
+}
+
+/// Files beside the report.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PartOutput {
+    /// Pictures (PNG).
+    pub pictures: bool,
+    /// Fields as VTKHDF.
+    pub fields: bool,
+    /// Time between fields; default: a fiftieth of the whole.
+    pub every: Option<Time>,
+    /// Pictures of so many stages.
+    pub stages: usize,
+}
+
+impl Default for PartOutput {
+    fn default() -> Self {
+        Self { pictures: true, fields: true, every: None, stages: 5 }
+    }
+}
+
+impl PartScene {
+    /// Checks what can be judged without a mesh.
+    ///
+    /// # Errors
+    /// A [`SceneError`] that names the key, the value found and what is allowed.
+    pub fn check(&self, source: &Source) -> Result<(), SceneError> {
+        for name in self.materials.keys() {
+            check_name(source, &format!("materials.{name}"), name)?;
+        }
+        if self.region.is_empty() {
+            return Err(source.error("region", "nothing", "at least one [[region]]"));
+        }
+        for (index, region) in self.region.iter().enumerate() {
+            if !self.materials.contains_key(&region.material) {
+                let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
+                let key = format!("region[{index}].material");
+                return Err(source.error(&key, format!("`{}`", region.material), known.join(", ")));
+            }
+        }
+        for (index, boundary) in self.boundary.iter().enumerate() {
+            boundary.check(source, &format!("boundary[{index}]"))?;
+        }
+        for (index, probe) in self.probe.iter().enumerate() {
+            let key = format!("probe[{index}].name");
+            check_name(source, &key, &probe.name)?;
+            if self.probe[..index].iter().any(|other| other.name == probe.name) {
+                return Err(source.error(&key, format!("`{}` twice", probe.name), "names that differ"));
+            }
+        }
+        if let Some(print) = &self.print {
+            print.check(source)?;
+        } else if self.time.end.is_none() {
+            return Err(source.error("time.end", "nothing", "a time, or a [print] that ends by itself"));
+        }
+        let positive = |key: &str, value: Option<f64>| match value {
+            Some(value) if !(value > 0.0 && value.is_finite()) => {
+                Err(source.error(key, value, "above 0, finite"))
+            }
+            _ => Ok(()),
+        };
+        positive("time.end", self.time.end.map(|t| t.si()))?;
+        positive("time.step", self.time.step.map(|t| t.si()))?;
+        positive("time.first_step", self.time.first_step.map(|t| t.si()))?;
+        positive("time.longest_step", self.time.longest_step.map(|t| t.si()))?;
+        positive("time.tolerance", self.time.tolerance.map(|t| t.si()))?;
+        positive("time.solver_tolerance", self.time.solver_tolerance.map(|t| t.si()))?;
+        positive("output.every", self.output.every.map(|t| t.si()))?;
+        if self.time.step.is_some() {
+            for (key, given) in [
+                ("tolerance", self.time.tolerance.is_some()),
+                ("first_step", self.time.first_step.is_some()),
+                ("longest_step", self.time.longest_step.is_some()),
+            ] {
+                if given {
+                    let key = format!("time.{key}");
+                    return Err(source.error(&key, "a key of adaptive steps", "nothing beside `step`"));
+                }
+            }
+        }
+        if !(1..=12).contains(&self.output.stages) {
+            return Err(source.error("output.stages", self.output.stages, "1 to 12"));
+        }
+        Ok(())
+    }
+}
+
+impl BoundarySpec {
+    fn check(&self, source: &Source, key: &str) -> Result<(), SceneError> {
+        let exchange = self.film.is_some() || self.emissivity.is_some();
+        let given = [self.temperature.is_some(), self.flux.is_some(), exchange];
+        if given.iter().filter(|&&given| given).count() != 1 {
+            let allowed = "one of `temperature`, `flux`, and `film` or `emissivity` (or both)";
+            return Err(source.error(key, "none or several conditions", allowed));
+        }
+        if exchange != self.ambient.is_some() {
+            let (found, allowed) = match exchange {
+                true => ("nothing", "a temperature of the surroundings"),
+                false => ("`ambient` of another condition", "nothing"),
+            };
+            return Err(source.error(&format!("{key}.ambient"), found, allowed));
+        }
+        if !self.except.is_empty() && self.surface != "outer" {
+            let key = format!("{key}.except");
+            return Err(source.error(&key, "`except` of another surface", "`surface = \"outer\"`"));
+        }
+        Ok(())
+    }
+}
+
+impl PrintSpec {
+    fn check(&self, source: &Source) -> Result<(), SceneError> {
+        let path = self.path.is_some();
+        let needed = [
+            ("layer_time", self.layer_time.is_some(), !path, !path),
+            ("layer_height", self.layer_height.is_some(), false, !path && self.elements.is_some()),
+            ("layers", self.layers.is_some(), false, !path && self.elements.is_none()),
+            ("bead_width", self.bead_width.is_some(), path, path),
+            ("bead_height", self.bead_height.is_some(), path, path),
+            ("window", self.window.is_some(), false, path),
+            ("elements", self.elements.is_some(), path || self.layer_height.is_some(), true),
+        ];
+        for (name, given, needed, allowed) in needed {
+            let key = format!("print.{name}");
+            let of = if path { "a path" } else { "layers" };
+            if needed && !given {
+                return Err(source.error(&key, "nothing", format!("`{name}`: {of} need it")));
+            }
+            if given && !allowed {
+                return Err(source.error(&key, format!("`{name}` of {of}"), "nothing"));
+            }
+        }
+        for (name, value) in [
+            ("layer_time", self.layer_time.map(|t| t.si())),
+            ("layer_height", self.layer_height.map(|t| t.si())),
+            ("bead_width", self.bead_width.map(|t| t.si())),
+            ("bead_height", self.bead_height.map(|t| t.si())),
+            ("window", self.window.map(|t| t.si())),
+        ] {
+            if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
+                return Err(source.error(&format!("print.{name}"), value, "above 0, finite"));
+            }
+        }
+        match self.start.map(|t| t.si()).filter(|t| !(*t >= 0.0 && t.is_finite())) {
+            Some(start) => Err(source.error("print.start", start, "0 s or later, finite")),
+            None => Ok(()),
+        }
+    }
+}

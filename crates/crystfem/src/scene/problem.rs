@@ -1,0 +1,258 @@
+//! From a scene to a problem of heat conduction.
+
+use super::material::located;
+use super::part::{BoundarySpec, PartScene, PrintSpec};
+use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
+use crate::error::Error;
+use crate::mesh::layers::{Layers, groups};
+use crate::mesh::path::{Bead, ToolPath, read_csv, read_gcode};
+use crate::mesh::surface::Surface;
+use crate::mesh::{Face, Mesh};
+use crate::problem::{Birth, Problem};
+use crate::simulation::Settings;
+use crate::time::Steps;
+use polycore::scene::{SceneError, Source};
+use std::sync::Arc;
+
+/// Temporal error in a step, K, and rms error of solves, K, unless a scene says otherwise.
+const TOLERANCE: f64 = 0.1;
+const SOLVES: f64 = 1e-7;
+/// First step over the end, and smallest over the first.
+const FIRST: f64 = 1e-6;
+const SMALLEST: f64 = 1e-3;
+
+/// What a scene asks to solve.
+pub struct Task {
+    /// The problem.
+    pub problem: Problem,
+    /// How.
+    pub settings: Settings,
+    /// When to end, s.
+    pub end: f64,
+    /// Elements that are printed, ascending; all where nothing is.
+    pub printed: Vec<u32>,
+    /// Elements of each layer, where there are layers.
+    pub layers: Vec<Vec<u32>>,
+    /// What should be looked at.
+    pub notes: Vec<String>,
+}
+
+impl PartScene {
+    /// The problem on a mesh.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for sets and surfaces that the mesh lacks, elements without a material, and for what
+    /// [`Problem::check`] refuses.
+    pub fn task(&self, source: &Source, mesh: Mesh) -> Result<Task, SceneError> {
+        let mut notes = Vec::new();
+        let (materials, material_of, temperature_of) = self.regions(source, &mesh)?;
+        let conditions = self.conditions(source, &mesh)?;
+        let mut heats = Vec::new();
+        for (index, spec) in self.source.iter().enumerate() {
+            let elements =
+                elements(source, &mesh, &format!("source[{index}].elements"), spec.elements.as_deref())?;
+            heats.push(Heat { elements, power: Field::constant(spec.power.si()) });
+        }
+        let mut births = Vec::new();
+        let mut layers = Vec::new();
+        let mut by_itself = 0.0;
+        if let Some(print) = &self.print {
+            let laid = print.laid(source, &mesh, &mut notes)?;
+            (births, layers, by_itself) = (laid.births, laid.layers, laid.end);
+        }
+        let end = self.time.end.map_or(by_itself, |end| end.si());
+        if let Some(late) = births.iter().find(|birth| birth.time >= end) {
+            let allowed = format!("after the last birth, at {} s", births.last().unwrap_or(late).time);
+            return Err(source.error("time.end", format!("{end} s"), allowed));
+        }
+        let mut printed: Vec<u32> = births.iter().flat_map(|birth| birth.elements.iter().copied()).collect();
+        printed.sort_unstable();
+        if printed.is_empty() {
+            printed = (0..mesh.element_count() as u32).collect();
+        }
+        let initial = initial(&mesh, &temperature_of);
+        let capacity = self.time.capacity;
+        let problem =
+            Problem { mesh, materials, material_of, initial, conditions, sources: heats, births, capacity };
+        problem.check().map_err(|error| located(source, "mesh", &error))?;
+        Ok(Task { problem, settings: self.settings(end), end, printed, layers, notes })
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn regions(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+    ) -> Result<(Vec<Arc<dyn crate::material::ThermalMaterial>>, Vec<u16>, Vec<f64>), SceneError> {
+        let mut materials: Vec<Arc<dyn crate::material::ThermalMaterial>> = Vec::new();
+        for (name, spec) in &self.materials {
+            materials.push(spec.build(source, &format!("materials.{name}"))?.into());
+        }
+        let mut material_of = vec![u16::MAX; mesh.element_count()];
+        let mut temperature_of = vec![f64::NAN; mesh.element_count()];
+        for (index, region) in self.region.iter().enumerate() {
+            let key = format!("region[{index}].elements");
+            let material = self.materials.keys().position(|name| *name == region.material).unwrap_or(0);
+            for element in elements(source, mesh, &key, region.elements.as_deref())? {
+                material_of[element as usize] = material as u16;
+                temperature_of[element as usize] = region.temperature.si();
+            }
+        }
+        if let Some(bare) = material_of.iter().position(|&material| material == u16::MAX) {
+            let [x, y, z] = mesh.centre(bare as u32);
+            let found = format!("element {bare} at ({x:.4e}, {y:.4e}, {z:.4e}) m without a material");
+            return Err(source.error("region", found, "regions that cover all elements"));
+        }
+        Ok((materials, material_of, temperature_of))
+    }
+
+    fn conditions(&self, source: &Source, mesh: &Mesh) -> Result<Vec<Condition>, SceneError> {
+        let surface = Surface::of_all(mesh).map_err(|error| located(source, "mesh", &error))?;
+        let faces = |key: &str, name: &str| -> Result<Vec<Face>, SceneError> {
+            let region = surface.region(mesh, name);
+            region.map(|region| surface.all_in(&region)).map_err(|error| located(source, key, &error))
+        };
+        let mut conditions = Vec::new();
+        for (index, spec) in self.boundary.iter().enumerate() {
+            let key = format!("boundary[{index}]");
+            let place = if spec.surface == "outer" {
+                let mut except = Vec::new();
+                for name in &spec.except {
+                    except.extend(faces(&format!("{key}.except"), name)?);
+                }
+                Where::Outer { except }
+            } else {
+                Where::Faces(faces(&format!("{key}.surface"), &spec.surface)?)
+            };
+            conditions.extend(spec.conditions(mesh, place));
+        }
+        Ok(conditions)
+    }
+
+    fn settings(&self, end: f64) -> Settings {
+        let time = &self.time;
+        let steps = match time.step {
+            Some(step) => Steps::Fixed { dt: step.si() },
+            None => {
+                let first = time.first_step.map_or(FIRST * end, |first| first.si());
+                Steps::Adaptive {
+                    tolerance: time.tolerance.map_or(TOLERANCE, |tolerance| tolerance.si()),
+                    first,
+                    smallest: SMALLEST * first,
+                    largest: time.longest_step.map_or(f64::INFINITY, |longest| longest.si()).max(first),
+                }
+            }
+        };
+        let tolerance = time.solver_tolerance.map_or(SOLVES, |tolerance| tolerance.si());
+        Settings { scheme: time.scheme, steps, tolerance }
+    }
+}
+
+impl BoundarySpec {
+    fn conditions(&self, mesh: &Mesh, place: Where) -> Vec<Condition> {
+        let mut conditions = Vec::new();
+        if let Some(temperature) = self.temperature {
+            let nodes = match &place {
+                Where::Faces(faces) => mesh.nodes_of(faces),
+                Where::Outer { .. } => Vec::new(),
+            };
+            conditions.push(Condition::Temperature { nodes, value: Field::constant(temperature.si()) });
+        }
+        if let Some(flux) = self.flux {
+            conditions.push(Condition::Flux { surface: place.clone(), inward: Field::constant(flux.si()) });
+        }
+        let ambient = Schedule::constant(self.ambient.map_or(0.0, |ambient| ambient.si()));
+        if let Some(film) = self.film {
+            let (surface, coefficient, ambient) = (place.clone(), film.si(), ambient.clone());
+            conditions.push(Condition::Film { surface, coefficient, ambient });
+        }
+        if let Some(emissivity) = self.emissivity {
+            conditions.push(Condition::Radiation { surface: place, emissivity, ambient });
+        }
+        conditions
+    }
+}
+
+/// What is laid down when.
+struct Laid {
+    births: Vec<Birth>,
+    layers: Vec<Vec<u32>>,
+    /// When it is over, s.
+    end: f64,
+}
+
+impl PrintSpec {
+    fn laid(&self, source: &Source, mesh: &Mesh, notes: &mut Vec<String>) -> Result<Laid, SceneError> {
+        let start = self.start.map_or(0.0, |start| start.si());
+        let temperature = self.temperature.si();
+        let at = |key: &str, error: Error| located(source, key, &error);
+        if let Some(file) = &self.path {
+            let path = source.path.parent().map_or_else(|| file.clone(), |folder| folder.join(file));
+            let table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+            let tool: ToolPath = if table { read_csv(&path, 1.0) } else { read_gcode(&path) }
+                .map_err(|error| at("print.path", error))?;
+            notes.extend(tool.notes.iter().cloned());
+            let elements = elements(source, mesh, "print.elements", self.elements.as_deref())?;
+            let bead = Bead {
+                width: self.bead_width.map_or(0.0, |width| width.si()),
+                height: self.bead_height.map_or(0.0, |height| height.si()),
+            };
+            let mut activation =
+                tool.activation(mesh, &elements, bead).map_err(|error| at("print.path", error))?;
+            if activation.fill(mesh) > 0 {
+                notes.push(format!("{} elements are never reached by the path", activation.missed.len()));
+            }
+            let window = self.window.map_or(0.01 * tool.duration(), |window| window.si());
+            let groups = groups(&activation.times, window).map_err(|error| at("print.window", error))?;
+            let births = groups
+                .into_iter()
+                .map(|(time, elements)| Birth { time: start + time, elements, temperature })
+                .collect();
+            return Ok(Laid { births, layers: Vec::new(), end: start + tool.duration() });
+        }
+        let layers = match (&self.elements, self.layer_height) {
+            (Some(set), Some(height)) => {
+                let elements = elements(source, mesh, "print.elements", Some(set))?;
+                Layers::from_height(mesh, &elements, height.si())
+                    .map_err(|error| at("print.layer_height", error))?
+            }
+            _ => Layers::from_sets(mesh, self.layers.as_deref().unwrap_or("layer-"))
+                .map_err(|error| at("print.layers", error))?,
+        };
+        notes.extend(layers.notes);
+        let interval = self.layer_time.map_or(0.0, |time| time.si());
+        let births = layers.elements.iter().enumerate().map(|(layer, elements)| Birth {
+            time: start + layer as f64 * interval,
+            elements: elements.clone(),
+            temperature,
+        });
+        let births: Vec<Birth> = births.collect();
+        let end = start + births.len() as f64 * interval;
+        Ok(Laid { births, layers: layers.elements, end })
+    }
+}
+
+/// An element set, or all elements.
+fn elements(source: &Source, mesh: &Mesh, key: &str, name: Option<&str>) -> Result<Vec<u32>, SceneError> {
+    let Some(name) = name else { return Ok((0..mesh.element_count() as u32).collect()) };
+    mesh.element_sets.get(name).cloned().ok_or_else(|| {
+        let known: Vec<&str> = mesh.element_sets.keys().map(String::as_str).collect();
+        source.error(key, format!("`{name}`"), format!("an element set of the mesh: {}", known.join(", ")))
+    })
+}
+
+/// Temperatures at nodes: that of the last element there; a node that two regions share takes that of the later one.
+fn initial(mesh: &Mesh, temperature_of: &[f64]) -> Field {
+    let first = temperature_of.first().copied().unwrap_or(0.0);
+    if temperature_of.iter().all(|&temperature| temperature == first) {
+        return Field::constant(first);
+    }
+    // by place, as the problem asks; places of nodes are exact
+    let mut at = std::collections::HashMap::new();
+    for (element, &temperature) in temperature_of.iter().enumerate() {
+        for &node in mesh.nodes(element as u32) {
+            at.insert(mesh.points[node as usize].map(f64::to_bits), temperature);
+        }
+    }
+    Field::function(move |place, _| at.get(&place.map(f64::to_bits)).copied().unwrap_or(first))
+}
