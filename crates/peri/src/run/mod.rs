@@ -18,7 +18,7 @@ use crate::checkpoint;
 use crate::error::Error;
 use crate::potential::{BondPotential, KernelFit};
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
-use crate::solver::{AdaptiveDynamicRelaxation, Breaking, Loads, State, Status, System};
+use crate::solver::{Breaking, Loads, State, Status, System, march};
 use crate::stress::{Loaded, Tensor, piola_in_cloud, piola_on_lattice};
 use polycore::report::{Phases, Report};
 use polycore::scene::{SceneError, Source};
@@ -260,12 +260,6 @@ fn solve<const D: usize>(
     frames: &mut Frames,
 ) -> Result<(), Failure> {
     let Solution { variant, finished, law, modulus, loads, critical_stretch } = *solution;
-    let solver = AdaptiveDynamicRelaxation {
-        tolerance: scene.solver.tolerance,
-        max_iterations: scene.solver.max_iterations,
-        accept: scene.solver.accept.unwrap_or(0.0),
-        mass_safety: scene.solver.mass_safety.unwrap_or(scene.material.law.mass_safety()),
-    };
     let steps = scene.solver.steps;
     let factors: Vec<f64> = (1..=steps).map(|s| s as f64 / steps as f64).collect();
     let name = variant.name();
@@ -295,7 +289,7 @@ fn solve<const D: usize>(
     };
     let solved = match &scene.dynamics {
         Some(dynamics) => dynamics.method().solve(&mut system, state, &mut watch, &mut finished),
-        None => solver.solve(&mut system, state, &mut watch, &mut finished),
+        None => march(&mut *scene.equilibria(), &mut system, state, &mut watch, &mut finished),
     };
     phases.stop();
     Ok(solved?)

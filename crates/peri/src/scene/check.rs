@@ -256,6 +256,10 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     within("steps", solver.steps as f64, 1.0, 1e6)?;
     within("max_iterations", solver.max_iterations as f64, 1.0, 1e9)?;
     within("mass_safety", solver.mass_safety.unwrap_or(1.1), 1.0, 100.0)?;
+    if solver.mass_safety.is_some() && solver.method != Method::Adr {
+        let found = format!("`mass_safety` of `{}`", solver.method.name());
+        return Err(source.error("solver.mass_safety", found, "nothing: only `adr` has a fictitious mass"));
+    }
     within("accept", solver.accept.unwrap_or(0.0), 0.0, 1.0)?;
     within("stop_below", solver.stop_below.unwrap_or(0.0), 0.0, 1.0)
 }
