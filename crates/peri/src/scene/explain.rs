@@ -29,7 +29,7 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bon
     if scene.material.critical.is_some() {
         builds("bonds that break, damage, a count of the bonds of each particle".to_owned());
     }
-    if scene.solver.method == Method::Lbfgs {
+    if scene.method() == Method::Lbfgs {
         builds("ten pairs of steps and gradient changes, a coarse level with its factors".to_owned());
     }
     if let Some(dynamics) = &scene.dynamics {

@@ -12,8 +12,8 @@ use serde::Deserialize;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Solver {
-    /// Method.
-    pub method: Method,
+    /// Method; default: [`Scene::method`].
+    pub method: Option<Method>,
     /// Out-of-balance force over reference force.
     pub tolerance: f64,
     /// Load steps from 0 to the full load.
@@ -35,7 +35,7 @@ pub struct Solver {
 impl Default for Solver {
     fn default() -> Self {
         Self {
-            method: Method::Adr,
+            method: None,
             tolerance: 1e-3,
             steps: 1,
             max_iterations: 200_000,
@@ -72,11 +72,18 @@ impl Method {
 }
 
 impl Scene {
+    /// The method: L-BFGS unless told otherwise, and dynamic relaxation where bonds break, which asks for many
+    /// equilibria near each other.
+    pub fn method(&self) -> Method {
+        let breaks = self.material.critical.is_some();
+        self.solver.method.unwrap_or(if breaks { Method::Adr } else { Method::Lbfgs })
+    }
+
     /// The quasi-static method with the settings of this scene.
     pub fn equilibria<const D: usize>(&self) -> Box<dyn Equilibrium<D>> {
         let Solver { tolerance, max_iterations, .. } = self.solver;
         let accept = self.solver.accept.unwrap_or(0.0);
-        match self.solver.method {
+        match self.method() {
             Method::Lbfgs => {
                 let plain = PreconditionedLbfgs::default();
                 Box::new(LimitedMemory::new(PreconditionedLbfgs {
