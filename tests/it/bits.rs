@@ -37,7 +37,7 @@ fn cracked_bar_in_three_dimensions() {
 /// A sheet torn apart, its bonds looked at in equilibrium or in every iteration.
 #[test]
 fn fracture() {
-    for solver in ["", "breaking = \"each-iteration\""] {
+    for solver in ["", "breaking = \"each-iteration\"", "method = \"lbfgs\""] {
         let directory = tempfile::tempdir().unwrap();
         let here = directory.path();
         fs::write(here.join("scene.toml"), scenes::fracture("4 mm", solver)).unwrap();

@@ -221,7 +221,7 @@ source = "a coarse lattice is below Kirsch's peak"
     let work = |name: &str| report["work"][name].as_u64().unwrap_or_else(|| panic!("no work `{name}`"));
     assert_eq!(work("particles"), particles_of_the_plate() as u64);
     assert_eq!(work("steps"), 1);
-    assert!(work("iterations") > 100 && work("force_evaluations") > work("iterations"));
+    assert!(work("iterations") > 5 && work("force_evaluations") > work("iterations"));
     assert_eq!(work("bond_evaluations"), work("directed_bonds") * work("force_evaluations"));
     assert!(work("bytes_bonds") <= 200 * work("particles"), "{:#}", report["work"]);
     for phase in ["build", "solve", "stress hardy", "stress one-point"] {

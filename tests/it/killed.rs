@@ -11,6 +11,11 @@ use std::time::{Duration, Instant};
 /// A plate of two variants that runs for about a second and a half on one thread.
 const LONG: (&str, &str) = ("\"10 mm\", \"5 mm\"", "1e-7");
 
+/// The slower method, so that there is something to interrupt.
+fn relaxed(scene: &str) -> String {
+    scene.replace("[solver]", "[solver]\nmethod = \"adr\"")
+}
+
 fn start(arguments: &str, here: &Path) -> Child {
     command("peri", arguments, here).spawn().unwrap()
 }
@@ -54,13 +59,14 @@ fn interrupt(here: &Path, signal: &str) -> crate::program::Ended {
 
 #[test]
 fn killed_at_random_times() {
-    survives_kills(&scenes::plate(LONG.0, LONG.1));
+    survives_kills(&relaxed(&scenes::plate(LONG.0, LONG.1)));
 }
 
 /// Broken bonds, histories and the fields of stages come back with the rest.
 #[test]
 fn killed_while_it_breaks() {
     survives_kills(&scenes::fracture("2 mm", ""));
+    survives_kills(&scenes::fracture("2 mm", "method = \"lbfgs\""));
 }
 
 fn survives_kills(scene: &str) {
@@ -107,6 +113,7 @@ fn interrupted_by_the_user() {
     ] {
         let directory = tempfile::tempdir().unwrap();
         let here = directory.path();
+        let scene = relaxed(&scene);
         fs::write(here.join("scene.toml"), &scene).unwrap();
         if let Some(points) = &points {
             fs::write(here.join("points.csv"), points).unwrap();
@@ -134,7 +141,7 @@ fn interrupted_by_the_user() {
 fn checkpoints_that_cannot_be_used() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    fs::write(here.join("scene.toml"), scenes::strip().replace("1e-6", "1e-9")).unwrap();
+    fs::write(here.join("scene.toml"), relaxed(&scenes::strip().replace("1e-6", "1e-9"))).unwrap();
     fs::write(here.join("points.csv"), scenes::points()).unwrap();
     peri("run scene.toml --output undisturbed", here).with_code(0);
     interrupt(here, "-KILL");

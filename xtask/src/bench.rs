@@ -15,16 +15,17 @@ mod forces;
 mod lammps;
 mod langevin;
 mod peri_peers;
+mod peri_solvers;
 
 /// What to measure.
 #[derive(clap::Args)]
 pub struct Options {
-    /// `langevin`, `peri-peers` (beside LAMMPS), or a program with a `bench --json` of its own.
+    /// `langevin`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, or a program with a `bench --json` of its own.
     name: String,
     /// Print the rows as JSON.
     #[arg(long)]
     json: bool,
-    /// Passed on to that program after `bench --json`.
+    /// Passed on to that program after `bench --json`; spacings of `peri-solvers`.
     #[arg(last = true)]
     arguments: Vec<String>,
 }
@@ -56,6 +57,10 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             (rows, table, true)
         }
         "peri-peers" => peri_peers::run(workspace, &folder)?,
+        "peri-solvers" => {
+            let (rows, table) = peri_solvers::run(workspace, &folder, &options.arguments)?;
+            (rows, table, true)
+        }
         program => {
             let rows = external(&workspace.release(program)?, &options.arguments)?;
             let table = text(&rows);

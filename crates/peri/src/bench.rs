@@ -11,6 +11,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 mod block;
+mod solvers;
 
 /// Horizon over spacing of every measurement.
 const RATIO: f64 = 3.015;
@@ -31,6 +32,8 @@ pub struct Bench {
     bench_threads: Vec<usize>,
     #[command(flatten)]
     block: block::Options,
+    #[command(flatten)]
+    solvers: solvers::Options,
 }
 
 #[derive(Serialize)]
@@ -47,6 +50,7 @@ impl Bench {
     pub fn print(self) -> Result<bool, Failure> {
         let rows = match self.block.block {
             Some(cells) => block::measure(cells, &self.block)?,
+            None if !self.solvers.solvers.is_empty() => solvers::measure(&self.solvers.solvers)?,
             None => self.rates()?,
         };
         if self.json {

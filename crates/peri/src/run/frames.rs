@@ -302,6 +302,9 @@ pub fn stages(
     // the longest bond in the picture is as long as the critical stretch lets it be
     let bridge = 1.6 * outcome.get("critical_stretch").unwrap_or(1.0);
     let mut map = FieldMap::new().lengths("mm", 1e-3).columns(stages.len()).size(420);
+    if !flat {
+        map = map.axes(["x", "z"]);
+    }
     // a crushed particle's Cauchy stress would take all the colours
     let mut all: Vec<f64> = stages.iter().flat_map(|stage| stage.stress.iter().copied()).collect();
     all.sort_by(f64::total_cmp);

@@ -18,12 +18,15 @@ use crate::checkpoint;
 use crate::error::Error;
 use crate::potential::{BondPotential, KernelFit};
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
-use crate::solver::{AdaptiveDynamicRelaxation, Breaking, Loads, State, Status, System};
+use crate::solver::{Breaking, Loads, State, Status, System, march};
 use crate::stress::{Loaded, Tensor, piola_in_cloud, piola_on_lattice};
 use polycore::report::{Phases, Report};
 use polycore::scene::{SceneError, Source};
 use std::path::Path;
 use std::time::{Duration, Instant};
+
+/// How long a run that is asked to stop looks for a moment from which it can go on.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// How a run behaves towards its user.
 pub struct Options<'a> {
@@ -260,27 +263,28 @@ fn solve<const D: usize>(
     frames: &mut Frames,
 ) -> Result<(), Failure> {
     let Solution { variant, finished, law, modulus, loads, critical_stretch } = *solution;
-    let solver = AdaptiveDynamicRelaxation {
-        tolerance: scene.solver.tolerance,
-        max_iterations: scene.solver.max_iterations,
-        accept: scene.solver.accept.unwrap_or(0.0),
-        mass_safety: scene.solver.mass_safety.unwrap_or(scene.material.law.mass_safety()),
-    };
     let steps = scene.solver.steps;
     let factors: Vec<f64> = (1..=steps).map(|s| s as f64 / steps as f64).collect();
     let name = variant.name();
-    let mut written = Instant::now();
+    let (mut written, mut asked) = (Instant::now(), None);
     let (output, quick, every, interrupted) =
         (options.output, options.quick, options.checkpoint_every, options.interrupted);
     let progress = &mut *options.progress;
     let mut watch = |status: &Status, state: &State<D>| -> Result<(), Error> {
         progress(&name, status);
-        let stop = interrupted() && status.restartable;
-        if stop || (status.restartable && written.elapsed() >= every) {
+        let stop = interrupted();
+        if status.restartable && (stop || written.elapsed() >= every) {
             checkpoint::write(output, source, quick, finished, Some(state))?;
             written = Instant::now();
         }
-        if stop { Err(Error::Interrupted(output.to_path_buf())) } else { Ok(()) }
+        if stop {
+            let since = *asked.get_or_insert_with(Instant::now);
+            // the last checkpoint will do where the next restartable moment is far
+            if status.restartable || since.elapsed() > PATIENCE {
+                return Err(Error::Interrupted(output.to_path_buf()));
+            }
+        }
+        Ok(())
     };
     let mut system = System::new(&mut *body.bonds, law, modulus, loads, &factors);
     system.fit_bound = scene.fit_bound();
@@ -295,7 +299,7 @@ fn solve<const D: usize>(
     };
     let solved = match &scene.dynamics {
         Some(dynamics) => dynamics.method().solve(&mut system, state, &mut watch, &mut finished),
-        None => solver.solve(&mut system, state, &mut watch, &mut finished),
+        None => march(&mut *scene.equilibria(), &mut system, state, &mut watch, &mut finished),
     };
     phases.stop();
     Ok(solved?)

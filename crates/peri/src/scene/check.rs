@@ -75,7 +75,7 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 }
 
 fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
-    let explicit = scene.solver.method == Method::Verlet;
+    let explicit = scene.method() == Method::Verlet;
     match &scene.dynamics {
         None if explicit => {
             let allowed = "a [dynamics] block with `density` and `end_time`: `verlet` needs it";
@@ -256,6 +256,14 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     within("steps", solver.steps as f64, 1.0, 1e6)?;
     within("max_iterations", solver.max_iterations as f64, 1.0, 1e9)?;
     within("mass_safety", solver.mass_safety.unwrap_or(1.1), 1.0, 100.0)?;
+    if solver.mass_safety.is_some() && scene.method() != Method::Adr {
+        let found = format!("`mass_safety` of `{}`", scene.method().name());
+        return Err(source.error(
+            "solver.mass_safety",
+            found,
+            "nothing, or `method = \"adr\"`: only it has a fictitious mass",
+        ));
+    }
     within("accept", solver.accept.unwrap_or(0.0), 0.0, 1.0)?;
     within("stop_below", solver.stop_below.unwrap_or(0.0), 0.0, 1.0)
 }

@@ -1,7 +1,7 @@
 //! What a scene will build, and what it leaves out.
 
 use super::variant::Variant;
-use super::{Scene, SurfaceCorrection};
+use super::{Method, Scene, SurfaceCorrection};
 use crate::bonds::{Bonds, VolumeCorrection};
 
 /// Lines for `peri check`.
@@ -28,6 +28,9 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bon
     ));
     if scene.material.critical.is_some() {
         builds("bonds that break, damage, a count of the bonds of each particle".to_owned());
+    }
+    if scene.method() == Method::Lbfgs {
+        builds("ten pairs of steps and gradient changes, a coarse level with its factors".to_owned());
     }
     if let Some(dynamics) = &scene.dynamics {
         let method = dynamics.method();

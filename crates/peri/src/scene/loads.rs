@@ -30,7 +30,7 @@ pub fn loads_of<const D: usize>(
         regions.push((members, support));
     }
     let loads = Loads::new(body.bonds.slots(), &regions);
-    if scene.solver.method == Method::Verlet {
+    if scene.method() == Method::Verlet {
         // a body in motion needs neither balance nor hold
         return Ok((loads, loaded));
     }

@@ -1,6 +1,10 @@
 //! What a scene says of its solver: quasi-static methods and explicit dynamics.
 
-use crate::solver::{Policy, VelocityVerlet};
+use super::Scene;
+use crate::solver::{
+    AdaptiveDynamicRelaxation, Equilibrium, LimitedMemory, Policy, PreconditionedLbfgs, Relaxation,
+    VelocityVerlet,
+};
 use polycore::units::{Density, Rate, Time};
 use serde::Deserialize;
 
@@ -8,8 +12,8 @@ use serde::Deserialize;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Solver {
-    /// Method.
-    pub method: Method,
+    /// Method; default: [`Scene::method`].
+    pub method: Option<Method>,
     /// Out-of-balance force over reference force.
     pub tolerance: f64,
     /// Load steps from 0 to the full load.
@@ -18,7 +22,7 @@ pub struct Solver {
     pub max_iterations: u64,
     /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break.
     pub fit_bound: Option<f64>,
-    /// Factor on the fictitious mass; default by law.
+    /// Factor on the fictitious mass of dynamic relaxation; default by law.
     pub mass_safety: Option<f64>,
     /// Go on from a search that has used all its iterations if its residual is below this; default: that is an error.
     pub accept: Option<f64>,
@@ -31,7 +35,7 @@ pub struct Solver {
 impl Default for Solver {
     fn default() -> Self {
         Self {
-            method: Method::Adr,
+            method: None,
             tolerance: 1e-3,
             steps: 1,
             max_iterations: 200_000,
@@ -50,8 +54,52 @@ impl Default for Solver {
 pub enum Method {
     /// Adaptive dynamic relaxation, quasi-static.
     Adr,
+    /// Preconditioned L-BFGS, quasi-static.
+    Lbfgs,
     /// Velocity Verlet: explicit dynamics, with a `[dynamics]` block.
     Verlet,
+}
+
+impl Method {
+    /// Its name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Adr => "adr",
+            Self::Lbfgs => "lbfgs",
+            Self::Verlet => "verlet",
+        }
+    }
+}
+
+impl Scene {
+    /// The method: L-BFGS unless told otherwise, and dynamic relaxation where bonds break, which asks for many
+    /// equilibria near each other.
+    pub fn method(&self) -> Method {
+        let breaks = self.material.critical.is_some();
+        self.solver.method.unwrap_or(if breaks { Method::Adr } else { Method::Lbfgs })
+    }
+
+    /// The quasi-static method with the settings of this scene.
+    pub fn equilibria<const D: usize>(&self) -> Box<dyn Equilibrium<D>> {
+        let Solver { tolerance, max_iterations, .. } = self.solver;
+        let accept = self.solver.accept.unwrap_or(0.0);
+        match self.method() {
+            Method::Lbfgs => {
+                let plain = PreconditionedLbfgs::default();
+                Box::new(LimitedMemory::new(PreconditionedLbfgs {
+                    tolerance,
+                    max_iterations,
+                    accept,
+                    ..plain
+                }))
+            }
+            Method::Adr | Method::Verlet => {
+                let mass_safety = self.solver.mass_safety.unwrap_or(self.material.law.mass_safety());
+                let settings = AdaptiveDynamicRelaxation { tolerance, max_iterations, accept, mass_safety };
+                Box::new(Relaxation::new(settings))
+            }
+        }
+    }
 }
 
 /// Explicit dynamics: loads rise linearly over the ramp and then stay.

@@ -8,7 +8,7 @@ use super::memory::{Memory, product};
 use super::passes::{Sums, force_pass};
 use super::preconditioner::Preconditioner;
 use super::system::{State, Status, System};
-use crate::bonds::{Bonds, StretchRange};
+use crate::bonds::{Bonds, StretchRange, stretch_range};
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use rayon::prelude::*;
@@ -28,6 +28,11 @@ const CURVATURE: f64 = 1e-3;
 /// Largest growth of the greatest stretch in a step, and least part of the smallest that is left.
 const STRETCH: f64 = 0.3;
 const CRUSH: f64 = 0.6;
+
+/// Largest change of a bond over its length in a step where bonds soften, so that none leaps over its energy's maximum.
+const LEAP: f64 = 0.3;
+/// Scale at which a direction dwarfs the bonds; a power of 2, so that nothing is rounded.
+const FAR: f64 = (1_u64 << 40) as f64;
 
 /// Settings of the method.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -251,9 +256,10 @@ impl<const D: usize> LimitedMemory<D> {
         slope: f64,
     ) -> Result<Search, Error> {
         let [least, most] = allowed(start.met);
+        let longest = self.longest_step(system, state, most);
         // the slope is too steep below `low` and has turned, or the body is torn, above `high`
         let (mut low, mut low_slope, mut high) = (0.0, slope, f64::INFINITY);
-        let (mut at, mut step) = (0.0, 1.0);
+        let (mut at, mut step) = (0.0, longest.min(1.0));
         for trial in 0..TRIALS {
             self.step(state, step - at);
             at = step;
@@ -279,15 +285,28 @@ impl<const D: usize> LimitedMemory<D> {
                 step = secant.clamp(low + DECAY * (high - low), high - DECAY * (high - low));
             } else {
                 // hardly any curvature so far: farther, unless the way is barred or long enough
-                if high.is_finite() || trial > 2 {
+                if high.is_finite() || trial > 2 || step >= longest {
                     return Ok(Search::Found(step, point));
                 }
                 (low, low_slope) = (step, point.slope);
-                step = secant.clamp(1.5 * step, GROWTH * step);
+                step = secant.clamp(1.5 * step, GROWTH * step).min(longest);
             }
         }
         self.step(state, -at);
         Ok(Search::Failed)
+    }
+
+    /// How far a step may go along the direction where bonds soften at stretches up to e = `most`: their energy is not
+    /// convex there.
+    fn longest_step(&mut self, system: &System<D>, state: &mut State<D>, most: f64) -> f64 {
+        if system.law.tension_derivative((1.0 + most).sqrt()) >= 0.0 {
+            return f64::INFINITY;
+        }
+        scale(&mut self.direction, FAR);
+        let range = stretch_range(&*system.bonds, &self.direction);
+        scale(&mut self.direction, 1.0 / FAR);
+        system.count_evaluation(state);
+        LEAP * FAR / (1.0 + range.high).sqrt()
     }
 
     /// One iteration from `point`; the next iterate, `None` where no direction led anywhere.
@@ -392,6 +411,11 @@ impl<const D: usize> Equilibrium<D> for LimitedMemory<D> {
         self.preconditioner.broke(&*system.bonds, slots);
         self.memory.clear(false);
     }
+}
+
+fn scale<const D: usize>(field: &mut Field<D>, factor: f64) {
+    let parts = field.chunks_mut().into_par_iter();
+    parts.for_each(|part| part.into_iter().flatten().for_each(|d| *d *= factor));
 }
 
 /// How far stretches may go in one step, as e = λ² − 1.

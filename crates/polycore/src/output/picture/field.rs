@@ -40,6 +40,7 @@ pub struct FieldMap<'a> {
     columns: Option<usize>,
     size: usize,
     lengths: Option<(String, f64)>,
+    names: [&'a str; 2],
 }
 
 /// One field: where the particles are (deformed or not) and what they carry.
@@ -145,7 +146,7 @@ impl Default for FieldMap<'_> {
 impl<'a> FieldMap<'a> {
     /// No panel yet.
     pub fn new() -> Self {
-        Self { panels: Vec::new(), columns: None, size: 720, lengths: None }
+        Self { panels: Vec::new(), columns: None, size: 720, lengths: None, names: ["x", "y"] }
     }
 
     /// Adds a field.
@@ -169,6 +170,12 @@ impl<'a> FieldMap<'a> {
     /// Draws axes: positions are divided by `factor` and given in `unit`. `("mm", 1e-3)` for positions in metres.
     pub fn lengths(mut self, unit: &str, factor: f64) -> Self {
         self.lengths = Some((unit.to_owned(), factor));
+        self
+    }
+
+    /// What the axes are called; `x` and `y` by default.
+    pub fn axes(mut self, names: [&'a str; 2]) -> Self {
+        self.names = names;
         self
     }
 
@@ -217,7 +224,8 @@ impl<'a> FieldMap<'a> {
         let raster = window.draw(panel.positions, panel.values, panel.spacing, panel.bridge);
         let (low, high) = panel.limits();
         let bar = Bar::new(panel, low, high, raster.height.max(220))?;
-        let axes = self.lengths.as_ref().map(|lengths| Axes::new(&window, &raster, lengths)).transpose()?;
+        let axes = self.lengths.as_ref().map(|lengths| Axes::new(&window, &raster, lengths, self.names));
+        let axes = axes.transpose()?;
         let title = Text::new(&panel.title, TITLE)?;
         let head = MARGIN + if panel.title.is_empty() { 0 } else { TITLE as usize * 3 / 2 + 10 };
         let left = MARGIN + axes.as_ref().map_or(0, |axes| axes.left);
@@ -328,7 +336,12 @@ struct Axes {
 }
 
 impl Axes {
-    fn new(window: &Window, raster: &Raster, (unit, factor): &(String, f64)) -> Result<Self, String> {
+    fn new(
+        window: &Window,
+        raster: &Raster,
+        (unit, factor): &(String, f64),
+        names: [&str; 2],
+    ) -> Result<Self, String> {
         if !(factor.is_finite() && *factor > 0.0) {
             return Err(format!("the factor {factor} of the unit of length must be positive"));
         }
@@ -345,7 +358,8 @@ impl Axes {
             positions.iter().zip(texts).map(|(tick, text)| Ok((pixel(*tick), text?))).collect()
         };
         let ticks = [along(0)?, along(1)?];
-        let names = [Text::new(&format!("x [{unit}]"), LABEL)?, Text::new(&format!("y [{unit}]"), LABEL)?];
+        let [across, up] = names.map(|name| Text::new(&format!("{name} [{unit}]"), LABEL));
+        let names = [across?, up?];
         let widest = ticks[1].iter().map(|(_, text)| text.width).max().unwrap_or(0);
         let line = |size: u32| size as usize * 3 / 2;
         let left = widest + TICK_LENGTH as usize + 12 + line(LABEL);
