@@ -1,5 +1,11 @@
 //! Tests of the public interface.
 
+mod births;
 mod bodies;
 mod brick;
+mod extremes;
+mod order;
+mod patch;
 mod readers;
+mod same_bits;
+mod verification;
