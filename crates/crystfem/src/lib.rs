@@ -4,6 +4,7 @@ pub mod boundary;
 mod element;
 pub mod error;
 pub mod exact;
+pub mod fit;
 pub mod history;
 pub mod kinetics;
 mod layers;

@@ -1,12 +1,11 @@
 //! Whole scenes: run, compared, drawn and judged.
 
 mod draw;
+mod fit;
 mod point;
 
-pub use point::explain;
-
 use crate::error::Error;
-use crate::scene::{self, Kind, PointScene};
+use crate::scene::{self, FitScene, Kind, PointScene};
 use polycore::report::Report;
 use polycore::scene::{SceneError, Source};
 use std::path::Path;
@@ -44,6 +43,18 @@ impl From<polycore::Error> for Failure {
 pub fn run(source: &Source, options: &Options) -> Result<Report, Failure> {
     match scene::kind(source)? {
         Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, options),
+        Kind::Fit => self::fit::run(source, &source.parse::<FitScene>()?, options),
+    }
+}
+
+/// What a scene of any kind builds and leaves out, in lines.
+///
+/// # Errors
+/// A fault of the scene.
+pub fn explain(source: &Source) -> Result<Vec<String>, SceneError> {
+    match scene::kind(source)? {
+        Kind::Point => self::point::explain(source, &source.parse::<PointScene>()?),
+        Kind::Fit => self::fit::explain(source, &source.parse::<FitScene>()?),
     }
 }
 

@@ -1,9 +1,11 @@
 //! Scenes, as written in TOML. Only what a scene names is built.
 
 mod either;
+mod fit;
 mod material;
 mod point;
 
+pub use fit::{DataSpec, FitLaw, FitScene, FitSpec, Job};
 pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, PointScene, PointSpec};
 
@@ -38,6 +40,8 @@ impl Default for OutputSpec {
 pub enum Kind {
     /// The material alone: `[[point]]`.
     Point,
+    /// Constants from measurements: `[[fit]]`.
+    Fit,
 }
 
 /// Tells what a scene asks for by the blocks that it has.
@@ -51,11 +55,18 @@ pub fn kind(source: &Source) -> Result<Kind, SceneError> {
         #[serde(rename = "program")]
         _program: Program,
         point: Option<IgnoredAny>,
+        fit: Option<IgnoredAny>,
     }
     let outline: Outline = source.parse()?;
-    match outline.point {
-        Some(_) => Ok(Kind::Point),
-        None => Err(source.error("program", "a scene without a task", "a block `[[point]]`")),
+    match (outline.point.is_some(), outline.fit.is_some()) {
+        (true, false) => Ok(Kind::Point),
+        (false, true) => Ok(Kind::Fit),
+        (true, true) => {
+            Err(source.error("fit", "`fit` beside `point`", "one of them: a scene does one thing"))
+        }
+        (false, false) => {
+            Err(source.error("program", "a scene without a task", "a block `[[point]]` or `[[fit]]`"))
+        }
     }
 }
 
@@ -67,3 +78,6 @@ pub(crate) fn check_name(source: &Source, key: &str, name: &str) -> Result<(), S
     }
     Err(source.error(key, format!("`{name}`"), "letters, digits, `-` and `_`: it names files"))
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,6 +6,8 @@ mod brick;
 mod extremes;
 mod order;
 mod patch;
+#[cfg(feature = "cli")]
+mod point;
 mod readers;
 mod same_bits;
 mod verification;
