@@ -124,7 +124,7 @@ impl Geometry {
         matrix
     }
 
-    /// Adds one integration point's part of [`Self::conduction`].
+    /// Adds one integration point's part of [`Self::conduction`], for a symmetric conductivity.
     pub fn add_conduction(&self, point: usize, conductivity: &Matrix3<f64>, matrix: &mut [f64; 64]) {
         let gradients = &self.gradients[point];
         for b in 0..self.nodes {
@@ -134,8 +134,13 @@ impl Geometry {
                     image[d] += self.weights[point] * conductivity[(d, n)] * gradients[b][n];
                 }
             }
-            for a in 0..self.nodes {
-                matrix[8 * a + b] += (0..3).map(|d| gradients[a][d] * image[d]).sum::<f64>();
+            // both triangles get the same bits: heat that leaves one node for another arrives there
+            for a in 0..=b {
+                let value = (0..3).map(|d| gradients[a][d] * image[d]).sum::<f64>();
+                matrix[8 * a + b] += value;
+                if a < b {
+                    matrix[8 * b + a] += value;
+                }
             }
         }
     }

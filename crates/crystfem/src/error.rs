@@ -32,6 +32,14 @@ pub enum Error {
         /// What may be there.
         allowed: String,
     },
+    /// Measurements from which nothing can be concluded.
+    #[error("{what}: {reason}")]
+    Data {
+        /// What was asked of them.
+        what: String,
+        /// What is wrong with them, and what is allowed.
+        reason: String,
+    },
     /// A result is not finite.
     #[error("{quantity} is not finite at {place}, t = {time} s")]
     NotFinite {
@@ -67,7 +75,7 @@ impl Error {
     /// Exit code of the command line: 2 for bad input, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Mesh(_) | Self::Parameter { .. } | Self::File { .. } => 2,
+            Self::Mesh(_) | Self::Parameter { .. } | Self::File { .. } | Self::Data { .. } => 2,
             Self::NotFinite { .. } | Self::NotConverged { .. } => 1,
             Self::Shared(error) => error.exit_code(),
         }

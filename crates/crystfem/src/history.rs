@@ -1,7 +1,7 @@
 //! Temperature histories: ramps and holds, or a table.
 
 use crate::error::Error;
-use crate::table::{Column, read};
+use crate::table::{Column, read_with_lines};
 use polycore::units::dimension::{TemperatureDimension, TimeDimension};
 use std::path::Path;
 
@@ -116,18 +116,21 @@ impl History {
     /// Reads a CSV file with the columns `time [unit]` and `temperature [unit]`.
     ///
     /// # Errors
-    /// As [`read`], and a [`Error::File`] with the line where times decrease.
+    /// [`Error::File`] as [`crate::table::read`], and where times decrease.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let columns =
             [Column::of::<TimeDimension>("time"), Column::of::<TemperatureDimension>("temperature")];
-        let [times, temperatures] = read(path, columns)?;
-        Self::new(times, temperatures).map_err(|error| Error::File {
-            path: path.to_path_buf(),
-            line: 0,
-            what: "history".to_owned(),
-            found: error.to_string(),
-            allowed: "times that do not decrease".to_owned(),
-        })
+        let ([times, temperatures], lines) = read_with_lines(path, columns)?;
+        if let Some(row) = (1..times.len()).find(|&row| times[row] < times[row - 1]) {
+            return Err(Error::File {
+                path: path.to_path_buf(),
+                line: lines[row],
+                what: "time".to_owned(),
+                found: format!("{} s", times[row]),
+                allowed: format!("{} s or later, as in the row before", times[row - 1]),
+            });
+        }
+        Self::new(times, temperatures)
     }
 
     /// The first temperature, K.
@@ -186,7 +189,7 @@ mod tests {
         let path = folder.path().join("h.csv");
         std::fs::write(&path, "time [s],temperature [degC]\n0,20\n10,30\n5,40\n").unwrap();
         let error = History::read(&path).unwrap_err().to_string();
-        assert!(error.contains("h.csv") && error.contains("found 5"), "{error}");
+        assert!(error.contains("h.csv:4: time: found \"5 s\"; allowed: 10 s or later"), "{error}");
         std::fs::write(&path, "time [min],temperature [degC]\n0,20\n10,30\n").unwrap();
         assert_eq!(History::read(&path).unwrap().span(), [0.0, 600.0]);
     }

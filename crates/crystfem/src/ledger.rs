@@ -2,6 +2,10 @@
 
 pub use crate::system::Exchange;
 
+/// Shift of temperature, K. A step that moves less heat than by which its balance would change if all temperatures
+/// shifted by this has its balance measured against that: temperatures of 500 K are known to 6e-14 K only.
+pub const NOTHING: f64 = 1e-2;
+
 /// Energy since the start, J. Heat into the body counts positive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Ledger {
@@ -30,6 +34,9 @@ pub struct Record {
     pub stored: f64,
     /// Σ|ΔE_i| over the nodes: heat moved within the body counts, too.
     pub moved: f64,
+    /// Change of the balance with a uniform shift of the free temperatures, J/K: capacity, and over the step what
+    /// goes through surfaces and to prescribed nodes.
+    pub sensitivity: f64,
     /// Heat through surfaces and from sources.
     pub exchange: Exchange,
     /// Heat that holds prescribed temperatures.
@@ -46,9 +53,11 @@ impl Record {
         self.stored - self.exchange.total() - self.reaction
     }
 
-    /// |[`Self::missing`]| over all heat moved, stored and exchanged; 0 where nothing moves.
+    /// |[`Self::missing`]| over all heat moved, stored and exchanged, or over that of [`NOTHING`], 10 mK, where
+    /// that is more.
     pub fn relative(&self) -> f64 {
-        let scale = self.moved + self.exchange.gross() + self.reaction.abs();
+        let scale =
+            (self.moved + self.exchange.gross() + self.reaction.abs()).max(NOTHING * self.sensitivity);
         if scale > 0.0 { self.missing().abs() / scale } else { 0.0 }
     }
 }

@@ -43,6 +43,8 @@ enum Command {
     Run(Scene),
     /// Run a scene of the material alone: kinetics and melting under temperature histories.
     Point(Scene),
+    /// Run a scene of fits: constants of the kinetics from measurements, with confidence intervals.
+    Fit(Scene),
     /// Validate a scene and print what it builds and leaves out.
     Check {
         /// The scene (TOML).
@@ -69,6 +71,7 @@ fn main() -> ExitCode {
     let result = match cli.command {
         Command::Run(scene) => run(&scene, None),
         Command::Point(scene) => run(&scene, Some(Kind::Point)),
+        Command::Fit(scene) => run(&scene, Some(Kind::Fit)),
         Command::Check { scene } => check(&scene),
         Command::Bench(bench) => bench.print(),
         Command::Completions { shell } => {

@@ -36,6 +36,17 @@ impl Column {
 /// [`Error::File`] with line and column for a file that cannot be read, a missing or repeated column, a row of another
 /// length, what is no finite number or not of the column's dimension, a number out of its range, and no row at all.
 pub fn read<const N: usize>(path: &Path, columns: [Column; N]) -> Result<[Vec<f64>; N], Error> {
+    read_with_lines(path, columns).map(|(data, _)| data)
+}
+
+/// As [`read`], with the line of each row, from 1.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with_lines<const N: usize>(
+    path: &Path,
+    columns: [Column; N],
+) -> Result<([Vec<f64>; N], Vec<usize>), Error> {
     let text = std::fs::read_to_string(path).map_err(polycore::Error::io("read", path))?;
     let fail = |line: u64, what: String, found: &str, allowed: String| Error::File {
         path: path.to_path_buf(),
@@ -68,7 +79,7 @@ pub fn read<const N: usize>(path: &Path, columns: [Column; N]) -> Result<[Vec<f6
         let [head] = <[_; 1]>::try_from(heads).map_err(|_| fail(line, "header".into(), &found, allowed))?;
         *place = head;
     }
-    let mut data = [(); N].map(|()| Vec::new());
+    let (mut data, mut lines) = ([(); N].map(|()| Vec::new()), Vec::new());
     for record in reader.records() {
         let record = record.map_err(|error| fail(0, "row".into(), &error.to_string(), "CSV".into()))?;
         let line = line_of(&text, record.position());
@@ -87,11 +98,12 @@ pub fn read<const N: usize>(path: &Path, columns: [Column; N]) -> Result<[Vec<f6
             }
             data.push(number);
         }
+        lines.push(usize::try_from(line).unwrap_or(0));
     }
     if data.iter().any(Vec::is_empty) {
         return Err(fail(line, "table".into(), "no row", "at least one row of numbers".into()));
     }
-    Ok(data)
+    Ok((data, lines))
 }
 
 /// The line of a record, from 1; the reader counts comments and blank lines before it as its own.

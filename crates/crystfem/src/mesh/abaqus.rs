@@ -81,49 +81,24 @@ const CHANGING: [&str; 11] = [
     "MODEL CHANGE",
 ];
 
-/// Elements by name; those of flow, of reduced integration and of other physics have the same nodes.
-const TYPES: [(&str, Kind); 40] = [
-    ("C3D8", Kind::Hexahedron),
-    ("DC3D8", Kind::Hexahedron),
-    ("C3D8R", Kind::Hexahedron),
-    ("C3D8I", Kind::Hexahedron),
-    ("C3D8T", Kind::Hexahedron),
-    ("C3D8RT", Kind::Hexahedron),
-    ("C3D4", Kind::Tetrahedron),
-    ("DC3D4", Kind::Tetrahedron),
-    ("C3D4T", Kind::Tetrahedron),
-    ("CPS3", Kind::Triangle),
-    ("CPE3", Kind::Triangle),
-    ("CAX3", Kind::Triangle),
-    ("DC2D3", Kind::Triangle),
-    ("S3", Kind::Triangle),
-    ("S3R", Kind::Triangle),
-    ("STRI3", Kind::Triangle),
-    ("M3D3", Kind::Triangle),
-    ("DS3", Kind::Triangle),
-    ("SFM3D3", Kind::Triangle),
-    ("CPS4", Kind::Quadrangle),
-    ("CPS4R", Kind::Quadrangle),
-    ("CPE4", Kind::Quadrangle),
-    ("CPE4R", Kind::Quadrangle),
-    ("CAX4", Kind::Quadrangle),
-    ("DC2D4", Kind::Quadrangle),
-    ("S4", Kind::Quadrangle),
-    ("S4R", Kind::Quadrangle),
-    ("M3D4", Kind::Quadrangle),
-    ("M3D4R", Kind::Quadrangle),
-    ("DS4", Kind::Quadrangle),
-    ("SFM3D4", Kind::Quadrangle),
-    ("SFM3D4R", Kind::Quadrangle),
-    ("R3D4", Kind::Quadrangle),
-    ("R3D3", Kind::Triangle),
-    ("T3D2", Kind::Line),
-    ("T2D2", Kind::Line),
-    ("B31", Kind::Line),
-    ("DC1D2", Kind::Line),
-    ("MASS", Kind::Point),
-    ("HEATCAP", Kind::Point),
+/// First-order elements by the stems of their names.
+const STEMS: [(Kind, &[&str]); 6] = [
+    (Kind::Hexahedron, &["C3D8", "DC3D8", "DCC3D8"]),
+    (Kind::Tetrahedron, &["C3D4", "DC3D4"]),
+    (Kind::Quadrangle, &["S4", "M3D4", "SFM3D4", "R3D4", "DS4", "CPS4", "CPE4", "CAX4", "DC2D4"]),
+    (Kind::Triangle, &["S3", "STRI3", "M3D3", "SFM3D3", "R3D3", "DS3", "CPS3", "CPE3", "CAX3", "DC2D3"]),
+    (Kind::Line, &["T3D2", "T2D2", "B31", "B21", "DC1D2"]),
+    (Kind::Point, &["MASS", "HEATCAP"]),
 ];
+
+/// Kind of an element by its name in upper case: letters after a stem (R, I, H, T, …) tell of integration and physics, not
+/// of nodes.
+fn kind_of(name: &str) -> Option<Kind> {
+    let is = |stem: &&str| {
+        name.strip_prefix(stem).is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_alphabetic()))
+    };
+    STEMS.iter().find(|(_, stems)| stems.iter().any(|stem| is(stem))).map(|(kind, _)| *kind)
+}
 
 struct Reader<'a> {
     path: &'a Path,
@@ -159,9 +134,9 @@ impl Reader<'_> {
 
     fn elements(&mut self, card: &Card, cards: &mut Cards) -> Result<(), Error> {
         let name = card.parameter("TYPE").unwrap_or("").to_uppercase();
-        let Some((_, kind)) = TYPES.iter().find(|known| known.0 == name) else {
-            let allowed = "C3D8, DC3D8, C3D8R, C3D8I, C3D8T, C3D8RT, C3D4, DC3D4, C3D4T; shells, membranes and trusses of \
-                           3, 4 and 2 nodes only name surfaces";
+        let Some(kind) = kind_of(&name) else {
+            let allowed = "C3D8, DC3D8, C3D4, DC3D4, with letters after them or not (C3D8R, C3D4H, …); shells, membranes and \
+                           trusses of 3, 4 and 2 nodes only name surfaces";
             return Err(line_error(self.path, card.line, "element type", name, allowed));
         };
         let count = kind.node_count();
@@ -195,7 +170,7 @@ impl Reader<'_> {
             }
             let mut nodes = [0; 8];
             nodes[..count].copy_from_slice(&labels[1..=count]);
-            self.content.elements.push(Element { label: labels[0], line: line as u32, kind: *kind, nodes });
+            self.content.elements.push(Element { label: labels[0], line: line as u32, kind, nodes });
         }
         if let Some(name) = card.parameter("ELSET") {
             let labels = self.content.elements[first..].iter();

@@ -1,12 +1,13 @@
 //! Whole scenes: run, compared, drawn and judged.
 
 mod draw;
+mod fit;
 mod part;
 mod point;
 mod section;
 
 use crate::error::Error;
-use crate::scene::{self, Kind, PartScene, PointScene};
+use crate::scene::{self, FitScene, Kind, PartScene, PointScene};
 use polycore::report::Report;
 use polycore::scene::{SceneError, Source};
 use std::path::Path;
@@ -44,17 +45,19 @@ impl From<polycore::Error> for Failure {
 pub fn run(source: &Source, options: &Options) -> Result<Report, Failure> {
     match scene::kind(source)? {
         Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, options),
+        Kind::Fit => self::fit::run(source, &source.parse::<FitScene>()?, options),
         Kind::Part => self::part::run(source, &source.parse::<PartScene>()?, options),
     }
 }
 
-/// What a scene builds and leaves out.
+/// What a scene of any kind builds and leaves out, in lines.
 ///
 /// # Errors
 /// A fault of the scene.
 pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
     match scene::kind(source)? {
         Kind::Point => Ok(self::point::explain(source, &source.parse::<PointScene>()?)?),
+        Kind::Fit => Ok(self::fit::explain(source, &source.parse::<FitScene>()?)?),
         Kind::Part => self::part::explain(source, &source.parse::<PartScene>()?),
     }
 }

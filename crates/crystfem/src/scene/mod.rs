@@ -1,12 +1,14 @@
 //! Scenes, as written in TOML. Only what a scene names is built.
 
 mod either;
+mod fit;
 mod material;
 mod mesh;
 mod part;
 mod point;
 mod problem;
 
+pub use fit::{DataSpec, FitLaw, FitScene, FitSpec, Job};
 pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
 pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
@@ -46,6 +48,8 @@ pub enum Kind {
     Point,
     /// A body in time: `[mesh]`.
     Part,
+    /// Constants from measurements: `[[fit]]`.
+    Fit,
 }
 
 /// Tells what a scene asks for by the blocks that it has.
@@ -59,17 +63,25 @@ pub fn kind(source: &Source) -> Result<Kind, SceneError> {
         #[serde(rename = "program")]
         _program: Program,
         point: Option<IgnoredAny>,
+        fit: Option<IgnoredAny>,
         mesh: Option<IgnoredAny>,
     }
     let outline: Outline = source.parse()?;
-    match (outline.point, outline.mesh) {
-        (Some(_), None) => Ok(Kind::Point),
-        (None, Some(_)) => Ok(Kind::Part),
-        (Some(_), Some(_)) => {
-            Err(source.error("point", "`[[point]]` beside `[mesh]`", "one of them, in a scene each"))
+    let tasks = [
+        (Kind::Point, "point", outline.point.is_some()),
+        (Kind::Fit, "fit", outline.fit.is_some()),
+        (Kind::Part, "mesh", outline.mesh.is_some()),
+    ];
+    let mut asked = tasks.iter().filter(|(_, _, given)| *given);
+    match (asked.next(), asked.next()) {
+        (Some((kind, ..)), None) => Ok(*kind),
+        (Some((_, first, _)), Some((_, second, _))) => {
+            let found = format!("`{second}` beside `{first}`");
+            Err(source.error(second, found, "one of them: a scene does one thing"))
         }
-        (None, None) => {
-            Err(source.error("program", "a scene without a task", "a block `[[point]]` or `[mesh]`"))
+        (None, _) => {
+            let allowed = "a block `[[point]]`, `[[fit]]` or `[mesh]`";
+            Err(source.error("program", "a scene without a task", allowed))
         }
     }
 }
@@ -82,3 +94,6 @@ pub(crate) fn check_name(source: &Source, key: &str, name: &str) -> Result<(), S
     }
     Err(source.error(key, format!("`{name}`"), "letters, digits, `-` and `_`: it names files"))
 }
+
+#[cfg(test)]
+mod tests;

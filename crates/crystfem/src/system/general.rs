@@ -152,7 +152,7 @@ impl General {
             let gradients = &geometry.gradients[g];
             let mut gradient = Vector3::zeros();
             for a in 0..nodes {
-                gradient += Vector3::from(gradients[a]) * end[a];
+                gradient += Vector3::from(gradients[a]) * (end[a] - end[0]);
             }
             let (mut from, mut to) = (start[g], end[g]);
             if consistent {

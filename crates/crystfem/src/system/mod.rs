@@ -219,7 +219,7 @@ impl System {
             self.rows.restore(base);
         }
         // linear materials
-        self.rows.product(None, [0.0, 1.0], at.temperature, &mut out.rate);
+        self.rows.flow(at.temperature, &mut out.rate);
         if self.consistent {
             out.scratch.resize(size, 0.0);
             vector::set(&mut out.scratch, |k| at.temperature[k] - at.start[k]);

@@ -269,13 +269,29 @@ impl Rows {
 
     /// y = diagonal·x + (`weights[0]`·M + `weights[1]`·K) x; returns x·y, summed in the order of the items.
     pub fn product(&self, diagonal: Option<&[f64]>, weights: [f64; 2], x: &[f64], y: &mut [f64]) -> f64 {
+        self.multiply::<false>(diagonal, weights, x, y)
+    }
+
+    /// y = K x as Σ_j K_ij (x_j − x_i): rows of K add up to nothing. Its rounding is that of the differences, so that
+    /// heat is conserved to rounding of what flows, not of what is stored.
+    pub fn flow(&self, x: &[f64], y: &mut [f64]) {
+        self.multiply::<true>(None, [0.0, 1.0], x, y);
+    }
+
+    fn multiply<const FLOW: bool>(
+        &self,
+        diagonal: Option<&[f64]>,
+        weights: [f64; 2],
+        x: &[f64],
+        y: &mut [f64],
+    ) -> f64 {
         let arch = Arch::new();
         let parts: Vec<f64> = y
             .par_chunks_mut(CHUNK)
             .enumerate()
             .map(|(item, y)| {
                 let segments = self.firsts[item] as usize..self.firsts[item + 1] as usize;
-                arch.dispatch(Product {
+                arch.dispatch(Product::<FLOW> {
                     rows: self,
                     segments: &self.segments[segments],
                     weights,
@@ -291,7 +307,7 @@ impl Rows {
 }
 
 /// One work item of a product.
-struct Product<'a> {
+struct Product<'a, const FLOW: bool> {
     rows: &'a Rows,
     segments: &'a [Segment],
     weights: [f64; 2],
@@ -301,7 +317,7 @@ struct Product<'a> {
     first: usize,
 }
 
-impl WithSimd for Product<'_> {
+impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
     type Output = f64;
 
     #[inline(always)]
@@ -322,19 +338,22 @@ impl WithSimd for Product<'_> {
                 let mut row = start;
                 let end = start + length;
                 while row + 4 * lanes <= end {
-                    block::<S, 4>(simd, offsets, values, diagonal, x, y, row, first);
+                    block::<S, 4, FLOW>(simd, offsets, values, diagonal, x, y, row, first);
                     row += 4 * lanes;
                 }
                 while row < end {
                     // the last vector may overlap the one before: it writes the same bits again
-                    block::<S, 1>(simd, offsets, values, diagonal, x, y, row.min(end - lanes), first);
+                    block::<S, 1, FLOW>(simd, offsets, values, diagonal, x, y, row.min(end - lanes), first);
                     row += lanes;
                 }
             } else {
                 for row in start..start + length {
                     let mut sums = [0.0; 4];
                     for (k, at) in range.clone().enumerate() {
-                        let other = x[row.wrapping_add_signed(stencils.offsets[at] as isize)];
+                        let mut other = x[row.wrapping_add_signed(stencils.offsets[at] as isize)];
+                        if FLOW {
+                            other -= x[row];
+                        }
                         sums[k & 3] += rows.value(at, weights) * other;
                     }
                     let mut sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
@@ -352,7 +371,7 @@ impl WithSimd for Product<'_> {
 /// V vectors of rows of one stencil.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
-fn block<S: Simd, const V: usize>(
+fn block<S: Simd, const V: usize, const FLOW: bool>(
     simd: S,
     offsets: &[i32],
     values: &[f64],
@@ -364,9 +383,9 @@ fn block<S: Simd, const V: usize>(
 ) {
     let width = V * S::F64_LANES;
     let mut sums = [simd.splat_f64s(0.0); V];
+    let (own, _) = S::as_simd_f64s(&x[row..row + width]);
     if let Some(diagonal) = diagonal {
         let (d, _) = S::as_simd_f64s(&diagonal[row..row + width]);
-        let (own, _) = S::as_simd_f64s(&x[row..row + width]);
         for v in 0..V {
             sums[v] = simd.mul_f64s(d[v], own[v]);
         }
@@ -376,7 +395,8 @@ fn block<S: Simd, const V: usize>(
         let (other, _) = S::as_simd_f64s(&x[start..start + width]);
         let value = simd.splat_f64s(*value);
         for v in 0..V {
-            sums[v] = simd.mul_add_f64s(value, other[v], sums[v]);
+            let other = if FLOW { simd.sub_f64s(other[v], own[v]) } else { other[v] };
+            sums[v] = simd.mul_add_f64s(value, other, sums[v]);
         }
     }
     let (out, _) = S::as_mut_simd_f64s(&mut y[row - first..row - first + width]);

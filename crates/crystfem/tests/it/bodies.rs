@@ -1,8 +1,10 @@
 //! What several tests are made of.
 
 use crystfem::boundary::{Condition, Field, Schedule, Where};
+use crystfem::kinetics::{Constants, Kinetics};
 use crystfem::ledger::Record;
-use crystfem::material::{Conductor, Property, ThermalMaterial};
+use crystfem::material::{Conductor, Polymer, Property, Semicrystalline, ThermalMaterial};
+use crystfem::melting::Melting;
 use crystfem::mesh::{Grid, Mesh};
 use crystfem::simulation::Simulation;
 use std::ops::ControlFlow;
@@ -14,6 +16,21 @@ pub const PA12: [f64; 3] = [0.25, 1010.0, 2200.0];
 pub fn conductor([k, density, c]: [f64; 3]) -> Arc<dyn ThermalMaterial> {
     let property = |name, value| Property::constant(name, value).unwrap();
     Arc::new(Conductor::new(density, property("k", k), property("c", c)).unwrap())
+}
+
+/// Semicrystalline PA12, Table 4.1, column 1.
+pub fn pa12(latent_heat: Option<f64>) -> Arc<dyn ThermalMaterial> {
+    let polymer = Polymer {
+        density: PA12[1],
+        conductivity: Property::constant("k", PA12[0]).unwrap(),
+        specific_heat: Property::constant("c", PA12[2]).unwrap(),
+        kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap(),
+        melting: Some(Melting::PA12),
+        ultimate_crystallinity: 0.25,
+        latent_heat,
+        seed: 0.0,
+    };
+    Arc::new(Semicrystalline::new(polymer).unwrap())
 }
 
 pub fn grid(lengths: [f64; 3], elements: [usize; 3]) -> Mesh {
@@ -32,7 +49,6 @@ pub fn radiation(surface: Where, emissivity: f64, ambient: f64) -> Condition {
     Condition::Radiation { surface, emissivity, ambient: Schedule::constant(ambient) }
 }
 
-#[allow(dead_code)]
 pub fn everywhere() -> Where {
     Where::Outer { except: Vec::new() }
 }

@@ -1,5 +1,13 @@
 //! Tests of the public interface.
 
+mod births;
 mod bodies;
 mod brick;
+mod extremes;
+mod order;
+mod patch;
+#[cfg(feature = "cli")]
+mod point;
 mod readers;
+mod same_bits;
+mod verification;

@@ -33,6 +33,16 @@ fn meshes_written_by_gmsh() {
     }
 }
 
+/// A cube and a pyramid of two tetrahedra on its side x = 1, height 2/3, written by meshio 5.3.
+#[test]
+fn a_mesh_written_by_meshio() {
+    let read = read(&fixture("meshio.inp"), 1.0).unwrap();
+    assert_eq!((read.mesh.hexahedra.len(), read.mesh.tetrahedra.len()), (1, 2));
+    assert!((read.quality.volume - (1.0 + 2.0 / 9.0)).abs() < 1e-15);
+    // quadrangle against two triangles
+    assert!(read.notes.iter().any(|note| note.contains("a side of hexahedron 1")), "{:?}", read.notes);
+}
+
 #[test]
 fn what_is_written_is_read_back() {
     let bar = Bar {
@@ -96,6 +106,9 @@ fn what_is_wrong_is_named_with_its_line() {
     };
     refused("", &["no hexahedra or tetrahedra"]);
     refused(&with("dc3d8", "C3D20R"), &["a.inp:15: element type: found \"C3D20R\"; allowed: C3D8, DC3D8"]);
+    for name in ["", "C3D", "C3D6", "C3D10", "C3D4-", "C3D8R5", "S8R"] {
+        refused(&with("dc3d8", name), &["a.inp:15: element type"]);
+    }
     refused(
         &with(" 5, 6, 7, 8\n", " 5, 6, 7\n"),
         &["a.inp:18: nodes of an element: found \"7\"; allowed: 8"],

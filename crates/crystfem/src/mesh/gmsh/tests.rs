@@ -57,6 +57,59 @@ fn text_and_bytes_are_one_mesh() {
     }
 }
 
+/// A cube, written by meshio 5.3.
+#[test]
+fn a_mesh_written_by_meshio() {
+    let read = read(&fixture("meshio_binary.msh").0, 1.0).unwrap();
+    assert_eq!(read.mesh.hexahedra, [[0, 1, 2, 3, 4, 5, 6, 7]]);
+    assert!((read.quality.volume - 1.0).abs() < 1e-15 && read.notes.is_empty());
+}
+
+/// [`TETRAHEDRON`] in bytes: either order, sizes of 4 and of 8 bytes.
+#[test]
+fn bytes_in_either_order_and_width() {
+    let text = parse(Path::new("a.msh"), TETRAHEDRON.as_bytes(), 1.0).unwrap();
+    for (little, width) in [(true, 8), (true, 4), (false, 8), (false, 4)] {
+        let ordered = |mut bytes: Vec<u8>| {
+            if !little {
+                bytes.reverse();
+            }
+            bytes
+        };
+        let int = |value: i32| ordered(value.to_le_bytes().to_vec());
+        let size = |value: u64| ordered(value.to_le_bytes()[..width].to_vec());
+        let double = |value: f64| ordered(value.to_le_bytes().to_vec());
+        let sizes = |values: &[u64]| values.iter().flat_map(|value| size(*value)).collect::<Vec<_>>();
+        let ints = |values: &[i32]| values.iter().flat_map(|value| int(*value)).collect::<Vec<_>>();
+        let doubles = |values: &[f64]| values.iter().flat_map(|value| double(*value)).collect::<Vec<_>>();
+        let header = format!("$MeshFormat\n4.1 1 {width}\n").into_bytes();
+        let points = [0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1., 5., 5., 5.];
+        let parts: [Vec<u8>; 19] = [
+            header,
+            int(1),
+            b"\n$EndMeshFormat\n$Comments\nby $ hand\n$EndComments\n$Entities\n".to_vec(),
+            sizes(&[0, 0, 0, 1]),
+            int(7),
+            doubles(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]),
+            size(1),
+            int(9),
+            size(0),
+            b"\n$EndEntities\n$Nodes\n".to_vec(),
+            sizes(&[1, 5, 1, 5]),
+            ints(&[3, 7, 0]),
+            sizes(&[5, 1, 2, 3, 4, 5]),
+            doubles(&points),
+            b"\n$EndNodes\n$Elements\n".to_vec(),
+            sizes(&[1, 1, 1, 1]),
+            ints(&[3, 7, 4]),
+            sizes(&[1, 11, 1, 2, 3, 4]),
+            b"\n$EndElements\n".to_vec(),
+        ];
+        let read = parse(Path::new("a.msh"), &parts.concat(), 1.0).unwrap();
+        assert_eq!(read, text, "{little} {width}");
+    }
+}
+
 const TETRAHEDRON: &str = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Comments\nby hand\n$EndComments\n\
      $Entities\n0 0 0 1\n7 0 0 0 1 1 1 1 9 0\n$EndEntities\n\
      $Nodes\n1 5 1 5\n3 7 0 5\n1\n2\n3\n4\n5\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n5 5 5\n$EndNodes\n\

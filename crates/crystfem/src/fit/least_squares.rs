@@ -1,0 +1,139 @@
+//! Levenberg–Marquardt from several starts, and the covariance at the minimum.
+
+use crate::error::Error;
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use std::cell::Cell;
+
+/// Model less measurement at parameters; `None` outside the model's domain.
+pub type Residuals<'a> = dyn Fn(&[f64]) -> Option<Vec<f64>> + 'a;
+
+/// A residual that no step is accepted with.
+const REJECTED: f64 = 1e100;
+
+/// Relative least eigenvalue of the normal matrix, its columns scaled to 1, below which the parameters are not
+/// determined: differences carry 1e-10, which it squares with the condition.
+const COLLINEAR: f64 = 1e-12;
+
+/// A minimum.
+pub struct Minimum {
+    /// Parameters.
+    pub at: Vec<f64>,
+    /// Residuals there.
+    pub residuals: Vec<f64>,
+    /// Covariance of the parameters, s² (JᵀJ)⁻¹ with s² = Σr²/(m − k).
+    pub covariance: DMatrix<f64>,
+    /// Degrees of freedom m − k.
+    pub degrees: usize,
+    /// Evaluations of all residuals, without those for derivatives.
+    pub evaluations: usize,
+}
+
+impl Minimum {
+    /// Root mean square of the residuals.
+    pub fn rms(&self) -> f64 {
+        (self.residuals.iter().map(|r| r * r).sum::<f64>() / self.residuals.len() as f64).sqrt()
+    }
+
+    /// Standard error of a function of the parameters, by its gradient.
+    pub fn error_of(&self, gradient: &[f64]) -> f64 {
+        let gradient = DVector::from_row_slice(gradient);
+        (gradient.transpose() * &self.covariance * gradient)[(0, 0)].max(0.0).sqrt()
+    }
+}
+
+/// The best minimum over all starts of `count` residuals.
+///
+/// # Errors
+/// [`Error::Data`] if no start arrives anywhere, or if the data do not determine the parameters.
+pub fn minimize(
+    what: &str,
+    residuals: &Residuals,
+    count: usize,
+    starts: &[Vec<f64>],
+) -> Result<Minimum, Error> {
+    let refuse = |reason: &str| Error::Data { what: what.to_owned(), reason: reason.to_owned() };
+    let mut best: Option<(f64, DVector<f64>)> = None;
+    let evaluations = Cell::new(0);
+    for start in starts {
+        let at = DVector::from_row_slice(start);
+        let problem = Problem { residuals, count, at, evaluations: &evaluations };
+        let (problem, report) = LevenbergMarquardt::new().with_patience(200).minimize(problem);
+        let objective = report.objective_function;
+        let better = best.as_ref().is_none_or(|(least, _)| objective < *least);
+        if objective < REJECTED && better && residuals(problem.at.as_slice()).is_some() {
+            best = Some((objective, problem.at));
+        }
+    }
+    let undetermined =
+        "the data do not determine all parameters (the model hardly changes along some direction)";
+    let (_, at) = best.ok_or_else(|| refuse("no start converged"))?;
+    let found = residuals(at.as_slice()).ok_or_else(|| refuse("no start converged"))?;
+    let jacobian = jacobian(residuals, &at).ok_or_else(|| refuse(undetermined))?;
+    let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
+    if norms.iter().any(|norm| norm.is_nan() || *norm < 1e-9) {
+        return Err(refuse(undetermined));
+    }
+    let scaled = DMatrix::from_fn(count, at.len(), |row, column| jacobian[(row, column)] / norms[column]);
+    let normal = scaled.tr_mul(&scaled);
+    if normal.clone().symmetric_eigenvalues().min() < COLLINEAR {
+        return Err(refuse(undetermined));
+    }
+    let inverse = normal.cholesky().ok_or_else(|| refuse(undetermined))?.inverse();
+    let degrees = count.saturating_sub(at.len()).max(1);
+    let variance = found.iter().map(|r| r * r).sum::<f64>() / degrees as f64;
+    let covariance =
+        DMatrix::from_fn(at.len(), at.len(), |i, j| variance * inverse[(i, j)] / (norms[i] * norms[j]));
+    let at = at.as_slice().to_vec();
+    Ok(Minimum { at, residuals: found, covariance, degrees, evaluations: evaluations.get() })
+}
+
+/// By central differences of step ∛ε, good to 1e-10.
+fn jacobian(residuals: &Residuals, at: &DVector<f64>) -> Option<DMatrix<f64>> {
+    let mut columns = Vec::with_capacity(at.len());
+    for i in 0..at.len() {
+        let step = f64::EPSILON.cbrt() * at[i].abs().max(1.0);
+        let (mut up, mut down) = (at.clone(), at.clone());
+        up[i] += step;
+        down[i] -= step;
+        let [above, below] = [residuals(up.as_slice())?, residuals(down.as_slice())?];
+        let width = up[i] - down[i];
+        columns.push(DVector::from_iterator(
+            above.len(),
+            above.iter().zip(&below).map(|(a, b)| (a - b) / width),
+        ));
+    }
+    Some(DMatrix::from_columns(&columns))
+}
+
+struct Problem<'a> {
+    residuals: &'a Residuals<'a>,
+    count: usize,
+    at: DVector<f64>,
+    evaluations: &'a Cell<usize>,
+}
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, at: &DVector<f64>) {
+        self.at.copy_from(at);
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.at.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        self.evaluations.set(self.evaluations.get() + 1);
+        // a trial outside the domain must be rejected; `None` would end the search
+        let rejected = || vec![REJECTED; self.count];
+        Some(DVector::from_vec((self.residuals)(self.at.as_slice()).unwrap_or_else(rejected)))
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        jacobian(self.residuals, &self.at)
+    }
+}

@@ -1,0 +1,110 @@
+//! Constants of the kinetics from measurements, by least squares in α, with 95 % confidence intervals.
+
+mod avrami;
+mod least_squares;
+mod nakamura;
+mod ozawa;
+mod student;
+
+pub use avrami::avrami;
+pub use nakamura::{Known, Run, nakamura};
+pub use ozawa::{Cooling, ozawa, rates_at};
+pub use student::quantile;
+
+use crate::error::Error;
+
+/// A fitted law.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// Its constants.
+    pub estimates: Vec<Estimate>,
+    /// Root mean square of model less measurement, in α.
+    pub rms: f64,
+    /// Measurements.
+    pub measurements: usize,
+    /// Evaluations of all residuals, without those for derivatives.
+    pub evaluations: usize,
+    /// α of the model at the measurements, in their order.
+    pub model: Vec<f64>,
+}
+
+/// A constant with its uncertainty: independent errors of the same size in every α, of unknown size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Its name.
+    pub name: &'static str,
+    /// Its SI unit.
+    pub unit: String,
+    /// The estimate.
+    pub value: f64,
+    /// Standard error.
+    pub standard_error: f64,
+    /// Interval that holds the true value with a probability of 95 %, where the law is nearly linear within it.
+    pub interval: [f64; 2],
+}
+
+impl Fit {
+    /// An estimate by name.
+    pub fn get(&self, name: &str) -> Option<&Estimate> {
+        self.estimates.iter().find(|estimate| estimate.name == name)
+    }
+}
+
+impl Estimate {
+    /// Of a positive constant whose logarithm has the estimate `logarithm` and a standard error; the interval is
+    /// symmetric in the logarithm.
+    fn of_logarithm(name: &'static str, unit: &str, logarithm: f64, error: f64, degrees: usize) -> Self {
+        let (value, reach) = (logarithm.exp(), quantile(degrees) * error);
+        Self {
+            name,
+            unit: unit.to_owned(),
+            value,
+            standard_error: value * error,
+            interval: [(logarithm - reach).exp(), (logarithm + reach).exp()],
+        }
+    }
+}
+
+/// Measured α that are accepted: noise carries some beyond 0 and 1, and to cut it off would bias the fit.
+pub const DEGREES: [f64; 2] = [-0.2, 1.2];
+
+/// Checks measured degrees of a fit of so many parameters.
+fn check(what: &str, degrees: &[f64], parameters: usize) -> Result<(), Error> {
+    let refuse = |reason: String| Err(Error::Data { what: what.to_owned(), reason });
+    let [least, most] = DEGREES;
+    if let Some((row, bad)) = degrees.iter().enumerate().find(|(_, a)| !(least..=most).contains(*a)) {
+        return refuse(format!("measurement {}: alpha = {bad}; allowed: {least} to {most}", row + 1));
+    }
+    if degrees.len() <= parameters {
+        let count = degrees.len();
+        return refuse(format!(
+            "{count} measurements for {parameters} parameters; allowed: at least {}",
+            parameters + 1
+        ));
+    }
+    let within = degrees.iter().filter(|a| (0.01..=0.99).contains(*a)).count();
+    if within < parameters {
+        return refuse(format!(
+            "{within} measurements of alpha between 0.01 and 0.99; allowed: at least {parameters}, as many as parameters"
+        ));
+    }
+    let [low, high] = degrees.iter().fold([1.0_f64, 0.0_f64], |[low, high], &a| [low.min(a), high.max(a)]);
+    if high - low < 0.01 {
+        return refuse(format!("alpha is constant, {low} to {high}; allowed: a range of at least 0.01"));
+    }
+    Ok(())
+}
+
+/// Checks a column of numbers.
+fn check_finite(what: &str, name: &str, values: &[f64], least: f64) -> Result<(), Error> {
+    match values.iter().enumerate().find(|(_, x)| !(x.is_finite() && **x >= least)) {
+        None => Ok(()),
+        Some((row, bad)) => Err(Error::Data {
+            what: what.to_owned(),
+            reason: format!("measurement {}: {name} = {bad}; allowed: finite, {least} or above", row + 1),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests;

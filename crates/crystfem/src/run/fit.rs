@@ -1,0 +1,183 @@
+//! Fits of measurements: constants with their intervals, tables, pictures.
+
+use super::point::CELSIUS;
+use super::{Failure, Options, prepare};
+use crate::error::Error;
+use crate::fit::{Fit, avrami, nakamura, ozawa};
+use crate::scene::{FitScene, FitSpec, Job};
+use polycore::output::picture::{LinePlot, Series};
+use polycore::output::{atomic_write, csv};
+use polycore::report::{Phases, Report};
+use polycore::scene::{SceneError, Source};
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+
+/// A finished fit and the abscissae of its measurements, series by series.
+struct Done {
+    name: String,
+    fit: Fit,
+    abscissa: (&'static str, &'static str),
+    series: Vec<(String, Vec<f64>, Vec<f64>)>,
+}
+
+/// Runs every fit.
+pub fn run(source: &Source, scene: &FitScene, options: &Options) -> Result<Report, Failure> {
+    let jobs = scene.jobs(source)?;
+    prepare(options.output)?;
+    let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
+    let mut phases = Phases::new();
+    let mut done = Vec::new();
+    for (index, (spec, job)) in scene.fit.iter().zip(jobs).enumerate() {
+        phases.start("fit");
+        let fits = solve(spec, job);
+        // data that say nothing are a fault of the scene, which names them
+        let fits = fits.map_err(|error| match error {
+            Error::Data { what, reason } => source.error(&format!("fit[{index}].data"), reason, what).into(),
+            other => Failure::Run(other),
+        })?;
+        done.extend(fits);
+    }
+    phases.start("write");
+    for one in &done {
+        record(&mut report, one);
+        write(options.output, one)?;
+        if scene.output.pictures {
+            draw(options.output, one)?;
+        }
+    }
+    write_estimates(options.output, &done)?;
+    phases.stop();
+    report.phases(&phases).threads(1).judge(&scene.expect, options.quick);
+    report.write(options.output)?;
+    Ok(report)
+}
+
+/// What a scene will fit.
+///
+/// # Errors
+/// A fault of the scene or of its data.
+pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneError> {
+    let jobs = scene.jobs(source)?;
+    let line = |(spec, job): (&FitSpec, &Job)| {
+        let what = match job {
+            Job::Avrami(times, _) => format!("k and n from {} measurements", times.len()),
+            Job::Ozawa(coolings, temperatures) => {
+                format!(
+                    "m and χ at {} temperatures from {} cooling rates",
+                    temperatures.len(),
+                    coolings.len()
+                )
+            }
+            Job::Nakamura(runs, _) => {
+                let rows: usize = runs.iter().map(|run| run.degrees.len()).sum();
+                format!("K0, K_G and n from {rows} measurements in {} runs", runs.len())
+            }
+        };
+        format!("fit {}: {:?}, {what}", spec.name, spec.law)
+    };
+    Ok(scene.fit.iter().zip(&jobs).map(line).collect())
+}
+
+fn solve(spec: &FitSpec, job: Job) -> Result<Vec<Done>, Error> {
+    let name = &spec.name;
+    let celsius = |temperatures: &[f64]| -> Vec<f64> { temperatures.iter().map(|t| t - CELSIUS).collect() };
+    match job {
+        Job::Avrami(times, degrees) => {
+            let fit = avrami(&times, &degrees)?;
+            let series = vec![("measured".to_owned(), times, degrees)];
+            Ok(vec![Done { name: name.clone(), fit, abscissa: ("time", "s"), series }])
+        }
+        Job::Nakamura(runs, known) => {
+            let fit = nakamura(&runs, &known)?;
+            let series = runs
+                .into_iter()
+                .zip(&spec.data)
+                .map(|(run, data)| (stem(&data.file), celsius(&run.temperatures), run.degrees))
+                .collect();
+            Ok(vec![Done { name: name.clone(), fit, abscissa: ("temperature", "degC"), series }])
+        }
+        Job::Ozawa(coolings, temperatures) => {
+            let mut all = Vec::new();
+            for temperature in temperatures {
+                let fit = ozawa(&coolings, temperature)?;
+                let (rates, degrees) = crate::fit::rates_at(&coolings, temperature);
+                let rates: Vec<f64> = rates.iter().map(|q| q * 60.0).collect();
+                let name = format!("{name}.{}_degC", (temperature - CELSIUS).round());
+                let series = vec![("measured".to_owned(), rates, degrees)];
+                all.push(Done { name, fit, abscissa: ("cooling_rate", "K/min"), series });
+            }
+            Ok(all)
+        }
+    }
+}
+
+/// A file's name without folder and extension.
+fn stem(file: &Path) -> String {
+    file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn record(report: &mut Report, done: &Done) {
+    let Done { name, fit, .. } = done;
+    for estimate in &fit.estimates {
+        let named = |what: &str| format!("{name}.{}{what}", estimate.name);
+        report.value(&named(""), estimate.value, &estimate.unit);
+        report.value(&named(".standard_error"), estimate.standard_error, &estimate.unit);
+        report.value(&named(".lower"), estimate.interval[0], &estimate.unit);
+        report.value(&named(".upper"), estimate.interval[1], &estimate.unit);
+    }
+    report.value(&format!("{name}.rms"), fit.rms, "");
+    report.work(&format!("{name}.measurements"), fit.measurements as u64);
+    report.work(&format!("{name}.evaluations"), fit.evaluations as u64);
+}
+
+/// estimates.csv: a line for each constant.
+fn write_estimates(output: &Path, all: &[Done]) -> Result<(), polycore::Error> {
+    let mut text = String::from("fit,constant,value,standard_error,lower_95,upper_95,unit\n");
+    for Done { name, fit, .. } in all {
+        for e in &fit.estimates {
+            let [lower, upper] = e.interval;
+            let numbers = format!("{:?},{:?},{lower:?},{upper:?}", e.value, e.standard_error);
+            let _ = writeln!(text, "{name},{},{numbers},{}", e.name, e.unit);
+        }
+    }
+    atomic_write(output.join("estimates.csv"), |file| file.write_all(text.as_bytes()))
+}
+
+/// NAME.csv: measurements beside the model.
+fn write(output: &Path, done: &Done) -> Result<(), polycore::Error> {
+    let mut columns = [Vec::new(), Vec::new(), Vec::new()];
+    for (index, (_, x, data)) in done.series.iter().enumerate() {
+        columns[0].extend(std::iter::repeat_n((index + 1) as f64, x.len()));
+        columns[1].extend(x);
+        columns[2].extend(data);
+    }
+    let [run, x, data] = &columns;
+    let (name, unit) = done.abscissa;
+    let columns: [csv::Column; 4] =
+        [("run", "", run), (name, unit, x), ("alpha", "", data), ("alpha_model", "", &done.fit.model)];
+    csv::write(output.join(format!("{}.csv", done.name)), &columns)
+}
+
+/// NAME.png: measurements as markers, the model dashed.
+fn draw(output: &Path, done: &Done) -> Result<(), polycore::Error> {
+    let unit = done.abscissa.1.replace("degC", "°C");
+    let axis = format!("{} ({unit})", done.abscissa.0.replace('_', " "));
+    let mut plot = LinePlot::new(&done.name).axes(&axis, "relative crystallinity α").size(800.0, 460.0);
+    let (mut row, mut curve) = (0, [Vec::new(), Vec::new()]);
+    for (name, x, data) in &done.series {
+        let model = &done.fit.model[row..row + x.len()];
+        row += x.len();
+        let mut order: Vec<usize> = (0..x.len()).collect();
+        order.sort_by(|&a, &b| x[a].total_cmp(&x[b]));
+        for index in order {
+            curve[0].push(x[index]);
+            curve[1].push(model[index]);
+        }
+        // a NaN ends the line of one run
+        curve.iter_mut().for_each(|values| values.push(f64::NAN));
+        plot = plot.series(Series::markers(name, x, data));
+    }
+    plot = plot.series(Series::reference("model", &curve[0], &curve[1]));
+    plot.write(output.join(format!("{}.png", done.name)))
+}

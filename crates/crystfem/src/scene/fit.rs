@@ -1,0 +1,264 @@
+//! The scene of a fit.
+
+use super::material::located;
+use super::{OutputSpec, Program, check_name};
+use crate::error::Error;
+use crate::fit::{Cooling, DEGREES, Known, Run};
+use crate::kinetics::{Constants, Kinetics};
+use crate::table::{Column, read};
+use polycore::report::Expect;
+use polycore::scene::{SceneError, Source};
+use polycore::units::dimension::{RatioDimension, TemperatureDimension, TimeDimension};
+use polycore::units::{MolarEnergy, Temperature, TemperatureRate};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// A whole scene.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitScene {
+    /// The program that runs it: `crystfem`.
+    pub program: Program,
+    /// One line for tables and pictures.
+    #[serde(default)]
+    pub title: String,
+    /// The fits.
+    pub fit: Vec<FitSpec>,
+    /// Files to write.
+    #[serde(default)]
+    pub output: OutputSpec,
+    /// What the results must be.
+    #[serde(default)]
+    pub expect: Vec<Expect>,
+}
+
+/// Laws that can be fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FitLaw {
+    /// Eq. (4.2), from one isothermal run: columns `time` and `alpha`.
+    Avrami,
+    /// Eq. (4.3), at each of `temperatures`, from runs at constant cooling rates: columns `temperature` and `alpha`.
+    Ozawa,
+    /// Eqs (4.4) to (4.7): K₀, K_G and n, from runs at constant cooling rates (`rate`; columns `temperature` and `alpha`) or
+    /// along any histories that begin in the melt (columns `time`, `temperature` and `alpha`).
+    Nakamura,
+}
+
+/// One fit.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitSpec {
+    /// Its name: the values are `NAME.half_time`, `NAME.half_time.lower` …
+    pub name: String,
+    /// Law.
+    pub law: FitLaw,
+    /// Measurements.
+    pub data: Vec<DataSpec>,
+    /// Where rates are compared, of `ozawa`.
+    #[serde(default)]
+    pub temperatures: Vec<Temperature>,
+    /// Equilibrium melting temperature T₀, of `nakamura`.
+    pub equilibrium_melting: Option<Temperature>,
+    /// Temperature T∞ of frozen chains, of `nakamura`.
+    pub frozen: Option<Temperature>,
+    /// Glass transition T_g, of `nakamura`, instead of `frozen`: T∞ = T_g − 30 K.
+    pub glass_transition: Option<Temperature>,
+    /// Activation energy U, of `nakamura`; default 6270 J/mol.
+    pub activation_energy: Option<MolarEnergy>,
+}
+
+/// A table of measurements.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DataSpec {
+    /// CSV file, relative to the scene.
+    pub file: PathBuf,
+    /// Cooling rate.
+    pub rate: Option<TemperatureRate>,
+}
+
+/// A fit with its data, checked.
+pub enum Job {
+    /// Times, s, and α.
+    Avrami(Vec<f64>, Vec<f64>),
+    /// Cooling curves, and where to compare them, K.
+    Ozawa(Vec<Cooling>, Vec<f64>),
+    /// Runs, and what is known.
+    Nakamura(Vec<Run>, Known),
+}
+
+impl FitScene {
+    /// All fits with their data.
+    ///
+    /// # Errors
+    /// A [`SceneError`] that names the key, the value found and what is allowed; for data, file, line and column.
+    pub fn jobs(&self, source: &Source) -> Result<Vec<Job>, SceneError> {
+        if self.fit.is_empty() {
+            return Err(source.error("fit", "nothing", "at least one [[fit]]"));
+        }
+        let mut jobs = Vec::new();
+        for (index, fit) in self.fit.iter().enumerate() {
+            let key = |field: &str| format!("fit[{index}].{field}");
+            check_name(source, &key("name"), &fit.name)?;
+            if self.fit[..index].iter().any(|other| other.name == fit.name) {
+                return Err(source.error(
+                    &key("name"),
+                    format!("`{}` a second time", fit.name),
+                    "another name",
+                ));
+            }
+            fit.check_keys(source, &key)?;
+            jobs.push(fit.job(source, &key)?);
+        }
+        Ok(jobs)
+    }
+}
+
+impl FitSpec {
+    fn check_keys(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<(), SceneError> {
+        use FitLaw::{Nakamura, Ozawa};
+        let foreign = [
+            ("temperatures", !self.temperatures.is_empty(), Ozawa),
+            ("equilibrium_melting", self.equilibrium_melting.is_some(), Nakamura),
+            ("frozen", self.frozen.is_some(), Nakamura),
+            ("glass_transition", self.glass_transition.is_some(), Nakamura),
+            ("activation_energy", self.activation_energy.is_some(), Nakamura),
+        ];
+        for (name, given, law) in foreign {
+            if given && law != self.law {
+                let law = format!("{law:?}").to_lowercase();
+                let found = format!("`{name}` of another law");
+                return Err(source.error(&key(name), found, format!("nothing, or `law = \"{law}\"`")));
+            }
+        }
+        let rows = self.data.len();
+        let needed = if self.law == Ozawa { 3 } else { 1 };
+        if rows < needed {
+            return Err(source.error(&key("data"), format!("{rows} files"), format!("at least {needed}")));
+        }
+        if self.law == FitLaw::Avrami && rows > 1 {
+            return Err(source.error(
+                &key("data[1]"),
+                "a second file",
+                "one: another temperature is another [[fit]]",
+            ));
+        }
+        for (i, data) in self.data.iter().enumerate() {
+            let at = key(&format!("data[{i}].rate"));
+            match (self.law, data.rate.map(|rate| rate.si())) {
+                (FitLaw::Avrami, Some(_)) => {
+                    return Err(source.error(&at, "`rate` of an isothermal run", "nothing"));
+                }
+                (Ozawa, None) => return Err(source.error(&at, "nothing", "`rate`: a cooling rate")),
+                (_, Some(rate)) if !(rate > 0.0 && rate.is_finite()) => {
+                    return Err(source.error(&at, format!("{rate} K/s"), "above 0: a cooling rate"));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn job(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<Job, SceneError> {
+        match self.law {
+            FitLaw::Avrami => {
+                let columns = [time().within(0.0, f64::INFINITY), alpha()];
+                let [times, degrees] = table(source, &key("data[0].file"), &self.data[0].file, columns)?;
+                Ok(Job::Avrami(times, degrees))
+            }
+            FitLaw::Ozawa => {
+                if self.temperatures.is_empty() {
+                    let allowed = "at least one temperature at which the rates are compared";
+                    return Err(source.error(&key("temperatures"), "nothing", allowed));
+                }
+                let mut coolings = Vec::new();
+                for (i, data) in self.data.iter().enumerate() {
+                    let at = key(&format!("data[{i}].file"));
+                    let [temperatures, degrees] = table(source, &at, &data.file, [temperature(), alpha()])?;
+                    coolings.push(Cooling { rate: data.rate.map_or(0.0, |r| r.si()), temperatures, degrees });
+                }
+                Ok(Job::Ozawa(coolings, self.temperatures.iter().map(|t| t.si()).collect()))
+            }
+            FitLaw::Nakamura => {
+                let known = self.known(source, key)?;
+                let mut runs = Vec::new();
+                for (i, data) in self.data.iter().enumerate() {
+                    let at = key(&format!("data[{i}].file"));
+                    runs.push(match data.rate {
+                        Some(rate) => {
+                            let [temperatures, degrees] =
+                                table(source, &at, &data.file, [temperature(), alpha()])?;
+                            let run = Run::cooling(rate.si(), temperatures, degrees, &known);
+                            run.map_err(|error| source.error(&at, error, "temperatures that fall"))?
+                        }
+                        None => {
+                            let columns = [time(), temperature(), alpha()];
+                            let [times, temperatures, degrees] = table(source, &at, &data.file, columns)?;
+                            let origin = [times[0], temperatures[0]];
+                            Run { times, temperatures, degrees, origin }
+                        }
+                    });
+                }
+                Ok(Job::Nakamura(runs, known))
+            }
+        }
+    }
+
+    fn known(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<Known, SceneError> {
+        let Some(melting) = self.equilibrium_melting else {
+            let allowed = "`equilibrium_melting`: the temperature T₀, e.g. by a Hoffman–Weeks plot";
+            return Err(source.error(&key("equilibrium_melting"), "nothing", allowed));
+        };
+        let frozen = match (self.frozen, self.glass_transition) {
+            (Some(frozen), None) => frozen.si(),
+            (None, Some(glass)) => glass.si() - 30.0,
+            (None, None) => {
+                let allowed = "`frozen`, or `glass_transition` for T∞ = T_g − 30 K";
+                return Err(source.error(&key("frozen"), "nothing", allowed));
+            }
+            (Some(_), Some(_)) => {
+                let found = "`glass_transition` beside `frozen`";
+                return Err(source.error(&key("glass_transition"), found, "one of them"));
+            }
+        };
+        let example = Constants::TABLE_4_1_COLUMN_1;
+        let known = Known {
+            equilibrium_melting: melting.si(),
+            frozen,
+            activation_energy: self.activation_energy.map_or(example.activation_energy, |u| u.si()),
+        };
+        let trial = Constants {
+            equilibrium_melting: known.equilibrium_melting,
+            frozen: known.frozen,
+            activation_energy: known.activation_energy,
+            ..example
+        };
+        Kinetics::new(trial).map_err(|error| located(source, &key("equilibrium_melting"), &error))?;
+        Ok(known)
+    }
+}
+
+fn time() -> Column {
+    Column::of::<TimeDimension>("time")
+}
+
+fn temperature() -> Column {
+    Column::of::<TemperatureDimension>("temperature")
+}
+
+fn alpha() -> Column {
+    Column::of::<RatioDimension>("alpha").within(DEGREES[0], DEGREES[1])
+}
+
+/// Reads a table beside the scene.
+fn table<const N: usize>(
+    source: &Source,
+    key: &str,
+    file: &Path,
+    columns: [Column; N],
+) -> Result<[Vec<f64>; N], SceneError> {
+    let folder = source.path.parent().unwrap_or(Path::new(""));
+    let allowed = "a CSV table of measurements";
+    read(&folder.join(file), columns).map_err(|error: Error| source.error(key, error, allowed))
+}

@@ -1,0 +1,207 @@
+use super::*;
+
+const MATERIAL: &str = r#"
+[material]
+law = "semicrystalline"
+density = "1010 kg/m^3"
+conductivity = "0.25 W/(m K)"
+specific_heat = "2200 J/(kg K)"
+kinetics = "table-4.1-column-1"
+melting = "pa12"
+crystallinity = 0.25
+"#;
+
+const POINT: &str = r#"
+[[point]]
+name = "a"
+start = "200 degC"
+legs = [{ to = "120 degC", rate = "1 K/min" }]
+"#;
+
+const FIT: &str = r#"
+[[fit]]
+name = "a"
+law = "nakamura"
+equilibrium_melting = "193.2 degC"
+frozen = "21 degC"
+data = [{ file = "a.csv", rate = "1 K/min" }]
+"#;
+
+fn head(rest: &str) -> String {
+    format!("version = 1\nprogram = \"crystfem\"\n{rest}")
+}
+
+/// What `crystfem check` says of a scene.
+fn complaint(text: &str, folder: &std::path::Path) -> String {
+    let source = Source::new(folder.join("case.toml"), text);
+    let result = crate::run::explain(&source);
+    result.map_or_else(|error| error.message().to_owned(), |lines| lines.join("\n"))
+}
+
+fn replaced(text: &str, from: &str, to: &str) -> String {
+    assert!(text.contains(from), "{from}");
+    text.replacen(from, to, 1)
+}
+
+#[test]
+fn a_good_scene_is_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    let lines = complaint(&head(&format!("{MATERIAL}{POINT}")), folder.path());
+    assert!(lines.contains("material: Semicrystalline, linear heat, melting, no latent heat"), "{lines}");
+    assert!(lines.contains("point a: prescribed temperature, 1 segments, 4800 s; adaptive steps"), "{lines}");
+    std::fs::write(folder.path().join("a.csv"), "temperature [degC],alpha\n160,0.1\n150,0.5\n").unwrap();
+    let lines = complaint(&head(FIT), folder.path());
+    assert_eq!(lines, "fit a: Nakamura, K0, K_G and n from 2 measurements in 1 runs");
+}
+
+/// Every fault is named with key, what was found and what is allowed.
+#[test]
+fn bad_points() {
+    let good = head(&format!("{MATERIAL}{POINT}"));
+    let legs = "legs = [{ to = \"120 degC\", rate = \"1 K/min\" }]";
+    let kinetics = "kinetics = \"table-4.1-column-1\"";
+    let given = |rest: &str| {
+        format!(
+            "kinetics = {{ growth_rate = \"1 1/s\", nucleation = \"1e5 K^2\", avrami_exponent = 2.5, {rest} }}"
+        )
+    };
+    let cases: &[(&str, String, &[&str])] = &[
+        ("law = \"semicrystalline\"", "law = \"semicrystaline\"".into(), &["did you mean `semicrystalline`"]),
+        ("program = \"crystfem\"", "program = \"peri\"".into(), &["`program`", "crystfem"]),
+        ("kinetics = ", "kinetic = ".into(), &["unknown key `kinetic`", "did you mean `kinetics`"]),
+        (kinetics, "kinetics = \"table-4.1-column-3\"".into(), &["did you mean `table-4.1-column-"]),
+        (kinetics, String::new(), &["`material.kinetics`", "a semicrystalline material needs it"]),
+        (kinetics, "kinetics = 3".into(), &["`material.kinetics`", "growth_rate"]),
+        (kinetics, given("frozen = \"21 degC\""), &["equilibrium_melting"]),
+        (kinetics, given("equilibrium_melting = \"193 degC\""), &["`glass_transition` for T∞ = T_g − 30 K"]),
+        (
+            kinetics,
+            given("equilibrium_melting = \"20 degC\", frozen = \"21 degC\""),
+            &["above the temperature of frozen chains"],
+        ),
+        (
+            kinetics,
+            given("equilibrium_melting = \"193 degC\", frozen = \"21 degC\", glass_transition = \"51 degC\""),
+            &["one of them"],
+        ),
+        (
+            "crystallinity = 0.25",
+            "crystallinity = 1.25".into(),
+            &["`material.crystallinity`", "1.25", "above 0, up to 1"],
+        ),
+        (
+            "crystallinity = 0.25",
+            "crystallinity = 0.25\nlatent_heat = \"209 J\"".into(),
+            &["is an energy", "an energy per mass is needed"],
+        ),
+        (
+            "crystallinity = 0.25",
+            "crystallinity = 0.25\nlatent_heat = \"-1 J/g\"".into(),
+            &["`material.latent_heat`", "0 or above"],
+        ),
+        (
+            "crystallinity = 0.25",
+            "crystallinity = 0.25\ninitial_alpha = 1".into(),
+            &["`material.initial_alpha`", "below 1"],
+        ),
+        (
+            "crystallinity = 0.25",
+            "crystallinity = 0.25\nsign = \"mended\"".into(),
+            &["`material.sign`", "law = \"printed\""],
+        ),
+        (
+            "law = \"semicrystalline\"",
+            "law = \"conductor\"".into(),
+            &["`material.kinetics`", "`kinetics` of a material that has none"],
+        ),
+        ("density = \"1010 kg/m^3\"", "density = \"0 kg/m^3\"".into(), &["`material.density`", "above 0"]),
+        (
+            "\"0.25 W/(m K)\"",
+            "\"0.25 W/m^2/K\"".into(),
+            &["is a heat transfer coefficient", "a thermal conductivity is needed"],
+        ),
+        (
+            "\"0.25 W/(m K)\"",
+            "{ temperature = [\"20 degC\"], value = [] }".into(),
+            &["`material.conductivity`", "a value for each of the 1"],
+        ),
+        ("melting = \"pa12\"", "melting = \"pa11\"".into(), &["did you mean `pa12`"]),
+        (
+            "melting = \"pa12\"",
+            "melting = { sharpness = \"1 1/K\", shape = 0.5, peak = \"177 degC\" }".into(),
+            &["`material.melting`", "1.001"],
+        ),
+        ("name = \"a\"", "name = \"a/b\"".into(), &["`point[0].name`", "it names files"]),
+        (legs, String::new(), &["one of `legs`, `history`, `exchange`, `adiabatic`"]),
+        (legs, format!("{legs}\nadiabatic = true"), &["`adiabatic` beside `legs`"]),
+        (legs, "adiabatic = true".into(), &["`point[0].duration`", "`adiabatic` needs it"]),
+        (legs, "adiabatic = true\nduration = \"-1 s\"".into(), &["`point[0].duration`", "above 0"]),
+        (legs, "history = \"none.csv\"".into(), &["`point[0].start`", "`start` beside `history`"]),
+        ("start = \"200 degC\"\n", String::new(), &["`point[0].start`", "`legs` needs it"]),
+        ("start = \"200 degC\"", "start = \"-300 degC\"".into(), &["below absolute zero"]),
+        (
+            legs,
+            "legs = [{ to = \"120 degC\", rate = \"-1 K/min\" }]".into(),
+            &["`point[0].legs`", "for heating and cooling alike"],
+        ),
+        (legs, "legs = [{ rate = \"1 K/min\" }]".into(), &["`point[0].legs[0]`", "`hold`, or `to`"]),
+        (legs, format!("{legs}\ncycles = 0"), &["`point[0].cycles`", "1 to 100000"]),
+        (legs, format!("{legs}\ntime_step = \"0 s\""), &["`point[0].time_step`", "above 0"]),
+        (
+            legs,
+            format!("{legs}\ntime_step = \"1 s\"\nlargest_change = 0.1"),
+            &["`largest_change` beside `time_step`"],
+        ),
+        (
+            legs,
+            format!("{legs}\nmaterials = [\"b\"]"),
+            &["`point[0].materials[0]`", "there is only `[material]`"],
+        ),
+        (legs, format!("{legs}\n[[compare]]\nmaterial = \"a\"\nwith = \"b\""), &["`compare[0].material`"]),
+        ("[material]", "[materials.x]".into(), &["point a"]),
+        ("[[point]]", "[[fit]]\nname = \"x\"\n[[point]]".into(), &["`fit` beside `point`"]),
+        ("[[point]]", "[[pint]]".into(), &["a scene without a task"]),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let mut missed = Vec::new();
+    for (from, to, parts) in cases {
+        let message = complaint(&replaced(&good, from, to), folder.path());
+        if !parts.iter().all(|part| message.contains(part)) {
+            missed.push(format!("{to}: {message}"));
+        }
+    }
+    assert!(missed.is_empty(), "{}", missed.join("\n"));
+}
+
+#[test]
+fn bad_fits() {
+    let good = head(FIT);
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.csv"), "temperature [degC],alpha\n160,0.1\n150,0.5\n").unwrap();
+    std::fs::write(folder.path().join("rising.csv"), "temperature [degC],alpha\n150,0.1\n160,0.5\n").unwrap();
+    std::fs::write(folder.path().join("text.csv"), "temperature [degC],alpha\n150,much\n").unwrap();
+    let cases: &[(&str, &str, &[&str])] = &[
+        ("law = \"nakamura\"", "law = \"nakamora\"", &["did you mean `nakamura`"]),
+        ("file = \"a.csv\"", "file = \"none.csv\"", &["`fit[0].data[0].file`", "none.csv", "a CSV table"]),
+        ("file = \"a.csv\"", "file = \"rising.csv\"", &["measurement 2", "temperatures that fall"]),
+        ("file = \"a.csv\"", "file = \"text.csv\"", &["text.csv:2: column 2, `alpha`: found \"much\""]),
+        ("rate = \"1 K/min\"", "rate = \"0 K/min\"", &["`fit[0].data[0].rate`", "above 0"]),
+        (", rate = \"1 K/min\"", "", &["a.csv:1: header", "`time [unit]`"]),
+        ("frozen = \"21 degC\"", "", &["`fit[0].frozen`", "`glass_transition`"]),
+        ("frozen = \"21 degC\"", "frozen = \"200 degC\"", &["above the temperature of frozen chains"]),
+        ("equilibrium_melting = \"193.2 degC\"", "", &["`fit[0].equilibrium_melting`", "Hoffman–Weeks"]),
+        ("law = \"nakamura\"", "law = \"avrami\"", &["`fit[0].equilibrium_melting`", "of another law"]),
+        ("law = \"nakamura\"", "law = \"nakamura\"\ntemperatures = [\"157 degC\"]", &["law = \"ozawa\""]),
+        ("data = [{ file = \"a.csv\", rate = \"1 K/min\" }]", "data = []", &["`fit[0].data`", "at least 1"]),
+        ("name = \"a\"", "name = \"\"", &["it names files"]),
+    ];
+    for (from, to, parts) in cases {
+        let message = complaint(&replaced(&good, from, to), folder.path());
+        assert!(parts.iter().all(|part| message.contains(part)), "{to}: {message}");
+    }
+    // two rows for three constants are found by the fit itself
+    let source = Source::new(folder.path().join("case.toml"), good);
+    let options = crate::run::Options { output: &folder.path().join("out"), quick: false };
+    let error = crate::run::run(&source, &options).unwrap_err().to_string();
+    assert!(error.contains("`fit[0].data`") && error.contains("2 measurements for 3 parameters"), "{error}");
+}
