@@ -97,7 +97,7 @@ fn kind_of(name: &str) -> Option<Kind> {
     let is = |stem: &&str| {
         name.strip_prefix(stem).is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_alphabetic()))
     };
-    STEMS.iter().find(|(_, stems)| stems.iter().any(|stem| is(stem))).map(|(kind, _)| *kind)
+    STEMS.iter().find(|(_, stems)| stems.iter().any(&is)).map(|(kind, _)| *kind)
 }
 
 struct Reader<'a> {

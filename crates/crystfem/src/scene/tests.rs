@@ -35,7 +35,7 @@ fn head(rest: &str) -> String {
 fn complaint(text: &str, folder: &std::path::Path) -> String {
     let source = Source::new(folder.join("case.toml"), text);
     let result = crate::run::explain(&source);
-    result.map_or_else(|error| error.message().to_owned(), |lines| lines.join("\n"))
+    result.map_or_else(|error| error.to_string(), |lines| lines.join("\n"))
 }
 
 fn replaced(text: &str, from: &str, to: &str) -> String {
