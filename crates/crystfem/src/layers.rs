@@ -62,8 +62,8 @@ impl Simulation {
             return Ok(());
         }
         self.state.work.builds += 1;
-        let generation = self.state.work.builds << 32;
-        let new = System::build(&self.problem, &self.behaviours, &self.state.born, generation)?;
+        let build = self.state.work.builds;
+        let new = System::build(&self.problem, &self.behaviours, &self.state.born, build)?;
         let old = std::mem::replace(&mut self.system, new);
         let sums = self.linear_sums(first)?;
         let mut state = std::mem::take(&mut self.state);

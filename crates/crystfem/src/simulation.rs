@@ -4,7 +4,9 @@
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::problem::Problem;
-use crate::system::vector::{set, sum};
+use crate::solver::Task;
+pub use crate::solver::{Choice, LinearSolver};
+use crate::system::vector::{largest, set, sum};
 use crate::system::{At, Behaviour, Exchange, NONE, System};
 pub use crate::system::{Memory, Points};
 use crate::time::{Attempt, Scheme, Stepper, Steps, Work};
@@ -23,18 +25,25 @@ pub struct Settings {
     pub steps: Steps,
     /// Rms error of temperature that linear solves and Newton's iteration may leave, K.
     pub tolerance: f64,
+    /// How linear systems are solved.
+    pub solver: LinearSolver,
 }
 
 impl Settings {
     /// TR-BDF2 with a temporal error of 0.1 K per step at most.
     pub fn adaptive(first: f64) -> Self {
         let steps = Steps::Adaptive { tolerance: 0.1, first, smallest: 1e-6 * first, largest: f64::INFINITY };
-        Self { scheme: Scheme::TrBdf2, steps, tolerance: 1e-7 }
+        Self { scheme: Scheme::TrBdf2, steps, tolerance: 1e-7, solver: LinearSolver::Auto }
     }
 
     /// Backward Euler with fixed steps.
     pub fn backward_euler(dt: f64) -> Self {
-        Self { scheme: Scheme::BackwardEuler, steps: Steps::Fixed { dt }, tolerance: 1e-7 }
+        Self {
+            scheme: Scheme::BackwardEuler,
+            steps: Steps::Fixed { dt },
+            tolerance: 1e-7,
+            solver: LinearSolver::Auto,
+        }
     }
 
     fn check(&self) -> Result<(), Error> {
@@ -85,6 +94,8 @@ pub struct State {
     pub next_dt: f64,
     /// Whether the last thing was a jump.
     pub jump: bool,
+    /// Whether linear systems are solved by factors since the last jump.
+    pub direct: bool,
     /// Energy since the start.
     pub ledger: Ledger,
     /// Work since the start.
@@ -247,6 +258,74 @@ impl Simulation {
         })
     }
 
+    /// How linear systems would be solved from now to a time, and why.
+    pub fn choose(&self, until: f64) -> Choice {
+        let (equal_steps, dt) = match self.settings.steps {
+            Steps::Fixed { dt } => (true, dt),
+            Steps::Adaptive { first, .. } => (false, first),
+        };
+        let next = self.breaks[self.breaks.partition_point(|&t| t <= self.state.time)..].first().copied();
+        let span = next.map_or(until, |next| next.min(until)) - self.state.time;
+        // A_ii of backward Euler over the capacity
+        let capacity = |k: usize| self.system.capacity[k];
+        let conduction = self.system.rows.diagonal([0.0, dt]);
+        let size = self.system.size();
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for &node in &self.system.nodes {
+            let point = self.problem.mesh.points[node as usize];
+            for d in 0..3 {
+                (low[d], high[d]) = (low[d].min(point[d]), high[d].max(point[d]));
+            }
+        }
+        let extent = [0, 1, 2].map(|d| (high[d] - low[d]).max(0.0));
+        let longest = extent.into_iter().fold(0.0, f64::max);
+        let spacing = (extent.iter().product::<f64>() / size as f64).cbrt().max(1e-6 * longest);
+        let stiffness = largest(size, |k| match capacity(k) > 0.0 {
+            true => 1.0 + conduction[k] / capacity(k),
+            false => 1.0,
+        });
+        let task = Task {
+            size,
+            length: longest / spacing,
+            entries: self.system.rows.stored()[2],
+            stiffness,
+            solves: span / dt,
+            linear: self.system.is_linear(),
+            equal_steps,
+            wanted: self.settings.solver,
+        };
+        task.choose()
+    }
+
+    /// What is solved and what is left out, for a run to a time: one sentence a line.
+    pub fn explain(&self, until: f64) -> Vec<String> {
+        let system = &self.system;
+        let [rows, segments, entries] = system.rows.stored();
+        let mut lines = vec![
+            format!(
+                "{} equations for {} of {} elements; {} nodes have no equation, {} are held",
+                system.size(),
+                system.elements.len(),
+                self.problem.material_of.len(),
+                self.problem.mesh.points.len() - system.size(),
+                system.fixed.len()
+            ),
+            format!("conduction: {rows} distinct rows ({entries} entries) in {segments} runs of equal rows"),
+        ];
+        lines.push(match system.is_linear() {
+            true => "linear: one linear solve a stage, no Newton iteration".into(),
+            false => "not linear: Newton's iteration with line search".into(),
+        });
+        if !system.nodal.is_empty() {
+            lines.push(format!("{} material points at nodes", system.nodal.material.len()));
+        }
+        if !system.general.is_empty() {
+            lines.push(format!("{} material points in elements", system.general.points()));
+        }
+        lines.push(self.choose(until).reason);
+        lines
+    }
+
     /// One accepted step.
     fn step(&mut self, until: f64) -> Result<Record, Error> {
         let time = self.state.time;
@@ -262,6 +341,9 @@ impl Simulation {
             let (rate, exchange) = self.stepper.rate(&self.problem, &mut self.system, &self.state)?;
             (self.state.rate, self.state.exchange) = (rate, exchange);
         }
+        if jump {
+            self.state.direct = self.choose(until).direct;
+        }
         let mut wanted = match self.settings.steps {
             Steps::Fixed { dt } => dt,
             Steps::Adaptive { largest, .. } => self.state.next_dt.min(largest),
@@ -276,11 +358,17 @@ impl Simulation {
             } else {
                 time + wanted
             };
-            let dt = end - time;
-            if dt <= 0.0 {
+            // equal steps have one length to the last bit, and with it one matrix
+            let equal = (end - time - wanted).abs() <= 1e-9 * wanted;
+            let dt = if equal { wanted } else { end - time };
+            if end <= time {
                 let allowed = format!("steps that change the time {time} s");
                 return Err(Error::Parameter { name: "time step", found: wanted, allowed });
             }
+            // factors serve many steps; a single one of another length does without
+            let single = adaptive.is_none() && (!equal || scheme != self.settings.scheme);
+            self.stepper.stages.direct =
+                self.state.direct && (!single || self.settings.solver == LinearSolver::Direct);
             let accuracy = adaptive.map(|(tolerance, ..)| 0.05 * tolerance);
             let mut work = self.state.work;
             let attempt = self.stepper.attempt(
@@ -288,7 +376,7 @@ impl Simulation {
                 &mut self.system,
                 &self.state,
                 scheme,
-                end,
+                [dt, end],
                 self.settings.tolerance,
                 accuracy,
                 &mut work,
@@ -300,7 +388,7 @@ impl Simulation {
                 Ok(attempt)
             });
             let Some((tolerance, smallest, largest)) = adaptive else {
-                return Ok(self.accept(end, &attempt?));
+                return Ok(self.accept([dt, end], &attempt?));
             };
             // a wish below this is not granted by a shorter next step only
             const REFUSED: f64 = 0.5;
@@ -313,14 +401,14 @@ impl Simulation {
                         // a step cut short by a landing says little about the next
                         let grown = (dt * grow).max(if lands { wanted } else { 0.0 });
                         self.state.next_dt = grown.min(dt * ratio).clamp(smallest, largest);
-                        return Ok(self.accept(end, attempt));
+                        return Ok(self.accept([dt, end], attempt));
                     }
                     grow.min(ratio.max(0.1)).min(0.9)
                 }
                 Err(_) => 0.25,
             };
             if dt <= smallest * (1.0 + 1e-9) {
-                return Ok(self.accept(end, &attempt?));
+                return Ok(self.accept([dt, end], &attempt?));
             }
             self.state.work.rejected += 1;
             wanted = (dt * factor).max(smallest);
@@ -341,9 +429,8 @@ impl Simulation {
     }
 
     /// Takes the end of the attempt as the new state.
-    fn accept(&mut self, end: f64, attempt: &Attempt) -> Record {
+    fn accept(&mut self, [dt, end]: [f64; 2], attempt: &Attempt) -> Record {
         let Self { state, stepper, system, .. } = self;
-        let dt = end - state.time;
         let size = system.size();
         let Stepper { temperature, stages, .. } = stepper;
         let residual = &stages.residual;

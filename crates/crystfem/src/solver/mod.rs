@@ -1,8 +1,13 @@
 //! Linear systems of one stage of a step, A δ = r with A = D + M + a·(K + faces).
 
 mod cg;
+mod choice;
+mod direct;
+mod dissection;
 
-pub use cg::ConjugateGradients;
+pub use cg::{ConjugateGradients, Ended};
+pub use choice::{Choice, LinearSolver, Task};
+pub use direct::Direct;
 
 use crate::system::vector::{sum, weighted_square};
 use crate::system::{FaceMatrix, Rows};

@@ -103,7 +103,7 @@ impl System {
         problem: &Problem,
         behaviours: &[Behaviour],
         born: &[u32],
-        generation: u64,
+        build: u64,
     ) -> Result<Self, Error> {
         let mesh = &problem.mesh;
         let consistent = problem.capacity == Capacity::Consistent;
@@ -154,7 +154,8 @@ impl System {
             free: vec![1.0; size],
             consistent,
             base: None,
-            generation,
+            build,
+            generation: build << 32,
         };
         system.collect_points(problem, behaviours, born, &kinds, &around);
         let volumes = system.add_elements(problem, behaviours, born, &kinds, &classes)?;

@@ -172,6 +172,8 @@ pub struct System {
     pub consistent: bool,
     /// Values of `rows` without the elements whose conduction or capacity varies.
     base: Option<[Vec<f64>; 2]>,
+    /// Number of this build.
+    pub build: u64,
     /// Counts rebuilt tangents: a matrix is unchanged while this is.
     pub generation: u64,
 }

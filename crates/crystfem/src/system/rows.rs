@@ -205,7 +205,6 @@ impl Rows {
     }
 
     /// Distinct rows stored, segments of equal rows, and stored entries.
-    #[cfg(test)]
     pub fn stored(&self) -> [usize; 3] {
         [self.stencils.count(), self.segments.len(), self.stencils.offsets.len()]
     }
@@ -250,7 +249,6 @@ impl Rows {
     }
 
     /// Entries (column, value) of a row of `capacity`·M + `conduction`·K, columns ascending.
-    #[cfg(test)]
     pub fn row(&self, row: usize, weights: [f64; 2]) -> impl Iterator<Item = (usize, f64)> + '_ {
         let segment = self.segments.partition_point(|s| s.start as usize <= row).saturating_sub(1);
         let range = self.segments.get(segment).map_or(0..0, |s| self.stencils.range(s.stencil));

@@ -1,7 +1,7 @@
 //! From one time to the next.
 //!
 //! E' = −Q is integrated in terms of energy, so that every scheme conserves it: with stage rates Q_s and weights b_s,
-//! E(t+Δt) = E(t) − Δt Σ b_s Q_s. A stage solves E(T) − E(t) + a Q(T) + known = 0 ([`Stages`]); a linear scene needs
+//! E(t+Δt) = E(t) − Δt Σ b_s Q_s. A stage solves E(T) − E(t) + a Q(T) + known = 0; a linear scene needs
 //! one linear solve for it, others Newton's iteration.
 //!
 //! - backward Euler: one stage, order 1, L-stable; temperatures with lumped capacity never overshoot.

@@ -4,7 +4,7 @@ use super::Work;
 use crate::error::Error;
 use crate::ledger::NOTHING;
 use crate::problem::Problem;
-use crate::solver::{ConjugateGradients, Operator, norm_squared};
+use crate::solver::{ConjugateGradients, Direct, Ended, Operator, norm_squared};
 use crate::system::vector::{largest, set, sum};
 use crate::system::{At, Evaluation, Memory, System};
 
@@ -52,6 +52,12 @@ pub struct Stages {
     /// K·1 and M·1 over the free nodes.
     free_sums: [Vec<f64>; 2],
     cg: ConjugateGradients,
+    /// Whether factors are wanted; they are made when first needed.
+    pub direct: bool,
+    factors: Option<Direct>,
+    /// For which generation the analysis and for which weight the factors were made.
+    analysed_for: Option<u64>,
+    factored_for: Option<(u64, u64)>,
     capacity: f64,
     floor: f64,
     /// For which generation and which weight the above was made.
@@ -78,7 +84,7 @@ impl Stages {
         self.evaluate(problem, system, stage, temperature, work)?;
         if system.is_linear() {
             self.prepare(system, stage.weight);
-            self.correct(system, stage, tolerance, work)?;
+            self.correct(problem, system, stage, tolerance, work)?;
             for (t, correction) in temperature.iter_mut().zip(&self.correction) {
                 *t += correction;
             }
@@ -108,7 +114,7 @@ impl Stages {
                 return self.finite(problem, system, stage, temperature);
             }
             work.newton_iterations += 1;
-            self.correct(system, stage, (1e-3 * error).max(0.3 * tolerance), work)?;
+            self.correct(problem, system, stage, (1e-3 * error).max(0.3 * tolerance), work)?;
             // line search along the correction, by the norm of this iterate's matrix
             let inverse = std::mem::take(&mut self.inverse);
             let mut part = 1.0;
@@ -159,9 +165,18 @@ impl Stages {
         let operator = operator(system, &self.diagonal, weight, &self.evaluation);
         let goal = [self.capacity, tolerance, 0.0];
         self.correction.resize(size, 0.0);
-        let ended =
-            self.cg.solve(&operator, &self.inverse, &mut self.right, &mut self.correction, goal, limit(size));
-        work.cg_iterations += ended.iterations as u64;
+        let made_for = Some((system.generation, weight.to_bits()));
+        match &mut self.factors {
+            Some(factors) if self.direct && self.factored_for == made_for && system.is_linear() => {
+                factors.solve(&self.right, &mut self.correction);
+                work.direct_solves += 1;
+            }
+            _ => {
+                let (inverse, right) = (&self.inverse, &mut self.right);
+                let ended = self.cg.solve(&operator, inverse, right, &mut self.correction, goal, limit(size));
+                work.cg_iterations += ended.iterations as u64;
+            }
+        }
         largest(size, |k| self.correction[k].abs()).max(0.0)
     }
 
@@ -240,6 +255,7 @@ impl Stages {
     /// The correction of temperature: A δ = −residual, and Σ(residual + A δ) = 0 over the free nodes to rounding.
     fn correct(
         &mut self,
+        problem: &Problem,
         system: &System,
         stage: &Stage,
         tolerance: f64,
@@ -253,8 +269,38 @@ impl Stages {
         let operator = operator(system, &self.diagonal, stage.weight, &self.evaluation);
         let goal = [self.capacity, tolerance, self.floor];
         let limit = limit(size);
-        let ended =
-            self.cg.solve(&operator, &self.inverse, &mut self.right, &mut self.correction, goal, limit);
+        let factored = self.direct && {
+            let made_for = Some((system.generation, stage.weight.to_bits()));
+            if self.analysed_for != Some(system.build) {
+                let place = |e: u32| problem.mesh.points[system.nodes[e as usize] as usize];
+                self.factors = Direct::analyse(&operator, &system.free, place);
+                (self.analysed_for, self.factored_for) = (Some(system.build), None);
+            }
+            // without memory for factors, or with a matrix that is singular to rounding, the other method goes on
+            if self.factored_for != made_for || !system.is_linear() {
+                work.factorizations += 1;
+                if !self.factors.as_mut().is_some_and(|factors| factors.factor(&operator)) {
+                    self.factors = None;
+                }
+                self.factored_for = made_for;
+            }
+            self.factors.is_some()
+        };
+        if factored && let Some(factors) = &mut self.factors {
+            factors.solve(&self.right, &mut self.correction);
+            work.direct_solves += 1;
+            self.trial.resize(size, 0.0);
+            operator.product(&self.correction, &mut self.trial);
+            let image = &self.trial;
+            for ((right, image), free) in self.right.iter_mut().zip(image).zip(&system.free) {
+                *right -= free * image;
+            }
+        }
+        let ended = if factored {
+            Ended { iterations: 0, error: 0.0, converged: true }
+        } else {
+            self.cg.solve(&operator, &self.inverse, &mut self.right, &mut self.correction, goal, limit)
+        };
         work.cg_iterations += ended.iterations as u64;
         if !ended.converged {
             return Err(Error::NotConverged {

@@ -59,7 +59,7 @@ impl Stepper {
         Ok((evaluation.rate, evaluation.exchange))
     }
 
-    /// A step to `end`; the temporal error is estimated to a fraction of `accuracy`, if given.
+    /// A step of length `dt`, which ends at `end`; the temporal error is estimated to a fraction of `accuracy`, if given.
     ///
     /// # Errors
     /// Those of the stages.
@@ -70,12 +70,11 @@ impl Stepper {
         system: &mut System,
         state: &State,
         scheme: Scheme,
-        end: f64,
+        [dt, end]: [f64; 2],
         tolerance: f64,
         accuracy: Option<f64>,
         work: &mut Work,
     ) -> Result<Attempt, Error> {
-        let dt = end - state.time;
         let size = system.size();
         let (start, slope) = (&state.temperature, &state.slope);
         self.temperature.resize(size, 0.0);

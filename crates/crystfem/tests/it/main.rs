@@ -10,4 +10,5 @@ mod patch;
 mod point;
 mod readers;
 mod same_bits;
+mod solvers;
 mod verification;

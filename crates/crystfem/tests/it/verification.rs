@@ -22,7 +22,7 @@ fn line(length: f64, elements: usize) -> Mesh {
 
 fn precise(tolerance: f64) -> Settings {
     let steps = Steps::Adaptive { tolerance, first: 1e-4, smallest: 1e-9, largest: 1e9 };
-    Settings { scheme: Scheme::TrBdf2, steps, tolerance: 1e-9 }
+    Settings { scheme: Scheme::TrBdf2, steps, ..Settings { tolerance: 1e-9, ..Settings::adaptive(1.0) } }
 }
 
 /// Temperature at x on meshes of h, h/2, h/4; the value extrapolated in h² and h⁴, and the observed order.

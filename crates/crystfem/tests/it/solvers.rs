@@ -1,0 +1,108 @@
+//! Factors and conjugate gradients give one temperature, and the choice follows the scene.
+
+use crate::bodies::{PA12, conductor, everywhere, film, grid, held, radiation, run};
+use crystfem::boundary::{Field, Where};
+use crystfem::problem::{Capacity, Problem};
+use crystfem::simulation::{LinearSolver, Settings, Simulation};
+use crystfem::time::{Scheme, Steps};
+
+fn brick(elements: usize, capacity: Capacity, settings: Settings) -> Simulation {
+    let mesh = grid([0.02; 3], [elements; 3]);
+    let bottom = mesh.surfaces["bottom"].clone();
+    let conditions = vec![
+        held(&mesh, "bottom", Field::constant(353.15)),
+        film(Where::Outer { except: bottom }, 15.0, 353.15),
+    ];
+    Simulation::new(Problem { conditions, capacity, ..Problem::new(mesh, conductor(PA12), 493.15) }, settings)
+        .unwrap()
+}
+
+fn settings(solver: LinearSolver, scheme: Scheme, dt: f64) -> Settings {
+    Settings { solver, scheme, steps: Steps::Fixed { dt }, tolerance: 1e-9 }
+}
+
+#[test]
+fn both_solvers_agree() {
+    for capacity in [Capacity::Lumped, Capacity::Consistent] {
+        for scheme in [Scheme::BackwardEuler, Scheme::TrBdf2] {
+            let [cg, direct] = [LinearSolver::ConjugateGradients, LinearSolver::Direct].map(|solver| {
+                let mut simulation = brick(12, capacity, settings(solver, scheme, 25.0));
+                run(&mut simulation, 500.0);
+                simulation
+            });
+            // the tolerance of both, and steps that pass errors on
+            for (a, b) in cg.temperatures(0.0).iter().zip(direct.temperatures(0.0)) {
+                assert!((a - b).abs() < 1e-6, "{capacity:?} {scheme:?}: {a}, {b}");
+            }
+            let work = direct.state().work;
+            assert!(cg.state().work.cg_iterations > 0 && cg.state().work.factorizations == 0);
+            // TR-BDF2 begins with one step of backward Euler, which has another matrix
+            let (factorizations, solves) = if scheme == Scheme::TrBdf2 { (2, 39) } else { (1, 20) };
+            assert_eq!(
+                (work.factorizations, work.direct_solves, work.cg_iterations),
+                (factorizations, solves, 0)
+            );
+            assert!(direct.state().ledger.worst < 1e-10, "{:?}", direct.state().ledger);
+        }
+    }
+}
+
+/// Asked for where the matrix changes, factors are made for each.
+#[test]
+fn factors_of_a_scene_that_is_not_linear() {
+    let run_with = |solver| {
+        let conditions = vec![radiation(everywhere(), 0.9, 300.0)];
+        let problem =
+            Problem { conditions, ..Problem::new(grid([0.02; 3], [8; 3]), conductor(PA12), 493.15) };
+        let mut simulation = Simulation::new(problem, settings(solver, Scheme::BackwardEuler, 50.0)).unwrap();
+        run(&mut simulation, 500.0);
+        (simulation.temperature(0).unwrap(), simulation.state().work)
+    };
+    let (cg, _) = run_with(LinearSolver::Auto);
+    let (direct, work) = run_with(LinearSolver::Direct);
+    assert!((cg - direct).abs() < 1e-6, "{cg}, {direct}");
+    assert!(work.cg_iterations == 0 && work.factorizations == work.newton_iterations, "{work:?}");
+}
+
+/// On a brick of equal elements conjugate gradients win at any step; along a line of them, factors.
+#[test]
+fn the_choice_follows_the_scene() {
+    let settings = |dt| settings(LinearSolver::Auto, Scheme::BackwardEuler, dt);
+    assert!(!brick(12, Capacity::Lumped, settings(0.5)).choose(500.0).direct);
+    let adaptive = brick(4, Capacity::Lumped, Settings::adaptive(1.0));
+    assert!(adaptive.choose(1e6).reason.contains("adaptive"));
+    let mesh = grid([0.2, 1e-3, 1e-3], [200, 1, 1]);
+    let conditions = vec![held(&mesh, "left", Field::constant(353.15))];
+    let problem = Problem { conditions, ..Problem::new(mesh, conductor(PA12), 493.15) };
+    let mut line = Simulation::new(problem, settings(100.0)).unwrap();
+    assert!(line.choose(1e4).direct, "{:?}", line.choose(1e4));
+    let lines = line.explain(1e4);
+    assert!(lines.iter().any(|line| line.contains("804 equations for 200 of 200 elements")), "{lines:#?}");
+    run(&mut line, 1e4);
+    assert_eq!((line.state().work.factorizations, line.state().work.direct_solves), (1, 100));
+}
+
+/// `cargo test --release -p crystfem --test it solvers::iterations -- --ignored --nocapture`
+#[test]
+#[ignore = "times, for a quiet machine"]
+fn iterations() {
+    for elements in [26, 45] {
+        for dt in [0.5, 5.0, 50.0, 500.0] {
+            for solver in [LinearSolver::ConjugateGradients, LinearSolver::Direct] {
+                let settings = Settings { tolerance: 1e-7, ..settings(solver, Scheme::BackwardEuler, dt) };
+                let mut simulation = brick(elements, Capacity::Lumped, settings);
+                let start = std::time::Instant::now();
+                run(&mut simulation, dt);
+                let first = start.elapsed().as_secs_f64();
+                let start = std::time::Instant::now();
+                run(&mut simulation, 11.0 * dt);
+                println!(
+                    "{elements}³, {dt} s, {solver:?}: first {first:.4} s, then {:.4} s a step, {:?}; {}",
+                    start.elapsed().as_secs_f64() / 10.0,
+                    simulation.state().work,
+                    simulation.choose(1e3 * dt).reason
+                );
+            }
+        }
+    }
+}
