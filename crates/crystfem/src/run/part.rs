@@ -71,19 +71,15 @@ pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failur
             task.printed.len()
         )),
     }
-    let linear = problem.materials.iter().all(|material| material.is_linear());
-    let radiates =
-        problem.conditions.iter().any(|c| matches!(c, crate::boundary::Condition::Radiation { .. }));
-    match linear && !radiates {
-        true => lines.push("leaves out Newton's iteration: the scene is linear".into()),
-        false => lines.push("builds     Newton's iteration".into()),
-    }
     let names: Vec<&str> = problem.materials.iter().flat_map(|m| m.field_names().iter().copied()).collect();
     match names.is_empty() {
         true => lines.push("leaves out states of materials".into()),
         false => lines.push(format!("builds     states: {}", names.join(", "))),
     }
-    lines.push(format!("ends at    {} s", task.end));
+    let (end, settings) = (task.end, task.settings);
+    let simulation = Simulation::new(task.problem, settings)?;
+    lines.extend(simulation.explain(end).into_iter().map(|line| format!("solver     {line}")));
+    lines.push(format!("ends at    {end} s"));
     Ok(lines)
 }
 

@@ -2,6 +2,7 @@
 
 use super::{MaterialSpec, MeshSpec, Program, check_name};
 use crate::problem::Capacity;
+use crate::simulation::LinearSolver;
 use crate::time::Scheme;
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
@@ -137,6 +138,8 @@ pub struct TimeSpec {
     pub longest_step: Option<Time>,
     /// Lumped or consistent capacity.
     pub capacity: Capacity,
+    /// Linear solver.
+    pub solver: LinearSolver,
     /// Rms error that solves may leave; default 1e-7 K.
     pub solver_tolerance: Option<TemperatureDifference>,
 }

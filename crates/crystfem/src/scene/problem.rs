@@ -144,7 +144,7 @@ impl PartScene {
             }
         };
         let tolerance = time.solver_tolerance.map_or(SOLVES, |tolerance| tolerance.si());
-        Settings { scheme: time.scheme, steps, tolerance }
+        Settings { scheme: time.scheme, steps, tolerance, solver: time.solver }
     }
 }
 
