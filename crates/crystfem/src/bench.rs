@@ -2,6 +2,8 @@
 
 use clap::Subcommand;
 use crystfem::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
+use crystfem::material::{Point, Polymer, Property, Semicrystalline, ThermalMaterial};
+use crystfem::melting::Melting;
 use crystfem::run::Failure;
 use serde::Serialize;
 use std::hint::black_box;
@@ -19,7 +21,8 @@ pub struct Bench {
 
 #[derive(Subcommand)]
 enum What {
-    /// Error in α against nanoseconds per step of the ways to integrate the kinetics.
+    /// Error in α against nanoseconds per step of the ways to integrate the kinetics, and the whole response of a
+    /// material.
     Kinetics {
         /// Cooling rate, K/min.
         #[arg(long, default_value_t = 10.0)]
@@ -90,7 +93,48 @@ fn kinetics(rate: f64) -> Result<Vec<Row>, Failure> {
             push("time", nanoseconds(&kinetics, scheme, rate, kelvin, steps), "ns/step");
         }
     }
+    for (name, start) in [("cooling", 425.0), ("heating", 425.0), ("heating above melting", 500.0)] {
+        for latent in [None, Some(209e3)] {
+            let sign = if name == "cooling" { -1.0 } else { 1.0 };
+            let coupled = if latent.is_some() { "with" } else { "without" };
+            let what = format!("response, {name} by 0.5 K, {coupled} latent heat");
+            let value = response(kinetics, latent, start, 0.5 * sign)?;
+            rows.push(Row { what, size: STEPS as u64, threads: 1, value, unit: "ns" });
+        }
+    }
     Ok(rows)
+}
+
+/// Nanoseconds of a material's response, tangent and all.
+fn response(
+    kinetics: Kinetics,
+    latent_heat: Option<f64>,
+    start: f64,
+    increment: f64,
+) -> Result<f64, Failure> {
+    let material = Semicrystalline::new(Polymer {
+        density: 1010.0,
+        conductivity: Property::Constant(0.25),
+        specific_heat: Property::Constant(2200.0),
+        kinetics,
+        melting: Some(Melting::PA12),
+        ultimate_crystallinity: 0.25,
+        latent_heat,
+        seed: 0.3,
+    })?;
+    let mut old = [0.0];
+    material.initial_state(start, &mut old);
+    let at = Point { temperature: start, increment, gradient: Default::default(), dt: 0.5 };
+    let mut times = Vec::new();
+    for _ in 0..REPEATS {
+        let since = Instant::now();
+        for _ in 0..STEPS {
+            black_box(material.respond(black_box(&at), black_box(&old), &mut [0.0])?);
+        }
+        times.push(since.elapsed().as_secs_f64() / STEPS as f64 * 1e9);
+    }
+    times.sort_by(f64::total_cmp);
+    Ok(times[REPEATS / 2])
 }
 
 fn error(

@@ -198,15 +198,42 @@ impl Kinetics {
 
     /// dα/dz = n z^{n−1} exp(−zⁿ).
     pub fn degree_slope(&self, z: f64) -> f64 {
+        self.degree_and_slope(z)[1]
+    }
+
+    /// α and dα/dz, for the cost of one power and one exponential.
+    #[inline]
+    pub fn degree_and_slope(&self, z: f64) -> [f64; 2] {
+        let extent = self.extent(z);
         let n = self.constants.avrami_exponent;
-        let remainder = self.remainder(z);
-        if remainder == 0.0 { 0.0 } else { n * z.powf(n - 1.0) * remainder }
+        let slope = if z > 0.0 {
+            n * (extent.power / z) * extent.remainder
+        } else {
+            // n z^{n−1} at 0
+            f64::from(u8::from(n == 1.0))
+        };
+        [extent.degree, slope]
+    }
+
+    /// zⁿ with α and 1 − α, both to full relative precision.
+    #[inline]
+    pub(crate) fn extent(&self, z: f64) -> Extent {
+        let power = self.power(z);
+        let degree = -(-power).exp_m1();
+        let remainder = if power < 0.5 { 1.0 - degree } else { (-power).exp() };
+        Extent { power, degree, remainder }
     }
 
     /// d ln α/dz = n z^{n−1}/(exp(zⁿ) − 1), for z > 0.
-    pub(crate) fn logarithmic_degree_slope(&self, z: f64) -> f64 {
-        let n = self.constants.avrami_exponent;
-        n * z.powf(n - 1.0) / self.power(z).exp_m1()
+    #[inline]
+    pub(crate) fn logarithmic_slope_of(&self, z: f64, extent: &Extent) -> f64 {
+        self.constants.avrami_exponent * (extent.power / z) * (extent.remainder / extent.degree)
+    }
+
+    /// z of zⁿ.
+    #[inline]
+    pub(crate) fn z_of_power(&self, power: f64) -> f64 {
+        self.root(power)
     }
 
     /// dα/dt = n K (1−α) \[ln 1/(1−α)\]^{(n−1)/n}, 1/s, Eq. (4.5), as printed: not guarded, a NaN beyond α = 1.
@@ -215,13 +242,23 @@ impl Kinetics {
         n * self.rate(temperature) * (1.0 - degree) * (-(-degree).ln_1p()).powf((n - 1.0) / n)
     }
 
+    #[inline]
     fn power(&self, z: f64) -> f64 {
         z.powf(self.constants.avrami_exponent)
     }
 
+    #[inline]
     fn root(&self, power: f64) -> f64 {
         power.max(0.0).powf(self.constants.avrami_exponent.recip()).min(LARGEST_Z)
     }
+}
+
+/// zⁿ, α = 1 − exp(−zⁿ) and 1 − α.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Extent {
+    pub power: f64,
+    pub degree: f64,
+    pub remainder: f64,
 }
 
 #[cfg(test)]

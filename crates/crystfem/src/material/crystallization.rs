@@ -1,6 +1,6 @@
 //! Growth and melting of crystals over an increment, at one point.
 
-use crate::kinetics::{Kinetics, PANELS, Panels};
+use crate::kinetics::{Extent, Kinetics, PANELS, Panels};
 use crate::melting::Melting;
 
 /// Panels of (T∞, T₀) on heating, where growth and melting alternate; PA12: 1.35 K.
@@ -45,6 +45,9 @@ impl Crystallization {
             }
         };
         let mut grown = Grown { z, slope: 0.0 };
+        if z == 0.0 && start >= kinetics.constants().equilibrium_melting {
+            return grown;
+        }
         let [mut before, _] = melting.survival(start);
         for panel in Panels::new(kinetics, start, end, HEATING_PANELS) {
             let growth = kinetics.growth_over(&panel, dt);
@@ -66,18 +69,18 @@ impl Crystallization {
         if z == 0.0 || logarithm > NOTHING {
             return grown;
         }
+        let before = kinetics.extent(z);
         let (survivors, lost) = (logarithm.exp(), -logarithm.exp_m1());
-        let degree = kinetics.degree(z) * survivors;
-        let z_after = if degree < 0.5 {
-            kinetics.z_of_degree(degree)
-        } else {
-            kinetics.z_of_remainder(lost + survivors * kinetics.remainder(z))
-        };
-        if z_after == 0.0 {
+        let degree = before.degree * survivors;
+        let remainder = lost + survivors * before.remainder;
+        let power = if degree < 0.5 { -(-degree).ln_1p() } else { -remainder.ln() };
+        let z_after = kinetics.z_of_power(power);
+        if z_after == 0.0 || degree == 0.0 {
             return Grown { z: 0.0, slope: 0.0 };
         }
-        let change = kinetics.logarithmic_degree_slope(z) * z_slope + slope;
-        let sensitivity = kinetics.logarithmic_degree_slope(z_after);
+        let after = Extent { power, degree, remainder };
+        let change = kinetics.logarithmic_slope_of(z, &before) * z_slope + slope;
+        let sensitivity = kinetics.logarithmic_slope_of(z_after, &after);
         Grown { z: z_after, slope: if sensitivity > 0.0 { change / sensitivity } else { 0.0 } }
     }
 }

@@ -128,13 +128,17 @@ impl ThermalMaterial for Semicrystalline {
             self.crystallization.advance(old[0], at.temperature, at.temperature + at.increment, at.dt);
         new[0] = grown.z;
         let kinetics = self.kinetics();
-        // away from the ends of α the change of 1 − α is that of α
-        let (before, after) = (kinetics.degree(old[0]), kinetics.degree(grown.z));
-        let change = (after - before).abs();
-        response.step_ratio = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, 10.0));
+        if grown.z == old[0] && self.latent.is_none() {
+            return Ok(response);
+        }
+        let [after, slope] = kinetics.degree_and_slope(grown.z);
+        if grown.z != old[0] {
+            let change = (after - kinetics.degree(old[0])).abs();
+            response.step_ratio = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, 10.0));
+        }
         if let Some(latent) = self.latent {
             response.energy -= latent * after;
-            response.d_energy_d_temperature -= latent * kinetics.degree_slope(grown.z) * grown.slope;
+            response.d_energy_d_temperature -= latent * slope * grown.slope;
         }
         Ok(response)
     }

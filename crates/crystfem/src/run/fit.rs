@@ -103,7 +103,7 @@ fn solve(spec: &FitSpec, job: Job) -> Result<Vec<Done>, Error> {
                 let fit = ozawa(&coolings, temperature)?;
                 let (rates, degrees) = crate::fit::rates_at(&coolings, temperature);
                 let rates: Vec<f64> = rates.iter().map(|q| q * 60.0).collect();
-                let name = format!("{name}.{}_degC", (temperature - CELSIUS).round());
+                let name = format!("{name}.{}_degC", ((temperature - CELSIUS) * 100.0).round() / 100.0);
                 let series = vec![("measured".to_owned(), rates, degrees)];
                 all.push(Done { name, fit, abscissa: ("cooling_rate", "K/min"), series });
             }
