@@ -1,6 +1,6 @@
 //! Malformed and absurd input: exit code 2, the message that helps, nothing written, no panic.
 //!
-//! A scene in `tests/bad/` says itself what it must be told: each leading `# expect: TEXT` is a part of the message;
+//! A scene in `tests/bad/` (of `peri`) or `tests/bad-parts/` (of `crystfem`) says itself what it must be told: each leading `# expect: TEXT` is a part of the message;
 //! the line at fault ends in `# <- here`.
 
 use crate::program::{Ended, command, executable, finish, peri, workspace};
@@ -12,19 +12,28 @@ const MARK: &str = "# <- here";
 
 #[test]
 fn every_bad_scene_gets_its_message() {
-    let folder = workspace().join("tests/bad");
+    judge_all("peri", "tests/bad", 100);
+}
+
+#[test]
+fn every_bad_scene_of_a_part_gets_its_message() {
+    judge_all("crystfem", "tests/bad-parts", 38);
+}
+
+fn judge_all(program: &str, folder: &str, least: usize) {
+    let folder = workspace().join(folder);
     let mut names: Vec<String> = fs::read_dir(&folder)
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
     names.retain(|name| name.ends_with(".toml"));
     names.sort();
-    let failures: Vec<String> = names.iter().filter_map(|name| judge(&folder, name).err()).collect();
-    assert!(names.len() >= 100, "only {} scenes", names.len());
+    let failures: Vec<String> = names.iter().filter_map(|name| judge(program, &folder, name).err()).collect();
+    assert!(names.len() >= least, "only {} scenes", names.len());
     assert!(failures.is_empty(), "{} of {}:\n{}", failures.len(), names.len(), failures.join("\n"));
 }
 
-fn judge(folder: &Path, name: &str) -> Result<(), String> {
+fn judge(program: &str, folder: &Path, name: &str) -> Result<(), String> {
     let text = fs::read_to_string(folder.join(name)).unwrap();
     let expected: Vec<&str> = text.lines().map_while(|line| line.strip_prefix("# expect: ")).collect();
     let fault = |what: String| Err(format!("{name}: {what}"));
@@ -33,8 +42,9 @@ fn judge(folder: &Path, name: &str) -> Result<(), String> {
     }
     let temporary = tempfile::tempdir().unwrap();
     let output = temporary.path().join("out");
-    let check = peri(&format!("check {name}"), folder);
-    let run = peri(&format!("run {name} --output {}", output.display()), folder);
+    let verb = |arguments: String| finish(command(program, &arguments, folder).spawn().unwrap());
+    let check = verb(format!("check {name}"));
+    let run = verb(format!("run {name} --output {}", output.display()));
     for (verb, ended) in [("check", &check), ("run", &run)] {
         if ended.code != Some(2) || !ended.stdout.is_empty() {
             return fault(format!("{verb}: exit code {:?}, prints `{}`", ended.code, ended.stdout));

@@ -11,6 +11,7 @@ mod bits;
 mod commands;
 mod documents;
 mod killed;
+mod parts;
 mod program;
 mod results;
 mod scenes;

@@ -124,7 +124,10 @@ impl PartScene {
             } else {
                 Where::Faces(faces(&format!("{key}.surface"), &spec.surface)?)
             };
-            conditions.extend(spec.conditions(mesh, place));
+            for condition in spec.conditions(mesh, place) {
+                condition.check().map_err(|error| located(source, &key, &error))?;
+                conditions.push(condition);
+            }
         }
         Ok(conditions)
     }

@@ -1,0 +1,107 @@
+//! `crystfem run` of a printed part.
+
+use crate::program::{command, finish};
+use crate::results::{assert_same, report, scalar};
+use polycore::output::vtkhdf;
+use std::fs;
+
+/// A bar of three layers on glass that crystallizes, with latent heat.
+const BAR: &str = r#"version = 1
+program = "crystfem"
+title = "Small bar"
+
+[mesh.bar]
+size = ["16 mm", "6 mm"]
+layers = 3
+layer_height = "0.5 mm"
+element_size = "1 mm"
+substrate = { size = ["24 mm", "12 mm"], thickness = "2 mm" }
+
+[materials.pa12]
+law = "semicrystalline"
+density = "1010 kg/m^3"
+conductivity = "0.25 W/(m K)"
+specific_heat = "2200 J/(kg K)"
+kinetics = "table-4.1-column-1"
+melting = "pa12"
+crystallinity = 0.25
+latent_heat = "209 J/g"
+
+[materials.glass]
+law = "conductor"
+density = "2500 kg/m^3"
+conductivity = "1 W/(m K)"
+specific_heat = "800 J/(kg K)"
+
+[[region]]
+material = "glass"
+temperature = "100 degC"
+
+[[region]]
+elements = "bar"
+material = "pa12"
+temperature = "220 degC"
+
+[print]
+temperature = "220 degC"
+layer_time = "10 s"
+
+[[boundary]]
+surface = "bottom"
+temperature = "100 degC"
+
+[[boundary]]
+surface = "outer"
+except = ["bottom"]
+film = "15 W/(m^2 K)"
+emissivity = 0.9
+ambient = "100 degC"
+
+[time]
+end = "120 s"
+tolerance = "1 K"
+
+[output]
+every = "10 s"
+stages = 2
+
+[[probe]]
+name = "middle"
+at = ["0 mm", "0 mm", "0.75 mm"]
+"#;
+
+#[test]
+fn a_printed_bar() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    fs::write(here.join("bar.toml"), BAR).unwrap();
+    let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
+    let told = crystfem("check bar.toml").with_code(0);
+    told.shows("builds     3 births of 288 elements");
+    told.shows("not linear: Newton's iteration");
+    for threads in 1..=3 {
+        crystfem(&format!("run bar.toml --output out{threads} --threads {threads}")).with_code(0);
+        assert_same(&here.join("out1"), &here.join(format!("out{threads}")));
+    }
+    let out = here.join("out1");
+    let report = report(&out);
+    // what is stored came in: to rounding of a few hundred steps and thousands of nodes
+    assert!(scalar(&report, "worst_balance") < 1e-10);
+    let [least, mean, largest] =
+        ["least_alpha", "mean_alpha", "largest_alpha"].map(|name| scalar(&report, name));
+    assert!(0.0 <= least && least < mean && mean <= largest && largest <= 1.0, "{least} {mean} {largest}");
+    // 90 s after the last layer all is at the temperature of its surroundings, and crystallized
+    assert!((scalar(&report, "mean_temperature") - 100.0).abs() < 1.0 && mean > 0.95);
+    let series = vtkhdf::read(out.join("fields.vtkhdf")).unwrap();
+    assert_eq!(series.len(), 13);
+    let born: Vec<f64> =
+        (0..series.len()).map(|step| series.cell_data(step, "exists").unwrap().iter().sum()).collect();
+    // a layer is born at the beginning of a step: fields at that time show what was before
+    let layers: Vec<f64> = born.iter().map(|count| (count - (born[12] - 288.0)) / 96.0).collect();
+    assert_eq!(layers[..5], [1.0, 1.0, 2.0, 3.0, 3.0]);
+    let temperature = series.data(0, "temperature_degC").unwrap();
+    assert!(temperature.iter().any(|t| t.is_nan()) && temperature.iter().all(|t| t.is_nan() || *t >= 99.9));
+    for name in ["probe_middle.csv", "probes_temperature.png", "section_alpha.png"] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+}
