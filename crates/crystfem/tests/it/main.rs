@@ -4,6 +4,7 @@ mod births;
 mod bodies;
 mod brick;
 mod extremes;
+mod fields;
 mod order;
 mod patch;
 #[cfg(feature = "cli")]
