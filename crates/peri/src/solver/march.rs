@@ -151,7 +151,7 @@ fn record<const D: usize>(system: &System<D>, state: &mut State<D>) {
     state.history.push(record);
 }
 
-/// Σ_I V_I Σ_J w V_J kθ |ξ| φ: the energy of all bonds, J.
+/// Σ_I V_I Σ_J w V_J kθ |ξ| φ: the energy of all bonds, J, and that of contact.
 pub fn stored_energy<const D: usize>(system: &System<D>, state: &State<D>, table: &EnergyTable) -> f64 {
     let of = |slots: &[u32]| {
         let mut sum = 0.0;
@@ -172,7 +172,11 @@ pub fn stored_energy<const D: usize>(system: &System<D>, state: &State<D>, table
         sum
     };
     let parts: Vec<f64> = system.bonds.particles().par_chunks(CHUNK).map(of).collect();
-    system.modulus * parts.iter().sum::<f64>()
+    let bonds = system.modulus * parts.iter().sum::<f64>();
+    match &system.contact {
+        Some(contact) => bonds + contact.energy(&state.displacement),
+        None => bonds,
+    }
 }
 
 /// Whether the load has fallen below the part of its largest at which the run is to stop.

@@ -3,6 +3,7 @@
 
 mod balance;
 mod bodies;
+mod contact;
 mod dynamics;
 mod forces;
 mod homogeneous;
