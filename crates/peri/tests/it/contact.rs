@@ -356,3 +356,116 @@ fn elastic_blocks_press_each_other() {
         assert!(touching.pairs > 20 && touching.closest > 0.6, "{touching:?}");
     }
 }
+
+fn bits<const D: usize>(state: &State<D>) -> Vec<u64> {
+    let fields = [&state.displacement, &state.velocity, &state.force];
+    let all = fields.into_iter().flat_map(|field| field.components().into_iter().flatten());
+    let history = state.history.iter().flat_map(|row| [row.load, row.stored]);
+    let numbers = all.copied().chain(history).chain([state.work]);
+    numbers.map(f64::to_bits).chain([state.total_iterations, state.broken]).collect()
+}
+
+/// A sheet with a crack of zero width across most of it, pressed upon and sheared by twice as much, so that the flanks
+/// slide over and into each other.
+fn sheet(cells: usize, down: f64) -> (Built<2>, impl Fn(&dyn Bonds<2>) -> Loads<2>) {
+    let n = cells as f64;
+    let mut body = Body::<2>::solid([cells, cells], 1.0, 3.015);
+    body.slits = vec![crate::bodies::Slit { at: 0.5 * n, from: 0.1 * n, to: 0.9 * n }];
+    let loads = move |bonds: &dyn Bonds<2>| {
+        hold(bonds, |x| {
+            (x[1] < 3.0).then_some((3, [0.0; 2])).or((x[1] > n - 3.0).then_some((3, [2.0 * down, -down])))
+        })
+    };
+    (body.build(), loads)
+}
+
+#[test]
+fn flanks_do_not_interpenetrate() {
+    for down in [2.0, 4.0] {
+        let mut closest = Vec::new();
+        for skin in [None, Some(0.5)] {
+            let (mut built, loads) = sheet(30, down);
+            let loads = loads(&built.lattice);
+            let factors: Vec<f64> = (1..=10).map(|k| 0.1 * f64::from(k)).collect();
+            let mut state = State::new(built.lattice.slots());
+            let bonds = &mut built.lattice;
+            let run =
+                Run { bonds, loads: &loads, factors: &factors, skin, breaking: None, solver: solver(1e-4) };
+            let contact = run.solve(&mut state, &mut |_, _| ());
+            let touching = contact.touching(&state.displacement);
+            eprintln!("down {down}, contact {skin:?}: {touching:?}, {} iterations", state.total_iterations);
+            closest.push(touching.closest);
+        }
+        // without it flanks pass through each other; with it they overlap by what presses them together over κ:
+        // a strain of 4/24 over 15, some three times that at the crack's ends
+        assert!(closest[0] < 0.5 && closest[1] > 0.75, "{closest:?}");
+    }
+}
+
+/// Threads, the list's skin and a restart in the middle of it all, while bonds break.
+#[test]
+fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
+    let run = |threads: usize, skin: f64, cloud: bool, from: Option<State<2>>, save: u64| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let (mut built, loads) = sheet(66, 5.5);
+            let bonds: &mut dyn Bonds<2> = if cloud { &mut built.cloud } else { &mut built.lattice };
+            let loads = loads(bonds);
+            let mut state = from.unwrap_or_else(|| State::new(bonds.slots()));
+            let mut saved = None;
+            let breaking = Some(Breaking { stretch: 1.17, policy: Default::default() });
+            let run = Run {
+                bonds,
+                loads: &loads,
+                factors: &[0.4, 0.7, 1.0],
+                skin: Some(skin),
+                breaking,
+                solver: solver(1e-2),
+            };
+            let contact = run.solve(&mut state, &mut |state, restartable| {
+                if restartable && state.total_iterations >= save && saved.is_none() {
+                    saved = Some(state.clone());
+                }
+            });
+            assert!(state.displacement.slots() > peri::field::CHUNK);
+            (bits(&state), saved, contact.touching(&state.displacement), contact.rebuilds(), state)
+        })
+    };
+    for cloud in [false, true] {
+        let one = run(1, 0.5, cloud, None, u64::MAX);
+        eprintln!(
+            "{:?}, {} broken, {} iterations, {} lists",
+            one.2, one.4.broken, one.4.total_iterations, one.3
+        );
+        assert!(one.2.pairs > 20 && one.4.broken > 0);
+        assert!(run(3, 0.5, cloud, None, u64::MAX).0 == one.0, "threads, cloud: {cloud}");
+        for skin in [0.0, 3.0] {
+            let other = run(2, skin, cloud, None, u64::MAX);
+            assert!(other.3 != one.3 && other.0 == one.0, "skin {skin}, cloud: {cloud}");
+        }
+        let saved = run(2, 0.5, cloud, None, one.4.total_iterations * 3 / 4).1.unwrap();
+        assert!(saved.total_iterations < one.4.total_iterations);
+        assert!(run(2, 0.2, cloud, Some(saved), u64::MAX).0 == one.0, "restart, cloud: {cloud}");
+    }
+}
+
+/// Where nothing touches, contact changes no bit, and none is built unless asked for.
+#[test]
+fn contact_without_touch_changes_no_bit() {
+    let solve = |skin: Option<f64>| {
+        let mut built = Body::<2>::solid([30, 24], 0.1, 3.015).build();
+        let bonds: &mut dyn Bonds<2> = &mut built.lattice;
+        let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 2.7).then(|| (3, [0.05 * x[0], 0.0])));
+        let mut state = State::new(bonds.slots());
+        let run =
+            Run { bonds, loads: &loads, factors: &[0.5, 1.0], skin, breaking: None, solver: solver(1e-4) };
+        let contact = run.solve(&mut state, &mut |_, _| ());
+        assert_eq!(contact.touching(&state.displacement).pairs, 0);
+        bits(&state)
+    };
+    assert!(solve(None) == solve(Some(0.5)));
+    let mut built = Body::<2>::solid([3, 3], 1.0, 1.5).build();
+    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let loads = Loads::default();
+    assert!(System::new(&mut built.lattice, &*law, MODULUS, &loads, &[]).contact.is_none());
+}
