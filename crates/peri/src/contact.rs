@@ -21,6 +21,7 @@ use crate::bonds::{Bonds, CellGrid};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// κ of Macek & Silling (2007).
 pub const STIFFNESS: f64 = 15.0;
@@ -39,6 +40,7 @@ pub struct Contact<const D: usize> {
     /// Particles' radii, m; empty where all are `largest`.
     radii: Vec<f64>,
     largest: f64,
+    largest_volume: f64,
     skin: f64,
     /// Displacement at which the list was made.
     listed_at: Field<D>,
@@ -71,26 +73,33 @@ struct Candidate<const D: usize> {
 }
 
 /// How particles touch.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Touching {
     /// Pairs with r < d.
     pub pairs: u64,
-    /// Least r/d; 1 where nothing touches, 0 for two particles in one place.
-    pub closest: f64,
+    /// Greatest 1 − r/d: 0 where nothing touches, 1 for two particles in one place.
+    pub overlap: f64,
+    /// Energy Σ ½κ(c/δ)(d − r)² V_I V_J over pairs, J.
+    pub energy: f64,
 }
 
 impl<const D: usize> Contact<D> {
-    /// Contact of a body with the bond modulus `modulus` = kθ and κ = `stiffness`, see [`STIFFNESS`].
+    /// Contact of a body with the bond modulus `modulus` = kθ and κ = `stiffness`, see [`STIFFNESS`]. κ = 0 repels
+    /// nothing: overlaps are looked at only.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where κ or kθ is not positive and finite.
+    /// [`Error::Parameter`] where κ is negative, kθ is not positive, or either is not finite.
     pub fn new(bonds: &dyn Bonds<D>, modulus: f64, stiffness: f64) -> Result<Self, Error> {
-        for (name, found) in [("contact.stiffness", stiffness), ("modulus of contact", modulus)] {
-            if !(found > 0.0 && found.is_finite()) {
-                return Err(Error::Parameter { name, found, allowed: "above 0, finite".into() });
+        let kappa = ("contact.stiffness", stiffness, stiffness >= 0.0, "0 or above, finite");
+        for (name, found, good, allowed) in
+            [kappa, ("modulus of contact", modulus, modulus > 0.0, "above 0, finite")]
+        {
+            if !good || !found.is_finite() {
+                return Err(Error::Parameter { name, found, allowed: allowed.into() });
             }
         }
         let volumes: Vec<f64> = bonds.particles().iter().map(|&slot| bonds.volume(slot as usize)).collect();
+        let largest_volume = volumes.iter().copied().fold(0.0, f64::max);
         let mean = volumes.iter().sum::<f64>() / volumes.len() as f64;
         let alike = volumes.iter().all(|&volume| volume == volumes[0]);
         let radius = |volume: f64| 0.5 * bonds.spacing() * (volume / mean).powf(1.0 / D as f64);
@@ -104,6 +113,7 @@ impl<const D: usize> Contact<D> {
             stiffness: stiffness * 6.0 * modulus / bonds.horizon(),
             radii,
             largest,
+            largest_volume,
             skin: SKIN * bonds.spacing(),
             listed_at: Field::zeros(0),
             listed: Vec::new(),
@@ -121,6 +131,11 @@ impl<const D: usize> Contact<D> {
         self.skin = skin.max(0.0).min(FAR * self.largest);
         self.listed_at = Field::zeros(0);
         self
+    }
+
+    /// Whether it repels: κ > 0.
+    pub fn repels(&self) -> bool {
+        self.stiffness > 0.0
     }
 
     /// How often the list was made.
@@ -247,34 +262,30 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Σ over pairs ½κ(c/δ)(d − r)² V_I V_J, J.
-    pub fn energy(&self, displacement: &Field<D>) -> f64 {
-        let of = |chunk: usize| {
-            let mut sum = 0.0;
-            for (own, candidates) in self.in_chunk(chunk) {
-                for touch in candidates.iter().filter_map(|c| c.touch(displacement, own.slot as usize)) {
-                    // half of a pair's from either side
-                    sum += 0.25 * self.stiffness * touch.overlap * touch.overlap * touch.volume * own.volume;
-                }
-            }
-            sum
-        };
-        let parts: Vec<f64> = (0..displacement.slots().div_ceil(CHUNK)).into_par_iter().map(of).collect();
-        parts.iter().sum::<f64>() + 0.0
-    }
-
     /// What touches.
     pub fn touching(&self, displacement: &Field<D>) -> Touching {
-        let mut touching = Touching { pairs: 0, closest: 1.0 };
-        for (own, candidates) in (0..displacement.slots().div_ceil(CHUNK)).flat_map(|c| self.in_chunk(c)) {
-            for candidate in candidates {
-                if let Some(touch) = candidate.touch(displacement, own.slot as usize) {
-                    touching.pairs += u64::from(own.slot < candidate.slot);
-                    touching.closest = touching.closest.min(1.0 - touch.overlap / candidate.distance);
+        let none = Touching { pairs: 0, overlap: 0.0, energy: 0.0 };
+        let of = |chunk: usize| {
+            let mut part = none;
+            for (own, candidates) in self.in_chunk(chunk) {
+                for candidate in candidates {
+                    let Some(touch) = candidate.touch(displacement, own.slot as usize) else { continue };
+                    part.pairs += u64::from(own.slot < candidate.slot);
+                    part.overlap = part.overlap.max(touch.overlap / candidate.distance);
+                    // half of a pair's from either side
+                    part.energy +=
+                        0.25 * self.stiffness * touch.overlap * touch.overlap * touch.volume * own.volume;
                 }
             }
-        }
-        touching
+            part
+        };
+        let parts: Vec<Touching> =
+            (0..displacement.slots().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        parts.into_iter().fold(none, |a, b| Touching {
+            pairs: a.pairs + b.pairs,
+            overlap: a.overlap.max(b.overlap),
+            energy: a.energy + b.energy,
+        })
     }
 
     /// max_I Σ_J κ(c/δ) V_J over what touches, N/m⁴: twice that over the density bounds what contact adds to the squared
@@ -288,6 +299,12 @@ impl<const D: usize> Contact<D> {
             sums.fold(0.0, f64::max)
         };
         (0..displacement.slots().div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max)
+    }
+
+    /// κ(c/δ) V of the largest particle: the least that [`Contact::greatest_stiffness`] is where anything touches, if all
+    /// are alike.
+    pub fn pair_stiffness(&self) -> f64 {
+        self.stiffness * self.largest_volume
     }
 
     /// Adds to the Gershgorin sums of dynamic relaxation, in units of `tangent`, those of what touches:

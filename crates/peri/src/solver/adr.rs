@@ -85,7 +85,7 @@ impl Relaxation {
 
     /// The Gershgorin sums of this iteration.
     fn masses<const D: usize>(&self, system: &System<D>, own: bool) -> &[f64] {
-        match (&system.contact, own) {
+        match (system.repulsion(), own) {
             (Some(_), _) => &self.contact_mass,
             (None, true) => &self.own_mass,
             (None, false) => &self.unit_mass,
@@ -110,7 +110,7 @@ impl Relaxation {
         }
         let tangent = if own { system.modulus } else { state.tangent };
         system.update_contact(&state.displacement);
-        if let Some(contact) = &system.contact {
+        if let Some(contact) = system.repulsion() {
             self.contact_mass.clone_from(if own { &self.own_mass } else { &self.unit_mass });
             contact.add_stiffness(&state.displacement, tangent, &mut self.contact_mass);
         }
@@ -145,7 +145,7 @@ impl Relaxation {
             return Ok(true);
         }
         move_pass(&system.loads, state, self.masses(system, own), mass, damping);
-        if let Some(contact) = &system.contact {
+        if let Some(contact) = system.repulsion() {
             contact.still(&mut state.velocity);
         }
         state.iteration += 1;

@@ -177,8 +177,9 @@ impl<const D: usize> LimitedMemory<D> {
     }
 
     /// New forces at the present displacement; their gradient goes to `self.trial`.
-    fn evaluate(&mut self, system: &System<D>, state: &mut State<D>) -> Point {
+    fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Point {
         let factor = system.factors[state.step];
+        system.update_contact(&state.displacement);
         // at rest the velocity leaves the pass' quotients at 0
         let (sums, met) = force_pass(system, state, self.preconditioner.local(), 1.0, factor, true);
         system.count_evaluation(state);

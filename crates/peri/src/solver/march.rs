@@ -125,7 +125,7 @@ fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
     state.balanced = [factor, pull, push];
 }
 
-fn record<const D: usize>(system: &System<D>, state: &mut State<D>) {
+fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let [factor, pull, _] = state.balanced;
     let met = state.balanced_stretches;
     let table = EnergyTable::new(system.law, system.fitted_part(met));
@@ -141,6 +141,7 @@ fn record<const D: usize>(system: &System<D>, state: &mut State<D>) {
         broken: state.broken,
         detached: state.detached,
         stored: stored_energy(system, state, &table),
+        contact: system.touching(state),
         work: state.work,
         released: state.released,
         largest_stretch: (1.0 + met.high).sqrt(),
@@ -173,8 +174,8 @@ pub fn stored_energy<const D: usize>(system: &System<D>, state: &State<D>, table
     };
     let parts: Vec<f64> = system.bonds.particles().par_chunks(CHUNK).map(of).collect();
     let bonds = system.modulus * parts.iter().sum::<f64>();
-    match &system.contact {
-        Some(contact) => bonds + contact.energy(&state.displacement),
+    match system.repulsion() {
+        Some(contact) => bonds + contact.touching(&state.displacement).energy,
         None => bonds,
     }
 }

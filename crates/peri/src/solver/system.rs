@@ -3,7 +3,7 @@
 use super::load::Loads;
 use super::verlet::Motion;
 use crate::bonds::{Bonds, Overstretched, StretchRange, overstretched, stretch_range};
-use crate::contact::Contact;
+use crate::contact::{Contact, Touching};
 use crate::error::Error;
 use crate::field::Field;
 use crate::potential::{BondPotential, KernelFit};
@@ -55,7 +55,7 @@ pub struct System<'a, const D: usize> {
     pub stop_below: f64,
     /// Largest relative error of the fitted bond law.
     pub fit_bound: f64,
-    /// Repulsion of particles without a bond, where wanted.
+    /// Repulsion of particles without a bond, or a look at how they overlap, where wanted.
     pub contact: Option<Contact<D>>,
 }
 
@@ -80,6 +80,8 @@ pub struct Record {
     pub detached: u64,
     /// Energy stored in bonds and contact, J.
     pub stored: f64,
+    /// What touches, where that is looked at.
+    pub contact: Option<Touching>,
     /// Work of the loads so far, J.
     pub work: f64,
     /// Energy that broken bonds held when they broke, J.
@@ -253,16 +255,30 @@ impl<'a, const D: usize> System<'a, D> {
     /// Has contact look for pairs again where particles have moved far since it last did. To be called before the forces
     /// of a new displacement, once; it makes no difference to them how often it looks.
     pub fn update_contact(&mut self, displacement: &Field<D>) {
-        if let Some(contact) = &mut self.contact {
+        if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
             contact.update(&*self.bonds, displacement);
         }
     }
 
     /// Has contact look for pairs, as it must where bonds have changed.
     fn rebuild_contact(&mut self, displacement: &Field<D>) {
-        if let Some(contact) = &mut self.contact {
+        if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
             contact.rebuild(&*self.bonds, displacement);
         }
+    }
+
+    /// Contact, where it does more than look.
+    pub fn repulsion(&self) -> Option<&Contact<D>> {
+        self.contact.as_ref().filter(|contact| contact.repels())
+    }
+
+    /// What touches in a state, where that is looked at.
+    pub(super) fn touching(&mut self, state: &State<D>) -> Option<Touching> {
+        let contact = self.contact.as_mut()?;
+        if !contact.repels() {
+            contact.rebuild(&*self.bonds, &state.displacement);
+        }
+        Some(contact.touching(&state.displacement))
     }
 
     /// Force densities of a work item, without loads: bonds, and all that acts between particles beside them.
@@ -274,7 +290,7 @@ impl<'a, const D: usize> System<'a, D> {
         track: Option<&mut StretchRange>,
     ) {
         self.bonds.force(displacement, chunk, force, track);
-        if let Some(contact) = &self.contact {
+        if let Some(contact) = self.repulsion() {
             contact.force(displacement, chunk, force);
         }
     }

@@ -17,7 +17,7 @@ fn contact<const D: usize>(bonds: &dyn Bonds<D>, slots: &[usize], u: &[[f64; D]]
     for (chunk, mut out) in force.chunks_mut().into_iter().enumerate() {
         contact.force(&field, chunk, &mut out);
     }
-    (slots.iter().map(|&slot| force.get(slot)).collect(), contact.energy(&field))
+    (slots.iter().map(|&slot| force.get(slot)).collect(), contact.touching(&field).energy)
 }
 
 /// The same by comparing all pairs: volumes and radii given, `bonded` by (I, J), I < J.
@@ -100,7 +100,7 @@ fn degenerate_states() {
     }
     let one = CloudBonds::new(&points[..1], &[1.0], 1.0, 1.0, VolumeCorrection::None, &[]).unwrap();
     assert_eq!(contact(&one, &[0], &[[7.0; 3]]), (vec![[0.0; 3]], 0.0));
-    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+    for bad in [-1.0, f64::NAN, f64::INFINITY] {
         assert!(Contact::new(&one, 1.0, bad).is_err() && Contact::new(&one, bad, 15.0).is_err());
     }
     // a body in a heap, all of it in one place: finite
@@ -353,7 +353,7 @@ fn elastic_blocks_press_each_other() {
             state.total_iterations,
             contact.rebuilds()
         );
-        assert!(touching.pairs > 20 && touching.closest > 0.6, "{touching:?}");
+        assert!(touching.pairs > 20 && touching.overlap < 0.4, "{touching:?}");
     }
 }
 
@@ -382,7 +382,7 @@ fn sheet(cells: usize, down: f64) -> (Built<2>, impl Fn(&dyn Bonds<2>) -> Loads<
 #[test]
 fn flanks_do_not_interpenetrate() {
     for down in [2.0, 4.0] {
-        let mut closest = Vec::new();
+        let mut deepest = Vec::new();
         for skin in [None, Some(0.5)] {
             let (mut built, loads) = sheet(30, down);
             let loads = loads(&built.lattice);
@@ -394,11 +394,11 @@ fn flanks_do_not_interpenetrate() {
             let contact = run.solve(&mut state, &mut |_, _| ());
             let touching = contact.touching(&state.displacement);
             eprintln!("down {down}, contact {skin:?}: {touching:?}, {} iterations", state.total_iterations);
-            closest.push(touching.closest);
+            deepest.push(touching.overlap);
         }
         // without it flanks pass through each other; with it they overlap by what presses them together over κ:
         // a strain of 4/24 over 15, some three times that at the crack's ends
-        assert!(closest[0] < 0.5 && closest[1] > 0.75, "{closest:?}");
+        assert!(deepest[0] > 0.5 && deepest[1] < 0.25, "{deepest:?}");
     }
 }
 
