@@ -9,8 +9,8 @@
 //! Other than there, intact bonds never repel: their own law resists compression. Particles have their whole volume,
 //! whatever the corrections of bonds.
 //!
-//! The pairs come from a list of all that are within d + skin, made anew where a particle has moved by half of the
-//! skin. Pairs beyond d add nothing, not even a rounding: the list is no part of the state, and how often it is made
+//! The pairs come from a list of all that are within d, what is about to touch, and a skin, made anew where a particle
+//! has moved by half of the skin. Pairs beyond d add nothing, not even a rounding: the list is no part of the state, and how often it is made
 //! makes no difference to any bit.
 //!
 //! Limits. Contact knows distances only: a particle that leaps past another in one step stays there. Force and energy
@@ -30,6 +30,8 @@ const OF_REFERENCE: f64 = 0.9;
 const OF_RADII: f64 = 1.35;
 /// Skin of the list, in spacings.
 const SKIN: f64 = 0.5;
+/// Largest gap, in spacings, over which two particles may be about to touch.
+const NEAR: f64 = 0.25;
 /// Farther than this many cells from the origin, particles are looked for in one place.
 const FAR: f64 = (1_u64 << 38) as f64;
 
@@ -41,6 +43,8 @@ pub struct Contact<const D: usize> {
     radii: Vec<f64>,
     largest: f64,
     largest_volume: f64,
+    /// Largest gap of particles about to touch, m.
+    near: f64,
     skin: f64,
     /// Displacement at which the list was made.
     listed_at: Field<D>,
@@ -114,6 +118,7 @@ impl<const D: usize> Contact<D> {
             radii,
             largest,
             largest_volume,
+            near: NEAR * bonds.spacing(),
             skin: SKIN * bonds.spacing(),
             listed_at: Field::zeros(0),
             listed: Vec::new(),
@@ -168,7 +173,8 @@ impl<const D: usize> Contact<D> {
     /// Makes the list for a displacement; to be called where bonds have changed.
     pub fn rebuild(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
         let particles = bonds.particles();
-        let edge = 2.0 * OF_RADII * self.largest + self.skin;
+        let reach = self.near + self.skin;
+        let edge = 2.0 * OF_RADII * self.largest + reach;
         let far = FAR * edge;
         let place = |&slot: &u32| {
             let (position, moved) = (bonds.position(slot as usize), displacement.get(slot as usize));
@@ -179,7 +185,7 @@ impl<const D: usize> Contact<D> {
         let near = |own: usize, found: &mut Vec<u32>| {
             found.clear();
             let slot = particles[own] as usize;
-            let radius = OF_RADII * (self.radius(slot) + self.largest) + self.skin;
+            let radius = OF_RADII * (self.radius(slot) + self.largest) + reach;
             // a little more: far from the origin places are rounded to 2⁻¹⁴ of an edge
             grid.near(places[own], radius + 1e-3 * edge, |other| {
                 if other != own {
@@ -197,7 +203,7 @@ impl<const D: usize> Contact<D> {
                 for &other in &found {
                     let candidate = self.candidate(bonds, slot, other as usize);
                     let (_, r) = candidate.apart(displacement, slot);
-                    if r < candidate.distance + self.skin && !bonds.is_bonded(slot, other as usize) {
+                    if r < candidate.distance + reach && !bonds.is_bonded(slot, other as usize) {
                         candidates.push(candidate);
                     }
                 }
@@ -307,31 +313,36 @@ impl<const D: usize> Contact<D> {
         self.stiffness * self.largest_volume
     }
 
-    /// Adds to the Gershgorin sums of dynamic relaxation, in units of `tangent`, those of what touches:
-    /// Σ_J κ(c/δ) V_J (1 + max_{d≠e} |n_d n_e|). A particle without bonds has twice that alone: it starts each step from
-    /// rest, see [`Contact::still`], and so must not go farther than a gradient step may.
+    /// Adds to the Gershgorin sums of dynamic relaxation, in units of `tangent`, those of what touches or is about to:
+    /// Σ_J κ(c/δ) V_J (1 + max_{d≠e} |n_d n_e|). A particle that became heavy only in touch would be driven far into
+    /// another as a light one, out again as a heavy one, and so on for ever. A particle without bonds has twice that alone:
+    /// it starts each step from rest, see [`Contact::still`], and so must not go farther than a gradient step may.
     pub fn add_stiffness(&self, displacement: &Field<D>, tangent: f64, masses: &mut [f64]) {
-        let sum = |(own, candidates): (&Listed, &[Candidate<D>])| {
+        let of = |own: &Listed, candidates: &[Candidate<D>]| {
             let mut sum = 0.0;
-            for touch in candidates.iter().filter_map(|c| c.touch(displacement, own.slot as usize)) {
-                let n = touch.direction;
-                let mut mixed = 0.0_f64;
-                for d in 0..D {
-                    for e in 0..d {
-                        mixed = mixed.max((n[d] * n[e]).abs());
+            for candidate in candidates {
+                let (zeta, r) = candidate.apart(displacement, own.slot as usize);
+                if r < candidate.distance + self.near {
+                    let mut mixed = 0.0_f64;
+                    for d in 0..D {
+                        for e in 0..d {
+                            mixed = mixed.max((zeta[d] * zeta[e]).abs());
+                        }
                     }
+                    sum += self.stiffness * candidate.volume * (1.0 + mixed / (r * r).max(f64::MIN_POSITIVE));
                 }
-                sum += self.stiffness * touch.volume * (1.0 + mixed);
             }
-            (own.slot as usize, own.alone, sum / tangent)
+            sum / tangent
         };
         let chunks = masses.len().div_ceil(CHUNK);
-        let sums: Vec<Vec<(usize, bool, f64)>> = (0..chunks)
-            .into_par_iter()
-            .map(|chunk| self.in_chunk(chunk).map(sum).filter(|(_, _, sum)| *sum > 0.0).collect())
-            .collect();
-        for (slot, alone, sum) in sums.into_iter().flatten() {
-            masses[slot] = if alone { 2.0 * sum } else { masses[slot] + sum };
+        let sums = (0..chunks).into_par_iter().map(|chunk| {
+            let all = self.in_chunk(chunk).map(|(own, candidates)| (own, of(own, candidates)));
+            all.filter(|(_, sum)| *sum > 0.0).collect()
+        });
+        let sums: Vec<Vec<(&Listed, f64)>> = sums.collect();
+        for (own, sum) in sums.into_iter().flatten() {
+            let mass = &mut masses[own.slot as usize];
+            *mass = if own.alone { 2.0 * sum } else { *mass + sum };
         }
     }
 
