@@ -8,6 +8,9 @@ use polycore::scene::{SceneError, Source};
 /// Largest horizon ratio: a stencil beyond it has more bonds than any use.
 pub const LARGEST_RATIO: f64 = 20.0;
 
+/// Stiffest contact: beyond it no method would get anywhere.
+const STIFFEST_CONTACT: f64 = 1e4;
+
 /// Checks a scene and lists its variants; `quick` leaves out those that a `--quick` run leaves out.
 ///
 /// # Errors
@@ -71,6 +74,12 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     }
     dynamics(source, scene)?;
+    if let Some(contact) = &scene.contact
+        && !(0.0..=STIFFEST_CONTACT).contains(&contact.stiffness)
+    {
+        let allowed = format!("0 to {}", plain(STIFFEST_CONTACT));
+        return Err(source.error("contact.stiffness", plain(contact.stiffness), allowed));
+    }
     output(source, scene)
 }
 
