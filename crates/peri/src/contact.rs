@@ -346,6 +346,33 @@ impl<const D: usize> Contact<D> {
         }
     }
 
+    /// How far a step along a direction may go so that none leaps past another: by a quarter of a spacing against each
+    /// other where they touch or are about to, by half of one at all. ∞ along a direction of zeros.
+    pub fn longest_step(&self, displacement: &Field<D>, direction: &Field<D>) -> f64 {
+        let slots = displacement.slots();
+        let of = |chunk: usize| {
+            let (mut farthest, mut closing) = (0.0_f64, 0.0_f64);
+            let parts = direction.components().map(|d| &d[chunk_range(chunk, slots)]);
+            for k in 0..parts[0].len() {
+                farthest = farthest.max((0..D).map(|d| parts[d][k] * parts[d][k]).sum());
+            }
+            for (own, candidates) in self.in_chunk(chunk) {
+                let slot = own.slot as usize;
+                let here = direction.get(slot);
+                for candidate in candidates {
+                    if candidate.apart(displacement, slot).1 < candidate.distance + self.near {
+                        let there = direction.get(candidate.slot as usize);
+                        closing = closing.max((0..D).map(|d| (there[d] - here[d]).powi(2)).sum());
+                    }
+                }
+            }
+            [farthest, closing]
+        };
+        let parts = (0..slots.div_ceil(CHUNK)).into_par_iter().map(of);
+        let [farthest, closing] = parts.reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+        self.near / (0.5 * farthest.sqrt()).max(closing.sqrt())
+    }
+
     /// Brings particles without bonds to rest: what is pushed aside does not fly on in a search for equilibrium.
     pub fn still(&self, velocity: &mut Field<D>) {
         self.alone.iter().for_each(|&slot| velocity.set(slot as usize, [0.0; D]));
