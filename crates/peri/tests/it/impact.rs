@@ -137,6 +137,49 @@ fn newtons_cradle() {
     assert!(velocities[2] > 0.9 && velocities[..2].iter().all(|v| v.abs() < 0.1), "{velocities:?}");
 }
 
+/// Two halves of a sheet that collide askew, on any number of threads, and from a state saved while they touch.
+#[test]
+fn neither_threads_nor_restarts_change_a_bit() {
+    let mut body = Body::<2>::solid([66, 66], 1.0, 3.015);
+    body.slits = vec![Slit { at: 33.0, from: -1.0, to: 67.0 }];
+    let run = |threads: usize, from: Option<State<2>>| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut built = body.build();
+            let bonds = &mut built.lattice;
+            let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+            let contact = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
+            let mut state = from.unwrap_or_else(|| {
+                let mut state = State::new(bonds.slots());
+                for &slot in bonds.particles() {
+                    if bonds.position(slot as usize)[1] > 33.0 {
+                        state.velocity.set(slot as usize, [1.0, -2.0]);
+                    }
+                }
+                state
+            });
+            let loads = Loads::default();
+            let mut system = System::new(bonds, &*law, MODULUS, &loads, &[]);
+            system.contact = Some(contact);
+            let solver = VelocityVerlet { records: 4, ..VelocityVerlet::new(DENSITY, 2.0) };
+            let mut saved = None;
+            let mut watch = |_: &peri::solver::Status, state: &State<2>| {
+                if state.motion.time > 1.0 && saved.is_none() {
+                    saved = Some(state.clone());
+                }
+                Ok(())
+            };
+            solver.solve(&mut system, &mut state, &mut watch, &mut |_, _| Ok(())).unwrap();
+            (state, saved.unwrap())
+        })
+    };
+    let (one, saved) = run(1, None);
+    eprintln!("askew: {:?}, {} steps", one.history[1].contact, one.total_iterations);
+    assert!(one.displacement.slots() > peri::field::CHUNK && one.history[1].contact.unwrap().pairs > 20);
+    // == of all fields and histories: no −0 and no NaN are here
+    assert!(run(3, None).0 == one && run(2, Some(saved)).0 == one);
+}
+
 /// Energy through an impact, over the time step: second order, from steps at the stability limit of the stiffest contact.
 #[test]
 fn energy_through_an_impact() {
