@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// File name inside an output directory.
 pub const FILE_NAME: &str = "checkpoint.bin";
 /// First bytes of the file: name and version of the format.
-const MAGIC: &[u8; 8] = b"peri-ck3";
+const MAGIC: &[u8; 8] = b"peri-ck4";
 
 /// The state of a run.
 #[derive(Debug, Serialize, Deserialize)]

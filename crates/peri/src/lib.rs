@@ -43,6 +43,7 @@
 
 pub mod bonds;
 pub mod calibrate;
+pub mod contact;
 pub mod correction;
 pub mod critical;
 pub mod error;

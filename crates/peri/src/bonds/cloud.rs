@@ -1,5 +1,6 @@
 //! A cloud of particles of any position and volume: neighbour lists in compressed rows, sorted for locality.
 
+use super::cells::CellGrid;
 use super::cloud_kernel::{CloudData, GROUP};
 use super::kernel::StretchRange;
 use super::rows::{CloudKernel, cloud_kernel};
@@ -9,83 +10,6 @@ use crate::field::{Field, chunk_range};
 use crate::geometry::Cut;
 use crate::potential::KernelFit;
 use rayon::prelude::*;
-
-/// Particles in cells of one horizon's edge, for range searches.
-pub struct CellGrid<const D: usize> {
-    low: [f64; D],
-    edge: f64,
-    cells: [usize; D],
-    starts: Vec<usize>,
-    members: Vec<u32>,
-}
-
-impl<const D: usize> CellGrid<D> {
-    /// Sorts points into cells of at least `edge`; at most four per point and axis in any case.
-    pub fn new(points: &[[f64; D]], edge: f64) -> Self {
-        let extreme = |pick: fn(f64, f64) -> f64, start: f64| -> [f64; D] {
-            std::array::from_fn(|d| points.iter().map(|p| p[d]).fold(start, pick))
-        };
-        let (low, high) = (extreme(f64::min, f64::INFINITY), extreme(f64::max, f64::NEG_INFINITY));
-        let most = (points.len() as f64).powf(1.0 / D as f64).ceil().max(1.0);
-        let widest = (0..D).map(|d| high[d] - low[d]).fold(0.0, f64::max);
-        let edge = edge.max(widest / (4.0 * most)).max(f64::MIN_POSITIVE);
-        let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / edge) as usize + 1);
-        let mut grid = Self { low, edge, cells, starts: Vec::new(), members: Vec::new() };
-        let keys: Vec<usize> = points.iter().map(|&p| grid.index(grid.cell(p))).collect();
-        grid.starts = vec![0; cells.iter().product::<usize>() + 1];
-        for &key in &keys {
-            grid.starts[key + 1] += 1;
-        }
-        for cell in 1..grid.starts.len() {
-            grid.starts[cell] += grid.starts[cell - 1];
-        }
-        let mut next = grid.starts.clone();
-        grid.members = vec![0; points.len()];
-        for (point, &key) in keys.iter().enumerate() {
-            grid.members[next[key]] = point as u32;
-            next[key] += 1;
-        }
-        grid
-    }
-
-    /// All members, cell by cell: an order in which near points are near.
-    pub fn order(&self) -> &[u32] {
-        &self.members
-    }
-
-    fn cell(&self, point: [f64; D]) -> [usize; D] {
-        std::array::from_fn(|d| (((point[d] - self.low[d]) / self.edge) as usize).min(self.cells[d] - 1))
-    }
-
-    fn index(&self, cell: [usize; D]) -> usize {
-        (0..D).rev().fold(0, |index, d| index * self.cells[d] + cell[d])
-    }
-
-    /// Visits every point in the cells that a ball around `point` may touch (farther points are visited too).
-    pub fn near(&self, point: [f64; D], radius: f64, mut visit: impl FnMut(usize)) {
-        let low = self.cell(point.map(|x| x - radius));
-        let high = self.cell(point.map(|x| x + radius));
-        let mut cell = low;
-        loop {
-            let index = self.index(cell);
-            for &member in &self.members[self.starts[index]..self.starts[index + 1]] {
-                visit(member as usize);
-            }
-            let mut d = 0;
-            loop {
-                if d == D {
-                    return;
-                }
-                cell[d] += 1;
-                if cell[d] <= high[d] {
-                    break;
-                }
-                cell[d] = low[d];
-                d += 1;
-            }
-        }
-    }
-}
 
 /// The bonds of a cloud.
 pub struct CloudBonds<const D: usize> {
@@ -275,6 +199,15 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
                 visit(self.bond(slot, k));
             }
         }
+    }
+
+    fn is_bonded(&self, slot: usize, other: usize) -> bool {
+        slot != other && self.neighbours[self.starts[slot]..self.starts[slot + 1]].contains(&(other as u32))
+    }
+
+    fn is_alone(&self, slot: usize) -> bool {
+        // padding and broken bonds lead to the particle itself
+        self.neighbours[self.starts[slot]..self.starts[slot + 1]].iter().all(|&other| other as usize == slot)
     }
 
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {

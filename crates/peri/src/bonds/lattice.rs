@@ -350,6 +350,18 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         }
     }
 
+    fn is_bonded(&self, slot: usize, other: usize) -> bool {
+        let (Some(own), Some(there)) = (self.cell_of(slot), self.cell_of(other)) else { return false };
+        let offset: [i32; D] = std::array::from_fn(|d| there[d] as i32 - own[d] as i32);
+        // offsets ascend, last axis slowest
+        let found = self.stencil.offsets.binary_search_by(|o| o.iter().rev().cmp(offset.iter().rev()));
+        found.is_ok_and(|k| self.is_intact(slot, k))
+    }
+
+    fn is_alone(&self, slot: usize) -> bool {
+        self.intact.iter().all(|words| words[slot] == 0)
+    }
+
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
         let spacing = self.lattice.spacing;
         let stencil: Vec<StencilBond<D>> = (0..self.stencil.offsets.len())

@@ -1,6 +1,7 @@
 //! Who is bonded to whom, and the forces that follow: a regular lattice without a neighbour list, or a cloud with one.
 
 mod breaking;
+mod cells;
 mod cloud;
 mod cloud_kernel;
 mod kernel;
@@ -9,7 +10,8 @@ mod lattice_kernel;
 mod rows;
 
 pub use breaking::{Overstretched, fragments, overstretched};
-pub use cloud::{CellGrid, CloudBonds};
+pub use cells::CellGrid;
+pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
 pub use kernel::StretchRange;
 pub use lattice::{Lattice, LatticeBonds, Stencil};
@@ -55,6 +57,10 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn spacing(&self) -> f64;
     /// Visits the intact bonds of a slot.
     fn neighbours(&self, slot: usize, visit: &mut dyn FnMut(Neighbour<D>));
+    /// Whether an intact bond leads from a slot to another.
+    fn is_bonded(&self, slot: usize, other: usize) -> bool;
+    /// Whether a slot has no intact bond.
+    fn is_alone(&self, slot: usize) -> bool;
     /// Sets the bond law q(e) and its modulus kθ, N/m⁶.
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
     /// Sets per-particle surface-correction factors (one field of `D` components over the slots).

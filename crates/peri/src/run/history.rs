@@ -60,6 +60,14 @@ impl Outcome {
             ("released".to_owned(), "J", each(&|r| r.released)),
             ("damped".to_owned(), "J", each(&|r| self.damped(r))),
         ]);
+        let touching: Vec<_> = self.history.iter().filter_map(|r| r.contact).collect();
+        if !touching.is_empty() {
+            columns.extend([
+                ("contact_energy".to_owned(), "J", touching.iter().map(|t| t.energy).collect()),
+                ("contacts".to_owned(), "", touching.iter().map(|t| t.pairs as f64).collect()),
+                ("overlap".to_owned(), "", touching.iter().map(|t| t.overlap).collect()),
+            ]);
+        }
         columns
     }
 
@@ -94,6 +102,12 @@ impl Outcome {
             self.value("released_energy", last.released, "J");
         }
         self.value("damped_energy", self.damped(&last), "J");
+        if let Some(touching) = last.contact {
+            self.value("contact_energy", touching.energy, "J");
+            self.value("contacts", touching.pairs as f64, "");
+            let deepest = self.history.iter().filter_map(|r| Some(r.contact?.overlap)).fold(0.0, f64::max);
+            self.value("deepest_overlap", deepest, "");
+        }
         if self.is_dynamic() {
             // largest difference of what came in and what is there, over what was turned over
             let off = |r: &Record| (r.work - r.stored - r.released - r.damped - r.kinetic).abs();
@@ -218,7 +232,8 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
             .size(900.0, 560.0)
             .axes(label, "energy (J)")
             .legend(LegendPlace::TopLeft);
-        for name in ["work", "stored", "kinetic", "released", "damped"] {
+        // stored is with that of contact
+        for name in ["work", "stored", "contact_energy", "kinetic", "released", "damped"] {
             if let Some(column) = columns.iter().find(|c| c.0 == name) {
                 plot = plot.series(Series::line(name, &x, &from_rest(&column.2, 1.0)));
             }

@@ -15,6 +15,7 @@ use frames::Frames;
 use crate::bonds::{Bonds, fragments, stretch_range};
 use crate::calibrate::Space;
 use crate::checkpoint;
+use crate::contact::Contact;
 use crate::error::Error;
 use crate::potential::{BondPotential, KernelFit};
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
@@ -286,9 +287,12 @@ fn solve<const D: usize>(
         }
         Ok(())
     };
+    let contact =
+        scene.contact.map(|contact| Contact::new(&*body.bonds, modulus, contact.stiffness)).transpose()?;
     let mut system = System::new(&mut *body.bonds, law, modulus, loads, &factors);
     system.fit_bound = scene.fit_bound();
     system.breaking = critical_stretch.map(|stretch| Breaking { stretch, policy: scene.solver.breaking });
+    system.contact = contact;
     system.stop_below = scene.solver.stop_below.unwrap_or(0.0);
     phases.start("solve");
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {

@@ -8,6 +8,10 @@ use polycore::scene::{SceneError, Source};
 /// Largest horizon ratio: a stencil beyond it has more bonds than any use.
 pub const LARGEST_RATIO: f64 = 20.0;
 
+/// Stiffest contact, beyond which no method would get anywhere, and stiffest one that L-BFGS can follow.
+const STIFFEST_CONTACT: f64 = 1e4;
+const STIFFEST_OF_LBFGS: f64 = 100.0;
+
 /// Checks a scene and lists its variants; `quick` leaves out those that a `--quick` run leaves out.
 ///
 /// # Errors
@@ -71,6 +75,7 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     }
     dynamics(source, scene)?;
+    contact(source, scene)?;
     output(source, scene)
 }
 
@@ -116,6 +121,21 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
         None => Ok(()),
     }
+}
+
+fn contact(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let Some(contact) = &scene.contact else { return Ok(()) };
+    let fault = |most: f64, why: &str| {
+        let allowed = format!("0 to {}{why}", plain(most));
+        Err(source.error("contact.stiffness", plain(contact.stiffness), allowed))
+    };
+    if !(0.0..=STIFFEST_CONTACT).contains(&contact.stiffness) {
+        return fault(STIFFEST_CONTACT, "");
+    }
+    if scene.method() == Method::Lbfgs && contact.stiffness > STIFFEST_OF_LBFGS {
+        return fault(STIFFEST_OF_LBFGS, " with `lbfgs`, more with `adr`");
+    }
+    Ok(())
 }
 
 fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {

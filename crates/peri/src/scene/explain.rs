@@ -36,6 +36,13 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bon
         let method = dynamics.method();
         builds(format!("explicit dynamics up to {} s, {} rows of history", method.end_time, method.records));
     }
+    if let Some(contact) = &scene.contact {
+        builds(if contact.stiffness > 0.0 {
+            format!("contact of stiffness {}, a list of near pairs without a bond", contact.stiffness)
+        } else {
+            "a look in each step at how far particles without a bond overlap, no repulsion".to_owned()
+        });
+    }
     if let Some(stress) = &scene.stress {
         let names: Vec<&str> = stress.measures.iter().map(|m| m.name()).collect();
         let when = if scene.output.every.is_some() { "in the steps written" } else { "once per variant" };
@@ -51,6 +58,7 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bon
     omits(variant.volume == VolumeCorrection::Linear, "volume correction");
     omits(scene.stress.is_some(), "the stress pass");
     omits(scene.dynamics.is_some(), "inertia");
+    omits(scene.contact.is_some(), "contact (no [contact] in this scene)");
     omits(scene.material.critical.is_some(), "damage and bond breaking (no `critical` in this scene)");
     omits(scene.output.every.is_some(), "fields of the steps before the last");
     let held = scene.boundary.iter().any(|b| b.displacement.is_some());

@@ -73,10 +73,10 @@ impl Method {
 
 impl Scene {
     /// The method: L-BFGS unless told otherwise, and dynamic relaxation where bonds break, which asks for many
-    /// equilibria near each other.
+    /// equilibria near each other, or particles touch, of which the coarse level of L-BFGS knows nothing.
     pub fn method(&self) -> Method {
-        let breaks = self.material.critical.is_some();
-        self.solver.method.unwrap_or(if breaks { Method::Adr } else { Method::Lbfgs })
+        let kinks = self.material.critical.is_some() || self.contact.is_some();
+        self.solver.method.unwrap_or(if kinks { Method::Adr } else { Method::Lbfgs })
     }
 
     /// The quasi-static method with the settings of this scene.

@@ -50,6 +50,8 @@ pub struct Scene {
     pub solver: Solver,
     /// Density and times of explicit dynamics.
     pub dynamics: Option<Dynamics>,
+    /// Repulsion of particles without a bond; without it there is none, and nothing of it is computed.
+    pub contact: Option<ContactSpec>,
     /// Stress output; without it no stress is computed.
     pub stress: Option<StressSpec>,
     /// A closed-form solution to compare with.
@@ -213,6 +215,20 @@ pub enum SurfaceCorrection {
     Energy,
 }
 
+/// Contact between particles that no intact bond joins.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ContactSpec {
+    /// κ: stiffness of a contact over that of a bond as long as the horizon; 0 only shows how particles overlap.
+    pub stiffness: f64,
+}
+
+impl Default for ContactSpec {
+    fn default() -> Self {
+        Self { stiffness: crate::contact::STIFFNESS }
+    }
+}
+
 /// Stress output.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -298,6 +314,8 @@ pub struct Study {
     pub solver: Option<Solver>,
     /// Instead of `dynamics`.
     pub dynamics: Option<Dynamics>,
+    /// Instead of `contact`.
+    pub contact: Option<ContactSpec>,
     /// Spacings.
     pub spacing: Vec<Length>,
     /// Horizon ratios.

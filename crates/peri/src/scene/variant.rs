@@ -71,13 +71,14 @@ impl Variant {
         if study.dynamics.is_some() {
             scene.dynamics = study.dynamics;
         }
+        scene.contact = study.contact.or(scene.contact);
         (source, scene)
     }
 }
 
 impl Study {
     /// Which key of the scene each key of a study stands for, and whether it is given.
-    pub(super) fn replaced(&self) -> [(&'static str, &'static str, bool); 7] {
+    pub(super) fn replaced(&self) -> [(&'static str, &'static str, bool); 8] {
         // the longer key first: it would be found under the shorter one
         [
             ("material.critical", "critical", self.critical.is_some()),
@@ -87,6 +88,7 @@ impl Study {
             ("boundary", "boundary", self.boundary.is_some()),
             ("solver", "solver", self.solver.is_some()),
             ("dynamics", "dynamics", self.dynamics.is_some()),
+            ("contact", "contact", self.contact.is_some()),
         ]
     }
 }

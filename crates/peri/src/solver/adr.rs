@@ -73,12 +73,23 @@ pub struct Relaxation {
     unit_mass: Vec<f64>,
     /// Gershgorin sums of the deformed body with each bond's own tangent, where bonds differ much in it.
     own_mass: Vec<f64>,
+    /// Either of them with what contact adds in this iteration.
+    contact_mass: Vec<f64>,
 }
 
 impl Relaxation {
     /// Nothing is computed yet.
     pub fn new(settings: AdaptiveDynamicRelaxation) -> Self {
-        Self { settings, unit_mass: Vec::new(), own_mass: Vec::new() }
+        Self { settings, unit_mass: Vec::new(), own_mass: Vec::new(), contact_mass: Vec::new() }
+    }
+
+    /// The Gershgorin sums of this iteration.
+    fn masses<const D: usize>(&self, system: &System<D>, own: bool) -> &[f64] {
+        match (system.repulsion(), own) {
+            (Some(_), _) => &self.contact_mass,
+            (None, true) => &self.own_mass,
+            (None, false) => &self.unit_mass,
+        }
     }
 
     /// One iteration; true where the forces balance (the displacement is then left as it is).
@@ -97,10 +108,14 @@ impl Relaxation {
         if own && (state.iteration.is_multiple_of(REFRESH) || self.own_mass.is_empty()) {
             own_mass(system, state, &mut self.own_mass);
         }
-        let (masses, tangent) =
-            if own { (&self.own_mass, system.modulus) } else { (&self.unit_mass, state.tangent) };
+        let tangent = if own { system.modulus } else { state.tangent };
+        system.update_contact(&state.displacement);
+        if let Some(contact) = system.repulsion() {
+            self.contact_mass.clone_from(if own { &self.own_mass } else { &self.unit_mass });
+            contact.add_stiffness(&state.displacement, tangent, &mut self.contact_mass);
+        }
         let mass = 0.5 * settings.mass_safety * tangent;
-        let (sums, met) = force_pass(system, state, masses, mass, factor, look);
+        let (sums, met) = force_pass(system, state, self.masses(system, own), mass, factor, look);
         system.count_evaluation(state);
         if !sums.is_finite() {
             return Err(system.not_finite(state));
@@ -129,8 +144,10 @@ impl Relaxation {
         if state.is_balanced(&goal, broken)? {
             return Ok(true);
         }
-        let masses = if own { &self.own_mass } else { &self.unit_mass };
-        move_pass(&system.loads, state, masses, mass, damping);
+        move_pass(&system.loads, state, self.masses(system, own), mass, damping);
+        if let Some(contact) = system.repulsion() {
+            contact.still(&mut state.velocity);
+        }
         state.iteration += 1;
         state.step_iterations += 1;
         state.total_iterations += 1;

@@ -177,8 +177,9 @@ impl<const D: usize> LimitedMemory<D> {
     }
 
     /// New forces at the present displacement; their gradient goes to `self.trial`.
-    fn evaluate(&mut self, system: &System<D>, state: &mut State<D>) -> Point {
+    fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Point {
         let factor = system.factors[state.step];
+        system.update_contact(&state.displacement);
         // at rest the velocity leaves the pass' quotients at 0
         let (sums, met) = force_pass(system, state, self.preconditioner.local(), 1.0, factor, true);
         system.count_evaluation(state);
@@ -296,17 +297,19 @@ impl<const D: usize> LimitedMemory<D> {
         Ok(Search::Failed)
     }
 
-    /// How far a step may go along the direction where bonds soften at stretches up to e = `most`: their energy is not
-    /// convex there.
+    /// How far a step may go along the direction where bonds soften at stretches up to e = `most`, or particles touch:
+    /// the energy is not convex there.
     fn longest_step(&mut self, system: &System<D>, state: &mut State<D>, most: f64) -> f64 {
+        let contact = system.repulsion();
+        let longest = contact.map_or(f64::INFINITY, |c| c.longest_step(&state.displacement, &self.direction));
         if system.law.tension_derivative((1.0 + most).sqrt()) >= 0.0 {
-            return f64::INFINITY;
+            return longest;
         }
         scale(&mut self.direction, FAR);
         let range = stretch_range(&*system.bonds, &self.direction);
         scale(&mut self.direction, 1.0 / FAR);
         system.count_evaluation(state);
-        LEAP * FAR / (1.0 + range.high).sqrt()
+        (LEAP * FAR / (1.0 + range.high).sqrt()).min(longest)
     }
 
     /// One iteration from `point`; the next iterate, `None` where no direction led anywhere.

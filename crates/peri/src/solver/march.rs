@@ -125,7 +125,7 @@ fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
     state.balanced = [factor, pull, push];
 }
 
-fn record<const D: usize>(system: &System<D>, state: &mut State<D>) {
+fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let [factor, pull, _] = state.balanced;
     let met = state.balanced_stretches;
     let table = EnergyTable::new(system.law, system.fitted_part(met));
@@ -141,6 +141,7 @@ fn record<const D: usize>(system: &System<D>, state: &mut State<D>) {
         broken: state.broken,
         detached: state.detached,
         stored: stored_energy(system, state, &table),
+        contact: system.touching(state),
         work: state.work,
         released: state.released,
         largest_stretch: (1.0 + met.high).sqrt(),
@@ -151,7 +152,7 @@ fn record<const D: usize>(system: &System<D>, state: &mut State<D>) {
     state.history.push(record);
 }
 
-/// Σ_I V_I Σ_J w V_J kθ |ξ| φ: the energy of all bonds, J.
+/// Σ_I V_I Σ_J w V_J kθ |ξ| φ: the energy of all bonds, J, and that of contact.
 pub fn stored_energy<const D: usize>(system: &System<D>, state: &State<D>, table: &EnergyTable) -> f64 {
     let of = |slots: &[u32]| {
         let mut sum = 0.0;
@@ -172,7 +173,11 @@ pub fn stored_energy<const D: usize>(system: &System<D>, state: &State<D>, table
         sum
     };
     let parts: Vec<f64> = system.bonds.particles().par_chunks(CHUNK).map(of).collect();
-    system.modulus * parts.iter().sum::<f64>()
+    let bonds = system.modulus * parts.iter().sum::<f64>();
+    match system.repulsion() {
+        Some(contact) => bonds + contact.touching(&state.displacement).energy,
+        None => bonds,
+    }
 }
 
 /// Whether the load has fallen below the part of its largest at which the run is to stop.

@@ -20,7 +20,7 @@ pub struct Preconditioner<const D: usize> {
     volumes: Vec<f64>,
     /// Gershgorin sums for a unit bond tangent.
     unit_mass: Vec<f64>,
-    /// The smallest of `local`: that of particles without bonds.
+    /// The smallest of `local`: that of particles that nothing holds.
     least: f64,
     coarse: Option<Coarse<D>>,
 }
@@ -54,13 +54,18 @@ impl<const D: usize> Preconditioner<D> {
             springs.clone_from(&self.unit_mass);
             state.tangent
         };
+        let particles = bonds.particles().iter().map(|&slot| slot as usize);
+        particles.filter(|&slot| survey.bonded[slot] == 0).for_each(|slot| springs[slot] = 0.0);
+        if let Some(contact) = system.repulsion() {
+            contact.add_stiffness(&state.displacement, tangent, &mut springs);
+        }
         springs.iter_mut().for_each(|m| *m *= 0.5 * tangent);
         self.local.clear();
         self.local.resize(slots, 0.0);
         self.least = f64::INFINITY;
         for &slot in bonds.particles() {
             let slot = slot as usize;
-            if survey.bonded[slot] > 0 && springs[slot] > 0.0 {
+            if springs[slot] > 0.0 {
                 self.local[slot] = weight / (bonds.volume(slot) * springs[slot]);
                 self.least = self.least.min(self.local[slot]);
             }
@@ -91,9 +96,8 @@ impl<const D: usize> Preconditioner<D> {
         let before: Vec<f64> = slots.iter().map(|&slot| self.unit_mass[slot as usize]).collect();
         update_unit_mass(bonds, slots, &mut self.unit_mass);
         for (&slot, before) in slots.iter().zip(before) {
-            let mut alone = true;
-            bonds.neighbours(slot as usize, &mut |_| alone = false);
             let local = &mut self.local[slot as usize];
+            let alone = bonds.is_alone(slot as usize);
             *local = if alone { self.least } else { *local * before / self.unit_mass[slot as usize] };
         }
     }

@@ -3,6 +3,7 @@
 use super::load::Loads;
 use super::verlet::Motion;
 use crate::bonds::{Bonds, Overstretched, StretchRange, overstretched, stretch_range};
+use crate::contact::{Contact, Touching};
 use crate::error::Error;
 use crate::field::Field;
 use crate::potential::{BondPotential, KernelFit};
@@ -54,6 +55,8 @@ pub struct System<'a, const D: usize> {
     pub stop_below: f64,
     /// Largest relative error of the fitted bond law.
     pub fit_bound: f64,
+    /// Repulsion of particles without a bond, or a look at how they overlap, where wanted.
+    pub contact: Option<Contact<D>>,
 }
 
 /// One load step in equilibrium.
@@ -75,8 +78,10 @@ pub struct Record {
     pub broken: u64,
     /// Particles that have lost all their bonds so far.
     pub detached: u64,
-    /// Energy stored in bonds, J.
+    /// Energy stored in bonds and contact, J.
     pub stored: f64,
+    /// What touches, where that is looked at.
+    pub contact: Option<Touching>,
     /// Work of the loads so far, J.
     pub work: f64,
     /// Energy that broken bonds held when they broke, J.
@@ -216,7 +221,17 @@ impl<'a, const D: usize> System<'a, D> {
         factors: &'a [f64],
     ) -> Self {
         let loads = Cow::Borrowed(loads);
-        Self { bonds, law, modulus, loads, factors, breaking: None, stop_below: 0.0, fit_bound: 1e-9 }
+        Self {
+            bonds,
+            law,
+            modulus,
+            loads,
+            factors,
+            breaking: None,
+            stop_below: 0.0,
+            fit_bound: 1e-9,
+            contact: None,
+        }
     }
 
     /// Brings bonds, law and loads to where a state is: at rest, or where an interrupted run was.
@@ -232,8 +247,38 @@ impl<'a, const D: usize> System<'a, D> {
             let particles = self.bonds.particles().to_vec();
             self.release(particles.iter().copied());
         }
+        self.rebuild_contact(&state.displacement);
         state.fitted[1] = state.fitted[1].min(self.most());
         self.fit(state)
+    }
+
+    /// Has contact look for pairs again where particles have moved far since it last did. To be called before the forces
+    /// of a new displacement, once; it makes no difference to them how often it looks.
+    pub fn update_contact(&mut self, displacement: &Field<D>) {
+        if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
+            contact.update(&*self.bonds, displacement);
+        }
+    }
+
+    /// Has contact look for pairs, as it must where bonds have changed.
+    fn rebuild_contact(&mut self, displacement: &Field<D>) {
+        if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
+            contact.rebuild(&*self.bonds, displacement);
+        }
+    }
+
+    /// Contact, where it does more than look.
+    pub fn repulsion(&self) -> Option<&Contact<D>> {
+        self.contact.as_ref().filter(|contact| contact.repels())
+    }
+
+    /// What touches in a state, where that is looked at.
+    pub(super) fn touching(&mut self, state: &State<D>) -> Option<Touching> {
+        let contact = self.contact.as_mut()?;
+        if !contact.repels() {
+            contact.rebuild(&*self.bonds, &state.displacement);
+        }
+        Some(contact.touching(&state.displacement))
     }
 
     /// Force densities of a work item, without loads: bonds, and all that acts between particles beside them.
@@ -245,6 +290,9 @@ impl<'a, const D: usize> System<'a, D> {
         track: Option<&mut StretchRange>,
     ) {
         self.bonds.force(displacement, chunk, force, track);
+        if let Some(contact) = self.repulsion() {
+            contact.force(displacement, chunk, force);
+        }
     }
 
     /// Counts one evaluation of all forces.
@@ -276,6 +324,7 @@ impl<'a, const D: usize> System<'a, D> {
         state.released += self.modulus * list.iter().map(energy).sum::<f64>();
         state.broken += list.len() as u64 / 2;
         self.bonds.sever(&list);
+        self.rebuild_contact(&state.displacement);
         state.intact = Some(self.bonds.intact());
         let mut slots: Vec<u32> = list.iter().map(|bond| bond.slot).collect();
         slots.dedup();
@@ -287,9 +336,7 @@ impl<'a, const D: usize> System<'a, D> {
     fn release(&mut self, slots: impl Iterator<Item = u32>) -> u64 {
         let mut count = 0;
         for slot in slots {
-            let mut alone = true;
-            self.bonds.neighbours(slot as usize, &mut |_| alone = false);
-            if alone {
+            if self.bonds.is_alone(slot as usize) {
                 count += 1;
                 if self.loads.body_force.as_ref().is_some_and(|b| b.get(slot as usize) != [0.0; D]) {
                     self.loads.to_mut().unload(slot as usize);

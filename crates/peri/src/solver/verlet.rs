@@ -21,6 +21,9 @@ const EXCESS: f64 = 0.25;
 /// exceeds the work by (3/n²)·¼ after n steps.
 const LENIENT: u64 = 8;
 
+/// Contact that is allowed for, over what was met: the time step is not shortened for each particle that joins.
+const GROWTH: f64 = 1.25;
+
 /// Settings of explicit dynamics. [`State::velocity`] is the velocity at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityVerlet {
@@ -64,6 +67,8 @@ pub struct Motion {
     origin: f64,
     planned: u64,
     taken: u64,
+    /// Greatest sum of contact stiffness on a particle that is allowed for, N/m⁴.
+    contact: f64,
     /// Σ-bounds of the unbroken body, see [`Family`].
     stiffness: f64,
     shortest: f64,
@@ -199,7 +204,11 @@ impl VelocityVerlet {
         let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
         let range = [met.low, met.high].map(|e| (1.0 + e).max(0.0).sqrt());
         let tangent = LawRange::new(system, range).least_tangent;
+        let contact = system.repulsion().map_or(0.0, |contact| {
+            contact.greatest_stiffness(&state.displacement).max(contact.pair_stiffness())
+        });
         state.motion = Motion {
+            contact,
             critical_step: critical(frequency),
             kinetic,
             begun: true,
@@ -225,13 +234,24 @@ impl VelocityVerlet {
         let motion = &mut state.motion;
         // blocks of the tangent's rows: ω² ≤ ‖A_II‖ + Σ‖A_IJ‖ with ‖t′nn + t/λ(1 − nn)‖ ≤ max(|t′|, |t|/λ);
         // Feingold & Varga (1962), doi:10.2140/pjm.1962.12.1241
-        let bound = 2.0 * motion.stiffness * state.tangent / self.density;
-        let estimate = motion.frequency * law.mean_tangent;
+        let bound = 2.0 * (motion.stiffness * state.tangent + motion.contact) / self.density;
+        // the greatest frequency of a sum is no greater than the sum of both (Weyl)
+        let estimate = motion.frequency * law.mean_tangent + 2.0 * motion.contact / self.density;
         motion.gershgorin_step = critical(bound);
         // nothing free, or a tangent without a positive frequency: the bound alone
         motion.covered_step = critical(if estimate > 0.0 { estimate.min(bound) } else { bound });
         motion.floor = law.least_energy * system.modulus * motion.extent;
         motion.longest = self.time_step.unwrap_or(self.safety * motion.covered_step);
+    }
+
+    /// Allows for more contact where more particles touch than so far.
+    fn cover_contact<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
+        let Some(contact) = system.repulsion() else { return };
+        let greatest = contact.greatest_stiffness(&state.displacement);
+        if greatest > state.motion.contact {
+            state.motion.contact = GROWTH * greatest;
+            self.cover(system, state);
+        }
     }
 
     /// One step.
@@ -249,6 +269,7 @@ impl VelocityVerlet {
         let first = leap_pass(&system.loads, state, volumes, &leap);
         // two ends, √D components
         state.motion.slack += 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
+        system.update_contact(&state.displacement);
         let look = state.motion.must_look(state.fitted, system.breaking.map(|b| b.stretch));
         let (mut second, met) = force_pass(system, state, volumes, &leap, look);
         system.count_evaluation(state);
@@ -271,11 +292,11 @@ impl VelocityVerlet {
         self.account(state, first, second)?;
         if look {
             self.sever(system, state, met, factor);
-            if state.motion.longest < (1.0 - 1e-9) * state.motion.time_step
-                && state.motion.taken < state.motion.planned
-            {
-                state.motion.plan(end);
-            }
+        }
+        self.cover_contact(system, state);
+        let motion = &mut state.motion;
+        if motion.longest < (1.0 - 1e-9) * motion.time_step && motion.taken < motion.planned {
+            motion.plan(end);
         }
         Ok(())
     }
@@ -333,7 +354,7 @@ impl VelocityVerlet {
     }
 
     /// A row of history.
-    fn record<const D: usize>(&self, system: &System<D>, state: &mut State<D>, table: &mut Table) {
+    fn record<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>, table: &mut Table) {
         let met = stretch_range(&*system.bonds, &state.displacement);
         system.count_evaluation(state);
         let stored = stored(system, state, met, table);
@@ -351,6 +372,7 @@ impl VelocityVerlet {
             broken: state.broken,
             detached: state.detached,
             stored,
+            contact: system.touching(state),
             work: state.work,
             released: state.released,
             largest_stretch: (1.0 + met.high).sqrt(),

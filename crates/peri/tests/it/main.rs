@@ -3,11 +3,14 @@
 
 mod balance;
 mod bodies;
+mod contact;
 mod dynamics;
 mod forces;
 mod homogeneous;
+mod impact;
 mod lbfgs;
 mod limits;
+mod pressed;
 mod relaxation;
 mod stress;
 mod surface;

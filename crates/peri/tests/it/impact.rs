@@ -1,0 +1,201 @@
+//! Bodies that hit each other, by velocity Verlet: the closed form of two particles, momentum, energy, Newton's cradle.
+
+use crate::bodies::{Body, MODULUS, Slit, hold};
+use crate::dynamics::DENSITY;
+use peri::Error;
+use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
+use peri::contact::{Contact, STIFFNESS};
+use peri::potential::Law;
+use peri::solver::{Loads, State, System, VelocityVerlet};
+use std::f64::consts::PI;
+
+/// Linear bonds, contact of stiffness κ.
+fn run(
+    solver: &VelocityVerlet,
+    bonds: &mut dyn Bonds<2>,
+    loads: &Loads<2>,
+    kappa: f64,
+    state: &mut State<2>,
+) -> Result<(), Error> {
+    let law = Law::Pmb.build(1.0, 1.0, false).unwrap();
+    let contact = Contact::new(bonds, MODULUS, kappa)?;
+    let mut system = System::new(bonds, &*law, MODULUS, loads, &[]);
+    system.contact = Some(contact);
+    solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
+}
+
+/// Two particles without a bond: while they touch, their distance swings with ω² = κ(c/δ)(V₁ + V₂)/ρ about d for half a
+/// period. Then each has 2v_m − v, v_m the velocity of their centre.
+#[test]
+fn two_particles_rebound() {
+    let (volumes, horizon) = ([1.0, 0.64], 1.5);
+    let points = [[0.0, 0.0], [2.0, 0.0]];
+    let stiffness = STIFFNESS * 6.0 * MODULUS / horizon;
+    let omega = (stiffness * (volumes[0] + volumes[1]) / DENSITY).sqrt();
+    let before = [0.3, -0.9];
+    let centre = (before[0] * volumes[0] + before[1] * volumes[1]) / (volumes[0] + volumes[1]);
+    let mut errors = Vec::new();
+    // half a step more: where a whole number of steps fits into the contact, its two ends cancel
+    for steps in [16.5, 32.5, 64.5, 128.5] {
+        let step = PI / omega / steps;
+        let mut sum = 0.0;
+        // the error depends on where in a step they meet
+        for phase in 0..8 {
+            let mut cloud =
+                CloudBonds::new(&points, &volumes, 1.0, horizon, VolumeCorrection::None, &[]).unwrap();
+            let slots = [0, 1].map(|p| cloud.input_order().iter().position(|&i| i == p).unwrap());
+            let mut state = State::new(cloud.slots());
+            for (slot, v) in slots.into_iter().zip(before) {
+                state.velocity.set(slot, [v, 0.0]);
+            }
+            let shift = 1.2 * step * f64::from(phase) / 8.0;
+            state.displacement.set(slots[0], [0.3 - shift, 0.0]);
+            let solver = VelocityVerlet {
+                time_step: Some(step),
+                records: 1,
+                ..VelocityVerlet::new(DENSITY, 1.0 + 2.0 * PI / omega)
+            };
+            run(&solver, &mut cloud, &Loads::default(), STIFFNESS, &mut state).unwrap();
+            let after = slots.map(|slot| state.velocity.get(slot)[0]);
+            let momentum = |v: [f64; 2]| v[0] * volumes[0] + v[1] * volumes[1];
+            // rounding of some thousand steps
+            assert!((momentum(after) - momentum(before)).abs() < 1e-13, "{after:?}");
+            let last = state.history.last().unwrap();
+            assert_eq!(last.contact.unwrap().pairs, 0, "they have parted");
+            // the trajectory is symmetric in time but for the phases at which it enters and leaves
+            let exact = before.map(|v| 2.0 * centre - v);
+            sum += (after[0] - exact[0]).powi(2) + (after[1] - exact[1]).powi(2);
+        }
+        errors.push((sum / 8.0).sqrt());
+    }
+    for pair in errors.windows(2) {
+        let order = (pair[0] / pair[1]).log2();
+        eprintln!("rebound: error {:.1e} m/s of 1.2, order {order:.2}", pair[1]);
+        // a force with a kink, met anywhere within a step
+        assert!((order - 2.0).abs() < 0.4, "{errors:?}");
+    }
+    assert!(errors[3] < 1e-3 * 1.2, "{errors:?}");
+}
+
+/// What bars of `bars` particles in a row do to each other: the velocities of their centres over that of the first, and
+/// the state. Horizon Δ, so that each bar is a chain of springs 6kθV²/Δ; it hits the next at a hundredth of its wave speed.
+fn cradle(bars: usize, particles: usize, safety: f64, kappa: f64) -> (Vec<f64>, State<2>) {
+    let count = bars * particles;
+    let mut body = Body::<2>::solid([1, count], 1.0, 1.015);
+    body.slits = (1..bars).map(|k| Slit { at: (k * particles) as f64, from: -1.0, to: 2.0 }).collect();
+    let mut built = body.build();
+    let bonds = &mut built.lattice;
+    let loads = hold(bonds, |_| Some((1, [0.0; 2])));
+    let speed = (6.0 * MODULUS / DENSITY).sqrt();
+    let first = 0.01 * speed;
+    let mut state = State::new(bonds.slots());
+    let bar = |bonds: &dyn Bonds<2>, slot: u32| bonds.position(slot as usize)[1] as usize / particles;
+    for &slot in bonds.particles() {
+        if bar(bonds, slot) == 0 {
+            state.velocity.set(slot as usize, [0.0, first]);
+        }
+    }
+    // to close the gaps, and for a wave to go up and down each bar
+    let end = (bars - 1) as f64 * 0.1 / first + (2 * particles * bars) as f64 / speed;
+    let solver = VelocityVerlet { safety, records: 200, ..VelocityVerlet::new(DENSITY, end) };
+    run(&solver, bonds, &loads, kappa, &mut state).unwrap();
+    let mut centres = vec![0.0; bars];
+    for &slot in bonds.particles() {
+        centres[bar(bonds, slot)] += state.velocity.get(slot as usize)[1] / (particles as f64 * first);
+    }
+    (centres, state)
+}
+
+fn energy_error(state: &State<2>) -> f64 {
+    let off = |row: &peri::solver::Record| ((row.kinetic + row.stored) / row.work - 1.0).abs();
+    state.history.iter().map(off).fold(0.0, f64::max)
+}
+
+/// Equal elastic bars exchange their velocities. Not all of it in chains of particles, whose waves disperse: what is left
+/// swinging falls with the number of particles. Momentum stays to rounding, energy to O(Δt²).
+#[test]
+fn newtons_cradle() {
+    let mut left = Vec::new();
+    for particles in [10, 40, 160] {
+        let (velocities, state) = cradle(2, particles, 0.5, STIFFNESS);
+        let momentum: f64 = velocities.iter().sum();
+        eprintln!(
+            "two bars of {particles}: {velocities:.4?}, momentum {:.1e}, energy {:.1e}, {} steps",
+            momentum - 1.0,
+            energy_error(&state),
+            state.total_iterations
+        );
+        // rounding of thousands of steps
+        assert!((momentum - 1.0).abs() < 1e-12);
+        assert_eq!(state.history.last().unwrap().contact.unwrap().pairs, 0, "they have parted");
+        left.push(velocities[0].abs());
+    }
+    assert!(left[2] < 0.02 && left[2] < 0.7 * left[1] && left[1] < 0.7 * left[0], "{left:?}");
+    let (velocities, _) = cradle(3, 40, 0.5, STIFFNESS);
+    eprintln!("three bars of 40: {velocities:.4?}");
+    assert!((velocities.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    assert!(velocities[2] > 0.9 && velocities[..2].iter().all(|v| v.abs() < 0.1), "{velocities:?}");
+}
+
+/// Two halves of a sheet that collide askew, on any number of threads, and from a state saved while they touch.
+#[test]
+fn neither_threads_nor_restarts_change_a_bit() {
+    let mut body = Body::<2>::solid([66, 66], 1.0, 3.015);
+    body.slits = vec![Slit { at: 33.0, from: -1.0, to: 67.0 }];
+    let run = |threads: usize, from: Option<State<2>>| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut built = body.build();
+            let bonds = &mut built.lattice;
+            let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+            let contact = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
+            let mut state = from.unwrap_or_else(|| {
+                let mut state = State::new(bonds.slots());
+                for &slot in bonds.particles() {
+                    if bonds.position(slot as usize)[1] > 33.0 {
+                        state.velocity.set(slot as usize, [1.0, -2.0]);
+                    }
+                }
+                state
+            });
+            let loads = Loads::default();
+            let mut system = System::new(bonds, &*law, MODULUS, &loads, &[]);
+            system.contact = Some(contact);
+            let solver = VelocityVerlet { records: 4, ..VelocityVerlet::new(DENSITY, 2.0) };
+            let mut saved = None;
+            let mut watch = |_: &peri::solver::Status, state: &State<2>| {
+                if state.motion.time > 1.0 && saved.is_none() {
+                    saved = Some(state.clone());
+                }
+                Ok(())
+            };
+            solver.solve(&mut system, &mut state, &mut watch, &mut |_, _| Ok(())).unwrap();
+            (state, saved.unwrap())
+        })
+    };
+    let (one, saved) = run(1, None);
+    eprintln!("askew: {:?}, {} steps", one.history[1].contact, one.total_iterations);
+    assert!(one.displacement.slots() > peri::field::CHUNK && one.history[1].contact.unwrap().pairs > 20);
+    // == of all fields and histories: no −0 and no NaN are here
+    assert!(run(3, None).0 == one && run(2, Some(saved)).0 == one);
+}
+
+/// Energy through an impact, over the time step: second order, from steps at the stability limit of the stiffest contact.
+#[test]
+fn energy_through_an_impact() {
+    for kappa in [STIFFNESS, 1e4] {
+        let errors: Vec<f64> = [0.4, 0.2, 0.1]
+            .map(|safety| {
+                let (_, state) = cradle(2, 20, safety, kappa);
+                let motion = state.motion;
+                // twice the stiffest pair's
+                let contact = 2.0 * kappa * 6.0 * MODULUS / 1.015 / DENSITY;
+                assert!(motion.covered_step < 2.0 / contact.sqrt(), "{motion:?}");
+                energy_error(&state)
+            })
+            .to_vec();
+        eprintln!("impact, κ = {kappa}: {errors:?}");
+        let order = (errors[0] / errors[2]).log2() / 2.0;
+        assert!(errors[2] < 1e-3 && (order - 2.0).abs() < 0.4, "κ = {kappa}: {errors:?}, order {order}");
+    }
+}
