@@ -67,6 +67,7 @@ fn killed_at_random_times() {
 fn killed_while_it_breaks() {
     survives_kills(&scenes::fracture("2 mm", ""));
     survives_kills(&scenes::fracture("2 mm", "method = \"lbfgs\""));
+    survives_kills(&scenes::fracture("2 mm", "[contact]"));
 }
 
 fn survives_kills(scene: &str) {
