@@ -37,8 +37,7 @@ fn cracked_bar_in_three_dimensions() {
 /// A sheet torn apart, its bonds looked at in equilibrium or in every iteration, with contact or without.
 #[test]
 fn fracture() {
-    let contact = "breaking = \"each-iteration\"\n[contact]";
-    for solver in ["", "breaking = \"each-iteration\"", "method = \"lbfgs\"", contact] {
+    for solver in ["", "breaking = \"each-iteration\"\n[contact]", "method = \"lbfgs\""] {
         let directory = tempfile::tempdir().unwrap();
         let here = directory.path();
         fs::write(here.join("scene.toml"), scenes::fracture("4 mm", solver)).unwrap();
