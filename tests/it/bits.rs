@@ -34,10 +34,10 @@ fn cracked_bar_in_three_dimensions() {
     assert_eq!((&work["particles"], &work["steps"]), (&320.into(), &3.into()));
 }
 
-/// A sheet torn apart, its bonds looked at in equilibrium or in every iteration.
+/// A sheet torn apart, its bonds looked at in equilibrium or in every iteration, with contact or without.
 #[test]
 fn fracture() {
-    for solver in ["", "breaking = \"each-iteration\"", "method = \"lbfgs\""] {
+    for solver in ["", "breaking = \"each-iteration\"\n[contact]", "method = \"lbfgs\""] {
         let directory = tempfile::tempdir().unwrap();
         let here = directory.path();
         fs::write(here.join("scene.toml"), scenes::fracture("4 mm", solver)).unwrap();

@@ -65,7 +65,7 @@ fn killed_at_random_times() {
 /// Broken bonds, histories and the fields of stages come back with the rest.
 #[test]
 fn killed_while_it_breaks() {
-    survives_kills(&scenes::fracture("2 mm", ""));
+    survives_kills(&scenes::fracture("2 mm", "[contact]"));
     survives_kills(&scenes::fracture("2 mm", "method = \"lbfgs\""));
 }
 

@@ -1,0 +1,224 @@
+//! Which particles without a bond are near each other, and how near.
+
+use crate::bonds::{Bonds, CellGrid};
+use crate::field::{CHUNK, Field, chunk_range};
+use rayon::prelude::*;
+
+/// Largest contact distance over the reference distance, and over the sum of the radii.
+const OF_REFERENCE: f64 = 0.9;
+const OF_RADII: f64 = 1.35;
+/// Skin of the list, in spacings.
+const SKIN: f64 = 0.5;
+/// Farther than this many cells from the origin, particles are looked for in one place.
+const FAR: f64 = (1_u64 << 38) as f64;
+
+/// Pairs of particles without a bond that are nearer than their contact distance, a gap and a skin.
+pub struct List<const D: usize> {
+    /// Particles' radii, m; empty where all are `largest`.
+    radii: Vec<f64>,
+    largest: f64,
+    gap: f64,
+    skin: f64,
+    /// Displacement at which the list was made.
+    listed_at: Field<D>,
+    /// Particles with candidates, ascending, and where each one's end.
+    listed: Vec<Listed>,
+    candidates: Vec<Candidate<D>>,
+    /// Particles without bonds, ascending.
+    pub alone: Vec<u32>,
+    /// How often it was made.
+    pub rebuilds: u64,
+}
+
+/// A particle that others are near to.
+pub struct Listed {
+    pub slot: u32,
+    /// Ends of its candidates, of which the first begin where those of the particle before it end.
+    end: usize,
+    pub volume: f64,
+    /// Whether it has no bonds.
+    pub alone: bool,
+}
+
+/// A particle near another, seen from there.
+#[derive(Clone, Copy)]
+pub struct Candidate<const D: usize> {
+    pub slot: u32,
+    /// ξ, m.
+    bond: [f64; D],
+    /// d, m.
+    pub distance: f64,
+    pub volume: f64,
+}
+
+impl<const D: usize> List<D> {
+    /// Of the undeformed body.
+    pub fn new(bonds: &dyn Bonds<D>, gap: f64) -> Self {
+        let volumes: Vec<f64> = bonds.particles().iter().map(|&slot| bonds.volume(slot as usize)).collect();
+        let mean = volumes.iter().sum::<f64>() / volumes.len() as f64;
+        let alike = volumes.iter().all(|&volume| volume == volumes[0]);
+        let radius = |volume: f64| 0.5 * bonds.spacing() * (volume / mean).powf(1.0 / D as f64);
+        let (mut radii, mut largest) = (Vec::new(), 0.5 * bonds.spacing());
+        if !alike {
+            radii = vec![0.0; bonds.slots()];
+            bonds.particles().iter().zip(volumes).for_each(|(&slot, v)| radii[slot as usize] = radius(v));
+            largest = radii.iter().copied().fold(0.0, f64::max);
+        }
+        let mut list = Self {
+            radii,
+            largest,
+            gap,
+            skin: SKIN * bonds.spacing(),
+            listed_at: Field::zeros(0),
+            listed: Vec::new(),
+            candidates: Vec::new(),
+            alone: Vec::new(),
+            rebuilds: 0,
+        };
+        list.rebuild(bonds, &Field::zeros(bonds.slots()));
+        list
+    }
+
+    /// Sets the skin, m; the list is made at the next update.
+    pub fn set_skin(&mut self, skin: f64) {
+        self.skin = skin.max(0.0).min(FAR * self.largest);
+        self.listed_at = Field::zeros(0);
+    }
+
+    /// Makes the list anew where a particle has moved by half of the skin since it was made.
+    pub fn update(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
+        // a little less, for rounding
+        let limit = (0.49 * self.skin).powi(2);
+        let (now, then) = (displacement.components(), self.listed_at.components());
+        let slots = bonds.slots();
+        let moved = |chunk: usize| {
+            let range = chunk_range(chunk, slots);
+            let mut square = [0.0; CHUNK];
+            for d in 0..D {
+                let parts = now[d][range.clone()].iter().zip(&then[d][range.clone()]);
+                square.iter_mut().zip(parts).for_each(|(s, (a, b))| *s += (a - b) * (a - b));
+            }
+            // NaN has moved, too
+            !square[..range.len()].iter().all(|&s| s <= limit)
+        };
+        let stale = self.skin == 0.0 || self.listed_at.slots() != slots;
+        if stale || (0..slots.div_ceil(CHUNK)).into_par_iter().any(moved) {
+            self.rebuild(bonds, displacement);
+        }
+    }
+
+    /// Makes the list for a displacement; to be called where bonds have changed.
+    pub fn rebuild(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
+        let particles = bonds.particles();
+        let reach = self.gap + self.skin;
+        let edge = 2.0 * OF_RADII * self.largest + reach;
+        let far = FAR * edge;
+        let place = |&slot: &u32| {
+            let (position, moved) = (bonds.position(slot as usize), displacement.get(slot as usize));
+            std::array::from_fn(|d| (position[d] + moved[d]).clamp(-far, far))
+        };
+        let places: Vec<[f64; D]> = particles.par_iter().map(place).collect();
+        let grid = CellGrid::with_edge(&places, edge);
+        let near = |own: usize, found: &mut Vec<u32>| {
+            found.clear();
+            let slot = particles[own] as usize;
+            let radius = OF_RADII * (self.radius(slot) + self.largest) + reach;
+            // a little more: far from the origin places are rounded to 2⁻¹⁴ of an edge
+            grid.near(places[own], radius + 1e-3 * edge, |other| {
+                if other != own {
+                    found.push(particles[other]);
+                }
+            });
+            found.sort_unstable();
+        };
+        let of = |part: usize| {
+            let (mut listed, mut candidates, mut found) = (Vec::new(), Vec::new(), Vec::new());
+            for own in chunk_range(part, particles.len()) {
+                let slot = particles[own] as usize;
+                near(own, &mut found);
+                let before = candidates.len();
+                for &other in &found {
+                    let candidate = self.candidate(bonds, slot, other as usize);
+                    let (_, r) = candidate.apart(displacement, slot);
+                    if r < candidate.distance + reach && !bonds.is_bonded(slot, other as usize) {
+                        candidates.push(candidate);
+                    }
+                }
+                if candidates.len() > before {
+                    let (volume, alone) = (bonds.volume(slot), bonds.is_alone(slot));
+                    listed.push(Listed { slot: slot as u32, end: candidates.len(), volume, alone });
+                }
+            }
+            (listed, candidates)
+        };
+        let parts: Vec<(Vec<Listed>, Vec<Candidate<D>>)> =
+            (0..particles.len().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        self.listed.clear();
+        self.candidates.clear();
+        for (listed, candidates) in parts {
+            let before = self.candidates.len();
+            self.listed.extend(listed.into_iter().map(|own| Listed { end: before + own.end, ..own }));
+            self.candidates.extend(candidates);
+        }
+        self.alone = particles.iter().copied().filter(|&slot| bonds.is_alone(slot as usize)).collect();
+        self.listed_at.clone_from(displacement);
+        self.rebuilds += 1;
+    }
+
+    fn radius(&self, slot: usize) -> f64 {
+        self.radii.get(slot).copied().unwrap_or(self.largest)
+    }
+
+    fn candidate(&self, bonds: &dyn Bonds<D>, slot: usize, other: usize) -> Candidate<D> {
+        let (here, there) = (bonds.position(slot), bonds.position(other));
+        let bond: [f64; D] = std::array::from_fn(|d| there[d] - here[d]);
+        let distance =
+            (OF_REFERENCE * length(&bond)).min(OF_RADII * (self.radius(slot) + self.radius(other)));
+        Candidate { slot: other as u32, bond, distance, volume: bonds.volume(other) }
+    }
+
+    /// The particles of a work item that have candidates, with them.
+    pub fn in_chunk(&self, chunk: usize) -> impl Iterator<Item = (&Listed, &[Candidate<D>])> {
+        let at = |chunk: usize| self.listed.partition_point(|own| (own.slot as usize) < chunk * CHUNK);
+        (at(chunk)..at(chunk + 1)).map(|k| {
+            let start = k.checked_sub(1).map_or(0, |before| self.listed[before].end);
+            (&self.listed[k], &self.candidates[start..self.listed[k].end])
+        })
+    }
+}
+
+/// A pair in contact, seen from one side.
+pub struct Touch<const D: usize> {
+    /// ζ/r.
+    pub direction: [f64; D],
+    /// d − r > 0, m.
+    pub overlap: f64,
+    /// V_J, m³.
+    pub volume: f64,
+}
+
+impl<const D: usize> Candidate<D> {
+    /// ζ and r; both have the same bits from either side, but for the sign of ζ.
+    pub fn apart(&self, displacement: &Field<D>, own: usize) -> ([f64; D], f64) {
+        let (here, there) = (displacement.get(own), displacement.get(self.slot as usize));
+        let zeta = std::array::from_fn(|d| self.bond[d] + (there[d] - here[d]));
+        (zeta, length(&zeta))
+    }
+
+    /// Where it touches.
+    pub fn touch(&self, displacement: &Field<D>, own: usize) -> Option<Touch<D>> {
+        let (zeta, r) = self.apart(displacement, own);
+        if r < self.distance {
+            let (along, size) = if r > 0.0 { (zeta, r) } else { (self.bond, length(&self.bond)) };
+            let direction = along.map(|x| x / size);
+            Some(Touch { direction, overlap: self.distance - r, volume: self.volume })
+        } else {
+            None
+        }
+    }
+}
+
+/// ‖x‖.
+pub fn length<const D: usize>(vector: &[f64; D]) -> f64 {
+    vector.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
