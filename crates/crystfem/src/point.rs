@@ -5,6 +5,9 @@ use crate::error::Error;
 use crate::history::{History, Segment};
 use crate::material::{Point, ThermalMaterial};
 use nalgebra::Vector3;
+use root::root;
+
+mod root;
 
 /// What drives the temperature.
 #[derive(Clone, Debug, PartialEq)]
@@ -374,44 +377,6 @@ impl Course<'_> {
         let jump = Segment { times: [from, from], temperatures: [a, a + share * (b - a)] };
         self.step(curves, row - 1, Some(&jump), from, from, 0.0)
     }
-}
-
-/// The zero of a function that rises in the large, near `guess`: Newton's method within a bracket.
-fn root(guess: f64, mut f: impl FnMut(f64) -> Result<[f64; 2], Error>) -> Result<f64, Error> {
-    let [value, slope] = f(guess)?;
-    if value == 0.0 {
-        return Ok(guess);
-    }
-    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-    let (mut at, mut value, mut slope) = (guess, value, slope);
-    let mut reach = 1.0;
-    for _ in 0..200 {
-        if value > 0.0 {
-            high = at
-        } else {
-            low = at
-        }
-        let newton = at - value / slope;
-        // a step of Newton's that stays inside, else wider until there is a bracket, else half of it
-        let next = if slope > 0.0 && newton > low && newton < high && (newton - at).abs() < 100.0 {
-            newton
-        } else if low.is_finite() && high.is_finite() {
-            0.5 * (low + high)
-        } else {
-            reach *= 2.0;
-            if value > 0.0 { at - reach } else { at + reach }
-        };
-        if (next - at).abs() <= 4.0 * f64::EPSILON * at.abs() || next == low || next == high {
-            return Ok(next);
-        }
-        at = next;
-        [value, slope] = f(at)?;
-        if value == 0.0 {
-            return Ok(at);
-        }
-    }
-    let iteration = "the temperature of a lumped body";
-    Err(polycore::Error::NoConvergence { iteration, steps: 200, residual: value }.into())
 }
 
 #[cfg(test)]
