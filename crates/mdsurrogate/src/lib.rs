@@ -29,9 +29,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod cell;
 pub mod dataset;
 pub mod error;
 pub mod kinematics;
+pub mod md;
 pub mod random;
 
 #[cfg(feature = "cli")]

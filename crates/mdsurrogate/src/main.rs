@@ -10,6 +10,8 @@ use polycore::scene::Source;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+mod md_command;
+
 /// From molecular dynamics to a constitutive law.
 #[derive(Parser)]
 #[command(
@@ -44,6 +46,9 @@ enum Command {
         #[arg(long)]
         instantaneous: bool,
     },
+    /// Molecular dynamics with LAMMPS: plan, prepare, run, resume, collect.
+    #[command(subcommand)]
+    Md(md_command::Md),
     /// Print a shell's completion script.
     Completions {
         /// The shell.
@@ -58,6 +63,7 @@ fn main() -> ExitCode {
             data(&scene, &output, quick)
         }
         Command::Info { file, instantaneous } => info(&file, instantaneous).map_err(Failure::from),
+        Command::Md(md) => md.run().map_err(Failure::from),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "mdsurrogate", &mut std::io::stdout());
             Ok(true)
