@@ -28,13 +28,36 @@
 //! assert!((noise.deviation[0] - 3f64.sqrt() * 1e6).abs() < 1.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! A law is used without any training framework ([`surrogate`]):
+//!
+//! ```
+//! use mdsurrogate::network::Activation::Softplus;
+//! use mdsurrogate::surrogate::{Header, Kind, Surrogate, Symmetry, Workspace};
+//!
+//! // an orthotropic energy with random weights, in place of `Surrogate::read("law.safetensors")`
+//! let header = Header::new(Kind::energy(Symmetry::Orthotropic), &[(32, Softplus), (32, Softplus)], 2);
+//! let law = Surrogate::<f64>::random(header, 1)?;
+//! let mut memory = Workspace::default();
+//! let rest = law.stress(&[1.0, 1.0, 1.0, 0.0, 0.0, 0.0].into(), &mut memory)?;
+//! assert_eq!(rest.stress.norm(), 0.0);
+//!
+//! // sheared: stress, the tangent 2 ∂S/∂C, and the doubt that no training data had shear
+//! let answer = law.tangent(&[1.1, 1.0, 1.0, 0.1, 0.0, 0.0].into(), &mut memory)?;
+//! let tangent = answer.tangent.unwrap();
+//! assert!((tangent - tangent.transpose()).norm() < 1e-14 * tangent.norm());
+//! assert!(answer.flags.unseen[3]);
+//! # Ok::<(), mdsurrogate::Error>(())
+//! ```
 
 pub mod cell;
 pub mod dataset;
 pub mod error;
 pub mod kinematics;
 pub mod md;
+pub mod network;
 pub mod random;
+pub mod surrogate;
 
 #[cfg(feature = "cli")]
 pub mod run;
