@@ -5,8 +5,11 @@ use mdsurrogate::Error;
 use mdsurrogate::dataset::{Columns, ReadOptions, read};
 use mdsurrogate::run::{Failure, describe, run};
 use mdsurrogate::scene::Scene;
+use mdsurrogate::surrogate::{CSource, Surrogate};
+use polycore::output::atomic_write;
 use polycore::report::Report;
 use polycore::scene::Source;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -49,6 +52,13 @@ enum Command {
     /// Molecular dynamics with LAMMPS: plan, prepare, run, resume, collect.
     #[command(subcommand)]
     Md(md_command::Md),
+    /// Write a law (safetensors) as C source and header.
+    Export {
+        /// The law.
+        law: PathBuf,
+        /// Where the files go; its last part is the name of the C function: out/pa12 gives out/pa12.c, out/pa12.h.
+        output: PathBuf,
+    },
     /// Print a shell's completion script.
     Completions {
         /// The shell.
@@ -64,6 +74,7 @@ fn main() -> ExitCode {
         }
         Command::Info { file, instantaneous } => info(&file, instantaneous).map_err(Failure::from),
         Command::Md(md) => md.run().map_err(Failure::from),
+        Command::Export { law, output } => export(&law, &output).map_err(Failure::from),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "mdsurrogate", &mut std::io::stdout());
             Ok(true)
@@ -112,6 +123,17 @@ fn info(file: &Path, instantaneous: bool) -> Result<bool, Error> {
     println!("without variance: {}", set.constant_components().join(", "));
     for line in &set.provenance {
         println!("{line}");
+    }
+    Ok(true)
+}
+
+fn export(law: &Path, output: &Path) -> Result<bool, Error> {
+    let name = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let CSource { header, source } = Surrogate::read(law)?.c_source(&name)?;
+    for (end, text) in [("h", header), ("c", source)] {
+        let path = output.with_file_name(format!("{name}.{end}"));
+        atomic_write(&path, |file| file.write_all(text.as_bytes()))?;
+        println!("{}", path.display());
     }
     Ok(true)
 }

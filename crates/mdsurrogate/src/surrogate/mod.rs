@@ -7,10 +7,12 @@
 //!
 //! An ensemble of members is one law: its answer is their mean, their spread a measure of doubt.
 
+mod export;
 mod file;
 mod header;
 mod symmetry;
 
+pub use export::CSource;
 pub use header::{Header, Kind};
 pub use symmetry::Symmetry;
 

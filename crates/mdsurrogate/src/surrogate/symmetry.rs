@@ -10,7 +10,7 @@ use polycore::tensor::{Tensor, Voigt6x6, voigt};
 use serde::{Deserialize, Serialize};
 
 /// A monomial: coefficient, and the components that are multiplied.
-type Monomial = (f64, &'static [usize]);
+type Monomial<'a> = (f64, &'a [usize]);
 
 /// A symmetry of the crystal, the third of the material axes being the special one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -36,10 +36,10 @@ const D: usize = 3; // 12
 const E: usize = 4; // 13
 const F: usize = 5; // 23
 
-const FIRST: &[Monomial] = &[(1.0, &[A]), (1.0, &[B]), (1.0, &[C])];
-const SECOND: &[Monomial] =
+const FIRST: &[Monomial<'static>] = &[(1.0, &[A]), (1.0, &[B]), (1.0, &[C])];
+const SECOND: &[Monomial<'static>] =
     &[(1.0, &[A, B]), (1.0, &[A, C]), (1.0, &[B, C]), (-1.0, &[D, D]), (-1.0, &[E, E]), (-1.0, &[F, F])];
-const THIRD: &[Monomial] =
+const THIRD: &[Monomial<'static>] =
     &[(1.0, &[A, B, C]), (2.0, &[D, E, F]), (-1.0, &[A, F, F]), (-1.0, &[B, E, E]), (-1.0, &[C, D, D])];
 
 impl Symmetry {
@@ -48,7 +48,7 @@ impl Symmetry {
         [Self::Triclinic, Self::Monoclinic, Self::Orthotropic, Self::Transverse, Self::Isotropic];
 
     /// The invariants: of isotropy I₁, I₂, I₃ (1.7)–(1.9), of transverse isotropy also a·Ca and a·C²a.
-    pub fn invariants(self) -> &'static [&'static [Monomial]] {
+    pub(crate) fn invariants(self) -> &'static [&'static [Monomial<'static>]] {
         match self {
             Self::Triclinic => &[
                 &[(1.0, &[A])],
@@ -115,7 +115,7 @@ impl Symmetry {
     }
 }
 
-fn polynomial<T: Real>(monomials: &[Monomial], c: &[T; 6]) -> T {
+fn polynomial<T: Real>(monomials: &[Monomial<'_>], c: &[T; 6]) -> T {
     let mut sum = T::ZERO;
     for (coefficient, factors) in monomials {
         sum += T::from_f64(*coefficient) * product(factors, c, usize::MAX, usize::MAX);
@@ -148,4 +148,24 @@ pub(super) fn into_material_axes(axes: &[[f64; 3]; 3]) -> Result<Voigt6x6, Error
         let allowed = "three orthonormal, right-handed rows";
         Err(Error::parameter("material axes", format!("{axes:?}"), allowed))
     }
+}
+
+/// The terms of a polynomial, or of its derivative by the components `by`, as C expressions in `c[…]`.
+pub(super) fn terms(monomials: &[Monomial<'_>], by: &[usize]) -> Vec<String> {
+    let Some((&a, rest)) = by.split_first() else {
+        let text = |(coefficient, factors): &Monomial<'_>| {
+            let product: String = factors.iter().map(|a| format!(" * c[{a}]")).collect();
+            format!("({coefficient:e}){product}")
+        };
+        return monomials.iter().map(text).collect();
+    };
+    let mut all = Vec::new();
+    for (coefficient, factors) in monomials {
+        for place in (0..factors.len()).filter(|&place| factors[place] == a) {
+            let mut left = factors.to_vec();
+            left.remove(place);
+            all.extend(terms(&[(*coefficient, &left)], rest));
+        }
+    }
+    all
 }
