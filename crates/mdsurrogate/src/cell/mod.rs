@@ -1,0 +1,351 @@
+//! The γ crystal of polyamide 12, built from the lattice of Table 3.1.
+//!
+//! Table 3.1: a = 4.79 Å, b = 31.90 Å (chain axis), c = 9.58 Å, β = 120°, P2₁/c. The cell holds four monomer units,
+//! that is **two** chains (148 atoms, 1.034 g/cm³), not the four chains of the text (formulation.md, chapter 3). As
+//! c = 2a and β = 120°, a and a + c are orthogonal: 4.79 × 8.297 × 31.90 Å along x, y and z hold the same atoms.
+//!
+//! The chain has standard bond lengths and angles and all torsions trans but the two beside the amide, which are
+//! solved so that one monomer follows from the other by the 2₁ screw: half a turn and a rise of b/2. Its neighbour is
+//! its inversion through a point half-way along x and y: parallel chains form hydrogen-bonded rows along x, the next
+//! row along y runs the other way.
+
+use crate::Error;
+use nalgebra::Vector3;
+
+mod chain;
+
+pub use chain::amide_torsions;
+use chain::placed_monomer;
+
+type Vec3 = Vector3<f64>;
+
+/// Lattice of Table 3.1, Å.
+pub const LATTICE: Lattice = Lattice { a: 4.79, b: 31.90, c: 9.58, beta: 120.0 };
+
+/// Grams in an atomic mass unit times Å⁻³ in cm⁻³ (CODATA 2018: 1.66053906660e-24 g).
+const DALTON_PER_CUBIC_ANGSTROM: f64 = 1.660_539_066_60;
+
+/// Atoms of one monomer: N H, eleven CH₂, C O.
+pub const ATOMS_OF_MONOMER: usize = 37;
+
+/// A monoclinic lattice, Å and degrees; b is the unique axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lattice {
+    /// |a|.
+    pub a: f64,
+    /// |b|, along the chains.
+    pub b: f64,
+    /// |c|.
+    pub c: f64,
+    /// Angle between a and c, degrees.
+    pub beta: f64,
+}
+
+impl Lattice {
+    /// Edges of the orthogonal cell of the same volume: |a|, the part of c across a, |b|.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] unless a and a + c are orthogonal (to 1e-9 of a²): only then is there such a cell.
+    pub fn orthogonal(&self) -> Result<[f64; 3], Error> {
+        let beta = self.beta.to_radians();
+        let product = self.a * self.a + self.a * self.c * beta.cos();
+        if product.is_nan() || product.abs() > 1e-9 * self.a * self.a {
+            let found = format!("a·(a + c) = {product} Å²");
+            return Err(Error::parameter("lattice", found, "0, as c = 2a and β = 120° give"));
+        }
+        Ok([self.a, self.c * beta.sin(), self.b])
+    }
+}
+
+/// The four elements of polyamide, in the order of their LAMMPS types from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Element {
+    /// Type 1.
+    C,
+    /// Type 2.
+    H,
+    /// Type 3.
+    O,
+    /// Type 4.
+    N,
+}
+
+impl Element {
+    /// All, by type.
+    pub const ALL: [Self; 4] = [Self::C, Self::H, Self::O, Self::N];
+
+    /// Standard atomic mass, g/mol.
+    pub fn mass(self) -> f64 {
+        [12.011, 1.008, 15.999, 14.007][self as usize]
+    }
+
+    /// Covalent radius, Å (Cordero et al. 2008, <https://doi.org/10.1039/b801115j>).
+    pub fn covalent_radius(self) -> f64 {
+        [0.76, 0.31, 0.66, 0.71][self as usize]
+    }
+}
+
+/// A periodic orthogonal box of atoms, Å.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Crystal {
+    /// Edges along x, y, z.
+    pub lengths: [f64; 3],
+    /// Elements and positions, wrapped into the box.
+    pub atoms: Vec<(Element, [f64; 3])>,
+}
+
+/// What can be chosen about the packing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Packing {
+    /// Rotation of the chains about their axis from N–H along x, degrees.
+    pub setting: f64,
+    /// Shift of the second chain along z from amides at the same level, Å (0 has the least energy at 0 K of a
+    /// ten-point scan with the Mattsson force field).
+    pub shift: f64,
+}
+
+impl Crystal {
+    /// One cell: 148 atoms of two chains with two monomers each.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a lattice without orthogonal cell or a rise b/2 that the chain cannot reach.
+    pub fn unit_cell(lattice: &Lattice, packing: Packing) -> Result<Self, Error> {
+        let lengths = lattice.orthogonal()?;
+        let rise = lattice.b / 2.0;
+        let monomer = placed_monomer(rise, packing.setting)?;
+        let turn = |p: &Vec3| Vec3::new(-p.x, -p.y, p.z + rise);
+        let mut atoms = Vec::with_capacity(4 * ATOMS_OF_MONOMER);
+        let centre = Vec3::new(lengths[0] / 2.0, lengths[1] / 2.0, packing.shift);
+        for inverted in [false, true] {
+            for second in [false, true] {
+                for (element, position) in &monomer {
+                    let p = if second { turn(position) } else { *position };
+                    let p = if inverted { centre - p } else { p };
+                    atoms.push((*element, wrap(p, lengths)));
+                }
+            }
+        }
+        Ok(Self { lengths, atoms })
+    }
+
+    /// A supercell of `n` cells along x, y, z; the thesis' 8 × 4 × 2 has 9,472 atoms.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for no cell or more than 10⁷ atoms.
+    pub fn replicate(&self, n: [usize; 3]) -> Result<Self, Error> {
+        let cells = n.iter().try_fold(1usize, |product, &n| product.checked_mul(n));
+        let atoms = cells.and_then(|cells| cells.checked_mul(self.atoms.len()));
+        let Some(atoms) = atoms.filter(|&atoms| atoms > 0 && atoms <= 10_000_000) else {
+            return Err(Error::parameter("cells", format!("{n:?}"), "at least 1 each, up to 10⁷ atoms"));
+        };
+        let mut copy = Vec::with_capacity(atoms);
+        for (i, j, k) in cells_of(n) {
+            let shift = [i, j, k].map(|i| i as f64);
+            copy.extend(self.atoms.iter().map(|(element, p)| {
+                (*element, [0, 1, 2].map(|axis| p[axis] + shift[axis] * self.lengths[axis]))
+            }));
+        }
+        Ok(Self { lengths: [0, 1, 2].map(|axis| self.lengths[axis] * n[axis] as f64), atoms: copy })
+    }
+
+    /// Mass over volume, g/cm³.
+    pub fn density(&self) -> f64 {
+        let mass: f64 = self.atoms.iter().map(|(element, _)| element.mass()).sum();
+        mass * DALTON_PER_CUBIC_ANGSTROM / self.lengths.iter().product::<f64>()
+    }
+
+    /// All bonds: pairs nearer than 1.2 times the sum of their covalent radii, with the vector from the first to the
+    /// second. Every pair with its 27 nearest images, so for unit cells.
+    pub fn bonds(&self) -> Vec<(usize, usize, Vec3)> {
+        let mut bonds = Vec::new();
+        for (i, (first, p)) in self.atoms.iter().enumerate() {
+            for (j, (second, q)) in self.atoms.iter().enumerate().skip(i) {
+                let reach = 1.2 * (first.covalent_radius() + second.covalent_radius());
+                for (a, b, c) in cells_of([3; 3]) {
+                    let image = [a, b, c].map(|n| n as f64 - 1.0);
+                    let d = [0, 1, 2].map(|axis| q[axis] - p[axis] + image[axis] * self.lengths[axis]);
+                    let d = Vec3::from(d);
+                    if d.norm() < reach && (i != j) {
+                        bonds.push((i, j, d));
+                    }
+                }
+            }
+        }
+        bonds
+    }
+
+    /// The text of a LAMMPS data file, `atom_style charge`, all charges 0 (QEq sets them).
+    pub fn lammps_data(&self, comment: &str) -> String {
+        use std::fmt::Write;
+        let mut text =
+            format!("{}\n\n{} atoms\n4 atom types\n\n", comment.replace('\n', " "), self.atoms.len());
+        for (length, axis) in self.lengths.iter().zip(["x", "y", "z"]) {
+            let _ = writeln!(text, "0.0 {length:.10} {axis}lo {axis}hi");
+        }
+        text.push_str("\nMasses\n\n");
+        for element in Element::ALL {
+            let _ = writeln!(text, "{} {}", element as usize + 1, element.mass());
+        }
+        text.push_str("\nAtoms # charge\n\n");
+        for (index, (element, [x, y, z])) in self.atoms.iter().enumerate() {
+            let kind = *element as usize + 1;
+            let _ = writeln!(text, "{} {kind} 0.0 {x:.8} {y:.8} {z:.8}", index + 1);
+        }
+        text
+    }
+}
+
+fn cells_of(n: [usize; 3]) -> impl Iterator<Item = (usize, usize, usize)> {
+    (0..n[0]).flat_map(move |i| (0..n[1]).flat_map(move |j| (0..n[2]).map(move |k| (i, j, k))))
+}
+
+fn wrap(p: Vec3, lengths: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| {
+        let inside = p[axis].rem_euclid(lengths[axis]);
+        // a negative rounding error wraps to the upper edge itself
+        if inside >= lengths[axis] { 0.0 } else { inside }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::chain::{backbone, screw};
+    use super::*;
+    use std::collections::BTreeMap;
+
+    fn cell() -> Crystal {
+        Crystal::unit_cell(&LATTICE, Packing::default()).unwrap()
+    }
+
+    /// formulation.md, chapter 3: 148 atoms, 1.034 g/cm³, 4.79 × 8.297 × 31.90 Å; 8 × 4 × 2 cells are 9,472 atoms.
+    #[test]
+    fn density_and_size() {
+        let cell = cell();
+        assert_eq!(cell.atoms.len(), 148);
+        assert!((cell.density() - 1.034).abs() < 5e-4, "{}", cell.density());
+        assert!((cell.lengths[1] - 8.297).abs() < 5e-4);
+        let whole = cell.replicate([8, 4, 2]).unwrap();
+        assert_eq!(whole.atoms.len(), 9472);
+        // §3.2: 38.3 × 33.2 × 63.8 Å
+        for (length, expected) in whole.lengths.iter().zip([38.3, 33.2, 63.8]) {
+            assert!((length - expected).abs() < 0.05);
+        }
+        assert!((whole.density() / cell.density() - 1.0).abs() < 1e-12);
+    }
+
+    /// PROVENANCE.md: torsions 116° and −112° beside the amide (or their mirror image).
+    #[test]
+    fn torsions_are_those_of_provenance() {
+        let [first, second] = amide_torsions(15.95).unwrap();
+        assert!((first.abs() - 116.0).abs() < 1.0 && (second.abs() - 112.0).abs() < 1.0, "{first} {second}");
+        assert!(first * second < 0.0);
+        let screw = screw(&backbone([first, second]));
+        assert!((screw.rise - 15.95).abs() < 1e-9 && screw.cosine < -1.0 + 1e-12);
+        for rise in [20.0, f64::NAN, 0.0, -1.0] {
+            assert!(amide_torsions(rise).is_err(), "{rise}");
+        }
+    }
+
+    /// Every C has 4 neighbours (3 in C=O), N 3, O and H 1, and lengths and angles are those put in, also across the
+    /// screw and the periodic boundary, which nothing but the solution of the torsions ensures.
+    #[test]
+    fn bonds_and_angles() {
+        let cell = cell();
+        let bonds = cell.bonds();
+        assert_eq!(bonds.len(), 148);
+        let mut of_atom = vec![Vec::new(); 148];
+        let mut kinds: BTreeMap<(Element, Element), Vec<f64>> = BTreeMap::new();
+        for (i, j, d) in &bonds {
+            of_atom[*i].push(*d);
+            of_atom[*j].push(-d);
+            let (a, b) = (cell.atoms[*i].0, cell.atoms[*j].0);
+            kinds.entry((a.min(b), a.max(b))).or_default().push(d.norm());
+        }
+        let counts: Vec<(Element, usize)> =
+            cell.atoms.iter().zip(&of_atom).map(|((e, _), n)| (*e, n.len())).collect();
+        for (element, allowed) in [(Element::H, 1), (Element::O, 1), (Element::N, 3)] {
+            assert!(counts.iter().filter(|(e, _)| *e == element).all(|(_, n)| *n == allowed));
+        }
+        let carbons = |n| counts.iter().filter(|c| **c == (Element::C, n)).count();
+        assert_eq!((carbons(4), carbons(3)), (44, 4));
+        for (pair, lengths) in [
+            ((Element::C, Element::C), vec![1.53, 1.515]),
+            ((Element::C, Element::H), vec![1.095]),
+            ((Element::C, Element::O), vec![1.235]),
+            ((Element::C, Element::N), vec![1.335, 1.455]),
+            ((Element::H, Element::N), vec![1.010]),
+        ] {
+            for found in &kinds[&pair] {
+                assert!(lengths.iter().any(|length| (length - found).abs() < 1e-6), "{pair:?} {found}");
+            }
+        }
+        assert_eq!(kinds.len(), 5);
+        for ((element, _), bonds) in cell.atoms.iter().zip(&of_atom) {
+            for (index, a) in bonds.iter().enumerate() {
+                for b in &bonds[..index] {
+                    let angle = a.angle(b).to_degrees();
+                    let allowed = if *element == Element::C && bonds.len() == 4 {
+                        107.0..=112.6
+                    } else {
+                        115.9..=123.0
+                    };
+                    assert!(allowed.contains(&angle), "{element:?} {angle}");
+                }
+            }
+        }
+    }
+
+    /// No atoms of different chains nearer than 1.6 Å (H…O of the hydrogen bond is near 1.9 Å), and each N–H has an O
+    /// of another chain within 2.6 Å along x.
+    #[test]
+    fn hydrogen_bonds_and_contacts() {
+        let cell = cell();
+        let mut least = f64::INFINITY;
+        let mut bonded = 0;
+        let bonds = cell.bonds();
+        for (i, (first, p)) in cell.atoms.iter().enumerate() {
+            let mut holds = false;
+            for (j, (second, q)) in cell.atoms.iter().enumerate() {
+                for (a, b, c) in cells_of([3; 3]) {
+                    let image = [a, b, c].map(|n| n as f64 - 1.0);
+                    let d = Vec3::from([0, 1, 2].map(|k| q[k] - p[k] + image[k] * cell.lengths[k]));
+                    let other = !bonds.iter().any(|(m, n, v)| {
+                        ((*m, *n) == (i, j) && (v - d).norm() < 1e-9)
+                            || ((*m, *n) == (j, i) && (v + d).norm() < 1e-9)
+                    });
+                    if d.norm() > 1e-9 && other && *first != Element::H {
+                        // 1–3 neighbours of heavy atoms lie at 2.0 Å and more
+                        least = least.min(d.norm());
+                    }
+                    let amide = bonds.iter().any(|(m, n, _)| {
+                        (*n == i && cell.atoms[*m].0 == Element::N)
+                            || (*m == i && cell.atoms[*n].0 == Element::N)
+                    });
+                    holds |= *first == Element::H && amide && *second == Element::O && d.norm() < 2.6;
+                }
+            }
+            bonded += usize::from(holds);
+        }
+        assert_eq!(bonded, 4);
+        assert!(least > 1.6, "{least}");
+    }
+
+    #[test]
+    fn lammps_reads_what_is_written() {
+        let text = cell().lammps_data("γ-PA12");
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines[0], "γ-PA12");
+        assert_eq!(lines[2..4], ["148 atoms", "4 atom types"]);
+        assert!(text.contains("\n0.0 31.9000000000 zlo zhi\n") && text.contains("\n4 14.007\n"));
+        assert_eq!(text.lines().skip_while(|line| *line != "Atoms # charge").count(), 150);
+    }
+
+    #[test]
+    fn wrong_cells() {
+        let oblique = Lattice { beta: 110.0, ..LATTICE };
+        assert!(Crystal::unit_cell(&oblique, Packing::default()).is_err());
+        for n in [[0, 1, 1], [1000, 1000, 1000], [usize::MAX, 2, 2]] {
+            assert!(cell().replicate(n).is_err());
+        }
+    }
+}

@@ -1,0 +1,213 @@
+//! Data sets as HDF5, the project's own layout.
+//!
+//! Root: attributes `format` = [`FORMAT`], `skipped`; datasets `C`, `S` (N, 6), `F` (N, 9, row by row), `cauchy`
+//! (N, 6), all SI, `sample`, `path` (N, i64), `time` (N, s); group `paths`: `id`, `kind` (P, strings), `rates`
+//! (P, 3, 1/s, NaN where an axis is not pulled); `provenance` (strings). A written split adds `split` (N, u8: 0
+//! train, 1 validation, 2 test) and the standardisation of the training rows, `mean` and `deviation` (6) of group
+//! `standardisation`. Files of others need `C` and `S` only; without `path` they are one path.
+
+use super::{Dataset, Path, Row, Split, Standardisation};
+use crate::Error;
+use crate::kinematics::{cauchy_of_material, stretch_of};
+use polycore::tensor::{DeformationGradient, Tensor, Voigt};
+use rust_hdf5::{H5File, H5Group};
+
+/// The value of the attribute `format`.
+pub const FORMAT: &str = "mdsurrogate data 1";
+
+const DEFLATE_LEVEL: u32 = 4;
+const CHUNK_ROWS: usize = 4096;
+
+type Hdf5<T> = Result<T, rust_hdf5::Hdf5Error>;
+
+/// Writes a set, and its split with the standardisation of the training rows if there is one; whole or not at all.
+///
+/// # Errors
+/// [`Error::File`] or an I/O error; an existing file stays as it was then.
+pub fn write(
+    path: impl AsRef<std::path::Path>,
+    set: &Dataset,
+    split: Option<(&Split, &Standardisation)>,
+) -> Result<(), Error> {
+    let path = path.as_ref();
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let temporary = tempfile::Builder::new()
+        .prefix(".")
+        .suffix(".part")
+        .tempdir_in(folder.unwrap_or(".".as_ref()))
+        .map_err(Error::io("create a folder beside", path))?;
+    let inside = temporary.path().join("data.h5");
+    fill(&inside, set, split).map_err(|error| Error::file(path, error, "a set that can be written"))?;
+    std::fs::File::open(&inside).and_then(|file| file.sync_all()).map_err(Error::io("synchronise", path))?;
+    std::fs::rename(&inside, path).map_err(Error::io("write", path))
+}
+
+fn fill(path: &std::path::Path, set: &Dataset, split: Option<(&Split, &Standardisation)>) -> Hdf5<()> {
+    let file = H5File::create(path)?;
+    let root = file.root_group();
+    file.set_attr_string("format", FORMAT)?;
+    file.set_attr_numeric("skipped", &(set.skipped as i64))?;
+    let rows: Vec<&Row> = set.rows().collect();
+    let six = |pick: fn(&Row) -> &Voigt| -> Vec<f64> {
+        rows.iter().flat_map(|row| pick(row).iter().copied()).collect()
+    };
+    table(&root, "C", 6, &six(|row| &row.c))?;
+    table(&root, "S", 6, &six(|row| &row.s))?;
+    table(&root, "cauchy", 6, &six(|row| &row.cauchy))?;
+    // nalgebra stores columns; the transpose's columns are the rows
+    let gradients: Vec<f64> =
+        rows.iter().flat_map(|row| row.deformation.matrix().transpose().as_slice().to_vec()).collect();
+    table(&root, "F", 9, &gradients)?;
+    let integers = |name: &str, data: Vec<i64>| {
+        root.new_dataset::<i64>().shape([data.len()]).create(name)?.write_raw(&data)
+    };
+    integers("sample", rows.iter().map(|row| row.sample as i64).collect())?;
+    integers("path", set.path_of_rows().into_iter().map(|path| path as i64).collect())?;
+    let times: Vec<f64> = rows.iter().map(|row| row.time).collect();
+    root.new_dataset::<f64>().shape([times.len()]).create("time")?.write_raw(&times)?;
+    let paths = file.create_group("paths")?;
+    paths.write_vlen_strings("id", &set.paths.iter().map(|path| path.id.as_str()).collect::<Vec<_>>())?;
+    paths.write_vlen_strings("kind", &set.paths.iter().map(|path| path.kind.as_str()).collect::<Vec<_>>())?;
+    table(&paths, "rates", 3, &set.paths.iter().flat_map(|path| path.rates).collect::<Vec<_>>())?;
+    file.write_vlen_strings("provenance", &set.provenance.iter().map(String::as_str).collect::<Vec<_>>())?;
+    if let Some((split, standardisation)) = split {
+        let labels = split.labels();
+        let dataset = root.new_dataset::<u8>().shape([labels.len()]).create("split")?;
+        dataset.write_raw(&labels)?;
+        let group = file.create_group("standardisation")?;
+        for (name, data) in [("mean", &standardisation.mean), ("deviation", &standardisation.deviation)] {
+            group.new_dataset::<f64>().shape([6]).create(name)?.write_raw(data)?;
+        }
+    }
+    file.close()
+}
+
+fn table(group: &H5Group, name: &str, columns: usize, data: &[f64]) -> Hdf5<()> {
+    let rows = data.len() / columns;
+    let builder = group.new_dataset::<f64>().shape([rows, columns]);
+    let builder = builder.chunk(&[rows.clamp(1, CHUNK_ROWS), columns]).shuffle_deflate(DEFLATE_LEVEL);
+    builder.create(name)?.write_raw(data)
+}
+
+/// Reads a set.
+///
+/// # Errors
+/// [`Error::File`] for what is no HDF5 file, for missing datasets, for shapes that do not fit and for numbers that
+/// are no deformation.
+pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
+    let path = path.as_ref();
+    let size = std::fs::metadata(path).map_err(Error::io("open", path))?.len();
+    let none = |error: rust_hdf5::Hdf5Error| Error::file(path, format!("no HDF5 file ({error})"), "HDF5");
+    let file = H5File::open(path).map_err(none)?;
+    let root = file.root_group();
+    let names = root.dataset_names().map_err(none)?;
+    let fail = |found: String, allowed: &str| Error::file(path, found, allowed);
+    let numbers = |name: &str, columns: usize| -> Result<Vec<f64>, Error> {
+        if !names.iter().any(|other| other == name) {
+            let similar = crate::error::nearest(name, names.iter().map(String::as_str));
+            return Err(Error::MissingColumn { path: path.to_path_buf(), column: name.into(), similar });
+        }
+        let dataset = file.dataset(name).map_err(none)?;
+        let shape = dataset.shape();
+        if shape.len() != 2 || shape[1] != columns {
+            return Err(fail(format!("dataset `{name}` of shape {shape:?}"), &format!("(N, {columns})")));
+        }
+        let data = dataset.read_raw::<f64>().map_err(none)?;
+        match data.iter().position(|value| !value.is_finite()) {
+            Some(at) => Err(fail(
+                format!("{} in row {} of dataset `{name}`", data[at], at / columns),
+                "finite numbers",
+            )),
+            None => Ok(data),
+        }
+    };
+    let integers = |name: &str, rows: usize| -> Result<Option<Vec<i64>>, Error> {
+        if !names.iter().any(|other| other == name) {
+            return Ok(None);
+        }
+        let data = file.dataset(name).and_then(|dataset| dataset.read_raw::<i64>()).map_err(none)?;
+        if data.len() != rows || data.iter().any(|value| *value < 0) {
+            let found = format!("{} numbers in dataset `{name}`", data.len());
+            return Err(fail(found, &format!("{rows}, none negative")));
+        }
+        Ok(Some(data))
+    };
+    let (c, s) = (numbers("C", 6)?, numbers("S", 6)?);
+    let rows = c.len() / 6;
+    if s.len() != c.len() {
+        return Err(fail(format!("{} rows of S for {rows} of C", s.len() / 6), "as many"));
+    }
+    let full = ["F", "cauchy"].iter().all(|name| names.iter().any(|other| other == name));
+    let gradients = if full { Some((numbers("F", 9)?, numbers("cauchy", 6)?)) } else { None };
+    if let Some((f, cauchy)) = &gradients
+        && (f.len() != 9 * rows || cauchy.len() != 6 * rows)
+    {
+        return Err(fail(format!("F and cauchy with other numbers of rows than C ({rows})"), "as many"));
+    }
+    let samples = integers("sample", rows)?;
+    let of_rows = integers("path", rows)?.unwrap_or_else(|| vec![0; rows]);
+    let times = match names.iter().any(|name| name == "time") {
+        true => file.dataset("time").and_then(|dataset| dataset.read_raw::<f64>()).map_err(none)?,
+        false => Vec::new(),
+    };
+    let mut set = Dataset { paths: paths(&file, path, &of_rows)?, ..Dataset::default() };
+    for row in 0..rows {
+        let six = |data: &[f64]| Voigt::from_row_slice(&data[6 * row..6 * row + 6]);
+        let at = |error: Error| fail(format!("row {row}: {error}"), "a deformation and its stress");
+        let target = &mut set.paths[of_rows[row] as usize].rows;
+        let sample = samples.as_ref().map_or(target.len() as u64, |samples| samples[row] as u64);
+        let time = times.get(row).copied().unwrap_or(f64::NAN);
+        let (c, s) = (six(&c), six(&s));
+        let (deformation, cauchy) = match &gradients {
+            Some((f, cauchy)) => {
+                let f = DeformationGradient::new(Tensor::from_row_slice(&f[9 * row..9 * row + 9]));
+                (f.map_err(|error| at(error.into()))?, six(cauchy))
+            }
+            None => {
+                let f = stretch_of(&c).map_err(at)?;
+                (f, cauchy_of_material(&f, &s))
+            }
+        };
+        target.push(Row { sample, time, deformation, cauchy, c, s });
+    }
+    if names.iter().any(|name| name == "provenance") {
+        let lines = file.dataset("provenance").and_then(|dataset| dataset.read_vlen_strings());
+        set.provenance = lines.map_err(none)?;
+    }
+    set.provenance.push(format!("{}: {size} bytes, HDF5, {rows} rows", path.display()));
+    Ok(set)
+}
+
+/// Empty paths with their names, kinds and rates.
+fn paths(file: &H5File, path: &std::path::Path, of_rows: &[i64]) -> Result<Vec<Path>, Error> {
+    let none = |error: rust_hdf5::Hdf5Error| Error::file(path, format!("damaged HDF5 ({error})"), "HDF5");
+    let count = of_rows.iter().max().map_or(0, |last| *last as usize + 1);
+    let groups = file.root_group().group_names().map_err(none)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if !groups.iter().any(|group| group == "paths") {
+        if count > of_rows.len() {
+            return Err(Error::file(path, format!("path number {}", count - 1), "one below the row count"));
+        }
+        let blank = |index| Path {
+            id: if count == 1 { name.to_string() } else { format!("{name}:{index}") },
+            kind: "unknown".into(),
+            rates: [f64::NAN; 3],
+            rows: Vec::new(),
+        };
+        return Ok((0..count).map(blank).collect());
+    }
+    let strings = |name: &str| {
+        file.dataset(&format!("paths/{name}")).and_then(|dataset| dataset.read_vlen_strings()).map_err(none)
+    };
+    let (ids, kinds) = (strings("id")?, strings("kind")?);
+    let rates = file.dataset("paths/rates").and_then(|d| d.read_raw::<f64>()).map_err(none)?;
+    if kinds.len() != ids.len() || rates.len() != 3 * ids.len() || count > ids.len() {
+        let found = format!("{} ids, {} kinds, {} rates", ids.len(), kinds.len(), rates.len());
+        return Err(Error::file(path, found, "one id, one kind and three rates a path"));
+    }
+    let build = |(index, (id, kind)): (usize, (String, String))| {
+        let rates = [rates[3 * index], rates[3 * index + 1], rates[3 * index + 2]];
+        Path { id, kind, rates, rows: Vec::new() }
+    };
+    Ok(ids.into_iter().zip(kinds).enumerate().map(build).collect())
+}

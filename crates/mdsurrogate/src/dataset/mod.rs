@@ -1,0 +1,222 @@
+//! Data sets of (C, S) by path: read, checked, standardised, split, and measured for noise and leaks.
+
+#[cfg(feature = "hdf5")]
+pub mod hdf5;
+mod read;
+mod split;
+mod standardise;
+mod statistics;
+mod table;
+
+pub use read::{Columns, ReadOptions, read};
+pub use split::{Fractions, Method, Split, split};
+pub use standardise::Standardisation;
+pub use statistics::{Leak, Noise, leak, noise};
+
+use crate::Error;
+use crate::kinematics::{NAMES, material_pair};
+use polycore::tensor::{DeformationGradient, Voigt};
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// Stretches between which data are taken for deformations: beyond, a unit is wrong.
+pub const STRETCHES: [f64; 2] = [0.1, 10.0];
+
+/// Root mean squares of the stress, Pa, that are taken for stresses of a solid: beyond, a unit is wrong.
+pub const STRESSES: [f64; 2] = [1e2, 1e12];
+
+/// One sample: a state of deformation and its stress.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Number of the sample within its run, as the file counts it.
+    pub sample: u64,
+    /// Time, s; NaN where the file has none.
+    pub time: f64,
+    /// F; U = √C where the file gives C only.
+    pub deformation: DeformationGradient,
+    /// σ, Pa, tension positive.
+    pub cauchy: Voigt,
+    /// C (3.2).
+    pub c: Voigt,
+    /// S (3.3), Pa.
+    pub s: Voigt,
+}
+
+impl Row {
+    /// A row from F and σ, with C and S after (3.5), (3.6).
+    pub fn new(sample: u64, time: f64, deformation: DeformationGradient, cauchy: Voigt) -> Self {
+        let (c, s) = material_pair(&deformation, &cauchy);
+        Self { sample, time, deformation, cauchy, c, s }
+    }
+}
+
+/// One run: rows along a path of deformation, correlated with each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// Its name, unique within a set.
+    pub id: String,
+    /// What kind of path: `ux`, `bxy`, …; `unknown` where the file says nothing.
+    pub kind: String,
+    /// Engineering rates along x, y, z, 1/s; NaN for an axis that is not pulled.
+    pub rates: [f64; 3],
+    /// The rows in order of their samples.
+    pub rows: Vec<Row>,
+}
+
+/// Runs, and where they came from.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Dataset {
+    /// The runs in order of appearance.
+    pub paths: Vec<Path>,
+    /// One line a file: name, bytes, checksum, columns.
+    pub provenance: Vec<String>,
+    /// Rows of files that had no averaged values (the state before a run).
+    pub skipped: usize,
+}
+
+impl Dataset {
+    /// The number of rows.
+    pub fn len(&self) -> usize {
+        self.paths.iter().map(|path| path.rows.len()).sum()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// All rows, path by path: the numbering that [`Split`] uses.
+    pub fn rows(&self) -> impl Iterator<Item = &Row> + Clone {
+        self.paths.iter().flat_map(|path| &path.rows)
+    }
+
+    /// The path of each row.
+    pub fn path_of_rows(&self) -> Vec<usize> {
+        let of = |(index, path): (usize, &Path)| std::iter::repeat_n(index, path.rows.len());
+        self.paths.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// Runs of each kind.
+    pub fn kinds(&self) -> BTreeMap<&str, usize> {
+        let mut kinds = BTreeMap::new();
+        for path in &self.paths {
+            *kinds.entry(path.kind.as_str()).or_default() += 1;
+        }
+        kinds
+    }
+
+    /// Appends the runs of another set.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for a run whose name is taken.
+    pub fn append(&mut self, other: Self) -> Result<(), Error> {
+        let names: HashSet<&str> = self.paths.iter().map(|path| path.id.as_str()).collect();
+        if let Some(twice) = other.paths.iter().find(|path| names.contains(path.id.as_str())) {
+            return Err(Error::Data {
+                what: "joining data sets",
+                found: format!("the run `{}` twice", twice.id),
+                allowed: "each run once".into(),
+            });
+        }
+        self.paths.extend(other.paths);
+        self.provenance.extend(other.provenance);
+        self.skipped += other.skipped;
+        Ok(())
+    }
+
+    /// Smallest and largest C of each component; (+∞, −∞) of an empty set.
+    pub fn box_of_c(&self) -> [[f64; 2]; 6] {
+        let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 6];
+        for row in self.rows() {
+            for (range, &value) in range.iter_mut().zip(&row.c) {
+                *range = [range[0].min(value), range[1].max(value)];
+            }
+        }
+        range
+    }
+
+    /// Components of C and S that are the same in all rows, by name.
+    pub fn constant_components(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        let Some(first) = self.rows().next() else { return names };
+        for (a, name) in NAMES.iter().enumerate() {
+            if self.rows().all(|row| row.c[a] == first.c[a]) {
+                names.push(format!("C{name}"));
+            }
+        }
+        for (a, name) in NAMES.iter().enumerate() {
+            if self.rows().all(|row| row.s[a] == first.s[a]) {
+                names.push(format!("S{name}"));
+            }
+        }
+        names
+    }
+
+    /// Rows that repeat an earlier row's (C, S) to the bit.
+    pub fn duplicate_rows(&self) -> usize {
+        let mut seen = HashSet::new();
+        self.rows().filter(|row| !seen.insert(bits(row))).count()
+    }
+
+    /// Whether the numbers can be deformations and stresses of a solid in the units they were read in.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for no row at all or a run that repeats another; [`Error::Implausible`] for stretches beyond [`STRETCHES`] or a root mean square of
+    /// the stress beyond [`STRESSES`] (a stress of exactly zero passes: it is reported as constant).
+    pub fn check(&self) -> Result<(), Error> {
+        if self.is_empty() {
+            return Err(Error::Data {
+                what: "data set",
+                found: "no row".into(),
+                allowed: "at least one row".into(),
+            });
+        }
+        let mut seen: HashMap<Vec<[u64; 12]>, &str> = HashMap::new();
+        for path in &self.paths {
+            for row in &path.rows {
+                let stretches = row.deformation.principal_stretches();
+                let far = stretches.iter().find(|l| !(STRETCHES[0]..=STRETCHES[1]).contains(*l));
+                if let Some(stretch) = far {
+                    return Err(Error::Implausible {
+                        place: format!("run `{}`, sample {}", path.id, row.sample),
+                        quantity: "principal stretch".into(),
+                        found: format!("{stretch:.4e}"),
+                        allowed: "the stretches of data lie between 0.1 and 10",
+                    });
+                }
+            }
+            // single rows coincide where runs start from one snapshot; whole runs do not
+            if path.rows.len() > 1
+                && let Some(first) = seen.insert(path.rows.iter().map(bits).collect(), &path.id)
+            {
+                return Err(Error::Data {
+                    what: "data set",
+                    found: format!("the runs `{first}` and `{}` with the same rows", path.id),
+                    allowed: "each run once (a copy would leak across a split)".into(),
+                });
+            }
+        }
+        let squares: f64 = self.rows().map(|row| row.cauchy.norm_squared()).sum();
+        let root = (squares / (6 * self.len()) as f64).sqrt();
+        if root != 0.0 && !(STRESSES[0]..=STRESSES[1]).contains(&root) {
+            return Err(Error::Implausible {
+                place: "all rows".into(),
+                quantity: "root mean square of the stress".into(),
+                found: format!("{root:.4e} Pa"),
+                allowed: "that of a solid lies between 100 Pa and 1 TPa",
+            });
+        }
+        Ok(())
+    }
+}
+
+fn bits(row: &Row) -> [u64; 12] {
+    let mut bits = [0; 12];
+    for (bit, value) in bits.iter_mut().zip(row.c.iter().chain(row.s.iter())) {
+        // −0 and 0 are the same number
+        *bit = (value + 0.0).to_bits();
+    }
+    bits
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,272 @@
+//! Data sets from CSV tables in three forms, and from HDF5.
+
+use super::table::{Column, Table};
+use super::{Dataset, Path, Row};
+use crate::Error;
+use crate::kinematics::{PeriodicBox, cauchy_of_material, stretch_of};
+use polycore::tensor::{DeformationGradient, Tensor, Voigt};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// Seconds in a femtosecond.
+const FEMTOSECOND: f64 = 1e-15;
+
+const STRESSES: [&str; 6] = ["sxx", "syy", "szz", "sxy", "sxz", "syz"];
+const LENGTHS: [&str; 3] = ["lx", "ly", "lz"];
+const TILTS: [&str; 3] = ["xy", "xz", "yz"];
+
+/// Which columns of a molecular dynamics table are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Columns {
+    /// `avg_…`: means over the interval before each sample. Stress at one instant in a small cell is mostly the
+    /// vibration of bonds (formulation.md, chapter 3).
+    #[default]
+    Averaged,
+    /// The values at the instant of sampling.
+    Instantaneous,
+}
+
+/// How a table is to be understood.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReadOptions {
+    /// Averaged or instantaneous.
+    pub columns: Columns,
+    /// Edges of the undeformed box, Å; without it, lengths are referred to the row where the file's own F is 1.
+    pub reference: Option<PeriodicBox>,
+    /// Pa in one unit of stress, for columns whose heading has no `[unit]`.
+    pub stress_unit: f64,
+}
+
+impl Default for ReadOptions {
+    /// Averaged columns, MPa.
+    fn default() -> Self {
+        Self { columns: Columns::Averaged, reference: None, stress_unit: 1e6 }
+    }
+}
+
+/// Reads a CSV table (also gzip) or HDF5 file, and checks it ([`Dataset::check`]).
+///
+/// Forms of a table, told by its headings:
+/// - `lx ly lz` (Å; with `xy xz yz` if the box is tilted) and `sxx syy szz sxy sxz syz` (σ), or the same with `avg_`;
+/// - `F11 F12 … F33` (all nine) and `sxx …` or `avg_sxx …`;
+/// - `C11 C22 C33 C12 C13 C23` and `S11 … S23`.
+///
+/// Optional columns: `run_id` (without it a file is one path), `kind`, `rate_x rate_y rate_z` (1/fs), `sample`,
+/// `time_fs`. Stress is in MPa, or in the unit of its heading. A row whose averaged cells are all empty (the state before a run) is skipped and counted.
+///
+/// # Errors
+/// File, line, column, what was found and what is allowed; [`Dataset::check`].
+pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<Dataset, Error> {
+    let path = path.as_ref();
+    let set = if is_hdf5(path)? {
+        #[cfg(feature = "hdf5")]
+        let set = super::hdf5::read(path)?;
+        #[cfg(not(feature = "hdf5"))]
+        return Err(Error::file(path, "an HDF5 file", "CSV, or a build with the feature `hdf5`"));
+        #[cfg(feature = "hdf5")]
+        set
+    } else {
+        table(&Table::read(path)?, options)?
+    };
+    set.check()?;
+    Ok(set)
+}
+
+fn is_hdf5(path: &std::path::Path) -> Result<bool, Error> {
+    use std::io::Read;
+    let mut start = Vec::new();
+    let file = std::fs::File::open(path).map_err(Error::io("open", path))?;
+    file.take(8).read_to_end(&mut start).map_err(Error::io("read", path))?;
+    let named = path.extension().is_some_and(|e| e == "h5" || e == "hdf5");
+    Ok(named || start == b"\x89HDF\r\n\x1a\n")
+}
+
+/// Where a table keeps the deformation and the stress.
+enum Form {
+    Box { lengths: [Column; 3], tilts: Option<[Column; 3]>, reference: PeriodicBox, stress: [Column; 6] },
+    Gradient { components: [Column; 9], stress: [Column; 6] },
+    Material { c: [Column; 6], s: [Column; 6] },
+}
+
+impl Form {
+    fn new(table: &Table, options: &ReadOptions) -> Result<Self, Error> {
+        if table.has("C11") {
+            let names = |letter: &str| crate::kinematics::NAMES.map(|name| format!("{letter}{name}"));
+            return Ok(Self::Material { c: table.columns(names("C"))?, s: table.columns(names("S"))? });
+        }
+        let prefix = match options.columns {
+            Columns::Averaged => "avg_",
+            Columns::Instantaneous => "",
+        };
+        let prefixed = |name: &str| format!("{prefix}{name}");
+        let stress = || table.columns(STRESSES.map(prefixed));
+        if table.has("F12") {
+            let mut names = Vec::with_capacity(9);
+            for (i, j) in (1..=3).flat_map(|i| (1..=3).map(move |j| (i, j))) {
+                names.push(format!("F{i}{j}"));
+            }
+            let mut components = [table.column("F12")?; 9];
+            for (column, name) in components.iter_mut().zip(&names) {
+                *column = table.column(name)?;
+            }
+            return Ok(Self::Gradient { components, stress: stress()? });
+        }
+        let lengths = table.columns(LENGTHS.map(prefixed))?;
+        let tilted = table.has(&prefixed("xy"));
+        let tilts = if tilted { Some(table.columns(TILTS.map(prefixed))?) } else { None };
+        let reference = match options.reference {
+            Some(reference) => reference,
+            None => undeformed(table)?,
+        };
+        Ok(Self::Box { lengths, tilts, reference, stress: stress()? })
+    }
+
+    fn stress(&self) -> &[Column; 6] {
+        match self {
+            Self::Box { stress, .. } | Self::Gradient { stress, .. } => stress,
+            Self::Material { s, .. } => s,
+        }
+    }
+
+    /// Whether a row has none of the values looked for.
+    fn is_blank(&self, table: &Table, row: usize) -> bool {
+        let blank = |column: &Column| table.text(row, *column).is_empty();
+        match self {
+            Self::Box { lengths, stress, .. } => lengths.iter().chain(stress).all(blank),
+            Self::Gradient { stress, .. } => stress.iter().all(blank),
+            Self::Material { .. } => false,
+        }
+    }
+
+    fn row(
+        &self,
+        table: &Table,
+        row: usize,
+        units: &[f64; 6],
+    ) -> Result<(DeformationGradient, Voigt), Error> {
+        let stress = table.numbers(row, self.stress())?;
+        let stress = Voigt::from_fn(|a, _| stress[a] * units[a]);
+        let at = |error: Error| {
+            Error::file(
+                &table.path,
+                format!("line {}: {error}", table.line(row)),
+                "a deformation with positive determinant",
+            )
+        };
+        match self {
+            Self::Box { lengths, tilts, reference, .. } => {
+                let lengths = table.numbers(row, lengths)?;
+                let tilts = tilts.map_or(Ok([0.0; 3]), |tilts| table.numbers(row, &tilts))?;
+                let current = PeriodicBox { lengths, tilts };
+                Ok((current.deformation_from(reference).map_err(at)?, stress))
+            }
+            Self::Gradient { components, .. } => {
+                let numbers = table.numbers(row, components)?;
+                let f = DeformationGradient::new(Tensor::from_row_slice(&numbers));
+                Ok((f.map_err(|error| at(error.into()))?, stress))
+            }
+            Self::Material { c, .. } => {
+                let c = Voigt::from_row_slice(&table.numbers(row, c)?);
+                let f = stretch_of(&c).map_err(at)?;
+                Ok((f, cauchy_of_material(&f, &stress)))
+            }
+        }
+    }
+}
+
+/// The box of the first row in which the file's own F is 1.
+fn undeformed(table: &Table) -> Result<PeriodicBox, Error> {
+    let columns = ["F11", "F22", "F33"].map(|name| table.find(name));
+    let lengths = LENGTHS.map(|name| table.find(name));
+    if let ([Some(a), Some(b), Some(c)], [Some(x), Some(y), Some(z)]) = (columns, lengths) {
+        for row in 0..table.rows() {
+            if table.numbers(row, &[a, b, c])? == [1.0; 3] {
+                return Ok(PeriodicBox::orthogonal(table.numbers(row, &[x, y, z])?));
+            }
+        }
+    }
+    Err(Error::file(
+        &table.path,
+        "box lengths, but no row with F11 = F22 = F33 = 1 and its lx, ly, lz",
+        "such a row, or `reference_lengths` in the scene",
+    ))
+}
+
+fn table(table: &Table, options: &ReadOptions) -> Result<Dataset, Error> {
+    let form = Form::new(table, options)?;
+    let mut units = [0.0; 6];
+    for (unit, column) in units.iter_mut().zip(form.stress()) {
+        *unit = table.stress_unit(*column, options.stress_unit)?;
+    }
+    let [run, kind, sample, time] = ["run_id", "kind", "sample", "time_fs"].map(|name| table.find(name));
+    let rates = ["rate_x", "rate_y", "rate_z"].map(|name| table.find(name));
+    let file_name = table.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut set = Dataset::default();
+    let mut index: HashMap<String, usize> = HashMap::new();
+    let mut samples: HashMap<(usize, u64), u64> = HashMap::new();
+    for row in 0..table.rows() {
+        let id = run.map_or(file_name.as_str(), |column| table.text(row, column));
+        if form.is_blank(table, row) {
+            set.skipped += 1;
+            continue;
+        }
+        let (deformation, cauchy) = form.row(table, row, &units)?;
+        let path = match index.get(id) {
+            Some(&path) => path,
+            None => {
+                let mut of_axes = [f64::NAN; 3];
+                for (rate, column) in of_axes.iter_mut().zip(rates) {
+                    if let Some(column) = column.filter(|column| !table.text(row, *column).is_empty()) {
+                        *rate = table.number(row, column)? / FEMTOSECOND;
+                    }
+                }
+                let kind = kind.map(|column| table.text(row, column)).filter(|kind| !kind.is_empty());
+                let kind = kind.unwrap_or("unknown").to_owned();
+                set.paths.push(Path { id: id.to_owned(), kind, rates: of_axes, rows: Vec::new() });
+                index.insert(id.to_owned(), set.paths.len() - 1);
+                set.paths.len() - 1
+            }
+        };
+        let number = match sample {
+            Some(column) => table
+                .text(row, column)
+                .parse()
+                .map_err(|_| table.cell(row, column, "a whole number, not negative"))?,
+            None => set.paths[path].rows.len() as u64,
+        };
+        if let Some(line) = samples.insert((path, number), table.line(row)) {
+            return Err(Error::Data {
+                what: "data set",
+                found: format!(
+                    "sample {number} of run `{id}` twice, in lines {line} and {} of {}",
+                    table.line(row),
+                    table.path.display()
+                ),
+                allowed: "each sample of a run once".into(),
+            });
+        }
+        let time = match time {
+            Some(column) => table.number(row, column)? * FEMTOSECOND,
+            None => f64::NAN,
+        };
+        set.paths[path].rows.push(Row::new(number, time, deformation, cauchy));
+    }
+    for path in &mut set.paths {
+        path.rows.sort_by_key(|row| row.sample);
+    }
+    let columns = match (&form, options.columns) {
+        (Form::Material { .. }, _) => "C and S",
+        (_, Columns::Averaged) => "averaged columns",
+        (_, Columns::Instantaneous) => "instantaneous columns",
+    };
+    set.provenance.push(format!(
+        "{}: {}, {columns}, {} rows of {} runs, {} skipped",
+        table.path.display(),
+        table.fingerprint,
+        set.len(),
+        set.paths.len(),
+        set.skipped
+    ));
+    Ok(set)
+}

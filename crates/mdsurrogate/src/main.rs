@@ -1,0 +1,139 @@
+//! The `mdsurrogate` command line.
+
+use clap::{CommandFactory, Parser, Subcommand};
+use mdsurrogate::Error;
+use mdsurrogate::dataset::{Columns, ReadOptions, read};
+use mdsurrogate::run::{Failure, describe, run};
+use mdsurrogate::scene::Scene;
+use mdsurrogate::surrogate::{CSource, Surrogate};
+use polycore::output::atomic_write;
+use polycore::report::Report;
+use polycore::scene::Source;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+mod md_command;
+
+/// From molecular dynamics to a constitutive law.
+#[derive(Parser)]
+#[command(
+    version,
+    about,
+    after_help = "Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Read the data of a scene, measure noise, split and leaks, draw, and write HDF5.
+    #[command(visible_alias = "data")]
+    Run {
+        /// The scene (TOML).
+        scene: PathBuf,
+        /// Directory for results; default: out/NAME after the scene's folder.
+        #[arg(long, short)]
+        output: Option<PathBuf>,
+        /// Leave out what the scene marks `quick = false`.
+        #[arg(long)]
+        quick: bool,
+    },
+    /// Print what a table (CSV, CSV.GZ, HDF5) holds: runs, ranges, noise.
+    Info {
+        /// The table.
+        file: PathBuf,
+        /// Read the columns at the instant of sampling instead of the averaged ones.
+        #[arg(long)]
+        instantaneous: bool,
+    },
+    /// Molecular dynamics with LAMMPS: plan, prepare, run, resume, collect.
+    #[command(subcommand)]
+    Md(md_command::Md),
+    /// Write a law (safetensors) as C source and header.
+    Export {
+        /// The law.
+        law: PathBuf,
+        /// Where the files go; its last part is the name of the C function: out/pa12 gives out/pa12.c, out/pa12.h.
+        output: PathBuf,
+    },
+    /// Print a shell's completion script.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Run { scene, output, quick } => {
+            let output = output.unwrap_or_else(|| default_output(&scene));
+            data(&scene, &output, quick)
+        }
+        Command::Info { file, instantaneous } => info(&file, instantaneous).map_err(Failure::from),
+        Command::Md(md) => md.run().map_err(Failure::from),
+        Command::Export { law, output } => export(&law, &output).map_err(Failure::from),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "mdsurrogate", &mut std::io::stdout());
+            Ok(true)
+        }
+    };
+    match result {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(Failure::Scene(error)) => {
+            eprint!("{}", error.render());
+            ExitCode::from(error.exit_code())
+        }
+        Err(Failure::Run(error)) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// `cases/ch3/pa12-data/case.toml` → `out/pa12-data`.
+fn default_output(scene: &Path) -> PathBuf {
+    let stem = scene.file_stem().unwrap_or_default();
+    let folder = scene.parent().and_then(Path::file_name);
+    let name = if stem == "case" { folder.unwrap_or(stem) } else { stem };
+    Path::new("out").join(name)
+}
+
+fn data(scene: &Path, output: &Path, quick: bool) -> Result<bool, Failure> {
+    let source = Source::read(scene)?;
+    let scene = source.parse::<Scene>()?;
+    let finished = run(&source, &scene, output, quick)?;
+    finished.report.print_table();
+    for remark in &finished.remarks {
+        println!("{remark}");
+    }
+    println!("results in {}", output.display());
+    Ok(finished.report.passed())
+}
+
+fn info(file: &Path, instantaneous: bool) -> Result<bool, Error> {
+    let columns = if instantaneous { Columns::Instantaneous } else { Columns::Averaged };
+    let set = read(file, &ReadOptions { columns, ..ReadOptions::default() })?;
+    let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), "");
+    describe(&mut report, "", &set);
+    report.print_table();
+    println!("without variance: {}", set.constant_components().join(", "));
+    for line in &set.provenance {
+        println!("{line}");
+    }
+    Ok(true)
+}
+
+fn export(law: &Path, output: &Path) -> Result<bool, Error> {
+    let name = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let CSource { header, source } = Surrogate::read(law)?.c_source(&name)?;
+    for (end, text) in [("h", header), ("c", source)] {
+        let path = output.with_file_name(format!("{name}.{end}"));
+        atomic_write(&path, |file| file.write_all(text.as_bytes()))?;
+        println!("{}", path.display());
+    }
+    Ok(true)
+}

@@ -1,0 +1,311 @@
+//! A folder in which a set is prepared, run, resumed and collected.
+
+use super::{Engine, Plan, Run, input, results};
+use crate::Error;
+use crate::cell::{Crystal, LATTICE, Packing};
+use polycore::output::atomic_write;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A set of runs on disk.
+#[derive(Debug, Clone)]
+pub struct Folder {
+    path: PathBuf,
+    plan: Plan,
+}
+
+impl Folder {
+    /// Writes plan, cell, inputs and job scripts into a folder.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a plan that cannot be run, for run names that repeat, or a folder that has another plan; I/O errors.
+    pub fn create(path: impl Into<PathBuf>, plan: Plan) -> Result<Self, Error> {
+        let path = path.into();
+        plan.protocol.check()?;
+        if plan.runs.is_empty() {
+            return Err(Error::parameter("runs", 0, "at least one: levels or paths"));
+        }
+        let mut names: Vec<&str> = plan.runs.iter().map(|run| run.id.as_str()).collect();
+        names.sort_unstable();
+        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(Error::parameter("runs", format!("`{}` twice", twice[0]), "each name once"));
+        }
+        if path.join("plan.json").exists() && Self::open(&path)?.plan != plan {
+            let found = format!("{} with another plan", path.display());
+            return Err(Error::parameter("folder", found, "an empty folder, or one with the same plan"));
+        }
+        for folder in ["", "in", "prepared", "runs", "work"] {
+            fs::create_dir_all(path.join(folder)).map_err(Error::io("create", path.join(folder)))?;
+        }
+        let folder = Self { path, plan };
+        folder.write_inputs()?;
+        Ok(folder)
+    }
+
+    /// Opens a folder that [`Folder::create`] wrote.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a damaged plan, I/O errors.
+    pub fn open(path: impl Into<PathBuf>) -> Result<Self, Error> {
+        let path = path.into();
+        let file = path.join("plan.json");
+        let text = fs::read_to_string(&file).map_err(Error::io("read", &file))?;
+        let plan: Plan = serde_json::from_str(&text)
+            .map_err(|error| Error::file(&file, error, "a plan that `mdsurrogate md write` wrote"))?;
+        plan.protocol.check()?;
+        Ok(Self { path, plan })
+    }
+
+    /// The plan.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Runs without a table yet.
+    pub fn open_runs(&self) -> Vec<usize> {
+        (0..self.plan.runs.len()).filter(|&index| !self.run_table(index).is_file()).collect()
+    }
+
+    /// Puts the force field into the folder: the file named, or `ffield.reax.mattsson` where the engine keeps it.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] that names the places looked at; I/O errors.
+    pub fn force_field(&self, named: Option<&Path>, engine: &Engine) -> Result<(), Error> {
+        let target = self.path.join(input::FORCE_FIELD);
+        let source = match named {
+            Some(path) => path.to_path_buf(),
+            None if target.is_file() => return Ok(()),
+            None => {
+                let places: Vec<PathBuf> =
+                    engine.potentials().into_iter().map(|place| place.join("ffield.reax.mattsson")).collect();
+                let found = places.iter().find(|place| place.is_file());
+                found.cloned().ok_or_else(|| {
+                    let looked: Vec<String> =
+                        places.iter().map(|place| place.display().to_string()).collect();
+                    let found = format!("none at {}", looked.join(", "));
+                    Error::parameter("force field", found, "one of them, or `--force-field FILE`")
+                })?
+            }
+        };
+        let bytes = fs::read(&source).map_err(Error::io("read", &source))?;
+        Ok(atomic_write(target, |file| file.write_all(&bytes))?)
+    }
+
+    /// Relaxes the box at 0 K, equilibrates, and makes the start configurations; what is there is not made again.
+    ///
+    /// # Errors
+    /// Those of the engine.
+    pub fn prepare(&self, engine: &Engine) -> Result<(), Error> {
+        let protocol = &self.plan.protocol;
+        let (small, copies) = relaxed_cells(protocol.cells);
+        let at = |name: &str| self.path.join("prepared").join(name);
+        self.write("in/cell.data", &crystal(small)?.lammps_data("gamma-PA12, orthogonal"))?;
+        if !at("relaxed.data").is_file() {
+            let text = input::relax(protocol, "in/cell.data", "work/relaxed.data");
+            self.stage(engine, "relax", &text)?;
+            self.keep("work/relaxed.data", "prepared/relaxed.data")?;
+        }
+        if !at("equilibrated.data").is_file() {
+            let text = input::equilibrate(
+                protocol,
+                copies,
+                "prepared/relaxed.data",
+                "work/equilibrated.data",
+                "work/lengths.txt",
+            );
+            self.stage(engine, "equilibrate", &text)?;
+            self.keep("work/lengths.txt", "prepared/lengths.txt")?;
+            self.keep("work/equilibrated.data", "prepared/equilibrated.data")?;
+        }
+        if !at(&format!("start_{}.data", protocol.snapshots)).is_file() {
+            let lengths = self.reference_lengths()?;
+            let text = input::snapshots(protocol, lengths, "prepared/equilibrated.data", "work/start");
+            self.stage(engine, "snapshots", &text)?;
+            // the last one is the record of completion
+            for k in 1..=protocol.snapshots {
+                self.keep(&format!("work/start_{k}.data"), &format!("prepared/start_{k}.data"))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Mean lengths of the equilibrated box, Å, to six decimals: the L₀ of every run.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a file without three positive numbers; I/O errors (not prepared yet).
+    pub fn reference_lengths(&self) -> Result<[f64; 3], Error> {
+        let path = self.path.join("prepared/lengths.txt");
+        let text = fs::read_to_string(&path).map_err(Error::io("read (prepare first)", &path))?;
+        let line = text.lines().rfind(|line| !line.starts_with('#') && !line.trim().is_empty());
+        let numbers: Vec<f64> =
+            line.unwrap_or_default().split_whitespace().skip(1).map_while(|word| word.parse().ok()).collect();
+        match numbers[..] {
+            [x, y, z] if [x, y, z].iter().all(|l| l.is_finite() && *l > 0.0) => {
+                Ok([x, y, z].map(|length| (length * 1e6).round() / 1e6))
+            }
+            _ => {
+                Err(Error::file(&path, format!("`{}`", line.unwrap_or_default()), "a step and three lengths"))
+            }
+        }
+    }
+
+    /// Runs one of the plan, unless its table is there, and writes its table.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a number beyond the plan; those of the engine and of [`results::read_run`].
+    pub fn run_one(&self, engine: &Engine, index: usize) -> Result<(), Error> {
+        let Some(run) = self.plan.runs.get(index) else {
+            let allowed = format!("0 to {}", self.plan.runs.len() - 1);
+            return Err(Error::parameter("run", index, allowed));
+        };
+        if self.run_table(index).is_file() {
+            return Ok(());
+        }
+        let reference = self.reference_lengths()?;
+        let id = &run.id;
+        engine.run(&self.path, &format!("runs/{id}.in"), &format!("work/{id}.log"))?;
+        let file = |end: &str| self.path.join(format!("work/{id}.{end}"));
+        let (inst, mean) = (file("inst"), file("mean"));
+        let (samples, means) = results::read_run(&inst, &mean, &self.plan.protocol)?;
+        let rows = results::table(&self.plan.protocol, run, reference, &samples, &means);
+        self.write(&format!("runs/{id}.csv"), &(results::heading() + &rows))?;
+        for file in [inst, mean, file("log")] {
+            let _ = fs::remove_file(file);
+        }
+        Ok(())
+    }
+
+    /// Runs all that are open, `jobs` at a time, and joins the tables after each; `report` hears of each that ends.
+    ///
+    /// One that fails does not stop the others.
+    ///
+    /// # Errors
+    /// The first failure, after all others have been tried.
+    pub fn run(
+        &self,
+        engine: &Engine,
+        jobs: usize,
+        report: &(dyn Fn(&Run, &Result<(), Error>) + Sync),
+    ) -> Result<(), Error> {
+        let open = self.open_runs();
+        let next = AtomicUsize::new(0);
+        let failure: Mutex<Option<Error>> = Mutex::new(None);
+        let keep = |result: Result<(), Error>| {
+            // a poisoned lock means that another worker has panicked: its data are still an Option
+            let mut first = failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let joined = result.and_then(|()| self.collect().map(|_| ()));
+            if let Err(error) = joined
+                && first.is_none()
+            {
+                *first = Some(error);
+            }
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..jobs.clamp(1, 1024).min(open.len().max(1)) {
+                scope.spawn(|| {
+                    while let Some(&index) = open.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let result = self.run_one(engine, index);
+                        report(&self.plan.runs[index], &result);
+                        keep(result);
+                    }
+                });
+            }
+        });
+        match failure.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner) {
+            Some(error) => Err(error),
+            None => Ok(()),
+        }
+    }
+
+    /// Joins the tables of finished runs into `runs.csv`, in the order of the plan; returns how many.
+    ///
+    /// # Errors
+    /// I/O errors.
+    pub fn collect(&self) -> Result<usize, Error> {
+        let mut text = results::heading();
+        let mut count = 0;
+        for index in 0..self.plan.runs.len() {
+            let path = self.run_table(index);
+            if path.is_file() {
+                let table = fs::read_to_string(&path).map_err(Error::io("read", &path))?;
+                text.push_str(table.split_once('\n').map_or("", |(_, rows)| rows));
+                count += 1;
+            }
+        }
+        self.write("runs.csv", &text)?;
+        Ok(count)
+    }
+
+    fn run_table(&self, index: usize) -> PathBuf {
+        self.path.join(format!("runs/{}.csv", self.plan.runs[index].id))
+    }
+
+    fn write(&self, name: &str, text: &str) -> Result<(), Error> {
+        Ok(atomic_write(self.path.join(name), |file| file.write_all(text.as_bytes()))?)
+    }
+
+    fn keep(&self, from: &str, to: &str) -> Result<(), Error> {
+        let (from, to) = (self.path.join(from), self.path.join(to));
+        fs::rename(&from, &to).map_err(Error::io("rename", from))
+    }
+
+    fn stage(&self, engine: &Engine, name: &str, text: &str) -> Result<(), Error> {
+        self.write(&format!("in/{name}.in"), text)?;
+        engine.run(&self.path, &format!("in/{name}.in"), &format!("work/{name}.log"))
+    }
+
+    fn write_inputs(&self) -> Result<(), Error> {
+        let protocol = &self.plan.protocol;
+        let plan = serde_json::to_string_pretty(&self.plan)
+            .map_err(|error| Error::file(&self.path, error, "a plan of finite numbers"))?;
+        self.write("in/control.reax", input::CONTROL)?;
+        self.write("in/driver.py", input::DRIVER)?;
+        self.write(
+            "in/cell.data",
+            &crystal(relaxed_cells(protocol.cells).0)?.lammps_data("gamma-PA12, orthogonal"),
+        )?;
+        for run in &self.plan.runs {
+            let start = format!("prepared/start_{}.data", run.snapshot % protocol.snapshots + 1);
+            let text = input::deform(protocol, run, &start, &format!("work/{}", run.id));
+            self.write(&format!("runs/{}.in", run.id), &text)?;
+        }
+        self.write("job.sh", &job_script(self.plan.runs.len()))?;
+        // the plan last: a folder with a plan is complete
+        self.write("plan.json", &(plan + "\n"))
+    }
+}
+
+/// The cell that is relaxed at 0 K, and how often the equilibration repeats it: the relaxed crystal is periodic in
+/// one cell; two along x keep ReaxFF's cut-offs from seeing too many images.
+fn relaxed_cells(cells: [usize; 3]) -> ([usize; 3], [usize; 3]) {
+    if cells[0].is_multiple_of(2) {
+        ([2, 1, 1], [cells[0] / 2, cells[1], cells[2]])
+    } else {
+        ([1, 1, 1], cells)
+    }
+}
+
+fn crystal(cells: [usize; 3]) -> Result<Crystal, Error> {
+    Crystal::unit_cell(&LATTICE, Packing::default())?.replicate(cells)
+}
+
+/// A SLURM job array, one run a core.
+fn job_script(runs: usize) -> String {
+    format!(
+        "#!/bin/sh
+# One run a core. First, once: mdsurrogate md prepare . --lammps lmp
+# then: sbatch job.sh; at the end: mdsurrogate md collect .
+#SBATCH --job-name=mdsurrogate
+#SBATCH --array=0-{}
+#SBATCH --ntasks=1
+#SBATCH --cpus-per-task=1
+#SBATCH --time=12:00:00
+#SBATCH --output=work/slurm-%A_%a.txt
+exec mdsurrogate md run . --lammps \"${{LAMMPS:-lmp}}\" --index \"$SLURM_ARRAY_TASK_ID\"
+",
+        runs - 1
+    )
+}

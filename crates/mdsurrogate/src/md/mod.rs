@@ -1,0 +1,252 @@
+//! Molecular dynamics of a crystal's deformation by LAMMPS: what is run, its inputs, the runs, their results.
+//!
+//! A folder holds a whole set: `plan.json` (this module), `in/` and `runs/ID.in` ([`input`]), `prepared/` start
+//! configurations, `runs/ID.csv` one table a finished run, and `runs.csv`, all of them joined, which
+//! [`crate::dataset::read`] reads. A run is finished when its table is there, and tables appear whole: after a kill,
+//! what is missing is run again.
+
+mod engine;
+mod folder;
+pub mod input;
+mod results;
+
+pub use engine::Engine;
+pub use folder::Folder;
+pub use results::{Sample, heading, read_run, table};
+
+use crate::Error;
+use serde::{Deserialize, Serialize};
+
+/// Names of the six rates: stretching of the edges, then tilts.
+pub const AXES: [&str; 6] = ["x", "y", "z", "xy", "xz", "yz"];
+
+/// How all runs of a set are made. Times in fs, as in LAMMPS' `units real`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Protocol {
+    /// Cells along x, y, z; the thesis: 8, 4, 2.
+    pub cells: [usize; 3],
+    /// Time step, fs.
+    pub time_step: f64,
+    /// Steps of a run.
+    pub steps: u64,
+    /// Steps between samples, over which the averages are taken.
+    pub every: u64,
+    /// Temperature of thermostats and of the first velocities, K.
+    pub temperature: f64,
+    /// Steps of box relaxation at 0 K. Without it the first NPT loses the crystal.
+    pub relaxation: u64,
+    /// Steps of NVT after the velocities are drawn.
+    pub warm_up: u64,
+    /// Steps of NPT at 1 atm, the second half of which gives the reference lengths.
+    pub equilibration: u64,
+    /// Steps of NVT in the reference box before the first start configuration.
+    pub settling: u64,
+    /// Start configurations, among which runs take turns.
+    pub snapshots: usize,
+    /// Steps between them.
+    pub gap: u64,
+    /// Seed of the first velocities.
+    pub seed: u32,
+}
+
+impl Default for Protocol {
+    /// The thesis' (§3.2–3.3): 8 × 4 × 2 cells, 0.5 fs, runs of 5 ps sampled every 50 fs, 50 ps of NPT at 300 K.
+    fn default() -> Self {
+        Self {
+            cells: [8, 4, 2],
+            time_step: 0.5,
+            steps: 10_000,
+            every: 100,
+            temperature: 300.0,
+            relaxation: 200,
+            warm_up: 400,
+            equilibration: 100_000,
+            settling: 1200,
+            snapshots: 6,
+            gap: 300,
+            seed: 1201,
+        }
+    }
+}
+
+impl Protocol {
+    /// # Errors
+    /// [`Error::Parameter`] for what no run can have.
+    pub fn check(&self) -> Result<(), Error> {
+        let positive = [("time step", self.time_step), ("temperature", self.temperature)];
+        for (name, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::parameter(name, value, "a positive number"));
+            }
+        }
+        if self.every == 0 || self.steps == 0 || !self.steps.is_multiple_of(self.every) {
+            let found = format!("{} steps, a sample every {}", self.steps, self.every);
+            return Err(Error::parameter("sampling", found, "whole intervals, at least one"));
+        }
+        for (name, value) in [
+            ("relaxation", self.relaxation),
+            ("equilibration", self.equilibration),
+            ("warm-up", self.warm_up),
+            ("settling", self.settling),
+            ("gap", self.gap),
+            ("snapshots", self.snapshots as u64),
+            ("seed", u64::from(self.seed)),
+        ] {
+            if value == 0 {
+                return Err(Error::parameter(name, 0, "at least 1"));
+            }
+        }
+        if self.equilibration < 4 {
+            return Err(Error::parameter("equilibration", self.equilibration, "at least 4 steps"));
+        }
+        if self.cells.contains(&0) || self.cells.iter().any(|n| *n > 1000) {
+            return Err(Error::parameter("cells", format!("{:?}", self.cells), "1 to 1000 each"));
+        }
+        Ok(())
+    }
+}
+
+/// One deformation run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// Its name, also of its files.
+    pub id: String,
+    /// `ux`, `bxy`, …: edges pulled; `gxy`: shear; `m…`: both.
+    pub kind: String,
+    /// Engineering rates, 1/fs, of lx, ly, lz and of the tilts xy/ly, xz/lz, yz/lz; an edge without a rate is on its
+    /// own barostat of 1 atm, a tilt without a rate stays.
+    pub rates: [Option<f64>; 6],
+    /// Which start configuration, from 0.
+    pub snapshot: usize,
+}
+
+/// A whole set: protocol and runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// How.
+    pub protocol: Protocol,
+    /// What.
+    pub runs: Vec<Run>,
+}
+
+/// The grid of Table 3.2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    /// Levels of rate a direction; the thesis: 15.
+    pub levels: usize,
+    /// Strains that the greatest rates reach at the end of a run; Table 3.2: 0.5, 0.6, 0.15.
+    pub ultimate_strains: [f64; 3],
+    /// A factor on all rates.
+    pub rate_scale: f64,
+}
+
+impl Default for Grid {
+    fn default() -> Self {
+        Self { levels: 15, ultimate_strains: [0.5, 0.6, 0.15], rate_scale: 1.0 }
+    }
+}
+
+impl Grid {
+    /// Rates of each direction, 1/fs: evenly spaced from a fifteenth of the greatest to the greatest, which is
+    /// strain/duration. **Table 3.2 prints them per step of 0.5 fs**, not per fs: 10,000 steps × 50e-6 = 0.5
+    /// (formulation.md, chapter 3). A single level is the greatest.
+    pub fn rates(&self, protocol: &Protocol) -> [Vec<f64>; 3] {
+        let duration = protocol.steps as f64 * protocol.time_step;
+        self.ultimate_strains.map(|strain| {
+            let greatest = self.rate_scale * strain / duration;
+            let last = (self.levels.max(2) - 1) as f64;
+            let level = |index: usize| {
+                let share = if self.levels < 2 { 1.0 } else { index as f64 / last };
+                greatest * (1.0 / 15.0 + share * (1.0 - 1.0 / 15.0))
+            };
+            (0..self.levels).map(level).collect()
+        })
+    }
+
+    /// All runs: each direction at each level, then each pair of directions at each pair of levels; 15 levels give
+    /// 3·15 + 3·15² = 720.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for more than 200 levels, or strains or a scale that are not positive.
+    pub fn runs(&self, protocol: &Protocol) -> Result<Vec<Run>, Error> {
+        if self.levels > 200 {
+            return Err(Error::parameter("levels", self.levels, "0 to 200"));
+        }
+        for value in self.ultimate_strains.into_iter().chain([self.rate_scale]) {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(Error::parameter("ultimate strain or rate scale", value, "a positive number"));
+            }
+        }
+        let rates = self.rates(protocol);
+        let mut runs = Vec::new();
+        for axis in 0..3 {
+            for (level, &rate) in rates[axis].iter().enumerate() {
+                let mut of = [None; 6];
+                of[axis] = Some(rate);
+                runs.push((format!("u{}_{level}", AXES[axis]), of));
+            }
+        }
+        for (first, second) in [(0, 1), (0, 2), (1, 2)] {
+            for (i, &a) in rates[first].iter().enumerate() {
+                for (j, &b) in rates[second].iter().enumerate() {
+                    let mut of = [None; 6];
+                    (of[first], of[second]) = (Some(a), Some(b));
+                    runs.push((format!("b{}{}_{i}_{j}", AXES[first], AXES[second]), of));
+                }
+            }
+        }
+        let numbered = runs.into_iter().enumerate();
+        Ok(numbered.map(|(n, (id, rates))| Run::new(id, rates, n % protocol.snapshots)).collect())
+    }
+}
+
+impl Run {
+    /// A run with the kind that its rates make.
+    pub fn new(id: String, rates: [Option<f64>; 6], snapshot: usize) -> Self {
+        let names = |range: std::ops::Range<usize>| -> String {
+            range.filter(|&axis| rates[axis].is_some()).map(|axis| AXES[axis]).collect()
+        };
+        let (pulled, sheared) = (names(0..3), names(3..6));
+        let kind = match (pulled.len(), sheared.is_empty()) {
+            (1, true) => format!("u{pulled}"),
+            (2, true) => format!("b{pulled}"),
+            (3, true) => format!("t{pulled}"),
+            (0, _) => format!("g{sheared}"),
+            _ => format!("m{pulled}{sheared}"),
+        };
+        Self { id, kind, rates, snapshot }
+    }
+
+    /// A general path from text: `x=1e-5,xy=-2e-5`, rates in 1/fs. Any C can be reached so: F of a box is an upper
+    /// triangle, as is the Cholesky factor of C.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for an unknown axis, an axis twice, a rate that is no finite number, none at all.
+    pub fn parse(text: &str, id: String, snapshot: usize) -> Result<Self, Error> {
+        let bad = |found: String| {
+            Error::parameter(
+                "path",
+                found,
+                "x, y, z, xy, xz, yz with a rate in 1/fs each, as `x=1e-5,xy=2e-5`",
+            )
+        };
+        let mut rates = [None; 6];
+        for part in text.split(',') {
+            let (axis, rate) = part.split_once('=').ok_or_else(|| bad(format!("`{part}`")))?;
+            let index = AXES.iter().position(|name| *name == axis.trim());
+            let index = index.ok_or_else(|| bad(format!("the axis `{}`", axis.trim())))?;
+            let rate: f64 = rate.trim().parse().map_err(|_| bad(format!("the rate `{}`", rate.trim())))?;
+            if !rate.is_finite() || rates[index].is_some() {
+                return Err(bad(format!("`{part}`")));
+            }
+            rates[index] = Some(rate);
+        }
+        Ok(Self::new(id, rates, snapshot))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,91 @@
+use super::*;
+
+/// Table 3.2 and formulation.md, chapter 3: 720 runs; [3.3, 50], [4, 60], [1, 15]e-6 per step of 0.5 fs.
+#[test]
+fn the_thesis_grid() {
+    let (protocol, grid) = (Protocol::default(), Grid::default());
+    let runs = grid.runs(&protocol).unwrap();
+    assert_eq!(runs.len(), 720);
+    for (rates, [least, greatest]) in
+        grid.rates(&protocol).iter().zip([[3.33, 50.0], [4.0, 60.0], [1.0, 15.0]])
+    {
+        assert_eq!(rates.len(), 15);
+        let per_step = |rate: f64| rate * protocol.time_step * 1e6;
+        // two digits in the table
+        assert!((per_step(rates[0]) - least).abs() < 0.005 && (per_step(rates[14]) - greatest).abs() < 1e-9);
+        let gap = rates[1] - rates[0];
+        assert!(rates.windows(2).all(|pair| ((pair[1] - pair[0]) / gap - 1.0).abs() < 1e-9));
+    }
+    // 10,000 steps at the greatest rate are the ultimate strain
+    assert!((grid.rates(&protocol)[1][14] * 5000.0 - 0.6).abs() < 1e-12);
+    let count = |kind: &str| runs.iter().filter(|run| run.kind == kind).count();
+    assert_eq!(["ux", "uy", "uz", "bxy", "bxz", "byz"].map(count), [15, 15, 15, 225, 225, 225]);
+    assert!(runs.iter().all(|run| run.snapshot < 6));
+    // samples: (10,000/100 + 1) · 720
+    assert_eq!((protocol.steps / protocol.every + 1) * 720, 72_720);
+}
+
+/// config.json of the project's data: five levels of 4 times the nominal rates in half the time.
+#[test]
+fn the_grid_of_the_shipped_data() {
+    let protocol = Protocol { steps: 5000, every: 50, ..Protocol::default() };
+    let rates = Grid { levels: 5, ..Grid::default() }.rates(&protocol);
+    for (found, expected) in rates[0].iter().zip([1.333333333e-5, 6e-5, 1.066666667e-4, 1.533333333e-4, 2e-4])
+    {
+        assert!((found / expected - 1.0).abs() < 1e-8);
+    }
+    assert!((rates[2][0] / 4e-6 - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn general_paths() {
+    let run = Run::parse("x=1e-5, xy=-2e-5", "p0".into(), 0).unwrap();
+    assert_eq!(run.rates, [Some(1e-5), None, None, Some(-2e-5), None, None]);
+    assert_eq!(run.kind, "mxxy");
+    assert_eq!(Run::parse("yz=1e-5", "p".into(), 0).unwrap().kind, "gyz");
+    for bad in ["", "x", "w=1", "x=fast", "x=inf", "x=1,x=2"] {
+        assert!(Run::parse(bad, "p".into(), 0).is_err(), "{bad}");
+    }
+    let text = input::deform(&Protocol::default(), &run, "d", "o");
+    assert!(text.contains("change_box      all triclinic\n"));
+    assert!(text.contains("deform 1 x erate 1e-5 xy erate -2e-5 remap x units box flip no\n"));
+    assert!(text.contains("npt temp 300 300 50 y 1 1 500 z 1 1 500 scalexy no"));
+    let all = Run::parse("x=1e-5,y=1e-5,z=1e-5", "p".into(), 0).unwrap();
+    assert!(input::deform(&Protocol::default(), &all, "d", "o").contains("all nvt temp"));
+}
+
+#[test]
+fn what_cannot_be_run() {
+    let good = Protocol::default();
+    for bad in [
+        Protocol { every: 0, ..good.clone() },
+        Protocol { every: 3, ..good.clone() },
+        Protocol { steps: 0, ..good.clone() },
+        Protocol { time_step: f64::NAN, ..good.clone() },
+        Protocol { snapshots: 0, ..good.clone() },
+        Protocol { cells: [0, 1, 1], ..good.clone() },
+        Protocol { equilibration: 2, ..good.clone() },
+    ] {
+        assert!(bad.check().is_err(), "{bad:?}");
+    }
+    assert!(Grid { levels: 201, ..Grid::default() }.runs(&good).is_err());
+    assert!(Grid { rate_scale: 0.0, ..Grid::default() }.runs(&good).is_err());
+    let directory = tempfile::tempdir().unwrap();
+    let plan = |runs| Plan { protocol: Protocol::default(), runs };
+    assert!(Folder::create(directory.path(), plan(vec![])).is_err());
+    let run = Run::parse("x=1e-5", "p".into(), 0).unwrap();
+    let twice = Folder::create(directory.path(), plan(vec![run.clone(), run.clone()])).unwrap_err();
+    assert!(twice.to_string().contains("`p` twice"), "{twice}");
+    Folder::create(directory.path(), plan(vec![run.clone()])).unwrap();
+    Folder::create(directory.path(), plan(vec![run])).unwrap();
+    let other = Run::parse("x=2e-5", "p".into(), 0).unwrap();
+    assert!(
+        Folder::create(directory.path(), plan(vec![other])).unwrap_err().to_string().contains("another plan")
+    );
+}
+
+#[test]
+fn no_engine_is_a_clear_error() {
+    let error = Engine::find(Some(std::path::Path::new("/no/such/lmp"))).unwrap_err();
+    assert!(error.to_string().contains("/no/such/lmp") && error.exit_code() == 2, "{error}");
+}

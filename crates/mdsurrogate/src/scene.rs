@@ -1,0 +1,67 @@
+//! The scene of a data set, as written in TOML.
+
+use crate::dataset::{Columns, Fractions, Method};
+use polycore::report::Expect;
+use polycore::units::{Length, Stress};
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// A whole scene.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// The program that runs it: `mdsurrogate`.
+    pub program: Program,
+    /// One line for tables and pictures.
+    #[serde(default)]
+    pub title: String,
+    /// What is read.
+    pub data: Data,
+    /// How it is divided.
+    #[serde(default)]
+    pub split: SplitSpec,
+    /// What the results must be.
+    #[serde(default)]
+    pub expect: Vec<Expect>,
+}
+
+/// The only program that runs these scenes.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Program {
+    /// This crate.
+    Mdsurrogate,
+}
+
+/// Files and how to read them.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Data {
+    /// CSV (also gzip) or HDF5 files to learn from, relative to the scene.
+    pub files: Vec<PathBuf>,
+    /// Files that are kept out of the split.
+    #[serde(default)]
+    pub heldout: Vec<PathBuf>,
+    /// `averaged` or `instantaneous` columns of molecular dynamics tables.
+    #[serde(default)]
+    pub columns: Columns,
+    /// Edges of the undeformed box; default: where the file's own F is 1.
+    pub reference_lengths: Option<[Length; 3]>,
+    /// The unit of stress columns without a unit in their heading; default 1 MPa.
+    pub stress_unit: Option<Stress>,
+}
+
+/// How rows are divided.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SplitSpec {
+    /// `path` (default) or `random` (the thesis').
+    #[serde(default)]
+    pub by: Method,
+    /// Shares of train, validation, test; default 0.64, 0.16, 0.2.
+    #[serde(default)]
+    pub fractions: Fractions,
+    /// Names the shuffle.
+    #[serde(default)]
+    pub seed: u64,
+}
