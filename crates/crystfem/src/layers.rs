@@ -67,7 +67,7 @@ impl Simulation {
         let old = std::mem::replace(&mut self.system, new);
         let sums = self.linear_sums(first)?;
         let mut state = std::mem::take(&mut self.state);
-        let result = self.migrate(&old, &mut state, first as u32, &sums);
+        let result = self.migrate(&old, &mut state, &sums);
         self.state = state;
         result?;
         self.restart();
@@ -149,13 +149,7 @@ impl Simulation {
     }
 
     /// Takes temperatures and points over to the new equations, and mixes at the nodes in `sums`.
-    fn migrate(
-        &mut self,
-        old: &System,
-        state: &mut State,
-        first: u32,
-        sums: &HashMap<u32, Sum>,
-    ) -> Result<(), Error> {
+    fn migrate(&mut self, old: &System, state: &mut State, sums: &HashMap<u32, Sum>) -> Result<(), Error> {
         let (problem, new) = (&self.problem, &self.system);
         let mut memory = Memory::empty(new);
         let mut temperature = vec![0.0; new.size()];
@@ -272,7 +266,6 @@ impl Simulation {
             reaction += if fixed.is_some() { change - new_heat } else { 0.0 };
             temperature[k] = reached;
         }
-        let _ = first;
         (state.temperature, state.memory) = (temperature, memory);
         state.ledger.add_birth(stored, brought, reaction);
         Ok(())

@@ -86,6 +86,7 @@ mod tests {
     fn the_error_is_below_the_tolerance() {
         let size = 500;
         let rows = Rows::build(size, false, |row, out| {
+            out.begin(std::iter::empty());
             out.add(0, 2.0, 0.0);
             if row > 0 {
                 out.add(-1, -1.0, 0.0);
@@ -119,7 +120,10 @@ mod tests {
 
     #[test]
     fn an_indefinite_matrix_and_a_short_limit_are_told() {
-        let rows = Rows::build(2, false, |_, out| out.add(0, -1.0, 0.0));
+        let rows = Rows::build(2, false, |_, out| {
+            out.begin(std::iter::empty());
+            out.add(0, -1.0, 0.0);
+        });
         let operator = Operator { rows: &rows, diagonal: None, weights: [0.0, 1.0], faces: &[] };
         let mut solution = [0.0; 2];
         let mut solve = |limit| {

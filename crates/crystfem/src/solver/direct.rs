@@ -157,6 +157,7 @@ mod tests {
         let (width, height) = (23_usize, 17);
         let size = width * height;
         let rows = Rows::build(size, false, |row, out| {
+            out.begin(std::iter::empty());
             out.add(0, 4.0, 0.0);
             for (other, there) in [
                 (-1, row % width > 0),

@@ -126,6 +126,16 @@ impl System {
         let around = Around::new(mesh, &elements, &equation, size);
 
         let rows = Rows::build(size, consistent, |index, row: &mut Row| {
+            // corners, classes and relative nodes of the elements around say all, but for elements of no class
+            let repeated = row.begin(around.of(index).iter().flat_map(|&corner| {
+                let position = (corner / 8) as usize;
+                let here = [corner % 8, u32::from(kinds[position])];
+                let others = mesh.nodes(elements[position]).iter();
+                here.into_iter().chain(others.map(|&n| equation[n as usize].wrapping_sub(index as u32)))
+            }));
+            if repeated {
+                return;
+            }
             for &corner in around.of(index) {
                 let (position, a) = ((corner / 8) as usize, (corner % 8) as usize);
                 let class = classes.get(usize::from(kinds[position]));

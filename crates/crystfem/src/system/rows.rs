@@ -28,9 +28,26 @@ pub struct Row {
     entries: Vec<(i32, f64, f64)>,
     /// Whether the row has entries that are set later, so that it cannot be shared.
     pub own: bool,
+    key: Vec<u32>,
+    new_key: Vec<u32>,
+    repeated: bool,
 }
 
 impl Row {
+    /// Begins a row by what determines it. True where that is the same as for the row before: nothing needs to be
+    /// added then.
+    pub fn begin(&mut self, determinants: impl Iterator<Item = u32>) -> bool {
+        self.new_key.clear();
+        self.new_key.extend(determinants);
+        self.repeated = !self.own && !self.key.is_empty() && self.key == self.new_key;
+        if !self.repeated {
+            std::mem::swap(&mut self.key, &mut self.new_key);
+            self.entries.clear();
+            self.own = false;
+        }
+        self.repeated
+    }
+
     /// Adds to the entry at a distance from the diagonal.
     pub fn add(&mut self, offset: i32, conduction: f64, capacity: f64) {
         match self.entries.iter_mut().find(|entry| entry.0 == offset) {
@@ -137,7 +154,7 @@ pub struct Rows {
 const SHARED: u32 = u32::MAX;
 
 impl Rows {
-    /// Of `size` rows; `fill` says what is in a row.
+    /// Of `size` rows; `fill` begins each row and says what is in it.
     pub fn build(size: usize, consistent: bool, fill: impl Fn(usize, &mut Row) + Sync) -> Self {
         struct Part {
             segments: Vec<Segment>,
@@ -151,9 +168,13 @@ impl Rows {
                 let mut finder = Finder::default();
                 let mut row = Row::default();
                 for index in item * CHUNK..((item + 1) * CHUNK).min(size) {
-                    row.entries.clear();
-                    row.own = false;
                     fill(index, &mut row);
+                    if row.repeated
+                        && let Some(last) = part.segments.last_mut()
+                    {
+                        last.length += 1;
+                        continue;
+                    }
                     row.entries.sort_unstable_by_key(|entry| entry.0);
                     let last =
                         part.segments.last_mut().filter(|_| !row.own && part.own.last() == Some(&false));
@@ -411,6 +432,7 @@ mod tests {
         let size = 10_000;
         let values = |row: usize| if row == 5000 { [-2.0, 7.0, -3.0] } else { [-1.0, 2.5, -1.0] };
         let mut rows = Rows::build(size, true, |row, out| {
+            out.begin(std::iter::empty());
             let v = values(row);
             for (k, offset) in [-1_i32, 0, 1].into_iter().enumerate() {
                 if (0..size as i64).contains(&(row as i64 + i64::from(offset))) {

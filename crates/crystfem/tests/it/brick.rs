@@ -71,6 +71,12 @@ fn times() {
                 start.elapsed().as_secs_f64() / 20.0,
                 simulation.state().work
             );
+            // the largest so far: of the last size
+            let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+            println!(
+                "{}",
+                status.lines().find(|line| line.starts_with("VmHWM")).unwrap_or("no figure of memory")
+            );
         }
     }
 }

@@ -46,7 +46,7 @@ fn on_any_number_of_threads() {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| {
                     let mut simulation = Simulation::new(problem(general), Settings::adaptive(0.05)).unwrap();
-                    run(&mut simulation, 2.0);
+                    run(&mut simulation, 1.02);
                     simulation.state().clone()
                 })
             })
