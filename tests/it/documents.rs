@@ -4,6 +4,9 @@ use crate::program::{command, finish, workspace};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// Programs that documents may show, besides `xtask`.
+const PROGRAMS: [&str; 4] = ["crystfem", "mdsurrogate", "peri", "polycore"];
+
 /// A command line in a document.
 #[derive(Debug)]
 struct Shown {
@@ -112,7 +115,7 @@ fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
         }
         [program, ..] => {
             let name = program.rsplit('/').next().unwrap_or(program);
-            ["peri", "polycore"].contains(&name).then(|| (name, words[1..].to_vec()))
+            PROGRAMS.contains(&name).then(|| (name, words[1..].to_vec()))
         }
         [] => None,
     }
@@ -140,7 +143,7 @@ fn commands_shown_are_understood() {
     for shown in documents().iter().flat_map(|file| commands_of(file)) {
         let place = format!("{}:{}: {}", shown.file.display(), shown.line, shown.words.join(" "));
         let Some((program, arguments)) = ours(&shown.words) else { continue };
-        if !["peri", "polycore", "xtask"].contains(&program) {
+        if program != "xtask" && !PROGRAMS.contains(&program) {
             faults.push(format!("{place}: there is no program `{program}`"));
             continue;
         }

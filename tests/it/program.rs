@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 /// Programs whose command lines are tested.
-const PACKAGES: [&str; 4] = ["crystfem", "peri", "polycore", "xtask"];
+const PACKAGES: [&str; 5] = ["crystfem", "mdsurrogate", "peri", "polycore", "xtask"];
 
 /// Longer than any of these tests takes on a busy machine: a program that hangs ends here.
 const PATIENCE: Duration = Duration::from_secs(240);
