@@ -69,11 +69,25 @@ fn killed_while_it_breaks() {
     survives_kills(&scenes::fracture("2 mm", "method = \"lbfgs\""));
 }
 
+/// Layers, crystallization with its latent heat, probes and fields.
+#[test]
+fn killed_while_it_prints() {
+    survives_kills_of(
+        "crystfem",
+        &crate::parts::BAR.replace("tolerance = \"1 K\"", "tolerance = \"0.02 K\""),
+    );
+}
+
 fn survives_kills(scene: &str) {
+    survives_kills_of("peri", scene);
+}
+
+fn survives_kills_of(program: &str, scene: &str) {
+    let run = |line: &str, here: &Path| finish(command(program, line, here).spawn().unwrap());
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     fs::write(here.join("plate.toml"), scene).unwrap();
-    peri("run plate.toml --output undisturbed --threads 1", here).with_code(0);
+    run("run plate.toml --output undisturbed --threads 1", here).with_code(0);
     let mut random = Random(2026);
     let mut kills = 0;
     for round in 0..3 {
@@ -90,13 +104,13 @@ fn survives_kills(scene: &str) {
         };
         for _ in 0..12 {
             let delay = Duration::from_secs_f64(0.5 * random.next());
-            if !killed(start(&line(), here), delay) {
+            if !killed(command(program, &line(), here).spawn().unwrap(), delay) {
                 break;
             }
             kills += 1;
         }
         if !out.join("report.json").is_file() || out.join("checkpoint.bin").is_file() {
-            peri(&line(), here).with_code(0);
+            run(&line(), here).with_code(0);
         }
         assert_same(&here.join("undisturbed"), &out);
     }

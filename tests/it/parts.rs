@@ -6,7 +6,7 @@ use polycore::output::vtkhdf;
 use std::fs;
 
 /// A bar of three layers on glass that crystallizes, with latent heat.
-const BAR: &str = r#"version = 1
+pub const BAR: &str = r#"version = 1
 program = "crystfem"
 title = "Small bar"
 

@@ -66,16 +66,20 @@ pub enum Error {
         /// Tolerance, K.
         wanted: f64,
     },
+    /// The run was asked to stop; its checkpoint is written.
+    #[error("interrupted; resume with `crystfem resume {}`", .0.display())]
+    Interrupted(PathBuf),
     /// Files, output, scenes.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
 }
 
 impl Error {
-    /// Exit code of the command line: 2 for bad input, 1 otherwise.
+    /// Exit code of the command line: 2 for bad input, 130 for an interrupted run, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Mesh(_) | Self::Parameter { .. } | Self::File { .. } | Self::Data { .. } => 2,
+            Self::Interrupted(_) => 130,
             Self::NotFinite { .. } | Self::NotConverged { .. } => 1,
             Self::Shared(error) => error.exit_code(),
         }

@@ -4,13 +4,12 @@ use crate::error::Error;
 use crate::run::Outcome;
 use crate::solver::State;
 use serde::{Deserialize, Serialize};
-use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// File name inside an output directory.
-pub const FILE_NAME: &str = "checkpoint.bin";
+pub use polycore::checkpoint::FILE_NAME;
+
 /// First bytes of the file: name and version of the format.
-const MAGIC: &[u8; 8] = b"peri-ck4";
+const MAGIC: &polycore::checkpoint::Magic = b"peri-ck4";
 
 /// The state of a run.
 #[derive(Debug, Serialize, Deserialize)]
@@ -64,57 +63,15 @@ pub fn write<const D: usize>(
     // files that a scene names lie beside it, from wherever the run is resumed
     let scene_path = std::path::absolute(&scene.path).unwrap_or_else(|_| scene.path.clone());
     let written = Written { scene: &scene.text, scene_path: &scene_path, quick, finished, state };
-    let path = directory.join(FILE_NAME);
-    let bytes = postcard::to_stdvec(&written)
-        .map_err(|error| Error::Checkpoint { path: path.clone(), why: error.to_string() })?;
-    polycore::output::atomic_write(&path, |file| {
-        file.write_all(MAGIC)?;
-        file.write_all(&checksum(&bytes).to_le_bytes())?;
-        file.write_all(&bytes)
-    })?;
-    Ok(())
-}
-
-fn bytes(path: &Path) -> Result<Vec<u8>, Error> {
-    let fail = |why: &str| Err(Error::Checkpoint { path: path.into(), why: why.into() });
-    let bytes = match std::fs::read(path) {
-        Ok(bytes) => bytes,
-        Err(error) if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) => {
-            return fail("there is none; a run begins with `peri run`");
-        }
-        Err(error) => return Err(polycore::Error::io("read", path)(error).into()),
-    };
-    let Some((sum, rest)) = bytes.strip_prefix(MAGIC).and_then(|rest| rest.split_first_chunk()) else {
-        return fail("not a checkpoint of this version");
-    };
-    if u64::from_le_bytes(*sum) != checksum(rest) {
-        return fail("damaged or cut short: its checksum does not fit; run the scene again");
-    }
-    Ok(rest.to_vec())
-}
-
-/// FNV-1a over words of 8 bytes, with the length: finds cuts and changed bytes, not forgeries.
-fn checksum(bytes: &[u8]) -> u64 {
-    const PRIME: u64 = 0x0000_0100_0000_01b3;
-    let start = 0xcbf2_9ce4_8422_2325 ^ bytes.len() as u64;
-    bytes.chunks(8).fold(start, |sum, chunk| {
-        let mut word = [0; 8];
-        word[..chunk.len()].copy_from_slice(chunk);
-        // the rotation carries the high bytes, which the product alone would only move up, back down
-        (sum ^ u64::from_le_bytes(word)).wrapping_mul(PRIME).rotate_left(23)
-    })
+    Ok(polycore::checkpoint::write(&directory.join(FILE_NAME), MAGIC, &written)?)
 }
 
 /// Reads which scene a directory's checkpoint belongs to.
 ///
 /// # Errors
-/// [`Error::Checkpoint`], or [`Error::Shared`] where there is no file.
+/// [`polycore::Error::Checkpoint`], or [`Error::Shared`] where there is no file.
 pub fn header(directory: &Path) -> Result<Header, Error> {
-    let path = directory.join(FILE_NAME);
-    let bytes = bytes(&path)?;
-    postcard::take_from_bytes::<Header>(&bytes)
-        .map(|(header, _)| header)
-        .map_err(|error| Error::Checkpoint { path, why: error.to_string() })
+    Ok(polycore::checkpoint::read(&directory.join(FILE_NAME), MAGIC)?)
 }
 
 /// Reads a directory's checkpoint.
@@ -122,7 +79,5 @@ pub fn header(directory: &Path) -> Result<Header, Error> {
 /// # Errors
 /// As [`header`].
 pub fn read<const D: usize>(directory: &Path) -> Result<Checkpoint<D>, Error> {
-    let path = directory.join(FILE_NAME);
-    let bytes = bytes(&path)?;
-    postcard::from_bytes(&bytes).map_err(|error| Error::Checkpoint { path, why: error.to_string() })
+    Ok(polycore::checkpoint::read(&directory.join(FILE_NAME), MAGIC)?)
 }

@@ -78,14 +78,6 @@ pub enum Error {
     /// The run was asked to stop; its checkpoint is written.
     #[error("interrupted; resume with `peri resume {}`", .0.display())]
     Interrupted(PathBuf),
-    /// A checkpoint cannot be used.
-    #[error("checkpoint {}: {why}", path.display())]
-    Checkpoint {
-        /// The file.
-        path: PathBuf,
-        /// Why not.
-        why: String,
-    },
     /// One of several variants.
     #[error("{variant}: {error}")]
     Within {
@@ -103,7 +95,7 @@ impl Error {
     /// Exit code of the command line: 2 for bad input, 130 for an interrupted run, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Geometry(_) | Self::Parameter { .. } | Self::Checkpoint { .. } | Self::TimeStep { .. } => 2,
+            Self::Geometry(_) | Self::Parameter { .. } | Self::TimeStep { .. } => 2,
             Self::Interrupted(_) => 130,
             Self::NotFinite { .. } | Self::NotConverged { .. } | Self::Unstable { .. } => 1,
             Self::Within { error, .. } => error.exit_code(),

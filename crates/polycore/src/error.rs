@@ -43,6 +43,14 @@ pub enum Error {
         /// What is wrong with it.
         reason: String,
     },
+    /// A checkpoint cannot be used.
+    #[error("checkpoint {}: {why}", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        why: String,
+    },
     /// A number outside the range on which an operation is defined.
     #[error("{quantity} = {value} is outside {allowed}")]
     Domain {
@@ -78,10 +86,10 @@ impl Error {
         move |source| Self::Io { operation, path, source }
     }
 
-    /// Exit code of the command lines: 2 for bad input (an unusable output directory), 1 for a failed run.
+    /// Exit code of the command lines: 2 for bad input (an unusable output directory or checkpoint), 1 for a failed run.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::OutputDirectory { .. } => crate::scene::EXIT_BAD_INPUT,
+            Self::OutputDirectory { .. } | Self::Checkpoint { .. } => crate::scene::EXIT_BAD_INPUT,
             _ => 1,
         }
     }

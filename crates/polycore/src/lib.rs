@@ -1,6 +1,7 @@
 //! Shared ground of the polymer-mechanics toolkit: tensors, Langevin statistics, hyperelastic laws,
 //! units, scenes, reports and output.
 
+pub mod checkpoint;
 pub mod error;
 pub mod hyperelastic;
 pub mod langevin;

@@ -1,9 +1,11 @@
 //! Whole scenes: run, compared, drawn and judged.
 
+pub mod checkpoint;
 mod draw;
 mod fit;
 mod part;
 mod point;
+mod probe;
 mod section;
 
 use crate::error::Error;
@@ -11,14 +13,35 @@ use crate::scene::{self, FitScene, Kind, PartScene, PointScene};
 use polycore::report::Report;
 use polycore::scene::{SceneError, Source};
 use std::path::Path;
+use std::time::Duration;
 
 /// How a run behaves towards its user.
-#[derive(Clone, Copy, Debug)]
 pub struct Options<'a> {
     /// Where results go.
     pub output: &'a Path,
     /// Leave out what is marked `quick = false`.
     pub quick: bool,
+    /// Time between checkpoints of a part's run.
+    pub checkpoint_every: Duration,
+    /// Go on from the checkpoint in `output`.
+    pub resume: bool,
+    /// Whether the user asked to stop.
+    pub interrupted: &'a (dyn Fn() -> bool + Sync),
+    /// Sees the progress of a part's run.
+    pub progress: &'a mut (dyn FnMut(&Progress) + Send),
+}
+
+/// Where the run of a part stands.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Time, s.
+    pub time: f64,
+    /// When it ends, s.
+    pub end: f64,
+    /// The last step, s.
+    pub dt: f64,
+    /// Equations.
+    pub equations: usize,
 }
 
 /// What stops a run: a fault in the scene, or one met on the way.
@@ -42,7 +65,7 @@ impl From<polycore::Error> for Failure {
 ///
 /// # Errors
 /// [`Failure`].
-pub fn run(source: &Source, options: &Options) -> Result<Report, Failure> {
+pub fn run(source: &Source, options: &mut Options) -> Result<Report, Failure> {
     match scene::kind(source)? {
         Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, options),
         Kind::Fit => self::fit::run(source, &source.parse::<FitScene>()?, options),

@@ -1,53 +1,64 @@
 //! A body in time: solved, recorded, drawn and judged.
 
+use super::probe::{self, Probe};
 use super::section::Section;
-use super::{Failure, Options, point::CELSIUS, prepare};
+use super::{Failure, Options, Progress, checkpoint, point::CELSIUS, prepare};
 use crate::error::Error;
-use crate::ledger::Ledger;
+use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
 use crate::scene::{PartScene, Task};
-use crate::simulation::Simulation;
-use polycore::output::csv;
-use polycore::output::picture::{FieldMap, LegendPlace, LinePlot, Panel, Series};
-use polycore::output::vtkhdf::{Cells, Data, MeshSeries};
+use crate::simulation::{Simulation, State};
+use polycore::output::picture::{FieldMap, Panel};
+use polycore::output::vtkhdf::{self, Cells, Data, MeshSeries};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::Instant;
 
+/// Name of the temperature among the fields.
+const TEMPERATURE: &str = "temperature_degC";
 /// Fields written unless the scene says how often.
 const FRAMES: f64 = 50.0;
-/// Rows of a probe that are drawn at most.
-const ROWS: usize = 4000;
 
-/// Runs the scene of a body.
-pub fn run(source: &Source, scene: &PartScene, options: &Options) -> Result<Report, Failure> {
+/// Runs the scene of a body, or goes on with it.
+pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<Report, Failure> {
     scene.check(source)?;
     let mut phases = Phases::new();
     phases.start("mesh");
     let built = scene.mesh.build(source)?;
     let task = scene.task(source, built.mesh)?;
-    let probes = Probes::new(scene, &task.problem.mesh);
-    let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     phases.start("solve");
-    let mut simulation = Simulation::new(task.problem.clone(), task.settings)?;
-    prepare(options.output)?;
-    let mut run = Run { scene, task: &task, output: options.output, probes, names: simulation.field_names() };
-    let (series, stages) = run.solve(&mut simulation, &mut phases)?;
+    let (mut simulation, frames, probes);
+    if options.resume {
+        let saved = checkpoint::read(options.output)?;
+        simulation = Simulation::resume(task.problem.clone(), task.settings, saved.state)?;
+        (frames, probes) = (saved.frames, saved.probes);
+    } else {
+        simulation = Simulation::new(task.problem.clone(), task.settings)?;
+        prepare(options.output)?;
+        let fields = simulation.field_names().len();
+        frames = 0;
+        probes = scene.probe.iter().map(|spec| Probe::new(spec, &task.problem.mesh, fields)).collect();
+    }
+    let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
+    let names = simulation.field_names();
+    let mut run = Run { source, scene, task: &task, probes, names, frames };
+    let series = run.solve(&mut simulation, &mut phases, options)?;
     phases.start("write");
     run.record(&simulation, &mut report);
-    run.probes.write(options.output, &mut report)?;
-    if let Some(series) = series {
-        series.finish()?;
-    }
+    probe::write(&run.probes, &run.names, options.output, &mut report)?;
+    let path = series.map(MeshSeries::finish).transpose()?;
     if scene.output.pictures {
         phases.start("draw");
-        run.probes.draw(scene, options.output)?;
-        run.draw(&stages)?;
+        probe::draw(&run.probes, &run.names, scene, options.output)?;
+        run.draw(&run.stages(&simulation, path.as_deref())?, options.output)?;
     }
     phases.stop();
     report.phases(&phases).threads(rayon::current_num_threads()).judge(&scene.expect, options.quick);
     report.write(options.output)?;
+    // the report is the last file: a checkpoint without it is an unfinished run
+    let _ = std::fs::remove_file(options.output.join(polycore::checkpoint::FILE_NAME));
     Ok(report)
 }
 
@@ -84,12 +95,14 @@ pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failur
 }
 
 struct Run<'a> {
+    source: &'a Source,
     scene: &'a PartScene,
     task: &'a Task,
-    output: &'a Path,
-    probes: Probes,
+    probes: Vec<Probe>,
     /// Names of the materials' fields.
     names: Vec<&'static str>,
+    /// Frames of the fields that are written.
+    frames: usize,
 }
 
 /// A section at a time.
@@ -101,49 +114,65 @@ struct Stage {
 }
 
 impl Run<'_> {
+    /// To the end, frame by frame; a frame is written at each of their times even where no fields are.
     fn solve(
         &mut self,
         simulation: &mut Simulation,
         phases: &mut Phases,
-    ) -> Result<(Option<MeshSeries>, Vec<Stage>), Failure> {
+        options: &mut Options,
+    ) -> Result<Option<MeshSeries>, Failure> {
         let (end, mesh) = (self.task.end, &self.task.problem.mesh);
         let every = self.scene.output.every.map_or(end / FRAMES, |every| every.si());
-        let frames = (end / every - 1e-9).ceil().max(1.0) as usize;
-        let wanted = self.scene.output.stages.min(frames);
-        let drawn: Vec<usize> = (1..=wanted).map(|stage| stage * frames / wanted).collect();
-        let mut series = match self.scene.output.fields {
-            true => {
-                let path = self.output.join("fields.vtkhdf");
-                Some(MeshSeries::create(path, mesh.points.clone(), cells(mesh))?)
-            }
-            false => None,
+        let last = (end / every - 1e-9).ceil().max(1.0) as usize;
+        let path = options.output.join("fields.vtkhdf");
+        let mut series = match (self.scene.output.fields, self.frames) {
+            (false, _) => None,
+            (true, 0) => Some(MeshSeries::create(path, mesh.points.clone(), cells(mesh))?),
+            (true, frames) => Some(MeshSeries::resume(path, mesh.points.clone(), cells(mesh), frames)?),
         };
-        let mut stages = Vec::new();
-        self.probes.record(simulation, &self.names);
-        if let Some(series) = &mut series {
-            self.frame(simulation, series)?;
+        let save = |frames: usize, state: &State, probes: &[Probe]| {
+            checkpoint::write(options.output, self.source, options.quick, frames, state, probes)
+        };
+        if self.frames == 0 {
+            probe::record(&mut self.probes, simulation, &self.names);
+            // a run can be resumed from its first moment on
+            save(0, simulation.state(), &self.probes)?;
         }
-        for frame in 1..=frames {
-            let until = (frame as f64 * every).min(end);
-            let (probes, names) = (&mut self.probes, &self.names);
-            let mut worst = Ok(());
-            let mut observe = |simulation: &Simulation, _: &_| -> ControlFlow<()> {
-                worst = probes.check(simulation);
-                probes.record(simulation, names);
-                if worst.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let mut written = Instant::now();
+        while self.frames <= last {
+            let until = (self.frames as f64 * every).min(end);
+            let (probes, names, frames) = (&mut self.probes, &self.names, self.frames);
+            let mut result = Ok(());
+            let mut observe = |simulation: &Simulation, step: &Record| -> ControlFlow<()> {
+                probe::record(probes, simulation, names);
+                let state = simulation.state();
+                (options.progress)(&Progress {
+                    time: state.time,
+                    end,
+                    dt: step.dt,
+                    equations: state.temperature.len(),
+                });
+                let stop = (options.interrupted)();
+                result = finite(simulation);
+                if result.is_ok() && (stop || written.elapsed() >= options.checkpoint_every) {
+                    result = save(frames, state, probes);
+                    written = Instant::now();
+                }
+                if result.is_ok() && stop {
+                    result = Err(Error::Interrupted(options.output.to_path_buf()));
+                }
+                if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
             let _ = simulation.advance(until, &mut observe)?;
-            worst?;
+            result?;
             phases.start("write");
             if let Some(series) = &mut series {
                 self.frame(simulation, series)?;
             }
-            if self.scene.output.pictures && drawn.contains(&frame) {
-                stages.push(self.stage(simulation));
-            }
+            self.frames += 1;
             phases.start("solve");
         }
-        Ok((series, stages))
+        Ok(series)
     }
 
     /// Writes the fields; what does not exist yet is NaN, and 0 in `exists`.
@@ -151,7 +180,7 @@ impl Run<'_> {
         let temperature: Vec<f64> =
             simulation.temperatures(f64::NAN).into_iter().map(|kelvin| kelvin - CELSIUS).collect();
         let fields: Vec<Vec<f64>> = self.names.iter().map(|name| simulation.field(name)).collect();
-        let mut arrays: Vec<Data> = vec![("temperature_degC", 1, temperature.as_slice())];
+        let mut arrays: Vec<Data> = vec![(TEMPERATURE, 1, temperature.as_slice())];
         arrays.extend(self.names.iter().zip(&fields).map(|(name, values)| (*name, 1, values.as_slice())));
         let elements = self.task.problem.mesh.element_count() as u32;
         let exists: Vec<f64> =
@@ -159,16 +188,42 @@ impl Run<'_> {
         Ok(series.step(simulation.time(), &arrays, &[("exists", 1, &exists)])?)
     }
 
-    fn stage(&self, simulation: &Simulation) -> Stage {
+    /// Stages for pictures: out of the fields, or where there are none only the end.
+    fn stages(&self, simulation: &Simulation, path: Option<&Path>) -> Result<Vec<Stage>, Error> {
+        let Some(path) = path else {
+            let temperature = shifted(&simulation.temperatures(f64::NAN));
+            let fields = self.names.iter().map(|name| simulation.field(name)).collect();
+            let born = |element: u32| simulation.is_born(element);
+            return Ok(vec![self.stage(simulation.time(), &born, temperature, fields)]);
+        };
+        let series = vtkhdf::read(path)?;
+        let last = series.len() - 1;
+        let wanted = self.scene.output.stages.min(last);
+        let mut stages = Vec::new();
+        for frame in (1..=wanted).map(|stage| stage * last / wanted) {
+            let exists = series.cell_data(frame, "exists")?;
+            let born = |element: u32| exists.get(element as usize) == Some(&1.0);
+            let temperature = series.data(frame, TEMPERATURE)?;
+            let fields = self.names.iter().map(|name| series.data(frame, name));
+            let fields = fields.collect::<Result<Vec<_>, _>>()?;
+            stages.push(self.stage(series.times()[frame], &born, temperature, fields));
+        }
+        Ok(stages)
+    }
+
+    fn stage(
+        &self,
+        time: f64,
+        born: &dyn Fn(u32) -> bool,
+        temperature: Vec<f64>,
+        fields: Vec<Vec<f64>>,
+    ) -> Stage {
         let mesh = &self.task.problem.mesh;
-        let born: Vec<u32> =
-            self.task.printed.iter().copied().filter(|&element| simulation.is_born(element)).collect();
+        let born: Vec<u32> = self.task.printed.iter().copied().filter(|&element| born(element)).collect();
         let section = Section::through_the_middle(mesh, &born);
-        let temperature: Vec<f64> =
-            simulation.temperatures(f64::NAN).into_iter().map(|kelvin| kelvin - CELSIUS).collect();
-        let mut values = vec![section.values(mesh, &temperature)];
-        values.extend(self.names.iter().map(|name| section.values(mesh, &simulation.field(name))));
-        Stage { title: format!("{:.4} s", simulation.time()), section, values }
+        let all = std::iter::once(temperature).chain(fields);
+        let values = all.map(|field| section.values(mesh, &field)).collect();
+        Stage { title: format!("{time:.4} s"), section, values }
     }
 
     /// The scalars of the end.
@@ -212,7 +267,7 @@ impl Run<'_> {
             .work("builds", work.builds);
     }
 
-    fn draw(&self, stages: &[Stage]) -> Result<(), Error> {
+    fn draw(&self, stages: &[Stage], output: &Path) -> Result<(), Error> {
         let labels = std::iter::once("T [°C]").chain(self.names.iter().copied());
         for (index, label) in labels.enumerate() {
             let all = stages.iter().flat_map(|stage| stage.values[index].iter().copied());
@@ -229,7 +284,7 @@ impl Run<'_> {
                 map = map.panel(if high > low { panel.range(low, high) } else { panel });
             }
             let name = if index == 0 { "temperature" } else { self.names[index - 1] };
-            map.write(self.output.join(format!("section_{name}.png")))?;
+            map.write(output.join(format!("section_{name}.png")))?;
         }
         Ok(())
     }
@@ -268,121 +323,9 @@ fn cells(mesh: &Mesh) -> Cells {
     cells
 }
 
-/// What is recorded in every step.
-struct Probes {
-    probes: Vec<Probe>,
-}
-
-struct Probe {
-    name: String,
-    node: u32,
-    /// How far the node is from where it was asked for, m.
-    distance: f64,
-    time: Vec<f64>,
-    /// °C.
-    temperature: Vec<f64>,
-    fields: Vec<(&'static str, Vec<f64>)>,
-}
-
-impl Probes {
-    fn new(scene: &PartScene, mesh: &Mesh) -> Self {
-        let probes = scene.probe.iter().map(|spec| {
-            let at = spec.at.map(|x| x.si());
-            let distance = |node: usize| {
-                let place = mesh.points[node];
-                (0..3).map(|d| (place[d] - at[d]).powi(2)).sum::<f64>().sqrt()
-            };
-            let nearest = (0..mesh.points.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-            let node = nearest.unwrap_or(0);
-            Probe {
-                name: spec.name.clone(),
-                node: node as u32,
-                distance: distance(node),
-                time: Vec::new(),
-                temperature: Vec::new(),
-                fields: Vec::new(),
-            }
-        });
-        Self { probes: probes.collect() }
-    }
-
-    /// Names a temperature that is none.
-    fn check(&self, simulation: &Simulation) -> Result<(), Error> {
-        let state = simulation.state();
-        let Some(wrong) = state.temperature.iter().position(|t| !t.is_finite()) else { return Ok(()) };
-        let place = format!("equation {wrong}");
-        Err(Error::NotFinite { quantity: "temperature", place, time: state.time })
-    }
-
-    fn record(&mut self, simulation: &Simulation, names: &[&'static str]) {
-        if !self.probes.iter().any(|probe| simulation.exists(probe.node)) {
-            return;
-        }
-        let fields: Vec<Vec<f64>> = names.iter().map(|name| simulation.field(name)).collect();
-        for probe in &mut self.probes {
-            let Some(temperature) = simulation.temperature(probe.node) else { continue };
-            if probe.time.last() == Some(&simulation.time()) {
-                continue;
-            }
-            probe.time.push(simulation.time());
-            probe.temperature.push(temperature - CELSIUS);
-            for (index, (name, values)) in names.iter().zip(&fields).enumerate() {
-                let value = values[probe.node as usize];
-                match probe.fields.get_mut(index) {
-                    Some((_, list)) => list.push(value),
-                    None => probe.fields.push((name, vec![value])),
-                }
-            }
-        }
-    }
-
-    fn write(&self, output: &Path, report: &mut Report) -> Result<(), Error> {
-        for probe in &self.probes {
-            let name = &probe.name;
-            report.value(&format!("{name}.distance"), probe.distance, "m");
-            let mut columns: Vec<csv::Column> =
-                vec![("time", "s", &probe.time), ("temperature", "degC", &probe.temperature)];
-            columns.extend(probe.fields.iter().map(|(name, values)| (*name, "", values.as_slice())));
-            csv::write(output.join(format!("probe_{name}.csv")), &columns)?;
-            let mut last = |quantity: &str, values: &[f64], unit: &str| {
-                if let Some(last) = values.last().filter(|last| last.is_finite()) {
-                    report.value(&format!("{name}.{quantity}"), *last, unit);
-                }
-            };
-            last("temperature", &probe.temperature, "degC");
-            for (quantity, values) in &probe.fields {
-                last(quantity, values, "");
-            }
-        }
-        Ok(())
-    }
-
-    /// Temperatures and fields of all probes over time.
-    fn draw(&self, scene: &PartScene, output: &Path) -> Result<(), Error> {
-        let mut quantities = vec![("temperature", "T [°C]")];
-        if let Some(probe) = self.probes.iter().find(|probe| !probe.fields.is_empty()) {
-            quantities.extend(probe.fields.iter().map(|(name, _)| (*name, *name)));
-        }
-        for (index, (name, label)) in quantities.iter().enumerate() {
-            let mut plot = LinePlot::new(&scene.title).axes("t [s]", label).legend(LegendPlace::TopRight);
-            let mut drawn = false;
-            for probe in self.probes.iter().filter(|probe| probe.time.len() > 1) {
-                let values = match index {
-                    0 => Some(&probe.temperature),
-                    _ => probe.fields.get(index - 1).map(|(_, values)| values),
-                };
-                if let Some(values) = values.filter(|values| values.iter().any(|x| x.is_finite())) {
-                    let every = values.len().div_ceil(ROWS);
-                    let thinned =
-                        |list: &[f64]| -> Vec<f64> { list.iter().copied().step_by(every).collect() };
-                    plot = plot.series(Series::line(&probe.name, &thinned(&probe.time), &thinned(values)));
-                    drawn = true;
-                }
-            }
-            if drawn {
-                plot.write(output.join(format!("probes_{name}.png")))?;
-            }
-        }
-        Ok(())
-    }
+/// Names a temperature that is none.
+fn finite(simulation: &Simulation) -> Result<(), Error> {
+    let state = simulation.state();
+    let Some(wrong) = state.temperature.iter().position(|t| !t.is_finite()) else { return Ok(()) };
+    Err(Error::NotFinite { quantity: "temperature", place: format!("equation {wrong}"), time: state.time })
 }

@@ -201,7 +201,14 @@ fn bad_fits() {
     }
     // two rows for three constants are found by the fit itself
     let source = Source::new(folder.path().join("case.toml"), good);
-    let options = crate::run::Options { output: &folder.path().join("out"), quick: false };
-    let error = crate::run::run(&source, &options).unwrap_err().to_string();
+    let mut options = crate::run::Options {
+        output: &folder.path().join("out"),
+        quick: false,
+        checkpoint_every: std::time::Duration::MAX,
+        resume: false,
+        interrupted: &|| false,
+        progress: &mut |_| {},
+    };
+    let error = crate::run::run(&source, &mut options).unwrap_err().to_string();
     assert!(error.contains("`fit[0].data`") && error.contains("2 measurements for 3 parameters"), "{error}");
 }

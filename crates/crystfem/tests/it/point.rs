@@ -1,9 +1,22 @@
 //! Scenes of the material alone, and fits, from their text to their report.
 
-use crystfem::run::{Options, run};
+use crystfem::run::{Failure, Options, run};
 use polycore::report::Report;
 use polycore::scene::Source;
 use std::path::Path;
+use std::time::Duration;
+
+fn run_quietly(source: &Source, output: &Path, quick: bool) -> Result<Report, Failure> {
+    let mut options = Options {
+        output,
+        quick,
+        checkpoint_every: Duration::MAX,
+        resume: false,
+        interrupted: &|| false,
+        progress: &mut |_| {},
+    };
+    run(source, &mut options)
+}
 
 const SCENE: &str = r#"
 version = 1
@@ -38,7 +51,7 @@ source = "formulation.md, kinetics table"
 
 fn run_in(folder: &Path, text: &str, quick: bool) -> Report {
     let source = Source::new(folder.join("case.toml"), text);
-    match run(&source, &Options { output: &folder.join("out"), quick }) {
+    match run_quietly(&source, &folder.join("out"), quick) {
         Ok(report) => report,
         Err(error) => panic!("{error}"),
     }
@@ -94,7 +107,7 @@ data = [{ file = "out/slow.csv" }, { file = "fast.csv" }]
     let fast: Vec<&str> = cooling.map(|(_, line)| line).collect();
     std::fs::write(folder.path().join("fast.csv"), fast.join("\n")).expect("a file");
     let source = Source::new(folder.path().join("fit.toml"), fit);
-    let report = match run(&source, &Options { output: &folder.path().join("fit"), quick: false }) {
+    let report = match run_quietly(&source, &folder.path().join("fit"), false) {
         Ok(report) => report,
         Err(error) => panic!("{error}"),
     };

@@ -200,7 +200,7 @@ fn run_variant<const D: usize>(
     if state.displacement.slots() != slots {
         let why = format!("it has {} particles' slots, the body now has {slots}", state.displacement.slots());
         let path = options.output.join(checkpoint::FILE_NAME);
-        return Err(Error::Checkpoint { path, why }.into());
+        return Err(polycore::Error::Checkpoint { path, why }.into());
     }
     let mut outcome = Outcome::new(variant.name(), variant);
     let path = options.output.join(format!("{}.vtkhdf", outcome.file_name()));

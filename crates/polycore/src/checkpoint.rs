@@ -1,0 +1,108 @@
+//! What a killed run needs to go on: one file, whole or not at all, with a checksum.
+
+use std::io::{ErrorKind, Write as _};
+use std::path::Path;
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::Error;
+use crate::output::atomic_write;
+
+/// File name inside an output directory.
+pub const FILE_NAME: &str = "checkpoint.bin";
+
+/// First bytes of a file: program and version of what it holds.
+pub type Magic = [u8; 8];
+
+/// Writes a value (postcard, behind magic and checksum).
+///
+/// # Errors
+/// [`Error::Checkpoint`] for what cannot be serialised, [`Error::Io`] where the file cannot be written.
+pub fn write(path: &Path, magic: &Magic, value: &impl Serialize) -> Result<(), Error> {
+    let bytes = postcard::to_stdvec(value).map_err(|error| refused(path, error))?;
+    atomic_write(path, |file| {
+        file.write_all(magic)?;
+        file.write_all(&checksum(&bytes).to_le_bytes())?;
+        file.write_all(&bytes)
+    })
+}
+
+/// Reads a value. A type with the first fields of what was written reads these.
+///
+/// # Errors
+/// [`Error::Checkpoint`] for none, another version, damage, and what is no such value.
+pub fn read<T: DeserializeOwned>(path: &Path, magic: &Magic) -> Result<T, Error> {
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) => {
+            return Err(refused(path, "there is none; a run begins with `run`"));
+        }
+        Err(error) => return Err(Error::io("read", path)(error)),
+    };
+    let Some((sum, rest)) = bytes.strip_prefix(magic).and_then(|rest| rest.split_first_chunk()) else {
+        return Err(refused(path, "not a checkpoint of this version"));
+    };
+    if u64::from_le_bytes(*sum) != checksum(rest) {
+        let why = "damaged or cut short: its checksum does not fit; run the scene again";
+        return Err(refused(path, why));
+    }
+    postcard::take_from_bytes(rest).map(|(value, _)| value).map_err(|error| refused(path, error))
+}
+
+fn refused(path: &Path, why: impl ToString) -> Error {
+    Error::Checkpoint { path: path.into(), why: why.to_string() }
+}
+
+/// FNV-1a over words of 8 bytes, with the length: finds cuts and changed bytes, not forgeries.
+fn checksum(bytes: &[u8]) -> u64 {
+    const PRIME: u64 = 0x0000_0100_0000_01b3;
+    let start = 0xcbf2_9ce4_8422_2325 ^ bytes.len() as u64;
+    bytes.chunks(8).fold(start, |sum, chunk| {
+        let mut word = [0; 8];
+        word[..chunk.len()].copy_from_slice(chunk);
+        // the rotation carries the high bytes, which the product alone would only move up, back down
+        (sum ^ u64::from_le_bytes(word)).wrapping_mul(PRIME).rotate_left(23)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MAGIC: &Magic = b"test-ck1";
+
+    #[test]
+    fn values_come_back_and_damage_is_told() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join(FILE_NAME);
+        let value = ("scene".to_owned(), vec![1.5, f64::NAN, -0.0], 7_u32);
+        write(&path, MAGIC, &value).unwrap();
+        let back: (String, Vec<f64>, u32) = read(&path, MAGIC).unwrap();
+        assert_eq!(
+            back.1.iter().map(|x| x.to_bits()).collect::<Vec<_>>(),
+            value.1.iter().map(|x| x.to_bits()).collect::<Vec<_>>()
+        );
+        assert_eq!((back.0, back.2), (value.0, value.2));
+        // the first fields alone
+        assert_eq!(read::<(String,)>(&path, MAGIC).unwrap().0, "scene");
+        let bytes = std::fs::read(&path).unwrap();
+        let told = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            read::<(String, Vec<f64>, u32)>(&path, MAGIC).unwrap_err().to_string()
+        };
+        for length in 16..bytes.len() {
+            assert!(told(&bytes[..length]).contains("damaged or cut short"), "{length}");
+        }
+        for at in 8..bytes.len() {
+            let mut changed = bytes.clone();
+            changed[at] ^= 0x10;
+            assert!(told(&changed).contains("damaged or cut short"), "{at}");
+        }
+        assert!(told(b"").contains("not a checkpoint of this version"));
+        assert!(told(b"test-ck0").contains("not a checkpoint of this version"));
+        std::fs::remove_file(&path).unwrap();
+        let none = read::<(String,)>(&path, MAGIC).unwrap_err();
+        assert!(none.to_string().contains("there is none") && none.exit_code() == 2);
+    }
+}
