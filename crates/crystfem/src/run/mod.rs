@@ -88,6 +88,8 @@ pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
 /// Makes the output directory, without the report of an earlier run, which must not pass for this one's.
 fn prepare(output: &Path) -> Result<(), Error> {
     polycore::output::prepare_directory(output)?;
-    let _ = std::fs::remove_file(output.join(polycore::report::FILE_NAME));
+    for old in [polycore::checkpoint::FILE_NAME, polycore::report::FILE_NAME] {
+        let _ = std::fs::remove_file(output.join(old));
+    }
     Ok(())
 }

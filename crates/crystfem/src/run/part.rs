@@ -32,11 +32,13 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
     let (mut simulation, frames, probes);
     if options.resume {
         let saved = checkpoint::read(options.output)?;
+        polycore::output::remove_unfinished(options.output);
         simulation = Simulation::resume(task.problem.clone(), task.settings, saved.state)?;
         (frames, probes) = (saved.frames, saved.probes);
     } else {
         simulation = Simulation::new(task.problem.clone(), task.settings)?;
         prepare(options.output)?;
+        polycore::output::remove_unfinished(options.output);
         let fields = simulation.field_names().len();
         frames = 0;
         probes = scene.probe.iter().map(|spec| Probe::new(spec, &task.problem.mesh, fields)).collect();

@@ -114,7 +114,7 @@ fn run_in<const D: usize>(
             let _ = std::fs::remove_file(options.output.join(old));
         }
     }
-    remove_unfinished_files(options.output);
+    polycore::output::remove_unfinished(options.output);
     let (mut finished, mut state) = (Vec::new(), None);
     if options.resume {
         let read = checkpoint::read::<D>(options.output)?;
@@ -164,17 +164,6 @@ fn run_in<const D: usize>(
 /// What the error of a variant must contain, where one is expected.
 fn expected_error<'a>(scene: &'a Scene, variant: &Variant) -> Option<&'a str> {
     variant.study.and_then(|index| scene.study.get(index)?.fails.as_deref())
-}
-
-/// A killed run leaves files that it had begun to write under their temporary names.
-fn remove_unfinished_files(directory: &Path) {
-    for entry in std::fs::read_dir(directory).into_iter().flatten().flatten() {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if name.starts_with('.') && name.ends_with(".part") {
-            let _ = std::fs::remove_file(entry.path());
-        }
-    }
 }
 
 fn run_variant<const D: usize>(
