@@ -5,7 +5,7 @@ use crystfem::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
 use crystfem::material::{Point, Polymer, Property, Semicrystalline, ThermalMaterial};
 use crystfem::melting::Melting;
 use crystfem::run::Failure;
-use serde::Serialize;
+use polycore::command::{Measurement, print_measurements};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -30,16 +30,6 @@ enum What {
     },
 }
 
-#[derive(Serialize)]
-struct Row {
-    what: String,
-    /// Steps.
-    size: u64,
-    threads: usize,
-    value: f64,
-    unit: &'static str,
-}
-
 /// Steps that a timing covers.
 const STEPS: usize = 200_000;
 /// Timings, of which the median counts.
@@ -54,22 +44,13 @@ impl Bench {
         let rows = match self.what {
             What::Kinetics { rate } => kinetics(rate)?,
         };
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&rows).unwrap_or_default());
-        } else {
-            for row in &rows {
-                println!(
-                    "{:<44} {:>9} {:>2} threads {:>12.4e} {}",
-                    row.what, row.size, row.threads, row.value, row.unit
-                );
-            }
-        }
+        print_measurements(&rows, self.json);
         Ok(true)
     }
 }
 
 /// Column 1 of Table 4.1, 200 → 120 °C from a seed of 1e-3 (from which Euler's method can start at all).
-fn kinetics(rate: f64) -> Result<Vec<Row>, Failure> {
+fn kinetics(rate: f64) -> Result<Vec<Measurement>, Failure> {
     if !(rate > 0.0 && rate.is_finite()) {
         let allowed = "above 0".to_owned();
         return Err(crystfem::Error::Parameter { name: "--rate, K/min", found: rate, allowed }.into());
@@ -83,7 +64,7 @@ fn kinetics(rate: f64) -> Result<Vec<Row>, Failure> {
             let steps = (80.0_f64 / kelvin).round() as usize;
             let mut push = |what: &str, value: f64, unit| {
                 let what = format!("{} {what} at {kelvin} K a step", scheme.name());
-                rows.push(Row { what, size: steps as u64, threads: 1, value, unit });
+                rows.push(Measurement { what, size: steps as u64, threads: 1, value, unit });
             };
             let error = error(&kinetics, scheme, rate, kelvin, steps, &exact);
             // JSON knows no NaN: a scheme that leaves [0, 1] for good has no row of errors
@@ -99,7 +80,7 @@ fn kinetics(rate: f64) -> Result<Vec<Row>, Failure> {
             let coupled = if latent.is_some() { "with" } else { "without" };
             let what = format!("response, {name} by 0.5 K, {coupled} latent heat");
             let value = response(kinetics, latent, start, 0.5 * sign)?;
-            rows.push(Row { what, size: STEPS as u64, threads: 1, value, unit: "ns" });
+            rows.push(Measurement { what, size: STEPS as u64, threads: 1, value, unit: "ns" });
         }
     }
     Ok(rows)

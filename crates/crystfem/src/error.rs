@@ -85,3 +85,9 @@ impl Error {
         }
     }
 }
+
+impl From<Error> for polycore::scene::Failure<Error> {
+    fn from(error: Error) -> Self {
+        Self::Run(error)
+    }
+}

@@ -3,17 +3,13 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use crystfem::run::{Failure, Options, Progress};
 use crystfem::scene::Kind;
+use polycore::command::{Progress as Bar, Threads, default_output, exit, interrupted, seconds};
 use polycore::scene::Source;
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 mod bench;
-
-/// Between lines of progress where no terminal shows a bar.
-const LOG_EVERY: Duration = Duration::from_secs(10);
 
 /// Heat conduction and crystallization of semicrystalline polymers printed layer by layer.
 #[derive(Parser)]
@@ -25,9 +21,8 @@ const LOG_EVERY: Duration = Duration::from_secs(10);
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Threads to compute on; default: all. The results are the same bits on any number.
-    #[arg(long, global = true, value_parser = clap::value_parser!(u16).range(1..=4096))]
-    threads: Option<u16>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 /// A scene and where its results go.
@@ -76,19 +71,11 @@ enum Command {
     },
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
-    if (0.0..=1e9).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 0 to 1e9")) }
-}
-
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    if let Some(threads) = cli.threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
-        if let Err(error) = pool.build_global() {
-            eprintln!("error: --threads {threads}: {error}");
-            return ExitCode::FAILURE;
-        }
+    if let Err(error) = cli.threads.apply() {
+        eprintln!("error: {error}");
+        return ExitCode::FAILURE;
     }
     let result = match cli.command {
         Command::Run(scene) => run(&scene, None),
@@ -102,33 +89,7 @@ fn main() -> ExitCode {
             Ok(true)
         }
     };
-    match result {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(failure) => complain(failure),
-    }
-}
-
-/// Prints a failure and tells its exit code.
-fn complain(failure: Failure) -> ExitCode {
-    match failure {
-        Failure::Scene(error) => {
-            eprint!("{}", error.render());
-            ExitCode::from(error.exit_code())
-        }
-        Failure::Run(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(error.exit_code())
-        }
-    }
-}
-
-/// `cases/ch4/cooling-rates/case.toml` → `out/cooling-rates`.
-fn default_output(scene: &Path) -> PathBuf {
-    let stem = scene.file_stem().unwrap_or_default();
-    let folder = scene.parent().and_then(Path::file_name);
-    let name = if stem == "case" { folder.unwrap_or(stem) } else { stem };
-    Path::new("out").join(name)
+    exit(result, crystfem::Error::exit_code)
 }
 
 fn run(scene: &Scene, kind: Option<Kind>) -> Result<bool, Failure> {
@@ -155,40 +116,22 @@ fn resume(output: &Path, every: f64) -> Result<bool, Failure> {
 }
 
 fn solve(source: &Source, output: &Path, quick: bool, every: f64, resume: bool) -> Result<bool, Failure> {
-    static STOP: AtomicBool = AtomicBool::new(false);
-    // a second handler cannot be set; the first does the same
-    let _ = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
-    let bar = match std::io::stderr().is_terminal() {
-        true => indicatif::ProgressBar::new(1000),
-        false => indicatif::ProgressBar::hidden(),
-    };
-    let style =
-        indicatif::ProgressStyle::with_template("{spinner} {bar:30} {elapsed} (about {eta} left) {wide_msg}");
-    bar.set_style(style.unwrap_or_else(|_| indicatif::ProgressStyle::default_bar()));
-    // a log file gets a line now and then
-    let mut logged = Instant::now();
+    let mut bar = Bar::start();
     let mut progress = |at: &Progress| {
-        let message = || {
+        bar.show(at.time / at.end, || {
             format!("t = {:.4} of {:.4} s  step {:.3e} s  {} equations", at.time, at.end, at.dt, at.equations)
-        };
-        if !bar.is_hidden() {
-            bar.set_position((1000.0 * at.time / at.end) as u64);
-            bar.set_message(message());
-        } else if logged.elapsed() >= LOG_EVERY {
-            logged = Instant::now();
-            eprintln!("{}", message());
-        }
+        });
     };
     let mut options = Options {
         output,
         quick,
         checkpoint_every: Duration::from_secs_f64(every),
         resume,
-        interrupted: &|| STOP.load(Ordering::Relaxed),
+        interrupted: interrupted(),
         progress: &mut progress,
     };
     let report = crystfem::run::run(source, &mut options)?;
-    bar.finish_and_clear();
+    bar.finish();
     report.print_table();
     println!("results in {}", output.display());
     Ok(report.passed())

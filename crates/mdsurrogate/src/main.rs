@@ -6,6 +6,7 @@ use mdsurrogate::dataset::{Columns, ReadOptions, read};
 use mdsurrogate::run::{Failure, describe, run};
 use mdsurrogate::scene::Scene;
 use mdsurrogate::surrogate::{CSource, Surrogate};
+use polycore::command::{default_output, exit};
 use polycore::output::atomic_write;
 use polycore::report::Report;
 use polycore::scene::Source;
@@ -80,26 +81,7 @@ fn main() -> ExitCode {
             Ok(true)
         }
     };
-    match result {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(Failure::Scene(error)) => {
-            eprint!("{}", error.render());
-            ExitCode::from(error.exit_code())
-        }
-        Err(Failure::Run(error)) => {
-            eprintln!("error: {error}");
-            ExitCode::from(error.exit_code())
-        }
-    }
-}
-
-/// `cases/ch3/pa12-data/case.toml` → `out/pa12-data`.
-fn default_output(scene: &Path) -> PathBuf {
-    let stem = scene.file_stem().unwrap_or_default();
-    let folder = scene.parent().and_then(Path::file_name);
-    let name = if stem == "case" { folder.unwrap_or(stem) } else { stem };
-    Path::new("out").join(name)
+    exit(result, Error::exit_code)
 }
 
 fn data(scene: &Path, output: &Path, quick: bool) -> Result<bool, Failure> {

@@ -9,26 +9,12 @@ use crate::scene::{Data, Scene};
 use polycore::output::picture::{LinePlot, Series};
 use polycore::output::{csv, prepare_directory};
 use polycore::report::{Phases, Report};
-use polycore::scene::{SceneError, Source};
+use polycore::scene::Source;
 use polycore::tensor::Voigt;
 use std::path::{Path, PathBuf};
 
 /// What stops a run: a fault in the scene, or one met on the way.
-#[derive(Debug, thiserror::Error)]
-pub enum Failure {
-    /// The scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Anything else.
-    #[error(transparent)]
-    Run(#[from] Error),
-}
-
-impl From<polycore::Error> for Failure {
-    fn from(error: polycore::Error) -> Self {
-        Self::Run(error.into())
-    }
-}
+pub type Failure = polycore::scene::Failure<Error>;
 
 /// A finished run.
 pub struct Finished {

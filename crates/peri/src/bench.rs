@@ -6,7 +6,7 @@ use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::potential::{KernelFit, Law};
 use peri::run::Failure;
-use serde::Serialize;
+use polycore::command::{Measurement, print_measurements};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -36,15 +36,6 @@ pub struct Bench {
     solvers: solvers::Options,
 }
 
-#[derive(Serialize)]
-struct Row {
-    what: String,
-    size: u64,
-    threads: usize,
-    value: f64,
-    unit: &'static str,
-}
-
 impl Bench {
     /// Measures and prints.
     pub fn print(self) -> Result<bool, Failure> {
@@ -53,20 +44,11 @@ impl Bench {
             None if !self.solvers.solvers.is_empty() => solvers::measure(&self.solvers.solvers)?,
             None => self.rates()?,
         };
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&rows).unwrap_or_default());
-        } else {
-            for row in &rows {
-                println!(
-                    "{:<44} {:>9} {:>2} threads {:>12.4e} {}",
-                    row.what, row.size, row.threads, row.value, row.unit
-                );
-            }
-        }
+        print_measurements(&rows, self.json);
         Ok(true)
     }
 
-    fn rates(&self) -> Result<Vec<Row>, Failure> {
+    fn rates(&self) -> Result<Vec<Measurement>, Failure> {
         let mut rows = Vec::new();
         for &threads in &self.bench_threads {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
@@ -81,8 +63,14 @@ impl Bench {
         Ok(rows)
     }
 
-    fn measure(&self, threads: usize, rows: &mut Vec<Row>) -> Result<(), Failure> {
-        rows.push(Row { what: "STREAM triad".into(), size: 1 << 25, threads, value: triad(), unit: "B/s" });
+    fn measure(&self, threads: usize, rows: &mut Vec<Measurement>) -> Result<(), Failure> {
+        rows.push(Measurement {
+            what: "STREAM triad".into(),
+            size: 1 << 25,
+            threads,
+            value: triad(),
+            unit: "B/s",
+        });
         for size in [1e4, 1e5, 1e6, 1e7_f64] {
             if size > self.largest {
                 break;
@@ -116,7 +104,11 @@ fn triad() -> f64 {
     3.0 * 8.0 * n as f64 / best
 }
 
-fn measure_dimension<const D: usize>(size: f64, threads: usize, rows: &mut Vec<Row>) -> Result<(), Failure> {
+fn measure_dimension<const D: usize>(
+    size: f64,
+    threads: usize,
+    rows: &mut Vec<Measurement>,
+) -> Result<(), Failure> {
     let side = size.powf(1.0 / D as f64).round();
     let body = [Operation::Add(Shape::Box { min: [0.0; D], max: [side; D] })];
     let lattice = lattice(&body, 1.0, 1.0)?;
@@ -151,7 +143,7 @@ fn measure_bonds<const D: usize>(
     law: Law,
     range: [f64; 2],
     threads: usize,
-    rows: &mut Vec<Row>,
+    rows: &mut Vec<Measurement>,
 ) -> Result<(), Failure> {
     let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
     let built = law.build(720.0, 1200.0, false)?;
@@ -182,12 +174,12 @@ fn measure_bonds<const D: usize>(
     let size = bonds.particles().len() as u64;
     let what = format!("{D}D {path} {} {}–{} ({})", law.name(), range[0], range[1], fit.kind());
     let rate = bonds.directed_bonds() as f64 / times[REPEATS / 2];
-    rows.push(Row { what: what.clone(), size, threads, value: rate, unit: "directed bonds/s" });
+    rows.push(Measurement { what: what.clone(), size, threads, value: rate, unit: "directed bonds/s" });
     if law == Law::Pmb || path == "list" {
         // bonds and particles; displacement, velocity, force and mass of the solver
         let solver = bonds.slots() * 8 * (3 * D + 1);
         let bytes = (bonds.bytes() + solver) as f64 / size as f64;
-        rows.push(Row {
+        rows.push(Measurement {
             what: format!("{D}D {path} memory"),
             size,
             threads,

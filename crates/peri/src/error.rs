@@ -108,3 +108,9 @@ impl Error {
         Self::Geometry(what)
     }
 }
+
+impl From<Error> for polycore::scene::Failure<Error> {
+    fn from(error: Error) -> Self {
+        Self::Run(error)
+    }
+}

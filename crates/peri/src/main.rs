@@ -3,15 +3,11 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use peri::run::{Failure, Options};
 use peri::scene::Scene;
+use polycore::command::{Progress, Threads, default_output, exit, interrupted, seconds};
 use polycore::scene::Source;
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
-
-/// Time between lines of progress where there is no terminal.
-const LOG_EVERY: Duration = Duration::from_secs(10);
+use std::time::Duration;
 
 mod bench;
 mod exact_command;
@@ -26,9 +22,8 @@ mod exact_command;
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Threads to compute on; default: all. The results are the same bits on any number.
-    #[arg(long, global = true, value_parser = clap::value_parser!(u16).range(1..=4096))]
-    threads: Option<u16>,
+    #[command(flatten)]
+    threads: Threads,
 }
 
 #[derive(Subcommand)]
@@ -78,19 +73,11 @@ enum Command {
     },
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
-    if (0.0..=1e9).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 0 to 1e9")) }
-}
-
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    if let Some(threads) = cli.threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
-        if let Err(error) = pool.build_global() {
-            eprintln!("error: --threads {threads}: {error}");
-            return ExitCode::FAILURE;
-        }
+    if let Err(error) = cli.threads.apply() {
+        eprintln!("error: {error}");
+        return ExitCode::FAILURE;
     }
     let result = match cli.command {
         Command::Run { scene, output, quick, explain, checkpoint_every } => {
@@ -106,33 +93,7 @@ fn main() -> ExitCode {
             Ok(true)
         }
     };
-    match result {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(failure) => complain(failure),
-    }
-}
-
-/// Prints a failure and tells its exit code.
-fn complain(failure: Failure) -> ExitCode {
-    match failure {
-        Failure::Scene(error) => {
-            eprint!("{}", error.render());
-            ExitCode::from(error.exit_code())
-        }
-        Failure::Run(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(error.exit_code())
-        }
-    }
-}
-
-/// `cases/ch2/plate-with-hole/case.toml` → `out/plate-with-hole`.
-fn default_output(scene: &Path) -> PathBuf {
-    let stem = scene.file_stem().unwrap_or_default();
-    let folder = scene.parent().and_then(Path::file_name);
-    let name = if stem == "case" { folder.unwrap_or(stem) } else { stem };
-    Path::new("out").join(name)
+    exit(result, peri::Error::exit_code)
 }
 
 fn load(path: &Path) -> Result<(Source, Scene), Failure> {
@@ -170,30 +131,21 @@ fn solve(
     every: f64,
     resume: bool,
 ) -> Result<bool, Failure> {
-    static STOP: AtomicBool = AtomicBool::new(false);
-    // a second handler cannot be set; the first does the same
-    let _ = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
-    let bar = if std::io::stderr().is_terminal() {
-        indicatif::ProgressBar::new(1000)
-    } else {
-        indicatif::ProgressBar::hidden()
-    };
-    let style =
-        indicatif::ProgressStyle::with_template("{spinner} {bar:30} {elapsed} (about {eta} left) {wide_msg}");
-    bar.set_style(style.unwrap_or_else(|_| indicatif::ProgressStyle::default_bar()));
+    let mut bar = Progress::start();
     let mut last = String::new();
-    // a log file gets a line now and then
-    let mut logged = Instant::now();
     let mut progress = |variant: &str, status: &peri::solver::Status| {
         if last != variant {
             variant.clone_into(&mut last);
-            bar.reset();
+            bar.restart();
         }
         if !status.iteration.is_multiple_of(20) {
             return;
         }
         let broken = if status.broken > 0 { format!("  broken {}", status.broken) } else { String::new() };
-        let message = || {
+        // residuals fall by powers of ten: progress is the share of the decades done
+        let decades = (1.0 / status.tolerance).log10();
+        let done = (-status.residual.log10()).clamp(0.0, decades) / decades;
+        bar.show((status.step as f64 + done) / status.steps as f64, || {
             format!(
                 "{variant}  step {}/{}{broken}  iteration {}  residual {:.2e}  reaction {:.3e}",
                 status.step + 1,
@@ -202,29 +154,18 @@ fn solve(
                 status.residual,
                 status.reaction
             )
-        };
-        if !bar.is_hidden() {
-            // residuals fall by powers of ten: progress is the share of the decades done
-            let decades = (1.0 / status.tolerance).log10();
-            let done = (-status.residual.log10()).clamp(0.0, decades) / decades;
-            let position = 1000.0 * (status.step as f64 + done) / status.steps as f64;
-            bar.set_position(position as u64);
-            bar.set_message(message());
-        } else if logged.elapsed() >= LOG_EVERY {
-            logged = Instant::now();
-            eprintln!("{}", message());
-        }
+        });
     };
     let mut options = Options {
         output,
         quick,
         checkpoint_every: Duration::from_secs_f64(every),
         resume,
-        interrupted: &|| STOP.load(Ordering::Relaxed),
+        interrupted: interrupted(),
         progress: &mut progress,
     };
     let finished = peri::run::run(source, scene, &mut options)?;
-    bar.finish_and_clear();
+    bar.finish();
     print!("{}", finished.summary());
     println!("results in {}", output.display());
     Ok(finished.report.passed())

@@ -2,6 +2,8 @@
 //! units, scenes, reports and output.
 
 pub mod checkpoint;
+#[cfg(feature = "command")]
+pub mod command;
 pub mod error;
 pub mod hyperelastic;
 pub mod langevin;

@@ -59,6 +59,20 @@ pub fn prepare_directory(directory: impl AsRef<Path>) -> Result<(), Error> {
     probe.write_all(b"probe").map_err(|error| fail(error.to_string()))
 }
 
+/// The directory of a new run: as [`prepare_directory`], without what an earlier run left, which must not pass for this one's.
+///
+/// # Errors
+/// As [`prepare_directory`].
+pub fn prepare_run(directory: impl AsRef<Path>) -> Result<(), Error> {
+    let directory = directory.as_ref();
+    prepare_directory(directory)?;
+    for old in [crate::checkpoint::FILE_NAME, crate::report::FILE_NAME] {
+        let _ = fs::remove_file(directory.join(old));
+    }
+    remove_unfinished(directory);
+    Ok(())
+}
+
 /// Makes a rename last; best effort, since not every system can synchronise a directory.
 pub(crate) fn sync_directory(directory: &Path) {
     if let Ok(handle) = File::open(directory) {

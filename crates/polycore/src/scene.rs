@@ -26,9 +26,11 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
 mod error;
+mod failure;
 mod locate;
 
 pub use error::SceneError;
+pub use failure::Failure;
 
 /// The only version of the scene format so far.
 pub const VERSION: i64 = 1;

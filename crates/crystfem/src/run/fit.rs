@@ -1,7 +1,7 @@
 //! Fits of measurements: constants with their intervals, tables, pictures.
 
 use super::point::CELSIUS;
-use super::{Failure, Options, prepare};
+use super::{Failure, Options};
 use crate::error::Error;
 use crate::fit::{Fit, avrami, nakamura, ozawa};
 use crate::scene::{FitScene, FitSpec, Job};
@@ -24,7 +24,7 @@ struct Done {
 /// Runs every fit.
 pub fn run(source: &Source, scene: &FitScene, options: &Options) -> Result<Report, Failure> {
     let jobs = scene.jobs(source)?;
-    prepare(options.output)?;
+    polycore::output::prepare_run(options.output)?;
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let mut phases = Phases::new();
     let mut done = Vec::new();

@@ -11,7 +11,7 @@ mod section;
 use crate::error::Error;
 use crate::scene::{self, FitScene, Kind, PartScene, PointScene};
 use polycore::report::Report;
-use polycore::scene::{SceneError, Source};
+use polycore::scene::Source;
 use std::path::Path;
 use std::time::Duration;
 
@@ -45,21 +45,7 @@ pub struct Progress {
 }
 
 /// What stops a run: a fault in the scene, or one met on the way.
-#[derive(Debug, thiserror::Error)]
-pub enum Failure {
-    /// The scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Anything else.
-    #[error(transparent)]
-    Run(#[from] Error),
-}
-
-impl From<polycore::Error> for Failure {
-    fn from(error: polycore::Error) -> Self {
-        Self::Run(error.into())
-    }
-}
+pub type Failure = polycore::scene::Failure<Error>;
 
 /// Runs a scene of any kind and writes its report.
 ///
@@ -83,13 +69,4 @@ pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
         Kind::Fit => Ok(self::fit::explain(source, &source.parse::<FitScene>()?)?),
         Kind::Part => self::part::explain(source, &source.parse::<PartScene>()?),
     }
-}
-
-/// Makes the output directory, without the report of an earlier run, which must not pass for this one's.
-fn prepare(output: &Path) -> Result<(), Error> {
-    polycore::output::prepare_directory(output)?;
-    for old in [polycore::checkpoint::FILE_NAME, polycore::report::FILE_NAME] {
-        let _ = std::fs::remove_file(output.join(old));
-    }
-    Ok(())
 }

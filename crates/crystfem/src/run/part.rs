@@ -2,7 +2,7 @@
 
 use super::probe::{self, Probe};
 use super::section::Section;
-use super::{Failure, Options, Progress, checkpoint, point::CELSIUS, prepare};
+use super::{Failure, Options, Progress, checkpoint, point::CELSIUS};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
@@ -37,8 +37,7 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
         (frames, probes) = (saved.frames, saved.probes);
     } else {
         simulation = Simulation::new(task.problem.clone(), task.settings)?;
-        prepare(options.output)?;
-        polycore::output::remove_unfinished(options.output);
+        polycore::output::prepare_run(options.output)?;
         let fields = simulation.field_names().len();
         frames = 0;
         probes = scene.probe.iter().map(|spec| Probe::new(spec, &task.problem.mesh, fields)).collect();

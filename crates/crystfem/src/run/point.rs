@@ -1,7 +1,7 @@
 //! The material alone: curves, events, pictures.
 
 use super::draw::{self, Run};
-use super::{Failure, Options, prepare};
+use super::{Failure, Options};
 use crate::error::Error;
 use crate::point::{Course, Curves, Drive, Event, Stepping};
 use crate::scene::PointScene;
@@ -24,7 +24,7 @@ pub fn run(source: &Source, scene: &PointScene, options: &Options) -> Result<Rep
         built.push((name.as_str(), *spec, spec.build(source, key)?));
     }
     let courses = scene.courses(source)?;
-    prepare(options.output)?;
+    polycore::output::prepare_run(options.output)?;
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let (mut phases, mut runs) = (Phases::new(), Vec::new());
     for (point, (drive, stepping)) in scene.point.iter().zip(courses) {

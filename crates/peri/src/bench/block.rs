@@ -4,12 +4,13 @@
 //! doi:10.1016/j.compstruc.2004.11.026), free on all sides, released at rest from a smooth displacement. The constants
 //! are those of LAMMPS' example `peri`, Parks et al. 2008, doi:10.1016/j.cpc.2008.06.011.
 
-use super::{RATIO, Row};
+use super::RATIO;
 use peri::Error;
 use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection, force};
 use peri::calibrate::{Space, modulus, poisson_ratio};
 use peri::field::{Field, chunk_range};
 use peri::potential::{KernelFit, Law};
+use polycore::command::Measurement;
 use polycore::output::csv::{self, Column};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -70,7 +71,7 @@ pub fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
 }
 
 /// Builds the block, moves it, and gives its rates.
-pub fn measure(cells: u16, options: &Options) -> Result<Vec<Row>, Error> {
+pub fn measure(cells: u16, options: &Options) -> Result<Vec<Measurement>, Error> {
     let mut block = Block::new(cells.into(), options)?;
     let start = Instant::now();
     for _ in 0..options.steps {
@@ -81,7 +82,7 @@ pub fn measure(cells: u16, options: &Options) -> Result<Vec<Row>, Error> {
         block.write(path)?;
     }
     let (particles, bonds) = (block.bonds.particles().len(), block.bonds.directed_bonds());
-    let row = |what: &str, value: f64, unit: &'static str| Row {
+    let row = |what: &str, value: f64, unit: &'static str| Measurement {
         what: format!("block: {what}"),
         size: particles as u64,
         threads: rayon::current_num_threads(),

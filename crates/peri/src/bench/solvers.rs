@@ -3,7 +3,7 @@
 //! The plate with a hole of `cases/ch2/plate-with-hole`, from rest to equilibrium in one load step. Error: the largest
 //! difference of displacements from the same lattice's equilibrium at a residual of 1e-11, over the root mean square.
 
-use super::{RATIO, Row};
+use super::RATIO;
 use peri::Error;
 use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
@@ -13,6 +13,7 @@ use peri::solver::{
     AdaptiveDynamicRelaxation, Equilibrium, LimitedMemory, Loads, PreconditionedLbfgs, Relaxation, State,
     Support, System, march,
 };
+use polycore::command::Measurement;
 use std::time::Instant;
 
 /// Half a side of the plate, its thickness, and the hole's radius, m.
@@ -39,7 +40,7 @@ fn spacing(text: &str) -> Result<f64, String> {
 }
 
 /// Every method at every tolerance.
-pub fn measure(spacings: &[f64]) -> Result<Vec<Row>, Error> {
+pub fn measure(spacings: &[f64]) -> Result<Vec<Measurement>, Error> {
     let mut rows = Vec::new();
     for spacing in spacings {
         let mut plate = Plate::new(1e-3 * spacing)?;
@@ -50,7 +51,7 @@ pub fn measure(spacings: &[f64]) -> Result<Vec<Row>, Error> {
                 let state = plate.solve(method, tolerance)?;
                 let seconds = start.elapsed().as_secs_f64();
                 let mut row = |what: &str, value: f64, unit: &'static str| {
-                    rows.push(Row {
+                    rows.push(Measurement {
                         what: format!("{method} {tolerance:e}: {what}"),
                         size: plate.bonds.particles().len() as u64,
                         threads: rayon::current_num_threads(),

@@ -22,7 +22,7 @@ use crate::scene::{self, Scene, Variant, body_of, loads_of};
 use crate::solver::{Breaking, Loads, State, Status, System, march};
 use crate::stress::{Loaded, Tensor, piola_in_cloud, piola_on_lattice};
 use polycore::report::{Phases, Report};
-use polycore::scene::{SceneError, Source};
+use polycore::scene::Source;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -46,21 +46,7 @@ pub struct Options<'a> {
 }
 
 /// What stops a run: a fault in the scene, or one met on the way.
-#[derive(Debug, thiserror::Error)]
-pub enum Failure {
-    /// The scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Anything else.
-    #[error(transparent)]
-    Run(#[from] Error),
-}
-
-impl From<polycore::Error> for Failure {
-    fn from(error: polycore::Error) -> Self {
-        Self::Run(error.into())
-    }
-}
+pub type Failure = polycore::scene::Failure<Error>;
 
 /// A finished run.
 pub struct Finished {
@@ -107,19 +93,13 @@ fn run_in<const D: usize>(
             Bonded::new(&source, &scene, variant, body)?;
         }
     }
-    polycore::output::prepare_directory(options.output)?;
-    if !options.resume {
-        // what an earlier run left must not pass for this one's
-        for old in [checkpoint::FILE_NAME, polycore::report::FILE_NAME] {
-            let _ = std::fs::remove_file(options.output.join(old));
-        }
-    }
-    polycore::output::remove_unfinished(options.output);
     let (mut finished, mut state) = (Vec::new(), None);
     if options.resume {
+        polycore::output::remove_unfinished(options.output);
         let read = checkpoint::read::<D>(options.output)?;
         (finished, state) = (read.finished, read.state);
     } else {
+        polycore::output::prepare_run(options.output)?;
         // a run can be resumed from its first moment on
         checkpoint::write::<D>(options.output, source, options.quick, &finished, None)?;
     }

@@ -1,0 +1,161 @@
+//! What the command lines of this workspace share: exit codes, progress, threads, where results go.
+
+use crate::scene::Failure;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::fmt::Display;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Time between lines of progress where there is no terminal.
+const LOG_EVERY: Duration = Duration::from_secs(10);
+
+/// The exit code of a command that tells whether it passed; a failure is printed. `code` is that of a run's error.
+pub fn exit<E: Display>(result: Result<bool, Failure<E>>, code: impl Fn(&E) -> u8) -> ExitCode {
+    match result {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(Failure::Scene(error)) => {
+            eprint!("{}", error.render());
+            ExitCode::from(error.exit_code())
+        }
+        Err(Failure::Run(error)) => {
+            eprintln!("error: {error}");
+            ExitCode::from(code(&error))
+        }
+    }
+}
+
+/// `cases/ch2/plate-with-hole/case.toml` → `out/plate-with-hole`.
+pub fn default_output(scene: &Path) -> PathBuf {
+    let stem = scene.file_stem().unwrap_or_default();
+    let folder = scene.parent().and_then(Path::file_name);
+    let name = if stem == "case" { folder.unwrap_or(stem) } else { stem };
+    Path::new("out").join(name)
+}
+
+/// A time in seconds, for clap.
+///
+/// # Errors
+/// The text is no number, or none of 0 to 1e9.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    if (0.0..=1e9).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 0 to 1e9")) }
+}
+
+/// The option `--threads`.
+#[derive(clap::Args)]
+pub struct Threads {
+    /// Threads to compute on; default: all. The results are the same bits on any number.
+    #[arg(long, global = true, value_parser = clap::value_parser!(u16).range(1..=4096))]
+    threads: Option<u16>,
+}
+
+impl Threads {
+    /// Makes the thread pool of the program.
+    ///
+    /// # Errors
+    /// The system does not give so many threads.
+    pub fn apply(&self) -> Result<(), String> {
+        let Some(threads) = self.threads else { return Ok(()) };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+        pool.build_global().map_err(|error| format!("--threads {threads}: {error}"))
+    }
+}
+
+/// Whether the user asked to stop (Ctrl-C, SIGTERM) since the first call.
+pub fn interrupted() -> &'static (dyn Fn() -> bool + Sync) {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    // a second handler cannot be set; the first does the same
+    let _ = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
+    &|| STOP.load(Ordering::Relaxed)
+}
+
+/// A measurement, for `bench`.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Measurement {
+    /// What was measured.
+    pub what: String,
+    /// Its size: particles, equations, steps.
+    pub size: u64,
+    /// Threads it ran on.
+    pub threads: usize,
+    /// The value.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+/// Prints measurements, for people or as JSON for programs.
+pub fn print_measurements(rows: &[Measurement], json: bool) {
+    if json {
+        println!("{}", serde_json::to_string_pretty(rows).unwrap_or_default());
+        return;
+    }
+    for Measurement { what, size, threads, value, unit } in rows {
+        println!("{what:<44} {size:>9} {threads:>2} threads {value:>12.4e} {unit}");
+    }
+}
+
+/// Progress of a long run: a bar on a terminal, a line now and then in a log file.
+pub struct Progress {
+    bar: ProgressBar,
+    logged: Instant,
+}
+
+impl Progress {
+    /// Nothing is shown yet.
+    pub fn start() -> Self {
+        let bar = match std::io::stderr().is_terminal() {
+            true => ProgressBar::new(1000),
+            false => ProgressBar::hidden(),
+        };
+        let style =
+            ProgressStyle::with_template("{spinner} {bar:30} {elapsed} (about {eta} left) {wide_msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Self { bar, logged: Instant::now() }
+    }
+
+    /// Starts the estimate of what is left again.
+    pub fn restart(&self) {
+        self.bar.reset();
+    }
+
+    /// The part done, 0 to 1, and what to say of it.
+    pub fn show(&mut self, part: f64, message: impl FnOnce() -> String) {
+        if !self.bar.is_hidden() {
+            self.bar.set_position((1000.0 * part) as u64);
+            self.bar.set_message(message());
+        } else if self.logged.elapsed() >= LOG_EVERY {
+            self.logged = Instant::now();
+            eprintln!("{}", message());
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_go_into_a_folder_of_the_case() {
+        let outputs =
+            ["cases/ch2/dent/case.toml", "mine/bar.toml", "bar.toml"].map(Path::new).map(default_output);
+        assert_eq!(outputs, ["out/dent", "out/bar", "out/bar"].map(PathBuf::from));
+    }
+
+    #[test]
+    fn seconds_are_checked() {
+        assert_eq!(seconds("1.5"), Ok(1.5));
+        for wrong in ["-1", "NaN", "inf", "2e9", "1 s"] {
+            assert!(seconds(wrong).is_err(), "{wrong}");
+        }
+    }
+}
