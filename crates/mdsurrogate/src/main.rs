@@ -14,6 +14,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+mod bench;
 mod md_command;
 
 /// From molecular dynamics to a constitutive law.
@@ -60,6 +61,8 @@ enum Command {
         /// Where the files go; its last part is the name of the C function: out/pa12 gives out/pa12.c, out/pa12.h.
         output: PathBuf,
     },
+    /// Measure the cost of a stress, a tangent and a batch, in both precisions, on one thread.
+    Bench(bench::Bench),
     /// Print a shell's completion script.
     Completions {
         /// The shell.
@@ -76,6 +79,7 @@ fn main() -> ExitCode {
         Command::Info { file, instantaneous } => info(&file, instantaneous).map_err(Failure::from),
         Command::Md(md) => md.run().map_err(Failure::from),
         Command::Export { law, output } => export(&law, &output).map_err(Failure::from),
+        Command::Bench(bench) => bench.print().map_err(Failure::from),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "mdsurrogate", &mut std::io::stdout());
             Ok(true)

@@ -1,71 +1,7 @@
-//! What neurons do with their sums, in two precisions.
+//! What neurons do with their sums.
 
+use super::real::Real;
 use serde::{Deserialize, Serialize};
-use std::fmt::Debug;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
-
-/// The two precisions of inference.
-pub trait Real:
-    Copy
-    + Default
-    + Debug
-    + PartialOrd
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-    + AddAssign
-    + Send
-    + Sync
-    + 'static
-{
-    /// 0.
-    const ZERO: Self;
-    /// 1.
-    const ONE: Self;
-    /// Rounded from f64.
-    fn from_f64(value: f64) -> Self;
-    /// To f64, exact.
-    fn to_f64(self) -> f64;
-    /// eˣ.
-    fn exp(self) -> Self;
-    /// ln(1 + x).
-    fn ln_1p(self) -> Self;
-    /// tanh x.
-    fn tanh(self) -> Self;
-}
-
-macro_rules! real {
-    ($type:ident) => {
-        impl Real for $type {
-            const ZERO: Self = 0.0;
-            const ONE: Self = 1.0;
-            #[inline]
-            fn from_f64(value: f64) -> Self {
-                value as Self
-            }
-            #[inline]
-            fn to_f64(self) -> f64 {
-                self.into()
-            }
-            #[inline]
-            fn exp(self) -> Self {
-                self.exp()
-            }
-            #[inline]
-            fn ln_1p(self) -> Self {
-                self.ln_1p()
-            }
-            #[inline]
-            fn tanh(self) -> Self {
-                self.tanh()
-            }
-        }
-    };
-}
-real!(f32);
-real!(f64);
 
 /// What a neuron does with its sum; (3.11) and more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -93,55 +29,156 @@ impl Activation {
         [Self::Linear, Self::Relu, Self::Softplus, Self::Tanh, Self::Sigmoid, Self::Silu, Self::Elu];
 
     /// Value, first and second derivative.
-    #[inline]
     pub fn at<T: Real>(self, x: T) -> [T; 3] {
-        let (zero, one) = (T::ZERO, T::ONE);
         match self {
-            Self::Linear => [x, one, zero],
-            Self::Relu => {
-                if x <= zero {
-                    [zero, zero, zero]
-                } else {
-                    [x, one, zero]
-                }
-            }
-            Self::Softplus => {
-                let small = if x < zero { x.exp() } else { (-x).exp() };
-                let s = logistic(x, small);
-                let positive = if x < zero { zero } else { x };
-                [positive + small.ln_1p(), s, s * (one - s)]
-            }
-            Self::Tanh => {
-                let t = x.tanh();
-                let first = one - t * t;
-                [t, first, -(t + t) * first]
-            }
-            Self::Sigmoid => {
-                let s = logistic(x, if x < zero { x.exp() } else { (-x).exp() });
-                let first = s * (one - s);
-                [s, first, first * (one - s - s)]
-            }
-            Self::Silu => {
-                let s = logistic(x, if x < zero { x.exp() } else { (-x).exp() });
-                let slope = s * (one - s);
-                [x * s, s + x * slope, slope * (one + one + x * (one - s - s))]
-            }
-            Self::Elu => {
-                if x > zero {
-                    [x, one, zero]
-                } else {
-                    let e = x.exp();
-                    [e - one, e, e]
-                }
-            }
+            Self::Linear => Linear::at::<T, false>(x),
+            Self::Relu => Relu::at::<T, false>(x),
+            Self::Softplus => Softplus::at::<T, false>(x),
+            Self::Tanh => Tanh::at::<T, false>(x),
+            Self::Sigmoid => Sigmoid::at::<T, false>(x),
+            Self::Silu => Silu::at::<T, false>(x),
+            Self::Elu => Elu::at::<T, false>(x),
+        }
+    }
+
+    /// Values, first and second derivatives of a list; lists that are empty are not wanted.
+    #[inline(always)]
+    pub(super) fn fill<T: Real, const FUSED: bool>(
+        self,
+        sums: &[T],
+        values: &mut [T],
+        first: &mut [T],
+        second: &mut [T],
+    ) {
+        match self {
+            Self::Linear => fill::<Linear, T, FUSED>(sums, values, first, second),
+            Self::Relu => fill::<Relu, T, FUSED>(sums, values, first, second),
+            Self::Softplus => fill::<Softplus, T, FUSED>(sums, values, first, second),
+            Self::Tanh => fill::<Tanh, T, FUSED>(sums, values, first, second),
+            Self::Sigmoid => fill::<Sigmoid, T, FUSED>(sums, values, first, second),
+            Self::Silu => fill::<Silu, T, FUSED>(sums, values, first, second),
+            Self::Elu => fill::<Elu, T, FUSED>(sums, values, first, second),
         }
     }
 }
 
+/// Plain loops without branches: the compiler turns them into vectors of the dispatched width.
+#[inline(always)]
+fn fill<F: Function, T: Real, const FUSED: bool>(
+    sums: &[T],
+    values: &mut [T],
+    first: &mut [T],
+    second: &mut [T],
+) {
+    let count = sums.len().min(values.len());
+    let (sums, values) = (&sums[..count], &mut values[..count]);
+    if second.len() >= count && first.len() >= count {
+        let (first, second) = (&mut first[..count], &mut second[..count]);
+        for k in 0..count {
+            [values[k], first[k], second[k]] = F::at::<T, FUSED>(sums[k]);
+        }
+    } else if first.len() >= count {
+        let first = &mut first[..count];
+        for k in 0..count {
+            [values[k], first[k], _] = F::at::<T, FUSED>(sums[k]);
+        }
+    } else {
+        for k in 0..count {
+            [values[k], _, _] = F::at::<T, FUSED>(sums[k]);
+        }
+    }
+}
+
+/// A function of one variable with two derivatives, without branches.
+trait Function {
+    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3];
+}
+
+struct Linear;
+struct Relu;
+struct Softplus;
+struct Tanh;
+struct Sigmoid;
+struct Silu;
+struct Elu;
+
+impl Function for Linear {
+    #[inline(always)]
+    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+        [x, T::ONE, T::ZERO]
+    }
+}
+
+impl Function for Relu {
+    #[inline(always)]
+    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+        // NaN is not ≤ 0 and stays
+        let off = x <= T::ZERO;
+        [if off { T::ZERO } else { x }, if off { T::ZERO } else { T::ONE }, T::ZERO]
+    }
+}
+
+impl Function for Softplus {
+    #[inline(always)]
+    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+        let small = exp_of_minus_size::<T, FUSED>(x);
+        let s = logistic(x, small);
+        let positive = if x < T::ZERO { T::ZERO } else { x };
+        [positive + small.ln_1p_of_unit::<FUSED>(), s, s * (T::ONE - s)]
+    }
+}
+
+impl Function for Tanh {
+    #[inline(always)]
+    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+        // (1 − e^{−2|x|})/(1 + e^{−2|x|}): to rounding of 1, not of small x
+        let small = exp_of_minus_size::<T, FUSED>(x + x);
+        let size = (T::ONE - small) / (T::ONE + small);
+        let t = if x < T::ZERO { -size } else { size };
+        let first = T::ONE - t * t;
+        [t, first, -(t + t) * first]
+    }
+}
+
+impl Function for Sigmoid {
+    #[inline(always)]
+    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+        let s = logistic(x, exp_of_minus_size::<T, FUSED>(x));
+        let first = s * (T::ONE - s);
+        [s, first, first * (T::ONE - s - s)]
+    }
+}
+
+impl Function for Silu {
+    #[inline(always)]
+    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+        let s = logistic(x, exp_of_minus_size::<T, FUSED>(x));
+        let slope = s * (T::ONE - s);
+        // far out the slope is 0, and so is what it multiplies, also where x is infinite
+        let bent = if slope == T::ZERO { T::ZERO } else { x * slope };
+        [x * s, s + bent, (slope + slope) + bent * (T::ONE - s - s)]
+    }
+}
+
+impl Function for Elu {
+    #[inline(always)]
+    fn at<T: Real, const FUSED: bool>(x: T) -> [T; 3] {
+        let e = exp_of_minus_size::<T, FUSED>(x);
+        let on = x > T::ZERO;
+        [if on { x } else { e - T::ONE }, if on { T::ONE } else { e }, if on { T::ZERO } else { e }]
+    }
+}
+
+/// e^{−|x|}.
+#[inline(always)]
+fn exp_of_minus_size<T: Real, const FUSED: bool>(x: T) -> T {
+    (if x > T::ZERO { -x } else { x }).exp_of_negative::<FUSED>()
+}
+
 /// 1/(1 + e⁻ˣ) from `small` = e^{−|x|}.
-#[inline]
+#[inline(always)]
 fn logistic<T: Real>(x: T, small: T) -> T {
-    if x < T::ZERO { small / (T::ONE + small) } else { T::ONE / (T::ONE + small) }
+    (if x < T::ZERO { small } else { T::ONE }) / (T::ONE + small)
 }
 
 #[cfg(test)]

@@ -5,8 +5,18 @@ use crate::random::SplitMix64;
 use serde::{Deserialize, Serialize};
 
 mod activation;
+mod packed;
+mod pass;
+mod real;
 
-pub use activation::{Activation, Real};
+pub(crate) use pass::BATCH;
+
+pub use activation::Activation;
+pub use pass::Tape;
+pub use real::Real;
+
+use packed::Packed;
+use pass::Want;
 
 /// Most inputs of a network whose derivatives are asked for: the lanes of one row of a Jacobian.
 pub const LANES: usize = 8;
@@ -87,20 +97,8 @@ pub struct Layer<T> {
 pub struct Network<T> {
     architecture: Architecture,
     layers: Vec<Layer<T>>,
-}
-
-/// Memory for one evaluation, reused between them.
-#[derive(Debug, Clone, Default)]
-pub struct Tape<T> {
-    /// Of each layer: activations, σ′, σ″.
-    values: Vec<Vec<T>>,
-    first: Vec<Vec<T>>,
-    second: Vec<Vec<T>>,
-    /// Of each layer: derivatives of its sums, and of its activations, by the inputs.
-    sums: Vec<Vec<[T; LANES]>>,
-    slopes: Vec<Vec<[T; LANES]>>,
-    adjoint: Vec<T>,
-    adjoint_before: Vec<T>,
+    packed: Vec<Packed<T>>,
+    transposed: Vec<Packed<T>>,
 }
 
 impl<T: Real> Network<T> {
@@ -133,7 +131,14 @@ impl<T: Real> Network<T> {
                 ));
             }
         }
-        Ok(Self { architecture, layers })
+        Ok(Self::packed(architecture, layers))
+    }
+
+    fn packed(architecture: Architecture, layers: Vec<Layer<T>>) -> Self {
+        let pairs = || architecture.widths.windows(2).zip(&layers);
+        let packed = pairs().map(|(w, layer)| Packed::new(w[0], &layer.weights, &layer.bias)).collect();
+        let transposed = pairs().map(|(w, layer)| Packed::transposed(w[0], w[1], &layer.weights)).collect();
+        Self { architecture, layers, packed, transposed }
     }
 
     /// Glorot's uniform weights, ±√(6/(inputs + outputs)), and no bias, as Keras begins; the same seed gives the same
@@ -173,61 +178,36 @@ impl<T: Real> Network<T> {
             bias: list(&layer.bias),
             activation: layer.activation,
         };
-        Network { architecture: self.architecture.clone(), layers: self.layers.iter().map(layer).collect() }
+        Network::packed(self.architecture.clone(), self.layers.iter().map(layer).collect())
     }
 
     /// The outputs at `input`; surplus inputs are not read, missing ones count as 0.
     pub fn forward<'t>(&self, input: &[T], tape: &'t mut Tape<T>) -> &'t [T] {
         tape.fit(self);
-        for (index, layer) in self.layers.iter().enumerate() {
-            let (before, after) = tape.values.split_at_mut(index);
-            let x = before.last().map_or(input, |values| &values[..]);
-            let width = self.architecture.widths[index];
-            for (k, row) in layer.weights.chunks_exact(width).enumerate() {
-                let [value, first, second] = layer.activation.at(layer.bias[k] + dot(row, x));
-                after[0][k] = value;
-                tape.first[index][k] = first;
-                tape.second[index][k] = second;
-            }
-        }
-        &tape.values[self.layers.len() - 1]
+        tape.set_input(0, input);
+        pass::run(self, Want::Points { count: 1, gradients: false }, tape);
+        tape.output(0)
     }
 
-    /// Outputs and their derivatives by the inputs, one row an output (forward mode; inputs up to [`LANES`]).
-    pub fn jacobian<'t>(&self, input: &[T], tape: &'t mut Tape<T>) -> (&'t [T], &'t [[T; LANES]]) {
-        self.forward(input, tape);
-        for (index, layer) in self.layers.iter().enumerate() {
-            let (before, after) = tape.slopes.split_at_mut(index);
-            let width = self.architecture.widths[index];
-            for (k, row) in layer.weights.chunks_exact(width).enumerate() {
-                let mut sum = [T::ZERO; LANES];
-                match before.last() {
-                    // the inputs by themselves are the unit matrix
-                    None => {
-                        for (lane, &weight) in sum.iter_mut().zip(row) {
-                            *lane = weight;
-                        }
-                    }
-                    Some(slopes) => {
-                        for (slope, &weight) in slopes.iter().zip(row) {
-                            for lane in 0..LANES {
-                                sum[lane] += weight * slope[lane];
-                            }
-                        }
-                    }
-                }
-                let first = tape.first[index][k];
-                for lane in 0..LANES {
-                    after[0][k][lane] = first * sum[lane];
-                }
-                tape.sums[index][k] = sum;
-            }
+    /// Outputs and their derivatives, ∂y/∂x_b in list b (forward mode; inputs up to [`LANES`], further ones are left out).
+    pub fn jacobian<'t>(&self, input: &[T], tape: &'t mut Tape<T>) -> (&'t [T], [&'t [T]; LANES]) {
+        let inputs = self.architecture.widths[0];
+        tape.fit(self);
+        tape.set_input(0, input);
+        let mut slopes: [&[T]; LANES] = [&[]; LANES];
+        if inputs > LANES {
+            pass::run(self, Want::Points { count: 1, gradients: false }, tape);
+            return (tape.output(0), slopes);
         }
-        let last = self.layers.len() - 1;
-        (&tape.values[last], &tape.slopes[last])
+        pass::run(self, Want::Slopes, tape);
+        let tape = &*tape;
+        for (b, slope) in slopes.iter_mut().enumerate().take(inputs) {
+            *slope = tape.output(b + 1);
+        }
+        (tape.output(0), slopes)
     }
 
-    /// Value, gradient and second derivatives of the first output by the inputs (up to [`LANES`]).
+    /// Value, gradient and second derivatives of the first output by the inputs (up to [`LANES`], all 0 for more).
     ///
     /// With the sums a of each layer and the adjoints g = ∂out/∂y of its activations y = σ(a):
     /// gradient by reverse mode, H = Σ g σ″(a) (∂a/∂x)(∂a/∂x)ᵀ over all neurons.
@@ -236,90 +216,69 @@ impl<T: Real> Network<T> {
         input: &[T],
         tape: &mut Tape<T>,
     ) -> (T, [T; LANES], [[T; LANES]; LANES]) {
-        self.derivatives(input, true, tape)
+        tape.fit(self);
+        tape.set_input(0, input);
+        if self.architecture.widths[0] > LANES {
+            return (self.forward(input, tape)[0], [T::ZERO; LANES], [[T::ZERO; LANES]; LANES]);
+        }
+        let hessian = pass::run(self, Want::Curvature, tape);
+        let (value, gradient) = first_output(tape, 0);
+        (value, gradient, hessian)
     }
 
-    /// Value and gradient of the first output, and its second derivatives if it is to be `curved` (else zero).
-    pub(crate) fn derivatives(
+    /// Value and gradient of the first output by the inputs (up to [`LANES`]).
+    pub fn gradient(&self, input: &[T], tape: &mut Tape<T>) -> (T, [T; LANES]) {
+        tape.fit(self);
+        tape.set_input(0, input);
+        pass::run(self, Want::Points { count: 1, gradients: true }, tape);
+        first_output(tape, 0)
+    }
+
+    /// Outputs at up to [`BATCH`] points side by side, to the same bits as one by one; `outputs` is called with each.
+    pub(crate) fn forward_batch(
         &self,
-        input: &[T],
-        curved: bool,
+        inputs: &[[T; LANES]],
         tape: &mut Tape<T>,
-    ) -> (T, [T; LANES], [[T; LANES]; LANES]) {
-        if curved {
-            self.jacobian(input, tape);
-        } else {
-            self.forward(input, tape);
+        mut outputs: impl FnMut(usize, &[T]),
+    ) {
+        let count = self.points(inputs, false, tape);
+        for point in 0..count {
+            outputs(point, tape.output(point));
         }
-        let mut hessian = [[T::ZERO; LANES]; LANES];
-        tape.adjoint.clear();
-        tape.adjoint.resize(self.architecture.widths[self.layers.len()], T::ZERO);
-        tape.adjoint[0] = T::ONE;
-        for (index, layer) in self.layers.iter().enumerate().rev() {
-            let width = self.architecture.widths[index];
-            tape.adjoint_before.clear();
-            tape.adjoint_before.resize(width, T::ZERO);
-            for (k, row) in layer.weights.chunks_exact(width).enumerate() {
-                let g = tape.adjoint[k];
-                if curved {
-                    let curvature = g * tape.second[index][k];
-                    let sum = &tape.sums[index][k];
-                    for i in 0..LANES {
-                        let scaled = curvature * sum[i];
-                        for j in 0..LANES {
-                            hessian[i][j] += scaled * sum[j];
-                        }
-                    }
-                }
-                let delta = g * tape.first[index][k];
-                for (before, &weight) in tape.adjoint_before.iter_mut().zip(row) {
-                    *before += delta * weight;
-                }
-            }
-            std::mem::swap(&mut tape.adjoint, &mut tape.adjoint_before);
+    }
+
+    /// Value and gradient of the first output at up to [`BATCH`] points side by side, to the same bits as one by one.
+    pub(crate) fn gradient_batch(
+        &self,
+        inputs: &[[T; LANES]],
+        tape: &mut Tape<T>,
+        mut outputs: impl FnMut(usize, T, [T; LANES]),
+    ) {
+        let count = self.points(inputs, true, tape);
+        for point in 0..count {
+            let (value, gradient) = first_output(tape, point);
+            outputs(point, value, gradient);
         }
-        let mut gradient = [T::ZERO; LANES];
-        for (lane, &adjoint) in gradient.iter_mut().zip(&tape.adjoint) {
-            *lane = adjoint;
+    }
+
+    fn points(&self, inputs: &[[T; LANES]], gradients: bool, tape: &mut Tape<T>) -> usize {
+        let count = inputs.len().min(BATCH);
+        tape.fit(self);
+        for (point, input) in inputs.iter().enumerate().take(count) {
+            tape.set_input(point, input);
         }
-        (tape.values[self.layers.len() - 1][0], gradient, hessian)
+        pass::run(self, Want::Points { count, gradients }, tape);
+        count
     }
 }
 
-impl<T: Real> Tape<T> {
-    fn fit(&mut self, network: &Network<T>) {
-        let widths = &network.architecture.widths[1..];
-        if self.values.len() == widths.len() && self.values.iter().zip(widths).all(|(v, w)| v.len() == *w) {
-            return;
-        }
-        let lists = || widths.iter().map(|&width| vec![T::ZERO; width]).collect();
-        let rows = || widths.iter().map(|&width| vec![[T::ZERO; LANES]; width]).collect();
-        (self.values, self.first, self.second) = (lists(), lists(), lists());
-        (self.sums, self.slopes) = (rows(), rows());
+/// Value and gradient of the first output at a point.
+fn first_output<T: Real>(tape: &Tape<T>, point: usize) -> (T, [T; LANES]) {
+    let mut gradient = [T::ZERO; LANES];
+    for (lane, &adjoint) in gradient.iter_mut().zip(tape.gradient(point)) {
+        *lane = adjoint;
     }
-}
-
-/// Σ aᵢbᵢ in eight partial sums, so that it vectorises; always in the same order.
-#[inline]
-fn dot<T: Real>(a: &[T], b: &[T]) -> T {
-    let mut sums = [T::ZERO; 8];
-    let (a_blocks, b_blocks) = (a.chunks_exact(8), b.chunks_exact(8));
-    let mut rest = T::ZERO;
-    if a.len() == b.len() {
-        for (&x, &y) in a_blocks.remainder().iter().zip(b_blocks.remainder()) {
-            rest += x * y;
-        }
-        for (x, y) in a_blocks.zip(b_blocks) {
-            for lane in 0..8 {
-                sums[lane] += x[lane] * y[lane];
-            }
-        }
-    } else {
-        for (&x, &y) in a.iter().zip(b) {
-            rest += x * y;
-        }
-    }
-    ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + rest
+    (tape.output(point)[0], gradient)
 }
 
 #[cfg(test)]
@@ -361,6 +320,50 @@ mod tests {
         assert_eq!(gradient[2..], [0.0; 6]);
     }
 
+    /// Widths around panels and vectors, all activations, against plain sums in f64: 1e-14 is some roundings a layer.
+    #[test]
+    fn kernels_give_what_plain_loops_give() {
+        for (width, inputs) in [(1, 3), (7, 6), (16, 1), (17, 5), (40, 7), (97, 8), (224, 4)] {
+            for activation in Activation::ALL {
+                let hidden = [(width, activation), (width / 2 + 1, Activation::Relu), (5, activation)];
+                let network = Network::<f64>::random(Architecture::new(inputs, &hidden, 6), 4).unwrap();
+                let x = [0.3, -0.2, 0.5, 0.1, -0.7, 0.9, 0.05, 0.6];
+                let mut values = x[..inputs].to_vec();
+                // rows of outputs, columns of inputs
+                let unit = |i: usize| (0..inputs).map(|j| f64::from(u8::from(i == j))).collect();
+                let mut slopes: Vec<Vec<f64>> = (0..inputs).map(unit).collect();
+                for layer in network.layers() {
+                    let (mut next, mut next_slopes) = (Vec::new(), Vec::new());
+                    for (row, bias) in layer.weights.chunks(values.len()).zip(&layer.bias) {
+                        let sum: f64 = row.iter().zip(&values).map(|(w, y)| w * y).sum();
+                        let [value, first, _] = layer.activation.at(sum + bias);
+                        next.push(value);
+                        let slope = |b: usize| row.iter().zip(&slopes).map(|(w, s)| w * s[b]).sum::<f64>();
+                        next_slopes.push((0..inputs).map(|b| first * slope(b)).collect());
+                    }
+                    (values, slopes) = (next, next_slopes);
+                }
+                let mut tape = Tape::default();
+                let (outputs, jacobian) = network.jacobian(&x, &mut tape);
+                for a in 0..6 {
+                    assert!((outputs[a] - values[a]).abs() < 1e-14, "{width} {inputs} {activation:?}");
+                    for b in 0..inputs {
+                        assert!(
+                            (jacobian[b][a] - slopes[a][b]).abs() < 1e-14,
+                            "{width} {inputs} {activation:?}"
+                        );
+                    }
+                }
+                let outputs = outputs.to_vec();
+                assert_eq!(network.forward(&x, &mut tape), outputs);
+                let gradient = network.gradient(&x, &mut tape).1;
+                for b in 0..inputs {
+                    assert!((gradient[b] - slopes[0][b]).abs() < 1e-14, "{width} {inputs} {activation:?}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn second_derivatives_are_those_of_the_gradient() {
         let hidden = [(13, Activation::Tanh), (9, Activation::Softplus), (5, Activation::Silu)];
@@ -372,7 +375,8 @@ mod tests {
         let (_, jacobian) = network.jacobian(&x, &mut tape);
         for lane in 0..LANES {
             // forward and reverse mode sum in different orders
-            assert!((jacobian[0][lane] - gradient[lane]).abs() < 1e-15);
+            let slope = jacobian[lane].first().copied().unwrap_or_default();
+            assert!((slope - gradient[lane]).abs() < 1e-15);
         }
         let step = 1e-5;
         for i in 0..7 {

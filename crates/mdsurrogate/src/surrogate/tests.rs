@@ -228,6 +228,29 @@ fn extreme_deformations_are_errors_or_finite() {
 }
 
 #[test]
+fn lists_give_the_bits_of_single_points() {
+    let mut random = SplitMix64::new(8);
+    let point =
+        |_| Voigt::from_fn(|a, _| if a < 3 { 0.8 + random.uniform() } else { 0.2 * random.uniform() });
+    let points: Vec<Voigt> = (0..21).map(point).collect();
+    let mut memory = Workspace::default();
+    for (name, law) in all() {
+        let mut answers = vec![Answer::default(); points.len()];
+        law.stresses(&points, &mut memory, &mut answers).unwrap();
+        for (c, answer) in points.iter().zip(&answers) {
+            assert_eq!(*answer, law.stress(c, &mut memory).unwrap(), "{name}");
+        }
+        law.tangents(&points, &mut memory, &mut answers).unwrap();
+        assert_eq!(answers[17], law.tangent(&points[17], &mut memory).unwrap(), "{name}");
+        let mut bad = points.clone();
+        bad[19][1] = f64::NAN;
+        let error = law.stresses(&bad, &mut memory, &mut answers).unwrap_err().to_string();
+        assert!(error.contains("(point 19 of the list)") && error.contains("component 22 = NaN"), "{error}");
+        assert!(law.stresses(&points, &mut memory, &mut answers[1..]).is_err());
+    }
+}
+
+#[test]
 fn single_precision_agrees() {
     for (name, law) in all() {
         let single: Surrogate<f32> = law.convert().unwrap();

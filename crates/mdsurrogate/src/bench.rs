@@ -1,0 +1,98 @@
+//! `mdsurrogate bench`: nanoseconds a point of stress, of tangent and of batches, of the thesis' network and of energies.
+
+use mdsurrogate::Error;
+use mdsurrogate::network::{Activation::Softplus, Architecture, Real};
+use mdsurrogate::surrogate::{Answer, Header, Kind, Surrogate, Symmetry, Workspace};
+use nalgebra::{SVector, Scalar};
+use polycore::command::{Measurement, print_measurements};
+use std::hint::black_box;
+use std::time::Instant;
+
+/// Repetitions, of which the least counts: what disturbs a measurement only adds to it.
+const REPEATS: usize = 15;
+
+/// Points of one repetition.
+const POINTS: usize = 512;
+
+/// What to measure.
+#[derive(clap::Args)]
+pub struct Bench {
+    /// Print JSON rows {what, size, threads, value, unit}.
+    #[arg(long)]
+    json: bool,
+    /// A law to measure in place of the built-in ones with random weights.
+    law: Option<std::path::PathBuf>,
+}
+
+impl Bench {
+    /// Measures and prints.
+    pub fn print(self) -> Result<bool, Error> {
+        let mut rows = Vec::new();
+        for (name, law) in self.laws()? {
+            measure(&name, "f64", &law, &mut rows)?;
+            measure(&name, "f32", &law.convert::<f32>()?, &mut rows)?;
+        }
+        print_measurements(&rows, self.json);
+        Ok(true)
+    }
+
+    fn laws(&self) -> Result<Vec<(String, Surrogate<f64>)>, Error> {
+        if let Some(path) = &self.law {
+            return Ok(vec![("law".into(), Surrogate::read(path)?)]);
+        }
+        let mut ann = Header::new(Kind::Ann, &[], 1);
+        ann.architecture = Architecture::thesis(4)?;
+        let hidden = [(96, Softplus), (96, Softplus)];
+        let energy = Header::new(Kind::energy(Symmetry::Orthotropic), &hidden, 1);
+        let named = [("ann-4", ann), ("energy 2 × 96", energy)];
+        named.into_iter().map(|(name, header)| Ok((name.to_owned(), Surrogate::random(header, 1)?))).collect()
+    }
+}
+
+fn measure<T: Real + Scalar>(
+    name: &str,
+    precision: &str,
+    law: &Surrogate<T>,
+    rows: &mut Vec<Measurement>,
+) -> Result<(), Error> {
+    let [low, high] = [0.9, 1.3];
+    let point = |k: usize| {
+        let at = |a: usize| low + (high - low) * ((k * (2 * a + 3)) % 97) as f64 / 97.0;
+        SVector::<T, 6>::from_fn(|a, _| T::from_f64(if a < 3 { at(a) } else { 0.1 * (at(a) - 1.0) }))
+    };
+    let points: Vec<_> = (0..POINTS).map(point).collect();
+    let mut memory = Workspace::default();
+    let mut answers = vec![Answer::default(); POINTS];
+    let size = law.header().architecture.parameters() as u64;
+    let mut row = |what: &str, value: f64| {
+        let what = format!("{name}, {precision}, {what}");
+        rows.push(Measurement { what, size, threads: 1, value, unit: "ns/point" });
+    };
+    let single = least_time(|| {
+        for (c, answer) in points.iter().zip(&mut answers) {
+            *answer = law.stress(black_box(c), &mut memory)?;
+        }
+        Ok(())
+    })?;
+    row("stress", single);
+    let with_tangent = least_time(|| {
+        for (c, answer) in points.iter().zip(&mut answers) {
+            *answer = law.tangent(black_box(c), &mut memory)?;
+        }
+        Ok(())
+    })?;
+    row("stress and tangent", with_tangent);
+    row("stress, batch", least_time(|| law.stresses(black_box(&points), &mut memory, &mut answers))?);
+    Ok(())
+}
+
+/// Nanoseconds a point.
+fn least_time(mut run: impl FnMut() -> Result<(), Error>) -> Result<f64, Error> {
+    let mut least = f64::INFINITY;
+    for _ in 0..REPEATS {
+        let start = Instant::now();
+        run()?;
+        least = least.min(start.elapsed().as_secs_f64() * 1e9 / POINTS as f64);
+    }
+    Ok(least)
+}

@@ -1,0 +1,174 @@
+//! Weights in the order in which the kernel reads them, and the kernel.
+//!
+//! Outputs stand in panels of [`Lanes::PANEL`](super::real::Lanes::PANEL); within a panel come all inputs, one row of
+//! the panel's width each. A product goes through the inputs once, with the sums of a panel for several columns
+//! (a value and its slopes, or several points) in registers, and skips inputs that are 0 in all columns, as many are
+//! after a `relu`. Each sum is taken in the order of the inputs, whatever the number of columns: the same bits.
+
+use super::real::{Lanes, Real};
+use pulp::Simd;
+
+/// Most columns of one product: a value and eight slopes.
+pub(super) const MOST_COLUMNS: usize = 9;
+
+/// W and b of one layer, packed.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Packed<T> {
+    inputs: usize,
+    padded: usize,
+    weights: Vec<T>,
+    bias: Vec<T>,
+}
+
+impl<T: Real> Packed<T> {
+    /// W, (outputs, inputs) row by row, and b.
+    pub fn new(inputs: usize, weights: &[T], bias: &[T]) -> Self {
+        Self::fill(inputs, bias.len(), bias, |k, j| weights[k * inputs + j])
+    }
+
+    /// Wᵀ without b: from outputs to inputs.
+    pub fn transposed(inputs: usize, outputs: usize, weights: &[T]) -> Self {
+        Self::fill(outputs, inputs, &[], |j, k| weights[k * inputs + j])
+    }
+
+    fn fill(inputs: usize, outputs: usize, bias: &[T], weight: impl Fn(usize, usize) -> T) -> Self {
+        let padded = padded::<T>(outputs);
+        let mut weights = vec![T::ZERO; inputs * padded];
+        for k in 0..outputs {
+            let (panel, lane) = (k / T::PANEL, k % T::PANEL);
+            for j in 0..inputs {
+                weights[(panel * inputs + j) * T::PANEL + lane] = weight(k, j);
+            }
+        }
+        let mut bias = bias.to_vec();
+        bias.resize(padded, T::ZERO);
+        Self { inputs, padded, weights, bias }
+    }
+
+    /// W x + b for each column of x, b only in the first `biased` of them; columns lie `stride` apart, those of the
+    /// result as far as the padded number of outputs.
+    #[inline(always)]
+    pub fn product<S: Simd>(
+        &self,
+        simd: S,
+        active: &[u32],
+        (x, stride): (&[T], usize),
+        (columns, biased): (usize, usize),
+        out: &mut [T],
+    ) {
+        match columns {
+            1 => self.columns::<S, 1>(simd, active, x, stride, biased, out),
+            2..=4 => self.columns::<S, 4>(simd, active, x, stride, biased, out),
+            5 | 6 => self.columns::<S, 6>(simd, active, x, stride, biased, out),
+            7 => self.columns::<S, 7>(simd, active, x, stride, biased, out),
+            8 => self.columns::<S, 8>(simd, active, x, stride, biased, out),
+            _ => self.columns::<S, MOST_COLUMNS>(simd, active, x, stride, biased, out),
+        }
+    }
+
+    #[inline(always)]
+    fn columns<S: Simd, const COLUMNS: usize>(
+        &self,
+        simd: S,
+        active: &[u32],
+        x: &[T],
+        stride: usize,
+        biased: usize,
+        out: &mut [T],
+    ) {
+        let mut lists: [&[T]; COLUMNS] = [&[]; COLUMNS];
+        for c in 0..COLUMNS {
+            lists[c] = &x[c * stride..c * stride + self.inputs];
+        }
+        let panels = self.padded / T::PANEL;
+        let in_panel = T::PANEL * size_of::<T>() / size_of::<T::Vector<S>>();
+        let mut panel = 0;
+        // one column: several panels at a time, to hide the latency of the sums
+        if COLUMNS == 1 && in_panel == 2 {
+            while panel + 4 <= panels {
+                self.tile::<S, COLUMNS, 4, 2>(simd, active, &lists, biased, (panel, 0), out);
+                panel += 4;
+            }
+            while panel + 2 <= panels {
+                self.tile::<S, COLUMNS, 2, 2>(simd, active, &lists, biased, (panel, 0), out);
+                panel += 2;
+            }
+        }
+        if COLUMNS == 1 && in_panel == 4 {
+            while panel + 2 <= panels {
+                self.tile::<S, COLUMNS, 2, 4>(simd, active, &lists, biased, (panel, 0), out);
+                panel += 2;
+            }
+        }
+        // 32 registers hold the sums of a whole panel of two; 16 those of one
+        for panel in panel..panels {
+            for place in (0..in_panel).step_by(if in_panel == 2 { 2 } else { 1 }) {
+                if in_panel == 2 {
+                    self.tile::<S, COLUMNS, 1, 2>(simd, active, &lists, biased, (panel, place), out);
+                } else {
+                    self.tile::<S, COLUMNS, 1, 1>(simd, active, &lists, biased, (panel, place), out);
+                }
+            }
+        }
+    }
+
+    /// `PANELS` panels from number `panel` on, of each `REGISTERS` vectors of outputs from number `place` on.
+    #[inline(always)]
+    fn tile<S: Simd, const COLUMNS: usize, const PANELS: usize, const REGISTERS: usize>(
+        &self,
+        simd: S,
+        active: &[u32],
+        lists: &[&[T]; COLUMNS],
+        biased: usize,
+        (panel, place): (usize, usize),
+        out: &mut [T],
+    ) {
+        let lanes = size_of::<T::Vector<S>>() / size_of::<T>();
+        let (in_panel, registers) = (T::PANEL / lanes, self.padded / lanes);
+        let (weights, bias) = (T::vectors::<S>(&self.weights), T::vectors::<S>(&self.bias));
+        let zero = T::splat(simd, T::ZERO);
+        let mut rows: [&[T::Vector<S>]; PANELS] = [&[]; PANELS];
+        let mut sums = [[[zero; REGISTERS]; PANELS]; COLUMNS];
+        let at = panel * in_panel + place;
+        for p in 0..PANELS {
+            let size = self.inputs * in_panel;
+            rows[p] = &weights[(panel + p) * size..(panel + p + 1) * size];
+            for c in 0..COLUMNS {
+                for r in 0..REGISTERS {
+                    if c < biased {
+                        sums[c][p][r] = bias[at + p * in_panel + r];
+                    }
+                }
+            }
+        }
+        for &j in active {
+            let j = j as usize;
+            let mut weight = [[zero; REGISTERS]; PANELS];
+            for p in 0..PANELS {
+                let row = &rows[p][j * in_panel + place..][..REGISTERS];
+                weight[p].copy_from_slice(row);
+            }
+            for c in 0..COLUMNS {
+                let value = T::splat(simd, lists[c][j]);
+                for p in 0..PANELS {
+                    for r in 0..REGISTERS {
+                        sums[c][p][r] = T::mul_add(simd, weight[p][r], value, sums[c][p][r]);
+                    }
+                }
+            }
+        }
+        let out = T::vectors_mut::<S>(out);
+        for c in 0..COLUMNS {
+            for p in 0..PANELS {
+                for r in 0..REGISTERS {
+                    out[c * registers + at + p * in_panel + r] = sums[c][p][r];
+                }
+            }
+        }
+    }
+}
+
+/// Outputs in whole panels.
+pub(super) fn padded<T: Lanes>(outputs: usize) -> usize {
+    outputs.next_multiple_of(T::PANEL)
+}

@@ -1,0 +1,287 @@
+//! From C to an answer: members, their mean, lists of points.
+
+use super::{Answer, Kind, Surrogate, Workspace, back, product};
+use crate::Error;
+use crate::kinematics::NAMES;
+use crate::network::{BATCH, LANES, Real, Tape};
+use nalgebra::{SMatrix, SVector};
+use polycore::tensor::voigt;
+
+/// Energy, ∂W/∂c (or S of an `ann`) and their derivatives by c.
+pub(super) struct Member<T> {
+    pub energy: T,
+    pub first: [T; 6],
+    pub second: [[T; 6]; 6],
+}
+
+impl<T: Real + nalgebra::Scalar> Surrogate<T> {
+    /// S at each C with its doubts, to the same bits as one by one, at less cost.
+    ///
+    /// # Errors
+    /// Those of [`Surrogate::stress`], with the place in the list; a list of answers of another length.
+    pub fn stresses(
+        &self,
+        c: &[SVector<T, 6>],
+        memory: &mut Workspace<T>,
+        answers: &mut [Answer<T>],
+    ) -> Result<(), Error> {
+        same_length(c.len(), answers.len())?;
+        let members = self.members.len();
+        for (chunk, (points, answers)) in c.chunks(BATCH).zip(answers.chunks_mut(BATCH)).enumerate() {
+            let (mut inputs, mut local) = ([[T::ZERO; LANES]; BATCH], [[T::ZERO; 6]; BATCH]);
+            for (p, point) in points.iter().enumerate() {
+                check_deformation(point).map_err(|error| at_point(chunk * BATCH + p, error))?;
+                local[p] = self.input(&(*point).into(), &mut inputs[p]);
+            }
+            let inputs = &inputs[..points.len()];
+            memory.parts.clear();
+            memory.parts.resize(members * BATCH, (T::ZERO, [T::ZERO; 6]));
+            for (network, parts) in self.members.iter().zip(memory.parts.chunks_mut(BATCH)) {
+                if matches!(self.header.kind, Kind::Ann) {
+                    network.forward_batch(inputs, &mut memory.tape, |p, values| {
+                        parts[p] = (T::ZERO, self.mapped(values).first);
+                    });
+                } else {
+                    network.gradient_batch(inputs, &mut memory.tape, |p, value, gradient| {
+                        let member = self.energetic(&local[p], value, &gradient, None);
+                        parts[p] = (member.energy, member.first);
+                    });
+                }
+            }
+            for (p, (point, answer)) in points.iter().zip(answers).enumerate() {
+                *answer = self
+                    .combine(point, memory.parts[p..].iter().step_by(BATCH), None)
+                    .map_err(|error| at_point(chunk * BATCH + p, error))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// S and the tangent 2 ∂S/∂C at each C with their doubts: the bits of [`Surrogate::tangent`], one after the other
+    /// (a tangent fills the registers by itself).
+    ///
+    /// # Errors
+    /// Those of [`Surrogate::tangent`], with the place in the list; a list of answers of another length.
+    pub fn tangents(
+        &self,
+        c: &[SVector<T, 6>],
+        memory: &mut Workspace<T>,
+        answers: &mut [Answer<T>],
+    ) -> Result<(), Error> {
+        same_length(c.len(), answers.len())?;
+        for (p, (point, answer)) in c.iter().zip(answers).enumerate() {
+            *answer = self.evaluate(point, true, memory).map_err(|error| at_point(p, error))?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn evaluate(
+        &self,
+        c: &SVector<T, 6>,
+        tangent: bool,
+        memory: &mut Workspace<T>,
+    ) -> Result<Answer<T>, Error> {
+        check_deformation(c)?;
+        let at: [T; 6] = (*c).into();
+        let mut slope = [[T::ZERO; 6]; 6];
+        memory.parts.clear();
+        for m in 0..self.members.len() {
+            let member = self.member(m, &at, tangent, &mut memory.tape);
+            memory.parts.push((member.energy, member.first));
+            if tangent {
+                for a in 0..6 {
+                    for b in 0..6 {
+                        slope[a][b] += member.second[a][b];
+                    }
+                }
+            }
+        }
+        self.combine(c, memory.parts.iter(), tangent.then_some(&slope))
+    }
+
+    /// The mean of the members, each without its value and stress at rest; `slope`: the sum of their second derivatives.
+    fn combine<'a>(
+        &self,
+        c: &SVector<T, 6>,
+        parts: impl Iterator<Item = &'a (T, [T; 6])> + Clone,
+        slope: Option<&[[T; 6]; 6]>,
+    ) -> Result<Answer<T>, Error> {
+        let energetic = !matches!(self.header.kind, Kind::Ann);
+        let count = T::from_f64(self.members.len() as f64);
+        let two = |b: usize| if b < 3 { T::ONE + T::ONE } else { T::ONE };
+        let factor = |a: usize| if energetic { two(a) } else { T::ONE };
+        let own = |m: usize, first: &[T; 6], a: usize| {
+            factor(a) * (first[a] - self.at_identity.get(m).map_or(T::ZERO, |(rest, _)| rest[a]))
+        };
+        let (mut mean, mut energy) = ([T::ZERO; 6], T::ZERO);
+        for (m, (value, first)) in parts.clone().enumerate() {
+            for a in 0..6 {
+                mean[a] += own(m, first, a) / count;
+            }
+            if let Some((rest, at_rest)) = self.at_identity.get(m) {
+                let mut linear = T::ZERO;
+                for a in 0..6 {
+                    linear += rest[a] * (c[a] - if a < 3 { T::ONE } else { T::ZERO });
+                }
+                energy += (*value - *at_rest - linear) / count;
+            }
+        }
+        let mut square = 0.0;
+        for (m, (_, first)) in parts.enumerate() {
+            for a in 0..6 {
+                let distance = (own(m, first, a) - mean[a]).to_f64();
+                square += distance * distance;
+            }
+        }
+        let spread = (square / self.members.len() as f64).sqrt();
+        let mut flags = self.flags(c);
+        flags.spread = self.header.spread_limit.is_some_and(|limit| spread > limit);
+        // columns 1–3: 2 ∂S/∂C_11; the others ∂S/∂C_12, counted once (polycore's voigt)
+        let tangent = slope.map(|slope| SMatrix::from_fn(|a, b| factor(a) * slope[a][b] * two(b) / count));
+        let finite = |value: &T| value.to_f64().is_finite();
+        if !mean.iter().chain(tangent.iter().flatten()).all(finite) {
+            let found = format!("C = {:?}, where the networks overflow", c.map(Real::to_f64).as_slice());
+            return Err(Error::parameter("C", found, "a deformation nearer to the training data"));
+        }
+        Ok(Answer {
+            stress: SVector::from(mean),
+            tangent,
+            energy: energetic.then_some(energy),
+            spread: T::from_f64(spread),
+            flags,
+        })
+    }
+
+    /// One member at c, without its correction at the identity.
+    pub(super) fn member(&self, m: usize, c: &[T; 6], tangent: bool, tape: &mut Tape<T>) -> Member<T> {
+        let network = &self.members[m];
+        let mut input = [T::ZERO; LANES];
+        let local = self.input(c, &mut input);
+        let input = &input[..self.mean.len().min(LANES)];
+        if matches!(self.header.kind, Kind::Ann) {
+            if !tangent {
+                return self.mapped(network.forward(input, tape));
+            }
+            let (values, slopes) = network.jacobian(input, tape);
+            let mut result = self.mapped(values);
+            for a in 0..6 {
+                for b in 0..6 {
+                    result.second[a][b] = self.output[a] * slopes[b][a] * self.inverse[b];
+                }
+            }
+            return result;
+        }
+        if tangent {
+            let (value, gradient, hessian) = network.second_derivatives(input, tape);
+            self.energetic(&local, value, &gradient, Some(&hessian))
+        } else {
+            let (value, gradient) = network.gradient(input, tape);
+            self.energetic(&local, value, &gradient, None)
+        }
+    }
+
+    /// The inputs of the networks at c; returns c in the material axes.
+    fn input(&self, c: &[T; 6], input: &mut [T; LANES]) -> [T; 6] {
+        let Kind::Energy { symmetry, .. } = &self.header.kind else {
+            for k in 0..6 {
+                input[k] = (c[k] - self.mean[k]) * self.inverse[k];
+            }
+            return *c;
+        };
+        let local = self.turn.as_ref().map_or(*c, |turn| turn.map(|row| product(&row, c)));
+        symmetry.values(&local, input);
+        for k in 0..self.mean.len().min(LANES) {
+            input[k] = (input[k] - self.mean[k]) * self.inverse[k];
+        }
+        local
+    }
+
+    /// S of an `ann` from the outputs of its network.
+    fn mapped(&self, values: &[T]) -> Member<T> {
+        let mut result = Member { energy: T::ZERO, first: [T::ZERO; 6], second: [[T::ZERO; 6]; 6] };
+        for a in 0..6 {
+            result.first[a] = self.output_mean[a] + self.output[a] * values[a];
+        }
+        result
+    }
+
+    /// W and its derivatives by c from those of a network by its inputs.
+    fn energetic(
+        &self,
+        local: &[T; 6],
+        value: T,
+        gradient: &[T; LANES],
+        hessian: Option<&[[T; LANES]; LANES]>,
+    ) -> Member<T> {
+        let Kind::Energy { symmetry, .. } = &self.header.kind else { return self.mapped(&[T::ZERO; 6]) };
+        let inputs = self.mean.len().min(LANES);
+        let scale = self.output[0];
+        let mut slopes = [[T::ZERO; 6]; LANES];
+        let (mut first, mut second) = ([T::ZERO; 6], [[T::ZERO; 6]; 6]);
+        for k in 0..inputs {
+            slopes[k] = symmetry.gradient(local, k).map(|slope| slope * self.inverse[k]);
+            let weight = scale * gradient[k];
+            for a in 0..6 {
+                first[a] += weight * slopes[k][a];
+            }
+            if hessian.is_some() {
+                symmetry.add_curvature(local, k, weight * self.inverse[k], &mut second);
+            }
+        }
+        if let Some(hessian) = hessian {
+            for k in 0..inputs {
+                let mut row = [T::ZERO; 6];
+                for l in 0..inputs {
+                    let weight = scale * hessian[k][l];
+                    for b in 0..6 {
+                        row[b] += weight * slopes[l][b];
+                    }
+                }
+                for a in 0..6 {
+                    for b in 0..6 {
+                        second[a][b] += slopes[k][a] * row[b];
+                    }
+                }
+            }
+        }
+        (first, second) = match &self.turn {
+            Some(turn) => back(turn, &first, &second),
+            None => (first, second),
+        };
+        Member { energy: scale * value, first, second }
+    }
+}
+
+fn same_length(points: usize, answers: usize) -> Result<(), Error> {
+    if points == answers {
+        return Ok(());
+    }
+    Err(Error::parameter("answers", answers, format!("{points}, one for each C")))
+}
+
+/// The error of one point of a list.
+fn at_point(point: usize, error: Error) -> Error {
+    match error {
+        Error::Parameter { name, found, allowed } => {
+            Error::Parameter { name, found: format!("{found} (point {point} of the list)"), allowed }
+        }
+        other => other,
+    }
+}
+
+/// Finite and positive definite (leading minors).
+fn check_deformation<T: Real + nalgebra::Scalar>(c: &SVector<T, 6>) -> Result<(), Error> {
+    let v = c.map(Real::to_f64);
+    let bad =
+        |found: String| Err(Error::parameter("C", found, "a positive definite tensor of finite components"));
+    if let Some(a) = (0..6).find(|&a| !v[a].is_finite()) {
+        return bad(format!("component {} = {}", NAMES[a], v[a]));
+    }
+    let minor = v[0] * v[1] - v[3] * v[3];
+    let third = voigt::to_stress(&v).determinant();
+    if v[0] > 0.0 && minor > 0.0 && third > 0.0 {
+        Ok(())
+    } else {
+        bad(format!("the leading minors {:e}, {minor:e}, {third:e}", v[0]))
+    }
+}
