@@ -67,7 +67,10 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             (rows, table, true)
         }
     };
-    let path = folder.join(format!("{}.json", options.name));
+    // a program's subcommand has a file of its own: crystfem-kinetics.json
+    let what = options.arguments.first().filter(|word| !word.starts_with('-') && !options.name.contains('-'));
+    let name = what.map_or_else(|| options.name.clone(), |what| format!("{}-{what}", options.name));
+    let path = folder.join(format!("{name}.json"));
     write(&path, &rows)?;
     if options.json {
         print(&(serde_json::to_string_pretty(&rows).into_diagnostic()? + "\n"));

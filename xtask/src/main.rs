@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod bench;
+mod report;
 mod table;
 mod tidy;
 mod validate;
@@ -29,7 +30,7 @@ enum Task {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
-    /// Run the cases and judge everything that they expect; results go to target/validate.
+    /// Run the cases and judge everything that they expect; the report is target/validation/report.html.
     Validate(validate::Options),
     /// Measure: `langevin`, `peri-peers`, or a program that has a `bench --json` of its own (`peri`).
     Bench(bench::Options),

@@ -34,6 +34,9 @@ pub struct Report {
     pub expect: Vec<Judgement>,
     /// Names (and where needed the column) of values that are NaN or infinite.
     pub non_finite: Vec<String>,
+    /// Runs of a stability suite.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trials: Vec<Trial>,
     /// Counts of work: steps, iterations, bond evaluations.
     pub work: BTreeMap<String, u64>,
     /// Seconds by phase.
@@ -74,6 +77,21 @@ pub struct Column {
     pub data: Vec<f64>,
 }
 
+/// A run of a stability suite.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Trial {
+    /// Its name.
+    pub what: String,
+    /// What must happen, as the scene has it.
+    pub must: String,
+    /// What was seen.
+    pub seen: String,
+    /// Iterations or steps, where they are counted.
+    pub iterations: Option<u64>,
+    /// It met its expectations.
+    pub passed: bool,
+}
+
 impl Report {
     /// An empty report; `scene_text` is the scene as it was run (with its defaults resolved, where known).
     pub fn new(program: &str, version: &str, scene_text: &str) -> Self {
@@ -82,6 +100,7 @@ impl Report {
             values: BTreeMap::new(),
             expect: Vec::new(),
             non_finite: Vec::new(),
+            trials: Vec::new(),
             work: BTreeMap::new(),
             seconds: BTreeMap::new(),
             provenance: Provenance::new(program, version, scene_text),

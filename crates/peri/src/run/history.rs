@@ -6,6 +6,7 @@ use crate::solver::Record;
 use polycore::Error;
 use polycore::output::csv;
 use polycore::output::picture::{LegendPlace, LinePlot, Series};
+use polycore::report::{Report, Trial};
 use std::path::Path;
 
 /// A column: name, unit, values.
@@ -160,11 +161,11 @@ fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
     if any { plot.write(output.join("peak_load.png")) } else { Ok(()) }
 }
 
-/// The table of a suite: what each variant is, what must happen, what was seen, and at what cost.
+/// The table of a suite, also as trials of the report: what each variant is, what must happen, what was seen, at what cost.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn suite(report: &polycore::report::Report, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+pub fn suite(report: &mut Report, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
     use std::fmt::Write;
     if outcomes.iter().all(|o| o.must.is_none()) {
         return Ok(());
@@ -184,14 +185,18 @@ pub fn suite(report: &polycore::report::Report, outcomes: &[Outcome], output: &P
             ),
             (None, false) => format!("missed: {}", failed.join(", ")),
         };
+        let must = outcome.must.clone().unwrap_or_default();
         let _ = writeln!(
             text,
-            "| {} | {} | {seen} | {} | {:.2} |",
+            "| {} | {must} | {seen} | {} | {:.2} |",
             outcome.name,
-            outcome.must.as_deref().unwrap_or_default(),
             work("iterations"),
             outcome.seconds_of("solve")
         );
+        if outcome.must.is_some() {
+            let (what, iterations) = (outcome.name.clone(), Some(work("iterations")));
+            report.trials.push(Trial { what, must, seen, iterations, passed: failed.is_empty() });
+        }
     }
     polycore::output::atomic_write(output.join("suite.md"), |file| {
         std::io::Write::write_all(file, text.as_bytes())

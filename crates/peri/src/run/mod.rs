@@ -129,9 +129,9 @@ fn run_in<const D: usize>(
         finished.push(outcome);
         checkpoint::write::<D>(options.output, source, options.quick, &finished, None)?;
     }
-    let report = compare::report(source, scene, &finished, options.quick);
+    let mut report = compare::report(source, scene, &finished, options.quick);
     history::write(scene, &finished, options.output)?;
-    history::suite(&report, &finished, options.output)?;
+    history::suite(&mut report, &finished, options.output)?;
     if scene.output.pictures {
         draw::curves(scene, &finished, options.output)?;
     }

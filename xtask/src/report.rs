@@ -1,0 +1,304 @@
+//! The report of `cargo xtask validate`: target/validation/{report.html, report.json, validation.md}, and, of a whole
+//! full run, docs/validation.md.
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use miette::{IntoDiagnostic, Result, miette};
+use polycore::output::atomic_write;
+use polycore::report::{Judgement, Provenance};
+use serde::Serialize;
+
+use crate::validate::outcome::Outcome;
+use crate::validate::summary;
+use crate::workspace::Workspace;
+
+mod baseline;
+mod cross;
+mod errata;
+mod evidence;
+mod markdown;
+mod pictures;
+mod stability;
+mod thesis;
+mod timing;
+
+use baseline::{Baseline, Difference};
+use pictures::{Gallery, Picture};
+
+/// Pictures shown of each case in the list of cases.
+const PICTURES: usize = 6;
+
+/// What the report is made from besides the outcomes.
+pub struct Sources {
+    map: thesis::Map,
+    errata: Vec<errata::Erratum>,
+    baseline: Option<Baseline>,
+}
+
+impl Sources {
+    /// Reads cases/thesis.toml, docs/errata.md and an earlier report.
+    pub fn read(workspace: &Workspace, baseline: Option<&Path>) -> Result<Self> {
+        let map = thesis::Map::read(workspace)?;
+        let errata = errata::Erratum::read(workspace)?;
+        let mut faults = map.faults(workspace);
+        faults.extend(errata::faults(workspace, &errata, &map.erratum));
+        if !faults.is_empty() {
+            return Err(miette!("cases/thesis.toml:\n{}", faults.join("\n")));
+        }
+        Ok(Self { map, errata, baseline: baseline.map(Baseline::read).transpose()? })
+    }
+}
+
+/// How much was run.
+#[derive(Clone, Copy)]
+pub struct Tier {
+    /// Without what cases mark `quick = false`.
+    pub quick: bool,
+    /// All cases below cases/.
+    pub everything: bool,
+}
+
+/// Everything on the page.
+#[derive(Serialize)]
+struct Page {
+    passed: bool,
+    tier: &'static str,
+    sums: String,
+    command: &'static str,
+    commit: String,
+    date: String,
+    machine: String,
+    versions: Vec<(String, String)>,
+    seconds: f64,
+    counts: Vec<(String, usize)>,
+    thesis: Vec<thesis::Judged>,
+    timing: Vec<timing::Measured>,
+    stability: Vec<stability::Trial>,
+    errata: Vec<errata::Proven>,
+    cross: Vec<cross::Crossed>,
+    difference: Option<Difference>,
+    cases: Vec<CaseView>,
+}
+
+/// A case on the page.
+#[derive(Serialize)]
+struct CaseView {
+    case: String,
+    anchor: String,
+    title: String,
+    program: String,
+    file: String,
+    href: String,
+    command: String,
+    results: String,
+    log: String,
+    seconds: f64,
+    kept: bool,
+    passed: bool,
+    complaint: String,
+    rows: Vec<[String; 5]>,
+    missed: usize,
+    pictures: Vec<Picture>,
+    work: Vec<(String, String)>,
+}
+
+/// report.json.
+#[derive(Serialize)]
+struct Json<'a> {
+    version: u32,
+    passed: bool,
+    tier: &'static str,
+    commit: String,
+    date: String,
+    machine: String,
+    versions: Vec<(String, String)>,
+    cases: Vec<JsonCase<'a>>,
+    thesis: Vec<thesis::Judged>,
+    timing: Vec<timing::Measured>,
+    stability: Vec<stability::Trial>,
+    errata: Vec<errata::Proven>,
+    cross_checks: Vec<cross::Crossed>,
+    difference: Option<Difference>,
+}
+
+#[derive(Serialize)]
+struct JsonCase<'a> {
+    case: &'a str,
+    file: &'a str,
+    program: &'a str,
+    command: &'a str,
+    passed: bool,
+    failure: Option<&'a str>,
+    seconds: f64,
+    expect: &'a [Judgement],
+    work: BTreeMap<&'a str, u64>,
+}
+
+impl<'a> JsonCase<'a> {
+    fn of(outcome: &'a Outcome) -> Self {
+        let work = outcome.report.iter().flat_map(|report| &report.work);
+        Self {
+            case: &outcome.case,
+            file: &outcome.file,
+            program: &outcome.program,
+            command: &outcome.command,
+            passed: outcome.passed(),
+            failure: outcome.failure.as_deref(),
+            seconds: outcome.seconds,
+            expect: outcome.expect(),
+            work: work.map(|(name, count)| (name.as_str(), *count)).collect(),
+        }
+    }
+}
+
+/// Writes the report; the paths of what was written.
+pub fn write(
+    workspace: &Workspace,
+    sources: &Sources,
+    outcomes: &[Outcome],
+    tier: Tier,
+) -> Result<Vec<PathBuf>> {
+    let folder = workspace.results("validation")?;
+    let page = page(workspace, &folder, sources, outcomes, tier)?;
+    let html = render(&page)?;
+    let text = markdown::text(&page, outcomes);
+    let mut paths =
+        vec![folder.join("report.html"), folder.join("report.json"), folder.join("validation.md")];
+    put(&paths[0], html.as_bytes())?;
+    put(&paths[2], text.as_bytes())?;
+    if tier.everything && !tier.quick {
+        paths.push(workspace.root().join("docs/validation.md"));
+        put(&paths[3], text.as_bytes())?;
+    }
+    let json = json(page, outcomes);
+    atomic_write(&paths[1], |file| {
+        serde_json::to_writer_pretty(&mut *file, &json)?;
+        file.write_all(b"\n")
+    })
+    .into_diagnostic()?;
+    Ok(paths)
+}
+
+fn put(path: &Path, bytes: &[u8]) -> Result<()> {
+    atomic_write(path, |file| file.write_all(bytes)).into_diagnostic()
+}
+
+fn page(
+    workspace: &Workspace,
+    folder: &Path,
+    sources: &Sources,
+    outcomes: &[Outcome],
+    tier: Tier,
+) -> Result<Page> {
+    let bench = workspace.target().join("bench");
+    let mut gallery = Gallery::default();
+    let thesis = sources.map.judge(outcomes, &mut gallery);
+    let provenance: Vec<&Provenance> =
+        outcomes.iter().filter_map(|outcome| Some(&outcome.report.as_ref()?.provenance)).collect();
+    let first = provenance.first();
+    let mut versions: Vec<(String, String)> =
+        provenance.iter().map(|p| (p.program.clone(), p.version.clone())).collect();
+    versions.sort();
+    versions.dedup();
+    let mut counts: Vec<(String, usize)> = Vec::new();
+    for judged in &thesis {
+        match counts.iter_mut().find(|(verdict, _)| verdict == judged.verdict()) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((judged.verdict().to_owned(), 1)),
+        }
+    }
+    Ok(Page {
+        passed: outcomes.iter().all(Outcome::passed),
+        tier: if tier.quick { "quick" } else { "full" },
+        sums: summary::sums(outcomes),
+        command: if tier.quick { "cargo xtask validate --quick" } else { "cargo xtask validate" },
+        commit: first
+            .and_then(|p| p.git.as_ref())
+            .map_or_else(|| "unknown".to_owned(), |git| git.hash.clone()),
+        date: first.map(|p| p.date.clone()).unwrap_or_default(),
+        machine: first.map_or_else(String::new, |p| {
+            format!("{}, {}, {} cores, {} threads", p.host.cpu, p.host.system, p.host.cores, p.host.threads)
+        }),
+        versions,
+        seconds: outcomes.iter().map(|outcome| outcome.seconds).sum(),
+        counts,
+        thesis,
+        timing: timing::measured(&bench, folder, outcomes)?,
+        stability: stability::trials(outcomes),
+        errata: errata::judge(&sources.errata, &sources.map.erratum, outcomes),
+        cross: cross::checked(&bench),
+        difference: sources.baseline.as_ref().map(|baseline| baseline.compare(outcomes)),
+        cases: outcomes.iter().map(|outcome| view(workspace, outcome, &mut gallery)).collect(),
+    })
+}
+
+fn view(workspace: &Workspace, outcome: &Outcome, gallery: &mut Gallery) -> CaseView {
+    let short = |path: &Path| workspace.short(path).to_string();
+    let work = outcome.report.iter().flat_map(|report| &report.work);
+    CaseView {
+        case: outcome.case.clone(),
+        anchor: anchor(&outcome.case),
+        title: outcome.title.clone(),
+        program: outcome.program.clone(),
+        file: outcome.file.clone(),
+        href: outcome.href.clone(),
+        command: outcome.command.clone(),
+        results: short(&outcome.output),
+        log: short(&outcome.log),
+        seconds: outcome.seconds,
+        kept: outcome.kept,
+        passed: outcome.passed(),
+        complaint: outcome.complaint(short),
+        rows: outcome.rows().collect(),
+        missed: outcome.expect().iter().filter(|judgement| !judgement.pass).count(),
+        pictures: gallery.rest(outcome, PICTURES),
+        work: work.map(|(name, count)| (name.clone(), count.to_string())).collect(),
+    }
+}
+
+/// The page without its pictures, and the cases with their judgements.
+fn json(page: Page, outcomes: &[Outcome]) -> Json<'_> {
+    Json {
+        version: 1,
+        passed: page.passed,
+        tier: page.tier,
+        commit: page.commit,
+        date: page.date,
+        machine: page.machine,
+        versions: page.versions,
+        cases: outcomes.iter().map(JsonCase::of).collect(),
+        thesis: page.thesis.into_iter().map(thesis::Judged::without_pictures).collect(),
+        timing: page.timing.into_iter().map(timing::Measured::without_picture).collect(),
+        stability: page.stability,
+        errata: page.errata,
+        cross_checks: page.cross,
+        difference: page.difference,
+    }
+}
+
+/// The page as HTML.
+fn render(page: &Page) -> Result<String> {
+    let mut environment = minijinja::Environment::new();
+    environment.add_template("report.html", include_str!("report/template.html")).into_diagnostic()?;
+    let template = environment.get_template("report.html").into_diagnostic()?;
+    template.render(minijinja::value::Serde(page)).into_diagnostic()
+}
+
+/// `Fig. 2.7` → `fig-2-7`.
+fn anchor(name: &str) -> String {
+    let parts = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|part| !part.is_empty());
+    parts.collect::<Vec<_>>().join("-").to_lowercase()
+}
+
+/// From target/validation to a file.
+pub fn link(workspace: &Workspace, file: &Path) -> String {
+    match (workspace.target().strip_prefix(workspace.root()), file.strip_prefix(workspace.root())) {
+        (Ok(target), Ok(below)) => {
+            let up = "../".repeat(target.components().count() + 1);
+            format!("{up}{}", below.display())
+        }
+        _ => format!("file://{}", file.display()),
+    }
+}

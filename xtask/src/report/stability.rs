@@ -1,0 +1,92 @@
+//! What is stiff, extreme or degenerate: what must happen, what was seen, at what cost.
+
+use std::collections::BTreeMap;
+
+use polycore::report::Judgement;
+use serde::Serialize;
+
+use crate::validate::outcome::Outcome;
+
+/// Words in the names of cases whose every run is such a thing, though their scenes have no `must`.
+const WORDS: [&str; 2] = ["stability", "extremes"];
+
+/// A run.
+#[derive(Serialize)]
+pub struct Trial {
+    case: String,
+    what: String,
+    must: String,
+    seen: String,
+    iterations: String,
+    passed: bool,
+}
+
+/// The trials that reports list; of cases without a list, a trial for each group of expectations.
+pub fn trials(outcomes: &[Outcome]) -> Vec<Trial> {
+    let mut trials = Vec::new();
+    for outcome in outcomes {
+        let Some(report) = &outcome.report else { continue };
+        let case = outcome.case.clone();
+        trials.extend(report.trials.iter().map(|trial| Trial {
+            case: case.clone(),
+            what: trial.what.clone(),
+            must: trial.must.clone(),
+            seen: trial.seen.clone(),
+            iterations: trial.iterations.map(|count| count.to_string()).unwrap_or_default(),
+            passed: trial.passed,
+        }));
+        let name = case.rsplit('/').next().unwrap_or(&case);
+        if report.trials.is_empty() && WORDS.iter().any(|word| name.contains(word)) {
+            trials
+                .extend(groups(&report.expect).into_iter().map(|(what, judged)| trial(&case, what, &judged)));
+        }
+    }
+    trials
+}
+
+/// `run.quantity` and `quantity[run]` by their runs.
+fn groups(expect: &[Judgement]) -> BTreeMap<&str, Vec<&Judgement>> {
+    let mut groups = BTreeMap::<&str, Vec<&Judgement>>::new();
+    for judgement in expect {
+        groups.entry(parts(&judgement.expect.quantity).0).or_default().push(judgement);
+    }
+    groups
+}
+
+/// The run and what of it.
+fn parts(quantity: &str) -> (&str, &str) {
+    match quantity.split_once('[').and_then(|(name, rest)| Some((rest.strip_suffix(']')?, name))) {
+        Some(parts) => parts,
+        None => quantity.rsplit_once('.').unwrap_or(("", quantity)),
+    }
+}
+
+fn trial(case: &str, what: &str, judged: &[&Judgement]) -> Trial {
+    let (mut must, mut seen) = (Vec::new(), Vec::new());
+    for judgement in judged {
+        let [_, quantity, value, asked, _] = judgement.row();
+        let name = parts(&quantity).1.replace('_', " ");
+        must.push(format!("{name} {asked}"));
+        seen.push(format!("{name} {value}"));
+    }
+    Trial {
+        case: case.to_owned(),
+        what: what.to_owned(),
+        must: must.join(", "),
+        seen: seen.join(", "),
+        iterations: String::new(),
+        passed: judged.iter().all(|judgement| judgement.pass),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_quantities() {
+        assert_eq!(parts("one-step-1e-3.final_alpha"), ("one-step-1e-3", "final_alpha"));
+        assert_eq!(parts("peak[dx=2.5mm m=3.015]"), ("dx=2.5mm m=3.015", "peak"));
+        assert_eq!(parts("rows"), ("", "rows"));
+    }
+}

@@ -1,0 +1,296 @@
+//! The thesis map: every numbered figure and table that holds a result, and what became of it here (cases/thesis.toml).
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use miette::{IntoDiagnostic, Result, WrapErr, miette};
+use serde::{Deserialize, Serialize};
+
+use super::evidence::{Asserted, Finding, Number, State};
+use super::pictures::{Gallery, Picture};
+use crate::validate::outcome::Outcome;
+use crate::workspace::Workspace;
+
+/// What must have a row (issue 6): figures and tables with a result, and the appendices.
+pub const NUMBERED: &[&str] = &[
+    "Fig. 2.6",
+    "Fig. 2.7",
+    "Fig. 2.8",
+    "Fig. 2.10",
+    "Fig. 2.11",
+    "Fig. 2.13",
+    "Fig. 2.14",
+    "Fig. 2.16",
+    "Fig. 2.18",
+    "Fig. 2.19",
+    "Table 3.1",
+    "Fig. 3.3",
+    "Fig. 3.4",
+    "Fig. 3.5",
+    "Fig. 3.6",
+    "Table 3.2",
+    "Table 3.3",
+    "Table 3.4",
+    "Fig. 3.7",
+    "Fig. 3.8",
+    "Fig. 3.9",
+    "Fig. 3.10",
+    "Fig. 3.11",
+    "Fig. 4.1",
+    "Table 4.1",
+    "Fig. 4.4",
+    "Fig. 4.5",
+    "Fig. 4.6",
+    "Fig. 4.7",
+    "Fig. 4.8",
+    "Fig. 4.9",
+    "Appendix A",
+    "Appendix B",
+];
+
+/// The file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Map {
+    /// In the order of the thesis.
+    pub row: Vec<Row>,
+    /// Numbers that prove the rows of docs/errata.md.
+    pub erratum: Vec<super::errata::Proof>,
+}
+
+/// A figure or table.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    /// `Fig. 2.7`.
+    pub number: String,
+    /// What it is.
+    pub title: String,
+    /// What the thesis shows.
+    pub shows: String,
+    /// What we get.
+    pub ours: String,
+    /// Claimed; holds only if its numbers do.
+    pub verdict: Verdict,
+    /// The difference, or why it cannot be reproduced.
+    pub because: Option<String>,
+    /// The case, `ch2/dent`.
+    pub case: Option<String>,
+    /// Quantities that the case expects.
+    #[serde(default)]
+    pub numbers: Vec<Number>,
+    /// Numbers that tests assert.
+    #[serde(default)]
+    pub tests: Vec<Asserted>,
+    /// Pictures among the case's results; of each group the first that exists is shown.
+    #[serde(default)]
+    pub pictures: Vec<Vec<String>>,
+}
+
+/// What is claimed of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// As the thesis shows it.
+    Reproduced,
+    /// With a difference that `because` states.
+    Differs,
+    /// The text does not say enough; `because` says what is missing.
+    NotFromTheText,
+    /// Not done yet; `because` says what is missing.
+    Open,
+}
+
+/// A row with what was found.
+#[derive(Serialize)]
+pub struct Judged {
+    number: String,
+    title: String,
+    shows: String,
+    ours: String,
+    because: Option<String>,
+    /// For a reader: `reproduced`.
+    verdict: &'static str,
+    /// For the page: `good`, `fair`, `bad`, `open`.
+    tone: &'static str,
+    findings: Vec<Finding>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pictures: Vec<Picture>,
+    case: Option<String>,
+    anchor: String,
+}
+
+impl Judged {
+    /// For the table in docs/validation.md.
+    pub fn cells(&self) -> [String; 4] {
+        let numbers: Vec<String> = self.findings.iter().map(|f| format!("{}: {}", f.what, f.value)).collect();
+        let because = self.because.as_ref().map(|text| format!(": {text}")).unwrap_or_default();
+        [self.number.clone(), self.title.clone(), numbers.join("; "), format!("{}{because}", self.verdict)]
+    }
+
+    /// For a reader: `reproduced`.
+    pub fn verdict(&self) -> &'static str {
+        self.verdict
+    }
+
+    /// Pictures are for the page only.
+    pub fn without_pictures(mut self) -> Self {
+        self.pictures.clear();
+        self
+    }
+}
+
+impl Map {
+    /// Reads cases/thesis.toml.
+    pub fn read(workspace: &Workspace) -> Result<Self> {
+        let path = workspace.root().join("cases/thesis.toml");
+        let text = fs::read_to_string(&path).into_diagnostic().wrap_err("cases/thesis.toml")?;
+        toml::from_str(&text).map_err(|error| miette!("cases/thesis.toml: {error}"))
+    }
+
+    /// Every row is there once and rests on something that exists; the list of what is wrong.
+    pub fn faults(&self, workspace: &Workspace) -> Vec<String> {
+        let mut faults = Vec::new();
+        let mut seen = BTreeSet::new();
+        for row in &self.row {
+            let mut fault = |text: String| faults.push(format!("{}: {text}", row.number));
+            if !seen.insert(row.number.as_str()) {
+                fault("stands there twice".to_owned());
+            }
+            if row.verdict != Verdict::Reproduced && row.because.as_deref().unwrap_or_default().is_empty() {
+                fault("says not why (`because`)".to_owned());
+            }
+            let because = row.because.as_deref().unwrap_or_default();
+            let judged = row.numbers.iter().filter(|number| number.judged).count();
+            let numbers = judged + row.tests.len();
+            if numbers == 0 && !because.contains(|c: char| c.is_ascii_digit()) {
+                fault("has a verdict and no number".to_owned());
+            }
+            if numbers == 0 && matches!(row.verdict, Verdict::Reproduced | Verdict::Differs) {
+                fault("claims a result without a quantity or a test".to_owned());
+            }
+            check(workspace, row.case.as_deref(), &row.numbers, &row.tests, &mut fault);
+        }
+        let missing = NUMBERED.iter().filter(|number| !seen.contains(*number));
+        faults.extend(missing.map(|number| format!("{number}: has no row")));
+        faults
+    }
+
+    /// Looks everything up.
+    pub fn judge(&self, outcomes: &[Outcome], gallery: &mut Gallery) -> Vec<Judged> {
+        self.row.iter().map(|row| row.judge(outcomes, gallery)).collect()
+    }
+}
+
+/// Adds what is wrong with numbers and tests.
+pub fn check(
+    workspace: &Workspace,
+    case: Option<&str>,
+    numbers: &[Number],
+    tests: &[Asserted],
+    fault: &mut dyn FnMut(String),
+) {
+    for number in numbers {
+        let Some(case) = number.case.as_deref().or(case) else {
+            fault(format!("`{}` is of no case", number.quantity));
+            continue;
+        };
+        match expected(workspace, case) {
+            Err(error) => fault(error.to_string()),
+            Ok(names) if number.judged && !names.contains(&number.quantity) => {
+                fault(format!("{case} expects no `{}`", number.quantity));
+            }
+            Ok(_) => {}
+        }
+    }
+    for test in tests {
+        if let Err(error) = test.check(workspace) {
+            fault(error.to_string());
+        }
+    }
+}
+
+/// The quantities that a case expects.
+fn expected(workspace: &Workspace, case: &str) -> Result<BTreeSet<String>> {
+    let path = workspace.root().join("cases").join(case).join("case.toml");
+    let text = fs::read_to_string(&path).map_err(|error| miette!("cases/{case}/case.toml: {error}"))?;
+    let table: toml::Table = toml::from_str(&text).map_err(|error| miette!("{case}: {error}"))?;
+    let list = table.get("expect").and_then(toml::Value::as_array);
+    let names = list.into_iter().flatten().filter_map(|expect| expect.get("quantity")?.as_str());
+    Ok(names.map(str::to_owned).collect())
+}
+
+impl Row {
+    fn judge(&self, outcomes: &[Outcome], gallery: &mut Gallery) -> Judged {
+        let found = self.numbers.iter().map(|number| number.find(self.case.as_deref(), outcomes));
+        let findings: Vec<Finding> = found.chain(self.tests.iter().map(Asserted::finding)).collect();
+        let has = |state| findings.iter().any(|finding| finding.state == state);
+        let backed = has(State::Met) || has(State::Asserted);
+        let (verdict, tone) = match self.verdict {
+            _ if has(State::Missed) => ("failed", "bad"),
+            Verdict::NotFromTheText => ("not reproducible from the text", "fair"),
+            Verdict::Open => ("not yet", "open"),
+            _ if !backed => ("not in this run", "open"),
+            Verdict::Reproduced => ("reproduced", "good"),
+            Verdict::Differs => ("reproduced with a stated difference", "fair"),
+        };
+        let outcome = outcomes.iter().find(|outcome| Some(&outcome.case) == self.case.as_ref());
+        let shown = |group: &Vec<String>| {
+            let outcome = outcome?;
+            group.iter().find_map(|name| gallery.picture(outcome, name))
+        };
+        Judged {
+            pictures: self.pictures.iter().filter_map(shown).collect(),
+            number: self.number.clone(),
+            title: self.title.clone(),
+            shows: self.shows.clone(),
+            ours: self.ours.clone(),
+            because: self.because.clone(),
+            verdict,
+            tone,
+            findings,
+            case: self.case.clone(),
+            anchor: super::anchor(&self.number),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn workspace() -> Workspace {
+        Workspace::new(std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."))
+    }
+
+    /// Every figure and table has a row, and every row a quantity that a case expects or a test that says so.
+    #[test]
+    fn the_map_is_whole() {
+        let map = Map::read(&workspace()).expect("cases/thesis.toml");
+        let faults = map.faults(&workspace());
+        assert!(faults.is_empty(), "{}", faults.join("\n"));
+        let errata = super::super::errata::Erratum::read(&workspace()).expect("docs/errata.md");
+        assert!(errata.len() > 30, "{}", errata.len());
+        let faults = super::super::errata::faults(&workspace(), &errata, &map.erratum);
+        assert!(faults.is_empty(), "{}", faults.join("\n"));
+    }
+
+    #[test]
+    fn faults_are_found() {
+        let row = |text: &str| {
+            let head = "erratum = []\n[[row]]\nnumber = 'Fig. 2.7'\ntitle = 't'\nshows = 's'\nours = 'o'\n";
+            let map: Map = toml::from_str(&format!("{head}{text}")).expect("a map");
+            map.faults(&workspace())
+                .into_iter()
+                .filter(|fault| fault.starts_with("Fig. 2.7:"))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(row("verdict = 'differs'").len(), 3);
+        assert_eq!(row("verdict = 'not-from-the-text'\nbecause = '38,000 atoms'"), [""; 0]);
+        let number = "verdict = 'reproduced'\ncase = 'ch2/dent'\nnumbers = [{ what = 'w', quantity = 'no' }]";
+        assert_eq!(row(number), ["Fig. 2.7: ch2/dent expects no `no`"]);
+        let test = "verdict = 'reproduced'\ntests = [{ file = 'crates/peri/src/calibrate.rs', what = 'w', number = '1', \
+                    test = 'single_point_integrals', holds = 'PI / 13' }]";
+        assert!(row(test)[0].contains("does not say `PI / 13`"));
+    }
+}

@@ -1,0 +1,349 @@
+//! Error against run time, from what `cargo xtask bench` has measured and from cases that time themselves.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use miette::{IntoDiagnostic, Result};
+use polycore::output::picture::{LinePlot, Series};
+use polycore::report::Value;
+use serde::Serialize;
+
+use super::pictures;
+use crate::bench::Row;
+use crate::validate::outcome::Outcome;
+
+/// Where the points of a subject are.
+enum Source {
+    /// Rows of target/bench/NAME.json: what distinguishes those of errors and those of times, the rest being a point.
+    Bench { name: &'static str, error: &'static str, time: &'static str },
+    /// Curves of a case's report, first column seconds, last column errors.
+    Case { case: &'static str, curves: &'static str },
+}
+
+/// Alternatives for one thing.
+struct Subject {
+    title: &'static str,
+    source: Source,
+    /// What separates the name of a method from its setting in a point's name.
+    split: &'static str,
+    /// The method that is taken where a scene names none.
+    default: &'static str,
+    axes: [&'static str; 2],
+    /// What measures it.
+    command: &'static str,
+    note: &'static str,
+}
+
+const SUBJECTS: &[Subject] = &[
+    Subject {
+        title: "Inverse Langevin functions",
+        source: Source::Bench { name: "langevin", error: "largest relative error", time: "time" },
+        split: "\n",
+        default: "exact",
+        axes: ["ns per call", "largest relative error over (0, 1)"],
+        command: "cargo xtask bench langevin",
+        note: "",
+    },
+    Subject {
+        title: "Evaluation of the bond law",
+        source: Source::Bench { name: "peri-laws", error: "largest error", time: "time" },
+        split: " with ",
+        default: "fitted",
+        axes: ["ns per bond", "largest relative error of the tension"],
+        command: "cargo xtask bench peri -- --laws",
+        note: "",
+    },
+    Subject {
+        title: "Stress measures and corrections",
+        source: Source::Case { case: "ch2/plate-convergence", curves: "error_against_time_" },
+        split: "\n",
+        default: "hardy [m=3.015]",
+        axes: ["s, whole solution", "RMSE of the normalized stress, Eq. (2.84)"],
+        command: "cargo xtask validate --case cases/ch2/plate-convergence",
+        note: "The plate with a hole against Kirsch at several spacings; each curve is one measure, horizon and correction.",
+    },
+    Subject {
+        title: "Quasi-static solvers",
+        source: Source::Bench { name: "peri-solvers", error: "error", time: "time" },
+        split: " ",
+        default: "lbfgs",
+        axes: ["s", "largest error / rms displacement"],
+        command: "cargo xtask bench peri-solvers",
+        note: "The plate with a hole on the finest lattice that was measured; a point for each tolerance of the residual.",
+    },
+    Subject {
+        title: "Integrators of Nakamura's law",
+        source: Source::Bench { name: "crystfem-kinetics", error: "largest error in alpha", time: "time" },
+        split: " at ",
+        default: "z-gauss2",
+        axes: ["ns per kelvin", "largest error in α"],
+        command: "cargo xtask bench crystfem -- kinetics",
+        note: "PA12 cooled from 200 to 120 °C; a point for each step, time is that of a step over its kelvin. Schemes that leave \
+               [0, 1] have no point there.",
+    },
+    Subject {
+        title: "Time integrators of heat conduction",
+        source: Source::Bench { name: "crystfem-heat", error: "largest error", time: "time" },
+        split: " at ",
+        default: "tr-bdf2",
+        axes: ["s", "largest error, K"],
+        command: "cargo xtask bench crystfem -- heat",
+        note: "",
+    },
+    Subject {
+        title: "Linear solvers of heat conduction",
+        source: Source::Bench { name: "crystfem-solvers", error: "largest error", time: "time" },
+        split: " at ",
+        default: "cg",
+        axes: ["s per step", "largest error, K"],
+        command: "cargo xtask bench crystfem -- solvers",
+        note: "",
+    },
+    Subject {
+        title: "Surrogate models",
+        source: Source::Bench { name: "mdsurrogate-eval", error: "error", time: "time" },
+        split: "\n",
+        default: "energy",
+        axes: ["µs per stress", "error on held-out runs, %"],
+        command: "cargo xtask bench mdsurrogate -- eval",
+        note: "",
+    },
+];
+
+/// A subject as measured.
+#[derive(Serialize)]
+pub struct Measured {
+    title: &'static str,
+    axes: [&'static str; 2],
+    default: &'static str,
+    command: &'static str,
+    note: &'static str,
+    points: Vec<Point>,
+    /// Whether a point of the default is on the front.
+    default_on_front: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    picture: Option<String>,
+}
+
+/// A method with one setting.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Point {
+    method: String,
+    name: String,
+    time: f64,
+    error: f64,
+    /// Nothing measured is both faster and more exact.
+    front: bool,
+    default: bool,
+    /// For a reader.
+    shown: [String; 2],
+}
+
+impl Measured {
+    /// Pictures are for the page only.
+    pub fn without_picture(mut self) -> Self {
+        self.picture = None;
+        self
+    }
+
+    /// The subject, the methods on its front, and where the default is; for docs/validation.md.
+    pub fn cells(&self) -> Option<[String; 3]> {
+        let mut front: Vec<&str> =
+            self.points.iter().filter(|p| p.front).map(|p| p.method.as_str()).collect();
+        front.sort_unstable();
+        front.dedup();
+        let verdict = if self.default_on_front { "on the front" } else { "not on the front" };
+        let cells = [self.title.to_owned(), front.join(", "), format!("{}: {verdict}", self.default)];
+        (!self.points.is_empty()).then_some(cells)
+    }
+
+    /// What was not measured, and by what it is.
+    pub fn absent(&self) -> [&'static str; 2] {
+        [self.title, self.command]
+    }
+}
+
+/// Everything that was measured, and by what command the rest is; pictures go to `folder`.
+pub fn measured(bench: &Path, folder: &Path, outcomes: &[Outcome]) -> Result<Vec<Measured>> {
+    SUBJECTS.iter().map(|subject| subject.measured(bench, folder, outcomes)).collect()
+}
+
+impl Subject {
+    fn measured(&self, bench: &Path, folder: &Path, outcomes: &[Outcome]) -> Result<Measured> {
+        let mut points = match self.source {
+            Source::Bench { name, error, time } => {
+                let text = fs::read_to_string(bench.join(format!("{name}.json"))).unwrap_or_default();
+                let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
+                pairs(&rows, error, time)
+            }
+            Source::Case { case, curves } => outcomes
+                .iter()
+                .find(|outcome| outcome.case == case)
+                .map_or_else(Vec::new, |outcome| of_curves(outcome, curves)),
+        };
+        if self.axes[0] == "ns per kelvin" {
+            points.iter_mut().for_each(per_kelvin);
+        }
+        let mut points: Vec<Point> = points
+            .into_iter()
+            .filter(|(_, time, error)| time.is_finite() && error.is_finite() && *time > 0.0)
+            .map(|(name, time, error)| {
+                let method = name.split(self.split).next().unwrap_or(&name).to_owned();
+                let default = method == self.default;
+                let shown = [time, error].map(|number| format!("{number:.2e}"));
+                Point { method, name, time, error, front: false, default, shown }
+            })
+            .collect();
+        front(&mut points);
+        let picture = if points.is_empty() { None } else { Some(self.draw(&points, folder)?) };
+        let default_on_front = points.iter().any(|point| point.front && point.default);
+        Ok(Measured {
+            title: self.title,
+            axes: self.axes,
+            default: self.default,
+            command: self.command,
+            note: self.note,
+            points,
+            default_on_front,
+            picture,
+        })
+    }
+
+    fn draw(&self, points: &[Point], folder: &Path) -> Result<String> {
+        // an error of 0 has no place on a logarithmic axis
+        let y = |point: &Point| point.error.max(1e-17);
+        let mut plot =
+            LinePlot::new(self.title).axes(self.axes[0], self.axes[1]).log_x().log_y().size(900.0, 520.0);
+        let mut methods: BTreeMap<&str, Vec<&Point>> = BTreeMap::new();
+        for point in points {
+            methods.entry(&point.method).or_default().push(point);
+        }
+        for (method, mut points) in methods {
+            points.sort_by(|a, b| a.time.total_cmp(&b.time));
+            let xs: Vec<f64> = points.iter().map(|point| point.time).collect();
+            let ys: Vec<f64> = points.iter().map(|point| y(point)).collect();
+            let name = if method == self.default { format!("{method} (default)") } else { method.to_owned() };
+            plot = plot.series(Series::markers(&name, &xs, &ys));
+        }
+        let mut on: Vec<&Point> = points.iter().filter(|point| point.front).collect();
+        on.sort_by(|a, b| a.time.total_cmp(&b.time));
+        let xs: Vec<f64> = on.iter().map(|point| point.time).collect();
+        let ys: Vec<f64> = on.iter().map(|point| y(point)).collect();
+        plot = plot.series(Series::reference("Pareto front", &xs, &ys));
+        let stem = self.title.to_lowercase().replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+        let path = folder.join(format!("{stem}.svg"));
+        plot.write(&path).into_diagnostic()?;
+        Ok(pictures::embed(&path).unwrap_or_default())
+    }
+}
+
+/// Rows of errors with the rows of times of the same point, of the largest size that has both: name, time, error.
+fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
+    let key = |row: &Row, marker: &str| {
+        let at = row.what.find(marker)?;
+        // `error` must not be found in `terrors`
+        let before = row.what[..at].chars().next_back().is_none_or(|c| c == ' ');
+        let rest = format!("{} {}", &row.what[..at], &row.what[at + marker.len()..]);
+        let rest = rest.split_whitespace().collect::<Vec<_>>().join(" ");
+        before.then(|| rest.trim_end_matches([':', ' ']).to_owned())
+    };
+    let mut points = Vec::new();
+    for row in rows {
+        let Some(name) = key(row, error) else { continue };
+        let same = |other: &&Row| key(other, time).as_ref() == Some(&name);
+        // where a size is that of the problem, partners have the same
+        let partner = rows.iter().filter(same).find(|other| other.size == row.size);
+        let partner = partner.or_else(|| rows.iter().find(same));
+        if let (Some(error), Some(time)) = (row.value, partner.and_then(|row| row.value)) {
+            points.push((row.size, name, time, error));
+        }
+    }
+    // the same name at several sizes: only the largest
+    let largest: BTreeMap<String, u64> = points.iter().fold(BTreeMap::new(), |mut most, (size, name, ..)| {
+        let entry = most.entry(name.clone()).or_insert(*size);
+        *entry = (*entry).max(*size);
+        most
+    });
+    points.retain(|(size, name, ..)| largest.get(name) == Some(size));
+    points.into_iter().map(|(_, name, time, error)| (name, time, error)).collect()
+}
+
+/// Points `KELVIN K a step`: time of a step over its kelvin, so that large steps show what they save.
+fn per_kelvin((name, time, _): &mut (String, f64, f64)) {
+    let words: Vec<&str> = name.split(' ').collect();
+    let kelvin = words.windows(2).find(|pair| pair[1] == "K").and_then(|pair| pair[0].parse::<f64>().ok());
+    *time /= kelvin.unwrap_or(f64::NAN);
+}
+
+/// Every point of every curve whose name begins so.
+fn of_curves(outcome: &Outcome, prefix: &str) -> Vec<(String, f64, f64)> {
+    let values = outcome.report.iter().flat_map(|report| &report.values);
+    let mut points = Vec::new();
+    for (name, value) in values {
+        let (Some(name), Value::Curve { columns }) = (name.strip_prefix(prefix), value) else { continue };
+        let (Some(time), Some(error)) = (columns.first(), columns.last()) else { continue };
+        let name = name.replace('[', " [");
+        points.extend(time.data.iter().zip(&error.data).map(|(t, e)| (name.clone(), *t, *e)));
+    }
+    points
+}
+
+/// Marks what nothing measured beats in both.
+fn front(points: &mut [Point]) {
+    let all: Vec<(f64, f64)> = points.iter().map(|point| (point.time, point.error)).collect();
+    for point in points {
+        let beaten = |&(time, error): &(f64, f64)| {
+            time <= point.time && error <= point.error && (time < point.time || error < point.error)
+        };
+        point.front = !all.iter().any(beaten);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(what: &str, size: u64, value: f64) -> Row {
+        Row { what: what.to_owned(), size, threads: 1, value: Some(value), unit: String::new() }
+    }
+
+    #[test]
+    fn errors_and_times_of_the_same_point() {
+        let rows = [
+            row("adr 1e-2: error", 10, 0.1),
+            row("adr 1e-2: time", 10, 3.0),
+            row("adr 1e-2: error", 20, 0.2),
+            row("adr 1e-2: time", 20, 6.0),
+            row("adr 1e-3: error", 20, 0.02),
+        ];
+        assert_eq!(pairs(&rows, "error", "time"), [("adr 1e-2".to_owned(), 6.0, 0.2)]);
+        let rows = [
+            row("euler largest error in alpha at 0.5 K a step", 1, 0.1),
+            row("euler time at 0.5 K a step", 1, 8.0),
+        ];
+        let mut found = pairs(&rows, "largest error in alpha", "time");
+        found.iter_mut().for_each(per_kelvin);
+        assert_eq!(found, [("euler at 0.5 K a step".to_owned(), 16.0, 0.1)]);
+        // sizes that count repetitions differ
+        let rows = [row("exact: error", 200, 1e-16), row("exact: time", 7, 4.0)];
+        assert_eq!(pairs(&rows, "error", "time"), [("exact".to_owned(), 4.0, 1e-16)]);
+    }
+
+    #[test]
+    fn the_front_is_what_nothing_beats() {
+        let point = |time, error| Point {
+            method: String::new(),
+            name: String::new(),
+            time,
+            error,
+            front: false,
+            default: false,
+            shown: [String::new(), String::new()],
+        };
+        let mut points =
+            [point(1.0, 1.0), point(2.0, 0.5), point(3.0, 0.6), point(2.0, 0.7), point(0.5, 2.0)];
+        front(&mut points);
+        assert_eq!(points.map(|point| point.front), [true, true, false, false, true]);
+    }
+}

@@ -1,0 +1,299 @@
+//! One case, run by the released command line. Whatever goes wrong is the outcome of this case and of no other.
+
+use std::fs::{self, File};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use miette::{IntoDiagnostic, Result, WrapErr, miette};
+use polycore::output::atomic_write;
+use polycore::report::{FILE_NAME, Report};
+use serde::{Deserialize, Serialize};
+
+use super::Case;
+use super::outcome::Outcome;
+
+/// How cases are run.
+pub struct Settings {
+    /// Where results go.
+    pub folder: PathBuf,
+    /// Leave out what the cases mark `quick = false`.
+    pub quick: bool,
+    /// Keep the results of cases that have not changed.
+    pub resume: bool,
+    /// Seconds after which a program is killed.
+    pub timeout: f64,
+}
+
+/// What a case was run from, beside its results: FOLDER.run.json.
+#[derive(Serialize, Deserialize)]
+struct Stamp {
+    /// Of the case's folder, the executable and the tier.
+    fingerprint: String,
+    /// How long it took and how it failed; absent while it runs.
+    ended: Option<Ended>,
+}
+
+#[derive(Clone, Serialize, Deserialize)]
+struct Ended {
+    seconds: f64,
+    failure: Option<String>,
+}
+
+/// Never an error: whatever goes wrong is the outcome of this case.
+pub fn run_case(
+    settings: &Settings,
+    case: &Case,
+    release: &mut dyn FnMut(&str) -> Result<PathBuf>,
+) -> Outcome {
+    let mut outcome = Outcome::new(&case.name);
+    outcome.output = settings.folder.join(&case.name);
+    outcome.log = settings.folder.join(format!("{}.log", case.name));
+    if let Err(error) = attempt(settings, case, release, &mut outcome) {
+        outcome.failure = Some(error.to_string());
+    }
+    outcome
+}
+
+fn attempt(
+    settings: &Settings,
+    case: &Case,
+    release: &mut dyn FnMut(&str) -> Result<PathBuf>,
+    outcome: &mut Outcome,
+) -> Result<()> {
+    (outcome.program, outcome.title) = heading(&case.file)?;
+    let executable = release(&outcome.program)?;
+    let path = settings.folder.join(format!("{}.run.json", case.name));
+    let fingerprint = fingerprint(case, &executable, settings.quick).into_diagnostic()?;
+    let before = fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str::<Stamp>(&text).ok());
+    let before = before.filter(|stamp| settings.resume && stamp.fingerprint == fingerprint);
+    let (ended, unfinished) = match before {
+        Some(Stamp { ended: Some(ended), .. }) => (Some(ended), false),
+        Some(Stamp { ended: None, .. }) => (None, outcome.output.join("checkpoint.bin").is_file()),
+        None => (None, false),
+    };
+    outcome.kept = ended.is_some();
+    let ended = match ended {
+        Some(ended) => ended,
+        None => {
+            if !unfinished {
+                // an old report must not be judged
+                clear(&outcome.output)?;
+            }
+            write(&path, &Stamp { fingerprint: fingerprint.clone(), ended: None })?;
+            let since = Instant::now();
+            let failure = start(&executable, case, settings, outcome, unfinished)?;
+            let ended = Ended { seconds: since.elapsed().as_secs_f64(), failure };
+            // a case that was cut off is not kept
+            let keep = outcome.output.join(FILE_NAME).is_file();
+            write(&path, &Stamp { fingerprint, ended: keep.then(|| ended.clone()) })?;
+            ended
+        }
+    };
+    outcome.seconds = ended.seconds;
+    match (Report::read(outcome.output.join(FILE_NAME)), ended.failure) {
+        (Ok(report), failed) => outcome.judge(report, failed, settings.quick),
+        (Err(_), Some(failed)) => outcome.failure = Some(failed),
+        (Err(error), None) => outcome.failure = Some(error.to_string()),
+    }
+    Ok(())
+}
+
+/// The keys that every case has: `program = "peri"`, `title = "…"`.
+fn heading(file: &Path) -> Result<(String, String)> {
+    let text = fs::read_to_string(file).into_diagnostic()?;
+    let table: toml::Table = toml::from_str(&text).map_err(|error| miette!("{}", error.message()))?;
+    let word = |key: &str| table.get(key).and_then(toml::Value::as_str).map(str::to_owned);
+    let program = word("program").ok_or_else(|| miette!("the case names no program (program = \"peri\")"))?;
+    Ok((program, word("title").unwrap_or_default()))
+}
+
+/// Of the case file's text, the files beside it, the executable and the tier.
+fn fingerprint(case: &Case, executable: &Path, quick: bool) -> std::io::Result<String> {
+    let mut hasher = DefaultHasher::new();
+    (fs::read(&case.file)?, quick).hash(&mut hasher);
+    let changed = |path: &Path| {
+        let metadata = fs::metadata(path)?;
+        std::io::Result::Ok((metadata.len(), metadata.modified()?))
+    };
+    let beside = case.file.parent().unwrap_or(Path::new("."));
+    let mut files: Vec<PathBuf> = fs::read_dir(beside)?.flatten().map(|entry| entry.path()).collect();
+    files.retain(|path| path.is_file());
+    files.sort();
+    files.push(executable.to_path_buf());
+    for path in files {
+        (changed(&path)?, path).hash(&mut hasher);
+    }
+    Ok(format!("{:016x}", hasher.finish()))
+}
+
+fn write(path: &Path, stamp: &Stamp) -> Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).into_diagnostic()?;
+    }
+    atomic_write(path, |file| Ok(serde_json::to_writer(file, stamp)?)).into_diagnostic()
+}
+
+fn clear(folder: &Path) -> Result<()> {
+    if folder.exists() {
+        fs::remove_dir_all(folder).into_diagnostic()?;
+    }
+    fs::create_dir_all(folder).into_diagnostic()
+}
+
+/// `PROGRAM run CASE --output FOLDER [--quick]` or `PROGRAM resume FOLDER`, its output in FOLDER.log; how it failed.
+fn start(
+    executable: &Path,
+    case: &Case,
+    settings: &Settings,
+    outcome: &Outcome,
+    resume: bool,
+) -> Result<Option<String>> {
+    let log = File::create(&outcome.log).into_diagnostic()?;
+    let mut command = Command::new(executable);
+    if resume {
+        command.arg("resume").arg(&outcome.output);
+    } else {
+        command.arg("run").arg(&case.file).arg("--output").arg(&outcome.output);
+        if settings.quick {
+            command.arg("--quick");
+        }
+    }
+    command.stdin(Stdio::null()).stdout(log.try_clone().into_diagnostic()?).stderr(log);
+    let child = command.spawn().into_diagnostic();
+    let child = child.wrap_err_with(|| format!("cannot start {}", executable.display()))?;
+    match wait(child, settings.timeout).into_diagnostic()? {
+        Some(status) => Ok(describe(status)),
+        None => Ok(Some(format!("killed after {} s (--timeout)", settings.timeout))),
+    }
+}
+
+/// The exit status, or none for a program that was killed because it took too long.
+fn wait(mut child: Child, timeout: f64) -> std::io::Result<Option<ExitStatus>> {
+    let since = Instant::now();
+    let mut pause = Duration::from_millis(2);
+    loop {
+        if let Some(status) = child.try_wait()? {
+            return Ok(Some(status));
+        }
+        if since.elapsed().as_secs_f64() > timeout {
+            child.kill()?;
+            child.wait()?;
+            return Ok(None);
+        }
+        std::thread::sleep(pause);
+        pause = (pause * 2).min(Duration::from_millis(200));
+    }
+}
+
+fn describe(status: ExitStatus) -> Option<String> {
+    #[cfg(unix)]
+    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
+        return Some(format!("killed by signal {signal}"));
+    }
+    (!status.success()).then(|| match status.code() {
+        Some(code) => format!("exit code {code}"),
+        None => status.to_string(),
+    })
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    /// A case run by a shell script in place of a program.
+    struct Stage {
+        folder: tempfile::TempDir,
+        case: Case,
+        settings: Settings,
+    }
+
+    impl Stage {
+        fn new(case: &str) -> Self {
+            let folder = tempfile::tempdir().expect("a folder");
+            fs::create_dir(folder.path().join("case")).expect("a folder");
+            let file = folder.path().join("case/case.toml");
+            fs::write(&file, case).expect("a case");
+            let settings =
+                Settings { folder: folder.path().join("results"), quick: true, resume: false, timeout: 60.0 };
+            Self { folder, case: Case { name: "ch9/it".to_owned(), file }, settings }
+        }
+
+        fn program(&self, script: &str) -> PathBuf {
+            use std::os::unix::fs::PermissionsExt;
+            let program = self.folder.path().join("program");
+            fs::write(&program, format!("#!/bin/sh\n{script}\n")).expect("a script");
+            fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("permissions");
+            program
+        }
+
+        fn run(&self, script: &str) -> Outcome {
+            let program = self.program(script);
+            run_case(&self.settings, &self.case, &mut |_| Ok(program.clone()))
+        }
+    }
+
+    const CASE: &str = "program = \"peri\"\ntitle = \"It\"";
+
+    fn good() -> String {
+        let report = serde_json::to_string(&Report::new("peri", "0", "")).expect("JSON");
+        format!("[ $1$3$5 = run--output--quick ] && echo '{report}' > $4/report.json")
+    }
+
+    #[test]
+    fn whatever_a_program_does_is_an_outcome() {
+        let failure = |case: &str, script: &str| Stage::new(case).run(script).failure.unwrap_or_default();
+        assert_eq!(failure(CASE, "kill -9 $$"), "killed by signal 9");
+        assert_eq!(failure(CASE, "exit 101"), "exit code 101");
+        assert!(failure(CASE, "exit 0").contains("report.json"));
+        assert!(failure(CASE, "echo '{' > $4/report.json").contains("not a valid report"));
+        assert!(failure("program = 3", "exit 0").contains("names no program"));
+        assert!(!failure("program = ", "exit 0").is_empty());
+        let outcome = Stage::new(CASE).run(&good());
+        assert!(outcome.passed() && outcome.title == "It");
+    }
+
+    #[test]
+    fn a_program_that_never_ends_is_killed() {
+        let mut stage = Stage::new(CASE);
+        stage.settings.timeout = 0.2;
+        let outcome = stage.run("exec sleep 600");
+        assert_eq!(outcome.failure.as_deref(), Some("killed after 0.2 s (--timeout)"));
+        assert!(outcome.seconds < 60.0);
+    }
+
+    #[test]
+    fn results_are_kept_while_nothing_has_changed() {
+        let mut stage = Stage::new(CASE);
+        let program = stage.program(&format!("{}\necho x >> $4/../../count", good()));
+        let run = |stage: &Stage| run_case(&stage.settings, &stage.case, &mut |_| Ok(program.clone()));
+        let count =
+            |stage: &Stage| fs::read(stage.settings.folder.join("count")).map_or(0, |text| text.len() / 2);
+        assert!(!run(&stage).kept);
+        stage.settings.resume = true;
+        let second = run(&stage);
+        assert!(second.kept && second.passed());
+        assert_eq!(count(&stage), 1);
+        fs::write(&stage.case.file, format!("{CASE}\n# changed")).expect("a case");
+        assert!(!run(&stage).kept);
+        assert_eq!(count(&stage), 2);
+        stage.settings.quick = false;
+        assert!(!run(&stage).kept, "another tier is another run");
+    }
+
+    #[test]
+    fn an_interrupted_case_goes_on_from_its_checkpoint() {
+        let mut stage = Stage::new(CASE);
+        let report = serde_json::to_string(&Report::new("peri", "0", "")).expect("JSON");
+        let script = format!(
+            "if [ $1 = resume ]; then [ -f $2/checkpoint.bin ] && echo '{report}' > $2/report.json\n\
+             else touch $4/checkpoint.bin; kill -9 $$; fi"
+        );
+        let program = stage.program(&script);
+        let run = |stage: &Stage| run_case(&stage.settings, &stage.case, &mut |_| Ok(program.clone()));
+        assert_eq!(run(&stage).failure.as_deref(), Some("killed by signal 9"));
+        stage.settings.resume = true;
+        assert!(run(&stage).passed());
+    }
+}

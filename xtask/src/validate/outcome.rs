@@ -1,0 +1,176 @@
+//! What became of a case.
+
+use std::path::{Path, PathBuf};
+
+use polycore::report::{Judgement, Report, Value};
+
+/// What became of a case.
+#[derive(Default)]
+pub struct Outcome {
+    /// `ch2/plate-with-hole`.
+    pub case: String,
+    /// The case file, relative to the root where it lies below it.
+    pub file: String,
+    /// Link to the case file from target/validation.
+    pub href: String,
+    /// The title in the case file.
+    pub title: String,
+    /// The command line that ran it.
+    pub program: String,
+    /// What a user types to run it.
+    pub command: String,
+    /// The folder of its results.
+    pub output: PathBuf,
+    /// What it printed.
+    pub log: PathBuf,
+    /// Wall time of the whole program.
+    pub seconds: f64,
+    /// Not run again: the results of an earlier run hold.
+    pub kept: bool,
+    /// Why it failed other than by its expectations: a crash, no report.
+    pub failure: Option<String>,
+    /// What it wrote.
+    pub report: Option<Report>,
+}
+
+impl Outcome {
+    /// Of a case that has not run yet.
+    pub fn new(case: &str) -> Self {
+        Self { case: case.to_owned(), ..Self::default() }
+    }
+
+    /// Takes over a report; `status` is how the program failed, if it did.
+    pub fn judge(&mut self, report: Report, status: Option<String>, quick: bool) {
+        let missed = report.expect.iter().any(|judgement| !judgement.pass);
+        self.failure = match status {
+            // an unmet expectation explains the exit code and has its own row
+            Some(_) if missed => None,
+            Some(status) if report.non_finite.is_empty() => Some(status),
+            _ if !report.non_finite.is_empty() => {
+                Some(format!("not finite: {}", report.non_finite.join(", ")))
+            }
+            None if report.expect.is_empty() && !quick => Some("the case expects nothing".to_owned()),
+            status => status,
+        };
+        self.report = Some(report);
+    }
+
+    /// The judged expectations.
+    pub fn expect(&self) -> &[Judgement] {
+        self.report.as_ref().map_or(&[], |report| &report.expect)
+    }
+
+    /// The unit of a scalar, as its report has it.
+    pub fn unit(&self, quantity: &str) -> &str {
+        match self.report.as_ref().and_then(|report| report.values.get(quantity)) {
+            Some(Value::Scalar { unit, .. }) => unit,
+            _ => "",
+        }
+    }
+
+    /// A scalar of the report with its unit, for a reader.
+    pub fn scalar(&self, quantity: &str) -> Option<String> {
+        match self.report.as_ref()?.values.get(quantity)? {
+            Value::Scalar { value, unit } if unit.is_empty() => Some(shown(*value)),
+            Value::Scalar { value, unit } => Some(format!("{} {unit}", shown(*value))),
+            Value::Curve { .. } => None,
+        }
+    }
+
+    /// It ran to its end and met every expectation.
+    pub fn passed(&self) -> bool {
+        self.failure.is_none() && self.expect().iter().all(|judgement| judgement.pass)
+    }
+
+    /// Verdict, quantity, value, requirement, source of every expectation, and the failure if there is one.
+    pub fn rows(&self) -> impl Iterator<Item = [String; 5]> {
+        let failure = self.failure.as_ref().map(|failure| {
+            let [verdict, run, empty] = ["FAIL", "(run)", ""].map(str::to_owned);
+            [verdict, run, failure.clone(), empty.clone(), empty]
+        });
+        self.expect().iter().map(Judgement::row).chain(failure)
+    }
+
+    /// What failed, by how much, and where to look; empty if nothing did.
+    pub fn complaint(&self, short: impl Fn(&Path) -> String) -> String {
+        let missed = self.expect().iter().filter(|judgement| !judgement.pass);
+        let mut lines: Vec<String> = missed
+            .map(|judgement| {
+                let [_, quantity, value, asked, _] = judgement.row();
+                let by = beyond(judgement).map(|by| format!(", beyond by {by}")).unwrap_or_default();
+                format!("{quantity} = {value}, asked for {asked}{by}")
+            })
+            .collect();
+        lines.extend(self.failure.clone());
+        if !lines.is_empty() {
+            lines.push(format!("results: {}, output: {}", short(&self.output), short(&self.log)));
+        }
+        lines.join("\n")
+    }
+}
+
+/// Four significant digits.
+fn shown(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 || !(1e-3..1e6).contains(&size) {
+        return format!("{value:.3e}");
+    }
+    let digits = (3 - size.log10().floor() as i32).max(0) as usize;
+    format!("{value:.digits$}")
+}
+
+/// How far a value lies outside what was asked for.
+fn beyond(judgement: &Judgement) -> Option<String> {
+    use polycore::report::Bound;
+    let value = judgement.value.filter(|value| value.is_finite())?;
+    let distance = match judgement.expect.bound {
+        Bound::Near { reference, tolerance } => (value - reference).abs() - tolerance.distance(reference),
+        Bound::Range { at_least, at_most } => {
+            let low = at_least.map_or(0.0, |low| low - value);
+            low.max(at_most.map_or(0.0, |high| value - high))
+        }
+    };
+    Some(format!("{distance:.3e}"))
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::*;
+
+    /// The text of a report with one expectation: kt = 3 ± 1 %.
+    pub fn report(value: f64) -> String {
+        let mut report = Report::new("peri", "0", "");
+        report.value("kt", value, "");
+        let expect = r#"{"quantity": "kt", "reference": 3.0, "tolerance": "1 %", "source": "a | b"}"#;
+        report.judge(&[serde_json::from_str(expect).expect("an expectation")], false);
+        serde_json::to_string(&report).expect("JSON")
+    }
+
+    /// Its outcome.
+    pub fn outcome(report: &str, status: Option<&str>) -> Outcome {
+        let mut outcome = Outcome::new("ch2/plate");
+        outcome.judge(serde_json::from_str(report).expect("a report"), status.map(str::to_owned), false);
+        outcome
+    }
+
+    #[test]
+    fn verdicts() {
+        assert!(outcome(&report(3.0), None).passed());
+        let missed = outcome(&report(4.0), Some("exit code 1"));
+        assert!(!missed.passed() && missed.failure.is_none());
+        assert_eq!(
+            outcome(&report(3.0), Some("killed by signal 9")).failure.as_deref(),
+            Some("killed by signal 9")
+        );
+        assert!(outcome(&report(f64::NAN), Some("exit code 1")).rows().any(|row| row[2].contains("NaN")));
+        let empty = serde_json::to_string(&Report::new("peri", "0", "")).expect("JSON");
+        assert!(!outcome(&empty, None).passed());
+    }
+
+    #[test]
+    fn complaints_say_what_and_by_how_much() {
+        let text = outcome(&report(4.0), None).complaint(|path| path.display().to_string());
+        assert!(text.starts_with("kt = 4, asked for 3 ± 1 %, beyond by 9.700e-1\nresults: "), "{text}");
+        assert_eq!(outcome(&report(3.0), None).complaint(|_| String::new()), "");
+    }
+}
