@@ -20,7 +20,7 @@ mod peri_solvers;
 /// What to measure.
 #[derive(clap::Args)]
 pub struct Options {
-    /// `langevin`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, or a program with a `bench --json` of its own.
+    /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, or a program with a `bench --json`.
     name: String,
     /// Print the rows as JSON.
     #[arg(long)]
@@ -49,7 +49,7 @@ pub struct Row {
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let folder = workspace.results("bench")?;
     let (rows, table, passed) = match options.name.as_str() {
-        "langevin" | "peri-peers" if !options.arguments.is_empty() => {
+        "langevin" | "peri-laws" | "peri-peers" if !options.arguments.is_empty() => {
             return Err(miette!("`bench {}` takes no arguments", options.name));
         }
         "langevin" => {
@@ -59,6 +59,11 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         "peri-peers" => peri_peers::run(workspace, &folder)?,
         "peri-solvers" => {
             let (rows, table) = peri_solvers::run(workspace, &folder, &options.arguments)?;
+            (rows, table, true)
+        }
+        "peri-laws" => {
+            let rows = external(&workspace.release("peri")?, &["--laws".to_owned()])?;
+            let table = text(&rows);
             (rows, table, true)
         }
         program => {

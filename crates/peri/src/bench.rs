@@ -11,6 +11,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 mod block;
+mod laws;
 mod solvers;
 
 /// Horizon over spacing of every measurement.
@@ -34,6 +35,9 @@ pub struct Bench {
     block: block::Options,
     #[command(flatten)]
     solvers: solvers::Options,
+    /// Time this instead: ways to evaluate the bond law, each with its error.
+    #[arg(long, conflicts_with_all = ["block", "solvers"])]
+    laws: bool,
 }
 
 impl Bench {
@@ -42,6 +46,7 @@ impl Bench {
         let rows = match self.block.block {
             Some(cells) => block::measure(cells, &self.block)?,
             None if !self.solvers.solvers.is_empty() => solvers::measure(&self.solvers.solvers)?,
+            None if self.laws => laws::measure()?,
             None => self.rates()?,
         };
         print_measurements(&rows, self.json);

@@ -1,0 +1,120 @@
+//! Ways to evaluate a bond law: error against time (`cargo xtask bench peri-laws`).
+//!
+//! Law `subtract`, n̄ = 720, D̂ = 1200, bond stretches uniform in [0.5, 2.9442], the critical one of the thesis' DENT
+//! specimen. Error: the largest of the tension over its root mean square, against the law itself.
+
+use peri::Error;
+use peri::potential::{BondPotential, KernelFit, Law};
+use polycore::command::Measurement;
+use std::hint::black_box;
+use std::time::Instant;
+
+const RANGE: [f64; 2] = [0.5, 2.9442];
+/// A row that stays in the first-level cache.
+const ROW: usize = 1024;
+/// Rows per repeat.
+const ROWS: usize = 100;
+/// Nodes of tables; the thesis gives no number.
+const NODES: [usize; 4] = [50, 200, 1000, 4000];
+/// Bounds of fits, the second that of the solvers.
+const BOUNDS: [f64; 4] = [1e-6, 1e-9, 1e-11, 1e-13];
+
+/// Every way with every setting.
+pub fn measure() -> Result<Vec<Measurement>, Error> {
+    let law = Law::Subtract.build(720.0, 1200.0, false)?;
+    let stretches = stretches();
+    let exact: Vec<f64> = stretches.iter().map(|&stretch| law.tension(stretch)).collect();
+    let rms = (exact.iter().map(|tension| tension * tension).sum::<f64>() / ROW as f64).sqrt();
+    let mut rows = Vec::new();
+    let mut push = |name: &str, way: &dyn Fn(&[f64], &mut [f64])| {
+        let mut found = vec![0.0; ROW];
+        way(&stretches, &mut found);
+        let error = found.iter().zip(&exact).map(|(f, e)| (f - e).abs()).fold(0.0, f64::max) / rms;
+        let mut row = |what: &str, value, unit| {
+            let what = format!("{name}: {what}");
+            rows.push(Measurement { what, size: ROW as u64, threads: 1, value, unit });
+        };
+        row("largest error", error, "");
+        row("time", nanoseconds(&stretches, &mut found, way), "ns/bond");
+    };
+    push("newton", &|l, t| {
+        for (l, t) in l.iter().zip(t) {
+            *t = law.tension(*l);
+        }
+    });
+    for nodes in NODES {
+        let table = Table::new(&*law, nodes);
+        push(&format!("linear table with {nodes} nodes"), &|l, t| table.linear(l, t));
+        push(&format!("hermite table with {nodes} nodes"), &|l, t| table.cubic(l, t));
+    }
+    for bound in BOUNDS {
+        let fit = KernelFit::new(&*law, RANGE, bound)?;
+        push(&format!("fitted with bound {bound:e}"), &|l, t| {
+            for (l, t) in l.iter().zip(t) {
+                *t = fit.value(l * l - 1.0) * l;
+            }
+        });
+    }
+    Ok(rows)
+}
+
+/// Uniform in the range and in no order: multiples of the golden section modulo 1.
+fn stretches() -> Vec<f64> {
+    const GOLDEN: f64 = 0.618_033_988_749_894_8;
+    let [low, high] = RANGE;
+    (1..=ROW).map(|k| low + (high - low) * (GOLDEN * k as f64).fract()).collect()
+}
+
+fn nanoseconds(stretches: &[f64], found: &mut [f64], way: &dyn Fn(&[f64], &mut [f64])) -> f64 {
+    let mut times: Vec<f64> = (0..super::REPEATS)
+        .map(|_| {
+            let since = Instant::now();
+            for _ in 0..ROWS {
+                way(black_box(stretches), black_box(&mut *found));
+            }
+            since.elapsed().as_secs_f64() * 1e9 / (ROWS * ROW) as f64
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    times[super::REPEATS / 2]
+}
+
+/// Tension and its derivative at equally spaced stretches.
+struct Table {
+    per_width: f64,
+    nodes: Vec<[f64; 2]>,
+}
+
+impl Table {
+    fn new(law: &dyn BondPotential, count: usize) -> Self {
+        let width = (RANGE[1] - RANGE[0]) / (count - 1) as f64;
+        let node = |k: usize| RANGE[0] + width * k as f64;
+        let nodes =
+            (0..count).map(|k| [law.tension(node(k)), law.tension_derivative(node(k)) * width]).collect();
+        Self { per_width: 1.0 / width, nodes }
+    }
+
+    /// The nodes on both sides, and how far from the first to the second.
+    fn between(&self, stretch: f64) -> ([f64; 2], [f64; 2], f64) {
+        let place = (stretch - RANGE[0]) * self.per_width;
+        let k = (place as usize).min(self.nodes.len() - 2);
+        (self.nodes[k], self.nodes[k + 1], place - k as f64)
+    }
+
+    /// As the thesis has it (§2.4).
+    fn linear(&self, stretches: &[f64], tensions: &mut [f64]) {
+        for (stretch, tension) in stretches.iter().zip(tensions) {
+            let ([a, _], [b, _], s) = self.between(*stretch);
+            *tension = a + s * (b - a);
+        }
+    }
+
+    fn cubic(&self, stretches: &[f64], tensions: &mut [f64]) {
+        for (stretch, tension) in stretches.iter().zip(tensions) {
+            let ([a, slope_a], [b, slope_b], s) = self.between(*stretch);
+            let r = 1.0 - s;
+            *tension =
+                r * r * ((1.0 + 2.0 * s) * a + s * slope_a) + s * s * ((3.0 - 2.0 * s) * b - r * slope_b);
+        }
+    }
+}
