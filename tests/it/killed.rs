@@ -72,6 +72,7 @@ fn killed_while_it_breaks() {
 /// Layers, crystallization with its latent heat, probes and fields.
 #[test]
 fn killed_while_it_prints() {
+    survives_kills_of("crystfem", &crate::parts::studies());
     survives_kills_of(
         "crystfem",
         &crate::parts::BAR.replace("tolerance = \"1 K\"", "tolerance = \"0.02 K\""),

@@ -1,7 +1,7 @@
 //! `crystfem run` of a printed part.
 
 use crate::program::{command, finish};
-use crate::results::{assert_same, report, scalar};
+use crate::results::{assert_same, report, scalar, timeless};
 use polycore::output::vtkhdf;
 use std::fs;
 
@@ -104,4 +104,79 @@ fn a_printed_bar() {
     for name in ["probe_middle.csv", "probes_temperature.png", "section_alpha.png"] {
         assert!(out.join(name).is_file(), "{name}");
     }
+}
+
+/// The bar with and without latent heat, colder, and one that is no bar; small, to be fast.
+pub fn studies() -> String {
+    let bar =
+        BAR.replace("latent_heat = \"209 J/g\"\n", "").replace("tolerance = \"1 K\"", "tolerance = \"2 K\"");
+    bar + r#"
+[[study]]
+name = "uncoupled"
+must = "crystallize"
+
+[[study]]
+name = "coupled"
+must = "crystallize later"
+set = { "materials.pa12.latent_heat" = "209 J/g" }
+
+[[study]]
+name = "cold"
+quick = false
+set = { "boundary[0].temperature" = "20 degC" }
+
+[[study]]
+name = "flat"
+must = "be refused"
+fails = "no extent"
+mesh = { brick = { size = ["1 mm", "1 mm", "0 mm"], elements = [1, 1, 1] } }
+
+[[expect]]
+quantity = "coupled.least_alpha"
+at_least = 0.95
+source = "90 s after the last layer"
+"#
+}
+
+#[test]
+fn studies_of_a_part() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    fs::write(here.join("bar.toml"), studies()).unwrap();
+    let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
+    let told = crystfem("check bar.toml").with_code(0);
+    told.shows("study coupled");
+    told.shows("  must fail  with `no extent`");
+    crystfem("run bar.toml --output out").with_code(0).shows("pass  coupled.least_alpha");
+    let out = here.join("out");
+    let report = report(&out);
+    let of = |name: &str| scalar(&report, name);
+    // what heat of crystallization adds stays in the bar for a while; glass at 20 °C quenches it
+    assert!(of("coupled.worst_balance") < 1e-10 && of("cold.mean_alpha") < 0.5);
+    assert!(of("uncoupled.least_alpha") > 0.95 && of("flat.failed_as_it_must") == 1.0);
+    // a study is what its scene alone would be
+    let alone = BAR.replace("tolerance = \"1 K\"", "tolerance = \"2 K\"");
+    fs::write(here.join("alone.toml"), alone).unwrap();
+    crystfem("run alone.toml --output alone").with_code(0);
+    let names: Vec<String> = timeless(&out)
+        .into_keys()
+        .filter_map(|name| Some(name.strip_prefix("coupled/")?.to_owned()))
+        .collect();
+    assert!(names.contains(&"fields.vtkhdf".to_owned()), "{names:?}");
+    for name in names.iter().filter(|name| *name != "report.json") {
+        let same = fs::read(out.join("coupled").join(name)).unwrap()
+            == fs::read(here.join("alone").join(name)).unwrap();
+        assert!(same, "{name}");
+    }
+    let table = fs::read_to_string(out.join("suite.md")).unwrap();
+    assert!(
+        table.contains("| coupled | crystallize later | ends at") && table.contains("refused: "),
+        "{table}"
+    );
+    let rows = fs::read_to_string(out.join("studies.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 5, "{rows}");
+    assert!(out.join("probe_middle_temperature.png").is_file());
+    // a quick run leaves the third out
+    crystfem("run bar.toml --output quick --quick").with_code(0);
+    assert!(!here.join("quick/cold").exists());
 }

@@ -69,6 +69,14 @@ pub enum Error {
     /// The run was asked to stop; its checkpoint is written.
     #[error("interrupted; resume with `crystfem resume {}`", .0.display())]
     Interrupted(PathBuf),
+    /// One of several studies failed.
+    #[error("study {name}: {error}")]
+    Study {
+        /// Its name.
+        name: String,
+        /// What went wrong in it.
+        error: Box<Error>,
+    },
     /// Files, output, scenes.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
@@ -81,6 +89,7 @@ impl Error {
             Self::Mesh(_) | Self::Parameter { .. } | Self::File { .. } | Self::Data { .. } => 2,
             Self::Interrupted(_) => 130,
             Self::NotFinite { .. } | Self::NotConverged { .. } => 1,
+            Self::Study { error, .. } => error.exit_code(),
             Self::Shared(error) => error.exit_code(),
         }
     }

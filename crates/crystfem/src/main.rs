@@ -5,6 +5,7 @@ use crystfem::run::{Failure, Options, Progress};
 use crystfem::scene::Kind;
 use polycore::command::{Progress as Bar, Threads, default_output, exit, interrupted, seconds};
 use polycore::scene::Source;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -112,14 +113,24 @@ fn resume(output: &Path, every: f64) -> Result<bool, Failure> {
         return Ok(true);
     }
     let header = crystfem::run::checkpoint::header(output)?;
+    if header.study.is_some()
+        && let Some(whole) = output.canonicalize().ok().and_then(|output| output.parent().map(PathBuf::from))
+    {
+        println!("{} is a study of the run in {}", output.display(), whole.display());
+        return resume(&whole, every);
+    }
     solve(&Source::new(header.scene_path, header.scene), output, header.quick, every, true)
 }
 
 fn solve(source: &Source, output: &Path, quick: bool, every: f64, resume: bool) -> Result<bool, Failure> {
     let mut bar = Bar::start();
     let mut progress = |at: &Progress| {
-        bar.show(at.time / at.end, || {
-            format!("t = {:.4} of {:.4} s  step {:.3e} s  {} equations", at.time, at.end, at.dt, at.equations)
+        let done = (at.of[0] as f64 - 1.0 + at.time / at.end) / at.of[1] as f64;
+        bar.show(done, || {
+            let run =
+                if at.of[1] > 1 { format!("run {} of {}  ", at.of[0], at.of[1]) } else { String::new() };
+            let Progress { time, end, dt, equations, .. } = at;
+            format!("{run}t = {time:.4} of {end:.4} s  step {dt:.3e} s  {equations} equations")
         });
     };
     let mut options = Options {
@@ -130,11 +141,12 @@ fn solve(source: &Source, output: &Path, quick: bool, every: f64, resume: bool) 
         interrupted: interrupted(),
         progress: &mut progress,
     };
-    let report = crystfem::run::run(source, &mut options)?;
+    let finished = crystfem::run::run(source, &mut options)?;
     bar.finish();
-    report.print_table();
+    // a closed pipe is no reason to fail a run
+    let _ = std::io::stdout().write_all(finished.text.as_bytes());
     println!("results in {}", output.display());
-    Ok(report.passed())
+    Ok(finished.report.passed())
 }
 
 fn check(path: &Path) -> Result<bool, Failure> {

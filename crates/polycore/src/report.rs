@@ -220,9 +220,9 @@ impl Report {
         text + &self.verdict()
     }
 
-    /// Of the expectations whose quantity ends with `ending`: how many hold, and what the others missed.
-    pub fn verdict_on(&self, ending: &str) -> (usize, Vec<String>) {
-        let of_it = || self.expect.iter().filter(|j| j.expect.quantity.ends_with(ending));
+    /// Of the expectations of some quantities: how many hold, and what the others missed.
+    pub fn verdict_on(&self, quantities: impl Fn(&str) -> bool) -> (usize, Vec<String>) {
+        let of_it = || self.expect.iter().filter(|j| quantities(&j.expect.quantity));
         let missed = of_it().filter(|j| !j.pass).map(|j| j.row()[..].join(" ")).collect();
         (of_it().filter(|j| j.pass).count(), missed)
     }

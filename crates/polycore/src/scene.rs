@@ -28,6 +28,7 @@ use toml::de::{DeTable, DeValue, Deserializer};
 mod error;
 mod failure;
 mod locate;
+mod overlay;
 
 pub use error::SceneError;
 pub use failure::Failure;
@@ -48,14 +49,14 @@ pub struct Source {
     pub path: PathBuf,
     /// Its content.
     pub text: String,
-    /// Keys that stand in for others, see [`Source::with_replaced`].
-    replaced: Vec<(String, String)>,
+    /// What stands in for other parts, see [`Source::with_replaced`].
+    overlays: Vec<overlay::Overlay>,
 }
 
 impl Source {
     /// A scene that does not lie in a file; `path` only names it in messages.
     pub fn new(path: impl Into<PathBuf>, text: impl Into<String>) -> Self {
-        Self { path: path.into(), text: text.into(), replaced: Vec::new() }
+        Self { path: path.into(), text: text.into(), overlays: Vec::new() }
     }
 
     /// Reads a scene file.
@@ -90,7 +91,7 @@ impl Source {
             let what = format!("is not UTF-8 text (byte {valid}, line {line})");
             fail("scene::not_utf8", what, Some("save the file as UTF-8; is it a scene at all?".into()))
         })?;
-        Ok(Self { path: path.to_path_buf(), text, replaced: Vec::new() })
+        Ok(Self { path: path.to_path_buf(), text, overlays: Vec::new() })
     }
 
     /// Parses the text as a scene of type `T`, which should `deny_unknown_fields`.
@@ -101,6 +102,7 @@ impl Source {
         let mut root = DeTable::parse(&self.text).map_err(|error| SceneError::syntax(self, &error))?;
         self.check_version(&root)?;
         root.get_mut().remove("version");
+        self.overlay(root.get_mut())?;
         T::deserialize(Deserializer::from(root)).map_err(|error| {
             // the first tree went into the deserializer; errors are rare, so parse once more
             match DeTable::parse(&self.text) {
@@ -110,26 +112,14 @@ impl Source {
         })
     }
 
-    /// The same scene where the value of `key` is the one written at `by`: errors about the first point at the second.
-    #[must_use]
-    pub fn with_replaced(&self, key: &str, by: &str) -> Self {
-        let mut source = self.clone();
-        source.replaced.push((key.to_owned(), by.to_owned()));
-        source
-    }
-
     /// An error about the value at a dotted key path, for rules that span several keys.
     ///
     /// `source.error("body.parts[1].radius", "0.6 m, larger than the plate", "less than 0.5 m")`. A path that does
     /// not exist points at its nearest existing parent.
     pub fn error(&self, key: &str, found: impl ToString, allowed: impl ToString) -> SceneError {
         let root = DeTable::parse(&self.text).ok();
-        let replaced = self.replaced.iter().find_map(|(old, new)| {
-            let rest =
-                key.strip_prefix(old.as_str()).filter(|r| r.is_empty() || r.starts_with(['.', '[']))?;
-            Some(format!("{new}{rest}"))
-        });
-        let key = replaced.as_deref().unwrap_or(key);
+        let origin = root.as_ref().and_then(|root| self.origin(root.get_ref(), key));
+        let key = origin.as_deref().unwrap_or(key);
         let span = root.as_ref().and_then(|root| locate::span(root.get_ref(), key)).unwrap_or(0..0);
         SceneError::value(self, key, span, &found.to_string(), &allowed.to_string())
     }

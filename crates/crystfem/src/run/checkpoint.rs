@@ -8,10 +8,10 @@ use polycore::scene::Source;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-const MAGIC: &Magic = b"part-ck1";
+const MAGIC: &Magic = b"part-ck2";
 
-/// The part of a checkpoint that tells the scene.
-#[derive(Debug, Deserialize)]
+/// The part of a checkpoint that tells the scene; all of it for a run of several studies.
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Header {
     /// The scene's text, so that a changed scene is not continued with an old state.
     pub scene: String,
@@ -19,6 +19,25 @@ pub struct Header {
     pub scene_path: PathBuf,
     /// Whether this is a `--quick` run.
     pub quick: bool,
+    /// The study, of the run in the folder above.
+    pub study: Option<String>,
+}
+
+impl Header {
+    /// Of a scene, or of one of its studies.
+    pub fn new(source: &Source, quick: bool, study: Option<&str>) -> Self {
+        // files that a scene names lie beside it, from wherever the run is resumed
+        let scene_path = std::path::absolute(&source.path).unwrap_or_else(|_| source.path.clone());
+        Self { scene: source.text.clone(), scene_path, quick, study: study.map(str::to_owned) }
+    }
+
+    /// Writes a checkpoint that tells no more than the scene.
+    ///
+    /// # Errors
+    /// As [`polycore::checkpoint::write`].
+    pub fn write(&self, directory: &Path) -> Result<(), Error> {
+        Ok(polycore::checkpoint::write(&directory.join(FILE_NAME), MAGIC, self)?)
+    }
 }
 
 /// Where a run stood.
@@ -37,9 +56,7 @@ pub struct Checkpoint {
 /// Borrowed form for writing, so that no field is copied.
 #[derive(Serialize)]
 struct Written<'a> {
-    scene: &'a str,
-    scene_path: &'a Path,
-    quick: bool,
+    header: &'a Header,
     frames: usize,
     state: &'a State,
     probes: &'a [Probe],
@@ -51,15 +68,12 @@ struct Written<'a> {
 /// As [`polycore::checkpoint::write`].
 pub fn write(
     directory: &Path,
-    source: &Source,
-    quick: bool,
+    header: &Header,
     frames: usize,
     state: &State,
     probes: &[Probe],
 ) -> Result<(), Error> {
-    // files that a scene names lie beside it, from wherever the run is resumed
-    let scene_path = std::path::absolute(&source.path).unwrap_or_else(|_| source.path.clone());
-    let written = Written { scene: &source.text, scene_path: &scene_path, quick, frames, state, probes };
+    let written = Written { header, frames, state, probes };
     Ok(polycore::checkpoint::write(&directory.join(FILE_NAME), MAGIC, &written)?)
 }
 

@@ -6,7 +6,9 @@ mod fit;
 mod part;
 mod point;
 mod probe;
+mod rows;
 mod section;
+mod suite;
 
 use crate::error::Error;
 use crate::scene::{self, FitScene, Kind, PartScene, PointScene};
@@ -42,19 +44,36 @@ pub struct Progress {
     pub dt: f64,
     /// Equations.
     pub equations: usize,
+    /// Which of how many runs this is, from 1.
+    pub of: [usize; 2],
 }
 
 /// What stops a run: a fault in the scene, or one met on the way.
 pub type Failure = polycore::scene::Failure<Error>;
 
+/// A run that came to its end.
+#[derive(Debug)]
+pub struct Finished {
+    /// What is in `report.json`.
+    pub report: Report,
+    /// What the user is shown of it.
+    pub text: String,
+}
+
+impl From<Report> for Finished {
+    fn from(report: Report) -> Self {
+        Self { text: report.table(), report }
+    }
+}
+
 /// Runs a scene of any kind and writes its report.
 ///
 /// # Errors
 /// [`Failure`].
-pub fn run(source: &Source, options: &mut Options) -> Result<Report, Failure> {
+pub fn run(source: &Source, options: &mut Options) -> Result<Finished, Failure> {
     match scene::kind(source)? {
-        Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, options),
-        Kind::Fit => self::fit::run(source, &source.parse::<FitScene>()?, options),
+        Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, options).map(Finished::from),
+        Kind::Fit => self::fit::run(source, &source.parse::<FitScene>()?, options).map(Finished::from),
         Kind::Part => self::part::run(source, &source.parse::<PartScene>()?, options),
     }
 }

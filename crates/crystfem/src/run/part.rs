@@ -1,8 +1,9 @@
 //! A body in time: solved, recorded, drawn and judged.
 
+use super::checkpoint::{self, Header};
 use super::probe::{self, Probe};
 use super::section::Section;
-use super::{Failure, Options, Progress, checkpoint, point::CELSIUS};
+use super::{Failure, Finished, Options, Progress, point::CELSIUS};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
@@ -22,8 +23,21 @@ const TEMPERATURE: &str = "temperature_degC";
 const FRAMES: f64 = 50.0;
 
 /// Runs the scene of a body, or goes on with it.
-pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<Report, Failure> {
+pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<Finished, Failure> {
+    if !scene.study.is_empty() {
+        return super::suite::run(source, scene, options);
+    }
     scene.check(source)?;
+    one(source, scene, None, options).map(Finished::from)
+}
+
+/// Runs one scene, or one study of a scene, whose expectations wait for the others.
+pub fn one(
+    source: &Source,
+    scene: &PartScene,
+    study: Option<&str>,
+    options: &mut Options,
+) -> Result<Report, Failure> {
     let mut phases = Phases::new();
     phases.start("mesh");
     let built = scene.mesh.build(source)?;
@@ -44,7 +58,8 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
     }
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let names = simulation.field_names();
-    let mut run = Run { source, scene, task: &task, probes, names, frames };
+    let header = Header::new(source, options.quick, study);
+    let mut run = Run { header, scene, task: &task, probes, names, frames };
     let series = run.solve(&mut simulation, &mut phases, options)?;
     phases.start("write");
     run.record(&simulation, &mut report);
@@ -56,7 +71,8 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
         run.draw(&run.stages(&simulation, path.as_deref())?, options.output)?;
     }
     phases.stop();
-    report.phases(&phases).threads(rayon::current_num_threads()).judge(&scene.expect, options.quick);
+    let expect = if study.is_none() { &scene.expect[..] } else { &[] };
+    report.phases(&phases).threads(rayon::current_num_threads()).judge(expect, options.quick);
     report.write(options.output)?;
     // the report is the last file: a checkpoint without it is an unfinished run
     let _ = std::fs::remove_file(options.output.join(polycore::checkpoint::FILE_NAME));
@@ -68,7 +84,18 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
 /// # Errors
 /// A fault of the scene.
 pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
+    if !scene.study.is_empty() {
+        return super::suite::explain(source, scene);
+    }
     scene.check(source)?;
+    explain_one(source, scene)
+}
+
+/// What one scene, that is checked, builds and leaves out.
+///
+/// # Errors
+/// As [`explain`].
+pub fn explain_one(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
     let built = scene.mesh.build(source)?;
     let (points, elements) = (built.mesh.points.len(), built.mesh.element_count());
     let mut lines = vec![format!("builds     {points} nodes, {elements} elements, {:.4e} m³", built.volume)];
@@ -96,7 +123,7 @@ pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failur
 }
 
 struct Run<'a> {
-    source: &'a Source,
+    header: Header,
     scene: &'a PartScene,
     task: &'a Task,
     probes: Vec<Probe>,
@@ -132,7 +159,7 @@ impl Run<'_> {
             (true, frames) => Some(MeshSeries::resume(path, mesh.points.clone(), cells(mesh), frames)?),
         };
         let save = |frames: usize, state: &State, probes: &[Probe]| {
-            checkpoint::write(options.output, self.source, options.quick, frames, state, probes)
+            checkpoint::write(options.output, &self.header, frames, state, probes)
         };
         if self.frames == 0 {
             probe::record(&mut self.probes, simulation, &self.names);
@@ -152,6 +179,7 @@ impl Run<'_> {
                     end,
                     dt: step.dt,
                     equations: state.temperature.len(),
+                    of: [1, 1],
                 });
                 let stop = (options.interrupted)();
                 result = finite(simulation);

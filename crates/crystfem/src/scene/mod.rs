@@ -7,6 +7,7 @@ mod mesh;
 mod part;
 mod point;
 mod problem;
+mod study;
 
 pub use fit::{DataSpec, FitLaw, FitScene, FitSpec, Job};
 pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
@@ -14,6 +15,7 @@ pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, PointScene, PointSpec};
 pub use problem::Task;
+pub use study::StudySpec;
 
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;

@@ -1,6 +1,6 @@
 //! The scene of a body in time: mesh, materials, layers, what acts on it.
 
-use super::{MaterialSpec, MeshSpec, Program, check_name};
+use super::{MaterialSpec, MeshSpec, Program, StudySpec, check_name};
 use crate::problem::Capacity;
 use crate::simulation::LinearSolver;
 use crate::time::Scheme;
@@ -45,6 +45,9 @@ pub struct PartScene {
     /// Files to write.
     #[serde(default)]
     pub output: PartOutput,
+    /// Variants to run in place of the scene itself.
+    #[serde(default)]
+    pub study: Vec<StudySpec>,
     /// What the results must be.
     #[serde(default)]
     pub expect: Vec<Expect>,

@@ -87,7 +87,7 @@ fn run_in<const D: usize>(
     // every body is built once before anything is computed or written: faults show at once
     if !options.resume {
         for variant in variants.iter().filter(|variant| expected_error(scene, variant).is_none()) {
-            let (source, scene) = variant.resolve(source, scene);
+            let (source, scene) = variant.resolve(source, scene)?;
             let body = body_of::<D>(&source, &scene, variant)?;
             loads_of(&source, &scene, &body)?;
             Bonded::new(&source, &scene, variant, body)?;
@@ -105,7 +105,7 @@ fn run_in<const D: usize>(
     }
     for variant in &variants[finished.len().min(variants.len())..] {
         let state = state.take();
-        let (own_source, own_scene) = variant.resolve(source, scene);
+        let (own_source, own_scene) = variant.resolve(source, scene)?;
         let study = variant.study.and_then(|index| scene.study.get(index));
         let expected = expected_error(scene, variant);
         let mut outcome = match scene::check_variant(&own_source, &own_scene)
@@ -321,7 +321,7 @@ fn explanation_in<const D: usize>(
             lines.push(format!("variant {}\n  must fail  with `{error}`", variant.name()));
             continue;
         }
-        let (source, scene) = variant.resolve(source, scene);
+        let (source, scene) = variant.resolve(source, scene)?;
         let body = body_of::<D>(&source, &scene, &variant)?;
         loads_of(&source, &scene, &body)?;
         let bonded = Bonded::new(&source, &scene, &variant, body)?;

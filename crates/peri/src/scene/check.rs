@@ -21,7 +21,7 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
     for variant in &variants {
         // what must fail does so when its turn comes
         if variant.study.is_none_or(|index| scene.study[index].fails.is_none()) {
-            let (source, scene) = variant.resolve(source, scene);
+            let (source, scene) = variant.resolve(source, scene)?;
             check_variant(&source, &scene)?;
         }
     }

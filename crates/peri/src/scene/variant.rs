@@ -46,33 +46,17 @@ impl Variant {
     }
 
     /// The scene of this variant, with the parts that its study replaces; errors point there.
-    pub fn resolve(&self, source: &Source, scene: &Scene) -> (Source, Scene) {
-        let (mut source, mut scene) = (source.clone(), scene.clone());
-        let Some(index) = self.study else { return (source, scene) };
-        let study = scene.study[index].clone();
-        for (key, by, given) in study.replaced() {
-            if given {
-                source = source.with_replaced(key, &format!("study[{index}].{by}"));
-            }
-        }
-        fn replace<T>(own: &mut T, new: Option<T>) {
-            if let Some(new) = new {
-                *own = new;
-            }
-        }
-        replace(&mut scene.body.shapes, study.shapes);
-        replace(&mut scene.body.cracks, study.cracks);
-        replace(&mut scene.material, study.material);
-        if study.critical.is_some() {
-            scene.material.critical = study.critical;
-        }
-        replace(&mut scene.boundary, study.boundary);
-        replace(&mut scene.solver, study.solver);
-        if study.dynamics.is_some() {
-            scene.dynamics = study.dynamics;
-        }
-        scene.contact = study.contact.or(scene.contact);
-        (source, scene)
+    ///
+    /// # Errors
+    /// As [`Source::parse`].
+    pub fn resolve(&self, source: &Source, scene: &Scene) -> Result<(Source, Scene), SceneError> {
+        let Some(index) = self.study else { return Ok((source.clone(), scene.clone())) };
+        let given = scene.study[index].replaced().into_iter().filter(|(_, _, given)| *given);
+        let source = given.fold(source.clone(), |source, (key, by, _)| {
+            source.with_replaced(key, &format!("study[{index}].{by}"))
+        });
+        let scene = source.parse()?;
+        Ok((source, scene))
     }
 }
 

@@ -168,8 +168,14 @@ impl SceneError {
             // the span of a key; inside buffered values (untagged enums) serde only knows the table
             let above =
                 parent.as_deref().map(|path| path.strip_suffix(name).unwrap_or(path).trim_end_matches('.'));
-            let (path, span) =
-                locate::key(root, above.unwrap_or(""), name).unwrap_or((name.to_owned(), span));
+            let there = source.text.get(span.clone()).unwrap_or_default().trim_matches(['"', '\'']);
+            let (path, span) = match &parent {
+                // also the last part of a path in quotes
+                Some(parent) if there == name || there.ends_with(&format!(".{name}")) => {
+                    (parent.clone(), span)
+                }
+                _ => locate::key(root, above.unwrap_or(""), name).unwrap_or((name.to_owned(), span)),
+            };
             let what = format!("unknown key `{name}`{}", within(&path, name));
             return Self::choice(source, "scene::unknown_key", path, span, &what, name, allowed);
         }

@@ -10,24 +10,49 @@ type Value<'i> = Spanned<DeValue<'i>>;
 
 /// The span of the value at `path` (`a.b[2].c`), or of its nearest existing parent other than the root.
 pub(super) fn span(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
-    let mut table = Some(root);
     let mut found = None;
-    for part in path.split('.') {
-        let (name, indices) = match part.find('[') {
-            Some(at) => part.split_at(at),
-            None => (part, ""),
-        };
-        let Some(mut value) = table.and_then(|table| table.get(name)) else { return found };
-        found = Some(value.span());
+    walk(root, path, &mut |value| found = Some(value.span()));
+    found
+}
+
+/// The value at `path`.
+pub(super) fn value<'t, 'i>(root: &'t DeTable<'i>, path: &str) -> Option<&'t Value<'i>> {
+    let mut last = None;
+    walk(root, path, &mut |value| last = Some(value)).then_some(last).flatten()
+}
+
+/// Visits what lies on the way to `path`; whether its end exists. A key may itself be a path, in quotes.
+fn walk<'t, 'i>(table: &'t DeTable<'i>, path: &str, visit: &mut impl FnMut(&'t Value<'i>)) -> bool {
+    let mut ends: Vec<usize> = path.match_indices('.').map(|(at, _)| at).collect();
+    ends.push(path.len());
+    // the longest name first
+    for end in ends.into_iter().rev() {
+        let (part, rest) = (&path[..end], path[end..].strip_prefix('.'));
+        // a quoted key may have brackets in it
+        let name = if table.contains_key(part) { part } else { without_indices(part) };
+        let (Some(mut value), indices) = (table.get(name), &part[name.len()..]) else { continue };
+        visit(value);
         for index in indices.split(['[', ']']).filter(|index| !index.is_empty()) {
             let element = value.get_ref().as_array().zip(index.parse::<usize>().ok());
-            let Some(next) = element.and_then(|(array, index)| array.get(index)) else { return found };
+            let Some(next) = element.and_then(|(array, index)| array.get(index)) else { return false };
             value = next;
-            found = Some(value.span());
+            visit(value);
         }
-        table = value.get_ref().as_table();
+        return match (rest, value.get_ref().as_table()) {
+            (None, _) => true,
+            (Some(rest), Some(table)) => walk(table, rest, visit),
+            (Some(_), None) => false,
+        };
     }
-    found
+    false
+}
+
+/// `a[1][2]` → `a`.
+fn without_indices(part: &str) -> &str {
+    match part.strip_suffix(']').and_then(|rest| rest.rfind('[')) {
+        Some(at) => without_indices(&part[..at]),
+        None => part,
+    }
 }
 
 /// The path of the innermost key or value around `place`.

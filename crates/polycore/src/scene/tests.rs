@@ -1,3 +1,5 @@
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
 
 use super::*;
@@ -213,5 +215,72 @@ fn absurd_texts_do_not_panic() {
         let error = fail(text);
         assert!(!error.message().is_empty());
         rendered(&error);
+    }
+}
+
+const STUDIES: &str = r#"
+[[study]]
+body = { spacing = "5 mm", horizon = 4 }
+
+[[study]]
+set = { "load[1].weight" = 0.25, body = { law = "shift" } }
+
+[[study]]
+set = { "load[2].weight" = 0.25 }
+
+[[study]]
+set = { "body.horizn" = 2 }
+
+[[study]]
+set = { "name.of" = 2 }
+
+[[study]]
+set = { "load[0].weight" = "3 kg", "body.count" = 12 }
+"#;
+
+#[derive(Debug, Deserialize)]
+#[allow(dead_code)]
+struct WithStudies {
+    #[serde(flatten)]
+    _rest: BTreeMap<String, serde::de::IgnoredAny>,
+    body: Body,
+    load: Vec<Load>,
+}
+
+#[test]
+fn parts_stand_in_for_others() {
+    let source = Source::new("s.toml", format!("{GOOD}{STUDIES}"));
+    let of = |source: Source| source.parse::<WithStudies>();
+    // whole: what the study does not name is not there
+    let replaced = source.with_replaced("body", "study[0].body");
+    let found = of(replaced.clone()).unwrap();
+    assert_eq!((found.body.spacing.si(), found.body.horizon), (5e-3, 4.0));
+    assert!(found.body.law.is_none());
+    assert_eq!(replaced.error("body.spacing", 1, 2).line(), Some(19));
+    // merged: the rest stays
+    let merged = source.with_merged("study[1].set");
+    let found = of(merged.clone()).unwrap();
+    assert!(matches!(found.body.law, Some(Law::Shift)) && found.body.spacing.si() == 2e-3);
+    assert_eq!(found.load.iter().map(|load| load.weight.si()).collect::<Vec<_>>(), [0.5, 0.25]);
+    assert_eq!(merged.error("load[1].weight", 1, 2).line(), Some(22));
+    assert_eq!(merged.error("body.law", 1, 2).key(), Some("study[1].set.body.law"));
+    assert_eq!(merged.error("load[0].weight", 1, 2).line(), Some(12));
+    // of two the first holds; a value that is added later finds its table
+    let both = source.with_merged("study[5].set").with_merged("study[1].set");
+    let error = of(both.clone()).unwrap_err();
+    assert!(
+        error.message().contains("a dimensionless number is needed") && error.line() == Some(34),
+        "{error}"
+    );
+    assert_eq!(both.error("body.count", 1, 2).line(), Some(34));
+    // what cannot stand there is named where it is written
+    for (study, line, words) in [
+        (2, 25, "found `load[2]`; allowed: `load` has 2 elements"),
+        (3, 28, "unknown key `horizn` in `study[3].set.body`; allowed"),
+        (4, 31, "allowed: a table: `name` is none"),
+    ] {
+        let error = of(source.with_merged(&format!("study[{study}].set"))).unwrap_err();
+        assert!(error.message().contains(words), "{error}");
+        assert_eq!(error.line(), Some(line), "{error}");
     }
 }

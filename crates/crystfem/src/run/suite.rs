@@ -1,0 +1,217 @@
+//! The studies of a scene: each in a folder of its own, compared and judged together.
+
+use super::checkpoint::Header;
+use super::rows::{Row, Rows};
+use super::{Failure, Finished, Options, Progress, part};
+use crate::error::Error;
+use crate::scene::PartScene;
+use polycore::output::picture::{LinePlot, Series};
+use polycore::output::{atomic_write, csv};
+use polycore::report::{Phases, Report, Value};
+use polycore::scene::Source;
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::Path;
+
+/// Points of a curve that are drawn at most.
+const POINTS: usize = 4000;
+
+/// Runs every study, or goes on with those that are left.
+pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<Finished, Failure> {
+    let studies = scene.studies(source, options.quick)?;
+    // every problem is built once before anything is computed or written: faults show at once
+    if !options.resume {
+        for &index in &studies {
+            if scene.study[index].fails.is_none() {
+                let (source, scene) = scene.of_study(source, index)?;
+                scene.task(&source, scene.mesh.build(&source)?.mesh)?;
+            }
+        }
+        polycore::output::prepare_run(options.output)?;
+        for &index in &studies {
+            polycore::output::prepare_run(options.output.join(&scene.study[index].name))?;
+        }
+        Header::new(source, options.quick, None).write(options.output)?;
+    }
+    polycore::output::remove_unfinished(options.output);
+    let mut rows = Rows { settings: Vec::new(), rows: Vec::new() };
+    for (place, &index) in studies.iter().enumerate() {
+        let name = scene.study[index].name.clone();
+        let outcome = study(source, scene, index, [place + 1, studies.len()], options)?;
+        rows.rows.push(Row { name, settings: Vec::new(), outcome });
+    }
+    let mut report = together(source, scene, &rows);
+    let mut phases = Phases::new();
+    phases.start("write");
+    rows.write(&options.output.join("studies.csv"))?;
+    if scene.output.pictures {
+        phases.start("draw");
+        compare(scene, &rows, options.output)?;
+    }
+    phases.stop();
+    report.phases(&phases).threads(rayon::current_num_threads()).judge(&scene.expect, options.quick);
+    table(&report, scene, &rows, options.output)?;
+    report.write(options.output)?;
+    let _ = std::fs::remove_file(options.output.join(polycore::checkpoint::FILE_NAME));
+    let text = rows.text() + &report.verdict();
+    Ok(Finished { report, text })
+}
+
+/// One study: its report, or the failure that the scene asks for.
+fn study(
+    source: &Source,
+    scene: &PartScene,
+    index: usize,
+    of: [usize; 2],
+    options: &mut Options,
+) -> Result<Result<Report, String>, Failure> {
+    let spec = &scene.study[index];
+    let output = options.output.join(&spec.name);
+    if options.resume
+        && let Ok(report) = Report::read(output.join(polycore::report::FILE_NAME))
+    {
+        return Ok(Ok(report));
+    }
+    let resume = options.resume && output.join(polycore::checkpoint::FILE_NAME).is_file();
+    let progress = &mut *options.progress;
+    let mut progress = |at: &Progress| progress(&Progress { of, ..*at });
+    let mut options = Options { output: &output, resume, progress: &mut progress, ..*options };
+    let outcome = scene
+        .of_study(source, index)
+        .map_err(Failure::from)
+        .and_then(|(source, scene)| part::one(&source, &scene, Some(&spec.name), &mut options));
+    let interrupted = |error: &Error| matches!(error, Error::Interrupted(_));
+    match (outcome, &spec.fails) {
+        (Err(Failure::Run(error)), _) if interrupted(&error) => {
+            let whole = output.parent().unwrap_or(&output).to_path_buf();
+            Err(Error::Interrupted(whole).into())
+        }
+        (Err(failure), Some(expected)) if failure.to_string().contains(expected.as_str()) => {
+            Ok(Err(failure.to_string()))
+        }
+        (Err(Failure::Run(error)), _) => {
+            Err(Error::Study { name: spec.name.clone(), error: Box::new(error) }.into())
+        }
+        (other, _) => other.map(Ok),
+    }
+}
+
+/// All values, with the study's name before each.
+fn together(source: &Source, scene: &PartScene, rows: &Rows) -> Report {
+    let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
+    for row in &rows.rows {
+        let name = &row.name;
+        if scene.study.iter().any(|study| study.name == *name && study.fails.is_some()) {
+            let failed = f64::from(u8::from(row.outcome.is_err()));
+            report.value(&format!("{name}.failed_as_it_must"), failed, "");
+        }
+        let Ok(own) = &row.outcome else { continue };
+        for (key, value) in &own.values {
+            if let Value::Scalar { value, unit } = value {
+                report.value(&format!("{name}.{key}"), *value, unit);
+            }
+        }
+        for (key, count) in &own.work {
+            report.work(&format!("{name}.{key}"), *count);
+        }
+        for (phase, seconds) in &own.seconds {
+            report.seconds(phase, *seconds);
+        }
+    }
+    report
+}
+
+/// suite.md and suite.json: what each study is, what must happen, what was seen, and at what cost.
+fn table(report: &Report, scene: &PartScene, rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
+    if scene.study.iter().all(|study| study.must.is_none()) {
+        return Ok(());
+    }
+    let mut text = String::from("| case | must | seen | steps | seconds |\n|---|---|---|---|---|\n");
+    let mut list = Vec::new();
+    for row in &rows.rows {
+        let name = &row.name;
+        let study = scene.study.iter().find(|study| study.name == *name);
+        let must = study.and_then(|study| study.must.as_deref()).unwrap_or_default();
+        let (held, missed) = report.verdict_on(|quantity| {
+            quantity.strip_prefix(name.as_str()).is_some_and(|rest| rest.starts_with('.'))
+        });
+        let seen = match &row.outcome {
+            Err(failure) => format!("refused: {}", failure.lines().next().unwrap_or_default()),
+            Ok(_) if !missed.is_empty() => format!("missed: {}", missed.join(", ")),
+            Ok(own) => {
+                let value = |name: &str| own.scalar(name).unwrap_or(f64::NAN);
+                let [low, high] = [value("least_temperature"), value("largest_temperature")];
+                let mut seen = format!("ends at {low:.3} to {high:.3} °C");
+                if let [Some(low), Some(high)] = ["least_alpha", "largest_alpha"].map(|name| own.scalar(name))
+                {
+                    seen += &format!(", α {low:.4} to {high:.4}");
+                }
+                seen + &format!("; energy kept to {:.0e}; {held} expectations hold", value("worst_balance"))
+            }
+        };
+        let own = row.outcome.as_ref().ok();
+        let steps = own.and_then(|own| own.work.get("steps")).copied().unwrap_or(0);
+        let seconds = own.and_then(|own| own.seconds.get("solve")).copied().unwrap_or(0.0);
+        text += &format!("| {name} | {must} | {seen} | {steps} | {seconds:.2} |\n");
+        let pass = missed.is_empty();
+        list.push(serde_json::json!({
+            "case": name, "must": must, "seen": seen, "pass": pass, "steps": steps, "seconds": seconds,
+        }));
+    }
+    atomic_write(output.join("suite.md"), |file| file.write_all(text.as_bytes()))?;
+    atomic_write(output.join("suite.json"), |file| Ok(serde_json::to_writer_pretty(file, &list)?))
+}
+
+/// probe_NAME_QUANTITY.png: what a probe of the same name saw in each study.
+fn compare(scene: &PartScene, rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
+    /// Curves by probe and heading.
+    type Curves = BTreeMap<(String, String), Vec<Series>>;
+    let mut curves = Curves::new();
+    for row in rows.rows.iter().filter(|row| row.outcome.is_ok()) {
+        // what is there, study by study: a study may have probes of its own
+        let folder = output.join(&row.name);
+        let entries = std::fs::read_dir(&folder).map_err(polycore::Error::io("read", &folder))?;
+        let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+        for file in names.filter(|name| name.starts_with("probe_") && name.ends_with(".csv")) {
+            let columns = csv::read(folder.join(&file))?;
+            let Some(((_, time), rest)) = columns.split_first().filter(|((_, t), _)| t.len() > 1) else {
+                continue;
+            };
+            let every = time.len().div_ceil(POINTS);
+            let thin = |list: &[f64]| -> Vec<f64> { list.iter().copied().step_by(every).collect() };
+            let probe = file.trim_start_matches("probe_").trim_end_matches(".csv");
+            for (heading, values) in rest.iter().filter(|(_, values)| values.iter().any(|x| x.is_finite())) {
+                let series = Series::line(&row.name, &thin(time), &thin(values));
+                curves.entry((probe.to_owned(), heading.clone())).or_default().push(series);
+            }
+        }
+    }
+    for ((probe, heading), series) in curves.into_iter().filter(|(_, series)| series.len() > 1) {
+        let title =
+            [scene.title.as_str(), &probe].iter().filter(|s| !s.is_empty()).copied().collect::<Vec<_>>();
+        let plot = LinePlot::new(&title.join(", ")).axes("t [s]", &heading.replace("degC", "°C"));
+        let plot = series.into_iter().fold(plot, LinePlot::series);
+        let name = heading.split(' ').next().unwrap_or_default();
+        plot.write(output.join(format!("probe_{probe}_{name}.png")))?;
+    }
+    Ok(())
+}
+
+/// What each study builds and leaves out.
+///
+/// # Errors
+/// A fault of the scene.
+pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
+    let mut lines = Vec::new();
+    for index in scene.studies(source, false)? {
+        let study = &scene.study[index];
+        lines.push(format!("study {}", study.name));
+        if let Some(error) = &study.fails {
+            lines.push(format!("  must fail  with `{error}`"));
+            continue;
+        }
+        let (source, scene) = scene.of_study(source, index)?;
+        lines.extend(part::explain_one(&source, &scene)?.iter().map(|line| format!("  {line}")));
+    }
+    Ok(lines)
+}
