@@ -11,21 +11,26 @@ use serde::{Deserialize, Serialize};
 use crate::table::{Table, print};
 use crate::workspace::Workspace;
 
+mod brick;
+mod calculix;
+mod crystfem;
 mod forces;
 mod lammps;
 mod langevin;
 mod peri_peers;
 mod peri_solvers;
+mod scikit_fem;
 
 /// What to measure.
 #[derive(clap::Args)]
 pub struct Options {
-    /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, or a program with a `bench --json`.
+    /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, `crystfem [-- PART… N,N…]`
+    /// (its brick beside CalculiX and scikit-fem), or a program with a `bench --json`.
     name: String,
     /// Print the rows as JSON.
     #[arg(long)]
     json: bool,
-    /// Passed on to that program after `bench --json`; spacings of `peri-solvers`.
+    /// Passed on to that program after `bench --json`; spacings of `peri-solvers`; parts and edges of `crystfem`.
     #[arg(last = true)]
     arguments: Vec<String>,
 }
@@ -57,6 +62,16 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             (rows, table, true)
         }
         "peri-peers" => peri_peers::run(workspace, &folder)?,
+        "crystfem" => {
+            // writes the rows of each part
+            let (rows, table, passed) = crystfem::run(workspace, &folder, &options.arguments)?;
+            if options.json {
+                print(&(serde_json::to_string_pretty(&rows).into_diagnostic()? + "\n"));
+            } else {
+                print(&format!("{table}written: {}\n", workspace.short(&folder)));
+            }
+            return Ok(passed);
+        }
         "peri-solvers" => {
             let (rows, table) = peri_solvers::run(workspace, &folder, &options.arguments)?;
             (rows, table, true)

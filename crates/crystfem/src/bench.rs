@@ -1,13 +1,17 @@
-//! `crystfem bench`: error against run time.
+//! `crystfem bench`: error against run time, seconds per step, memory.
 
 use clap::Subcommand;
-use crystfem::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
-use crystfem::material::{Point, Polymer, Property, Semicrystalline, ThermalMaterial};
-use crystfem::melting::Melting;
 use crystfem::run::Failure;
-use polycore::command::{Measurement, print_measurements};
-use std::hint::black_box;
-use std::time::Instant;
+use polycore::command::print_measurements;
+
+mod brick;
+mod cube;
+mod integrators;
+mod kinetics;
+mod solvers;
+
+/// Timings, of which the median counts.
+const REPEATS: usize = 7;
 
 /// What to measure.
 #[derive(clap::Args)]
@@ -21,142 +25,53 @@ pub struct Bench {
 
 #[derive(Subcommand)]
 enum What {
-    /// Error in α against nanoseconds per step of the ways to integrate the kinetics, and the whole response of a
+    /// Error in alpha against nanoseconds per step of the ways to integrate the kinetics, and the whole response of a
     /// material.
     Kinetics {
         /// Cooling rate, K/min.
         #[arg(long, default_value_t = 10.0)]
         rate: f64,
     },
+    /// Error against time of the time integrators, with fixed and with adaptive steps: a cube that cools from a smooth
+    /// temperature, and one that is quenched.
+    Integrators {
+        /// Elements along an edge.
+        #[arg(long, default_value_t = 16, value_parser = elements)]
+        elements: usize,
+    },
+    /// Error against time of the linear solvers in short and long steps of the quenched cube.
+    Solvers {
+        /// Elements along an edge.
+        #[arg(long, default_value_t = 26, value_parser = elements)]
+        elements: usize,
+    },
+    /// Seconds per step, iterations and memory of a brick with film and radiation, 20 steps of 0.5 s.
+    Brick(brick::Options),
 }
 
-/// Steps that a timing covers.
-const STEPS: usize = 200_000;
-/// Timings, of which the median counts.
-const REPEATS: usize = 7;
+fn elements(text: &str) -> Result<usize, String> {
+    let value: usize = text.parse().map_err(|_| format!("`{text}` is no whole number"))?;
+    if (1..=400).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 1 to 400")) }
+}
 
 impl Bench {
     /// Measures and prints.
     ///
     /// # Errors
-    /// A rate that is not above 0.
+    /// A rate that is not above 0; those of the runs and of files that cannot be written.
     pub fn print(self) -> Result<bool, Failure> {
         let rows = match self.what {
-            What::Kinetics { rate } => kinetics(rate)?,
+            What::Kinetics { rate } => kinetics::measure(rate)?,
+            What::Integrators { elements } => integrators::measure(elements)?,
+            What::Solvers { elements } => solvers::measure(elements)?,
+            What::Brick(options) => brick::measure(&options)?,
         };
         print_measurements(&rows, self.json);
         Ok(true)
     }
 }
 
-/// Column 1 of Table 4.1, 200 → 120 °C from a seed of 1e-3 (from which Euler's method can start at all).
-fn kinetics(rate: f64) -> Result<Vec<Measurement>, Failure> {
-    if !(rate > 0.0 && rate.is_finite()) {
-        let allowed = "above 0".to_owned();
-        return Err(crystfem::Error::Parameter { name: "--rate, K/min", found: rate, allowed }.into());
-    }
-    let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?;
-    let rate = rate / 60.0;
-    let exact = cooling_curve(&kinetics, rate, 473.15, 393.15, 1e-3, 2);
-    let mut rows = Vec::new();
-    for scheme in Scheme::ALL {
-        for kelvin in [0.001, 0.01, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0] {
-            let steps = (80.0_f64 / kelvin).round() as usize;
-            let mut push = |what: &str, value: f64, unit| {
-                let what = format!("{} {what} at {kelvin} K a step", scheme.name());
-                rows.push(Measurement { what, size: steps as u64, threads: 1, value, unit });
-            };
-            let error = error(&kinetics, scheme, rate, kelvin, steps, &exact);
-            // JSON knows no NaN: a scheme that leaves [0, 1] for good has no row of errors
-            if error.is_finite() {
-                push("largest error in alpha", error, "");
-            }
-            push("time", nanoseconds(&kinetics, scheme, rate, kelvin, steps), "ns/step");
-        }
-    }
-    for (name, start) in [("cooling", 425.0), ("heating", 425.0), ("heating above melting", 500.0)] {
-        for latent in [None, Some(209e3)] {
-            let sign = if name == "cooling" { -1.0 } else { 1.0 };
-            let coupled = if latent.is_some() { "with" } else { "without" };
-            let what = format!("response, {name} by 0.5 K, {coupled} latent heat");
-            let value = response(kinetics, latent, start, 0.5 * sign)?;
-            rows.push(Measurement { what, size: STEPS as u64, threads: 1, value, unit: "ns" });
-        }
-    }
-    Ok(rows)
-}
-
-/// Nanoseconds of a material's response, tangent and all.
-fn response(
-    kinetics: Kinetics,
-    latent_heat: Option<f64>,
-    start: f64,
-    increment: f64,
-) -> Result<f64, Failure> {
-    let material = Semicrystalline::new(Polymer {
-        density: 1010.0,
-        conductivity: Property::Constant(0.25),
-        specific_heat: Property::Constant(2200.0),
-        kinetics,
-        melting: Some(Melting::PA12),
-        ultimate_crystallinity: 0.25,
-        latent_heat,
-        seed: 0.3,
-    })?;
-    let mut old = [0.0];
-    material.initial_state(start, &mut old);
-    let at = Point { temperature: start, increment, gradient: Default::default(), dt: 0.5 };
-    let mut times = Vec::new();
-    for _ in 0..REPEATS {
-        let since = Instant::now();
-        for _ in 0..STEPS {
-            black_box(material.respond(black_box(&at), black_box(&old), &mut [0.0])?);
-        }
-        times.push(since.elapsed().as_secs_f64() / STEPS as f64 * 1e9);
-    }
-    times.sort_by(f64::total_cmp);
-    Ok(times[REPEATS / 2])
-}
-
-fn error(
-    kinetics: &Kinetics,
-    scheme: Scheme,
-    rate: f64,
-    kelvin: f64,
-    steps: usize,
-    exact: &crystfem::kinetics::CoolingCurve,
-) -> f64 {
-    let mut state = scheme.state(kinetics, 1e-3);
-    let mut worst = 0.0_f64;
-    for k in 0..steps {
-        let (start, end) = (473.15 - k as f64 * kelvin, 473.15 - (k + 1) as f64 * kelvin);
-        state = scheme.advance(kinetics, state, start, end, kelvin / rate);
-        let error = (scheme.degree(kinetics, state) - kinetics.degree(exact.z_at(end))).abs();
-        if !error.is_finite() {
-            return f64::NAN;
-        }
-        worst = worst.max(error);
-    }
-    worst
-}
-
-/// The curve again and again, α at the end of each step included.
-fn nanoseconds(kinetics: &Kinetics, scheme: Scheme, rate: f64, kelvin: f64, steps: usize) -> f64 {
-    let repeats = (STEPS / steps).max(1);
-    let mut times: Vec<f64> = (0..REPEATS)
-        .map(|_| {
-            let start = Instant::now();
-            for _ in 0..repeats {
-                let mut state = scheme.state(kinetics, 1e-3);
-                for k in 0..steps {
-                    let (from, to) = (473.15 - k as f64 * kelvin, 473.15 - (k + 1) as f64 * kelvin);
-                    state = scheme.advance(kinetics, state, from, to, kelvin / rate);
-                    black_box(scheme.degree(kinetics, state));
-                }
-            }
-            start.elapsed().as_secs_f64() / (repeats * steps) as f64 * 1e9
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    times[REPEATS / 2]
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
 }

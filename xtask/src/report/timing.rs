@@ -74,31 +74,60 @@ const SUBJECTS: &[Subject] = &[
     },
     Subject {
         title: "Integrators of Nakamura's law",
-        source: Source::Bench { name: "crystfem-kinetics", error: "largest error in alpha", time: "time" },
-        split: " at ",
+        source: Source::Bench { name: "crystfem-kinetics", error: "error", time: "time" },
+        split: " ",
         default: "z-gauss2",
-        axes: ["ns per kelvin", "largest error in α"],
+        axes: ["s, whole curve", "largest error in α"],
         command: "cargo xtask bench crystfem -- kinetics",
-        note: "PA12 cooled from 200 to 120 °C; a point for each step, time is that of a step over its kelvin. Schemes that leave \
-               [0, 1] have no point there.",
+        note: "PA12 cooled from 200 to 120 °C; a point for each length of steps, K. Schemes that leave [0, 1] have no point there.",
     },
     Subject {
-        title: "Time integrators of heat conduction",
-        source: Source::Bench { name: "crystfem-heat", error: "largest error", time: "time" },
-        split: " at ",
-        default: "tr-bdf2",
-        axes: ["s", "largest error, K"],
-        command: "cargo xtask bench crystfem -- heat",
-        note: "",
+        title: "Time integrators of heat conduction, smooth",
+        source: Source::Bench { name: "crystfem-integrators", error: "error, smooth", time: "time, smooth" },
+        split: " ",
+        default: "tr-bdf2-adaptive",
+        axes: ["s", "rms error, K"],
+        command: "cargo xtask bench crystfem -- integrators",
+        note: "A cube that cools from an eigenvector of its finite elements; a point for each number of steps or tolerance.",
     },
     Subject {
-        title: "Linear solvers of heat conduction",
-        source: Source::Bench { name: "crystfem-solvers", error: "largest error", time: "time" },
-        split: " at ",
+        title: "Time integrators of heat conduction, quenched",
+        source: Source::Bench {
+            name: "crystfem-integrators",
+            error: "error, quenched",
+            time: "time, quenched",
+        },
+        split: " ",
+        default: "tr-bdf2-adaptive",
+        axes: ["s", "rms error, K"],
+        command: "cargo xtask bench crystfem -- integrators",
+        note: "The same cube, quenched at three faces.",
+    },
+    Subject {
+        title: "Linear solvers of heat conduction, short steps",
+        source: Source::Bench {
+            name: "crystfem-solvers",
+            error: "error, 0.5 s a step",
+            time: "time, 0.5 s a step",
+        },
+        split: " ",
         default: "cg",
-        axes: ["s per step", "largest error, K"],
+        axes: ["s per step", "rms error, K"],
         command: "cargo xtask bench crystfem -- solvers",
-        note: "",
+        note: "The quenched cube of 27³ nodes, 0.5 s a step; a point for each tolerance. Factors are made before.",
+    },
+    Subject {
+        title: "Linear solvers of heat conduction, long steps",
+        source: Source::Bench {
+            name: "crystfem-solvers",
+            error: "error, 50 s a step",
+            time: "time, 50 s a step",
+        },
+        split: " ",
+        default: "cg",
+        axes: ["s per step", "rms error, K"],
+        command: "cargo xtask bench crystfem -- solvers",
+        note: "The same with 50 s a step.",
     },
     Subject {
         title: "Surrogate models",
@@ -171,7 +200,7 @@ pub fn measured(bench: &Path, folder: &Path, outcomes: &[Outcome]) -> Result<Vec
 
 impl Subject {
     fn measured(&self, bench: &Path, folder: &Path, outcomes: &[Outcome]) -> Result<Measured> {
-        let mut points = match self.source {
+        let points = match self.source {
             Source::Bench { name, error, time } => {
                 let text = fs::read_to_string(bench.join(format!("{name}.json"))).unwrap_or_default();
                 let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
@@ -182,9 +211,6 @@ impl Subject {
                 .find(|outcome| outcome.case == case)
                 .map_or_else(Vec::new, |outcome| of_curves(outcome, curves)),
         };
-        if self.axes[0] == "ns per kelvin" {
-            points.iter_mut().for_each(per_kelvin);
-        }
         let mut points: Vec<Point> = points
             .into_iter()
             .filter(|(_, time, error)| time.is_finite() && error.is_finite() && *time > 0.0)
@@ -269,13 +295,6 @@ fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
     points.into_iter().map(|(_, name, time, error)| (name, time, error)).collect()
 }
 
-/// Points `KELVIN K a step`: time of a step over its kelvin, so that large steps show what they save.
-fn per_kelvin((name, time, _): &mut (String, f64, f64)) {
-    let words: Vec<&str> = name.split(' ').collect();
-    let kelvin = words.windows(2).find(|pair| pair[1] == "K").and_then(|pair| pair[0].parse::<f64>().ok());
-    *time /= kelvin.unwrap_or(f64::NAN);
-}
-
 /// Every point of every curve whose name begins so.
 fn of_curves(outcome: &Outcome, prefix: &str) -> Vec<(String, f64, f64)> {
     let values = outcome.report.iter().flat_map(|report| &report.values);
@@ -318,13 +337,9 @@ mod tests {
             row("adr 1e-3: error", 20, 0.02),
         ];
         assert_eq!(pairs(&rows, "error", "time"), [("adr 1e-2".to_owned(), 6.0, 0.2)]);
-        let rows = [
-            row("euler largest error in alpha at 0.5 K a step", 1, 0.1),
-            row("euler time at 0.5 K a step", 1, 8.0),
-        ];
-        let mut found = pairs(&rows, "largest error in alpha", "time");
-        found.iter_mut().for_each(per_kelvin);
-        assert_eq!(found, [("euler at 0.5 K a step".to_owned(), 16.0, 0.1)]);
+        let rows = [row("bdf 4: error, smooth", 1, 0.1), row("bdf 4: time, smooth", 1, 8.0)];
+        assert_eq!(pairs(&rows, "error, smooth", "time, smooth"), [("bdf 4".to_owned(), 8.0, 0.1)]);
+        assert_eq!(pairs(&rows, "error, quenched", "time, quenched"), []);
         // sizes that count repetitions differ
         let rows = [row("exact: error", 200, 1e-16), row("exact: time", 7, 4.0)];
         assert_eq!(pairs(&rows, "error", "time"), [("exact".to_owned(), 4.0, 1e-16)]);

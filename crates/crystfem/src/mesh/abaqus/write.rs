@@ -4,8 +4,11 @@ use std::io::{self, Write};
 
 use crate::mesh::Mesh;
 
-/// Writes nodes, elements, sets and surfaces, numbers counted from 1, coordinates so that they are read back to the last
-/// bit. `diffusive` elements are DC3D8 and DC3D4 (Abaqus), otherwise C3D8 and C3D4 (CalculiX takes both, structural ones
+/// CalculiX reads the first twenty letters of a number.
+const WIDTH: usize = 20;
+
+/// Writes nodes, elements, sets and surfaces, numbers counted from 1, coordinates to the last bit where twenty letters
+/// hold it and to 1e-12 elsewhere. `diffusive` elements are DC3D8 and DC3D4 (Abaqus), otherwise C3D8 and C3D4 (CalculiX takes both, structural ones
 /// for `*HEAT TRANSFER` too). Names with spaces or commas are written with underscores.
 ///
 /// # Errors
@@ -13,7 +16,8 @@ use crate::mesh::Mesh;
 pub fn write(mesh: &Mesh, diffusive: bool, to: &mut impl Write) -> io::Result<()> {
     writeln!(to, "*NODE")?;
     for (number, [x, y, z]) in (1u32..).zip(&mesh.points) {
-        writeln!(to, "{number},{x:e},{y:e},{z:e}")?;
+        let [x, y, z] = [x, y, z].map(|x| coordinate(*x));
+        writeln!(to, "{number},{x},{y},{z}")?;
     }
     let prefix = if diffusive { "D" } else { "" };
     let mut number = 1u32;
@@ -48,6 +52,15 @@ pub fn write(mesh: &Mesh, diffusive: bool, to: &mut impl Write) -> io::Result<()
     Ok(())
 }
 
+/// A number in at most [`WIDTH`] letters.
+fn coordinate(x: f64) -> String {
+    let short = format!("{x:e}");
+    let plain = format!("{x}").replacen("0.", ".", usize::from(x.abs() < 1.0));
+    let rounded = (12..17).rev().map(|digits| format!("{x:.digits$e}"));
+    let all = [short, plain].into_iter().chain(rounded);
+    all.min_by_key(|text| text.len().saturating_sub(WIDTH)).unwrap_or_default()
+}
+
 /// Twelve to a line: CalculiX takes sixteen.
 fn numbers(set: &[u32], to: &mut impl Write) -> io::Result<()> {
     for line in set.chunks(12) {
@@ -59,4 +72,23 @@ fn numbers(set: &[u32], to: &mut impl Write) -> io::Result<()> {
 
 fn plain(name: &str) -> String {
     name.replace(|c: char| c.is_whitespace() || ",=*\"".contains(c), "_")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coordinates_fit_calculix() {
+        for x in
+            [0.0, -0.0, 1.0, 0.02 / 13.0, -0.02 / 13.0, 1.0 / 3.0, -1e-7 / 3.0, 1e300 / 7.0, -1e-300 / 7.0]
+        {
+            let text = coordinate(x);
+            assert!(text.len() <= WIDTH, "{text}");
+            let read: f64 = text.parse().unwrap();
+            assert!((read - x).abs() <= 1e-12 * x.abs() && (x == 0.0 || read != 0.0), "{text}, {x}");
+        }
+        assert_eq!(coordinate(0.02 / 13.0), ".0015384615384615385");
+        assert_eq!(coordinate(-0.25), "-2.5e-1");
+    }
 }
