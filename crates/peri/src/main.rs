@@ -66,6 +66,8 @@ enum Command {
     Exact(exact_command::Exact),
     /// Measure bond evaluations per second, memory, and the machine's bandwidth.
     Bench(bench::Bench),
+    /// Print the JSON Schema of scenes, by which editors complete and check them.
+    Schema,
     /// Print a shell's completion script.
     Completions {
         /// The shell.
@@ -88,6 +90,10 @@ fn main() -> ExitCode {
         Command::Check { scene, quick } => check(&scene, quick),
         Command::Exact(exact) => exact.print(),
         Command::Bench(bench) => bench.print(),
+        Command::Schema => {
+            println!("{:#}", peri::scene::schema());
+            Ok(true)
+        }
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "peri", &mut std::io::stdout());
             Ok(true)

@@ -29,9 +29,11 @@ mod error;
 mod failure;
 mod locate;
 mod overlay;
+mod schema;
 
 pub use error::SceneError;
 pub use failure::Failure;
+pub use schema::schema;
 
 /// The only version of the scene format so far.
 pub const VERSION: i64 = 1;

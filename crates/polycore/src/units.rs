@@ -6,6 +6,7 @@
 //! Symbols, factors and dimensions come from [`uom`]; the grammar on top allows products (`N*mm`, `N·mm`, `N mm`),
 //! quotients (`J/(kg K)`), powers (`mm^2`, `mm²`, `s^-1`) and `u` for `µ`. `J/kg K` is ambiguous and refused.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
 use std::str::FromStr;
@@ -116,6 +117,32 @@ impl<D: Dimension> Serialize for Quantity<D> {
 impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
     fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
         deserializer.deserialize_any(QuantityVisitor(PhantomData))
+    }
+}
+
+/// A text `NUMBER UNIT`; a bare number too where there is no unit.
+impl<D: Dimension> schemars::JsonSchema for Quantity<D> {
+    fn schema_name() -> Cow<'static, str> {
+        let noun = D::NAME.trim_start_matches("an ").trim_start_matches("a ");
+        noun.replace(|letter: char| !letter.is_ascii_alphanumeric(), "_").into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        const NUMBER: &str = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?";
+        if D::EXPONENTS == [0; 8] {
+            return schemars::json_schema!({
+                "type": ["number", "string"],
+                "description": D::NAME,
+                "pattern": format!("{NUMBER}\\s*[%‰]?\\s*$"),
+                "examples": [D::EXAMPLE],
+            });
+        }
+        schemars::json_schema!({
+            "type": "string",
+            "description": format!("{} with its unit", D::NAME),
+            "pattern": format!("{NUMBER}\\s*\\S.*$"),
+            "examples": [D::EXAMPLE],
+        })
     }
 }
 

@@ -41,7 +41,7 @@ pub trait BondPotential: Send + Sync {
 }
 
 /// The laws by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Law {
     /// t = T(l) − T(1): the printed chain force less its value at rest.

@@ -4,7 +4,7 @@ use polycore::units::{Force, Length, Speed, Stress};
 use serde::Deserialize;
 
 /// A region and what holds there.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundary {
     /// Its name in curves and values; default: the side, or `box` and its number.
@@ -28,7 +28,7 @@ pub struct Boundary {
 }
 
 /// Sides of the bounding box.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 pub enum Side {
     /// Smallest x.
     #[serde(rename = "x-")]
@@ -78,6 +78,20 @@ pub enum Held {
     Free,
     /// Prescribed, m.
     At(f64),
+}
+
+impl schemars::JsonSchema for Held {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Held".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let length = generator.subschema_for::<Length>();
+        schemars::json_schema!({
+            "description": "a length, or free: not prescribed",
+            "anyOf": [{ "const": "free" }, length],
+        })
+    }
 }
 
 impl<'de> Deserialize<'de> for Held {

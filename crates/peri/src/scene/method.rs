@@ -9,7 +9,7 @@ use polycore::units::{Density, Rate, Time};
 use serde::Deserialize;
 
 /// Solver settings.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Solver {
     /// Method; default: [`Scene::method`].
@@ -49,7 +49,7 @@ impl Default for Solver {
 }
 
 /// Methods.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Adaptive dynamic relaxation, quasi-static.
@@ -103,7 +103,7 @@ impl Scene {
 }
 
 /// Explicit dynamics: loads rise linearly over the ramp and then stay.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Dynamics {
     /// Mass density ρ.

@@ -30,7 +30,7 @@ use serde::Deserialize;
 use std::path::PathBuf;
 
 /// A whole scene.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// The program that runs it: `peri`.
@@ -68,7 +68,7 @@ pub struct Scene {
 }
 
 /// The only program that runs these scenes.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Program {
     /// This crate.
@@ -76,7 +76,7 @@ pub enum Program {
 }
 
 /// Geometry: shapes on a regular lattice, or points from a file.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodySpec {
     /// `plane-stress`, `plane-strain` or `solid`.
@@ -103,7 +103,7 @@ pub struct BodySpec {
 pub const HORIZON_RATIO: f64 = 3.015;
 
 /// One shape; which lengths it needs depends on its kind.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShapeSpec {
     /// Kind of a shape put on.
@@ -125,7 +125,7 @@ pub struct ShapeSpec {
 }
 
 /// Kinds of shapes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ShapeKind {
     /// Axis-parallel box (2D: rectangle).
@@ -139,7 +139,7 @@ pub enum ShapeKind {
 }
 
 /// A coordinate axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Axis {
     /// First.
@@ -152,7 +152,7 @@ pub enum Axis {
 
 /// A crack of zero width: the segment `from`–`to` in 2D, the parallelogram `from`, `to`, `and` (two neighbouring
 /// corners of `from`) in 3D.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CrackSpec {
     /// First corner.
@@ -164,7 +164,7 @@ pub struct CrackSpec {
 }
 
 /// The bond law and its constants.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
     /// Young's modulus E of the continuum; ν follows from the space.
@@ -195,7 +195,7 @@ pub struct Material {
 }
 
 /// A part of the body whose bonds are stiffer or softer; a bond across its border has the mean of both.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Inclusion {
     /// Where: a shape to `add`.
@@ -205,7 +205,7 @@ pub struct Inclusion {
 }
 
 /// Whether bonds near a free surface are stiffened.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SurfaceCorrection {
     /// As printed.
@@ -216,7 +216,7 @@ pub enum SurfaceCorrection {
 }
 
 /// Contact between particles that no intact bond joins.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactSpec {
     /// κ: stiffness of a contact over that of a bond as long as the horizon; 0 only shows how particles overlap.
@@ -230,7 +230,7 @@ impl Default for ContactSpec {
 }
 
 /// Stress output.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StressSpec {
     /// Measures to compute; the first is drawn.
@@ -255,7 +255,7 @@ impl StressSpec {
 }
 
 /// Closed-form solutions.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(tag = "problem", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ExactSpec {
     /// Circular hole at the origin in a plate under remote tension along x, Eqs (2.81)–(2.83).
@@ -268,7 +268,7 @@ pub enum ExactSpec {
 }
 
 /// Files to write beside the report.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OutputSpec {
     /// Pictures (PNG).
@@ -291,7 +291,7 @@ impl Default for OutputSpec {
 
 /// A set of variants: every combination of what is listed, the scene's own value where nothing is. What replaces a part
 /// of the scene replaces it whole.
-#[derive(Clone, Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Study {
     /// What its variants are called, after their spacing and horizon.
@@ -326,6 +326,11 @@ pub struct Study {
     pub volume_correction: Vec<VolumeCorrection>,
     /// Part of `--quick` runs.
     pub quick: Option<bool>,
+}
+
+/// The JSON Schema of scenes.
+pub fn schema() -> serde_json::Value {
+    polycore::scene::schema("peri", |generator| vec![generator.subschema_for::<Scene>()])
 }
 
 impl Scene {

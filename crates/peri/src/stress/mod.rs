@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 pub type Tensor<const D: usize> = [[f64; D]; D];
 
 /// How stress is measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Measure {
     /// All bonds crossing the ball, weighted by the part of them inside; ball volume inside the body.
@@ -47,7 +47,7 @@ impl Measure {
 }
 
 /// Volume Ω of the averaging ball inside the body, for [`Measure::Hardy`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BallVolume {
     /// The ball's volume times the share of its particles that exist.

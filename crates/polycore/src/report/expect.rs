@@ -20,7 +20,7 @@ use crate::units::Ratio;
 /// ```
 ///
 /// or with `at_most = …` and/or `at_least = …` in place of `reference` and `tolerance`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(try_from = "Written", into = "Written")]
 pub struct Expect {
     /// The name of a scalar of the report.
@@ -93,6 +93,16 @@ impl fmt::Display for Tolerance {
     }
 }
 
+impl schemars::JsonSchema for Tolerance {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Tolerance".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        Ratio::json_schema(generator)
+    }
+}
+
 impl Serialize for Tolerance {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
@@ -130,20 +140,28 @@ impl<'de> Deserialize<'de> for Tolerance {
 }
 
 /// The keys as they stand in a scene.
-#[derive(Clone, Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "Expect")]
 struct Written {
+    /// The name of a scalar of the report.
     quantity: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The figure to reproduce, with `tolerance`.
     reference: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// `"1 %"` of the reference, or a number in the unit of the value.
     tolerance: Option<Tolerance>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// In place of a reference: a lower bound.
     at_least: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// In place of a reference: an upper bound.
     at_most: Option<f64>,
+    /// Where the figure and its tolerance come from.
     source: String,
     #[serde(default = "yes")]
+    /// Judged in `--quick` runs too.
     quick: bool,
 }
 
