@@ -65,6 +65,8 @@ enum Command {
     },
     /// Measure error against run time.
     Bench(bench::Bench),
+    /// Print the JSON Schema of scenes, by which editors complete and check them.
+    Schema,
     /// Print a shell's completion script.
     Completions {
         /// The shell.
@@ -85,6 +87,10 @@ fn main() -> ExitCode {
         Command::Resume { output, checkpoint_every } => resume(&output, checkpoint_every),
         Command::Check { scene } => check(&scene),
         Command::Bench(bench) => bench.print(),
+        Command::Schema => {
+            println!("{:#}", crystfem::scene::schema());
+            Ok(true)
+        }
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "crystfem", &mut std::io::stdout());
             Ok(true)

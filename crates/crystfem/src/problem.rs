@@ -8,7 +8,9 @@ use crate::mesh::{Face, Mesh};
 use std::sync::Arc;
 
 /// How heat capacity is represented.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Capacity {
     /// At the nodes; so are film, radiation and the state of materials with constant conductivity. Temperatures do

@@ -14,7 +14,7 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// A whole scene.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitScene {
     /// The program that runs it: `crystfem`.
@@ -33,7 +33,7 @@ pub struct FitScene {
 }
 
 /// Laws that can be fitted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FitLaw {
     /// Eq. (4.2), from one isothermal run: columns `time` and `alpha`.
@@ -46,7 +46,7 @@ pub enum FitLaw {
 }
 
 /// One fit.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitSpec {
     /// Its name: the values are `NAME.half_time`, `NAME.half_time.lower` …
@@ -69,7 +69,7 @@ pub struct FitSpec {
 }
 
 /// A table of measurements.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataSpec {
     /// CSV file, relative to the scene.

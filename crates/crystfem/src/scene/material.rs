@@ -14,7 +14,7 @@ use polycore::units::{
 use serde::{Deserialize, Deserializer};
 
 /// Laws of heat and crystallization.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
     /// [`Conductor`].
@@ -38,7 +38,7 @@ pub enum Law {
 /// crystallinity = 0.25
 /// latent_heat = "209 J/g"   # without it heat and crystallinity are uncoupled
 /// ```
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialSpec {
     /// Law.
@@ -66,7 +66,7 @@ pub struct MaterialSpec {
 }
 
 /// See [`Sign`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SignSpec {
     /// Heating crystallizes.
@@ -104,7 +104,7 @@ pub enum KineticsSpec {
 }
 
 /// The constants of Eq. (4.7).
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GivenKinetics {
     /// Growth rate constant K₀.
@@ -133,7 +133,7 @@ pub enum MeltingSpec {
 }
 
 /// The constants of Eq. (4.8).
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GivenMelting {
     /// Sharpness k_m.
@@ -367,6 +367,57 @@ impl TextOrTable for MeltingSpec {
 
     fn from_table(table: GivenMelting) -> Self {
         Self::Given(table)
+    }
+}
+
+impl<D: Dimension> schemars::JsonSchema for PropertySpec<D> {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        format!("{}_or_table", Quantity::<D>::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let constant = generator.subschema_for::<Quantity<D>>();
+        let temperature = generator.subschema_for::<Temperature>();
+        schemars::json_schema!({
+            "description": "a constant, or a table: linear between its temperatures, constant beyond",
+            "anyOf": [constant, {
+                "type": "object",
+                "properties": {
+                    "temperature": { "type": "array", "items": temperature, "description": "Increasing temperatures." },
+                    "value": { "type": "array", "items": constant, "description": "A value for each." },
+                },
+                "required": ["temperature", "value"],
+                "additionalProperties": false,
+            }],
+        })
+    }
+}
+
+impl schemars::JsonSchema for KineticsSpec {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Kinetics".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let given = generator.subschema_for::<GivenKinetics>();
+        schemars::json_schema!({
+            "description": "constants by name, or one by one",
+            "anyOf": [{ "enum": KINETICS_NAMES }, given],
+        })
+    }
+}
+
+impl schemars::JsonSchema for MeltingSpec {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Melting".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let given = generator.subschema_for::<GivenMelting>();
+        schemars::json_schema!({
+            "description": "constants by name, or one by one",
+            "anyOf": [{ "const": "pa12" }, given],
+        })
     }
 }
 

@@ -19,7 +19,7 @@ use std::path::PathBuf;
 /// element_size = "1 mm"
 /// substrate = { size = ["120 mm", "40 mm"], thickness = "4 mm", growth = 1.4 }
 /// ```
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshSpec {
     /// A bar in layers, with or without a substrate.
@@ -33,7 +33,7 @@ pub struct MeshSpec {
 }
 
 /// See [`Bar`].
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BarSpec {
     /// Extents along x and y.
@@ -51,7 +51,7 @@ pub struct BarSpec {
 }
 
 /// See [`Substrate`].
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SubstrateSpec {
     /// Extents along x and y.
@@ -63,7 +63,7 @@ pub struct SubstrateSpec {
 }
 
 /// A box with its lower corner at the origin.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BrickSpec {
     /// Extents.

@@ -22,7 +22,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 /// The only program that runs these scenes.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Program {
     /// This crate.
@@ -30,7 +30,7 @@ pub enum Program {
 }
 
 /// Files to write beside the report.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct OutputSpec {
     /// Pictures (PNG).
@@ -52,6 +52,17 @@ pub enum Kind {
     Part,
     /// Constants from measurements: `[[fit]]`.
     Fit,
+}
+
+/// The JSON Schema of scenes.
+pub fn schema() -> serde_json::Value {
+    polycore::scene::schema("crystfem", |generator| {
+        vec![
+            generator.subschema_for::<PartScene>(),
+            generator.subschema_for::<PointScene>(),
+            generator.subschema_for::<FitScene>(),
+        ]
+    })
 }
 
 /// Tells what a scene asks for by the blocks that it has.

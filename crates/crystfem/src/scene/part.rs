@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A whole scene.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PartScene {
     /// The program that runs it: `crystfem`.
@@ -54,7 +54,7 @@ pub struct PartScene {
 }
 
 /// Elements of one material. Of two regions that name an element, the later one holds.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegionSpec {
     /// An element set of the mesh; default: all.
@@ -66,7 +66,7 @@ pub struct RegionSpec {
 }
 
 /// Elements that appear while time goes on: in layers, or along a path.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PrintSpec {
     /// Temperature of what is laid down.
@@ -92,7 +92,7 @@ pub struct PrintSpec {
 }
 
 /// What acts on a surface: one of a temperature, a flux, or a film and radiation.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundarySpec {
     /// `outer` (the current outer surface), a surface of the mesh, an element set, or a side of the box around the mesh:
@@ -114,7 +114,7 @@ pub struct BoundarySpec {
 }
 
 /// Heat released in elements.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SourceSpec {
     /// An element set of the mesh; default: all.
@@ -124,7 +124,7 @@ pub struct SourceSpec {
 }
 
 /// Times and steps: of one length, or adaptive.
-#[derive(Clone, Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TimeSpec {
     /// When to end; default: one layer time after the last layer, or when the path ends.
@@ -148,7 +148,7 @@ pub struct TimeSpec {
 }
 
 /// A place: the nearest node.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeSpec {
     /// Its name: values are `NAME.temperature` and so on.
@@ -158,7 +158,7 @@ pub struct ProbeSpec {
 }
 
 /// Files beside the report.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PartOutput {
     /// Pictures (PNG).

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A whole scene.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointScene {
     /// The program that runs it: `crystfem`.
@@ -41,7 +41,7 @@ pub struct PointScene {
 
 /// Two materials: `POINT.shift_at_0.5` is the temperature of the first less that of the second, and
 /// `POINT.longer_to_0.99` its time over that of the second, less 1.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CompareSpec {
     /// Name of the first material.
@@ -51,7 +51,7 @@ pub struct CompareSpec {
 }
 
 /// One run: legs or a table of temperatures, or a lumped body that exchanges heat or none.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PointSpec {
     /// Its name: the values are `NAME.alpha`, or `NAME.MATERIAL.alpha` with several materials.
@@ -92,7 +92,7 @@ fn yes() -> bool {
 }
 
 /// A ramp (`to` with `rate` or `duration`), a jump (`to` alone) or a hold (`hold`).
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LegSpec {
     /// Where to.
@@ -106,7 +106,7 @@ pub struct LegSpec {
 }
 
 /// Newton's cooling: dU/dt = −c (T − T_a)/τ.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExchangeSpec {
     /// Temperature of the surroundings T_a.

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 /// name = "coupled"
 /// set = { "materials.pa12.latent_heat" = "209 J/g" }
 /// ```
-#[derive(Clone, Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudySpec {
     /// Its name: values are `NAME.mean_alpha` and so on, files lie in a folder of this name.
@@ -25,24 +25,34 @@ pub struct StudySpec {
     /// Part of `--quick` runs; default yes.
     pub quick: Option<bool>,
     /// Values by their paths (`"print.layer_time"`, `"boundary[1].film"`), merged into the scene.
+    #[schemars(with = "Option<BTreeMap<String, serde_json::Value>>")]
     pub set: Option<BTreeMap<String, IgnoredAny>>,
     /// Instead of the scene's.
+    #[schemars(with = "Option<super::MeshSpec>")]
     pub mesh: Option<IgnoredAny>,
     /// Instead of the scene's.
+    #[schemars(with = "Option<BTreeMap<String, super::MaterialSpec>>")]
     pub materials: Option<IgnoredAny>,
     /// Instead of the scene's.
+    #[schemars(with = "Option<Vec<super::RegionSpec>>")]
     pub region: Option<IgnoredAny>,
     /// Instead of the scene's.
+    #[schemars(with = "Option<super::PrintSpec>")]
     pub print: Option<IgnoredAny>,
     /// Instead of the scene's.
+    #[schemars(with = "Option<Vec<super::BoundarySpec>>")]
     pub boundary: Option<IgnoredAny>,
     /// Instead of the scene's.
+    #[schemars(with = "Option<Vec<super::SourceSpec>>")]
     pub source: Option<IgnoredAny>,
     /// Instead of the scene's.
+    #[schemars(with = "Option<super::TimeSpec>")]
     pub time: Option<IgnoredAny>,
     /// Instead of the scene's.
+    #[schemars(with = "Option<Vec<super::ProbeSpec>>")]
     pub probe: Option<IgnoredAny>,
     /// Instead of the scene's.
+    #[schemars(with = "Option<super::PartOutput>")]
     pub output: Option<IgnoredAny>,
 }
 

@@ -1,7 +1,9 @@
 //! Which linear solver a run takes, and why.
 
 /// How linear systems are solved.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum LinearSolver {
     /// By an estimate of the work, see [`Choice`].
