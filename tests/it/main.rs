@@ -4,6 +4,7 @@
 //! * [`commands`]: exit codes, help, closed forms, reports and files;
 //! * [`bits`]: the same bits on any number of threads;
 //! * [`killed`]: the same bits after `kill -9`, Ctrl-C and `peri resume`;
+//! * [`schemas`]: JSON Schemas, by which every case is valid;
 //! * [`documents`]: the commands and links that README and docs show.
 
 mod bad;
@@ -15,3 +16,4 @@ mod parts;
 mod program;
 mod results;
 mod scenes;
+mod schemas;
