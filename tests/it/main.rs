@@ -1,9 +1,11 @@
-//! Whole-program tests: they run the released command lines as a user does, and know nothing of their insides.
+//! Whole-program tests: they run the released command lines as a user does, and know nothing of their insides (but
+//! [`front_door`], which takes the readers by themselves).
 //!
 //! * [`bad`]: malformed and absurd scenes in `tests/bad/`, each with the message it must get;
 //! * [`commands`]: exit codes, help, closed forms, reports and files;
 //! * [`bits`]: the same bits on any number of threads;
 //! * [`killed`]: the same bits after `kill -9`, Ctrl-C and `peri resume`;
+//! * [`front_door`]: scenes, meshes, tables, laws and checkpoints damaged at random;
 //! * [`schemas`]: JSON Schemas, by which every case is valid;
 //! * [`documents`]: the commands and links that README and docs show.
 
@@ -11,6 +13,7 @@ mod bad;
 mod bits;
 mod commands;
 mod documents;
+mod front_door;
 mod killed;
 mod parts;
 mod program;

@@ -29,9 +29,29 @@ fn cases(program: &str) -> Vec<(PathBuf, Value)> {
 /// What of draft 7 the schemas use, patterns aside. The schemas were also checked with Python's `jsonschema`.
 fn faults(root: &Value, schema: &Value, value: &Value, place: &str, faults: &mut Vec<String>) {
     let known = [
-        "$ref", "$schema", "additionalProperties", "allOf", "anyOf", "const", "default", "definitions",
-        "description", "enum", "examples", "format", "items", "maxItems", "minItems", "minimum", "maximum", "oneOf",
-        "pattern", "properties", "required", "title", "type",
+        "$ref",
+        "$schema",
+        "additionalProperties",
+        "allOf",
+        "anyOf",
+        "const",
+        "default",
+        "definitions",
+        "description",
+        "enum",
+        "examples",
+        "format",
+        "items",
+        "maxItems",
+        "minItems",
+        "minimum",
+        "maximum",
+        "oneOf",
+        "pattern",
+        "properties",
+        "required",
+        "title",
+        "type",
     ];
     let Some(keys) = schema.as_object() else {
         if *schema == json!(false) {
@@ -43,8 +63,12 @@ fn faults(root: &Value, schema: &Value, value: &Value, place: &str, faults: &mut
     assert!(unknown.is_empty(), "{place}: this test knows no {unknown:?}");
     let mut say = |text: String| faults.push(format!("{place}: {text}"));
     if let Some(types) = keys.get("type") {
-        let names: Vec<&str> =
-            types.as_array().map_or_else(|| vec![types], |list| list.iter().collect()).iter().filter_map(|t| t.as_str()).collect();
+        let names: Vec<&str> = types
+            .as_array()
+            .map_or_else(|| vec![types], |list| list.iter().collect())
+            .iter()
+            .filter_map(|t| t.as_str())
+            .collect();
         let is = |name: &str| match name {
             "object" => value.is_object(),
             "array" => value.is_array(),
@@ -90,7 +114,9 @@ fn faults(root: &Value, schema: &Value, value: &Value, place: &str, faults: &mut
         for (key, value) in object {
             let place = format!("{place}.{key}");
             match (properties.and_then(|p| p.get(key)), keys.get("additionalProperties")) {
-                (Some(schema), _) | (None, Some(schema)) => self::faults(root, schema, value, &place, &mut inner),
+                (Some(schema), _) | (None, Some(schema)) => {
+                    self::faults(root, schema, value, &place, &mut inner)
+                }
                 (None, None) => {}
             }
         }
@@ -100,7 +126,8 @@ fn faults(root: &Value, schema: &Value, value: &Value, place: &str, faults: &mut
             }
         }
     }
-    if let (Some(items), Some(list)) = (keys.get("items").filter(|items| items.is_object()), value.as_array()) {
+    if let (Some(items), Some(list)) = (keys.get("items").filter(|items| items.is_object()), value.as_array())
+    {
         for (index, value) in list.iter().enumerate() {
             self::faults(root, items, value, &format!("{place}[{index}]"), &mut inner);
         }
@@ -134,7 +161,11 @@ fn slips_are_found() {
     let good: toml::Table = toml::from_str(&fs::read_to_string(file).unwrap()).unwrap();
     let good = serde_json::to_value(good).unwrap();
     let mut slips: Vec<(&str, Value)> = vec![("/body/spacing", json!(2)), ("/solver/steps", json!("many"))];
-    slips.extend([("/body/space", json!("plain-stress")), ("/version", json!(2)), ("/boundary/0/side", json!("x"))]);
+    slips.extend([
+        ("/body/space", json!("plain-stress")),
+        ("/version", json!(2)),
+        ("/boundary/0/side", json!("x")),
+    ]);
     for (path, wrong) in slips {
         let mut scene = good.clone();
         *scene.pointer_mut(path).unwrap() = wrong.clone();

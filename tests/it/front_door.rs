@@ -1,0 +1,334 @@
+//! What users hand in, damaged at random: scenes, meshes, tool paths, tables, laws, checkpoints. No panic, no hang, and
+//! an error that names the place.
+//!
+//! 2000 mutations of each kind, the same ones every time; `FRONT_DOOR=100000 cargo test --release -p tests front_door`
+//! takes that many, new ones every time. What it finds is kept in tests/proptest-regressions and tried first.
+
+use crate::program::workspace;
+use polycore::scene::Source;
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Mutations of each kind, unless `FRONT_DOOR` says otherwise.
+const FEW: u32 = 2000;
+/// Longer than any of these may take, on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// Of a larger file only so much is taken.
+const LARGEST: usize = 64 << 10;
+
+/// What is put in: numbers at the edges, brackets, words of the formats.
+const TOKENS: [&str; 48] = [
+    "0",
+    "-1",
+    "1",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "nan",
+    "inf",
+    "-inf",
+    "4294967296",
+    "18446744073709551616",
+    "-9223372036854775809",
+    "999999999999",
+    "0.0000001",
+    "\"",
+    "'",
+    "[",
+    "]",
+    "{",
+    "}",
+    "=",
+    ",",
+    "\n",
+    "\r\n",
+    "\t",
+    " ",
+    "#",
+    ".",
+    "\0",
+    "é",
+    "𝓛",
+    "\u{feff}",
+    "0 mm",
+    "1e300 mm",
+    "-5 K",
+    "[[",
+    "]]",
+    "[body]",
+    "[[study]]",
+    "free",
+    "*NODE",
+    "*ELEMENT, TYPE=C3D8",
+    "$Nodes",
+    "$EndNodes",
+    "$Elements",
+    "G1 X1e300",
+    "NaN",
+    "true",
+];
+
+/// One change of a file; places and lengths are shares of its length.
+#[derive(Clone, Debug)]
+enum Change {
+    Flip(u16, u8),
+    Delete(u16, u8),
+    Repeat(u16, u8),
+    Insert(u16, usize),
+    Replace(u16, u8, usize),
+    Cut(u16),
+}
+
+fn change() -> impl Strategy<Value = Change> {
+    let token = 0..TOKENS.len();
+    prop_oneof![
+        (any::<u16>(), 1u8..).prop_map(|(at, bits)| Change::Flip(at, bits)),
+        (any::<u16>(), any::<u8>()).prop_map(|(at, length)| Change::Delete(at, length)),
+        (any::<u16>(), any::<u8>()).prop_map(|(at, length)| Change::Repeat(at, length)),
+        (any::<u16>(), token.clone()).prop_map(|(at, token)| Change::Insert(at, token)),
+        (any::<u16>(), 0u8..24, token).prop_map(|(at, length, token)| Change::Replace(at, length, token)),
+        any::<u16>().prop_map(Change::Cut),
+    ]
+}
+
+fn apply(bytes: &mut Vec<u8>, change: &Change) {
+    let place = |at: u16| bytes.len() * usize::from(at) / (usize::from(u16::MAX) + 1);
+    let end = |at: usize, length: u8| (at + usize::from(length)).min(bytes.len());
+    match *change {
+        Change::Flip(at, bits) => {
+            let at = place(at);
+            if let Some(byte) = bytes.get_mut(at) {
+                *byte ^= bits;
+            }
+        }
+        Change::Delete(at, length) => {
+            let at = place(at);
+            let end = end(at, length);
+            bytes.drain(at..end);
+        }
+        Change::Repeat(at, length) => {
+            let at = place(at);
+            let piece = bytes[at..end(at, length)].to_vec();
+            bytes.splice(at..at, piece);
+        }
+        Change::Insert(at, token) => {
+            let at = place(at);
+            bytes.splice(at..at, TOKENS[token].bytes());
+        }
+        Change::Replace(at, length, token) => {
+            let at = place(at);
+            let end = end(at, length);
+            bytes.splice(at..end, TOKENS[token].bytes());
+        }
+        Change::Cut(at) => bytes.truncate(place(at)),
+    }
+}
+
+/// Damages files of a kind and opens them; an error must hold `name`, the place that a user has to look at.
+fn attack(kind: &str, files: &[PathBuf], name: &str, open: impl Fn(&[u8]) -> Result<(), String>) {
+    let corpus: Vec<Vec<u8>> = files
+        .iter()
+        .map(|file| {
+            let mut bytes = fs::read(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+            bytes.truncate(LARGEST);
+            bytes
+        })
+        .collect();
+    assert!(!corpus.is_empty(), "{kind}");
+    let asked = std::env::var("FRONT_DOOR").ok().map(|count| count.parse().expect("FRONT_DOOR, a count"));
+    let config = Config { cases: asked.unwrap_or(FEW), source_file: Some(file!()), ..Config::default() };
+    let mut runner = match asked {
+        Some(_) => TestRunner::new(config),
+        None => TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha)),
+    };
+    let inputs = (0..corpus.len(), prop::collection::vec(change(), 1..6));
+    let result = runner.run(&inputs, |(index, changes)| {
+        let mut bytes = corpus[index].clone();
+        changes.iter().for_each(|change| apply(&mut bytes, change));
+        let begun = Instant::now();
+        let opened = open(&bytes);
+        prop_assert!(begun.elapsed() < PATIENCE, "{:?}", begun.elapsed());
+        match opened {
+            Err(message) if !message.contains(name) => {
+                Err(TestCaseError::fail(format!("no place: {message}")))
+            }
+            _ => Ok(()),
+        }
+    });
+    if let Err(error) = result {
+        panic!("{kind}: {error}");
+    }
+}
+
+/// Files below a folder of the workspace whose names end so.
+fn below(folder: &str, ending: &str) -> Vec<PathBuf> {
+    let (mut found, mut folders) = (Vec::new(), vec![workspace().join(folder)]);
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.to_string_lossy().ends_with(ending) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Cases of a program.
+fn cases(program: &str) -> Vec<PathBuf> {
+    let mark = format!("program = \"{program}\"");
+    let mut files = below("cases", "case.toml");
+    files.retain(|file| fs::read_to_string(file).unwrap().contains(&mark));
+    files
+}
+
+/// Opens scenes given as a text by `open`.
+fn attack_scenes(files: &[PathBuf], open: impl Fn(&Source) -> Result<(), polycore::scene::SceneError>) {
+    attack("scene", files, "scene.toml", |bytes| {
+        let source = Source::new("scene.toml", String::from_utf8_lossy(bytes).into_owned());
+        open(&source).map_err(|error| error.render())
+    });
+}
+
+/// Opens files at a path by `open`.
+fn attack_files(kind: &str, files: &[PathBuf], name: &str, open: impl Fn(&Path) -> Result<(), String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    attack(kind, files, name, |bytes| {
+        fs::write(&path, bytes).unwrap();
+        open(&path)
+    });
+}
+
+#[test]
+fn scenes_of_peri() {
+    let mut files = cases("peri");
+    files.extend(below("tests/bad", ".toml").into_iter().filter(|file| file.is_file()));
+    attack_scenes(&files, |source| {
+        let scene = source.parse::<peri::scene::Scene>()?;
+        peri::scene::check(source, &scene, false).map(|_| ())
+    });
+}
+
+#[test]
+fn scenes_of_crystfem() {
+    use crystfem::scene::{FitScene, Kind, PartScene, PointScene, kind};
+    attack_scenes(&cases("crystfem"), |source| match kind(source)? {
+        Kind::Part => source.parse::<PartScene>()?.check(source),
+        Kind::Point => source.parse::<PointScene>().map(|_| ()),
+        Kind::Fit => source.parse::<FitScene>().map(|_| ()),
+    });
+}
+
+#[test]
+fn meshes_of_gmsh() {
+    let files = below("crates/crystfem/tests/fixtures", ".msh");
+    attack("Gmsh", &files, "part.msh", |bytes| {
+        let mesh = crystfem::mesh::gmsh::parse(Path::new("part.msh"), bytes, 1e-3);
+        mesh.map(|_| ()).map_err(|error| error.to_string())
+    });
+}
+
+#[test]
+fn meshes_of_abaqus() {
+    let files = below("crates/crystfem/tests/fixtures", ".inp");
+    attack("Abaqus", &files, "part.inp", |bytes| {
+        let mesh = crystfem::mesh::abaqus::parse(Path::new("part.inp"), bytes, 1e-3);
+        mesh.map(|_| ()).map_err(|error| error.to_string())
+    });
+}
+
+#[test]
+fn tool_paths() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        path
+    };
+    let lines: String =
+        (0..40).map(|k| format!("G1 X{} Y{} Z{} E{} F1800\n", k % 7, k % 5, k / 8, k)).collect();
+    let gcode = write("a.gcode", &format!("G21\nG90\nM82\nG92 E0\n; layer\n{lines}G28 ; home\n"));
+    attack("G-code", &[gcode], "path.gcode", |bytes| {
+        let path = crystfem::mesh::path::parse(Path::new("path.gcode"), bytes);
+        path.map(|_| ()).map_err(|error| error.to_string())
+    });
+    let rows: String = (0..40).map(|k| format!("{k},{},{},{},{}\n", k % 7, k % 5, k / 8, k % 2)).collect();
+    let table = write("a.csv", &format!("time [s],x [mm],y [mm],z [mm],print\n{rows}"));
+    attack_files("table of moves", &[table], "path.csv", |path| {
+        crystfem::mesh::path::read_csv(path, 1e-3).map(|_| ()).map_err(|error| error.to_string())
+    });
+}
+
+#[test]
+fn tables() {
+    let mut files = below("cases", ".csv");
+    files.extend(below("tests/bad/clouds", ".csv"));
+    attack_files("CSV", &files, "table.csv", |path| {
+        polycore::output::csv::read(path).map(|_| ()).map_err(|error| error.to_string())
+    });
+    attack_files("history", &below("cases/ch4", ".csv"), "history.csv", |path| {
+        crystfem::history::History::read(path).map(|_| ()).map_err(|error| error.to_string())
+    });
+    let rubber = below("cases/ch1", ".csv");
+    attack_files("rubber data", &rubber, "rubber.csv", |path| {
+        polycore::hyperelastic::data::Table::read(path).map(|_| ()).map_err(|error| error.to_string())
+    });
+}
+
+#[test]
+fn data_of_molecular_dynamics() {
+    use mdsurrogate::dataset::{ReadOptions, read};
+    let folder = tempfile::tempdir().unwrap();
+    let head = "run_id,kind,rate_x,rate_y,rate_z,sample,time_fs,lx,ly,lz,sxx,syy,szz,sxy,sxz,syz\n";
+    let row = |k: usize| {
+        format!("r{},ux,1e-5,0,0,{k},{k},{},33,64,{k},1,2,3,4,5\n", k / 20, 38.0 + 0.1 * (k % 20) as f64)
+    };
+    let path = folder.path().join("a.csv");
+    fs::write(&path, head.to_owned() + &(0..60).map(row).collect::<String>()).unwrap();
+    let mut files = vec![path];
+    files.extend(below("cases/ch3", ".csv.gz"));
+    attack_files("data set", &files, "data.csv", |path| {
+        read(path, &ReadOptions::default()).map(|_| ()).map_err(|error| error.to_string())
+    });
+}
+
+#[test]
+fn laws_of_a_surrogate() {
+    use mdsurrogate::network::Activation;
+    use mdsurrogate::surrogate::{Header, Kind, Surrogate, Symmetry};
+    let folder = tempfile::tempdir().unwrap();
+    let kinds = [("ann", Kind::Ann), ("energy", Kind::energy(Symmetry::Orthotropic))];
+    let files = kinds.map(|(name, kind)| {
+        let path = folder.path().join(name);
+        let header = Header::new(kind, &[(8, Activation::Softplus)], 2);
+        Surrogate::<f64>::random(header, 1).unwrap().write(&path).unwrap();
+        path
+    });
+    attack_files("law", &files, "law.safetensors", |path| {
+        Surrogate::<f64>::read(path).map(|_| ()).map_err(|error| error.to_string())
+    });
+}
+
+#[test]
+fn checkpoints() {
+    const MAGIC: &polycore::checkpoint::Magic = b"fronting";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a");
+    let value: Vec<(String, Vec<f64>)> = (0..9).map(|k| (format!("field {k}"), vec![0.5; 20 * k])).collect();
+    polycore::checkpoint::write(&path, MAGIC, &value).unwrap();
+    attack_files("checkpoint", &[path], "checkpoint.bin", |path| {
+        match polycore::checkpoint::read::<Vec<(String, Vec<f64>)>>(path, MAGIC) {
+            // its checksum lets nothing through
+            Ok(read) if read != value => Err("a damaged checkpoint was read".to_owned()),
+            Ok(_) => Ok(()),
+            Err(error) => Err(error.to_string()),
+        }
+    });
+}
