@@ -2,6 +2,8 @@
 
 mod c;
 mod fortran;
+mod onnx;
+mod protobuf;
 
 pub use c::CSource;
 
@@ -52,7 +54,6 @@ impl Surrogate<f64> {
         let code = |activation: &Activation| {
             Activation::ALL.iter().position(|other| other == activation).unwrap_or_default()
         };
-        let invariants = self.header.kind.invariants();
         let inputs = self.mean.len();
         let identity = |i: usize| f64::from(u8::from(i / 6 == i % 6));
         let rest = |m: usize| {
@@ -72,9 +73,8 @@ impl Surrogate<f64> {
             outputs: self.output.len(),
             widest: architecture.widths.iter().max().copied().unwrap_or(1),
             parameters: architecture.parameters(),
-            energetic: invariants.is_some(),
-            // the inputs of an `ann` are the components themselves
-            invariants: invariants.unwrap_or(Invariants::new(Symmetry::Triclinic, false)),
+            energetic: self.header.kind.invariants().is_some(),
+            invariants: invariants_of(self),
             widths: architecture.widths.clone(),
             activations: architecture.activations.iter().map(code).collect(),
             mean: self.mean.clone(),
@@ -190,6 +190,11 @@ impl Language {
         };
         terms.iter().map(term).collect::<Vec<_>>().join(" + ")
     }
+}
+
+/// Those of an energy; the inputs of an `ann` are the components of C.
+fn invariants_of(law: &Surrogate<f64>) -> Invariants {
+    law.header.kind.invariants().unwrap_or(Invariants::new(Symmetry::Triclinic, false))
 }
 
 /// # Errors

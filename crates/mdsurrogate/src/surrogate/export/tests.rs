@@ -208,6 +208,48 @@ contains
 end program main
 ";
 
+/// Every law in onnxruntime (the python named by `ONNX_PYTHON`, or `python3`), all points at once.
+#[test]
+fn exported_onnx_agrees() {
+    let python = std::env::var("ONNX_PYTHON").unwrap_or("python3".into());
+    let probe = Command::new(&python).args(["-c", "import onnxruntime"]).output();
+    if !probe.is_ok_and(|output| output.status.success()) {
+        eprintln!("skipped exported_onnx_agrees: {python} has no onnxruntime");
+        return;
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let points: Vec<Voigt> = deformations().iter().map(c_of).collect();
+    let mut memory = Workspace::default();
+    for (name, law) in laws() {
+        let model = directory.path().join("law.onnx");
+        std::fs::write(&model, law.onnx()).unwrap();
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/onnx.py");
+        let mut command = Command::new(&python);
+        command.arg(script).arg(&model).args(points.iter().map(|c| numbers(c.as_slice())));
+        let text = run(&mut command);
+        let lines: Vec<Vec<f64>> = text.lines().map(numbers_of).collect();
+        assert_eq!(lines.len(), points.len());
+        // S, spread, W (NaN without), far (NaN without), outside
+        for (c, numbers) in points.iter().zip(&lines) {
+            let answer = law.stress(c, &mut memory).unwrap();
+            let stress = Voigt::from_row_slice(&numbers[..6]);
+            let size = answer.stress.norm() + 1e6;
+            let difference = (stress - answer.stress).norm();
+            assert!(difference < 1e-12 * size, "{name}: {difference:e} of {size:e}");
+            assert!((numbers[6] - answer.spread).abs() < 1e-12 * size, "{name}");
+            match answer.energy {
+                Some(energy) => assert!((numbers[7] - energy).abs() < 1e-12 * (energy.abs() + 1e6), "{name}"),
+                None => assert!(numbers[7].is_nan(), "{name}"),
+            }
+            match law.header().support {
+                Some(_) => assert_eq!(numbers[8], f64::from(answer.flags.far), "{name}"),
+                None => assert!(numbers[8].is_nan(), "{name}"),
+            }
+            assert_eq!(numbers[9..15], answer.flags.outside.map(f64::from), "{name}");
+        }
+    }
+}
+
 /// DDSDDE by its meaning: a small symmetric, spin-free change of F gives the change of the Kirchhoff stress over J
 /// (Sun et al. 2008), by central differences: 1e-7 is ε/h = 2e-11 and h² = 1e-10 of the largest entries.
 #[test]
