@@ -54,12 +54,16 @@ enum Command {
     /// Molecular dynamics with LAMMPS: plan, prepare, run, resume, collect.
     #[command(subcommand)]
     Md(md_command::Md),
-    /// Write a law (safetensors) as C source and header.
+    /// Write a law (safetensors) as source code or as ONNX.
     Export {
         /// The law.
         law: PathBuf,
-        /// Where the files go; its last part is the name of the C function: out/pa12 gives out/pa12.c, out/pa12.h.
+        /// Where the files go; the last part is the name of the function: out/pa12 gives out/pa12.c and out/pa12.h,
+        /// out/pa12.f90 or out/pa12.onnx.
         output: PathBuf,
+        /// In which form.
+        #[arg(long, value_enum, default_value_t = Form::C)]
+        form: Form,
     },
     /// Measure the cost of a stress, a tangent and a batch, in both precisions, on one thread.
     Bench(bench::Bench),
@@ -78,7 +82,7 @@ fn main() -> ExitCode {
         }
         Command::Info { file, instantaneous } => info(&file, instantaneous).map_err(Failure::from),
         Command::Md(md) => md.run().map_err(Failure::from),
-        Command::Export { law, output } => export(&law, &output).map_err(Failure::from),
+        Command::Export { law, output, form } => export(&law, &output, form).map_err(Failure::from),
         Command::Bench(bench) => bench.print().map_err(Failure::from),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "mdsurrogate", &mut std::io::stdout());
@@ -113,13 +117,32 @@ fn info(file: &Path, instantaneous: bool) -> Result<bool, Error> {
     Ok(true)
 }
 
-fn export(law: &Path, output: &Path) -> Result<bool, Error> {
+fn export(law: &Path, output: &Path, form: Form) -> Result<bool, Error> {
     let name = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let CSource { header, source } = Surrogate::read(law)?.c_source(&name)?;
-    for (end, text) in [("h", header), ("c", source)] {
+    let law = Surrogate::read(law)?;
+    let files = match form {
+        Form::C => {
+            let CSource { header, source } = law.c_source(&name)?;
+            vec![("h", header.into_bytes()), ("c", source.into_bytes())]
+        }
+        Form::Fortran => vec![("f90", law.fortran_source(&name)?.into_bytes())],
+        Form::Onnx => vec![("onnx", law.onnx())],
+    };
+    for (end, bytes) in files {
         let path = output.with_file_name(format!("{name}.{end}"));
-        atomic_write(&path, |file| file.write_all(text.as_bytes()))?;
+        atomic_write(&path, |file| file.write_all(&bytes))?;
         println!("{}", path.display());
     }
     Ok(true)
+}
+
+/// Forms of an exported law.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Form {
+    /// C99: source and header.
+    C,
+    /// Fortran 2008: a subroutine and a UMAT.
+    Fortran,
+    /// ONNX, operator set 17, double precision.
+    Onnx,
 }

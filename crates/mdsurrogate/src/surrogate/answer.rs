@@ -9,6 +9,8 @@ pub struct Flags {
     pub outside: [bool; 6],
     /// Of those, the ones that never changed in the training data: shear that was never seen, for example.
     pub unseen: [bool; 6],
+    /// Farther from the representatives of the training strains than any training row: in a gap of the box.
+    pub far: bool,
     /// The members of the ensemble disagree by more than the law's limit.
     pub spread: bool,
 }
@@ -16,7 +18,7 @@ pub struct Flags {
 impl Flags {
     /// Whether there is any doubt.
     pub fn any(&self) -> bool {
-        self.outside.contains(&true) || self.spread
+        self.outside.contains(&true) || self.far || self.spread
     }
 }
 

@@ -1,6 +1,6 @@
 //! From C to an answer: members, their mean, lists of points.
 
-use super::{Answer, Kind, Surrogate, Workspace, back, product};
+use super::{Answer, Kind, Rest, Surrogate, Workspace, back, product};
 use crate::Error;
 use crate::kinematics::NAMES;
 use crate::network::{BATCH, LANES, Real, Tape};
@@ -36,14 +36,14 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
             let inputs = &inputs[..points.len()];
             memory.parts.clear();
             memory.parts.resize(members * BATCH, (T::ZERO, [T::ZERO; 6]));
-            for (network, parts) in self.members.iter().zip(memory.parts.chunks_mut(BATCH)) {
+            for (m, (network, parts)) in self.members.iter().zip(memory.parts.chunks_mut(BATCH)).enumerate() {
                 if matches!(self.header.kind, Kind::Ann) {
                     network.forward_batch(inputs, &mut memory.tape, |p, values| {
                         parts[p] = (T::ZERO, self.mapped(values).first);
                     });
                 } else {
                     network.gradient_batch(inputs, &mut memory.tape, |p, value, gradient| {
-                        let member = self.energetic(&local[p], value, &gradient, None);
+                        let member = self.energetic(&local[p], &self.rest[m], value, &gradient, None);
                         parts[p] = (member.energy, member.first);
                     });
                 }
@@ -86,7 +86,8 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         let mut slope = [[T::ZERO; 6]; 6];
         memory.parts.clear();
         for m in 0..self.members.len() {
-            let member = self.member(m, &at, tangent, &mut memory.tape);
+            let rest = self.rest.get(m).copied().unwrap_or_default();
+            let member = self.member(m, &at, &rest, tangent, &mut memory.tape);
             memory.parts.push((member.energy, member.first));
             if tangent {
                 for a in 0..6 {
@@ -111,19 +112,19 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         let two = |b: usize| if b < 3 { T::ONE + T::ONE } else { T::ONE };
         let factor = |a: usize| if energetic { two(a) } else { T::ONE };
         let own = |m: usize, first: &[T; 6], a: usize| {
-            factor(a) * (first[a] - self.at_identity.get(m).map_or(T::ZERO, |(rest, _)| rest[a]))
+            factor(a) * (first[a] - self.rest.get(m).map_or(T::ZERO, |rest| rest.slope[a]))
         };
         let (mut mean, mut energy) = ([T::ZERO; 6], T::ZERO);
         for (m, (value, first)) in parts.clone().enumerate() {
             for a in 0..6 {
                 mean[a] += own(m, first, a) / count;
             }
-            if let Some((rest, at_rest)) = self.at_identity.get(m) {
+            if let Some(rest) = self.rest.get(m) {
                 let mut linear = T::ZERO;
                 for a in 0..6 {
-                    linear += rest[a] * (c[a] - if a < 3 { T::ONE } else { T::ZERO });
+                    linear += rest.slope[a] * (c[a] - if a < 3 { T::ONE } else { T::ZERO });
                 }
-                energy += (*value - *at_rest - linear) / count;
+                energy += (*value - rest.value - linear) / count;
             }
         }
         let mut square = 0.0;
@@ -153,7 +154,14 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     }
 
     /// One member at c, without its correction at the identity.
-    pub(super) fn member(&self, m: usize, c: &[T; 6], tangent: bool, tape: &mut Tape<T>) -> Member<T> {
+    pub(super) fn member(
+        &self,
+        m: usize,
+        c: &[T; 6],
+        rest: &Rest<T>,
+        tangent: bool,
+        tape: &mut Tape<T>,
+    ) -> Member<T> {
         let network = &self.members[m];
         let mut input = [T::ZERO; LANES];
         let local = self.input(c, &mut input);
@@ -173,23 +181,23 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         }
         if tangent {
             let (value, gradient, hessian) = network.second_derivatives(input, tape);
-            self.energetic(&local, value, &gradient, Some(&hessian))
+            self.energetic(&local, rest, value, &gradient, Some(&hessian))
         } else {
             let (value, gradient) = network.gradient(input, tape);
-            self.energetic(&local, value, &gradient, None)
+            self.energetic(&local, rest, value, &gradient, None)
         }
     }
 
     /// The inputs of the networks at c; returns c in the material axes.
-    fn input(&self, c: &[T; 6], input: &mut [T; LANES]) -> [T; 6] {
-        let Kind::Energy { symmetry, .. } = &self.header.kind else {
+    pub(super) fn input(&self, c: &[T; 6], input: &mut [T; LANES]) -> [T; 6] {
+        let Some(invariants) = self.header.kind.invariants() else {
             for k in 0..6 {
                 input[k] = (c[k] - self.mean[k]) * self.inverse[k];
             }
             return *c;
         };
         let local = self.turn.as_ref().map_or(*c, |turn| turn.map(|row| product(&row, c)));
-        symmetry.values(&local, input);
+        invariants.values(&local, input);
         for k in 0..self.mean.len().min(LANES) {
             input[k] = (input[k] - self.mean[k]) * self.inverse[k];
         }
@@ -209,23 +217,29 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     fn energetic(
         &self,
         local: &[T; 6],
+        rest: &Rest<T>,
         value: T,
         gradient: &[T; LANES],
         hessian: Option<&[[T; LANES]; LANES]>,
     ) -> Member<T> {
-        let Kind::Energy { symmetry, .. } = &self.header.kind else { return self.mapped(&[T::ZERO; 6]) };
+        let Some(invariants) = self.header.kind.invariants() else { return self.mapped(&[T::ZERO; 6]) };
         let inputs = self.mean.len().min(LANES);
         let scale = self.output[0];
         let mut slopes = [[T::ZERO; 6]; LANES];
         let (mut first, mut second) = ([T::ZERO; 6], [[T::ZERO; 6]; 6]);
+        let mut energy = scale * value;
+        let mut corrected = [T::ZERO; LANES];
+        invariants.values(local, &mut corrected);
         for k in 0..inputs {
-            slopes[k] = symmetry.gradient(local, k).map(|slope| slope * self.inverse[k]);
-            let weight = scale * gradient[k];
+            energy += rest.invariants[k] * (corrected[k] - rest.at[k]);
+            let slope = invariants.gradient(local, k);
+            slopes[k] = slope.map(|slope| slope * self.inverse[k]);
+            let weight = scale * gradient[k] * self.inverse[k] + rest.invariants[k];
             for a in 0..6 {
-                first[a] += weight * slopes[k][a];
+                first[a] += weight * slope[a];
             }
             if hessian.is_some() {
-                symmetry.add_curvature(local, k, weight * self.inverse[k], &mut second);
+                invariants.add_curvature(local, k, weight, &mut second);
             }
         }
         if let Some(hessian) = hessian {
@@ -248,7 +262,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
             Some(turn) => back(turn, &first, &second),
             None => (first, second),
         };
-        Member { energy: scale * value, first, second }
+        Member { energy, first, second }
     }
 }
 

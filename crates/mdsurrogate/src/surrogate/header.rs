@@ -1,10 +1,17 @@
 //! What a law is, without its weights.
 
-use super::Symmetry;
+use super::invariants::Invariants;
+use super::{Support, Symmetry};
 use crate::Error;
 use crate::kinematics::NAMES;
 use crate::network::{Activation, Architecture};
 use serde::{Deserialize, Serialize};
+
+/// The axes of the data.
+const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// Convex functions that never fall.
+const CONVEX: [Activation; 4] = [Activation::Linear, Activation::Relu, Activation::Softplus, Activation::Elu];
 
 /// What the networks of a law compute.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -18,21 +25,48 @@ pub enum Kind {
         symmetry: Symmetry,
         /// Material axes as rows, orthonormal and right-handed.
         axes: [[f64; 3]; 3],
+        /// Whether W is polyconvex by construction: see [`Kind::non_negative`].
+        #[serde(default)]
+        polyconvex: bool,
     },
 }
 
 impl Kind {
     /// An energy in the axes of the data.
     pub fn energy(symmetry: Symmetry) -> Self {
-        Self::Energy { symmetry, axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
+        Self::Energy { symmetry, axes: AXES, polyconvex: false }
+    }
+
+    /// A polyconvex energy in the axes of the data: convex in (F, cof F, J), and so elliptic everywhere; it cannot follow
+    /// data that soften (Ball 1976, <https://doi.org/10.1007/BF00279992>).
+    pub fn polyconvex_energy(symmetry: Symmetry) -> Self {
+        Self::Energy { symmetry, axes: AXES, polyconvex: true }
+    }
+
+    /// Whether a weight of `layer` (0 is the one after the inputs) for its input `input` must not be negative, so that a
+    /// polyconvex energy is convex and grows in all its inputs but J, the last one, which may come with any sign.
+    ///
+    /// With convex growing activations (`softplus`, `relu`, `elu`, `linear`) a network of such weights is an
+    /// input-convex one (Amos et al. 2017, <https://arxiv.org/abs/1609.07152>). Files hold the weights themselves; a
+    /// training without bounds writes them as softplus(r) of free numbers r.
+    pub fn non_negative(&self, layer: usize, input: usize) -> bool {
+        match self {
+            Self::Energy { polyconvex: true, .. } => layer > 0 || input + 1 < self.inputs(),
+            _ => false,
+        }
+    }
+
+    /// The invariants of an energy.
+    pub(crate) fn invariants(&self) -> Option<Invariants> {
+        match self {
+            Self::Ann => None,
+            Self::Energy { symmetry, polyconvex, .. } => Some(Invariants::new(*symmetry, *polyconvex)),
+        }
     }
 
     /// Inputs of its networks: 6, or the number of invariants.
     pub fn inputs(&self) -> usize {
-        match self {
-            Self::Ann => 6,
-            Self::Energy { symmetry, .. } => symmetry.invariants().len(),
-        }
+        self.invariants().map_or(6, Invariants::count)
     }
 
     /// Outputs of its networks: 6 or 1.
@@ -64,6 +98,9 @@ pub struct Header {
     pub output_deviation: Vec<f64>,
     /// Least and greatest C of each component in the training data; equal where a component was never seen to change.
     pub training_box: [[f64; 2]; 6],
+    /// Representatives of the training strains, farther from which than any training row an answer is flagged.
+    #[serde(default)]
+    pub support: Option<Support>,
     /// Spread of the ensemble, Pa, beyond which an answer is flagged.
     pub spread_limit: Option<f64>,
     /// Where data and weights come from.
@@ -84,6 +121,7 @@ impl Header {
             output_mean: vec![0.0; outputs],
             output_deviation: vec![1e6; outputs],
             training_box: [1.0, 1.0, 1.0, 0.0, 0.0, 0.0].map(|c| [c, c]),
+            support: None,
             spread_limit: None,
             provenance: Vec::new(),
         }
@@ -92,6 +130,16 @@ impl Header {
     /// # Errors
     /// [`Error::Parameter`] for parts that do not fit together or numbers that are not finite.
     pub fn check(&self) -> Result<(), Error> {
+        if let Kind::Energy { symmetry, polyconvex: true, .. } = self.kind {
+            if symmetry.polyconvex_invariants().is_none() {
+                let allowed = "orthotropic, transverse or isotropic for a polyconvex energy";
+                return Err(Error::parameter("symmetry", format!("{symmetry:?}"), allowed));
+            }
+            if let Some(other) = self.architecture.activations.iter().find(|a| !CONVEX.contains(a)) {
+                let allowed = format!("{CONVEX:?} in a polyconvex energy");
+                return Err(Error::parameter("activation", format!("{other:?}"), allowed));
+            }
+        }
         self.architecture.check()?;
         let widths = &self.architecture.widths;
         let (inputs, outputs) = (self.kind.inputs(), self.kind.outputs());
@@ -118,6 +166,9 @@ impl Header {
                 let found = format!("C{name} in [{low}, {high}]");
                 return Err(Error::parameter("training box", found, "finite, ascending bounds"));
             }
+        }
+        if let Some(support) = &self.support {
+            support.check()?;
         }
         match self.spread_limit {
             Some(limit) if !(limit.is_finite() && limit > 0.0) => {

@@ -12,18 +12,23 @@ mod evaluate;
 mod export;
 mod file;
 mod header;
+mod invariants;
+mod support;
 mod symmetry;
 
 pub use answer::{Answer, Flags};
 pub use export::CSource;
 pub use header::{Header, Kind};
+pub use support::Support;
 pub use symmetry::Symmetry;
 
 use crate::Error;
 use crate::kinematics::cauchy_of_material;
-use crate::network::{Network, Real, Tape};
+use crate::network::{LANES, Network, Real, Tape};
+use invariants::Invariants;
 use nalgebra::SVector;
 use polycore::tensor::{DeformationGradient, Voigt, voigt};
+use support::Nearest;
 
 /// A difference from a component that never changed in the training data that counts as rounding: ten times that of f32.
 const UNSEEN: f64 = 1e-6;
@@ -39,8 +44,9 @@ pub struct Surrogate<T: Real = f64> {
     output: Vec<T>,
     /// C → material axes, row by row; none for the axes of the data.
     turn: Option<[[T; 6]; 6]>,
-    /// Of each member of an energy, so that W(I) = 0 and S(I) = 0: ∂N/∂c at I and N at I, scaled.
-    at_identity: Vec<([T; 6], T)>,
+    nearest: Option<Nearest<T>>,
+    /// Of each member of an energy, so that W(I) = 0 and S(I) = 0.
+    rest: Vec<Rest<T>>,
 }
 
 /// Memory for one evaluation, reused between them.
@@ -51,12 +57,23 @@ pub struct Workspace<T> {
     parts: Vec<(T, [T; 6])>,
 }
 
+/// What is taken from a member's energy: its value at I and a function that is linear in c or in the invariants.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rest<T> {
+    value: T,
+    /// −∂/∂c.
+    slope: [T; 6],
+    /// Added to ∂W/∂x of the invariants, and the invariants at I.
+    invariants: [T; LANES],
+    at: [T; LANES],
+}
+
 impl<T: Real + nalgebra::Scalar> Surrogate<T> {
     /// A law from its header and the networks of its members.
     ///
     /// # Errors
-    /// [`Header::check`]; [`Error::Parameter`] for another number of networks or another architecture, or axes that are
-    /// not orthonormal.
+    /// [`Header::check`]; [`Error::Parameter`] for another number of networks or another architecture, axes that are
+    /// not orthonormal, or a negative weight where a polyconvex energy must have none ([`Kind::non_negative`]).
     pub fn new(header: Header, members: Vec<Network<T>>) -> Result<Self, Error> {
         header.check()?;
         if members.len() != header.members {
@@ -65,6 +82,17 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         if let Some(other) = members.iter().find(|member| *member.architecture() != header.architecture) {
             let found = format!("{:?}", other.architecture());
             return Err(Error::parameter("network", found, format!("{:?}", header.architecture)));
+        }
+        for layers in members.iter().map(Network::layers) {
+            for (l, layer) in layers.iter().enumerate() {
+                let inputs = header.architecture.widths[l];
+                let bad =
+                    |(i, weight): &(usize, &T)| header.kind.non_negative(l, i % inputs) && **weight < T::ZERO;
+                if let Some((i, weight)) = layer.weights.iter().enumerate().find(bad) {
+                    let found = format!("{weight:?} for input {} of layer {l}", i % inputs);
+                    return Err(Error::parameter("weight", found, "0 or more in a polyconvex energy"));
+                }
+            }
         }
         let list = |values: &[f64]| values.iter().map(|value| T::from_f64(*value)).collect::<Vec<T>>();
         let inverse: Vec<f64> =
@@ -88,34 +116,88 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
             inverse: list(&inverse),
             output_mean: list(&header.output_mean),
             output: list(&header.output_deviation),
+            nearest: header.support.as_ref().map(Nearest::new),
             header,
             members,
             turn,
-            at_identity: Vec::new(),
+            rest: Vec::new(),
         };
-        if matches!(law.header.kind, Kind::Energy { .. }) {
-            let mut tape = Tape::default();
-            let identity = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0].map(T::from_f64);
-            let zero = ([T::ZERO; 6], T::ZERO);
-            law.at_identity = vec![zero; law.members.len()];
-            let raw = (0..law.members.len()).map(|m| {
-                let at = law.member(m, &identity, false, &mut tape);
-                (at.first, at.energy)
-            });
-            law.at_identity = raw.collect();
+        if let Some(invariants) = law.header.kind.invariants() {
+            law.rest = vec![Rest::default(); law.members.len()];
+            for m in 0..law.members.len() {
+                law.rest[m] = law.rest_of(m, invariants);
+            }
         }
         Ok(law)
     }
 
-    /// A law with random weights ([`Network::random`], seeds `seed`, `seed` + 1, …).
+    /// A law with random weights ([`Network::random`], seeds `seed`, `seed` + 1, …), without their sign where
+    /// [`Kind::non_negative`] asks for it.
     ///
     /// # Errors
     /// Those of [`Surrogate::new`].
     pub fn random(header: Header, seed: u64) -> Result<Self, Error> {
         header.check()?;
-        let network = |m: usize| Network::random(header.architecture.clone(), seed.wrapping_add(m as u64));
+        let network = |m: usize| {
+            let network = Network::<T>::random(header.architecture.clone(), seed.wrapping_add(m as u64))?;
+            let mut layers = network.layers().to_vec();
+            for (l, layer) in layers.iter_mut().enumerate() {
+                for (i, weight) in layer.weights.iter_mut().enumerate() {
+                    if header.kind.non_negative(l, i % header.architecture.widths[l]) && *weight < T::ZERO {
+                        *weight = -*weight;
+                    }
+                }
+            }
+            Network::new(header.architecture.clone(), layers)
+        };
         let members = (0..header.members).map(network).collect::<Result<Vec<_>, _>>()?;
         Self::new(header, members)
+    }
+
+    /// The correction of member m. Of a polyconvex energy it is polyconvex itself: with S(I) = Σ sᵢ aᵢ⊗aᵢ in the material
+    /// axes, add ½|sᵢ| (aᵢ·Caᵢ − 1) for sᵢ < 0 and ½sᵢ (aᵢ·cof C aᵢ − 1) − sᵢ(J − 1) for sᵢ > 0, since
+    /// 2 ∂(aᵢ·cof C aᵢ)/∂C = 2(1 − aᵢ⊗aᵢ) and 2 ∂J/∂C = 1 at I (after Linden et al. 2023,
+    /// <https://doi.org/10.1016/j.jmps.2023.105363>).
+    fn rest_of(&self, m: usize, invariants: Invariants) -> Rest<T> {
+        let mut tape = Tape::default();
+        let identity = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0].map(T::from_f64);
+        let mut rest = Rest::default();
+        invariants.values(&identity, &mut rest.at);
+        if let Kind::Energy { symmetry, polyconvex: true, .. } = self.header.kind {
+            let last = invariants.count() - 1;
+            let mut input = [T::ZERO; LANES];
+            self.input(&identity, &mut input);
+            let (_, gradient) = self.members[m].gradient(&input[..=last], &mut tape);
+            let mut stress = [T::ZERO; 6];
+            for k in 0..=last {
+                let slope = invariants.gradient(&identity, k);
+                for a in 0..6 {
+                    stress[a] +=
+                        (T::ONE + T::ONE) * self.output[0] * gradient[k] * self.inverse[k] * slope[a];
+                }
+            }
+            // (stress, place of aᵢ·Caᵢ, of aᵢ·cof C aᵢ)
+            let [s1, s2, s3, ..] = stress;
+            let (spherical, directions): (T, &[(T, usize, usize)]) = match symmetry {
+                Symmetry::Orthotropic => (T::ZERO, &[(s1, 0, 3), (s2, 1, 4), (s3, 2, 5)]),
+                Symmetry::Transverse => (s1, &[(s3 - s1, 2, 3)]),
+                _ => (s1, &[]),
+            };
+            rest.invariants[last] = -spherical;
+            for &(s, plain, cofactor) in directions {
+                if s < T::ZERO {
+                    rest.invariants[plain] = -(s / (T::ONE + T::ONE));
+                } else {
+                    rest.invariants[cofactor] = s / (T::ONE + T::ONE);
+                    rest.invariants[last] += -s;
+                }
+            }
+        }
+        // what is left: all of it, or rounding
+        let raw = self.member(m, &identity, &rest, false, &mut tape);
+        rest.value = raw.energy;
+        rest.slope = raw.first;
+        rest
     }
 
     /// Everything but the weights.
@@ -150,6 +232,9 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
             let slack = if low == high { UNSEEN } else { 0.0 };
             flags.outside[a] = !(value >= low - slack && value <= high + slack);
             flags.unseen[a] = flags.outside[a] && low == high;
+        }
+        if let Some(nearest) = &self.nearest {
+            flags.far = nearest.distance(&(*c).into()) > nearest.limit;
         }
         flags
     }
@@ -218,4 +303,7 @@ fn back<T: Real>(turn: &[[T; 6]; 6], g: &[T; 6], h: &[[T; 6]; 6]) -> ([T; 6], [[
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
+
+#[cfg(test)]
+mod polyconvex_tests;

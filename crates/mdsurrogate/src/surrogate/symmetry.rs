@@ -5,12 +5,11 @@
 //! Smith 1962 (<https://doi.org/10.1007/BF00281203>) for monoclinic and orthotropic.
 
 use crate::Error;
-use crate::network::Real;
 use polycore::tensor::{Tensor, Voigt6x6, voigt};
 use serde::{Deserialize, Serialize};
 
 /// A monomial: coefficient, and the components that are multiplied.
-type Monomial<'a> = (f64, &'a [usize]);
+pub(super) type Monomial<'a> = (f64, &'a [usize]);
 
 /// A symmetry of the crystal, the third of the material axes being the special one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -41,6 +40,8 @@ const SECOND: &[Monomial<'static>] =
     &[(1.0, &[A, B]), (1.0, &[A, C]), (1.0, &[B, C]), (-1.0, &[D, D]), (-1.0, &[E, E]), (-1.0, &[F, F])];
 const THIRD: &[Monomial<'static>] =
     &[(1.0, &[A, B, C]), (2.0, &[D, E, F]), (-1.0, &[A, F, F]), (-1.0, &[B, E, E]), (-1.0, &[C, D, D])];
+
+const COFACTOR_3: &[Monomial<'static>] = &[(1.0, &[A, B]), (-1.0, &[D, D])];
 
 impl Symmetry {
     /// All of them, from none to all rotations.
@@ -83,55 +84,26 @@ impl Symmetry {
         }
     }
 
-    /// Values of the invariants at c.
-    pub fn values<T: Real>(self, c: &[T; 6], out: &mut [T]) {
-        for (value, invariant) in out.iter_mut().zip(self.invariants()) {
-            *value = polynomial(invariant, c);
+    /// The same in functions that are convex in (F, cof F, J): |F aᵢ|² = aᵢ·C aᵢ and |cof F aᵢ|² = aᵢ·cof C aᵢ or their
+    /// sums, and last J² (whose root is the input). None where too few are known: triclinic and monoclinic.
+    ///
+    /// Schröder & Neff 2003, <https://doi.org/10.1016/S0020-7683(02)00458-4>.
+    pub(crate) fn polyconvex_invariants(self) -> Option<&'static [&'static [Monomial<'static>]]> {
+        match self {
+            Self::Triclinic | Self::Monoclinic => None,
+            Self::Orthotropic => Some(&[
+                &[(1.0, &[A])],
+                &[(1.0, &[B])],
+                &[(1.0, &[C])],
+                &[(1.0, &[B, C]), (-1.0, &[F, F])],
+                &[(1.0, &[A, C]), (-1.0, &[E, E])],
+                COFACTOR_3,
+                THIRD,
+            ]),
+            Self::Transverse => Some(&[FIRST, SECOND, &[(1.0, &[C])], COFACTOR_3, THIRD]),
+            Self::Isotropic => Some(&[FIRST, SECOND, THIRD]),
         }
     }
-
-    /// ∂x_k/∂c_a, c₁₂ counted once.
-    pub(super) fn gradient<T: Real>(self, c: &[T; 6], index: usize) -> [T; 6] {
-        let mut gradient = [T::ZERO; 6];
-        for (coefficient, factors) in self.invariants()[index] {
-            for (place, &a) in factors.iter().enumerate() {
-                gradient[a] += T::from_f64(*coefficient) * product(factors, c, place, usize::MAX);
-            }
-        }
-        gradient
-    }
-
-    /// Adds weight · ∂²x_k/∂c_a∂c_b.
-    pub(super) fn add_curvature<T: Real>(self, c: &[T; 6], index: usize, weight: T, to: &mut [[T; 6]; 6]) {
-        for (coefficient, factors) in self.invariants()[index] {
-            for (first, &a) in factors.iter().enumerate() {
-                for (second, &b) in factors.iter().enumerate() {
-                    if first != second {
-                        to[a][b] += weight * T::from_f64(*coefficient) * product(factors, c, first, second);
-                    }
-                }
-            }
-        }
-    }
-}
-
-fn polynomial<T: Real>(monomials: &[Monomial<'_>], c: &[T; 6]) -> T {
-    let mut sum = T::ZERO;
-    for (coefficient, factors) in monomials {
-        sum += T::from_f64(*coefficient) * product(factors, c, usize::MAX, usize::MAX);
-    }
-    sum
-}
-
-/// The product of a monomial's components but those at two places.
-fn product<T: Real>(factors: &[usize], c: &[T; 6], without: usize, and: usize) -> T {
-    let mut product = T::ONE;
-    for (place, &a) in factors.iter().enumerate() {
-        if place != without && place != and {
-            product = product * c[a];
-        }
-    }
-    product
 }
 
 /// The matrix T of C' = T C (as vectors), C' in the material axes, which are the rows of `axes`.
@@ -148,24 +120,4 @@ pub(super) fn into_material_axes(axes: &[[f64; 3]; 3]) -> Result<Voigt6x6, Error
         let allowed = "three orthonormal, right-handed rows";
         Err(Error::parameter("material axes", format!("{axes:?}"), allowed))
     }
-}
-
-/// The terms of a polynomial, or of its derivative by the components `by`, as C expressions in `c[…]`.
-pub(super) fn terms(monomials: &[Monomial<'_>], by: &[usize]) -> Vec<String> {
-    let Some((&a, rest)) = by.split_first() else {
-        let text = |(coefficient, factors): &Monomial<'_>| {
-            let product: String = factors.iter().map(|a| format!(" * c[{a}]")).collect();
-            format!("({coefficient:e}){product}")
-        };
-        return monomials.iter().map(text).collect();
-    };
-    let mut all = Vec::new();
-    for (coefficient, factors) in monomials {
-        for place in (0..factors.len()).filter(|&place| factors[place] == a) {
-            let mut left = factors.to_vec();
-            left.remove(place);
-            all.extend(terms(&[(*coefficient, &left)], rest));
-        }
-    }
-    all
 }

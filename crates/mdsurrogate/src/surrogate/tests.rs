@@ -13,7 +13,7 @@ fn turned() -> [[f64; 3]; 3] {
 }
 
 /// Every kind, with activations that are smooth, ensembles, turned axes, and inputs that are scaled.
-fn all() -> Vec<(String, Surrogate<f64>)> {
+pub(super) fn all() -> Vec<(String, Surrogate<f64>)> {
     let mut laws = Vec::new();
     let mut add = |name: String, mut header: Header| {
         for (index, (mean, deviation)) in
@@ -28,16 +28,22 @@ fn all() -> Vec<(String, Surrogate<f64>)> {
     add("ann × 3".into(), Header::new(Kind::Ann, &[(17, Sigmoid), (8, Softplus)], 3));
     for symmetry in Symmetry::ALL {
         add(format!("energy {symmetry:?}"), Header::new(Kind::energy(symmetry), &smooth, 1));
-        let kind = Kind::Energy { symmetry, axes: turned() };
+        let kind = Kind::Energy { symmetry, axes: turned(), polyconvex: false };
         add(
             format!("energy {symmetry:?} turned × 2"),
             Header::new(kind, &[(16, Softplus), (16, Softplus)], 2),
         );
     }
+    for symmetry in [Symmetry::Orthotropic, Symmetry::Transverse, Symmetry::Isotropic] {
+        let hidden = [(16, Softplus), (9, Softplus)];
+        add(format!("polyconvex {symmetry:?}"), Header::new(Kind::polyconvex_energy(symmetry), &hidden, 1));
+        let kind = Kind::Energy { symmetry, axes: turned(), polyconvex: true };
+        add(format!("polyconvex {symmetry:?} turned × 2"), Header::new(kind, &[(12, Softplus), (7, Elu)], 2));
+    }
     laws
 }
 
-fn deformations() -> Vec<DeformationGradient> {
+pub(super) fn deformations() -> Vec<DeformationGradient> {
     let mut random = SplitMix64::new(3);
     let mut f = || {
         let noise = Tensor::from_fn(|_, _| 0.6 * (random.uniform() - 0.5));
@@ -46,7 +52,7 @@ fn deformations() -> Vec<DeformationGradient> {
     (0..5).map(|_| f()).collect()
 }
 
-fn c_of(f: &DeformationGradient) -> Voigt {
+pub(super) fn c_of(f: &DeformationGradient) -> Voigt {
     voigt::from_stress(&f.right_cauchy_green())
 }
 
@@ -71,7 +77,9 @@ fn tangents_are_the_derivatives_of_the_stress() {
                 gradient.set_column(b, &((up.stress - down.stress) / (2.0 * step)));
                 if let (Some(up), Some(down)) = (up.energy, down.energy) {
                     let slope = (up - down) / (2.0 * step) * if b < 3 { 2.0 } else { 1.0 };
-                    assert!((slope - answer.stress[b]).abs() < 1e-3, "{name} {b}: {slope}");
+                    // rounding ε·W/h
+                    let size = 1e6 + answer.stress.norm() + answer.energy.unwrap_or(0.0).abs();
+                    assert!((slope - answer.stress[b]).abs() < 1e-9 * size, "{name} {b}: {slope}");
                 }
             }
             let expected = voigt::tangent_from_stress_gradient(&gradient);
@@ -141,7 +149,7 @@ fn invariant_under_the_group_and_nothing_more() {
     let about_z = |angle: f64| Rotation3::from_euler_angles(0.0, 0.0, angle).into_inner();
     let about_x = Rotation3::from_euler_angles(PI, 0.0, 0.0).into_inner();
     for (name, law) in all() {
-        let Kind::Energy { symmetry, axes } = law.header().kind.clone() else { continue };
+        let Kind::Energy { symmetry, axes, .. } = law.header().kind.clone() else { continue };
         let group = match symmetry {
             Symmetry::Triclinic => vec![],
             Symmetry::Monoclinic => vec![about_z(PI)],
@@ -328,83 +336,8 @@ fn headers_that_do_not_fit() {
     for axes in
         [[[1.0, 0.0, 0.0]; 3], [[f64::NAN; 3]; 3], [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]]
     {
-        let kind = Kind::Energy { symmetry: Symmetry::Transverse, axes };
+        let kind = Kind::Energy { symmetry: Symmetry::Transverse, axes, polyconvex: false };
         let error = Surrogate::<f64>::random(Header::new(kind, &[(3, Tanh)], 1), 1).unwrap_err();
         assert!(error.to_string().contains("orthonormal"), "{error}");
     }
-}
-
-/// Every law in C, compiled by gcc, against Rust: 1e-12 of the norm, a few hundred roundings in another order.
-#[test]
-fn exported_c_agrees() {
-    use std::process::Command;
-    let gcc = Command::new("gcc").arg("--version").output();
-    if !gcc.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped exported_c_agrees: there is no gcc");
-        return;
-    }
-    let directory = tempfile::tempdir().unwrap();
-    let file = |name: &str| directory.path().join(name);
-    let (mut laws, mut main) = (all(), String::from("#include <stdio.h>\n"));
-    let mut relu = Header::new(Kind::Ann, &[(6, Relu), (5, Elu)], 2);
-    relu.spread_limit = Some(1.0);
-    laws.push(("relu".into(), Surrogate::random(relu, 2).unwrap()));
-    let mut calls = String::new();
-    let mut build = Command::new("gcc");
-    build
-        .args(["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-o"])
-        .arg(file("laws"))
-        .arg(file("main.c"));
-    for (index, (_, law)) in laws.iter().enumerate() {
-        let name = format!("law{index}");
-        let CSource { header, source } = law.c_source(&name).unwrap();
-        std::fs::write(file(&format!("{name}.h")), header).unwrap();
-        std::fs::write(file(&format!("{name}.c")), source).unwrap();
-        build.arg(file(&format!("{name}.c")));
-        main += &format!("#include \"{name}.h\"\n");
-        for f in deformations() {
-            let c: Vec<String> = c_of(&f).iter().map(|v| format!("{v:e}")).collect();
-            calls += &format!("{{ double c[6] = {{{}}}; show({name}, c); }}\n", c.join(", "));
-        }
-    }
-    main += "typedef int law(const double *, double *, double *, double *, double *, unsigned *);\n\
-        static void show(law *f, const double *c) { double v[44]; unsigned flags; int i, r;\n\
-        r = f(c, v, v + 6, v + 42, v + 43, &flags); printf(\"%d %u\", r, flags);\n\
-        for (i = 0; i < 44; i++) { printf(\" %.17g\", v[i]); } printf(\"\\n\"); }\n";
-    let bad = "{ double c[6] = {1, 1, 1, 1, 0, 0}, s[6]; printf(\"%d\\n\", law0(c, s, 0, 0, 0, 0)); }\n";
-    main += &format!("int main(void) {{\n{calls}{bad}return 0; }}\n");
-    std::fs::write(file("main.c"), main).unwrap();
-    let output = build.arg("-lm").output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let text = String::from_utf8(Command::new(file("laws")).output().unwrap().stdout).unwrap();
-    let mut lines = text.lines();
-    let mut memory = Workspace::default();
-    for (name, law) in &laws {
-        for f in deformations() {
-            let answer = law.tangent(&c_of(&f), &mut memory).unwrap();
-            let words: Vec<f64> =
-                lines.next().unwrap().split(' ').map(|word| word.parse().unwrap()).collect();
-            let flags = answer.flags;
-            let mut bits = u32::from(flags.spread) << 12;
-            for a in 0..6 {
-                bits |= u32::from(flags.outside[a]) << a | u32::from(flags.unseen[a]) << (6 + a);
-            }
-            assert_eq!((words[0], words[1]), (0.0, f64::from(bits)), "{name}");
-            let stress = Voigt::from_row_slice(&words[2..8]);
-            assert!((stress - answer.stress).norm() < 1e-12 * (stress.norm() + 1e6), "{name}");
-            let tangent = Voigt6x6::from_row_slice(&words[8..44]);
-            assert!((tangent - answer.tangent.unwrap()).norm() < 1e-12 * (tangent.norm() + 1e6), "{name}");
-            assert!(
-                (words[44] - answer.energy.unwrap_or(0.0)).abs() < 1e-12 * (words[44].abs() + 1e6),
-                "{name}"
-            );
-            assert!((words[45] - answer.spread).abs() < 1e-12 * (stress.norm() + 1e6), "{name}");
-        }
-    }
-    assert_eq!(lines.next(), Some("1"));
-    for name in ["", "1law", "a b", "ä"] {
-        assert!(laws[0].1.c_source(name).is_err());
-    }
-    let wide = Header::new(Kind::Ann, &[(20_000, Relu)], 1);
-    assert!(Surrogate::random(wide, 1).unwrap().c_source("law").unwrap_err().to_string().contains("stack"));
 }
