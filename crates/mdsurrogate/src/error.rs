@@ -72,6 +72,24 @@ pub enum Error {
         /// What is allowed.
         allowed: String,
     },
+    /// A training whose numbers left the range of f32.
+    #[error(
+        "training diverged in epoch {epoch}, batch {batch}: loss {loss} at learning rate {learning_rate:e}; \
+         allowed: finite numbers (a smaller learning rate); the epochs before are kept"
+    )]
+    Diverged {
+        /// From 1.
+        epoch: u32,
+        /// From 1.
+        batch: usize,
+        /// What was found.
+        loss: f64,
+        /// Adam's step.
+        learning_rate: f64,
+    },
+    /// The run was asked to stop; its checkpoint is written.
+    #[error("interrupted; resume with `mdsurrogate resume {}`", .0.display())]
+    Interrupted(PathBuf),
     /// Files, output, scenes, tensors.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
@@ -95,6 +113,8 @@ impl Error {
     /// Exit code of the command line: 2 for bad input, 1 for a failed run.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::Diverged { .. } => 1,
+            Self::Interrupted(_) => 130,
             Self::Shared(error) => error.exit_code(),
             _ => polycore::scene::EXIT_BAD_INPUT,
         }

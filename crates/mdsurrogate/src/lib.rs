@@ -53,11 +53,14 @@
 pub mod cell;
 pub mod dataset;
 pub mod error;
+pub mod eval;
 pub mod kinematics;
 pub mod md;
 pub mod network;
 pub mod random;
 pub mod surrogate;
+#[cfg(feature = "train")]
+pub mod train;
 
 #[cfg(feature = "cli")]
 pub mod run;

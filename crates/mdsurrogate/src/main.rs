@@ -3,26 +3,25 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use mdsurrogate::Error;
 use mdsurrogate::dataset::{Columns, ReadOptions, read};
-use mdsurrogate::run::{Failure, describe, run};
-use mdsurrogate::scene::Scene;
+use mdsurrogate::run::{Failure, describe};
 use mdsurrogate::surrogate::{CSource, Surrogate};
-use polycore::command::{default_output, exit};
+use polycore::command::exit;
 use polycore::output::atomic_write;
 use polycore::report::Report;
-use polycore::scene::Source;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 mod bench;
 mod md_command;
+mod scene_command;
 
 /// From molecular dynamics to a constitutive law.
 #[derive(Parser)]
 #[command(
     version,
     about,
-    after_help = "Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input."
+    after_help = "Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -31,18 +30,18 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Read the data of a scene, measure noise, split and leaks, draw, and write HDF5.
-    #[command(visible_alias = "data")]
-    Run {
+    /// Run a scene: measure and divide its data, train its models, judge them, draw.
+    #[command(visible_alias = "data", visible_alias = "train")]
+    Run(scene_command::Run),
+    /// Go on with an interrupted or killed run.
+    Resume(scene_command::Resume),
+    /// Validate a scene and its data, and print what it builds and leaves out.
+    Check {
         /// The scene (TOML).
         scene: PathBuf,
-        /// Directory for results; default: out/NAME after the scene's folder.
-        #[arg(long, short)]
-        output: Option<PathBuf>,
-        /// Leave out what the scene marks `quick = false`.
-        #[arg(long)]
-        quick: bool,
     },
+    /// Judge laws on the data of a scene: errors, physics, held-out runs, error against time.
+    Eval(scene_command::Eval),
     /// Print what a table (CSV, CSV.GZ, HDF5) holds: runs, ranges, noise.
     Info {
         /// The table.
@@ -76,10 +75,10 @@ enum Command {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Run { scene, output, quick } => {
-            let output = output.unwrap_or_else(|| default_output(&scene));
-            data(&scene, &output, quick)
-        }
+        Command::Run(run) => run.run(),
+        Command::Resume(resume) => resume.run(),
+        Command::Check { scene } => scene_command::check(&scene),
+        Command::Eval(eval) => eval.run(),
         Command::Info { file, instantaneous } => info(&file, instantaneous).map_err(Failure::from),
         Command::Md(md) => md.run().map_err(Failure::from),
         Command::Export { law, output, form } => export(&law, &output, form).map_err(Failure::from),
@@ -90,18 +89,6 @@ fn main() -> ExitCode {
         }
     };
     exit(result, Error::exit_code)
-}
-
-fn data(scene: &Path, output: &Path, quick: bool) -> Result<bool, Failure> {
-    let source = Source::read(scene)?;
-    let scene = source.parse::<Scene>()?;
-    let finished = run(&source, &scene, output, quick)?;
-    finished.report.print_table();
-    for remark in &finished.remarks {
-        println!("{remark}");
-    }
-    println!("results in {}", output.display());
-    Ok(finished.report.passed())
 }
 
 fn info(file: &Path, instantaneous: bool) -> Result<bool, Error> {

@@ -282,3 +282,39 @@ fn hdf5_of_others() {
     assert!(fails(&c, &s, "stress").contains("column `S` is missing"));
     assert!(fails(&c, &[f64::NAN; 12], "S").contains("NaN in row 0"));
 }
+
+/// Twelve paths of 40 rows of a compressible neo-Hookean solid, S = μ(I − C⁻¹) + λ ln J C⁻¹ with μ = 1 GPa, λ = 2 GPa
+/// (Bonet & Wood 2008, Eq. 6.28): stretched along one or two axes up to 20 to 30 %.
+pub(crate) fn set_of_a_law() -> Dataset {
+    let path = |index: usize| {
+        let row = |sample: usize| {
+            let strain = 0.005 * sample as f64 * (1.0 + (index / 6) as f64 * 0.5);
+            let mut matrix = Tensor::identity();
+            matrix[(index % 3, index % 3)] = 1.0 + strain;
+            if index % 6 > 2 {
+                matrix[((index + 1) % 3, (index + 1) % 3)] = 1.0 + 0.6 * strain;
+            }
+            let f = DeformationGradient::new(matrix).unwrap();
+            let s = neo_hookean(&polycore::tensor::voigt::from_stress(&f.right_cauchy_green()));
+            Row::new(sample as u64, f64::NAN, f, crate::kinematics::cauchy_of_material(&f, &s))
+        };
+        let rows = (0..40).map(row).collect();
+        let kind = format!("{}{}", if index % 6 > 2 { "b" } else { "u" }, index % 3);
+        Path { id: format!("n{index}"), kind, rates: [f64::NAN; 3], rows }
+    };
+    Dataset { paths: (0..12).map(path).collect(), provenance: vec!["made".into()], skipped: 0 }
+}
+
+/// The rows of [`set_of_a_law`].
+pub(crate) fn rows_of_a_law() -> Vec<Row> {
+    set_of_a_law().rows().copied().collect()
+}
+
+/// S of [`set_of_a_law`] at C, Pa.
+pub(crate) fn neo_hookean(c: &Voigt) -> Voigt {
+    use polycore::tensor::voigt;
+    let c = voigt::to_stress(c);
+    let inverse = c.try_inverse().unwrap();
+    let half_log = 0.5 * c.determinant().ln();
+    voigt::from_stress(&(1e9 * (Tensor::identity() - inverse) + 2e9 * half_log * inverse))
+}

@@ -10,6 +10,7 @@
 mod answer;
 mod evaluate;
 mod export;
+mod features;
 mod file;
 mod header;
 mod invariants;

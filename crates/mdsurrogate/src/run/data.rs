@@ -1,28 +1,18 @@
-//! Runs a scene: reads and measures the data, splits, draws, writes HDF5, CSV, PNG and `report.json`.
+//! The data of a scene: read, measured, divided, drawn, written as HDF5.
 
+use super::Failure;
 use crate::dataset::{
     Dataset, Noise, ReadOptions, Row, Split, Standardisation, hdf5, leak, noise, read, split,
 };
 use crate::error::Error;
 use crate::kinematics::{ANGSTROM, NAMES, PeriodicBox};
 use crate::scene::{Data, Scene};
+use polycore::output::csv;
 use polycore::output::picture::{LinePlot, Series};
-use polycore::output::{csv, prepare_directory};
-use polycore::report::{Phases, Report};
+use polycore::report::Report;
 use polycore::scene::Source;
 use polycore::tensor::Voigt;
 use std::path::{Path, PathBuf};
-
-/// What stops a run: a fault in the scene, or one met on the way.
-pub type Failure = polycore::scene::Failure<Error>;
-
-/// A finished run.
-pub struct Finished {
-    /// As written to `report.json`.
-    pub report: Report,
-    /// Lines that no number can say: names of constant components, provenance.
-    pub remarks: Vec<String>,
-}
 
 /// Reads, checks and joins the files of a scene; paths are relative to it.
 ///
@@ -56,50 +46,77 @@ pub fn load(source: &Source, data: &Data, files: &[PathBuf], key: &str) -> Resul
     Ok(set)
 }
 
-/// Runs a scene.
-///
-/// # Errors
-/// [`Failure`]; nothing half-written remains.
-pub fn run(source: &Source, scene: &Scene, output: &Path, quick: bool) -> Result<Finished, Failure> {
-    prepare_directory(output)?;
-    let mut phases = Phases::new();
-    phases.start("read");
-    let set = load(source, &scene.data, &scene.data.files, "data.files")?;
-    let heldout = match &scene.data.heldout[..] {
-        [] => None,
-        files => Some(load(source, &scene.data, files, "data.heldout")?),
-    };
-    phases.start("measure");
-    let split = split(&set, scene.split.by, scene.split.fractions, scene.split.seed)
-        .map_err(|error| source.error("split", error.to_string(), "a split that the data allow"))?;
-    let rows: Vec<&Row> = set.rows().collect();
-    let training: Vec<Voigt> = split.train.iter().map(|&row| rows[row].c).collect();
-    let standardisation = Standardisation::of(training.iter())?;
-    let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), &source.text);
-    describe(&mut report, "", &set);
-    measure_split(&mut report, &set, &split, &standardisation);
-    if let Some(heldout) = &heldout {
-        describe(&mut report, "heldout ", heldout);
+/// What a scene learns from and is judged by.
+pub struct Prepared {
+    /// The runs to learn from.
+    pub set: Dataset,
+    /// The runs kept out of the split.
+    pub heldout: Option<Dataset>,
+    /// Which rows of `set` are for what.
+    pub split: Split,
+}
+
+impl Prepared {
+    /// Reads and divides the data of a scene.
+    ///
+    /// # Errors
+    /// [`load`]; a split that the data do not allow.
+    pub fn new(source: &Source, scene: &Scene) -> Result<Self, Failure> {
+        let set = load(source, &scene.data, &scene.data.files, "data.files")?;
+        let heldout = match &scene.data.heldout[..] {
+            [] => None,
+            files => Some(load(source, &scene.data, files, "data.heldout")?),
+        };
+        let split = split(&set, scene.split.by, scene.split.fractions, scene.split.seed)
+            .map_err(|error| source.error("split", error.to_string(), "a split that the data allow"))?;
+        Ok(Self { set, heldout, split })
     }
-    let mut remarks = set.provenance.clone();
-    remarks.extend(heldout.iter().flat_map(|set| set.provenance.clone()));
-    let constant = set.constant_components();
-    if !constant.is_empty() {
-        remarks.push(format!(
-            "without variance: {} (standardised to 0; other values of them are not to be trusted)",
-            constant.join(", ")
-        ));
+
+    /// Rows of the set by their numbers.
+    pub fn rows(&self, numbers: &[usize]) -> Vec<&Row> {
+        let all: Vec<&Row> = self.set.rows().collect();
+        numbers.iter().map(|&row| all[row]).collect()
     }
-    phases.start("write");
-    hdf5::write(output.join("data.h5"), &set, Some((&split, &standardisation)))?;
-    if let Some(heldout) = &heldout {
-        hdf5::write(output.join("heldout.h5"), heldout, None)?;
+
+    /// Measures the data into a report; gives lines that no number can say.
+    ///
+    /// # Errors
+    /// Numbers that are not finite.
+    pub fn measure(&self, report: &mut Report) -> Result<Vec<String>, Error> {
+        let standardisation = self.standardisation()?;
+        describe(report, "", &self.set);
+        measure_split(report, &self.set, &self.split, &standardisation);
+        if let Some(heldout) = &self.heldout {
+            describe(report, "heldout ", heldout);
+        }
+        let mut remarks = self.set.provenance.clone();
+        remarks.extend(self.heldout.iter().flat_map(|set| set.provenance.clone()));
+        let constant = self.set.constant_components();
+        if !constant.is_empty() {
+            remarks.push(format!(
+                "without variance: {} (standardised to 0; other values of them are not to be trusted)",
+                constant.join(", ")
+            ));
+        }
+        Ok(remarks)
     }
-    draw(&set, heldout.as_ref(), output)?;
-    phases.stop();
-    report.phases(&phases).work("rows", set.len() as u64).work("paths", set.paths.len() as u64);
-    report.judge(&scene.expect, quick).write(output)?;
-    Ok(Finished { report, remarks })
+
+    fn standardisation(&self) -> Result<Standardisation, Error> {
+        let training: Vec<Voigt> = self.rows(&self.split.train).iter().map(|row| row.c).collect();
+        Standardisation::of(training.iter())
+    }
+
+    /// Writes the data as HDF5 and draws the uniaxial runs.
+    ///
+    /// # Errors
+    /// I/O errors.
+    pub fn write(&self, output: &Path) -> Result<(), Error> {
+        hdf5::write(output.join("data.h5"), &self.set, Some((&self.split, &self.standardisation()?)))?;
+        if let Some(heldout) = &self.heldout {
+            hdf5::write(output.join("heldout.h5"), heldout, None)?;
+        }
+        draw(&self.set, self.heldout.as_ref(), output)
+    }
 }
 
 /// Counts, ranges and noise of a set.

@@ -1,10 +1,15 @@
-//! The scene of a data set, as written in TOML.
+//! Scenes, as written in TOML: data and what is learnt from them.
 
 use crate::dataset::{Columns, Fractions, Method};
 use polycore::report::Expect;
+use polycore::scene::{SceneError, Source};
 use polycore::units::{Length, Stress};
 use serde::Deserialize;
 use std::path::PathBuf;
+
+mod model;
+
+pub use model::{KindName, ModelSpec, Outputs, ThesisNetwork, TrainingSpec, check_models};
 
 /// A whole scene.
 #[derive(Clone, Debug, Deserialize)]
@@ -20,9 +25,25 @@ pub struct Scene {
     /// How it is divided.
     #[serde(default)]
     pub split: SplitSpec,
+    /// Laws to train, in this order.
+    #[serde(default)]
+    pub model: Vec<ModelSpec>,
+    /// How they are trained.
+    #[serde(default)]
+    pub training: TrainingSpec,
     /// What the results must be.
     #[serde(default)]
     pub expect: Vec<Expect>,
+}
+
+impl Scene {
+    /// Rules that serde does not know.
+    ///
+    /// # Errors
+    /// What is wrong and where.
+    pub fn check(&self, source: &Source) -> Result<(), SceneError> {
+        check_models(source, &self.model, &self.training)
+    }
 }
 
 /// The only program that runs these scenes.

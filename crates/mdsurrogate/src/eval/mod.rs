@@ -1,0 +1,161 @@
+//! How good a law is: errors on data, and whether it obeys what every elastic solid does.
+
+mod physics;
+
+pub use physics::Physics;
+
+use crate::Error;
+use crate::dataset::{Dataset, Path, Row};
+use crate::surrogate::{Surrogate, Workspace};
+use polycore::tensor::Voigt;
+use std::time::Instant;
+
+/// Evaluations in a measurement of the time of one.
+const TIMED: usize = 2000;
+/// Measurements, of which the shortest counts: a busy machine only adds.
+const ROUNDS: usize = 5;
+
+/// Errors of a law on some rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Errors {
+    /// Rows.
+    pub rows: usize,
+    /// Mean over the rows of the squared error of each component, Pa².
+    pub squares: Voigt,
+    /// Mean of (3.13), %, over the rows with a stress.
+    pub percentage: f64,
+    /// Rows whose C lies outside the box of the training data.
+    pub flagged: usize,
+}
+
+impl Errors {
+    /// (3.12): mean over the rows of ‖S − Ŝ‖², Pa²; Keras reports a sixth of it.
+    pub fn mean_square(&self) -> f64 {
+        self.squares.sum()
+    }
+}
+
+/// Errors of a law on some rows; zero for none.
+///
+/// # Errors
+/// Those of [`Surrogate::stress`].
+pub fn errors<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a Row>) -> Result<Errors, Error> {
+    let mut memory = Workspace::default();
+    let (mut squares, mut percentage, mut flagged) = (Voigt::zeros(), 0.0, 0);
+    let (mut count, mut stressed) = (0, 0);
+    for row in rows {
+        let answer = law.stress(&row.c, &mut memory)?;
+        let error = answer.stress - row.s;
+        squares += error.component_mul(&error);
+        if let Some(share) = percentage_error(&row.s, &answer.stress) {
+            percentage += share;
+            stressed += 1;
+        }
+        flagged += usize::from(answer.flags.outside.contains(&true));
+        count += 1;
+    }
+    let over = |sum: f64, count: usize| if count > 0 { sum / count as f64 } else { 0.0 };
+    Ok(Errors {
+        rows: count,
+        squares: squares.map(|square| over(square, count)),
+        percentage: over(percentage, stressed),
+        flagged,
+    })
+}
+
+/// 100 ‖S − Ŝ‖/‖S‖ (3.13) with the norm of the six components; none where S = 0.
+pub fn percentage_error(stress: &Voigt, predicted: &Voigt) -> Option<f64> {
+    let norm = stress.norm();
+    (norm > 0.0).then(|| 100.0 * (stress - predicted).norm() / norm)
+}
+
+/// Whether a held-out run was pulled at rates that the training runs of its kind enclose; none where rates are unknown
+/// or no run is of its kind.
+pub fn within_rates(run: &Path, training: &Dataset) -> Option<bool> {
+    let of_kind = || training.paths.iter().filter(|path| path.kind == run.kind);
+    let pulled = || (0..3).filter(|&axis| !run.rates[axis].is_nan());
+    if pulled().next().is_none() || of_kind().next().is_none() {
+        return None;
+    }
+    let enclosed = |axis: usize| {
+        let rates = || of_kind().map(|path| path.rates[axis]).filter(|rate| !rate.is_nan());
+        let least = rates().fold(f64::INFINITY, f64::min);
+        let greatest = rates().fold(f64::NEG_INFINITY, f64::max);
+        (least..=greatest).contains(&run.rates[axis])
+    };
+    Some(pulled().all(enclosed))
+}
+
+/// Seconds of one stress at the C of some rows, on one thread: the shortest of a few measurements.
+///
+/// # Errors
+/// Those of [`Surrogate::stress`]; [`Error::Data`] for no row.
+pub fn seconds_of_a_stress(law: &Surrogate, rows: &[&Row]) -> Result<f64, Error> {
+    if rows.is_empty() {
+        let (found, allowed) = ("no row".into(), "at least one row".into());
+        return Err(Error::Data { what: "measuring a stress", found, allowed });
+    }
+    let mut memory = Workspace::default();
+    let mut shortest = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let since = Instant::now();
+        let mut sum = 0.0;
+        for k in 0..TIMED {
+            sum += law.stress(&rows[k % rows.len()].c, &mut memory)?.stress[0];
+        }
+        // so that nothing is left out
+        std::hint::black_box(sum);
+        shortest = shortest.min(since.elapsed().as_secs_f64() / TIMED as f64);
+    }
+    Ok(shortest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::tests::set_of_a_law;
+    use crate::network::Activation::Tanh;
+    use crate::surrogate::{Header, Kind};
+
+    #[test]
+    fn errors_by_hand() {
+        let set = set_of_a_law();
+        let mut header = Header::new(Kind::Ann, &[(3, Tanh)], 1);
+        // a law that answers with 7 MPa on 22 and nothing else
+        header.output_deviation = vec![0.0; 6];
+        header.output_mean[1] = 7e6;
+        let law = Surrogate::random(header, 1).unwrap();
+        let row = &set.paths[0].rows[10];
+        let found = errors(&law, [row].into_iter()).unwrap();
+        let off = row.s - Voigt::new(0.0, 7e6, 0.0, 0.0, 0.0, 0.0);
+        assert!((found.mean_square() / off.norm_squared() - 1.0).abs() < 1e-14);
+        assert!((found.percentage - 100.0 * off.norm() / row.s.norm()).abs() < 1e-12);
+        // the box of this header is C = I
+        assert_eq!((found.rows, found.flagged), (1, 1));
+        assert_eq!(errors(&law, [].into_iter()).unwrap().mean_square(), 0.0);
+        assert_eq!(percentage_error(&Voigt::zeros(), &row.s), None);
+        // the first row is C = I, S = 0: it has no percentage
+        assert_eq!(errors(&law, set.paths[0].rows[..1].iter()).unwrap().percentage, 0.0);
+        assert!(seconds_of_a_stress(&law, &[row]).unwrap() > 0.0);
+        assert!(seconds_of_a_stress(&law, &[]).is_err());
+    }
+
+    #[test]
+    fn rates_within_and_beyond() {
+        let mut set = set_of_a_law();
+        for (index, path) in set.paths.iter_mut().enumerate() {
+            path.rates[index % 3] = 1e9 * (1 + index) as f64;
+        }
+        let mut run = set.paths[0].clone();
+        // runs u0 are numbers 0 and 6
+        for (rate, expected) in [(1e9, true), (5e9, true), (7e9, true), (0.9e9, false), (8e9, false)] {
+            run.rates[0] = rate;
+            assert_eq!(within_rates(&run, &set), Some(expected), "{rate}");
+        }
+        run.rates = [f64::NAN; 3];
+        assert_eq!(within_rates(&run, &set), None);
+        run.kind = "twisted".into();
+        run.rates[0] = 1e9;
+        assert_eq!(within_rates(&run, &set), None);
+    }
+}

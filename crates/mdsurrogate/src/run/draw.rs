@@ -1,0 +1,105 @@
+//! Pictures of trained laws: Figs 3.7 and 3.9–3.11 of the thesis, and error against time.
+
+use super::judge::{Heldout, percentages};
+use crate::error::Error;
+use crate::kinematics::NAMES;
+use crate::train::State;
+use polycore::output::picture::{LinePlot, Series};
+use std::io::Write;
+use std::path::Path;
+
+/// Percentages beyond this are drawn at the edge: (3.13) has no bound where the stress vanishes.
+const LARGEST_PERCENTAGE: f64 = 300.0;
+
+/// Fig. 3.7: training and validation loss by epoch, of the first member of each law.
+pub(super) fn learning(curves: &[(&str, &State)], output: &Path) -> Result<(), Error> {
+    let mut plot = LinePlot::new("Learning curves").axes("epoch", "loss (3.12) (MPa²)").log_y();
+    let mut drawn = false;
+    for (name, state) in curves {
+        let history = state.history();
+        let epochs: Vec<f64> = (1..=history.len()).map(|epoch| epoch as f64).collect();
+        // a loss of exactly 0 has no place on a logarithmic axis
+        let shown = |loss: f64| if loss > 0.0 { loss } else { f64::NAN };
+        let train: Vec<f64> = history.iter().map(|epoch| shown(epoch.train)).collect();
+        plot = plot.series(Series::line(&format!("{name}, training"), &epochs, &train));
+        drawn |= train.iter().any(|loss| !loss.is_nan());
+        if history.iter().any(|epoch| epoch.validation.is_some()) {
+            let loss = |k: usize| shown(history[k].validation.unwrap_or(0.0));
+            let validation: Vec<f64> = (0..history.len()).map(loss).collect();
+            plot = plot.series(Series::line(&format!("{name}, validation"), &epochs, &validation));
+        }
+    }
+    if drawn { Ok(plot.write(output.join("learning.png"))?) } else { Ok(()) }
+}
+
+/// Error on the test rows against training time and against the time of one stress, as picture and table.
+pub(super) fn against_time(
+    names: &[&str],
+    losses: &[f64],
+    training: &[f64],
+    inference: &[f64],
+    floor: Option<f64>,
+    output: &Path,
+) -> Result<(), Error> {
+    polycore::output::atomic_write(output.join("error_against_time.csv"), |file| {
+        writeln!(file, "law,test error (3.12) [MPa²],training [s],one stress [s]")?;
+        for (k, name) in names.iter().enumerate() {
+            writeln!(file, "{name},{:?},{:?},{:?}", losses[k], training[k], inference[k])?;
+        }
+        Ok(())
+    })?;
+    let microseconds: Vec<f64> = inference.iter().map(|time| time * 1e6).collect();
+    for (what, label, times) in [
+        ("training", "training time (s)", training),
+        ("inference", "time of one stress (µs)", &microseconds[..]),
+    ] {
+        let known = |k: &usize| times[*k] > 0.0 && losses[*k] > 0.0;
+        let shown: Vec<usize> = (0..names.len()).filter(known).collect();
+        let (Some(least), Some(greatest)) = (
+            shown.iter().map(|&k| times[k]).reduce(f64::min),
+            shown.iter().map(|&k| times[k]).reduce(f64::max),
+        ) else {
+            continue;
+        };
+        let mut plot =
+            LinePlot::new("Error against time").axes(label, "test error (3.12) (MPa²)").log_x().log_y();
+        for &k in &shown {
+            plot = plot.series(Series::markers(names[k], &[times[k]], &[losses[k]]));
+        }
+        if let Some(floor) = floor.filter(|floor| *floor > 0.0) {
+            let [low, high] = [0.8 * least, 1.25 * greatest];
+            plot = plot.series(Series::reference("noise of the data", &[low, high], &[floor, floor]));
+        }
+        plot.write(output.join(format!("error_against_time_{what}.png")))?;
+    }
+    Ok(())
+}
+
+/// Figs 3.9–3.11: measured and predicted stress of each held-out run, and the percentage error of all.
+pub(super) fn heldout(seen: &[Heldout], names: &[&str], output: &Path) -> Result<(), Error> {
+    let mut errors = LinePlot::new("Percentage error (3.13) of held-out runs")
+        .axes("C along the axis of tension", "percentage error (%)")
+        .y_range(0.0, LARGEST_PERCENTAGE);
+    for held in seen {
+        let component = NAMES[held.axis];
+        let c: Vec<f64> = held.run.rows.iter().map(|row| row.c[held.axis]).collect();
+        let measured: Vec<f64> = held.run.rows.iter().map(|row| row.s[held.axis] / 1e6).collect();
+        let rates = match held.within {
+            Some(true) => ", rates within the training range",
+            Some(false) => ", rates beyond the training range",
+            None => "",
+        };
+        let mut plot = LinePlot::new(&format!("Held-out run {}{rates}", held.run.id))
+            .axes(&format!("C{component}"), &format!("S{component} (MPa)"))
+            .series(Series::reference("molecular dynamics", &c, &measured));
+        for (name, predicted) in names.iter().zip(&held.predicted) {
+            let along: Vec<f64> = predicted.iter().map(|stress| stress[held.axis] / 1e6).collect();
+            plot = plot.series(Series::line(name, &c, &along));
+            let limit = |error: f64| error.min(LARGEST_PERCENTAGE);
+            let shown: Vec<f64> = percentages(&held.run.rows, predicted).into_iter().map(limit).collect();
+            errors = errors.series(Series::line(&format!("{}, {name}", held.run.id), &c, &shown));
+        }
+        plot.write(output.join(format!("heldout-{}.png", held.run.id)))?;
+    }
+    if seen.is_empty() { Ok(()) } else { Ok(errors.write(output.join("percentage-error.png"))?) }
+}

@@ -1,0 +1,119 @@
+//! Whole scenes: data measured, laws trained, judged, drawn and written, with `report.json` last.
+
+pub mod checkpoint;
+mod data;
+mod draw;
+mod judge;
+mod training;
+
+pub use data::{Prepared, describe, load};
+pub use judge::{Named, judge_laws};
+
+use crate::error::Error;
+use crate::scene::Scene;
+use polycore::report::{Phases, Report};
+use polycore::scene::Source;
+use std::path::Path;
+use std::time::Duration;
+
+/// What stops a run: a fault in the scene, or one met on the way.
+pub type Failure = polycore::scene::Failure<Error>;
+
+/// How a run behaves towards its user.
+pub struct Options<'a> {
+    /// Where results go.
+    pub output: &'a Path,
+    /// Leave out what is marked `quick = false`.
+    pub quick: bool,
+    /// Time between checkpoints.
+    pub checkpoint_every: Duration,
+    /// Go on from the checkpoint in `output`.
+    pub resume: bool,
+    /// Whether the user asked to stop.
+    pub interrupted: &'a (dyn Fn() -> bool + Sync),
+    /// Sees the part done, from 0 to 1, and a line about it.
+    pub progress: &'a mut dyn FnMut(f64, &dyn Fn() -> String),
+}
+
+/// A finished run.
+pub struct Finished {
+    /// As written to `report.json`.
+    pub report: Report,
+    /// Lines that no number can say: names of constant components, provenance, tables.
+    pub remarks: Vec<String>,
+}
+
+/// Runs a scene.
+///
+/// # Errors
+/// [`Failure`]; nothing half-written remains.
+pub fn run(source: &Source, options: &mut Options) -> Result<Finished, Failure> {
+    let scene = source.parse::<Scene>()?;
+    scene.check(source)?;
+    let mut phases = Phases::new();
+    phases.start("read");
+    let data = Prepared::new(source, &scene)?;
+    if options.resume {
+        polycore::output::remove_unfinished(options.output);
+    } else {
+        polycore::output::prepare_run(options.output)?;
+    }
+    phases.start("measure");
+    let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), &source.text);
+    let mut remarks = data.measure(&mut report)?;
+    report.work("rows", data.set.len() as u64).work("paths", data.set.paths.len() as u64);
+    let models: Vec<_> = scene.model.iter().filter(|model| model.quick || !options.quick).collect();
+    if !models.is_empty() {
+        phases.start("train");
+        let trained = training::train(source, &scene, &models, &data, options)?;
+        phases.start("judge");
+        training::record(&trained, options.output, &mut report)?;
+        let laws: Vec<judge::Named> = trained.iter().map(training::Trained::named).collect();
+        remarks.extend(judge_laws(&laws, &data, options.output, &mut report)?);
+    }
+    phases.start("write");
+    data.write(options.output)?;
+    phases.stop();
+    report.phases(&phases).threads(1).judge(&scene.expect, options.quick).write(options.output)?;
+    // the report is the last file: a checkpoint without it is an unfinished run
+    let _ = std::fs::remove_file(options.output.join(polycore::checkpoint::FILE_NAME));
+    Ok(Finished { report, remarks })
+}
+
+/// What a scene builds and leaves out, in lines.
+///
+/// # Errors
+/// A fault of the scene or its data.
+pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
+    let scene = source.parse::<Scene>()?;
+    scene.check(source)?;
+    let data = Prepared::new(source, &scene)?;
+    let (set, split) = (&data.set, &data.split);
+    let mut lines = vec![format!(
+        "reads      {} rows of {} runs: {} to train, {} to validate, {} to test",
+        set.len(),
+        set.paths.len(),
+        split.train.len(),
+        split.validation.len(),
+        split.test.len()
+    )];
+    match &data.heldout {
+        Some(heldout) => lines.push(format!("reads      {} held-out runs", heldout.paths.len())),
+        None => lines.push("leaves out held-out runs".into()),
+    }
+    for model in &scene.model {
+        let settings = model.training.over(&scene.training, false);
+        lines.push(format!(
+            "trains     {}: {} of {} parameters, {} epochs of {} steps",
+            model.title(),
+            if model.members == 1 { "a network".into() } else { format!("{} networks", model.members) },
+            model.architecture().parameters(),
+            settings.epochs,
+            split.train.len().div_ceil(settings.batch)
+        ));
+    }
+    if scene.model.is_empty() {
+        lines.push("leaves out training".into());
+    }
+    Ok(lines)
+}

@@ -1,0 +1,215 @@
+//! The models of a scene, trained one after the other.
+
+use super::judge::Named;
+use super::{Failure, Options, Prepared, checkpoint};
+use crate::error::Error;
+use crate::scene::{ModelSpec, Scene};
+use crate::surrogate::{Header, Surrogate};
+use crate::train::{Settings, State, Training, ensemble};
+use polycore::output::csv;
+use polycore::report::Report;
+use polycore::scene::Source;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::time::Instant;
+
+/// Where the trainings of a scene stand: member by member of model by model; the last may be unfinished.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Progress {
+    states: Vec<State>,
+}
+
+/// A law and how it came to be.
+pub struct Trained {
+    name: String,
+    law: Surrogate,
+    states: Vec<State>,
+}
+
+impl Trained {
+    /// The law with its training time.
+    pub fn named(&self) -> Named<'_> {
+        let seconds = self.states.iter().map(State::seconds).sum();
+        Named { name: &self.name, law: &self.law, seconds: Some(seconds) }
+    }
+}
+
+/// Trains the models, or goes on with it; writes each law when its members are done.
+///
+/// # Errors
+/// Those of [`Training`], with what is finished kept in the checkpoint; [`Error::Interrupted`].
+pub fn train(
+    source: &Source,
+    scene: &Scene,
+    models: &[&ModelSpec],
+    data: &Prepared,
+    options: &mut Options,
+) -> Result<Vec<Trained>, Failure> {
+    let mut run = Run {
+        header: checkpoint::Header::new(source, options.quick),
+        progress: match options.resume {
+            true => checkpoint::read(options.output)?,
+            false => Progress::default(),
+        },
+        saved: Instant::now(),
+        total: models.iter().map(|model| model.members).sum(),
+        done: 0,
+    };
+    if !options.resume {
+        checkpoint::write(options.output, &run.header, &run.progress)?;
+    }
+    let (rows, validation) = (data.rows(&data.split.train), data.rows(&data.split.validation));
+    let mut trained = Vec::new();
+    for model in models {
+        let mut header =
+            Header::fitted(model.law(), model.architecture(), model.members, &rows, model.standardised())?;
+        let settings = model.training.over(&scene.training, options.quick);
+        header.provenance.clone_from(&data.set.provenance);
+        header.provenance.push(format!(
+            "{} {}: {} training rows of a split by {:?} with seed {}; {settings:?}",
+            env!("CARGO_PKG_NAME"),
+            env!("CARGO_PKG_VERSION"),
+            rows.len(),
+            data.split.method,
+            data.split.seed,
+        ));
+        let first = run.done;
+        for member in 0..model.members {
+            let settings = Settings { seed: settings.seed.wrapping_add(member as u64), ..settings };
+            let training = match run.progress.states.get(run.done) {
+                Some(state) => Training::resume(&header, &rows, &validation, settings, state.clone()),
+                None => Training::new(&header, &rows, &validation, settings),
+            };
+            let title = match model.members {
+                1 => model.title(),
+                members => format!("{} ({} of {members})", model.title(), member + 1),
+            };
+            let result = run.finish(training?, &title, settings, options);
+            // also of a diverged training: its best epoch is a law
+            if let Err(failure) = result {
+                let begun = &run.progress.states[first.min(run.progress.states.len())..];
+                write(&model.title(), &header, begun, options.output)?;
+                return Err(failure);
+            }
+        }
+        let states = run.progress.states[first..run.done].to_vec();
+        let law = write(&model.title(), &header, &states, options.output)?;
+        trained.push(Trained { name: model.title(), law, states });
+    }
+    Ok(trained)
+}
+
+struct Run {
+    header: checkpoint::Header,
+    progress: Progress,
+    saved: Instant,
+    total: usize,
+    done: usize,
+}
+
+impl Run {
+    /// Trains to the end, with checkpoints.
+    fn finish(
+        &mut self,
+        mut training: Training,
+        title: &str,
+        settings: Settings,
+        options: &mut Options,
+    ) -> Result<(), Failure> {
+        while training.ending().is_none() {
+            let result = training.epoch().map(|epoch| *epoch);
+            let epochs = training.state().history().len();
+            if result.is_err() || (options.interrupted)() {
+                self.save(&training, options)?;
+                result?;
+                return Err(Error::Interrupted(options.output.to_path_buf()).into());
+            }
+            let epoch = result?;
+            if self.saved.elapsed() >= options.checkpoint_every {
+                self.save(&training, options)?;
+            }
+            let part = (self.done as f64 + epochs as f64 / f64::from(settings.epochs)) / self.total as f64;
+            (options.progress)(part, &|| {
+                let validation =
+                    epoch.validation.map_or(String::new(), |loss| format!(", validation {loss:.0}"));
+                format!(
+                    "{title}: epoch {epochs} of {}, loss {:.0}{validation} MPa², best in epoch {}",
+                    settings.epochs,
+                    epoch.train,
+                    training.state().best_epoch()
+                )
+            });
+        }
+        self.store(&training);
+        self.done += 1;
+        checkpoint::write(options.output, &self.header, &self.progress)?;
+        Ok(())
+    }
+
+    fn store(&mut self, training: &Training) {
+        self.progress.states.truncate(self.done);
+        self.progress.states.push(training.state().clone());
+    }
+
+    fn save(&mut self, training: &Training, options: &Options) -> Result<(), Error> {
+        self.store(training);
+        checkpoint::write(options.output, &self.header, &self.progress)?;
+        self.saved = Instant::now();
+        Ok(())
+    }
+}
+
+/// Writes a law of the best epochs, and its learning curves.
+fn write(name: &str, header: &Header, states: &[State], output: &Path) -> Result<Surrogate, Error> {
+    let learnt: Vec<Vec<f32>> =
+        states.iter().filter(|state| state.best_epoch() > 0).map(|state| state.best().to_vec()).collect();
+    if learnt.is_empty() {
+        return Surrogate::random(header.clone(), 0);
+    }
+    for (member, state) in states.iter().enumerate() {
+        let end = if states.len() == 1 { String::new() } else { format!("-{}", member + 1) };
+        learning_curve(state, &output.join(format!("learning-{name}{end}.csv")))?;
+    }
+    let law = ensemble(header.clone(), &learnt)?;
+    law.write(output.join(format!("{name}.safetensors")))?;
+    Ok(law)
+}
+
+/// Loss by epoch: (3.12), and the mean over the components that Keras reports.
+fn learning_curve(state: &State, path: &Path) -> Result<(), Error> {
+    let history = state.history();
+    let column = |value: &dyn Fn(usize) -> f64| (0..history.len()).map(value).collect::<Vec<f64>>();
+    let validation = |k: usize| history[k].validation.unwrap_or(f64::NAN);
+    Ok(csv::write(
+        path,
+        &[
+            ("epoch", "", &column(&|k| (k + 1) as f64)),
+            ("learning rate", "", &column(&|k| history[k].learning_rate)),
+            ("training loss (3.12)", "MPa²", &column(&|k| history[k].train)),
+            ("training loss per component", "MPa²", &column(&|k| history[k].train / 6.0)),
+            ("validation loss (3.12)", "MPa²", &column(&validation)),
+            ("validation loss per component", "MPa²", &column(&|k| validation(k) / 6.0)),
+        ],
+    )?)
+}
+
+/// Numbers of the trainings, and Fig. 3.7.
+///
+/// # Errors
+/// I/O errors.
+pub fn record(trained: &[Trained], output: &Path, report: &mut Report) -> Result<(), Error> {
+    for model in trained {
+        let name = &model.name;
+        let epochs: usize = model.states.iter().map(|state| state.history().len()).sum();
+        report.work(&format!("epochs of {name}"), epochs as u64);
+        report.value(&format!("{name} parameters"), model.law.header().architecture.parameters() as f64, "");
+        report.seconds(&format!("training of {name}"), model.states.iter().map(State::seconds).sum());
+        for (member, state) in model.states.iter().enumerate() {
+            let end =
+                if model.states.len() == 1 { String::new() } else { format!(", member {}", member + 1) };
+            report.value(&format!("{name} best epoch{end}"), f64::from(state.best_epoch()), "");
+        }
+    }
+    let curves: Vec<_> = trained.iter().map(|model| (model.name.as_str(), &model.states[0])).collect();
+    super::draw::learning(&curves, output)
+}

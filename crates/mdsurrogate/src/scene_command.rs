@@ -1,0 +1,131 @@
+//! Commands on scenes: run, resume, check, and laws evaluated on a scene's data.
+
+use mdsurrogate::run::{self, Failure, Named, Options, Prepared, checkpoint, judge_laws};
+use mdsurrogate::scene::Scene;
+use mdsurrogate::surrogate::Surrogate;
+use polycore::command::{Progress, default_output, interrupted, seconds};
+use polycore::report::Report;
+use polycore::scene::Source;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// A scene and where its results go.
+#[derive(clap::Args)]
+pub struct Run {
+    /// The scene (TOML).
+    scene: PathBuf,
+    /// Directory for results; default: out/NAME after the scene's folder.
+    #[arg(long, short)]
+    output: Option<PathBuf>,
+    /// Leave out what the scene marks `quick = false`, and train for its `quick_epochs`.
+    #[arg(long)]
+    quick: bool,
+    /// Seconds between checkpoints.
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
+    checkpoint_every: f64,
+}
+
+/// An unfinished run.
+#[derive(clap::Args)]
+pub struct Resume {
+    /// The run's output directory.
+    output: PathBuf,
+    /// Seconds between checkpoints.
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
+    checkpoint_every: f64,
+}
+
+/// Laws to judge.
+#[derive(clap::Args)]
+pub struct Eval {
+    /// The scene (TOML) whose data they are judged on.
+    scene: PathBuf,
+    /// The laws (safetensors).
+    #[arg(required = true)]
+    laws: Vec<PathBuf>,
+    /// Directory for results; default: out/NAME-eval after the scene's folder.
+    #[arg(long, short)]
+    output: Option<PathBuf>,
+}
+
+impl Run {
+    /// Runs the scene from its beginning.
+    pub fn run(self) -> Result<bool, Failure> {
+        let source = Source::read(&self.scene)?;
+        let output = self.output.unwrap_or_else(|| default_output(&self.scene));
+        solve(&source, &output, self.quick, self.checkpoint_every, false)
+    }
+}
+
+impl Resume {
+    /// Goes on with a run.
+    pub fn run(self) -> Result<bool, Failure> {
+        let output = &self.output;
+        let is_there = |name| output.join(name).is_file();
+        if !is_there(polycore::checkpoint::FILE_NAME) && is_there(polycore::report::FILE_NAME) {
+            println!("{} is finished: nothing to resume", output.display());
+            return Ok(true);
+        }
+        let header = checkpoint::header(output)?;
+        let source = Source::new(header.scene_path, header.scene);
+        solve(&source, output, header.quick, self.checkpoint_every, true)
+    }
+}
+
+fn solve(source: &Source, output: &Path, quick: bool, every: f64, resume: bool) -> Result<bool, Failure> {
+    let mut bar = Progress::start();
+    let mut progress = |part: f64, line: &dyn Fn() -> String| bar.show(part, line);
+    let mut options = Options {
+        output,
+        quick,
+        checkpoint_every: Duration::from_secs_f64(every),
+        resume,
+        interrupted: interrupted(),
+        progress: &mut progress,
+    };
+    let finished = run::run(source, &mut options)?;
+    bar.finish();
+    finished.report.print_table();
+    for remark in &finished.remarks {
+        println!("{remark}");
+    }
+    println!("results in {}", output.display());
+    Ok(finished.report.passed())
+}
+
+/// Validates a scene and its data, and prints what it builds.
+pub fn check(path: &Path) -> Result<bool, Failure> {
+    for line in run::explain(&Source::read(path)?)? {
+        println!("{line}");
+    }
+    println!("{}: the scene is valid", path.display());
+    Ok(true)
+}
+
+impl Eval {
+    /// Judges the laws.
+    pub fn run(self) -> Result<bool, Failure> {
+        let source = Source::read(&self.scene)?;
+        let scene = source.parse::<Scene>()?;
+        scene.check(&source)?;
+        let name = |path: &Path| path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let laws = self.laws.iter().map(|path| Ok((name(path), Surrogate::read(path)?)));
+        let laws = laws.collect::<Result<Vec<_>, mdsurrogate::Error>>()?;
+        let data = Prepared::new(&source, &scene)?;
+        let output = self.output.unwrap_or_else(|| {
+            let plain = default_output(&self.scene);
+            plain.with_file_name(format!("{}-eval", plain.file_name().unwrap_or_default().to_string_lossy()))
+        });
+        polycore::output::prepare_run(&output)?;
+        let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), &source.text);
+        let named: Vec<Named> = laws.iter().map(|(name, law)| Named { name, law, seconds: None }).collect();
+        let table = judge_laws(&named, &data, &output, &mut report)?;
+        report.threads(1).write(&output)?;
+        report.print_table();
+        for line in table {
+            println!("{line}");
+        }
+        println!("results in {}", output.display());
+        Ok(report.passed())
+    }
+}

@@ -1,0 +1,111 @@
+//! Rows as networks see them: single precision, standardised, in batches.
+
+use super::Loss;
+use crate::dataset::Row;
+use crate::surrogate::{Header, Kind, Surrogate};
+use burn::tensor::TensorData;
+
+/// Pa in the unit of the loss.
+const MEGAPASCAL: f64 = 1e6;
+
+/// Inputs and targets of some rows.
+pub(super) struct Examples {
+    inputs: usize,
+    /// (rows, inputs).
+    x: Vec<f32>,
+    /// (rows, inputs · 6): what the gradient of N by its inputs is multiplied with to give S in MPa; of an energy.
+    slopes: Vec<f32>,
+    /// (rows, 6): targets, in units of [`units`].
+    s: Vec<f32>,
+    /// Variances of the components of S, MPa².
+    variances: [f64; 6],
+}
+
+/// Some rows as tensors.
+pub(super) struct Batch {
+    pub rows: usize,
+    pub x: TensorData,
+    pub slopes: Option<TensorData>,
+    pub s: TensorData,
+}
+
+/// What a network's outputs are multiplied with and added to, to give S in MPa.
+pub(super) fn units(header: &Header) -> ([f64; 6], [f64; 6]) {
+    let (mut unit, mut mean) = ([1.0; 6], [0.0; 6]);
+    if header.kind == Kind::Ann {
+        for a in 0..6 {
+            unit[a] = header.output_deviation[a] / MEGAPASCAL;
+            mean[a] = header.output_mean[a] / MEGAPASCAL;
+        }
+    }
+    (unit, mean)
+}
+
+/// S in MPa = Σ_k slopes[k] ∂N/∂x_k before the correction at the identity: (inputs · 6), in f32.
+pub(super) fn scaled_slopes(law: &Surrogate<f64>, slopes: &[[f64; 6]]) -> Vec<f32> {
+    let scale = law.header().output_deviation[0] / MEGAPASCAL;
+    // S_ii = 2 ∂W/∂C_ii, S_12 = ∂W/∂C_12 with C_12 counted once
+    let factor = |a: usize| if a < 3 { 2.0 } else { 1.0 };
+    let row = |slope: &[f64; 6]| [0, 1, 2, 3, 4, 5].map(|a| (factor(a) * scale * slope[a]) as f32);
+    slopes.iter().flat_map(row).collect()
+}
+
+impl Examples {
+    pub fn new(law: &Surrogate<f64>, rows: &[&Row]) -> Self {
+        let inputs = law.header().kind.inputs();
+        let (unit, mean) = units(law.header());
+        let energetic = law.header().kind != Kind::Ann;
+        let mut examples =
+            Self { inputs, x: Vec::new(), slopes: Vec::new(), s: Vec::new(), variances: [0.0; 6] };
+        for row in rows {
+            let features = law.features(&row.c);
+            examples.x.extend(features.values[..inputs].iter().map(|value| *value as f32));
+            if energetic {
+                examples.slopes.extend(scaled_slopes(law, &features.slopes[..inputs]));
+            }
+            for a in 0..6 {
+                let target = row.s[a] / MEGAPASCAL - mean[a];
+                // a component that never changes has no unit and is not learnt
+                examples.s.push(if unit[a] > 0.0 { (target / unit[a]) as f32 } else { 0.0 });
+            }
+        }
+        for (a, variance) in examples.variances.iter_mut().enumerate() {
+            let count = rows.len() as f64;
+            let mean = rows.iter().map(|row| row.s[a] / MEGAPASCAL).sum::<f64>() / count;
+            *variance = rows.iter().map(|row| (row.s[a] / MEGAPASCAL - mean).powi(2)).sum::<f64>() / count;
+        }
+        examples
+    }
+
+    /// Rows.
+    pub fn len(&self) -> usize {
+        self.s.len() / 6
+    }
+
+    /// What each component's square, MPa², counts in the loss.
+    pub fn weights(&self, loss: Loss) -> [f64; 6] {
+        match loss {
+            Loss::Stress => [1.0; 6],
+            Loss::Scaled => self.variances.map(|variance| if variance > 0.0 { 1.0 / variance } else { 1.0 }),
+        }
+    }
+
+    /// The rows of these numbers.
+    pub fn batch(&self, rows: &[usize]) -> Batch {
+        let gather = |from: &[f32], width: usize| {
+            let mut data = Vec::with_capacity(rows.len() * width);
+            for &row in rows {
+                data.extend_from_slice(&from[row * width..(row + 1) * width]);
+            }
+            data
+        };
+        let count = rows.len();
+        Batch {
+            rows: count,
+            x: TensorData::new(gather(&self.x, self.inputs), [count, self.inputs]),
+            slopes: (!self.slopes.is_empty())
+                .then(|| TensorData::new(gather(&self.slopes, 6 * self.inputs), [count, self.inputs, 6])),
+            s: TensorData::new(gather(&self.s, 6), [count, 6]),
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! Networks in burn's tensors: prediction, loss and its gradients.
+
+use super::dataset::{Batch, scaled_slopes, units};
+use super::parameters::Layout;
+use crate::Error;
+use crate::network::Activation;
+use crate::surrogate::{Kind, Surrogate};
+use burn::tensor::{Device, Tensor, TensorData, activation};
+use polycore::tensor::Voigt;
+
+/// A law's networks, without their weights.
+pub(super) struct Model {
+    activations: Vec<Activation>,
+    /// Of an energy: inputs and slopes at C = I, where the stress is to vanish.
+    identity: Option<[TensorData; 2]>,
+    /// Squares of the units of the outputs, MPa².
+    unit_squares: [f64; 6],
+    /// What a component's square, MPa², counts.
+    weights: [f64; 6],
+    device: Device,
+    tracking: Device,
+}
+
+/// A layer's parameters as tensors: (inputs, outputs) and (1, outputs).
+struct Tensors {
+    weights: Tensor<2>,
+    bias: Tensor<2>,
+}
+
+/// Derivatives of the loss by all parameters: weights and biases of each layer.
+pub(super) struct Gradients {
+    pub layers: Vec<[Vec<f32>; 2]>,
+}
+
+/// What a batch gives.
+pub(super) struct Step {
+    /// The loss that is minimised.
+    pub loss: f64,
+    /// Sum over the rows of each component's squared error, MPa².
+    pub squares: [f64; 6],
+    pub gradients: Gradients,
+}
+
+impl Model {
+    /// The model of a law's networks; `weights` is what a component's square counts.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for an energy of ReLU.
+    pub fn new(law: &Surrogate<f64>, weights: &[f64; 6]) -> Result<Self, Error> {
+        let header = law.header();
+        let activations = header.architecture.activations.clone();
+        let identity = match header.kind {
+            Kind::Ann => None,
+            Kind::Energy { polyconvex: true, .. } => {
+                return Err(Error::parameter(
+                    "kind",
+                    "a polyconvex energy",
+                    "an energy that is not (so far)",
+                ));
+            }
+            Kind::Energy { .. } => {
+                if activations.contains(&Activation::Relu) {
+                    let allowed = "softplus, tanh, sigmoid, silu or elu (the stress is a derivative)";
+                    return Err(Error::parameter("activation of an energy", "relu", allowed));
+                }
+                let at = law.features(&Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0));
+                let inputs = header.kind.inputs();
+                let values: Vec<f32> = at.values[..inputs].iter().map(|value| *value as f32).collect();
+                let slopes = scaled_slopes(law, &at.slopes[..inputs]);
+                Some([TensorData::new(values, [1, inputs]), TensorData::new(slopes, [1, inputs, 6])])
+            }
+        };
+        let device = Device::flex();
+        Ok(Self {
+            activations,
+            identity,
+            unit_squares: units(header).0.map(|unit| unit * unit),
+            weights: *weights,
+            tracking: device.clone().autodiff(),
+            device,
+        })
+    }
+
+    /// The loss of mean squared errors in MPa².
+    pub fn loss(&self, squares: &[f64; 6]) -> f64 {
+        squares.iter().zip(&self.weights).map(|(square, weight)| square * weight).sum()
+    }
+
+    /// Loss and gradients of a batch.
+    pub fn step(&self, layout: &Layout, parameters: &[f32], batch: &Batch) -> Step {
+        let layers: Vec<Tensors> = tensors(layout, parameters, &self.tracking)
+            .into_iter()
+            .map(|layer| Tensors { weights: layer.weights.require_grad(), bias: layer.bias.require_grad() })
+            .collect();
+        let squares = self.squared_errors(&layers, batch, &self.tracking);
+        let each = numbers(squares.clone().inner());
+        // (3.12): the sum over components, the mean over rows
+        let weight = |a: usize| (self.weights[a] * self.unit_squares[a] / batch.rows as f64) as f32;
+        let weights = TensorData::new([0, 1, 2, 3, 4, 5].map(weight).to_vec(), [1, 6]);
+        let loss = (squares * Tensor::from_data(weights, &self.tracking)).sum();
+        let mut gradients = loss.backward();
+        let mut taken = |tensor: &Tensor<2>, length: usize| match tensor.grad_remove(&mut gradients) {
+            Some(gradient) => numbers(gradient),
+            // the last bias of an energy has no part in the stress
+            None => vec![0.0; length],
+        };
+        let layers = layers.iter().enumerate().map(|(l, layer)| {
+            [taken(&layer.weights, layout.weights(l).len()), taken(&layer.bias, layout.bias(l).len())]
+        });
+        let gradients = Gradients { layers: layers.collect() };
+        let squares = self.in_megapascal(&each);
+        let mean = squares.map(|square| square / batch.rows as f64);
+        Step { loss: self.loss(&mean), squares, gradients }
+    }
+
+    /// Sum over the rows of each component's squared error, MPa².
+    pub fn squares(&self, layout: &Layout, parameters: &[f32], batch: &Batch) -> [f64; 6] {
+        let layers = tensors(layout, parameters, &self.device);
+        self.in_megapascal(&numbers(self.squared_errors(&layers, batch, &self.device)))
+    }
+
+    fn in_megapascal(&self, squares: &[f32]) -> [f64; 6] {
+        let mut result = [0.0; 6];
+        for a in 0..6 {
+            result[a] = f64::from(squares[a]) * self.unit_squares[a];
+        }
+        result
+    }
+
+    /// Sum over the rows of each component's squared error, in units of the outputs: (1, 6).
+    fn squared_errors(&self, layers: &[Tensors], batch: &Batch, device: &Device) -> Tensor<2> {
+        let tensor = |data: &TensorData| Tensor::<2>::from_data(data.clone(), device);
+        let outputs = match (&self.identity, &batch.slopes) {
+            (Some([x, at_rest]), Some(slopes)) => {
+                let stress = |x: &TensorData, slopes: &TensorData| {
+                    let gradient = self.input_gradient(layers, tensor(x));
+                    let slopes = Tensor::<3>::from_data(slopes.clone(), device);
+                    // Σ_k ∂N/∂x_k · slopes_k
+                    (gradient.unsqueeze_dim::<3>(2) * slopes).sum_dim(1).squeeze_dim::<2>(1)
+                };
+                stress(&batch.x, slopes) - stress(x, at_rest)
+            }
+            _ => self.forward(layers, tensor(&batch.x)),
+        };
+        let error = outputs - tensor(&batch.s);
+        (error.clone() * error).sum_dim(0)
+    }
+
+    /// N(x), row by row.
+    fn forward(&self, layers: &[Tensors], x: Tensor<2>) -> Tensor<2> {
+        let mut y = x;
+        for (layer, kind) in layers.iter().zip(&self.activations) {
+            y = value(*kind, y.matmul(layer.weights.clone()) + layer.bias.clone());
+        }
+        y
+    }
+
+    /// ∂N/∂x of the first output, row by row, written out in tensor operations: reverse mode through the layers, since
+    /// burn differentiates once and the loss takes that one.
+    fn input_gradient(&self, layers: &[Tensors], x: Tensor<2>) -> Tensor<2> {
+        let last = layers.len() - 1;
+        let mut slopes = Vec::with_capacity(last);
+        let mut y = x;
+        for (l, (layer, kind)) in layers[..last].iter().zip(&self.activations).enumerate() {
+            let sum = y.clone().matmul(layer.weights.clone()) + layer.bias.clone();
+            slopes.push(slope(*kind, sum.clone()));
+            if l + 1 < last {
+                y = value(*kind, sum);
+            }
+        }
+        let rows = y.dims()[0];
+        // (outputs, inputs) of the last layer: one row for all rows
+        let mut adjoint = layers[last].weights.clone().transpose();
+        if last == 0 {
+            adjoint = adjoint.expand([rows, layers[0].weights.dims()[0]]);
+        }
+        for (layer, slope) in layers[..last].iter().zip(slopes).rev() {
+            adjoint = (slope * adjoint).matmul(layer.weights.clone().transpose());
+        }
+        adjoint
+    }
+}
+
+fn tensors(layout: &Layout, parameters: &[f32], device: &Device) -> Vec<Tensors> {
+    let tensor = |range: std::ops::Range<usize>, shape: [usize; 2]| {
+        Tensor::from_data(TensorData::new(parameters[range].to_vec(), shape), device)
+    };
+    let layer = |(l, [inputs, outputs]): (usize, &[usize; 2])| Tensors {
+        weights: tensor(layout.weights(l), [*inputs, *outputs]),
+        bias: tensor(layout.bias(l), [1, *outputs]),
+    };
+    layout.shapes.iter().enumerate().map(layer).collect()
+}
+
+/// The numbers of a tensor of f32.
+fn numbers(tensor: Tensor<2>) -> Vec<f32> {
+    // all tensors here are f32 on a device without faults
+    tensor.into_data().try_into_vec::<f32>().unwrap_or_default()
+}
+
+/// σ(a).
+fn value(kind: Activation, a: Tensor<2>) -> Tensor<2> {
+    match kind {
+        Activation::Linear => a,
+        Activation::Relu => activation::relu(a),
+        // ln(1 + eᵃ) = −ln σ(−a), which burn computes without overflow
+        Activation::Softplus => -activation::log_sigmoid(-a),
+        Activation::Tanh => a.tanh(),
+        Activation::Sigmoid => activation::sigmoid(a),
+        Activation::Silu => activation::silu(a),
+        Activation::Elu => activation::elu(a, 1.0),
+    }
+}
+
+/// σ′(a).
+fn slope(kind: Activation, a: Tensor<2>) -> Tensor<2> {
+    match kind {
+        Activation::Linear => a.ones_like(),
+        // refused by `Model::new`
+        Activation::Relu => a.zeros_like(),
+        Activation::Softplus => activation::sigmoid(a),
+        Activation::Tanh => {
+            let t = a.tanh();
+            -(t.clone() * t) + 1.0
+        }
+        Activation::Sigmoid => {
+            let s = activation::sigmoid(a);
+            s.clone() * (-s + 1.0)
+        }
+        Activation::Silu => {
+            let s = activation::sigmoid(a.clone());
+            s.clone() * ((-s + 1.0) * a + 1.0)
+        }
+        // eᵃ below 0, 1 above
+        Activation::Elu => a.clamp_max(0.0).exp(),
+    }
+}

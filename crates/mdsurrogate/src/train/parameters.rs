@@ -1,0 +1,68 @@
+//! All weights and biases of a network as one list of f32, in the order of burn's layers.
+
+use crate::Error;
+use crate::network::{Architecture, Layer, Network};
+use std::ops::Range;
+
+/// Where in the list the parts of each layer stand: weights (inputs, outputs), then biases.
+#[derive(Debug, Clone)]
+pub(super) struct Layout {
+    /// Inputs and outputs of each layer.
+    pub shapes: Vec<[usize; 2]>,
+    starts: Vec<usize>,
+}
+
+impl Layout {
+    pub fn new(architecture: &Architecture) -> Self {
+        let shapes: Vec<[usize; 2]> = architecture.widths.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+        let mut starts = vec![0];
+        for [inputs, outputs] in &shapes {
+            starts.push(starts[starts.len() - 1] + (inputs + 1) * outputs);
+        }
+        Self { shapes, starts }
+    }
+
+    /// Parameters in all.
+    pub fn len(&self) -> usize {
+        self.starts[self.shapes.len()]
+    }
+
+    pub fn weights(&self, layer: usize) -> Range<usize> {
+        let [inputs, outputs] = self.shapes[layer];
+        self.starts[layer]..self.starts[layer] + inputs * outputs
+    }
+
+    pub fn bias(&self, layer: usize) -> Range<usize> {
+        self.weights(layer).end..self.starts[layer + 1]
+    }
+
+    /// A network's parameters, rounded to f32.
+    pub fn flat(&self, network: &Network<f64>) -> Vec<f32> {
+        let mut flat = Vec::with_capacity(self.len());
+        for (layer, [inputs, outputs]) in network.layers().iter().zip(&self.shapes) {
+            for i in 0..*inputs {
+                flat.extend((0..*outputs).map(|o| layer.weights[o * inputs + i] as f32));
+            }
+            flat.extend(layer.bias.iter().map(|bias| *bias as f32));
+        }
+        flat
+    }
+
+    /// The network of these parameters, to the bit.
+    pub fn network(&self, architecture: &Architecture, flat: &[f32]) -> Result<Network<f64>, Error> {
+        if flat.len() != self.len() {
+            return Err(Error::parameter("parameters", flat.len(), format!("{}", self.len())));
+        }
+        let layer = |l: usize| {
+            let [inputs, outputs] = self.shapes[l];
+            let (weights, bias) = (&flat[self.weights(l)], &flat[self.bias(l)]);
+            let mut turned = Vec::with_capacity(weights.len());
+            for o in 0..outputs {
+                turned.extend((0..inputs).map(|i| f64::from(weights[i * outputs + o])));
+            }
+            let bias = bias.iter().copied().map(f64::from).collect();
+            Layer { weights: turned, bias, activation: architecture.activations[l] }
+        };
+        Network::new(architecture.clone(), (0..self.shapes.len()).map(layer).collect())
+    }
+}

@@ -1,0 +1,249 @@
+use super::*;
+use crate::dataset::tests::{neo_hookean, rows_of_a_law};
+use crate::network::Activation::{Elu, Linear, Relu, Sigmoid, Silu, Softplus, Tanh};
+use crate::network::{Activation, Architecture};
+use crate::surrogate::{Kind, Symmetry, Workspace};
+use polycore::tensor::Voigt;
+
+fn header(kind: Kind, hidden: &[(usize, Activation)], rows: &[&Row]) -> Header {
+    let architecture = Architecture::new(kind.inputs(), hidden, kind.outputs());
+    Header::fitted(kind, architecture, 1, rows, true).unwrap()
+}
+
+fn trained(header: &Header, rows: &[&Row], settings: Settings) -> Training {
+    let mut training = Training::new(header, rows, &[], settings).unwrap();
+    while training.ending().is_none() {
+        training.epoch().unwrap();
+    }
+    training
+}
+
+const SHORT: Settings = Settings {
+    epochs: 3,
+    batch: 32,
+    learning_rate: 1e-3,
+    schedule: Schedule::Constant,
+    patience: None,
+    loss: Loss::Stress,
+    seed: 5,
+};
+
+/// The laws that are compared: every activation, both kinds, turned axes, and no hidden layer at all.
+fn laws(rows: &[&Row]) -> Vec<Header> {
+    let (s, c) = 0.4f64.sin_cos();
+    let axes = [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]];
+    let smooth = [(7, Softplus), (6, Tanh), (5, Sigmoid), (8, Silu), (4, Elu), (3, Linear)];
+    let mut laws = vec![
+        header(Kind::Ann, &[(9, Relu), (7, Softplus), (6, Tanh), (5, Silu), (5, Elu), (4, Sigmoid)], rows),
+        header(Kind::Ann, &[], rows),
+        header(Kind::energy(Symmetry::Isotropic), &[], rows),
+        header(Kind::Energy { symmetry: Symmetry::Monoclinic, axes, polyconvex: false }, &smooth, rows),
+    ];
+    laws.extend(
+        Symmetry::ALL.map(|symmetry| header(Kind::energy(symmetry), &[(8, Softplus), (8, Softplus)], rows)),
+    );
+    laws
+}
+
+/// burn's loss is that of the stresses which the law gives without burn.
+#[test]
+fn burn_and_inference_agree() {
+    let rows = rows_of_a_law();
+    let rows: Vec<&Row> = rows.iter().collect();
+    for header in laws(&rows) {
+        let training = trained(&header, &rows, SHORT);
+        let law = ensemble(header.clone(), &[training.state().weights.clone()]).unwrap();
+        let mut expected = [0.0; 6];
+        let mut memory = Workspace::default();
+        for row in &rows {
+            let error = law.stress(&row.c, &mut memory).unwrap().stress - row.s;
+            for a in 0..6 {
+                expected[a] += (error[a] / 1e6).powi(2) / rows.len() as f64;
+            }
+        }
+        let burn = training.squares(&training.train);
+        let total: f64 = expected.iter().sum();
+        assert!(total > 1.0, "{total}");
+        for a in 0..6 {
+            // a hundred roundings of f32 (6e-8) on stresses up to ten times the errors that are squared here
+            assert!((burn[a] - expected[a]).abs() < 1e-4 * total, "{:?}: {burn:?} {expected:?}", header.kind);
+        }
+    }
+}
+
+/// Along its own gradient the loss changes as the gradient says.
+#[test]
+fn gradients_are_derivatives_of_the_loss() {
+    let rows = rows_of_a_law();
+    let rows: Vec<&Row> = rows.iter().collect();
+    for header in laws(&rows) {
+        let training = Training::new(&header, &rows, &[], SHORT).unwrap();
+        let batch = training.train.batch(&(0..rows.len()).collect::<Vec<_>>());
+        let weights = &training.state.weights;
+        let step = training.model.step(&training.layout, weights, &batch);
+        let gradient: Vec<f32> = step.gradients.layers.iter().flatten().flatten().copied().collect();
+        assert_eq!(gradient.len(), weights.len());
+        let norm = gradient.iter().map(|g| f64::from(*g).powi(2)).sum::<f64>().sqrt();
+        let at = |distance: f64| {
+            let moved =
+                weights.iter().zip(&gradient).map(|(w, g)| w + (distance * f64::from(*g) / norm) as f32);
+            let moved: Vec<f32> = moved.collect();
+            training.model.step(&training.layout, &moved, &batch).loss
+        };
+        let slope = (at(2e-3) - at(-2e-3)) / 4e-3;
+        // rounding 6e-8/2e-3 of the loss, curvature, and corners of ReLU
+        assert!((slope / norm - 1.0).abs() < 2e-2, "{:?}: {slope} {norm}", header.kind);
+    }
+}
+
+#[test]
+fn reruns_and_resumed_runs_have_the_same_bits() {
+    let rows = rows_of_a_law();
+    let rows: Vec<&Row> = rows.iter().collect();
+    let (learnt, kept) = rows.split_at(400);
+    let header = header(Kind::energy(Symmetry::Orthotropic), &[(8, Softplus)], learnt);
+    let settings = Settings { epochs: 4, schedule: Schedule::Cosine, ..SHORT };
+    let bits = |state: &State| {
+        let weights = state.weights.iter().chain(&state.best).map(|w| w.to_bits()).collect::<Vec<_>>();
+        let losses: Vec<_> = state.history.iter().map(|e| (e.train.to_bits(), e.judged.to_bits())).collect();
+        (weights, losses)
+    };
+    let run = || {
+        let mut training = Training::new(&header, learnt, kept, settings).unwrap();
+        while training.ending().is_none() {
+            training.epoch().unwrap();
+        }
+        bits(training.state())
+    };
+    let undisturbed = run();
+    assert_eq!(run(), undisturbed);
+    let mut first = Training::new(&header, learnt, kept, settings).unwrap();
+    first.epoch().unwrap();
+    let stored = serde_json::to_vec(first.state()).unwrap();
+    let mut second =
+        Training::resume(&header, learnt, kept, settings, serde_json::from_slice(&stored).unwrap()).unwrap();
+    while second.ending().is_none() {
+        second.epoch().unwrap();
+    }
+    assert_eq!(bits(second.state()), undisturbed);
+    // and another seed another network
+    let other = Training::new(&header, learnt, kept, Settings { seed: 6, ..settings }).unwrap();
+    assert_ne!(other.state().weights, first.state().weights);
+}
+
+#[test]
+fn divergence_is_named_and_loses_nothing() {
+    let rows = rows_of_a_law();
+    let rows: Vec<&Row> = rows.iter().collect();
+    let hidden = [(32, Relu), (32, Softplus), (32, Relu), (32, Softplus)];
+    let header = header(Kind::Ann, &hidden, &rows);
+    let mut training = trained(&header, &rows, SHORT);
+    training.settings.learning_rate = 1e10;
+    training.settings.epochs = 50;
+    let mut before = training.state().clone();
+    let error = loop {
+        match training.epoch() {
+            Ok(_) => before = training.state().clone(),
+            Err(error) => break error,
+        }
+    };
+    assert!(matches!(error, Error::Diverged { batch: 1.., learning_rate: 1e10, .. }), "{error}");
+    assert!(error.to_string().contains("learning rate 1e10"), "{error}");
+    assert_eq!(error.exit_code(), 1);
+    assert_eq!(*training.state(), before);
+    assert!(training.best().iter().all(|weight| weight.is_finite()));
+}
+
+/// The noiseless law of the test rows, between its paths.
+#[test]
+fn a_known_law_is_learnt() {
+    let rows = rows_of_a_law();
+    let rows: Vec<&Row> = rows.iter().collect();
+    let c = Voigt::new(1.2, 1.1, 1.0, 0.0, 0.0, 0.0);
+    let expected = neo_hookean(&c);
+    for (kind, activation, bound) in
+        [(Kind::Ann, Tanh, 0.03), (Kind::energy(Symmetry::Orthotropic), Softplus, 0.03)]
+    {
+        let header = header(kind.clone(), &[(24, activation), (24, activation)], &rows);
+        let settings = Settings {
+            epochs: 200,
+            learning_rate: 5e-3,
+            schedule: Schedule::Cosine,
+            batch: 32,
+            ..Settings::default()
+        };
+        let training = trained(&header, &rows, settings);
+        let history = training.state().history();
+        assert!(history[history.len() - 1].train < 1e-3 * history[0].train, "{kind:?}: {history:?}");
+        let law = ensemble(header, &[training.best().to_vec()]).unwrap();
+        let stress = law.stress(&c, &mut Workspace::default()).unwrap().stress;
+        // an interpolation between paths, not a datum: 3 % of it, an order above the error on the rows
+        assert!((stress - expected).norm() < bound * expected.norm(), "{kind:?}: {stress} {expected}");
+    }
+}
+
+#[test]
+fn early_stopping_keeps_the_best() {
+    let rows = rows_of_a_law();
+    let rows: Vec<&Row> = rows.iter().collect();
+    let header = header(Kind::Ann, &[(8, Tanh)], &rows[..80]);
+    let settings = Settings { epochs: 500, patience: Some(3), learning_rate: 0.05, ..SHORT };
+    let mut training = Training::new(&header, &rows[..80], &rows[200..280], settings).unwrap();
+    while training.ending().is_none() {
+        training.epoch().unwrap();
+    }
+    assert_eq!(training.ending(), Some(Ending::Stopped));
+    let state = training.state();
+    let losses: Vec<f64> = state.history().iter().map(|epoch| epoch.validation.unwrap()).collect();
+    let least = losses.iter().copied().fold(f64::INFINITY, f64::min);
+    assert_eq!(losses[state.best_epoch() as usize - 1], least);
+    assert_eq!(losses.len(), state.best_epoch() as usize + 3);
+    // the best weights have the best loss
+    let mut best = Training::new(&header, &rows[..80], &rows[200..280], settings).unwrap();
+    best.state.weights.clone_from(&state.best);
+    let validation = best.squares(best.validation.as_ref().unwrap());
+    assert_eq!(validation.iter().sum::<f64>(), least);
+}
+
+#[test]
+fn extremes() {
+    let rows = rows_of_a_law();
+    let all: Vec<&Row> = rows.iter().collect();
+    // one row, repeated rows: trained all the same
+    for few in [vec![&rows[30]], vec![&rows[30]; 5]] {
+        for kind in [Kind::Ann, Kind::energy(Symmetry::Transverse)] {
+            let header = header(kind, &[(4, Tanh)], &few);
+            assert!(trained(&header, &few, SHORT).best().iter().all(|weight| weight.is_finite()));
+        }
+    }
+    assert!(Training::new(&header(Kind::Ann, &[], &all), &[], &all, SHORT).is_err());
+    let relu = header(Kind::energy(Symmetry::Isotropic), &[(4, Relu)], &all);
+    let error = Training::new(&relu, &all, &[], SHORT).err().unwrap().to_string();
+    assert!(error.contains("activation of an energy: found relu"), "{error}");
+    // the state of another network
+    let small = Training::new(&header(Kind::Ann, &[(4, Tanh)], &all), &all, &[], SHORT).unwrap();
+    let other = header(Kind::Ann, &[(5, Tanh)], &all);
+    let error = Training::resume(&other, &all, &[], SHORT, small.state().clone()).err().unwrap().to_string();
+    assert!(error.contains("found 58; allowed: 71"), "{error}");
+    for (settings, part) in [
+        (Settings { epochs: 0, ..SHORT }, "epochs: found 0"),
+        (Settings { batch: 0, ..SHORT }, "batch: found 0"),
+        (Settings { learning_rate: f64::NAN, ..SHORT }, "learning rate: found NaN"),
+        (Settings { learning_rate: -1.0, ..SHORT }, "learning rate: found -1"),
+        (Settings { patience: Some(0), ..SHORT }, "patience: found 0"),
+    ] {
+        let error = settings.check().unwrap_err().to_string();
+        assert!(error.contains(part), "{error}");
+    }
+}
+
+#[test]
+fn schedules() {
+    let cosine = Settings { epochs: 11, learning_rate: 0.1, schedule: Schedule::Cosine, ..SHORT };
+    assert!((cosine.rate(0) - 0.1).abs() < 1e-15 && (cosine.rate(10) - 0.001).abs() < 1e-15);
+    assert!((cosine.rate(5) - 0.0505).abs() < 1e-15);
+    // beyond the end, and of a single epoch
+    assert!((cosine.rate(20) - 0.001).abs() < 1e-15);
+    assert!((Settings { epochs: 1, ..cosine }.rate(0) - 0.1).abs() < 1e-15);
+    assert_eq!(SHORT.rate(2), 1e-3);
+}
