@@ -17,7 +17,9 @@ use crate::validate::outcome::Outcome;
 enum Source {
     /// Rows of target/bench/NAME.json: what distinguishes those of errors and those of times, the rest being a point.
     Bench { name: &'static str, error: &'static str, time: &'static str },
-    /// Curves of a case's report, first column seconds, last column errors.
+    /// A table among a case's results: a method a row, its name in the first column; these columns, the times multiplied.
+    Table { case: &'static str, file: &'static str, error: usize, time: usize, scale: f64 },
+    /// Curves of a case's report: columns `seconds` and, last, errors.
     Case { case: &'static str, curves: &'static str },
 }
 
@@ -130,13 +132,34 @@ const SUBJECTS: &[Subject] = &[
         note: "The same with 50 s a step.",
     },
     Subject {
-        title: "Surrogate models",
-        source: Source::Bench { name: "mdsurrogate-eval", error: "error", time: "time" },
+        title: "Surrogate models: training",
+        source: Source::Table {
+            case: "ch3/train-default",
+            file: "error_against_time.csv",
+            error: 1,
+            time: 2,
+            scale: 1.0,
+        },
         split: "\n",
         default: "energy",
-        axes: ["µs per stress", "error on held-out runs, %"],
-        command: "cargo xtask bench mdsurrogate -- eval",
-        note: "",
+        axes: ["s of training", "error (3.12) on test runs, MPa²"],
+        command: "cargo xtask validate --case cases/ch3/train-default",
+        note: "Laws learnt from the shipped molecular dynamics, split by path.",
+    },
+    Subject {
+        title: "Surrogate models: inference",
+        source: Source::Table {
+            case: "ch3/train-default",
+            file: "error_against_time.csv",
+            error: 1,
+            time: 3,
+            scale: 1e6,
+        },
+        split: "\n",
+        default: "energy",
+        axes: ["µs per stress", "error (3.12) on test runs, MPa²"],
+        command: "cargo xtask validate --case cases/ch3/train-default",
+        note: "The same laws, one stress at a time.",
     },
 ];
 
@@ -205,6 +228,12 @@ impl Subject {
                 let text = fs::read_to_string(bench.join(format!("{name}.json"))).unwrap_or_default();
                 let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
                 pairs(&rows, error, time)
+            }
+            Source::Table { case, file, error, time, scale } => {
+                let outcome = outcomes.iter().find(|outcome| outcome.case == case);
+                let path = outcome.map(|outcome| outcome.output.join(file));
+                let text = path.and_then(|path| fs::read_to_string(path).ok()).unwrap_or_default();
+                of_table(&text, error, time, scale)
             }
             Source::Case { case, curves } => outcomes
                 .iter()
@@ -295,13 +324,24 @@ fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
     points.into_iter().map(|(_, name, time, error)| (name, time, error)).collect()
 }
 
+/// Rows `NAME,…` with numbers in two columns.
+fn of_table(text: &str, error: usize, time: usize, scale: f64) -> Vec<(String, f64, f64)> {
+    let point = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let number = |k: usize| cells.get(k)?.trim().parse::<f64>().ok();
+        Some((cells[0].to_owned(), scale * number(time)?, number(error)?))
+    };
+    text.lines().skip(1).filter_map(point).collect()
+}
+
 /// Every point of every curve whose name begins so.
 fn of_curves(outcome: &Outcome, prefix: &str) -> Vec<(String, f64, f64)> {
     let values = outcome.report.iter().flat_map(|report| &report.values);
     let mut points = Vec::new();
     for (name, value) in values {
         let (Some(name), Value::Curve { columns }) = (name.strip_prefix(prefix), value) else { continue };
-        let (Some(time), Some(error)) = (columns.first(), columns.last()) else { continue };
+        let seconds = columns.iter().find(|column| column.name == "seconds");
+        let (Some(time), Some(error)) = (seconds, columns.last()) else { continue };
         let name = name.replace('[', " [");
         points.extend(time.data.iter().zip(&error.data).map(|(t, e)| (name.clone(), *t, *e)));
     }
@@ -343,6 +383,16 @@ mod tests {
         // sizes that count repetitions differ
         let rows = [row("exact: error", 200, 1e-16), row("exact: time", 7, 4.0)];
         assert_eq!(pairs(&rows, "error", "time"), [("exact".to_owned(), 4.0, 1e-16)]);
+    }
+
+    #[test]
+    fn rows_of_a_table() {
+        let text = "law,error,training [s],one stress [s]\nenergy,2.5,30,1e-6\nANN-4,3,nothing,2e-6\n";
+        assert_eq!(
+            of_table(text, 1, 3, 1e6),
+            [("energy".to_owned(), 1.0, 2.5), ("ANN-4".to_owned(), 2.0, 3.0)]
+        );
+        assert_eq!(of_table(text, 1, 2, 1.0), [("energy".to_owned(), 30.0, 2.5)]);
     }
 
     #[test]
