@@ -200,6 +200,28 @@ fn links_lead_to_files() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
+/// What mdBook would leave out: pages that SUMMARY.md does not name.
+#[test]
+fn every_page_is_in_the_summary() {
+    let guide = workspace().join("docs/guide/src");
+    let summary = fs::read_to_string(guide.join("SUMMARY.md")).unwrap();
+    let named: Vec<PathBuf> = summary
+        .split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split(')').next())
+        .map(|target| guide.join(target))
+        .collect();
+    for page in &named {
+        let text = fs::read_to_string(page).unwrap_or_else(|error| panic!("{}: {error}", page.display()));
+        assert!(text.starts_with("# "), "{}: a page begins with its heading", page.display());
+    }
+    let pages =
+        documents().into_iter().filter(|page| page.starts_with(&guide) && !page.ends_with("SUMMARY.md"));
+    let missing: Vec<PathBuf> = pages.filter(|page| !named.contains(page)).collect();
+    assert!(missing.is_empty(), "not in SUMMARY.md: {missing:?}");
+    assert!(named.len() > 20, "{}", named.len());
+}
+
 #[test]
 fn shell_lines_are_cut_into_words() {
     let words = |line: &str| parts(line).iter().map(|part| part.join("|")).collect::<Vec<_>>();

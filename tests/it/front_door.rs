@@ -201,6 +201,8 @@ fn attack_files(kind: &str, files: &[PathBuf], name: &str, open: impl Fn(&Path) 
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     attack(kind, files, name, |bytes| {
+        // a file that is overwritten would be flushed to the disk every time
+        let _ = fs::remove_file(&path);
         fs::write(&path, bytes).unwrap();
         open(&path)
     });

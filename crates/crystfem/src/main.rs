@@ -17,7 +17,14 @@ mod bench;
 #[command(
     version,
     about,
-    after_help = "Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted."
+    after_help = "Examples:
+  crystfem check cases/ch4/printed-bar/case.toml    what it builds and leaves out
+  crystfem run cases/ch4/printed-bar/case.toml      print the bar, draw, judge; results in out/printed-bar
+  crystfem run cases/ch4/cooling-rates/case.toml    the material alone
+  crystfem resume out/printed-bar                   go on after an interruption
+  crystfem schema > crystfem.schema.json            for editors
+
+Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted."
 )]
 struct Cli {
     #[command(subcommand)]

@@ -21,7 +21,13 @@ mod scene_command;
 #[command(
     version,
     about,
-    after_help = "Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted."
+    after_help = "Examples:
+  mdsurrogate check cases/ch3/train-default/case.toml   the scene and its data
+  mdsurrogate run cases/ch3/train-default/case.toml     train, judge, draw; results in out/train-default
+  mdsurrogate resume out/train-default                  go on after an interruption
+  mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      what a table holds
+
+Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted."
 )]
 struct Cli {
     #[command(subcommand)]

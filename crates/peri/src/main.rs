@@ -17,7 +17,14 @@ mod exact_command;
 #[command(
     version,
     about,
-    after_help = "Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted."
+    after_help = "Examples:
+  peri check cases/ch2/dent/case.toml               what it builds and leaves out
+  peri run cases/ch2/dent/case.toml --quick         solve, draw, judge; results in out/dent
+  peri resume out/dent                              go on after an interruption
+  peri exact law --law chain --links 720 --dissociation 1200
+  peri schema > peri.schema.json                    for editors
+
+Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted."
 )]
 struct Cli {
     #[command(subcommand)]

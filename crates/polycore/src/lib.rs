@@ -1,5 +1,22 @@
 //! Shared ground of the polymer-mechanics toolkit: tensors, Langevin statistics, hyperelastic laws,
 //! units, scenes, reports and output.
+//!
+//! ```
+//! use polycore::hyperelastic::{EightChain, homogeneous::uniaxial};
+//! use polycore::langevin::inverse;
+//! use polycore::units::Stress;
+//!
+//! // the eight-chain law fitted to Treloar's rubber, which at this stretch took 1.56 MPa
+//! let modulus: Stress = "0.273 MPa".parse()?;
+//! let law = EightChain::new(modulus.si(), 25.46)?;
+//! let nominal = uniaxial(&law, 4.852)?;
+//! assert!((nominal / 1e6 - 1.5617).abs() < 0.2, "{nominal} Pa");
+//!
+//! // the inverse Langevin function is exact: 𝓛(𝓛⁻¹(x)) = x
+//! let beta = inverse(0.9);
+//! assert!((1.0 / beta.tanh() - 1.0 / beta - 0.9).abs() < 1e-15);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod checkpoint;
 #[cfg(feature = "command")]
