@@ -9,6 +9,9 @@ mod probe;
 mod rows;
 mod section;
 mod suite;
+mod sweep;
+
+pub use sweep::{SweepOptions, Vary, sweep};
 
 use crate::error::Error;
 use crate::scene::{self, FitScene, Kind, PartScene, PointScene};

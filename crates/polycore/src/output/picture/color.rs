@@ -10,6 +10,8 @@ pub enum ColorMap {
     /// Dark blue to yellow, perceptually uniform, legible in grey and to the colour-blind.
     #[default]
     Viridis,
+    /// Black over red to light yellow, perceptually uniform: temperatures.
+    Inferno,
     /// Blue over white to red, for signed numbers; symmetric about zero unless a range is set.
     Diverging,
 }
@@ -20,6 +22,7 @@ pub(super) const MISSING: [u8; 3] = [190, 190, 190];
 type Table = [[u8; 3]; 256];
 
 static VIRIDIS: LazyLock<Table> = LazyLock::new(|| table(&Kuva::Viridis, false));
+static INFERNO: LazyLock<Table> = LazyLock::new(|| table(&Kuva::Inferno, false));
 // the scheme runs from red to blue; hot is positive
 static DIVERGING: LazyLock<Table> = LazyLock::new(|| table(&Kuva::RedBlue, true));
 
@@ -31,6 +34,7 @@ impl ColorMap {
         }
         let table = match self {
             Self::Viridis => &*VIRIDIS,
+            Self::Inferno => &*INFERNO,
             Self::Diverging => &*DIVERGING,
         };
         table[(share.clamp(0.0, 1.0) * 255.0).round() as usize]
