@@ -14,7 +14,7 @@ use crate::output::atomic_write;
 const TITLE: u32 = 22;
 const TICK: u32 = 18;
 const MARGIN: usize = 18;
-const GAP: usize = 34;
+const GAP: usize = 64;
 const BAR: usize = 16;
 const TICK_LENGTH: isize = 6;
 const LINE: isize = 1;
