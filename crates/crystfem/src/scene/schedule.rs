@@ -83,6 +83,32 @@ impl<D: Dimension> TextOrTable for ScheduleSpec<D> {
     }
 }
 
+impl<D: Dimension> schemars::JsonSchema for ScheduleSpec<D> {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        format!("{}_over_time", Quantity::<D>::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let constant = generator.subschema_for::<Quantity<D>>();
+        let time = generator.subschema_for::<Time>();
+        schemars::json_schema!({
+            "description": "a constant, or values over time: linear between the times, constant outside of them",
+            "anyOf": [constant, {
+                "type": "object",
+                "properties": {
+                    "time": { "type": "array", "items": time, "description": "Increasing times." },
+                    "value": { "type": "array", "items": constant, "description": "A value for each." },
+                    "file": {
+                        "type": "string",
+                        "description": "Or a CSV file with the columns `time [unit]` and `value [unit]`.",
+                    },
+                },
+                "additionalProperties": false,
+            }],
+        })
+    }
+}
+
 impl<'de, D: Dimension> Deserialize<'de> for ScheduleSpec<D> {
     fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
         either::deserialize(deserializer)
