@@ -101,7 +101,7 @@ fn a_printed_bar() {
     assert_eq!(layers[..5], [1.0, 1.0, 2.0, 3.0, 3.0]);
     let temperature = series.data(0, "temperature_degC").unwrap();
     assert!(temperature.iter().any(|t| t.is_nan()) && temperature.iter().all(|t| t.is_nan() || *t >= 99.9));
-    for name in ["probe_middle.csv", "probes_temperature.png", "section_alpha.png"] {
+    for name in ["probe_middle.csv", "probes_temperature.png", "sections.png", "process.png"] {
         assert!(out.join(name).is_file(), "{name}");
     }
 }

@@ -161,7 +161,7 @@ pub enum Condition {
         /// Where.
         surface: Where,
         /// h, W/(m² K).
-        coefficient: f64,
+        coefficient: Schedule,
         /// T_a, K.
         ambient: Schedule,
     },
@@ -188,11 +188,12 @@ impl Condition {
     }
 
     /// Times where a schedule's slope changes.
-    pub fn breaks(&self) -> &[f64] {
+    pub fn breaks(&self) -> Vec<f64> {
         match self {
-            Self::Temperature { value, .. } => value.breaks(),
-            Self::Flux { inward, .. } => inward.breaks(),
-            Self::Film { ambient, .. } | Self::Radiation { ambient, .. } => ambient.breaks(),
+            Self::Temperature { value, .. } => value.breaks().to_vec(),
+            Self::Flux { inward, .. } => inward.breaks().to_vec(),
+            Self::Film { coefficient, ambient, .. } => [coefficient.breaks(), ambient.breaks()].concat(),
+            Self::Radiation { ambient, .. } => ambient.breaks().to_vec(),
         }
     }
 
@@ -213,8 +214,9 @@ impl Condition {
             },
             Self::Flux { inward, .. } => inward.check("flux"),
             Self::Film { coefficient, ambient, .. } => {
-                if !(*coefficient >= 0.0 && coefficient.is_finite()) {
-                    return wrong("film coefficient", *coefficient, "0 or above, finite");
+                let bad = |h: &&f64| !(**h >= 0.0 && h.is_finite());
+                if let Some(&found) = coefficient.values.iter().find(bad) {
+                    return wrong("film coefficient", found, "0 or above, finite");
                 }
                 not_below_zero("ambient temperature", ambient)
             }
@@ -269,7 +271,7 @@ mod tests {
         let surface = || Where::Outer { except: Vec::new() };
         let film = |coefficient, ambient| Condition::Film {
             surface: surface(),
-            coefficient,
+            coefficient: Schedule::constant(coefficient),
             ambient: Schedule::constant(ambient),
         };
         assert!(film(0.0, 0.0).check().is_ok());

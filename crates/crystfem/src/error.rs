@@ -69,6 +69,9 @@ pub enum Error {
     /// The run was asked to stop; its checkpoint is written.
     #[error("interrupted; resume with `crystfem resume {}`", .0.display())]
     Interrupted(PathBuf),
+    /// A sweep was asked to stop; what its runs have done is kept.
+    #[error("interrupted; the same command goes on with what is in {}", .0.display())]
+    SweepInterrupted(PathBuf),
     /// One of several studies failed.
     #[error("study {name}: {error}")]
     Study {
@@ -87,7 +90,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Mesh(_) | Self::Parameter { .. } | Self::File { .. } | Self::Data { .. } => 2,
-            Self::Interrupted(_) => 130,
+            Self::Interrupted(_) | Self::SweepInterrupted(_) => 130,
             Self::NotFinite { .. } | Self::NotConverged { .. } => 1,
             Self::Study { error, .. } => error.exit_code(),
             Self::Shared(error) => error.exit_code(),

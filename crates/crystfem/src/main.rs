@@ -1,7 +1,7 @@
 //! The `crystfem` command line.
 
 use clap::{CommandFactory, Parser, Subcommand};
-use crystfem::run::{Failure, Options, Progress};
+use crystfem::run::{Failure, Options, Progress, SweepOptions, Vary};
 use crystfem::scene::Kind;
 use polycore::command::{Progress as Bar, Threads, default_output, exit, interrupted, seconds};
 use polycore::scene::Source;
@@ -57,6 +57,20 @@ enum Command {
     Point(Scene),
     /// Run a scene of fits: constants of the kinetics from measurements, with confidence intervals.
     Fit(Scene),
+    /// Run a part for every combination of values of some keys, in parallel; finished runs are kept.
+    Sweep {
+        /// The scene (TOML), without studies.
+        scene: PathBuf,
+        /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid.
+        #[arg(long, value_name = "KEY=VALUE,…", required = true)]
+        vary: Vec<Vary>,
+        /// Directory for results; default: out/NAME-sweep.
+        #[arg(long, short)]
+        output: Option<PathBuf>,
+        /// Seconds between checkpoints of each run.
+        #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = seconds)]
+        checkpoint_every: f64,
+    },
     /// Go on with an interrupted or killed run of a part.
     Resume {
         /// The run's output directory.
@@ -91,6 +105,14 @@ fn main() -> ExitCode {
         Command::Run(scene) => run(&scene, None),
         Command::Point(scene) => run(&scene, Some(Kind::Point)),
         Command::Fit(scene) => run(&scene, Some(Kind::Fit)),
+        Command::Sweep { scene, vary, output, checkpoint_every } => {
+            let output = output.unwrap_or_else(|| {
+                let mut name = default_output(&scene).into_os_string();
+                name.push("-sweep");
+                name.into()
+            });
+            sweep(&scene, &vary, &output, checkpoint_every)
+        }
         Command::Resume { output, checkpoint_every } => resume(&output, checkpoint_every),
         Command::Check { scene } => check(&scene),
         Command::Bench(bench) => bench.print(),
@@ -116,6 +138,29 @@ fn run(scene: &Scene, kind: Option<Kind>) -> Result<bool, Failure> {
     }
     let output = scene.output.clone().unwrap_or_else(|| default_output(&scene.scene));
     solve(&source, &output, scene.quick, scene.checkpoint_every, false)
+}
+
+fn sweep(scene: &Path, vary: &[Vary], output: &Path, every: f64) -> Result<bool, Failure> {
+    let source = Source::read(scene)?;
+    let mut bar = Bar::start();
+    let mut progress = |done: usize, all: usize, last: &str| {
+        bar.show(done as f64 / all as f64, || format!("{done} of {all} runs are done, last {last}"));
+    };
+    let mut options = SweepOptions {
+        output,
+        checkpoint_every: Duration::from_secs_f64(every),
+        interrupted: interrupted(),
+        progress: &mut progress,
+    };
+    let finished = crystfem::run::sweep(&source, vary, &mut options)?;
+    bar.finish();
+    tell(&finished.text, output);
+    Ok(finished.report.passed())
+}
+
+fn tell(text: &str, output: &Path) {
+    // a closed pipe is no reason to fail a run
+    let _ = std::io::stdout().write_all(format!("{text}results in {}\n", output.display()).as_bytes());
 }
 
 fn resume(output: &Path, every: f64) -> Result<bool, Failure> {
@@ -156,9 +201,7 @@ fn solve(source: &Source, output: &Path, quick: bool, every: f64, resume: bool) 
     };
     let finished = crystfem::run::run(source, &mut options)?;
     bar.finish();
-    // a closed pipe is no reason to fail a run
-    let _ = std::io::stdout().write_all(finished.text.as_bytes());
-    println!("results in {}", output.display());
+    tell(&finished.text, output);
     Ok(finished.report.passed())
 }
 

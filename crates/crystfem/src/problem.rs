@@ -71,7 +71,7 @@ impl Problem {
 
     /// Times where something changes its slope or appears, sorted.
     pub(crate) fn breaks(&self) -> Vec<f64> {
-        let mut times: Vec<f64> = self.conditions.iter().flat_map(|c| c.breaks().iter().copied()).collect();
+        let mut times: Vec<f64> = self.conditions.iter().flat_map(Condition::breaks).collect();
         times.extend(self.sources.iter().flat_map(|s| s.power.breaks().iter().copied()));
         times.extend(self.births.iter().map(|birth| birth.time));
         times.sort_unstable_by(f64::total_cmp);

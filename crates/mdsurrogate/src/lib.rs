@@ -33,7 +33,7 @@
 //!
 //! ```
 //! use mdsurrogate::network::Activation::Softplus;
-//! use mdsurrogate::surrogate::{Header, Kind, Surrogate, Symmetry, Workspace};
+//! use mdsurrogate::surrogate::{Answer, Header, Kind, Surrogate, Symmetry, Workspace};
 //!
 //! // an orthotropic energy with random weights, in place of `Surrogate::read("law.safetensors")`
 //! let header = Header::new(Kind::energy(Symmetry::Orthotropic), &[(32, Softplus), (32, Softplus)], 2);
@@ -47,6 +47,11 @@
 //! let tangent = answer.tangent.unwrap();
 //! assert!((tangent - tangent.transpose()).norm() < 1e-14 * tangent.norm());
 //! assert!(answer.flags.unseen[3]);
+//!
+//! // many points at once: the same bits, at about half the cost
+//! let points = vec![[1.1, 1.0, 1.0, 0.0, 0.0, 0.0].into(); 100];
+//! let mut answers = vec![Answer::default(); 100];
+//! law.stresses(&points, &mut memory, &mut answers)?;
 //! # Ok::<(), mdsurrogate::Error>(())
 //! ```
 

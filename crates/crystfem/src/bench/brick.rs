@@ -97,7 +97,7 @@ fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
     let ambient = || Schedule::constant(COLD);
     let conditions = vec![
         Condition::Temperature { nodes: mesh.node_sets["bottom"].clone(), value: Field::constant(COLD) },
-        Condition::Film { surface: surface(), coefficient: 15.0, ambient: ambient() },
+        Condition::Film { surface: surface(), coefficient: Schedule::constant(15.0), ambient: ambient() },
         Condition::Radiation { surface: surface(), emissivity: 0.9, ambient: ambient() },
     ];
     let capacity = if options.lumped { Capacity::Lumped } else { Capacity::Consistent };

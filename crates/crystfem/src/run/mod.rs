@@ -2,6 +2,7 @@
 
 pub mod checkpoint;
 mod draw;
+mod film;
 mod fit;
 mod part;
 mod point;
@@ -9,6 +10,9 @@ mod probe;
 mod rows;
 mod section;
 mod suite;
+mod sweep;
+
+pub use sweep::{SweepOptions, Vary, sweep};
 
 use crate::error::Error;
 use crate::scene::{self, FitScene, Kind, PartScene, PointScene};

@@ -2,23 +2,20 @@
 
 use super::checkpoint::{self, Header};
 use super::probe::{self, Probe};
-use super::section::Section;
-use super::{Failure, Finished, Options, Progress, point::CELSIUS};
+use super::{Failure, Finished, Options, Progress, film, point::CELSIUS};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
 use crate::scene::{PartScene, Task};
 use crate::simulation::{Simulation, State};
-use polycore::output::picture::{FieldMap, Panel};
-use polycore::output::vtkhdf::{self, Cells, Data, MeshSeries};
+use polycore::output::vtkhdf::{Cells, Data, MeshSeries};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::time::Instant;
 
 /// Name of the temperature among the fields.
-const TEMPERATURE: &str = "temperature_degC";
+pub const TEMPERATURE: &str = "temperature_degC";
 /// Fields written unless the scene says how often.
 const FRAMES: f64 = 50.0;
 
@@ -68,7 +65,7 @@ pub fn one(
     if scene.output.pictures {
         phases.start("draw");
         probe::draw(&run.probes, &run.names, scene, options.output)?;
-        run.draw(&run.stages(&simulation, path.as_deref())?, options.output)?;
+        film::draw(scene, &task, &simulation, path.as_deref(), options.output)?;
     }
     phases.stop();
     let expect = if study.is_none() { &scene.expect[..] } else { &[] };
@@ -131,14 +128,6 @@ struct Run<'a> {
     names: Vec<&'static str>,
     /// Frames of the fields that are written.
     frames: usize,
-}
-
-/// A section at a time.
-struct Stage {
-    title: String,
-    section: Section,
-    /// °C, then the fields.
-    values: Vec<Vec<f64>>,
 }
 
 impl Run<'_> {
@@ -217,44 +206,6 @@ impl Run<'_> {
         Ok(series.step(simulation.time(), &arrays, &[("exists", 1, &exists)])?)
     }
 
-    /// Stages for pictures: out of the fields, or where there are none only the end.
-    fn stages(&self, simulation: &Simulation, path: Option<&Path>) -> Result<Vec<Stage>, Error> {
-        let Some(path) = path else {
-            let temperature = shifted(&simulation.temperatures(f64::NAN));
-            let fields = self.names.iter().map(|name| simulation.field(name)).collect();
-            let born = |element: u32| simulation.is_born(element);
-            return Ok(vec![self.stage(simulation.time(), &born, temperature, fields)]);
-        };
-        let series = vtkhdf::read(path)?;
-        let last = series.len() - 1;
-        let wanted = self.scene.output.stages.min(last);
-        let mut stages = Vec::new();
-        for frame in (1..=wanted).map(|stage| stage * last / wanted) {
-            let exists = series.cell_data(frame, "exists")?;
-            let born = |element: u32| exists.get(element as usize) == Some(&1.0);
-            let temperature = series.data(frame, TEMPERATURE)?;
-            let fields = self.names.iter().map(|name| series.data(frame, name));
-            let fields = fields.collect::<Result<Vec<_>, _>>()?;
-            stages.push(self.stage(series.times()[frame], &born, temperature, fields));
-        }
-        Ok(stages)
-    }
-
-    fn stage(
-        &self,
-        time: f64,
-        born: &dyn Fn(u32) -> bool,
-        temperature: Vec<f64>,
-        fields: Vec<Vec<f64>>,
-    ) -> Stage {
-        let mesh = &self.task.problem.mesh;
-        let born: Vec<u32> = self.task.printed.iter().copied().filter(|&element| born(element)).collect();
-        let section = Section::through_the_middle(mesh, &born);
-        let all = std::iter::once(temperature).chain(fields);
-        let values = all.map(|field| section.values(mesh, &field)).collect();
-        Stage { title: format!("{time:.4} s"), section, values }
-    }
-
     /// The scalars of the end.
     fn record(&self, simulation: &Simulation, report: &mut Report) {
         let state = simulation.state();
@@ -295,31 +246,9 @@ impl Run<'_> {
             .work("material_responses", work.responses)
             .work("builds", work.builds);
     }
-
-    fn draw(&self, stages: &[Stage], output: &Path) -> Result<(), Error> {
-        let labels = std::iter::once("T [°C]").chain(self.names.iter().copied());
-        for (index, label) in labels.enumerate() {
-            let all = stages.iter().flat_map(|stage| stage.values[index].iter().copied());
-            let (low, high) = all
-                .filter(|x| x.is_finite())
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-            if low > high {
-                continue;
-            }
-            let mut map = FieldMap::new().lengths("mm", 1e-3).columns(1).size(700).axes(["x", "z"]);
-            for stage in stages.iter().filter(|stage| !stage.section.places.is_empty()) {
-                let (places, values) = (&stage.section.places, &stage.values[index]);
-                let panel = Panel::new(&stage.title, label, places, values, stage.section.spacing);
-                map = map.panel(if high > low { panel.range(low, high) } else { panel });
-            }
-            let name = if index == 0 { "temperature" } else { self.names[index - 1] };
-            map.write(output.join(format!("section_{name}.png")))?;
-        }
-        Ok(())
-    }
 }
 
-fn shifted(kelvin: &[f64]) -> Vec<f64> {
+pub fn shifted(kelvin: &[f64]) -> Vec<f64> {
     kelvin.iter().map(|t| t - CELSIUS).collect()
 }
 

@@ -7,6 +7,7 @@ mod mesh;
 mod part;
 mod point;
 mod problem;
+mod schedule;
 mod study;
 
 pub use fit::{DataSpec, FitLaw, FitScene, FitSpec, Job};
@@ -15,6 +16,7 @@ pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, PointScene, PointSpec};
 pub use problem::Task;
+pub use schedule::{ScheduleSpec, TimesSpec};
 pub use study::StudySpec;
 
 use polycore::scene::{SceneError, Source};

@@ -1,14 +1,15 @@
 //! The scene of a body in time: mesh, materials, layers, what acts on it.
 
-use super::{MaterialSpec, MeshSpec, Program, StudySpec, check_name};
+use super::{MaterialSpec, MeshSpec, Program, ScheduleSpec, StudySpec, check_name};
 use crate::problem::Capacity;
 use crate::simulation::LinearSolver;
 use crate::time::Scheme;
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
-use polycore::units::{
-    HeatFlux, HeatTransfer, Length, PowerDensity, Temperature, TemperatureDifference, Time,
+use polycore::units::dimension::{
+    HeatFluxDimension, HeatTransferDimension, PowerDensityDimension, TemperatureDimension,
 };
+use polycore::units::{Length, Temperature, TemperatureDifference, Time};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -69,8 +70,8 @@ pub struct RegionSpec {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PrintSpec {
-    /// Temperature of what is laid down.
-    pub temperature: Temperature,
+    /// Temperature of what is laid down, at the time it is.
+    pub temperature: ScheduleSpec<TemperatureDimension>,
     /// Element sets `PREFIX1`, `PREFIX2`, …; default `layer-`.
     pub layers: Option<String>,
     /// Or an element set cut into layers of `layer_height`, or printed along a `path`.
@@ -102,15 +103,15 @@ pub struct BoundarySpec {
     #[serde(default)]
     pub except: Vec<String>,
     /// Prescribed temperature.
-    pub temperature: Option<Temperature>,
+    pub temperature: Option<ScheduleSpec<TemperatureDimension>>,
     /// Heat flux into the body.
-    pub flux: Option<HeatFlux>,
+    pub flux: Option<ScheduleSpec<HeatFluxDimension>>,
     /// Film coefficient h.
-    pub film: Option<HeatTransfer>,
+    pub film: Option<ScheduleSpec<HeatTransferDimension>>,
     /// Emissivity ε.
     pub emissivity: Option<f64>,
     /// Temperature of the surroundings, for film and radiation.
-    pub ambient: Option<Temperature>,
+    pub ambient: Option<ScheduleSpec<TemperatureDimension>>,
 }
 
 /// Heat released in elements.
@@ -120,7 +121,7 @@ pub struct SourceSpec {
     /// An element set of the mesh; default: all.
     pub elements: Option<String>,
     /// Heat per volume.
-    pub power: PowerDensity,
+    pub power: ScheduleSpec<PowerDensityDimension>,
 }
 
 /// Times and steps: of one length, or adaptive.

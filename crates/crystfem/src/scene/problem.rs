@@ -51,7 +51,8 @@ impl PartScene {
         for (index, spec) in self.source.iter().enumerate() {
             let elements =
                 elements(source, &mesh, &format!("source[{index}].elements"), spec.elements.as_deref())?;
-            heats.push(Heat { elements, power: Field::constant(spec.power.si()) });
+            let power = Field::Uniform(spec.power.build(source, &format!("source[{index}].power"))?);
+            heats.push(Heat { elements, power });
         }
         let mut births = Vec::new();
         let mut layers = Vec::new();
@@ -124,7 +125,7 @@ impl PartScene {
             } else {
                 Where::Faces(faces(&format!("{key}.surface"), &spec.surface)?)
             };
-            for condition in spec.conditions(mesh, place) {
+            for condition in spec.conditions(source, &key, mesh, place)? {
                 condition.check().map_err(|error| located(source, &key, &error))?;
                 conditions.push(condition);
             }
@@ -152,27 +153,40 @@ impl PartScene {
 }
 
 impl BoundarySpec {
-    fn conditions(&self, mesh: &Mesh, place: Where) -> Vec<Condition> {
+    fn conditions(
+        &self,
+        source: &Source,
+        key: &str,
+        mesh: &Mesh,
+        place: Where,
+    ) -> Result<Vec<Condition>, SceneError> {
+        let of = |name: &str| format!("{key}.{name}");
         let mut conditions = Vec::new();
-        if let Some(temperature) = self.temperature {
+        if let Some(temperature) = &self.temperature {
             let nodes = match &place {
                 Where::Faces(faces) => mesh.nodes_of(faces),
                 Where::Outer { .. } => Vec::new(),
             };
-            conditions.push(Condition::Temperature { nodes, value: Field::constant(temperature.si()) });
+            let value = Field::Uniform(temperature.build(source, &of("temperature"))?);
+            conditions.push(Condition::Temperature { nodes, value });
         }
-        if let Some(flux) = self.flux {
-            conditions.push(Condition::Flux { surface: place.clone(), inward: Field::constant(flux.si()) });
+        if let Some(flux) = &self.flux {
+            let inward = Field::Uniform(flux.build(source, &of("flux"))?);
+            conditions.push(Condition::Flux { surface: place.clone(), inward });
         }
-        let ambient = Schedule::constant(self.ambient.map_or(0.0, |ambient| ambient.si()));
-        if let Some(film) = self.film {
-            let (surface, coefficient, ambient) = (place.clone(), film.si(), ambient.clone());
+        let ambient = match &self.ambient {
+            Some(ambient) => ambient.build(source, &of("ambient"))?,
+            None => Schedule::constant(0.0),
+        };
+        if let Some(film) = &self.film {
+            let coefficient = film.build(source, &of("film"))?;
+            let (surface, ambient) = (place.clone(), ambient.clone());
             conditions.push(Condition::Film { surface, coefficient, ambient });
         }
         if let Some(emissivity) = self.emissivity {
             conditions.push(Condition::Radiation { surface: place, emissivity, ambient });
         }
-        conditions
+        Ok(conditions)
     }
 }
 
@@ -187,7 +201,8 @@ struct Laid {
 impl PrintSpec {
     fn laid(&self, source: &Source, mesh: &Mesh, notes: &mut Vec<String>) -> Result<Laid, SceneError> {
         let start = self.start.map_or(0.0, |start| start.si());
-        let temperature = self.temperature.si();
+        let schedule = self.temperature.build(source, "print.temperature")?;
+        let temperature = |time: f64| schedule.at(time);
         let at = |key: &str, error: Error| located(source, key, &error);
         if let Some(file) = &self.path {
             let path = source.path.parent().map_or_else(|| file.clone(), |folder| folder.join(file));
@@ -209,7 +224,8 @@ impl PrintSpec {
             let groups = groups(&activation.times, window).map_err(|error| at("print.window", error))?;
             let births = groups
                 .into_iter()
-                .map(|(time, elements)| Birth { time: start + time, elements, temperature })
+                .map(|(time, elements)| (start + time, elements))
+                .map(|(time, elements)| Birth { time, elements, temperature: temperature(time) })
                 .collect();
             return Ok(Laid { births, layers: Vec::new(), end: start + tool.duration() });
         }
@@ -224,10 +240,9 @@ impl PrintSpec {
         };
         notes.extend(layers.notes);
         let interval = self.layer_time.map_or(0.0, |time| time.si());
-        let births = layers.elements.iter().enumerate().map(|(layer, elements)| Birth {
-            time: start + layer as f64 * interval,
-            elements: elements.clone(),
-            temperature,
+        let births = layers.elements.iter().enumerate().map(|(layer, elements)| {
+            let time = start + layer as f64 * interval;
+            Birth { time, elements: elements.clone(), temperature: temperature(time) }
         });
         let births: Vec<Birth> = births.collect();
         let end = start + births.len() as f64 * interval;

@@ -166,6 +166,7 @@ impl System {
             base: None,
             build,
             generation: build << 32,
+            evaluated_at: f64::NEG_INFINITY,
         };
         system.collect_points(problem, behaviours, born, &kinds, &around);
         let volumes = system.add_elements(problem, behaviours, born, &kinds, &classes)?;

@@ -176,6 +176,8 @@ pub struct System {
     pub build: u64,
     /// Counts rebuilt tangents: a matrix is unchanged while this is.
     pub generation: u64,
+    /// Time of the last evaluation, s.
+    evaluated_at: f64,
 }
 
 impl System {
@@ -237,6 +239,8 @@ impl System {
             self.general.evaluate(problem, self.consistent, at, &old.general, &mut self.rows, out)?;
             self.generation += u64::from(at.tangent);
         }
+        self.generation += u64::from(self.surfaces.varies(problem, [self.evaluated_at, at.time]));
+        self.evaluated_at = at.time;
         self.surfaces.evaluate(problem, &self.nodes, at, out);
         Ok(())
     }

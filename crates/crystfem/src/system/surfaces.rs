@@ -145,6 +145,14 @@ impl Surfaces {
         self.radiates
     }
 
+    /// Whether a film has another coefficient at one time than at another: the matrix is another too.
+    pub fn varies(&self, problem: &Problem, between: [f64; 2]) -> bool {
+        self.parts.iter().any(|part| match &problem.conditions[part.condition] {
+            Condition::Film { coefficient, .. } => coefficient.at(between[0]) != coefficient.at(between[1]),
+            _ => false,
+        })
+    }
+
     /// Adds to `rate`, `conductance`, `faces`; sets `exchange`.
     pub fn evaluate(&self, problem: &Problem, nodes: &[u32], at: &At, out: &mut Evaluation) {
         let mut exchange = Exchange::default();
@@ -161,8 +169,8 @@ impl Surfaces {
                     }
                 }
                 Condition::Film { coefficient, ambient, .. } => {
-                    let ambient = ambient.at(at.time);
-                    exchange.film -= part.lose(at, out, |t| (coefficient * (t - ambient), *coefficient));
+                    let (film, ambient) = (coefficient.at(at.time), ambient.at(at.time));
+                    exchange.film -= part.lose(at, out, |t| (film * (t - ambient), film));
                 }
                 Condition::Radiation { emissivity, ambient, .. } => {
                     let ambient = ambient.at(at.time);

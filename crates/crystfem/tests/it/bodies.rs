@@ -42,7 +42,11 @@ pub fn held(mesh: &Mesh, side: &str, value: Field) -> Condition {
 }
 
 pub fn film(surface: Where, coefficient: f64, ambient: f64) -> Condition {
-    Condition::Film { surface, coefficient, ambient: Schedule::constant(ambient) }
+    Condition::Film {
+        surface,
+        coefficient: Schedule::constant(coefficient),
+        ambient: Schedule::constant(ambient),
+    }
 }
 
 pub fn radiation(surface: Where, emissivity: f64, ambient: f64) -> Condition {

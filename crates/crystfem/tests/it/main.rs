@@ -11,5 +11,6 @@ mod patch;
 mod point;
 mod readers;
 mod same_bits;
+mod schedules;
 mod solvers;
 mod verification;

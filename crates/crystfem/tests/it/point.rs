@@ -15,7 +15,7 @@ fn run_quietly(source: &Source, output: &Path, quick: bool) -> Result<Report, Fa
         interrupted: &|| false,
         progress: &mut |_| {},
     };
-    run(source, &mut options)
+    run(source, &mut options).map(|finished| finished.report)
 }
 
 const SCENE: &str = r#"

@@ -121,3 +121,76 @@ fn numbers(tensors: &SafeTensors, name: &str, shape: &[usize]) -> Result<Vec<f64
         other => Err((format!("`{name}` of type {other:?}"), allowed())),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::Activation::Softplus;
+    use crate::surrogate::{Kind, Support, Symmetry, Workspace};
+    use polycore::tensor::Voigt;
+    use proptest::prelude::*;
+
+    fn law() -> Vec<u8> {
+        let kind = Kind::polyconvex_energy(Symmetry::Transverse);
+        let mut header = Header::new(kind, &[(3, Softplus), (2, Softplus)], 2);
+        header.support = Some(Support::of(&[Voigt::repeat(1.0), Voigt::repeat(2.0)], 2).unwrap());
+        header.spread_limit = Some(1e6);
+        Surrogate::random(header, 3).unwrap().to_bytes().unwrap()
+    }
+
+    /// Reads; what can be read can also be used.
+    fn use_it(bytes: &[u8]) {
+        if let Ok(law) = Surrogate::from_bytes(bytes) {
+            let mut memory = Workspace::default();
+            let c = Voigt::new(1.1, 1.0, 0.9, 0.1, 0.0, 0.05);
+            if let Ok(answer) = law.tangent(&c, &mut memory) {
+                assert!(answer.stress.iter().all(|s| s.is_finite()));
+            }
+            assert!(!law.onnx().is_empty());
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+        /// Changed, lost and surplus bytes, most of them in the header: an error or a law, never a panic.
+        #[test]
+        fn damaged_files(
+            changes in prop::collection::vec((0.0..1.0f64, any::<u8>()), 1..6),
+            header in any::<bool>(),
+            cut in prop::option::of(0.0..1.0f64),
+            digits in any::<bool>(),
+        ) {
+            let mut bytes = law();
+            let length = if header { u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize + 8 } else { bytes.len() };
+            for (place, byte) in changes {
+                let at = (place * length as f64) as usize;
+                // digits for digits keep the JSON well formed
+                if digits && bytes[at].is_ascii_digit() {
+                    bytes[at] = b'0' + byte % 10;
+                } else if !digits {
+                    bytes[at] = byte;
+                }
+            }
+            if let Some(part) = cut {
+                bytes.truncate((part * bytes.len() as f64) as usize);
+            }
+            use_it(&bytes);
+        }
+    }
+
+    #[test]
+    fn headers_of_before_and_of_other_kinds() {
+        let bytes = law();
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        assert!(text.contains("polyconvex") && text.contains("support"));
+        // a file without the newer entries is the law it was
+        let old = "{\"kind\":{\"energy\":{\"symmetry\":\"isotropic\",\"axes\":[[1,0,0],[0,1,0],[0,0,1]]}},\
+            \"architecture\":{\"widths\":[3,1],\"activations\":[\"linear\"]},\"members\":1,\"input_mean\":[0,0,0],\
+            \"input_deviation\":[1,1,1],\"output_mean\":[0],\"output_deviation\":[1],\
+            \"training_box\":[[1,1],[1,1],[1,1],[0,0],[0,0],[0,0]],\"spread_limit\":null}";
+        let header: Header = serde_json::from_str(old).unwrap();
+        header.check().unwrap();
+        assert_eq!((header.kind, header.support), (Kind::energy(Symmetry::Isotropic), None));
+    }
+}

@@ -308,3 +308,6 @@ pub(crate) mod tests;
 
 #[cfg(test)]
 mod polyconvex_tests;
+
+#[cfg(test)]
+mod doubt_tests;

@@ -33,7 +33,7 @@ impl Support {
     /// Of the strains of training rows, with up to `most` representatives.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for no rows, rows that are not finite, or `most` outside of 1 to [`MOST`].
+    /// [`Error::Parameter`] for no rows, rows that are not finite, or `most` outside of 1 to 4096.
     pub fn of(rows: &[Voigt], most: usize) -> Result<Self, Error> {
         if !(1..=MOST).contains(&most) {
             return Err(Error::parameter("representatives", most, format!("1 to {MOST}")));

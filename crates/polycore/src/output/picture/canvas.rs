@@ -64,6 +64,11 @@ impl Canvas {
         }
     }
 
+    /// The green of every pixel, row by row: all there is of a grey picture.
+    pub(super) fn greens(&self) -> impl Iterator<Item = u8> {
+        self.pixels.iter().map(|pixel| pixel[1])
+    }
+
     #[cfg(test)]
     pub(super) fn get(&self, x: usize, y: usize) -> Color {
         self.pixels[y * self.width + x]

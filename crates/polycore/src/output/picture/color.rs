@@ -10,6 +10,8 @@ pub enum ColorMap {
     /// Dark blue to yellow, perceptually uniform, legible in grey and to the colour-blind.
     #[default]
     Viridis,
+    /// Dark violet over red to light yellow, perceptually uniform: temperatures.
+    Inferno,
     /// Blue over white to red, for signed numbers; symmetric about zero unless a range is set.
     Diverging,
 }
@@ -19,9 +21,11 @@ pub(super) const MISSING: [u8; 3] = [190, 190, 190];
 
 type Table = [[u8; 3]; 256];
 
-static VIRIDIS: LazyLock<Table> = LazyLock::new(|| table(&Kuva::Viridis, false));
+static VIRIDIS: LazyLock<Table> = LazyLock::new(|| table(&Kuva::Viridis, 0.0, 1.0));
+// without its black, which is no colour of anything
+static INFERNO: LazyLock<Table> = LazyLock::new(|| table(&Kuva::Inferno, 0.15, 1.0));
 // the scheme runs from red to blue; hot is positive
-static DIVERGING: LazyLock<Table> = LazyLock::new(|| table(&Kuva::RedBlue, true));
+static DIVERGING: LazyLock<Table> = LazyLock::new(|| table(&Kuva::RedBlue, 1.0, 0.0));
 
 impl ColorMap {
     /// The colour at `share` between 0 and 1 (clamped); grey for NaN.
@@ -31,16 +35,17 @@ impl ColorMap {
         }
         let table = match self {
             Self::Viridis => &*VIRIDIS,
+            Self::Inferno => &*INFERNO,
             Self::Diverging => &*DIVERGING,
         };
         table[(share.clamp(0.0, 1.0) * 255.0).round() as usize]
     }
 }
 
-fn table(map: &Kuva, reversed: bool) -> Table {
+/// A part of a scheme.
+fn table(map: &Kuva, from: f64, to: f64) -> Table {
     std::array::from_fn(|index| {
-        let index = if reversed { 255 - index } else { index };
         // none only for custom maps
-        map.map_rgb(index as f64 / 255.0).map_or(MISSING, |(r, g, b)| [r, g, b])
+        map.map_rgb(from + (to - from) * index as f64 / 255.0).map_or(MISSING, |(r, g, b)| [r, g, b])
     })
 }

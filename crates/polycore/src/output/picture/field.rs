@@ -101,7 +101,7 @@ impl<'a> Panel<'a> {
         let (low, high) = match self.colors {
             _ if low > high => (0.0, 1.0),
             ColorMap::Diverging => (-low.abs().max(high.abs()), low.abs().max(high.abs())),
-            ColorMap::Viridis => (low, high),
+            ColorMap::Viridis | ColorMap::Inferno => (low, high),
         };
         // a constant field still needs a bar
         let least = 1e-12 * low.abs().max(high.abs());

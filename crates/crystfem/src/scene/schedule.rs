@@ -1,0 +1,116 @@
+//! Values over time: written as a constant, as a table, or as a CSV file.
+
+use super::either::{self, TextOrTable};
+use super::material::located;
+use crate::boundary::Schedule;
+use crate::table::{Column, read};
+use polycore::scene::{SceneError, Source};
+use polycore::units::dimension::TimeDimension;
+use polycore::units::{Dimension, Quantity, Time};
+use serde::{Deserialize, Deserializer};
+use std::path::PathBuf;
+
+/// A constant (`"80 degC"`), a table (`{ time = […], value = […] }`) or a file (`{ file = "chamber.csv" }`): linear
+/// between the given times and constant outside of them.
+#[derive(Clone, Debug)]
+pub enum ScheduleSpec<D> {
+    /// The same always.
+    Constant(Quantity<D>),
+    /// Over time.
+    Over(TimesSpec<D>),
+}
+
+/// Values over time.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, bound = "D: Dimension")]
+pub struct TimesSpec<D> {
+    /// Increasing times.
+    #[serde(default)]
+    pub time: Vec<Time>,
+    /// A value for each.
+    #[serde(default)]
+    pub value: Vec<Quantity<D>>,
+    /// Or a CSV file with the columns `time [unit]` and `value [unit]`.
+    pub file: Option<PathBuf>,
+}
+
+impl<D: Dimension + Copy> ScheduleSpec<D> {
+    /// The schedule, in SI units.
+    ///
+    /// # Errors
+    /// A file beside a table, a table with a gap, times that do not increase, and a file that is no such table.
+    pub fn build(&self, source: &Source, key: &str) -> Result<Schedule, SceneError> {
+        let over = match self {
+            Self::Constant(value) => return Ok(Schedule::constant(value.si())),
+            Self::Over(over) => over,
+        };
+        let (times, values) = match &over.file {
+            Some(_) if !(over.time.is_empty() && over.value.is_empty()) => {
+                return Err(source.error(key, "a file beside a table", "one of them"));
+            }
+            Some(file) => {
+                let path = source.path.parent().map_or_else(|| file.clone(), |folder| folder.join(file));
+                let columns = [Column::of::<TimeDimension>("time"), Column::of::<D>("value")];
+                let [times, values] =
+                    read(&path, columns).map_err(|error| located(source, &format!("{key}.file"), &error))?;
+                (times, values)
+            }
+            None => (over.time.iter().map(|t| t.si()).collect(), over.value.iter().map(|v| v.si()).collect()),
+        };
+        if times.len() != values.len() {
+            let allowed = format!("a value for each of the {} times", times.len());
+            return Err(source.error(&format!("{key}.value"), format!("{} values", values.len()), allowed));
+        }
+        let pairs: Vec<(f64, f64)> = times.into_iter().zip(values).collect();
+        let place = if over.file.is_some() { "file" } else { "time" };
+        Schedule::linear(&pairs).map_err(|error| located(source, &format!("{key}.{place}"), &error))
+    }
+}
+
+impl<D: Dimension> TextOrTable for ScheduleSpec<D> {
+    type Table = TimesSpec<D>;
+
+    fn expected() -> String {
+        format!("{}, e.g. \"{}\", {{ time = […], value = […] }} or {{ file = … }}", D::NAME, D::EXAMPLE)
+    }
+
+    fn from_text<E: serde::de::Error>(text: &str) -> Result<Self, E> {
+        text.parse().map(Self::Constant).map_err(E::custom)
+    }
+
+    fn from_table(table: TimesSpec<D>) -> Self {
+        Self::Over(table)
+    }
+}
+
+impl<D: Dimension> schemars::JsonSchema for ScheduleSpec<D> {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        format!("{}_over_time", Quantity::<D>::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let constant = generator.subschema_for::<Quantity<D>>();
+        let time = generator.subschema_for::<Time>();
+        schemars::json_schema!({
+            "description": "a constant, or values over time: linear between the times, constant outside of them",
+            "anyOf": [constant, {
+                "type": "object",
+                "properties": {
+                    "time": { "type": "array", "items": time, "description": "Increasing times." },
+                    "value": { "type": "array", "items": constant, "description": "A value for each." },
+                    "file": {
+                        "type": "string",
+                        "description": "Or a CSV file with the columns `time [unit]` and `value [unit]`.",
+                    },
+                },
+                "additionalProperties": false,
+            }],
+        })
+    }
+}
+
+impl<'de, D: Dimension> Deserialize<'de> for ScheduleSpec<D> {
+    fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
+        either::deserialize(deserializer)
+    }
+}
