@@ -36,7 +36,9 @@ pub fn sums(outcomes: &[Outcome]) -> String {
     let failed = outcomes.iter().filter(|outcome| !outcome.passed()).count();
     let judged = || outcomes.iter().flat_map(Outcome::expect);
     let missed = judged().filter(|judgement| !judgement.pass).count();
-    format!("{} cases, {failed} failed; {} expectations, {missed} not met", outcomes.len(), judged().count())
+    let plural = if outcomes.len() == 1 { "" } else { "s" };
+    let [cases, expectations] = [outcomes.len(), judged().count()];
+    format!("{cases} case{plural}, {failed} failed; {expectations} expectations, {missed} not met")
 }
 
 #[cfg(test)]
