@@ -12,7 +12,7 @@ use serde::Deserialize;
 /// quantity = "face.temperature"
 /// studies = ["wall-8", "wall-16", "wall-32"]
 /// ```
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConvergenceSpec {
     /// Its name: values are `NAME.limit` and `NAME.order`.
