@@ -9,6 +9,9 @@ const HEATING_PANELS: usize = 4 * PANELS;
 /// A melting below this part of the crystals is none.
 const NOTHING: f64 = -1e-17;
 
+/// Fewer crystals are none: quotients of smaller numbers overflow.
+const FAINT: f64 = 1e-280;
+
 /// Kinetics and melting together: dz/dt = K(T) at every temperature, and on heating α falls in proportion to
 /// 1 − X_m(T).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +78,7 @@ impl Crystallization {
         let remainder = lost + survivors * before.remainder;
         let power = if degree < 0.5 { -(-degree).ln_1p() } else { -remainder.ln() };
         let z_after = kinetics.z_of_power(power);
-        if z_after == 0.0 || degree == 0.0 {
+        if degree < FAINT {
             return Grown { z: 0.0, slope: 0.0 };
         }
         let after = Extent { power, degree, remainder };

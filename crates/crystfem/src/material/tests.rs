@@ -312,3 +312,25 @@ mod printed {
         assert!(alphas.iter().any(|&alpha| alpha > 1.0));
     }
 }
+
+/// Crystals that melt away to nothing on strong heating leave finite tangents, at any step.
+#[test]
+fn tangents_are_finite_on_strong_heating() {
+    let material = pa12(Some(209e3));
+    let faint = (200..640).map(|k| 10_f64.powf(-0.5 * f64::from(k)));
+    for z in faint.chain([0.0, 1e-320, 1e-30, 1e-8, 0.1, 1.0, 3.0]) {
+        for start in
+            [73.15, 290.0, 294.0, 294.2, 320.0, 400.0, 440.0, 455.0, 466.0, 466.4, 470.0, 600.0, 1175.7]
+        {
+            for increment in [-100.0, -1e-3, 0.0, 1e-9, 1e-3, 0.5, 10.0, 100.0, 900.0] {
+                for dt in [0.0, 1e-12, 1e-6, 1e-3, 1.0, 1e6] {
+                    let at = Point { temperature: start, increment, gradient: Default::default(), dt };
+                    let mut new = [0.0];
+                    let response = material.respond(&at, &[z], &mut new).unwrap();
+                    let found = [new[0], response.energy, response.d_energy_d_temperature];
+                    assert!(found.iter().all(|x| x.is_finite()), "{z} {at:?}: {found:?}");
+                }
+            }
+        }
+    }
+}

@@ -72,7 +72,7 @@ pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static s
     }
 }
 
-/// probe_NAME.csv and the values at the end.
+/// probe_NAME.csv, the values at the end, and the extremes of temperature.
 pub fn write(
     probes: &[Probe],
     names: &[&'static str],
@@ -94,6 +94,12 @@ pub fn write(
         last("temperature", &probe.temperature, "degC");
         for (quantity, values) in names.iter().zip(&probe.fields) {
             last(quantity, values, "");
+        }
+        if !probe.temperature.is_empty() {
+            let extreme = |pick: fn(f64, f64) -> f64| probe.temperature.iter().copied().reduce(pick);
+            let [lowest, highest] = [extreme(f64::min), extreme(f64::max)].map(Option::unwrap_or_default);
+            report.value(&format!("{name}.lowest_temperature"), lowest, "degC");
+            report.value(&format!("{name}.highest_temperature"), highest, "degC");
         }
     }
     Ok(())

@@ -118,6 +118,25 @@ fn together(source: &Source, scene: &PartScene, rows: &Rows) -> Report {
             report.seconds(phase, *seconds);
         }
     }
+    for spec in &scene.convergence {
+        let of = |name: &String| {
+            let own = rows.rows.iter().find(|row| row.name == *name)?.outcome.as_ref().ok()?;
+            own.values.get(&spec.quantity).and_then(|value| match value {
+                Value::Scalar { value, unit } => Some((*value, unit)),
+                _ => None,
+            })
+        };
+        let [Some((coarse, unit)), Some((middle, _)), Some((fine, _))] = spec.studies.each_ref().map(of)
+        else {
+            continue;
+        };
+        let [limit, order] = spec.limit_and_order([coarse, middle, fine]);
+        report.value(&format!("{}.limit", spec.name), limit, unit);
+        // of equal values there is none
+        if order.is_finite() {
+            report.value(&format!("{}.order", spec.name), order, "");
+        }
+    }
     report
 }
 

@@ -1,5 +1,6 @@
 //! Scenes, as written in TOML. Only what a scene names is built.
 
+mod convergence;
 mod either;
 mod fit;
 mod material;
@@ -10,6 +11,7 @@ mod problem;
 mod schedule;
 mod study;
 
+pub use convergence::ConvergenceSpec;
 pub use fit::{DataSpec, FitLaw, FitScene, FitSpec, Job};
 pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
 pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec};

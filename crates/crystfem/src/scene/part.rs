@@ -1,6 +1,6 @@
 //! The scene of a body in time: mesh, materials, layers, what acts on it.
 
-use super::{MaterialSpec, MeshSpec, Program, ScheduleSpec, StudySpec, check_name};
+use super::{ConvergenceSpec, MaterialSpec, MeshSpec, Program, ScheduleSpec, StudySpec, check_name};
 use crate::problem::Capacity;
 use crate::simulation::LinearSolver;
 use crate::time::Scheme;
@@ -49,6 +49,9 @@ pub struct PartScene {
     /// Variants to run in place of the scene itself.
     #[serde(default)]
     pub study: Vec<StudySpec>,
+    /// Limits and orders of quantities over studies.
+    #[serde(default)]
+    pub convergence: Vec<ConvergenceSpec>,
     /// What the results must be.
     #[serde(default)]
     pub expect: Vec<Expect>,

@@ -12,6 +12,7 @@ use crate::problem::{Birth, Problem};
 use crate::simulation::Settings;
 use crate::time::Steps;
 use polycore::scene::{SceneError, Source};
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// Temporal error in a step, K, and rms error of solves, K, unless a scene says otherwise.
@@ -71,7 +72,8 @@ impl PartScene {
         if printed.is_empty() {
             printed = (0..mesh.element_count() as u32).collect();
         }
-        let initial = initial(&mesh, &temperature_of);
+        let later: HashSet<u32> = births.iter().flat_map(|birth| birth.elements.iter().copied()).collect();
+        let initial = initial(&mesh, &temperature_of, &later);
         let capacity = self.time.capacity;
         let problem =
             Problem { mesh, materials, material_of, initial, conditions, sources: heats, births, capacity };
@@ -259,15 +261,19 @@ fn elements(source: &Source, mesh: &Mesh, key: &str, name: Option<&str>) -> Resu
     })
 }
 
-/// Temperatures at nodes: that of the last element there; a node that two regions share takes that of the later one.
-fn initial(mesh: &Mesh, temperature_of: &[f64]) -> Field {
+/// Temperatures at nodes: that of the last element there that is not laid down later; a node that two regions share takes
+/// that of the later one.
+fn initial(mesh: &Mesh, temperature_of: &[f64], later: &HashSet<u32>) -> Field {
     let first = temperature_of.first().copied().unwrap_or(0.0);
     if temperature_of.iter().all(|&temperature| temperature == first) {
         return Field::constant(first);
     }
     // by place, as the problem asks; places of nodes are exact
-    let mut at = std::collections::HashMap::new();
+    let mut at = HashMap::new();
     for (element, &temperature) in temperature_of.iter().enumerate() {
+        if later.contains(&(element as u32)) {
+            continue;
+        }
         for &node in mesh.nodes(element as u32) {
             at.insert(mesh.points[node as usize].map(f64::to_bits), temperature);
         }

@@ -77,7 +77,8 @@ impl PartScene {
     /// The studies of a run, by their places in `study`; `quick` leaves out those marked so.
     ///
     /// # Errors
-    /// Names that name no folder or two studies, and a quick run of nothing.
+    /// Names that name no folder or two studies, a quick run of nothing, and those of
+    /// [`Self::check_convergence`].
     pub fn studies(&self, source: &Source, quick: bool) -> Result<Vec<usize>, SceneError> {
         for (index, study) in self.study.iter().enumerate() {
             let key = format!("study[{index}].name");
@@ -87,6 +88,7 @@ impl PartScene {
                 return Err(source.error(&key, format!("`{}` twice", study.name), "names that differ"));
             }
         }
+        self.check_convergence(source)?;
         let asked: Vec<usize> =
             (0..self.study.len()).filter(|&index| !quick || self.study[index].quick != Some(false)).collect();
         if asked.is_empty() && !self.study.is_empty() {

@@ -146,7 +146,10 @@ impl<T: Real> Packed<T> {
             let mut weight = [[zero; REGISTERS]; PANELS];
             for p in 0..PANELS {
                 let row = &rows[p][j * in_panel + place..][..REGISTERS];
-                weight[p].copy_from_slice(row);
+                #[expect(clippy::manual_memcpy, reason = "a call of memcpy costs more than the product")]
+                for r in 0..REGISTERS {
+                    weight[p][r] = row[r];
+                }
             }
             for c in 0..COLUMNS {
                 let value = T::splat(simd, lists[c][j]);
