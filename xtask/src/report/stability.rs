@@ -1,9 +1,11 @@
 //! What is stiff, extreme or degenerate: what must happen, what was seen, at what cost.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 use polycore::report::Judgement;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::validate::outcome::Outcome;
 
@@ -36,12 +38,39 @@ pub fn trials(outcomes: &[Outcome]) -> Vec<Trial> {
             passed: trial.passed,
         }));
         let name = case.rsplit('/').next().unwrap_or(&case);
-        if report.trials.is_empty() && WORDS.iter().any(|word| name.contains(word)) {
+        let listed = of_suite(&case, &outcome.output);
+        if !listed.is_empty() {
+            trials.extend(listed);
+        } else if report.trials.is_empty() && WORDS.iter().any(|word| name.contains(word)) {
             trials
                 .extend(groups(&report.expect).into_iter().map(|(what, judged)| trial(&case, what, &judged)));
         }
     }
     trials
+}
+
+/// A row of suite.json, which some programs write beside their report.
+#[derive(Deserialize)]
+struct Row {
+    case: String,
+    must: String,
+    seen: String,
+    pass: bool,
+    steps: Option<u64>,
+}
+
+fn of_suite(case: &str, output: &Path) -> Vec<Trial> {
+    let text = fs::read_to_string(output.join("suite.json")).unwrap_or_default();
+    let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
+    let trial = |row: Row| Trial {
+        case: case.to_owned(),
+        what: row.case,
+        must: row.must,
+        seen: row.seen,
+        iterations: row.steps.map(|steps| steps.to_string()).unwrap_or_default(),
+        passed: row.pass,
+    };
+    rows.into_iter().map(trial).collect()
 }
 
 /// `run.quantity` and `quantity[run]` by their runs.
@@ -82,6 +111,20 @@ fn trial(case: &str, what: &str, judged: &[&Judgement]) -> Trial {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_of_a_suite() {
+        let folder = tempfile::tempdir().expect("a folder");
+        assert!(of_suite("ch4/x", folder.path()).is_empty());
+        let rows =
+            r#"[{"case": "a", "must": "end", "seen": "ended", "pass": true, "steps": 7, "seconds": 0.1}]"#;
+        fs::write(folder.path().join("suite.json"), rows).expect("a suite");
+        let trials = of_suite("ch4/x", folder.path());
+        assert_eq!(
+            (trials[0].what.as_str(), trials[0].iterations.as_str(), trials[0].passed),
+            ("a", "7", true)
+        );
+    }
 
     #[test]
     fn runs_of_quantities() {
