@@ -63,6 +63,8 @@ pub mod kinematics;
 pub mod md;
 pub mod network;
 pub mod random;
+#[cfg(feature = "train")]
+pub mod search;
 pub mod surrogate;
 #[cfg(feature = "train")]
 pub mod train;

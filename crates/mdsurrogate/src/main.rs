@@ -36,8 +36,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Run a scene: measure and divide its data, train its models, judge them, draw.
-    #[command(visible_alias = "data", visible_alias = "train")]
+    /// Run a scene: measure and divide its data, train and judge its models or search for better ones, draw.
+    #[command(visible_aliases = ["data", "train", "tune"])]
     Run(scene_command::Run),
     /// Go on with an interrupted or killed run.
     Resume(scene_command::Resume),

@@ -174,7 +174,7 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
         let lines = file.dataset("provenance").and_then(|dataset| dataset.read_vlen_strings());
         set.provenance = lines.map_err(none)?;
     }
-    set.provenance.push(format!("{}: {size} bytes, HDF5, {rows} rows", path.display()));
+    set.provenance.push(format!("{}: {size} bytes, HDF5, {rows} rows", super::read::name_of(path)));
     Ok(set)
 }
 

@@ -73,6 +73,11 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
     Ok(set)
 }
 
+/// A file's name without its folder: provenance is the same from wherever a file is read.
+pub(super) fn name_of(path: &std::path::Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
 fn is_hdf5(path: &std::path::Path) -> Result<bool, Error> {
     use std::io::Read;
     let mut start = Vec::new();
@@ -262,7 +267,7 @@ fn table(table: &Table, options: &ReadOptions) -> Result<Dataset, Error> {
     };
     set.provenance.push(format!(
         "{}: {}, {columns}, {} rows of {} runs, {} skipped",
-        table.path.display(),
+        name_of(&table.path),
         table.fingerprint,
         set.len(),
         set.paths.len(),

@@ -4,6 +4,7 @@ pub mod checkpoint;
 mod data;
 mod draw;
 mod judge;
+mod search;
 mod training;
 
 pub use data::{Prepared, describe, load};
@@ -71,6 +72,10 @@ pub fn run(source: &Source, options: &mut Options) -> Result<Finished, Failure> 
         let laws: Vec<judge::Named> = trained.iter().map(training::Trained::named).collect();
         remarks.extend(judge_laws(&laws, &data, options.output, &mut report)?);
     }
+    if let Some(spec) = &scene.search {
+        phases.start("search");
+        remarks.extend(search::search(source, &scene, spec, &data, options, &mut report)?);
+    }
     phases.start("write");
     data.write(options.output)?;
     phases.stop();
@@ -111,6 +116,10 @@ pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
             settings.epochs,
             split.train.len().div_ceil(settings.batch)
         ));
+    }
+    if let Some(search) = &scene.search {
+        let names: Vec<&str> = search.methods.iter().map(|method| method.name()).collect();
+        lines.push(format!("searches   by {}, {} epochs at most", names.join(" and "), search.epochs));
     }
     if scene.model.is_empty() {
         lines.push("leaves out training".into());

@@ -117,7 +117,7 @@ impl Run {
         options: &mut Options,
     ) -> Result<(), Failure> {
         while training.ending().is_none() {
-            let result = training.epoch().map(|epoch| *epoch);
+            let result = training.epoch().copied();
             let epochs = training.state().history().len();
             if result.is_err() || (options.interrupted)() {
                 self.save(&training, options)?;

@@ -8,8 +8,10 @@ use serde::Deserialize;
 use std::path::PathBuf;
 
 mod model;
+mod search;
 
 pub use model::{KindName, ModelSpec, Outputs, ThesisNetwork, TrainingSpec, check_models};
+pub use search::SearchSpec;
 
 /// A whole scene.
 #[derive(Clone, Debug, Deserialize)]
@@ -31,6 +33,8 @@ pub struct Scene {
     /// How they are trained.
     #[serde(default)]
     pub training: TrainingSpec,
+    /// A search for hyperparameters of an `ann`.
+    pub search: Option<SearchSpec>,
     /// What the results must be.
     #[serde(default)]
     pub expect: Vec<Expect>,
@@ -42,7 +46,14 @@ impl Scene {
     /// # Errors
     /// What is wrong and where.
     pub fn check(&self, source: &Source) -> Result<(), SceneError> {
-        check_models(source, &self.model, &self.training)
+        check_models(source, &self.model, &self.training)?;
+        match &self.search {
+            Some(_) if !self.model.is_empty() => {
+                Err(source.error("search", "`[search]` beside `[[model]]`", "one of them in a scene"))
+            }
+            Some(search) => search.check(source),
+            None => Ok(()),
+        }
     }
 }
 

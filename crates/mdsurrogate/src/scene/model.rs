@@ -1,7 +1,7 @@
 //! Models and their training, as written in a scene.
 
 use crate::network::{Activation, Architecture};
-use crate::surrogate::{Header, Kind, Symmetry};
+use crate::surrogate::{Header, Kind, Surrogate, Symmetry};
 use crate::train::{Loss, Schedule, Settings};
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
@@ -9,6 +9,9 @@ use std::collections::HashSet;
 
 /// The axes of the data.
 const OWN_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// Weights and biases of a network that is still trained on one machine: 400 MB of them, their gradients and moments.
+const MOST_PARAMETERS: usize = 20_000_000;
 
 /// A law to train.
 #[derive(Clone, Debug, Deserialize)]
@@ -213,11 +216,21 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
             return Err(source.error(&at("hidden"), "relu in an energy", allowed));
         }
         let mut header = Header::new(model.law(), &[], model.members);
+        if (1..=1000).contains(&model.members) {
+            // a law without hidden layers has the same axes
+            Surrogate::<f64>::random(header.clone(), 0)
+                .map_err(|error| source.error(&at("axes"), error, "axes that a material can have"))?;
+        }
         header.architecture = model.architecture();
         header.check().map_err(|error| {
             let key = if (1..=1000).contains(&model.members) { "hidden" } else { "members" };
             source.error(&at(key), error, "a network that can be built")
         })?;
+        let parameters = header.architecture.parameters();
+        if parameters > MOST_PARAMETERS {
+            let allowed = format!("networks of {MOST_PARAMETERS} at most");
+            return Err(source.error(&at("hidden"), format!("{parameters} parameters"), allowed));
+        }
         check_training(source, &at("training"), &model.training)?;
     }
     check_training(source, "training", general)

@@ -3,3 +3,4 @@
 mod data;
 mod md;
 mod memory;
+mod scenes;

@@ -50,8 +50,9 @@
         end select
     end subroutine neuron
 
+    ! recursive: local arrays are then never static, and threads do not share them
     ! first: S of a map, dW/dC of an energy; second: its derivative by C
-    subroutine member(m, c, value, first, second)
+    recursive subroutine member(m, c, value, first, second)
         integer, intent(in) :: m
         real(dp), intent(in) :: c(6)
         real(dp), intent(out) :: value, first(6), second(6, 6)
@@ -134,7 +135,7 @@
     end subroutine member
 
     ! The mean of the members. status 0; 1: C is not positive definite or not finite; 2: the result is not finite
-    subroutine evaluate(c, s, tangent, energy, spread, flags, status)
+    recursive subroutine evaluate(c, s, tangent, energy, spread, flags, status)
         use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
         real(dp), intent(in) :: c(6)
         real(dp), intent(out) :: s(6), tangent(6, 6), energy, spread
@@ -203,7 +204,7 @@ end module NAME_law
 ! outside the training data; bit a + 5: it never changed there; bit 12: the ensemble disagrees; bit 13: farther from the
 ! training strains than any of them was from the others.
 ! status 0; 1: C is not positive definite or not finite; 2: the result is not finite.
-subroutine NAME(c, s, tangent, energy, spread, flags, status)
+recursive subroutine NAME(c, s, tangent, energy, spread, flags, status)
     use NAME_law, only: evaluate
     implicit none
     double precision, intent(in) :: c(6)
@@ -216,7 +217,7 @@ end subroutine NAME
 ! stress over J (Sun, Chaikof, Levenston 2008, doi 10.1115/1.2979872):
 ! F_iI F_jJ F_kK F_lL C_IJKL / J + (s_ik d_jl + s_jk d_il + s_il d_jk + s_jl d_ik) / 2.
 ! PROPS(1): pascals in a unit of stress, for example 1e6 for MPa. STATEV(1): flags, STATEV(2): spread.
-subroutine umat(stress, statev, ddsdde, sse, spd, scd, rpl, ddsddt, drplde, drpldt, stran, dstran, time, dtime, &
+recursive subroutine umat(stress, statev, ddsdde, sse, spd, scd, rpl, ddsddt, drplde, drpldt, stran, dstran, time, dtime, &
     temp, dtemp, predef, dpred, cmname, ndi, nshr, ntens, nstatv, props, nprops, coords, drot, pnewdt, celent, &
     dfgrd0, dfgrd1, noel, npt, layer, kspt, jstep, kinc)
     use NAME_law, only: evaluate

@@ -22,7 +22,7 @@ impl Surrogate<f64> {
     /// unsigned *flags)`, in the conventions of [`Answer`](crate::surrogate::Answer); agrees with it to rounding (tested to 1e-12).
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a name that is no C identifier of 1 to 60 characters, or networks so wide that they would
+    /// [`Error::Parameter`] for a name that is no identifier of 1 to 50 characters, or networks so wide that they would
     /// need more than 1 MiB of stack.
     pub fn c_source(&self, name: &str) -> Result<CSource, Error> {
         check_name(name)?;

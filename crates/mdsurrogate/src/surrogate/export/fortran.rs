@@ -51,7 +51,9 @@ impl Surrogate<f64> {
             list_of(&mut text, name, &list);
         }
         text.push_str("contains\n\n");
-        text.push_str("    subroutine features(c, x, d, dd)\n        real(dp), intent(in) :: c(6)\n");
+        text.push_str(
+            "    recursive subroutine features(c, x, d, dd)\n        real(dp), intent(in) :: c(6)\n",
+        );
         text.push_str("        real(dp), intent(out) :: x(INPUTS), d(INPUTS, 6), dd(INPUTS, 6, 6)\n");
         for line in law.inputs_with_derivatives(Language::Fortran) {
             statement(&mut text, &line);

@@ -2,7 +2,10 @@
 
 use super::*;
 use crate::kinematics::jaumann_tangent;
-use crate::network::Activation::{Elu, Relu};
+use crate::network::{
+    Activation::{Elu, Relu},
+    Architecture,
+};
 use crate::surrogate::tests::{all, c_of, deformations};
 use crate::surrogate::{Answer, Flags, Header, Kind, Support, Workspace};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, Voigt6x6};
@@ -18,7 +21,7 @@ fn there(program: &str, test: &str) -> bool {
     found
 }
 
-/// All laws, one with kinks, limits and representatives beside them.
+/// All laws, beside them one with kinks, limits and representatives, and the thesis' network.
 fn laws() -> Vec<(String, Surrogate<f64>)> {
     let mut laws = all();
     let mut header = Header::new(Kind::Ann, &[(6, Relu), (5, Elu)], 2);
@@ -27,6 +30,9 @@ fn laws() -> Vec<(String, Surrogate<f64>)> {
     let rows: Vec<Voigt> = deformations()[..3].iter().map(c_of).collect();
     header.support = Some(Support::of(&rows, 2).unwrap());
     laws.push(("relu".into(), Surrogate::random(header, 2).unwrap()));
+    let mut header = Header::new(Kind::Ann, &[], 1);
+    header.architecture = Architecture::thesis(4).unwrap();
+    laws.push(("ANN-4".into(), Surrogate::random(header, 2).unwrap()));
     laws
 }
 

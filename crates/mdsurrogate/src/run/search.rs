@@ -1,0 +1,263 @@
+//! A scene's search for hyperparameters: trained, remembered, written as a table like 3.4.
+
+use super::{Failure, Options, Prepared, checkpoint};
+use crate::dataset::Row;
+use crate::error::Error;
+use crate::scene::{Scene, SearchSpec};
+use crate::search::{Journal, Method, Oracle, Trial, bayesian, hyperband};
+use crate::surrogate::{Header, Kind};
+use crate::train::{Settings, State, Training};
+use polycore::output::atomic_write;
+use polycore::output::picture::{LinePlot, Series};
+use polycore::report::Report;
+use polycore::scene::Source;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+/// Where a search stands.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Progress {
+    journal: Journal,
+    /// Trainings of candidates that may be asked about again, by method and number.
+    states: BTreeMap<(bool, usize), State>,
+}
+
+/// Searches, or goes on with it; gives the table in lines.
+///
+/// # Errors
+/// [`Error::Interrupted`]; I/O errors.
+pub fn search(
+    source: &Source,
+    scene: &Scene,
+    spec: &SearchSpec,
+    data: &Prepared,
+    options: &mut Options,
+    report: &mut Report,
+) -> Result<Vec<String>, Failure> {
+    let header = checkpoint::Header::new(source, options.quick);
+    let Progress { mut journal, states } = match options.resume {
+        true => checkpoint::read(options.output)?,
+        false => Progress::default(),
+    };
+    if !options.resume {
+        checkpoint::write(options.output, &header, &Progress::default())?;
+    }
+    let (epochs, trials) = (spec.epochs(options.quick), spec.trials(options.quick));
+    let expected = expected_epochs(spec, epochs, trials);
+    let mut trainer = Trainer {
+        rows: data.rows(&data.split.train),
+        validation: data.rows(&data.split.validation),
+        settings: scene.training.over(&Default::default(), options.quick),
+        header,
+        states,
+        saved: Instant::now(),
+        epochs: 0,
+        expected,
+        options,
+    };
+    for method in &spec.methods {
+        match method {
+            Method::Hyperband => {
+                hyperband(&spec.space, epochs, spec.eta, spec.seed, &mut journal, &mut trainer)?;
+            }
+            Method::Bayesian => {
+                bayesian(
+                    &spec.space,
+                    [spec.initial, trials],
+                    epochs,
+                    spec.seed.wrapping_add(1),
+                    &mut journal,
+                    &mut trainer,
+                )?;
+            }
+        }
+    }
+    let output = trainer.options.output;
+    report.work("trainings of the search", journal.trials.len() as u64);
+    Ok(write(spec, &journal, output, report)?)
+}
+
+/// Epochs that a search will train, for its progress.
+fn expected_epochs(spec: &SearchSpec, epochs: u32, trials: usize) -> u64 {
+    let mut sum = 0;
+    for method in &spec.methods {
+        sum += match method {
+            Method::Bayesian => trials as u64 * u64::from(epochs),
+            Method::Hyperband => {
+                let brackets = crate::search::brackets(epochs, spec.eta).unwrap_or_default();
+                let of = |rounds: &Vec<(usize, u32)>| {
+                    let mut before = 0;
+                    let mut sum = 0;
+                    for &(count, trained) in rounds {
+                        sum += count as u64 * u64::from(trained - before);
+                        before = trained;
+                    }
+                    sum
+                };
+                brackets.iter().map(of).sum()
+            }
+        };
+    }
+    sum.max(1)
+}
+
+/// Trains candidates, further where they were trained before.
+struct Trainer<'a, 'o> {
+    rows: Vec<&'a Row>,
+    validation: Vec<&'a Row>,
+    settings: Settings,
+    header: checkpoint::Header,
+    states: BTreeMap<(bool, usize), State>,
+    saved: Instant,
+    epochs: u64,
+    expected: u64,
+    options: &'a mut Options<'o>,
+}
+
+#[derive(Serialize)]
+struct Borrowed<'a> {
+    journal: &'a Journal,
+    states: &'a BTreeMap<(bool, usize), State>,
+}
+
+impl Trainer<'_, '_> {
+    fn save(&mut self, journal: &Journal) -> Result<(), Error> {
+        self.saved = Instant::now();
+        checkpoint::write(self.options.output, &self.header, &Borrowed { journal, states: &self.states })
+    }
+}
+
+impl Oracle for Trainer<'_, '_> {
+    fn loss(&mut self, question: &Trial, journal: &Journal) -> Result<Option<f64>, Error> {
+        let candidate = &question.candidate;
+        let law = Header::fitted(Kind::Ann, candidate.architecture(), 1, &self.rows, true)?;
+        let settings = Settings {
+            epochs: question.epochs,
+            learning_rate: candidate.learning_rate,
+            seed: self.settings.seed.wrapping_add(question.number as u64),
+            ..self.settings
+        };
+        let key = (question.method == Method::Bayesian, question.number);
+        let mut training = match self.states.get(&key) {
+            Some(state) => Training::resume(&law, &self.rows, &self.validation, settings, state.clone())?,
+            None => Training::new(&law, &self.rows, &self.validation, settings)?,
+        };
+        while training.ending().is_none() {
+            if (self.options.interrupted)() {
+                self.states.insert(key, training.state().clone());
+                self.save(journal)?;
+                return Err(Error::Interrupted(self.options.output.to_path_buf()));
+            }
+            match training.epoch() {
+                Ok(_) => {}
+                Err(Error::Diverged { .. }) => return Ok(None),
+                Err(error) => return Err(error),
+            }
+            self.epochs += 1;
+            let part = (self.epochs as f64 / self.expected as f64).min(1.0);
+            (self.options.progress)(part, &|| {
+                format!(
+                    "{} {}: {} at {}, epoch {} of {}, best loss {:.0} MPa²",
+                    question.method.name(),
+                    question.number + 1,
+                    candidate.layers(),
+                    candidate.learning_rate,
+                    training.state().history().len(),
+                    question.epochs,
+                    training.state().best_loss()
+                )
+            });
+        }
+        let loss = training.state().best_loss();
+        self.states.insert(key, training.state().clone());
+        if self.saved.elapsed() >= self.options.checkpoint_every {
+            self.save(journal)?;
+        }
+        Ok(Some(loss))
+    }
+
+    fn forget(&mut self, method: Method, numbers: &[usize]) {
+        for number in numbers {
+            self.states.remove(&(method == Method::Bayesian, *number));
+        }
+    }
+}
+
+/// The table of the best candidates as CSV and in lines, their losses as a picture and values.
+fn write(
+    spec: &SearchSpec,
+    journal: &Journal,
+    output: &Path,
+    report: &mut Report,
+) -> Result<Vec<String>, Error> {
+    let ranking = journal.ranking();
+    let parameters = |trial: &Trial| trial.candidate.architecture().parameters();
+    let top: Vec<&Trial> = ranking.iter().copied().filter(|t| t.loss.is_some()).take(spec.top).collect();
+    // the thesis takes the least complex of the best ten (§3.3)
+    let chosen = top.iter().copied().min_by_key(|trial| parameters(trial));
+    atomic_write(output.join("search.csv"), |file| {
+        writeln!(
+            file,
+            "rank,method,number,hidden layers,learning rate,parameters,epochs,validation loss (3.12) [MPa²],chosen"
+        )?;
+        for (rank, trial) in ranking.iter().enumerate() {
+            writeln!(
+                file,
+                "{},{},{},\"{}\",{},{},{},{},{}",
+                rank + 1,
+                trial.method.name(),
+                trial.number + 1,
+                trial.candidate.layers(),
+                trial.candidate.learning_rate,
+                parameters(trial),
+                trial.epochs,
+                trial.loss.map_or("diverged".into(), |loss| format!("{loss:?}")),
+                if chosen == Some(*trial) { "yes" } else { "" }
+            )?;
+        }
+        Ok(())
+    })?;
+    let mut lines = vec![format!(
+        "{:>4} {:<9} {:>10} {:>13} {:>6} {:>15}  hidden layers",
+        "rank", "method", "parameters", "learning rate", "epochs", "loss (3.12)"
+    )];
+    for (rank, trial) in top.iter().enumerate() {
+        lines.push(format!(
+            "{:>4} {:<9} {:>10} {:>13} {:>6} {:>10.0} MPa²  {}{}",
+            rank + 1,
+            trial.method.name(),
+            parameters(trial),
+            trial.candidate.learning_rate,
+            trial.epochs,
+            trial.loss.unwrap_or(f64::NAN),
+            trial.candidate.layers(),
+            if chosen == Some(*trial) { "  ← the fewest parameters" } else { "" }
+        ));
+    }
+    let diverged = ranking.iter().filter(|trial| trial.loss.is_none()).count();
+    report.value("candidates", ranking.len() as f64, "").value(
+        "candidates that diverged",
+        diverged as f64,
+        "",
+    );
+    let mut plot =
+        LinePlot::new("Search").axes("parameters", "validation loss (3.12) (MPa²)").log_x().log_y();
+    for method in &spec.methods {
+        let own = || ranking.iter().filter(|t| t.method == *method && t.loss.is_some_and(|loss| loss > 0.0));
+        let losses: Vec<f64> = own().filter_map(|trial| trial.loss).collect();
+        if let Some(best) = losses.first() {
+            report.value(&format!("best validation loss of {}", method.name()), *best, "MPa²");
+            let sizes: Vec<f64> = own().map(|trial| parameters(trial) as f64).collect();
+            plot = plot.series(Series::markers(method.name(), &sizes, &losses));
+        }
+    }
+    if let Some(chosen) = chosen {
+        report.value("parameters of the chosen candidate", parameters(chosen) as f64, "");
+        report.value("validation loss of the chosen candidate", chosen.loss.unwrap_or(f64::NAN), "MPa²");
+        plot.write(output.join("search.png"))?;
+    }
+    Ok(lines)
+}

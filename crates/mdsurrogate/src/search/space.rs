@@ -1,0 +1,140 @@
+//! What may be chosen.
+
+use crate::Error;
+use crate::network::{Activation, Architecture, MOST_NEURONS};
+use crate::random::SplitMix64;
+use serde::{Deserialize, Serialize};
+
+/// Ranges of the hyperparameters.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Space {
+    /// Fewest and most hidden layers.
+    pub layers: [usize; 2],
+    /// Fewest and most neurons in a layer.
+    pub neurons: [usize; 2],
+    /// Distance of the numbers of neurons tried.
+    pub step: usize,
+    /// Of a layer.
+    pub activations: Vec<Activation>,
+    /// Of Adam.
+    pub learning_rates: Vec<f64>,
+}
+
+impl Default for Space {
+    /// Table 3.3. The distance of 32 neurons is not printed there: all widths of Table 3.4 are multiples of it.
+    fn default() -> Self {
+        Self {
+            layers: [2, 5],
+            neurons: [32, 256],
+            step: 32,
+            activations: vec![Activation::Relu, Activation::Softplus],
+            learning_rates: vec![1e-1, 1e-2, 1e-3],
+        }
+    }
+}
+
+/// One choice.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// Neurons and activation of each hidden layer.
+    pub hidden: Vec<(usize, Activation)>,
+    /// Of Adam.
+    pub learning_rate: f64,
+}
+
+impl Candidate {
+    /// Its network from C to S.
+    pub fn architecture(&self) -> Architecture {
+        Architecture::new(6, &self.hidden, 6)
+    }
+
+    /// Its layers as Table 3.4 writes them.
+    pub fn layers(&self) -> String {
+        let layer = |(neurons, activation): &(usize, Activation)| format!("{neurons} × {activation:?}");
+        self.hidden.iter().map(layer).collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Space {
+    /// # Errors
+    /// [`Error::Parameter`] for an empty range, a step of 0, or numbers that no network or training can have.
+    pub fn check(&self) -> Result<(), Error> {
+        let [least, most] = self.layers;
+        if !(1..=most).contains(&least) || most > 20 {
+            return Err(Error::parameter("layers", format!("{:?}", self.layers), "1 to 20, ascending"));
+        }
+        let [least, most] = self.neurons;
+        if !(1..=most).contains(&least) || most > MOST_NEURONS {
+            return Err(Error::parameter("neurons", format!("{:?}", self.neurons), "1 to 65,536, ascending"));
+        }
+        if self.step == 0 {
+            return Err(Error::parameter("step", 0, "1 neuron or more"));
+        }
+        if self.activations.is_empty() {
+            return Err(Error::parameter("activations", "none", "at least one"));
+        }
+        match self.learning_rates.iter().find(|rate| !(rate.is_finite() && **rate > 0.0)) {
+            Some(rate) => Err(Error::parameter("learning_rates", rate, "positive, finite numbers")),
+            None if self.learning_rates.is_empty() => {
+                Err(Error::parameter("learning_rates", "none", "at least one"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// How many numbers of neurons there are.
+    fn widths(&self) -> usize {
+        1 + (self.neurons[1] - self.neurons[0]) / self.step
+    }
+
+    fn layer(&self, random: &mut SplitMix64) -> (usize, Activation) {
+        let neurons = self.neurons[0] + self.step * random.below(self.widths());
+        (neurons, self.activations[random.below(self.activations.len())])
+    }
+
+    /// Any candidate, each number of layers, width, activation and rate being as likely as the others.
+    pub fn sample(&self, random: &mut SplitMix64) -> Candidate {
+        let layers = self.layers[0] + random.below(self.layers[1] - self.layers[0] + 1);
+        let hidden = (0..layers).map(|_| self.layer(random)).collect();
+        Candidate { hidden, learning_rate: self.learning_rates[random.below(self.learning_rates.len())] }
+    }
+
+    /// A candidate that differs from another in one layer, its depth or its rate.
+    pub fn neighbour(&self, of: &Candidate, random: &mut SplitMix64) -> Candidate {
+        let mut near = of.clone();
+        match random.below(4) {
+            0 => near.learning_rate = self.learning_rates[random.below(self.learning_rates.len())],
+            1 if near.hidden.len() < self.layers[1] => near.hidden.push(self.layer(random)),
+            2 if near.hidden.len() > self.layers[0] => {
+                near.hidden.remove(random.below(near.hidden.len()));
+            }
+            _ => {
+                let place = random.below(near.hidden.len());
+                near.hidden[place] = self.layer(random);
+            }
+        }
+        near
+    }
+
+    /// A candidate as a point for a Gaussian process: depth, decimal logarithm of the rate, and of each layer that it
+    /// might have the width (0 for none) and one number for each activation but the first, all about 0 to 1.
+    pub fn encode(&self, candidate: &Candidate) -> Vec<f64> {
+        let share =
+            |value: f64, [low, high]: [f64; 2]| if high > low { (value - low) / (high - low) } else { 0.0 };
+        let rates = || self.learning_rates.iter().map(|rate| rate.log10());
+        let of_rates = [rates().fold(f64::INFINITY, f64::min), rates().fold(f64::NEG_INFINITY, f64::max)];
+        let mut point = vec![
+            share(candidate.hidden.len() as f64, self.layers.map(|count| count as f64)),
+            share(candidate.learning_rate.log10(), of_rates),
+        ];
+        for layer in 0..self.layers[1] {
+            let at = candidate.hidden.get(layer);
+            point.push(at.map_or(0.0, |(neurons, _)| *neurons as f64 / self.neurons[1] as f64));
+            for other in self.activations.iter().skip(1) {
+                point.push(at.map_or(0.5, |(_, activation)| f64::from(u8::from(activation == other))));
+            }
+        }
+        point
+    }
+}
