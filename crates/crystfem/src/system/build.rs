@@ -246,7 +246,8 @@ impl System {
         let mut volumes = Vec::new();
         for first in (0..self.elements.len()).step_by(BATCH) {
             let range = first..(first + BATCH).min(self.elements.len());
-            let own: Vec<Option<Geometry>> = range
+            // boxed: most elements have none, and a geometry has thousands of bytes
+            let own: Vec<Option<Box<Geometry>>> = range
                 .clone()
                 .into_par_iter()
                 .map(|position| {
@@ -256,7 +257,7 @@ impl System {
                     let number = self.elements[position];
                     let (corners, nodes) = element::corners(mesh, number);
                     let geometry = Geometry::new(&corners[..nodes]);
-                    geometry.map(Some).ok_or_else(|| Error::Mesh(format!("element {number}: inverted")))
+                    geometry.map(|g| Some(Box::new(g))).ok_or_else(|| Error::Mesh(format!("element {number}: inverted")))
                 })
                 .collect::<Result<_, _>>()?;
             for (position, geometry) in range.zip(own) {
@@ -268,7 +269,7 @@ impl System {
                     Some(geometry) => geometry.corner_volumes,
                     None => classes[usize::from(kinds[position])].volumes,
                 };
-                if let Some(geometry) = geometry.as_ref().filter(|_| kinds[position] == OWN) {
+                if let Some(geometry) = geometry.as_deref().filter(|_| kinds[position] == OWN) {
                     let (conduction, capacity) = matrices(geometry, behaviour);
                     for (a, &row) in nodes.iter().enumerate() {
                         for (b, &column) in nodes.iter().enumerate() {

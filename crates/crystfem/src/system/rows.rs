@@ -38,7 +38,9 @@ impl Row {
     /// added then.
     pub fn begin(&mut self, determinants: impl Iterator<Item = u32>) -> bool {
         self.new_key.clear();
-        self.new_key.extend(determinants);
+        // iterated from within: chains of iterators are slow from outside
+        let Self { new_key, .. } = self;
+        determinants.for_each(|determinant| new_key.push(determinant));
         self.repeated = !self.own && !self.key.is_empty() && self.key == self.new_key;
         if !self.repeated {
             std::mem::swap(&mut self.key, &mut self.new_key);
