@@ -214,6 +214,7 @@ impl Run<'_> {
         report.value("exchanged_energy", exchange.total(), "J");
         report.value("reaction_energy", reaction, "J");
         report.value("birth_energy", birth, "J");
+        report.value("heat_given_off", -(exchange.total() + reaction), "J");
         report.value("missing_energy", missing, "J");
         report.value("worst_balance", worst, "");
         let temperature = simulation.temperatures(f64::NAN);

@@ -332,8 +332,9 @@ fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), polycore::Error
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             let name = [statistic.trim_end_matches("_of_").trim_end_matches('_'), other];
             let name: Vec<&str> = name.into_iter().filter(|part| !part.is_empty()).collect();
+            let name = name.join(", ").replace("degC", " °C");
             let (x, y): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
-            Series::marked_line(&name.join(", "), &x, &y)
+            Series::marked_line(&name, &x, &y)
         };
         let plot = |statistics: &[&str], what: &str| {
             let mut plot = LinePlot::new("At the end").axes(&label, what).size(800.0, 480.0);
