@@ -4,6 +4,7 @@ use crate::program::{command, finish};
 use crate::results::{assert_same, report, scalar, timeless};
 use polycore::output::vtkhdf;
 use std::fs;
+use std::path::Path;
 
 /// A bar of three layers on glass that crystallizes, with latent heat.
 pub const BAR: &str = r#"version = 1
@@ -78,7 +79,8 @@ fn a_printed_bar() {
     let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
     let told = crystfem("check bar.toml").with_code(0);
     told.shows("builds     3 births of 288 elements");
-    told.shows("not linear: Newton's iteration");
+    told.shows("solver     when all is printed: not linear: Newton's iteration");
+    told.shows("leaves out conditions that change over time");
     for threads in 1..=3 {
         crystfem(&format!("run bar.toml --output out{threads} --threads {threads}")).with_code(0);
         assert_same(&here.join("out1"), &here.join(format!("out{threads}")));
@@ -146,6 +148,7 @@ fn studies_of_a_part() {
     let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
     let told = crystfem("check bar.toml").with_code(0);
     told.shows("study coupled");
+    told.shows("leaves out latent heat: temperatures know nothing of crystals");
     told.shows("  must fail  with `no extent`");
     crystfem("run bar.toml --output out").with_code(0).shows("pass  coupled.least_alpha");
     let out = here.join("out");
@@ -179,4 +182,47 @@ fn studies_of_a_part() {
     // a quick run leaves the third out
     crystfem("run bar.toml --output quick --quick").with_code(0);
     assert!(!here.join("quick/cold").exists());
+}
+
+#[test]
+fn a_sweep_keeps_what_is_finished() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let scene = BAR.replace("tolerance = \"1 K\"", "tolerance = \"3 K\"");
+    fs::write(here.join("bar.toml"), &scene).unwrap();
+    let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
+    let refused = crystfem("sweep bar.toml --vary print.layer_tim=5s --output sweep").with_code(2);
+    refused.tells("did you mean `layer_time`?");
+    assert!(!here.join("sweep").exists());
+    crystfem("sweep bar.toml --vary print.layer_time").with_code(2);
+    // one of the runs ends before its last layer: it is named, the others go on
+    let vary = "sweep bar.toml --vary print.layer_time=5s,10s,100s --vary boundary[1].film=10W/m^2/K";
+    crystfem(&format!("{vary} --output one --threads 1"))
+        .with_code(1)
+        .shows("after the last birth, at 200 s");
+    crystfem(&format!("{vary} --output two --threads 2")).with_code(1);
+    assert_same(&here.join("one"), &here.join("two"));
+    let rows = fs::read_to_string(here.join("one/sweep.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 4, "{rows}");
+    assert!(scalar(&report(&here.join("one")), "failed_runs") == 1.0);
+    assert!(here.join("one/sweep_deviation_of_alpha.png").is_file());
+    // a run of the sweep is what its scene alone would be
+    let alone = scene
+        .replace("layer_time = \"10 s\"", "layer_time = \"5 s\"")
+        .replace("15 W/(m^2 K)", "10 W/(m^2 K)");
+    fs::write(here.join("alone.toml"), alone).unwrap();
+    crystfem("run alone.toml --output alone").with_code(0);
+    let row = here.join("one/layer_time-5s_film-10W_m_2_K");
+    let own = report(&row);
+    let same =
+        |name: &str| assert_eq!(scalar(&own, name), scalar(&report(&here.join("alone")), name), "{name}");
+    ["mean_alpha", "deviation_of_alpha", "mean_temperature", "heat_given_off"].map(same);
+    // the same command computes nothing again, and a finished run that is lost is made again
+    let written = |path: &Path| fs::metadata(path.join("report.json")).unwrap().modified().unwrap();
+    let other = here.join("one/layer_time-10s_film-10W_m_2_K");
+    let before = (written(&row), fs::read(other.join("probe_middle.csv")).unwrap());
+    fs::remove_dir_all(&other).unwrap();
+    crystfem(&format!("{vary} --output one")).with_code(1);
+    assert_eq!(before, (written(&row), fs::read(other.join("probe_middle.csv")).unwrap()));
+    assert_same(&here.join("one"), &here.join("two"));
 }

@@ -44,6 +44,9 @@ struct Scene {
     /// Leave out what the scene marks `quick = false`.
     #[arg(long)]
     quick: bool,
+    /// First print what the scene builds and leaves out.
+    #[arg(long)]
+    explain: bool,
     /// Seconds between checkpoints of a part's run.
     #[arg(long, value_name = "SECONDS", default_value_t = 30.0, value_parser = seconds)]
     checkpoint_every: f64,
@@ -135,6 +138,11 @@ fn run(scene: &Scene, kind: Option<Kind>) -> Result<bool, Failure> {
     {
         let found = "a scene of another kind";
         return Err(source.error("program", found, "`crystfem run`, which takes scenes of all kinds").into());
+    }
+    if scene.explain {
+        for line in crystfem::run::explain(&source)? {
+            println!("{line}");
+        }
     }
     let output = scene.output.clone().unwrap_or_else(|| default_output(&scene.scene));
     solve(&source, &output, scene.quick, scene.checkpoint_every, false)

@@ -2,6 +2,7 @@
 
 pub mod checkpoint;
 mod draw;
+mod explain;
 mod film;
 mod fit;
 mod part;

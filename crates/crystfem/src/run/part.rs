@@ -85,38 +85,7 @@ pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failur
         return super::suite::explain(source, scene);
     }
     scene.check(source)?;
-    explain_one(source, scene)
-}
-
-/// What one scene, that is checked, builds and leaves out.
-///
-/// # Errors
-/// As [`explain`].
-pub fn explain_one(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
-    let built = scene.mesh.build(source)?;
-    let (points, elements) = (built.mesh.points.len(), built.mesh.element_count());
-    let mut lines = vec![format!("builds     {points} nodes, {elements} elements, {:.4e} m³", built.volume)];
-    lines.extend(built.notes.iter().map(|note| format!("note       {note}")));
-    let task = scene.task(source, built.mesh)?;
-    lines.extend(task.notes.iter().map(|note| format!("note       {note}")));
-    let problem = &task.problem;
-    match problem.births.len() {
-        0 => lines.push("leaves out births: everything exists from the start".into()),
-        births => lines.push(format!(
-            "builds     {births} births of {} elements; what is not printed yet has no equations",
-            task.printed.len()
-        )),
-    }
-    let names: Vec<&str> = problem.materials.iter().flat_map(|m| m.field_names().iter().copied()).collect();
-    match names.is_empty() {
-        true => lines.push("leaves out states of materials".into()),
-        false => lines.push(format!("builds     states: {}", names.join(", "))),
-    }
-    let (end, settings) = (task.end, task.settings);
-    let simulation = Simulation::new(task.problem, settings)?;
-    lines.extend(simulation.explain(end).into_iter().map(|line| format!("solver     {line}")));
-    lines.push(format!("ends at    {end} s"));
-    Ok(lines)
+    super::explain::one(source, scene)
 }
 
 struct Run<'a> {

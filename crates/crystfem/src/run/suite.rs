@@ -230,7 +230,7 @@ pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failur
             continue;
         }
         let (source, scene) = scene.of_study(source, index)?;
-        lines.extend(part::explain_one(&source, &scene)?.iter().map(|line| format!("  {line}")));
+        lines.extend(super::explain::one(&source, &scene)?.iter().map(|line| format!("  {line}")));
     }
     Ok(lines)
 }

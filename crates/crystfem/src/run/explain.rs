@@ -1,0 +1,81 @@
+//! What a part's scene builds and leaves out, and how it will be solved.
+
+use super::Failure;
+use crate::boundary::{Condition, Where};
+use crate::scene::PartScene;
+use crate::simulation::Simulation;
+use polycore::scene::Source;
+
+/// The lines of one scene, that is checked.
+///
+/// # Errors
+/// A fault of the scene.
+pub fn one(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
+    let built = scene.mesh.build(source)?;
+    let (points, elements) = (built.mesh.points.len(), built.mesh.element_count());
+    let mut lines = vec![format!("builds     {points} nodes, {elements} elements, {:.4e} m³", built.volume)];
+    lines.extend(built.notes.iter().map(|note| format!("note       {note}")));
+    let task = scene.task(source, built.mesh)?;
+    lines.extend(task.notes.iter().map(|note| format!("note       {note}")));
+    let mut problem = task.problem;
+    let births = problem.births.len();
+    if births > 0 {
+        lines.push(format!(
+            "builds     {births} births of {} elements; what is not printed yet has no equations",
+            task.printed.len()
+        ));
+    }
+    let names: Vec<&str> = problem.materials.iter().flat_map(|m| m.field_names().iter().copied()).collect();
+    if !names.is_empty() {
+        lines.push(format!("builds     states: {}", names.join(", ")));
+    }
+    for (condition, number) in problem.conditions.iter().zip(1..) {
+        lines.push(format!("builds     condition {number}: {}", told(condition)));
+    }
+    let radiates = problem.conditions.iter().any(|c| matches!(c, Condition::Radiation { .. }));
+    let changes = problem.conditions.iter().any(|c| !c.breaks().is_empty())
+        || problem.sources.iter().any(|source| !source.power.breaks().is_empty());
+    let latent = scene.materials.values().any(|material| material.latent_heat.is_some());
+    for (needed, what) in [
+        (births > 0, "births: everything exists from the start"),
+        (!names.is_empty(), "states of materials"),
+        (latent || names.is_empty(), "latent heat: temperatures know nothing of crystals"),
+        (radiates, "radiation"),
+        (!problem.sources.is_empty(), "heat sources"),
+        (changes, "conditions that change over time"),
+        (!scene.probe.is_empty(), "probes"),
+        (scene.output.fields, "fields (VTKHDF)"),
+        (scene.output.pictures, "pictures and the animation"),
+    ] {
+        if !needed {
+            lines.push(format!("leaves out {what}"));
+        }
+    }
+    // at the start there may be nothing yet
+    let when = if births > 0 { "solver     when all is printed: " } else { "solver     " };
+    problem.births.clear();
+    let simulation = Simulation::new(problem, task.settings)?;
+    lines.extend(simulation.explain(task.end).into_iter().map(|line| format!("{when}{line}")));
+    lines.push(format!("ends at    {} s", task.end));
+    Ok(lines)
+}
+
+/// A condition in words.
+fn told(condition: &Condition) -> String {
+    let place = match condition.surface() {
+        Some(Where::Outer { except }) if except.is_empty() => "the current outer surface".to_owned(),
+        Some(Where::Outer { except }) => format!("the current outer surface except {} faces", except.len()),
+        Some(Where::Faces(faces)) => format!("{} faces", faces.len()),
+        None => String::new(),
+    };
+    let what = match condition {
+        Condition::Temperature { nodes, .. } => format!("temperature of {} nodes", nodes.len()),
+        Condition::Flux { .. } => format!("flux into {place}"),
+        Condition::Film { .. } => format!("film on {place}"),
+        Condition::Radiation { .. } => format!("radiation of {place}"),
+    };
+    match condition.breaks().len() {
+        0 => what,
+        kinks => format!("{what}, over {kinks} given times, on which steps land"),
+    }
+}
