@@ -25,7 +25,7 @@ pub struct Named<'a> {
 /// A held-out run as laws see it.
 pub(super) struct Heldout<'a> {
     pub run: &'a Path_,
-    /// The axis that is pulled most.
+    /// The axis that is pulled most; of all, where it is not known which ones are.
     pub axis: usize,
     /// Whether its rates lie within those of the training runs, where that is known.
     pub within: Option<bool>,
@@ -147,7 +147,9 @@ fn look_at_heldout<'a>(laws: &[Named], data: &'a Prepared) -> Result<Vec<Heldout
             predicted.push(rows.collect::<Result<Vec<[f64; 6]>, Error>>()?);
         }
         let reach = |axis: usize| run.rows.iter().map(|row| (row.c[axis] - 1.0).abs()).fold(0.0, f64::max);
-        let axis = (0..3).fold(0, |best, axis| if reach(axis) > reach(best) { axis } else { best });
+        let unknown = run.rates.iter().all(|rate| rate.is_nan());
+        let pulled = (0..3).filter(|&axis| unknown || !run.rates[axis].is_nan());
+        let axis = pulled.max_by(|&a, &b| reach(a).total_cmp(&reach(b))).unwrap_or(0);
         seen.push(Heldout { run, axis, within: within_rates(run, &data.set), predicted });
     }
     Ok(seen)
