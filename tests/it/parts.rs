@@ -214,9 +214,10 @@ fn a_sweep_keeps_what_is_finished() {
     crystfem("run alone.toml --output alone").with_code(0);
     let row = here.join("one/layer_time-5s_film-10W_m_2_K");
     let own = report(&row);
-    let same =
-        |name: &str| assert_eq!(scalar(&own, name), scalar(&report(&here.join("alone")), name), "{name}");
-    ["mean_alpha", "deviation_of_alpha", "mean_temperature", "heat_given_off"].map(same);
+    let alone = report(&here.join("alone"));
+    for name in ["mean_alpha", "deviation_of_alpha", "mean_temperature", "heat_given_off"] {
+        assert_eq!(scalar(&own, name), scalar(&alone, name), "{name}");
+    }
     // the same command computes nothing again, and a finished run that is lost is made again
     let written = |path: &Path| fs::metadata(path.join("report.json")).unwrap().modified().unwrap();
     let other = here.join("one/layer_time-10s_film-10W_m_2_K");

@@ -20,12 +20,13 @@ mod langevin;
 mod peri_peers;
 mod peri_solvers;
 mod scikit_fem;
+mod surrogate;
 
 /// What to measure.
 #[derive(clap::Args)]
 pub struct Options {
     /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, `crystfem [-- PART… N,N…]`
-    /// (its brick beside CalculiX and scikit-fem), or a program with a `bench --json`.
+    /// (its brick beside CalculiX and scikit-fem), `mdsurrogate` (its training beside PyTorch), or a program with a `bench --json`.
     name: String,
     /// Print the rows as JSON.
     #[arg(long)]
@@ -78,6 +79,11 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         }
         "peri-laws" => {
             let rows = external(&workspace.release("peri")?, &["--laws".to_owned()])?;
+            let table = text(&rows);
+            (rows, table, true)
+        }
+        "mdsurrogate" if options.arguments.is_empty() => {
+            let rows = surrogate::run(workspace)?;
             let table = text(&rows);
             (rows, table, true)
         }

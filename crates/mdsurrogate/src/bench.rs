@@ -20,6 +20,9 @@ pub struct Bench {
     /// Print JSON rows {what, size, threads, value, unit}.
     #[arg(long)]
     json: bool,
+    /// Measure training: an epoch of the thesis' network on rows of the thesis' number.
+    #[arg(long, conflicts_with = "law")]
+    training: bool,
     /// A law to measure in place of the built-in ones with random weights.
     law: Option<std::path::PathBuf>,
 }
@@ -27,6 +30,10 @@ pub struct Bench {
 impl Bench {
     /// Measures and prints.
     pub fn print(self) -> Result<bool, Error> {
+        if self.training {
+            print_measurements(&crate::bench_training::measure()?, self.json);
+            return Ok(true);
+        }
         let mut rows = Vec::new();
         for (name, law) in self.laws()? {
             measure(&name, "f64", &law, &mut rows)?;

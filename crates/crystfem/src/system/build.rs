@@ -257,7 +257,9 @@ impl System {
                     let number = self.elements[position];
                     let (corners, nodes) = element::corners(mesh, number);
                     let geometry = Geometry::new(&corners[..nodes]);
-                    geometry.map(|g| Some(Box::new(g))).ok_or_else(|| Error::Mesh(format!("element {number}: inverted")))
+                    geometry
+                        .map(|g| Some(Box::new(g)))
+                        .ok_or_else(|| Error::Mesh(format!("element {number}: inverted")))
                 })
                 .collect::<Result<_, _>>()?;
             for (position, geometry) in range.zip(own) {

@@ -1,0 +1,147 @@
+//! One accepted step: its length, its attempts, and what it leaves.
+
+use super::{LinearSolver, Simulation};
+use crate::error::Error;
+use crate::ledger::Record;
+use crate::system::At;
+use crate::system::vector::{set, sum};
+use crate::time::{Attempt, Scheme, Stepper, Steps};
+
+/// Part of the step that the temporal error would allow, and growth of a step at most.
+const SAFETY: f64 = 0.9;
+const MOST_GROWTH: f64 = 4.0;
+
+impl Simulation {
+    /// One accepted step.
+    pub(super) fn step(&mut self, until: f64) -> Result<Record, Error> {
+        let time = self.state.time;
+        let next = self.breaks[self.breaks.partition_point(|&t| t <= time)..].first().copied();
+        let target = next.map_or(until, |next| next.min(until));
+        let jump = self.state.jump;
+        let scheme = if jump { Scheme::BackwardEuler } else { self.settings.scheme };
+        let adaptive = match self.settings.steps {
+            Steps::Adaptive { tolerance, smallest, largest, .. } => Some((tolerance, smallest, largest)),
+            Steps::Fixed { .. } => None,
+        };
+        if self.state.rate.is_empty() && (adaptive.is_some() || scheme == Scheme::TrBdf2) {
+            let (rate, exchange) = self.stepper.rate(&self.problem, &mut self.system, &self.state)?;
+            (self.state.rate, self.state.exchange) = (rate, exchange);
+        }
+        if jump {
+            self.state.direct = self.choose(until).direct;
+        }
+        let mut wanted = match self.settings.steps {
+            Steps::Fixed { dt } => dt,
+            Steps::Adaptive { largest, .. } => self.state.next_dt.min(largest),
+        };
+        loop {
+            let left = target - time;
+            let lands = wanted >= left * (1.0 - 1e-9);
+            let end = if lands {
+                target
+            } else if adaptive.is_some() && wanted > 0.5 * left {
+                time + 0.5 * left
+            } else {
+                time + wanted
+            };
+            // equal steps have one length to the last bit, and with it one matrix
+            let equal = (end - time - wanted).abs() <= 1e-9 * wanted;
+            let dt = if equal { wanted } else { end - time };
+            if end <= time {
+                let allowed = format!("steps that change the time {time} s");
+                return Err(Error::Parameter { name: "time step", found: wanted, allowed });
+            }
+            // factors serve many steps; a single one of another length does without
+            let single = adaptive.is_none() && (!equal || scheme != self.settings.scheme);
+            self.stepper.stages.direct =
+                self.state.direct && (!single || self.settings.solver == LinearSolver::Direct);
+            let accuracy = adaptive.map(|(tolerance, ..)| 0.05 * tolerance);
+            let mut work = self.state.work;
+            let attempt = self.stepper.attempt(
+                &self.problem,
+                &mut self.system,
+                &self.state,
+                scheme,
+                [dt, end],
+                self.settings.tolerance,
+                accuracy,
+                &mut work,
+            );
+            self.state.work = work;
+            let attempt = attempt.and_then(|mut attempt| {
+                let ratio = self.follow(dt)?;
+                attempt.step_ratio = ratio.into_iter().chain(attempt.step_ratio).reduce(f64::min);
+                Ok(attempt)
+            });
+            let Some((tolerance, smallest, largest)) = adaptive else {
+                return Ok(self.accept([dt, end], &attempt?));
+            };
+            // a wish below this is not granted by a shorter next step only
+            const REFUSED: f64 = 0.5;
+            let factor = match &attempt {
+                Ok(attempt) => {
+                    let ratio = attempt.step_ratio.unwrap_or(f64::INFINITY);
+                    let error = attempt.error.unwrap_or(0.0) / tolerance;
+                    let grow = (SAFETY * error.powf(-1.0 / f64::from(attempt.order))).clamp(0.1, MOST_GROWTH);
+                    if (error <= 1.0 && ratio >= REFUSED) || dt <= smallest * (1.0 + 1e-9) {
+                        // a step cut short by a landing says little about the next
+                        let grown = (dt * grow).max(if lands { wanted } else { 0.0 });
+                        self.state.next_dt = grown.min(dt * ratio).clamp(smallest, largest);
+                        return Ok(self.accept([dt, end], attempt));
+                    }
+                    grow.min(ratio.max(0.1)).min(0.9)
+                }
+                Err(_) => 0.25,
+            };
+            if dt <= smallest * (1.0 + 1e-9) {
+                return Ok(self.accept([dt, end], &attempt?));
+            }
+            self.state.work.rejected += 1;
+            wanted = (dt * factor).max(smallest);
+        }
+    }
+
+    /// States of materials whose energy does not depend on them, at the end of an attempt.
+    fn follow(&mut self, dt: f64) -> Result<Option<f64>, Error> {
+        let Stepper { temperature, stages, .. } = &mut self.stepper;
+        let at =
+            At { temperature, start: &self.state.temperature, dt, time: self.state.time, tangent: false };
+        let old = &self.state.memory.nodal;
+        let out = &mut stages.evaluation;
+        out.responses = 0;
+        let ratio = self.system.nodal.follow(&self.problem, &at, old, out)?;
+        self.state.work.responses += out.responses;
+        Ok(ratio)
+    }
+
+    /// Takes the end of the attempt as the new state.
+    fn accept(&mut self, [dt, end]: [f64; 2], attempt: &Attempt) -> Record {
+        let Self { state, stepper, system, .. } = self;
+        let size = system.size();
+        let Stepper { temperature, stages, .. } = stepper;
+        let residual = &stages.residual;
+        let change = &stages.evaluation.change;
+        let record = Record {
+            time: end,
+            dt,
+            stored: sum(size, |k| change[k]),
+            moved: sum(size, |k| change[k].abs()),
+            sensitivity: stages.sensitivity,
+            exchange: attempt.exchange,
+            reaction: system.fixed.iter().map(|&(equation, _)| residual[equation as usize]).sum(),
+            error: attempt.error,
+            step_ratio: attempt.step_ratio,
+        };
+        state.slope.resize(size, 0.0);
+        set(&mut state.slope, |k| (temperature[k] - state.temperature[k]) / dt);
+        std::mem::swap(&mut state.temperature, temperature);
+        std::mem::swap(&mut state.rate, &mut stages.evaluation.rate);
+        state.exchange = stages.evaluation.exchange;
+        std::mem::swap(&mut state.memory, &mut stages.evaluation.memory);
+        state.time = end;
+        state.jump = false;
+        state.work.steps += 1;
+        state.ledger.add(&record);
+        record
+    }
+}
