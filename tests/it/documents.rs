@@ -163,11 +163,13 @@ fn commands_shown_are_understood() {
         }
         let missing_example = arguments.iter().any(|a| a.ends_with(".toml") && !a.contains('/'));
         let mut run = command(program, "", playground.path());
-        run.args(&arguments);
+        // arguments are parsed from left to right, and help ends the parsing before anything is run
+        let end = arguments.iter().position(|argument| *argument == "--").unwrap_or(arguments.len());
+        run.args(&arguments[..end]);
         if !cheap || missing_example {
-            // arguments are parsed from left to right, and help ends the parsing before anything is run
             run.arg("--help");
         }
+        run.args(&arguments[end..]);
         let ended = finish(run.spawn().unwrap());
         if ended.code != Some(0) {
             faults.push(format!("{place}: exit code {:?}\n{}", ended.code, ended.stderr));

@@ -27,6 +27,7 @@ mod scene_command;
   mdsurrogate run cases/ch3/train-default/case.toml     train, judge, draw; results in out/train-default
   mdsurrogate resume out/train-default                  go on after an interruption
   mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      what a table holds
+  mdsurrogate schema > mdsurrogate.schema.json          for editors
 
 Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted."
 )]
@@ -73,6 +74,8 @@ enum Command {
     },
     /// Measure the cost of a stress, a tangent and a batch, in both precisions, on one thread.
     Bench(bench::Bench),
+    /// Print the JSON Schema of scenes, by which editors complete and check them.
+    Schema,
     /// Print a shell's completion script.
     Completions {
         /// The shell.
@@ -90,6 +93,10 @@ fn main() -> ExitCode {
         Command::Md(md) => md.run().map_err(Failure::from),
         Command::Export { law, output, form } => export(&law, &output, form).map_err(Failure::from),
         Command::Bench(bench) => bench.print().map_err(Failure::from),
+        Command::Schema => {
+            println!("{:#}", mdsurrogate::scene::schema());
+            Ok(true)
+        }
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "mdsurrogate", &mut std::io::stdout());
             Ok(true)

@@ -4,7 +4,7 @@ use super::real::Real;
 use serde::{Deserialize, Serialize};
 
 /// What a neuron does with its sum; (3.11) and more.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Activation {
     /// x.

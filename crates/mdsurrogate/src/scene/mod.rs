@@ -14,7 +14,7 @@ pub use model::{KindName, ModelSpec, Outputs, ThesisNetwork, TrainingSpec, check
 pub use search::SearchSpec;
 
 /// A whole scene.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// The program that runs it: `mdsurrogate`.
@@ -40,6 +40,11 @@ pub struct Scene {
     pub expect: Vec<Expect>,
 }
 
+/// The JSON Schema of scenes.
+pub fn schema() -> serde_json::Value {
+    polycore::scene::schema("mdsurrogate", |generator| vec![generator.subschema_for::<Scene>()])
+}
+
 impl Scene {
     /// Rules that serde does not know.
     ///
@@ -58,7 +63,7 @@ impl Scene {
 }
 
 /// The only program that runs these scenes.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Program {
     /// This crate.
@@ -66,7 +71,7 @@ pub enum Program {
 }
 
 /// Files and how to read them.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Data {
     /// CSV (also gzip) or HDF5 files to learn from, relative to the scene.
@@ -84,7 +89,7 @@ pub struct Data {
 }
 
 /// How rows are divided.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SplitSpec {
     /// `path` (default) or `random` (the thesis').

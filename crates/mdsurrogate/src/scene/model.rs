@@ -14,7 +14,7 @@ const OWN_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.
 const MOST_PARAMETERS: usize = 20_000_000;
 
 /// A law to train.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelSpec {
     /// Names its files and results; default: its network's row of Table 3.4, or its kind.
@@ -46,7 +46,7 @@ pub struct ModelSpec {
 }
 
 /// What the networks of a law compute, by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum KindName {
     /// C → S (3.9).
@@ -56,7 +56,7 @@ pub enum KindName {
 }
 
 /// The columns of Table 3.4.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[allow(missing_docs)]
 pub enum ThesisNetwork {
     #[serde(rename = "ANN-1")]
@@ -70,7 +70,7 @@ pub enum ThesisNetwork {
 }
 
 /// Units of an `ann`'s outputs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Outputs {
     /// Mean 0 and deviation 1 over the training rows, component by component.
@@ -80,7 +80,7 @@ pub enum Outputs {
 }
 
 /// How networks are trained; what is left out is that of [`Settings::default`].
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrainingSpec {
     /// Passes over the training rows.

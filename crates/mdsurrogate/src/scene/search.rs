@@ -7,7 +7,7 @@ use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
 
 /// What is searched, how, and how long.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SearchSpec {
     /// `hyperband`, `bayesian` or both, in this order.

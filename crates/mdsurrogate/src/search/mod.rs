@@ -19,7 +19,7 @@ use crate::Error;
 use serde::{Deserialize, Serialize};
 
 /// How candidates are chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Many candidates for few epochs, the best of them for more (Li et al. 2018,

@@ -337,7 +337,9 @@ mod tests {
             };
             for colors in [ColorMap::Inferno, ColorMap::Viridis] {
                 // the raster without the sample that is nothing, and a level of the bar
-                assert!(pixel(colors.at(frame as f64 / 2.0 * 119.0 / 119.0)) >= 3599, "frame {frame}");
+                let last = (LEVELS - 1) as f64;
+                let level = (frame as f64 / 2.0 * last).round();
+                assert!(pixel(colors.at(level / last)) >= 3599, "frame {frame}");
             }
             assert!(pixel([255; 3]) > 3600);
         }
