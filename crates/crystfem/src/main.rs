@@ -3,7 +3,7 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use crystfem::run::{Failure, Options, Progress, SweepOptions, Vary};
 use crystfem::scene::Kind;
-use polycore::command::{Progress as Bar, Threads, default_output, exit, interrupted, seconds};
+use polycore::command::{Progress as Bar, Threads, default_output, exit, interrupted, is_finished, seconds};
 use polycore::scene::Source;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -172,10 +172,7 @@ fn tell(text: &str, output: &Path) {
 }
 
 fn resume(output: &Path, every: f64) -> Result<bool, Failure> {
-    if !output.join(polycore::checkpoint::FILE_NAME).is_file()
-        && output.join(polycore::report::FILE_NAME).is_file()
-    {
-        println!("{} is finished: nothing to resume", output.display());
+    if is_finished(output) {
         return Ok(true);
     }
     let header = crystfem::run::checkpoint::header(output)?;

@@ -3,7 +3,7 @@
 use mdsurrogate::run::{self, Failure, Named, Options, Prepared, checkpoint, judge_laws};
 use mdsurrogate::scene::Scene;
 use mdsurrogate::surrogate::Surrogate;
-use polycore::command::{Progress, default_output, interrupted, seconds};
+use polycore::command::{Progress, default_output, interrupted, is_finished, seconds};
 use polycore::report::Report;
 use polycore::scene::Source;
 use std::path::{Path, PathBuf};
@@ -61,9 +61,7 @@ impl Resume {
     /// Goes on with a run.
     pub fn run(self) -> Result<bool, Failure> {
         let output = &self.output;
-        let is_there = |name| output.join(name).is_file();
-        if !is_there(polycore::checkpoint::FILE_NAME) && is_there(polycore::report::FILE_NAME) {
-            println!("{} is finished: nothing to resume", output.display());
+        if is_finished(output) {
             return Ok(true);
         }
         let header = checkpoint::header(output)?;

@@ -3,7 +3,7 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use peri::run::{Failure, Options};
 use peri::scene::Scene;
-use polycore::command::{Progress, Threads, default_output, exit, interrupted, seconds};
+use polycore::command::{Progress, Threads, default_output, exit, interrupted, is_finished, seconds};
 use polycore::scene::Source;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -124,10 +124,7 @@ fn run(scene: &Path, output: &Path, quick: bool, explain: bool, every: f64) -> R
 }
 
 fn resume(output: &Path, every: f64) -> Result<bool, Failure> {
-    if !output.join(peri::checkpoint::FILE_NAME).is_file()
-        && output.join(polycore::report::FILE_NAME).is_file()
-    {
-        println!("{} is finished: nothing to resume", output.display());
+    if is_finished(output) {
         return Ok(true);
     }
     let header = peri::checkpoint::header(output)?;

@@ -36,6 +36,16 @@ pub fn default_output(scene: &Path) -> PathBuf {
     Path::new("out").join(name)
 }
 
+/// Whether the run of an output directory is finished, which is said: its report is there, and its checkpoint is gone.
+pub fn is_finished(output: &Path) -> bool {
+    let there = |name: &str| output.join(name).is_file();
+    let finished = !there(crate::checkpoint::FILE_NAME) && there(crate::report::FILE_NAME);
+    if finished {
+        println!("{} is finished: nothing to resume", output.display());
+    }
+    finished
+}
+
 /// A time in seconds, for clap.
 ///
 /// # Errors

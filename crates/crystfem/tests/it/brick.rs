@@ -52,31 +52,3 @@ fn lumped_capacity_comes_close() {
     });
     assert!(difference[1].abs() < 0.35 * difference[0].abs(), "{difference:?}");
 }
-
-/// `cargo test --release -p crystfem --test it brick::times -- --ignored --nocapture`
-#[test]
-#[ignore = "times, for a quiet machine"]
-fn times() {
-    for elements in [26, 45, 66, 99] {
-        for capacity in [Capacity::Lumped, Capacity::Consistent] {
-            let start = std::time::Instant::now();
-            let mut simulation = brick(elements, capacity);
-            let built = start.elapsed();
-            let start = std::time::Instant::now();
-            run(&mut simulation, 10.0);
-            println!(
-                "{:7} dof {capacity:?}: build {:.3} s, step {:.5} s, {:?}",
-                (elements + 1_usize).pow(3),
-                built.as_secs_f64(),
-                start.elapsed().as_secs_f64() / 20.0,
-                simulation.state().work
-            );
-            // the largest so far: of the last size
-            let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-            println!(
-                "{}",
-                status.lines().find(|line| line.starts_with("VmHWM")).unwrap_or("no figure of memory")
-            );
-        }
-    }
-}

@@ -81,28 +81,3 @@ fn the_choice_follows_the_scene() {
     run(&mut line, 1e4);
     assert_eq!((line.state().work.factorizations, line.state().work.direct_solves), (1, 100));
 }
-
-/// `cargo test --release -p crystfem --test it solvers::iterations -- --ignored --nocapture`
-#[test]
-#[ignore = "times, for a quiet machine"]
-fn iterations() {
-    for elements in [26, 45] {
-        for dt in [0.5, 5.0, 50.0, 500.0] {
-            for solver in [LinearSolver::ConjugateGradients, LinearSolver::Direct] {
-                let settings = Settings { tolerance: 1e-7, ..settings(solver, Scheme::BackwardEuler, dt) };
-                let mut simulation = brick(elements, Capacity::Lumped, settings);
-                let start = std::time::Instant::now();
-                run(&mut simulation, dt);
-                let first = start.elapsed().as_secs_f64();
-                let start = std::time::Instant::now();
-                run(&mut simulation, 11.0 * dt);
-                println!(
-                    "{elements}³, {dt} s, {solver:?}: first {first:.4} s, then {:.4} s a step, {:?}; {}",
-                    start.elapsed().as_secs_f64() / 10.0,
-                    simulation.state().work,
-                    simulation.choose(1e3 * dt).reason
-                );
-            }
-        }
-    }
-}

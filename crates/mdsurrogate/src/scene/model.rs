@@ -29,7 +29,8 @@ pub struct ModelSpec {
     pub symmetry: Option<Symmetry>,
     /// Material axes of an energy as rows; default: those of the data.
     pub axes: Option<[[f64; 3]; 3]>,
-    /// Whether an energy is polyconvex by construction; it cannot follow data that soften.
+    /// Whether an energy is polyconvex by construction; it cannot follow data that soften. Such laws can be used and
+    /// exported, but training refuses them so far.
     #[serde(default)]
     pub polyconvex: bool,
     /// Networks trained from different seeds into one law.
