@@ -6,7 +6,11 @@
 //! after a `relu`. Each sum is taken in the order of the inputs, whatever the number of columns: the same bits.
 
 use super::real::{Lanes, Real};
+use aligned_vec::{AVec, ConstAlign};
 use pulp::Simd;
+
+/// Numbers that begin where a cache line does: a vector that lies across two lines costs two loads.
+type Lines<T> = AVec<T, ConstAlign<64>>;
 
 /// Most columns of one product: a value and eight slopes.
 pub(super) const MOST_COLUMNS: usize = 9;
@@ -16,8 +20,8 @@ pub(super) const MOST_COLUMNS: usize = 9;
 pub(super) struct Packed<T> {
     inputs: usize,
     padded: usize,
-    weights: Vec<T>,
-    bias: Vec<T>,
+    weights: Lines<T>,
+    bias: Lines<T>,
 }
 
 impl<T: Real> Packed<T> {
@@ -33,16 +37,16 @@ impl<T: Real> Packed<T> {
 
     fn fill(inputs: usize, outputs: usize, bias: &[T], weight: impl Fn(usize, usize) -> T) -> Self {
         let padded = padded::<T>(outputs);
-        let mut weights = vec![T::ZERO; inputs * padded];
+        let mut weights = zeros(inputs * padded);
         for k in 0..outputs {
             let (panel, lane) = (k / T::PANEL, k % T::PANEL);
             for j in 0..inputs {
                 weights[(panel * inputs + j) * T::PANEL + lane] = weight(k, j);
             }
         }
-        let mut bias = bias.to_vec();
-        bias.resize(padded, T::ZERO);
-        Self { inputs, padded, weights, bias }
+        let mut filled = zeros(padded);
+        filled[..bias.len()].copy_from_slice(bias);
+        Self { inputs, padded, weights, bias: filled }
     }
 
     /// W x + b for each column of x, b only in the first `biased` of them; columns lie `stride` apart, those of the
@@ -169,6 +173,12 @@ impl<T: Real> Packed<T> {
             }
         }
     }
+}
+
+fn zeros<T: Real>(length: usize) -> Lines<T> {
+    let mut list = Lines::with_capacity(0, length);
+    list.resize(length, T::ZERO);
+    list
 }
 
 /// Outputs in whole panels.

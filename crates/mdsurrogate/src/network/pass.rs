@@ -5,6 +5,9 @@ use super::real::Real;
 use super::{Activation, Layer, Network};
 use pulp::{Arch, Simd, WithSimd};
 
+/// Values whose being 0 is one word of bits.
+const GROUP: usize = 64;
+
 /// Points that a batch takes side by side.
 pub(crate) const BATCH: usize = 8;
 
@@ -165,10 +168,17 @@ fn find_active<'a, T: Real>(values: &[T], sparse: bool, all: &'a [u32], active: 
         return &all[..width];
     }
     let mut count = 0;
-    for j in 0..width {
-        active[count] = j as u32;
-        // NaN is not 0
-        count += usize::from(values[j] != T::ZERO);
+    for (start, part) in (0..).step_by(GROUP).zip(values.chunks(GROUP)) {
+        let mut bits = 0_u64;
+        for (lane, value) in part.iter().enumerate() {
+            // NaN is not 0
+            bits |= u64::from(*value != T::ZERO) << lane;
+        }
+        while bits != 0 {
+            active[count] = start + bits.trailing_zeros();
+            count += 1;
+            bits &= bits - 1;
+        }
     }
     &active[..count]
 }
