@@ -26,7 +26,7 @@ mod surrogate;
 #[derive(clap::Args)]
 pub struct Options {
     /// `langevin`, `peri-laws`, `peri-peers` (beside LAMMPS), `peri-solvers [-- MM,MM…]`, `crystfem [-- PART… N,N…]`
-    /// (its brick beside CalculiX and scikit-fem), `mdsurrogate` (its training beside PyTorch), or a program with a `bench --json`.
+    /// (its brick beside CalculiX and scikit-fem), `mdsurrogate` (its training and answers beside PyTorch and onnxruntime), or a program with a `bench --json`.
     name: String,
     /// Print the rows as JSON.
     #[arg(long)]
@@ -83,7 +83,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
             (rows, table, true)
         }
         "mdsurrogate" if options.arguments.is_empty() => {
-            let rows = surrogate::run(workspace)?;
+            let rows = surrogate::run(workspace, &folder)?;
             let table = text(&rows);
             (rows, table, true)
         }

@@ -15,6 +15,7 @@ use std::process::ExitCode;
 mod bench;
 mod bench_training;
 mod md_command;
+mod predict;
 mod scene_command;
 
 /// From molecular dynamics to a constitutive law.
@@ -26,6 +27,8 @@ mod scene_command;
   mdsurrogate check cases/ch3/train-default/case.toml   the scene and its data
   mdsurrogate run cases/ch3/train-default/case.toml     train, judge, draw; results in out/train-default
   mdsurrogate resume out/train-default                  go on after an interruption
+  mdsurrogate predict law.safetensors strains.csv -o stresses.csv
+                                                        what a law answers at the strains of a table
   mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      what a table holds
   mdsurrogate schema > mdsurrogate.schema.json          for editors
 
@@ -72,6 +75,8 @@ enum Command {
         #[arg(long, value_enum, default_value_t = Form::C)]
         form: Form,
     },
+    /// Answer at the strains of a table: stress, doubts, tangent.
+    Predict(predict::Predict),
     /// Measure the cost of a stress, a tangent and a batch, in both precisions, on one thread.
     Bench(bench::Bench),
     /// Print the JSON Schema of scenes, by which editors complete and check them.
@@ -92,6 +97,7 @@ fn main() -> ExitCode {
         Command::Info { file, instantaneous } => info(&file, instantaneous).map_err(Failure::from),
         Command::Md(md) => md.run().map_err(Failure::from),
         Command::Export { law, output, form } => export(&law, &output, form).map_err(Failure::from),
+        Command::Predict(predict) => predict.print().map_err(Failure::from),
         Command::Bench(bench) => bench.print().map_err(Failure::from),
         Command::Schema => {
             println!("{:#}", mdsurrogate::scene::schema());

@@ -1,37 +1,107 @@
-//! `mdsurrogate`: its own measurements, and an epoch of the thesis' network beside PyTorch in the same run.
+//! `mdsurrogate`: its own measurements; beside them, in the same run, an epoch of the thesis' network in PyTorch, and the
+//! answers of a trained law in PyTorch and in onnxruntime.
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use miette::Result;
+use miette::{IntoDiagnostic, Result, WrapErr, miette};
+use polycore::output::atomic_write;
 
 use super::{Row, external};
 use crate::workspace::Workspace;
 
-const SCRIPT: &str = include_str!("torch_training.py");
+const TRAINING: &str = include_str!("torch_training.py");
+const ANSWERS: &str = include_str!("surrogate_peers.py");
 
-/// Rows; what PyTorch cannot measure here is named in a row without a value.
-pub fn run(workspace: &Workspace) -> Result<Vec<Row>> {
+/// The case whose ANN-4 is asked, as its quick tier trains it.
+const CASE: &str = "cases/ch3/train-default/case.toml";
+
+/// Strains at which it is asked.
+const POINTS: usize = 512;
+
+/// Rows; what a peer cannot measure here is named in a row without a value.
+pub fn run(workspace: &Workspace, folder: &Path) -> Result<Vec<Row>> {
     let program = workspace.release("mdsurrogate")?;
     let mut rows = external(&program, &[])?;
     rows.extend(external(&program, &["--training".to_owned()])?);
-    let python = std::env::var("TORCH_PYTHON").unwrap_or_else(|_| "python3".into());
-    match torch(Path::new(&python)) {
-        Some(measured) => rows.extend(measured),
-        None => rows.push(Row {
-            what: format!("PyTorch: skipped, `{python}` has none (TORCH_PYTHON names another)"),
-            size: 0,
-            threads: 1,
-            value: None,
-            unit: String::new(),
-        }),
+    let folder = folder.join("mdsurrogate");
+    let path = |name: &str| folder.join(name).display().to_string();
+    let (law, strains, answers) = (path("ANN-4.safetensors"), path("strains.csv"), path("answers.csv"));
+    let case = workspace.root().join(CASE).display().to_string();
+    mdsurrogate(&program, &["run", &case, "--quick", "--output", &folder.display().to_string()])?;
+    let table = points();
+    atomic_write(&strains, |file| std::io::Write::write_all(file, table.as_bytes())).into_diagnostic()?;
+    mdsurrogate(&program, &["predict", &law, &strains, "--tangent", "--output", &answers])?;
+    mdsurrogate(&program, &["export", &law, &path("ann4"), "--form", "onnx"])?;
+    for (name, variable, script, arguments) in [
+        (
+            "PyTorch, training",
+            "TORCH_PYTHON",
+            TRAINING,
+            ["58176", "4", "32", "256"].map(str::to_owned).to_vec(),
+        ),
+        ("PyTorch, answers", "TORCH_PYTHON", ANSWERS, vec!["torch".to_owned(), law, answers.clone()]),
+        ("onnxruntime", "ONNX_PYTHON", ANSWERS, vec!["onnx".to_owned(), path("ann4.onnx"), answers]),
+    ] {
+        let python = std::env::var(variable).unwrap_or_else(|_| "python3".into());
+        match peer(Path::new(&python), script, &arguments) {
+            Ok(measured) => rows.extend(measured),
+            Err(reason) => rows.push(Row {
+                what: format!("{name}: skipped, `{python}` ({variable} names another): {reason}"),
+                size: 0,
+                threads: 1,
+                value: None,
+                unit: String::new(),
+            }),
+        }
     }
     Ok(rows)
 }
 
-fn torch(python: &Path) -> Option<Vec<Row>> {
+/// Strains of the training data's kind, stretches of up to 0.9 to 1.3, and some shear beyond it.
+fn points() -> String {
+    let mut table = "C11,C22,C33,C12,C13,C23\n".to_owned();
+    for k in 0..POINTS {
+        let at = |a: usize| ((k * (2 * a + 3)) % 97) as f64 / 97.0;
+        let normal = |a: usize| 0.9 + 0.4 * at(a);
+        let shear = |a: usize| 0.02 * (at(a) - 0.5);
+        let _ = writeln!(
+            table,
+            "{},{},{},{},{},{}",
+            normal(0),
+            normal(1),
+            normal(2),
+            shear(3),
+            shear(4),
+            shear(5)
+        );
+    }
+    table
+}
+
+/// Runs the program; what it prints is shown only if it fails.
+fn mdsurrogate(program: &Path, arguments: &[&str]) -> Result<()> {
+    let output = Command::new(program)
+        .args(arguments)
+        .stdin(Stdio::null())
+        .output()
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot start {}", program.display()))?;
+    // 1: an expectation of the case was not met, which is not the question here
+    match output.status.code() {
+        Some(0 | 1) => Ok(()),
+        _ => Err(miette!("mdsurrogate {}: {}", arguments.join(" "), String::from_utf8_lossy(&output.stderr))),
+    }
+}
+
+fn peer(python: &Path, script: &str, arguments: &[String]) -> Result<Vec<Row>, String> {
     let mut command = Command::new(python);
-    command.args(["-c", SCRIPT, "58176", "4", "32", "256"]).stdin(Stdio::null()).stderr(Stdio::null());
-    let output = command.output().ok().filter(|output| output.status.success())?;
-    serde_json::from_slice(&output.stdout).ok()
+    command.args(["-c", script]).args(arguments).stdin(Stdio::null());
+    let output = command.output().map_err(|error| error.to_string())?;
+    if !output.status.success() {
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        return Err(errors.lines().last().unwrap_or("no message").to_owned());
+    }
+    serde_json::from_slice(&output.stdout).map_err(|error| error.to_string())
 }

@@ -1,0 +1,111 @@
+//! `mdsurrogate predict`: what a law answers at the strains of a table.
+
+use mdsurrogate::Error;
+use mdsurrogate::kinematics::NAMES;
+use mdsurrogate::surrogate::{Answer, Surrogate, Workspace};
+use polycore::output::csv;
+use polycore::tensor::Voigt;
+use std::path::{Path, PathBuf};
+
+/// Pascals in a megapascal.
+const MEGA: f64 = 1e6;
+
+/// A law and where it is asked.
+#[derive(clap::Args)]
+pub struct Predict {
+    /// The law (safetensors).
+    law: PathBuf,
+    /// The strains (CSV): columns C11, C22, C33 and, where there is shear, C12, C13, C23 (C = FᵀF; C12 counted once).
+    table: PathBuf,
+    /// The answers (CSV): S and its spread in MPa, W in MJ/m³ of an energy, and a 1 for each doubt.
+    #[arg(long, short)]
+    output: PathBuf,
+    /// Also the 36 components of 2 ∂S/∂C.
+    #[arg(long)]
+    tangent: bool,
+}
+
+impl Predict {
+    /// Answers and writes.
+    pub fn print(self) -> Result<bool, Error> {
+        let law = Surrogate::<f64>::read(&self.law)?;
+        let points = strains(&self.table)?;
+        let mut answers = vec![Answer::default(); points.len()];
+        let mut memory = Workspace::default();
+        let asked = if self.tangent {
+            law.tangents(&points, &mut memory, &mut answers)
+        } else {
+            law.stresses(&points, &mut memory, &mut answers)
+        };
+        asked.map_err(|error| match error {
+            Error::Parameter { name, found, allowed } => {
+                Error::File { path: self.table.clone(), found: format!("{name}: {found}"), allowed }
+            }
+            other => other,
+        })?;
+        write(&self.output, &points, &answers)?;
+        let doubtful = answers.iter().filter(|answer| answer.flags.any()).count();
+        println!("{} answers, {doubtful} of them with a doubt: {}", answers.len(), self.output.display());
+        Ok(true)
+    }
+}
+
+/// The six components of C in each row; shear that has no column is 0, other columns are left alone.
+fn strains(path: &Path) -> Result<Vec<Voigt>, Error> {
+    let known = NAMES.map(|name| format!("C{name}"));
+    let table = csv::read(path)?;
+    let mut points = vec![Voigt::zeros(); table.first().map_or(0, |(_, column)| column.len())];
+    // a slip in a name must not become a shear of 0
+    if let Some((heading, _)) =
+        table.iter().find(|(name, _)| name.starts_with(['C', 'c']) && !known.contains(name))
+    {
+        let found = format!("column `{heading}`");
+        return Err(Error::File { path: path.to_path_buf(), found, allowed: known.join(", ") });
+    }
+    for (a, name) in known.iter().enumerate() {
+        match table.iter().find(|(heading, _)| heading == name) {
+            Some((_, column)) => points.iter_mut().zip(column).for_each(|(point, &value)| point[a] = value),
+            None if a < 3 => {
+                let (path, column) = (path.to_path_buf(), name.clone());
+                return Err(Error::MissingColumn { path, column, similar: None });
+            }
+            None => {}
+        }
+    }
+    Ok(points)
+}
+
+fn write(path: &Path, points: &[Voigt], answers: &[Answer<f64>]) -> Result<(), Error> {
+    let column = |value: &dyn Fn(&Answer<f64>) -> f64| answers.iter().map(value).collect::<Vec<f64>>();
+    let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
+    for (a, name) in NAMES.iter().enumerate() {
+        columns.push((format!("C{name}"), "", points.iter().map(|point| point[a]).collect()));
+    }
+    for (a, name) in NAMES.iter().enumerate() {
+        columns.push((format!("S{name}"), "MPa", column(&|answer| answer.stress[a] / MEGA)));
+    }
+    if answers.iter().any(|answer| answer.energy.is_some()) {
+        columns.push(("W".into(), "MJ/m³", column(&|answer| answer.energy.unwrap_or(f64::NAN) / MEGA)));
+    }
+    columns.push(("spread".into(), "MPa", column(&|answer| answer.spread / MEGA)));
+    let doubts: [(&str, &dyn Fn(&Answer<f64>) -> bool); 4] = [
+        ("outside the box", &|answer| answer.flags.outside.contains(&true)),
+        ("never seen", &|answer| answer.flags.unseen.contains(&true)),
+        ("far from the data", &|answer| answer.flags.far),
+        ("members disagree", &|answer| answer.flags.spread),
+    ];
+    for (name, doubt) in doubts {
+        columns.push((name.into(), "", column(&|answer| f64::from(u8::from(doubt(answer))))));
+    }
+    if answers.iter().any(|answer| answer.tangent.is_some()) {
+        for (a, row) in NAMES.iter().enumerate() {
+            for (b, name) in NAMES.iter().enumerate() {
+                let value = |answer: &Answer<f64>| answer.tangent.map_or(f64::NAN, |t| t[(a, b)] / MEGA);
+                columns.push((format!("tangent {row} {name}"), "MPa", column(&value)));
+            }
+        }
+    }
+    let columns: Vec<csv::Column> =
+        columns.iter().map(|(name, unit, values)| (name.as_str(), *unit, &values[..])).collect();
+    Ok(csv::write(path, &columns)?)
+}
