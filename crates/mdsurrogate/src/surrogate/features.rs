@@ -14,18 +14,24 @@ const REPRESENTATIVES: usize = 256;
 pub(crate) struct Features {
     /// Standardised inputs (3.8); the first of them count.
     pub values: [f64; LANES],
-    /// Of an energy: their derivatives by the six components of C, C₁₂ counted once.
+    /// Of an energy: derivatives of its invariants, not yet standardised, by the six components of C, C₁₂ counted once.
     pub slopes: [[f64; 6]; LANES],
 }
 
 impl Surrogate<f64> {
+    /// What each input is multiplied with when it is standardised (3.8); 0 for one without variance.
+    #[cfg(feature = "train")]
+    pub(crate) fn input_scales(&self) -> &[f64] {
+        &self.inverse
+    }
+
     /// The inputs at `c`; those of an `ann` are the components of C themselves and have no slopes.
     pub(crate) fn features(&self, c: &Voigt) -> Features {
         let mut features = Features { values: [0.0; LANES], slopes: [[0.0; 6]; LANES] };
         let local = self.input(&(*c).into(), &mut features.values);
         if let Some(invariants) = self.header.kind.invariants() {
             for k in 0..invariants.count() {
-                let slope = invariants.gradient(&local, k).map(|slope| slope * self.inverse[k]);
+                let slope = invariants.gradient(&local, k);
                 features.slopes[k] = match &self.turn {
                     Some(turn) => back(turn, &slope, &[[0.0; 6]; 6]).0,
                     None => slope,
@@ -149,7 +155,7 @@ mod tests {
                 let (up, down) = (law.features(&(at + step)).values, law.features(&(at - step)).values);
                 for k in 0..law.header().kind.inputs() {
                     // rounding 1e-16/1e-5; cubic at most
-                    assert!(((up[k] - down[k]) / 2e-5 - slopes[k][a]).abs() < 1e-9, "{symmetry:?} {k} {a}");
+                    assert!(((up[k] - down[k]) / 2e-5 - slopes[k][a] * law.inverse[k]).abs() < 1e-9, "{symmetry:?} {k} {a}");
                 }
             }
         }

@@ -43,17 +43,18 @@ impl Kind {
         Self::Energy { symmetry, axes: AXES, polyconvex: true }
     }
 
+    /// Whether this is a polyconvex energy.
+    pub fn is_polyconvex(&self) -> bool {
+        matches!(self, Self::Energy { polyconvex: true, .. })
+    }
+
     /// Whether a weight of `layer` (0 is the one after the inputs) for its input `input` must not be negative, so that a
     /// polyconvex energy is convex and grows in all its inputs but J, the last one, which may come with any sign.
     ///
     /// With convex growing activations (`softplus`, `relu`, `elu`, `linear`) a network of such weights is an
-    /// input-convex one (Amos et al. 2017, <https://arxiv.org/abs/1609.07152>). Files hold the weights themselves; a
-    /// training without bounds writes them as softplus(r) of free numbers r.
+    /// input-convex one (Amos et al. 2017, <https://arxiv.org/abs/1609.07152>).
     pub fn non_negative(&self, layer: usize, input: usize) -> bool {
-        match self {
-            Self::Energy { polyconvex: true, .. } => layer > 0 || input + 1 < self.inputs(),
-            _ => false,
-        }
+        self.is_polyconvex() && (layer > 0 || input + 1 < self.inputs())
     }
 
     /// The invariants of an energy.

@@ -23,10 +23,12 @@ pub use header::{Header, Kind};
 pub use support::Support;
 pub use symmetry::Symmetry;
 
+pub(crate) use invariants::Invariants;
+pub(crate) use symmetry::StressAtRest;
+
 use crate::Error;
 use crate::kinematics::cauchy_of_material;
 use crate::network::{LANES, Network, Real, Tape};
-use invariants::Invariants;
 use nalgebra::SVector;
 use polycore::tensor::{DeformationGradient, Voigt, voigt};
 use support::Nearest;
@@ -177,15 +179,17 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
                         (T::ONE + T::ONE) * self.output[0] * gradient[k] * self.inverse[k] * slope[a];
                 }
             }
-            // (stress, place of aᵢ·Caᵢ, of aᵢ·cof C aᵢ)
-            let [s1, s2, s3, ..] = stress;
-            let (spherical, directions): (T, &[(T, usize, usize)]) = match symmetry {
-                Symmetry::Orthotropic => (T::ZERO, &[(s1, 0, 3), (s2, 1, 4), (s3, 2, 5)]),
-                Symmetry::Transverse => (s1, &[(s3 - s1, 2, 3)]),
-                _ => (s1, &[]),
+            let part = |of: [f64; 3]| {
+                let mut sum = T::ZERO;
+                for i in 0..3 {
+                    sum += T::from_f64(of[i]) * stress[i];
+                }
+                sum
             };
-            rest.invariants[last] = -spherical;
-            for &(s, plain, cofactor) in directions {
+            let StressAtRest { spherical, along } = symmetry.stress_at_rest();
+            rest.invariants[last] = -part(spherical);
+            for &(of, plain, cofactor) in along {
+                let s = part(of);
                 if s < T::ZERO {
                     rest.invariants[plain] = -(s / (T::ONE + T::ONE));
                 } else {

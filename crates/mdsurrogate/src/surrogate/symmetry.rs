@@ -104,6 +104,29 @@ impl Symmetry {
             Self::Isotropic => Some(&[FIRST, SECOND, THIRD]),
         }
     }
+
+    /// How a polyconvex energy takes away its stress at rest, which has the form p 1 + Σ s a⊗a in the material axes.
+    pub(crate) fn stress_at_rest(self) -> StressAtRest {
+        match self {
+            Self::Orthotropic => StressAtRest {
+                spherical: [0.0; 3],
+                along: &[([1.0, 0.0, 0.0], 0, 3), ([0.0, 1.0, 0.0], 1, 4), ([0.0, 0.0, 1.0], 2, 5)],
+            },
+            Self::Transverse => {
+                StressAtRest { spherical: [1.0, 0.0, 0.0], along: &[([-1.0, 0.0, 1.0], 2, 3)] }
+            }
+            _ => StressAtRest { spherical: [1.0, 0.0, 0.0], along: &[] },
+        }
+    }
+}
+
+/// The parts of S(I) = p 1 + Σ s a⊗a as sums over S₁₁, S₂₂, S₃₃.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StressAtRest {
+    /// p.
+    pub spherical: [f64; 3],
+    /// Of each direction a: s, and the places of a·Ca and a·cof C a among the polyconvex invariants.
+    pub along: &'static [([f64; 3], usize, usize)],
 }
 
 /// The matrix T of C' = T C (as vectors), C' in the material axes, which are the rows of `axes`.

@@ -13,7 +13,8 @@ pub(super) struct Examples {
     inputs: usize,
     /// (rows, inputs).
     x: Vec<f32>,
-    /// (rows, inputs · 6): what the gradient of N by its inputs is multiplied with to give S in MPa; of an energy.
+    /// (rows, inputs · 6): what the gradient of N by its inputs is multiplied with to give S in MPa; of an energy. Of a
+    /// polyconvex one, by its invariants: also by those without variance in these rows, which its stress at rest needs.
     slopes: Vec<f32>,
     /// (rows, 6): targets, in units of [`units`].
     s: Vec<f32>,
@@ -46,8 +47,11 @@ pub(super) fn scaled_slopes(law: &Surrogate<f64>, slopes: &[[f64; 6]]) -> Vec<f3
     let scale = law.header().output_deviation[0] / MEGAPASCAL;
     // S_ii = 2 ∂W/∂C_ii, S_12 = ∂W/∂C_12 with C_12 counted once
     let factor = |a: usize| if a < 3 { 2.0 } else { 1.0 };
-    let row = |slope: &[f64; 6]| [0, 1, 2, 3, 4, 5].map(|a| (factor(a) * scale * slope[a]) as f32);
-    slopes.iter().flat_map(row).collect()
+    let row = |(slope, input): (&[f64; 6], &f64)| {
+        let input = if law.header().kind.is_polyconvex() { 1.0 } else { *input };
+        [0, 1, 2, 3, 4, 5].map(|a| (factor(a) * scale * (slope[a] * input)) as f32)
+    };
+    slopes.iter().zip(law.input_scales()).flat_map(row).collect()
 }
 
 impl Examples {

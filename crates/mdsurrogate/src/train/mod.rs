@@ -162,7 +162,7 @@ pub struct Training {
 }
 
 impl Training {
-    /// A network with random weights ([`Network::random`] of the seed), to be trained as one member of a law.
+    /// A network with random weights ([`Surrogate::random`] of the seed), to be trained as one member of a law.
     ///
     /// Without validation rows the training loss of an epoch takes their place.
     ///
@@ -175,9 +175,9 @@ impl Training {
         validation: &[&Row],
         settings: Settings,
     ) -> Result<Self, Error> {
-        let network = Network::random(header.architecture.clone(), settings.seed)?;
+        let law = Surrogate::random(Header { members: 1, ..header.clone() }, settings.seed)?;
         let layout = Layout::new(&header.architecture);
-        let state = State::new(layout.flat(&network));
+        let state = State::new(layout.flat(&law.members()[0]));
         Self::resume(header, train, validation, settings, state)
     }
 
@@ -259,6 +259,8 @@ impl Training {
                 return diverged(self, batch + 1, step.loss);
             }
             self.state.adam.step(rate, &mut self.state.weights, &self.layout, &step.gradients);
+            // bounds by projection: weights in files, checkpoints and steps are the same numbers
+            self.layout.project(&self.header.kind, &mut self.state.weights);
             for (sum, square) in squares.iter_mut().zip(step.squares) {
                 *sum += square;
             }

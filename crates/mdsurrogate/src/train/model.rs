@@ -4,21 +4,97 @@ use super::dataset::{Batch, scaled_slopes, units};
 use super::parameters::Layout;
 use crate::Error;
 use crate::network::Activation;
-use crate::surrogate::{Kind, Surrogate};
+use crate::surrogate::{Invariants, Kind, StressAtRest, Surrogate, Symmetry};
 use burn::tensor::{Device, Tensor, TensorData, activation};
 use polycore::tensor::Voigt;
 
 /// A law's networks, without their weights.
 pub(super) struct Model {
     activations: Vec<Activation>,
-    /// Of an energy: inputs and slopes at C = I, where the stress is to vanish.
-    identity: Option<[TensorData; 2]>,
+    /// Of an energy.
+    rest: Option<Rest>,
     /// Squares of the units of the outputs, MPa².
     unit_squares: [f64; 6],
     /// What a component's square, MPa², counts.
     weights: [f64; 6],
     device: Device,
     tracking: Device,
+}
+
+/// How the stress of an energy vanishes at C = I.
+struct Rest {
+    /// Inputs there.
+    x: TensorData,
+    taken: Taken,
+}
+
+/// What an energy's stress S(C) loses.
+enum Taken {
+    /// S(I) = Σ_k ∂N/∂x_k · slopes_k, the slopes at I: (1, inputs, 6).
+    Stress(TensorData),
+    /// Multiples of the invariants, see `Surrogate::rest_of`.
+    Polyconvex(Polyconvex),
+}
+
+/// Matrices from ∂N/∂x at I, with x the invariants, to the multiples of the invariants that are added to W.
+struct Polyconvex {
+    /// (1, inputs): from the derivative by an input to that by an invariant.
+    scales: TensorData,
+    /// (inputs, 3): the parts s of S(I) along directions.
+    along: TensorData,
+    /// (3, inputs): what is added for a negative and for a positive s.
+    negative: TensorData,
+    positive: TensorData,
+    /// (inputs, inputs): what is added for the pressure at I.
+    spherical: TensorData,
+}
+
+impl Polyconvex {
+    /// In units in which the energy is Σ_k weight_k x_k.
+    fn new(law: &Surrogate<f64>, symmetry: Symmetry, invariants: Invariants) -> Self {
+        let inputs = invariants.count();
+        let StressAtRest { spherical, along } = symmetry.stress_at_rest();
+        let identity = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
+        // S_ii = 2 Σ_k ∂W/∂x_k ∂x_k/∂C_ii
+        let part = |k: usize, of: [f64; 3]| {
+            let slope = invariants.gradient(&identity, k);
+            (0..3).map(|i| 2.0 * slope[i] * of[i]).sum::<f64>()
+        };
+        let (mut parts, mut pressure) = (vec![0.0; 3 * inputs], vec![0.0; inputs * inputs]);
+        let (mut negative, mut positive) = (vec![0.0; 3 * inputs], vec![0.0; 3 * inputs]);
+        for k in 0..inputs {
+            pressure[(k + 1) * inputs - 1] = -part(k, spherical);
+        }
+        for (d, &(of, plain, cofactor)) in along.iter().enumerate() {
+            for k in 0..inputs {
+                parts[3 * k + d] = part(k, of);
+            }
+            negative[d * inputs + plain] = 0.5;
+            positive[d * inputs + cofactor] = 0.5;
+            positive[(d + 1) * inputs - 1] = -1.0;
+        }
+        let data = |values: &[f64], shape: [usize; 2]| {
+            TensorData::new(values.iter().map(|value| *value as f32).collect::<Vec<f32>>(), shape)
+        };
+        Self {
+            scales: data(law.input_scales(), [1, inputs]),
+            along: data(&parts, [inputs, 3]),
+            negative: data(&negative, [3, inputs]),
+            positive: data(&positive, [3, inputs]),
+            spherical: data(&pressure, [inputs, inputs]),
+        }
+    }
+
+    /// ∂W/∂x by the invariants from ∂N/∂x by the inputs, (rows, inputs), and the same at I, (1, inputs).
+    fn corrected(&self, gradient: Tensor<2>, at_rest: Tensor<2>, device: &Device) -> Tensor<2> {
+        let tensor = |data: &TensorData| Tensor::<2>::from_data(data.clone(), device);
+        let at_rest = at_rest * tensor(&self.scales);
+        let along = at_rest.clone().matmul(tensor(&self.along));
+        let added = activation::relu(-along.clone()).matmul(tensor(&self.negative))
+            + activation::relu(along).matmul(tensor(&self.positive))
+            + at_rest.matmul(tensor(&self.spherical));
+        gradient * tensor(&self.scales) + added
+    }
 }
 
 /// A layer's parameters as tensors: (inputs, outputs) and (1, outputs).
@@ -49,16 +125,8 @@ impl Model {
     pub fn new(law: &Surrogate<f64>, weights: &[f64; 6]) -> Result<Self, Error> {
         let header = law.header();
         let activations = header.architecture.activations.clone();
-        let identity = match header.kind {
-            Kind::Ann => None,
-            Kind::Energy { polyconvex: true, .. } => {
-                return Err(Error::parameter(
-                    "kind",
-                    "a polyconvex energy",
-                    "an energy that is not (so far)",
-                ));
-            }
-            Kind::Energy { .. } => {
+        let rest = match (&header.kind, header.kind.invariants()) {
+            (Kind::Energy { symmetry, polyconvex, .. }, Some(invariants)) => {
                 if activations.contains(&Activation::Relu) {
                     let allowed = "softplus, tanh, sigmoid, silu or elu (the stress is a derivative)";
                     return Err(Error::parameter("activation of an energy", "relu", allowed));
@@ -66,14 +134,21 @@ impl Model {
                 let at = law.features(&Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0));
                 let inputs = header.kind.inputs();
                 let values: Vec<f32> = at.values[..inputs].iter().map(|value| *value as f32).collect();
-                let slopes = scaled_slopes(law, &at.slopes[..inputs]);
-                Some([TensorData::new(values, [1, inputs]), TensorData::new(slopes, [1, inputs, 6])])
+                let taken = match polyconvex {
+                    true => Taken::Polyconvex(Polyconvex::new(law, *symmetry, invariants)),
+                    false => {
+                        let slopes = scaled_slopes(law, &at.slopes[..inputs]);
+                        Taken::Stress(TensorData::new(slopes, [1, inputs, 6]))
+                    }
+                };
+                Some(Rest { x: TensorData::new(values, [1, inputs]), taken })
             }
+            _ => None,
         };
         let device = Device::flex();
         Ok(Self {
             activations,
-            identity,
+            rest,
             unit_squares: units(header).0.map(|unit| unit * unit),
             weights: *weights,
             tracking: device.clone().autodiff(),
@@ -130,15 +205,21 @@ impl Model {
     /// Sum over the rows of each component's squared error, in units of the outputs: (1, 6).
     fn squared_errors(&self, layers: &[Tensors], batch: &Batch, device: &Device) -> Tensor<2> {
         let tensor = |data: &TensorData| Tensor::<2>::from_data(data.clone(), device);
-        let outputs = match (&self.identity, &batch.slopes) {
-            (Some([x, at_rest]), Some(slopes)) => {
-                let stress = |x: &TensorData, slopes: &TensorData| {
-                    let gradient = self.input_gradient(layers, tensor(x));
+        let outputs = match (&self.rest, &batch.slopes) {
+            (Some(rest), Some(slopes)) => {
+                // Σ_k ∂N/∂x_k · slopes_k
+                let stress = |gradient: Tensor<2>, slopes: &TensorData| {
                     let slopes = Tensor::<3>::from_data(slopes.clone(), device);
-                    // Σ_k ∂N/∂x_k · slopes_k
                     (gradient.unsqueeze_dim::<3>(2) * slopes).sum_dim(1).squeeze_dim::<2>(1)
                 };
-                stress(&batch.x, slopes) - stress(x, at_rest)
+                let gradient = self.input_gradient(layers, tensor(&batch.x));
+                let at_rest = self.input_gradient(layers, tensor(&rest.x));
+                match &rest.taken {
+                    Taken::Stress(slopes_at_rest) => {
+                        stress(gradient, slopes) - stress(at_rest, slopes_at_rest)
+                    }
+                    Taken::Polyconvex(part) => stress(part.corrected(gradient, at_rest, device), slopes),
+                }
             }
             _ => self.forward(layers, tensor(&batch.x)),
         };

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::network::{Architecture, Layer, Network};
+use crate::surrogate::Kind;
 use std::ops::Range;
 
 /// Where in the list the parts of each layer stand: weights (inputs, outputs), then biases.
@@ -46,6 +47,22 @@ impl Layout {
             flat.extend(layer.bias.iter().map(|bias| *bias as f32));
         }
         flat
+    }
+
+    /// Puts weights that must not be negative ([`Kind::non_negative`]) back to 0; NaN stays, so that it is found.
+    pub fn project(&self, kind: &Kind, flat: &mut [f32]) {
+        if !kind.is_polyconvex() {
+            return;
+        }
+        for (l, [inputs, outputs]) in self.shapes.iter().enumerate() {
+            for (i, row) in flat[self.weights(l)].chunks_mut(*outputs).enumerate().take(*inputs) {
+                if kind.non_negative(l, i) {
+                    for weight in row {
+                        *weight = if *weight < 0.0 { 0.0 } else { *weight };
+                    }
+                }
+            }
+        }
     }
 
     /// The network of these parameters, to the bit.
