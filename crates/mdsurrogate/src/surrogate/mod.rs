@@ -134,8 +134,8 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
         Ok(law)
     }
 
-    /// A law with random weights ([`Network::random`], seeds `seed`, `seed` + 1, …), without their sign where
-    /// [`Kind::non_negative`] asks for it.
+    /// A law with random weights ([`Network::random`], seeds `seed`, `seed` + 1, …). Where [`Kind::non_negative`] asks for
+    /// it they are |w|/√n with n inputs: a sum of n numbers of one sign is √n times as large as one of both signs.
     ///
     /// # Errors
     /// Those of [`Surrogate::new`].
@@ -145,9 +145,11 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
             let network = Network::<T>::random(header.architecture.clone(), seed.wrapping_add(m as u64))?;
             let mut layers = network.layers().to_vec();
             for (l, layer) in layers.iter_mut().enumerate() {
+                let inputs = header.architecture.widths[l];
+                let scale = T::ONE / T::from_f64(inputs as f64).root();
                 for (i, weight) in layer.weights.iter_mut().enumerate() {
-                    if header.kind.non_negative(l, i % header.architecture.widths[l]) && *weight < T::ZERO {
-                        *weight = -*weight;
+                    if header.kind.non_negative(l, i % inputs) {
+                        *weight = scale * if *weight < T::ZERO { -*weight } else { *weight };
                     }
                 }
             }

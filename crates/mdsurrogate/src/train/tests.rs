@@ -136,6 +136,33 @@ fn reruns_and_resumed_runs_have_the_same_bits() {
     assert_ne!(other.state().weights, first.state().weights);
 }
 
+/// Bounded weights: never negative, after any step, and resumed with the same bits.
+#[test]
+fn weights_of_a_polyconvex_energy_keep_their_sign() {
+    let rows = rows_of_a_law();
+    let rows: Vec<&Row> = rows.iter().collect();
+    let header = header(Kind::polyconvex_energy(Symmetry::Orthotropic), &[(8, Softplus), (8, Softplus)], &rows);
+    let settings = Settings { learning_rate: 0.1, epochs: 4, ..SHORT };
+    let mut training = Training::new(&header, &rows, &[], settings).unwrap();
+    for epoch in 0..4 {
+        training.epoch().unwrap();
+        let weights = &training.state().weights;
+        // 6 of 7 inputs, then all; the weights of J, the biases and nothing else may have any sign
+        let layout = &training.layout;
+        let bounded = weights[..48].iter().chain(&weights[layout.weights(1)]).chain(&weights[layout.weights(2)]);
+        assert!(bounded.clone().all(|weight| *weight >= 0.0) && bounded.clone().any(|weight| *weight == 0.0));
+        assert!(weights[48..56].iter().any(|weight| *weight < 0.0));
+        // what it leads to is a law
+        ensemble(header.clone(), &[weights.clone()]).unwrap();
+        if epoch == 1 {
+            let state = serde_json::from_str(&serde_json::to_string(training.state()).unwrap()).unwrap();
+            training = Training::resume(&header, &rows, &[], settings, state).unwrap();
+        }
+    }
+    let undisturbed = trained(&header, &rows, settings);
+    assert_eq!(undisturbed.state().weights, training.state().weights);
+}
+
 #[test]
 fn divergence_is_named_and_loses_nothing() {
     let rows = rows_of_a_law();
@@ -166,31 +193,30 @@ fn a_known_law_is_learnt() {
     let rows: Vec<&Row> = rows.iter().collect();
     let c = Voigt::new(1.2, 1.1, 1.0, 0.0, 0.0, 0.0);
     let expected = neo_hookean(&c);
-    for (kind, activation, bound) in
-        [
-            (Kind::Ann, Tanh, 0.03),
-            (Kind::energy(Symmetry::Orthotropic), Softplus, 0.03),
-            (Kind::polyconvex_energy(Symmetry::Orthotropic), Softplus, 0.03),
-            (Kind::polyconvex_energy(Symmetry::Transverse), Softplus, 0.03),
-            (Kind::polyconvex_energy(Symmetry::Isotropic), Softplus, 0.03),
-        ]
-    {
+    // −μ ln J + λ/2 ln²J is convex for J < e: the law is polyconvex where the rows are
+    for (kind, activation, learning_rate) in [
+        (Kind::Ann, Tanh, 5e-3),
+        (Kind::energy(Symmetry::Orthotropic), Softplus, 5e-3),
+        (Kind::polyconvex_energy(Symmetry::Orthotropic), Softplus, 2e-2),
+        (Kind::polyconvex_energy(Symmetry::Transverse), Softplus, 2e-2),
+        (Kind::polyconvex_energy(Symmetry::Isotropic), Softplus, 2e-2),
+    ] {
         let header = header(kind.clone(), &[(24, activation), (24, activation)], &rows);
         let settings = Settings {
             epochs: 200,
-            learning_rate: 5e-3,
+            learning_rate,
             schedule: Schedule::Cosine,
             batch: 32,
             ..Settings::default()
         };
         let training = trained(&header, &rows, settings);
         let history = training.state().history();
-        assert!(history[history.len() - 1].train < 1e-3 * history[0].train, "{kind:?}: {history:?}");
+        let (first, last) = (history[0].train, history[199].train);
+        assert!(last < 1e-3 * first && last < 40.0, "{kind:?}: {first} {last} MPa²");
         let law = ensemble(header, &[training.best().to_vec()]).unwrap();
         let stress = law.stress(&c, &mut Workspace::default()).unwrap().stress;
         // an interpolation between paths, not a datum: 3 % of it, an order above the error on the rows
-        println!("{kind:?}: {} {} {}", history[0].train, history[199].train, (stress-expected).norm()/expected.norm());
-        assert!((stress - expected).norm() < bound * expected.norm(), "{kind:?}: {stress} {expected}");
+        assert!((stress - expected).norm() < 0.03 * expected.norm(), "{kind:?}: {stress} {expected}");
     }
 }
 
@@ -223,8 +249,12 @@ fn extremes() {
     let all: Vec<&Row> = rows.iter().collect();
     // one row, repeated rows: trained all the same
     for few in [vec![&rows[30]], vec![&rows[30]; 5]] {
-        for kind in [Kind::Ann, Kind::energy(Symmetry::Transverse)] {
-            let header = header(kind, &[(4, Tanh)], &few);
+        for (kind, activation) in [
+            (Kind::Ann, Tanh),
+            (Kind::energy(Symmetry::Transverse), Tanh),
+            (Kind::polyconvex_energy(Symmetry::Transverse), Softplus),
+        ] {
+            let header = header(kind, &[(4, activation)], &few);
             assert!(trained(&header, &few, SHORT).best().iter().all(|weight| weight.is_finite()));
         }
     }
