@@ -103,13 +103,14 @@ impl NewFilePermissions for tempfile::Builder<'_, '_> {
     }
 }
 
-/// Removes what a killed run leaves: files that it had begun to write under their temporary names.
+/// Removes what a killed run leaves: files and folders that it had begun to write under their temporary names.
 pub fn remove_unfinished(directory: &Path) {
     for entry in fs::read_dir(directory).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
         if name.starts_with('.') && name.ends_with(".part") {
-            let _ = fs::remove_file(entry.path());
+            let folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+            let _ = if folder { fs::remove_dir_all(entry.path()) } else { fs::remove_file(entry.path()) };
         }
     }
 }

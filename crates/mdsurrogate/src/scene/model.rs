@@ -29,8 +29,8 @@ pub struct ModelSpec {
     pub symmetry: Option<Symmetry>,
     /// Material axes of an energy as rows; default: those of the data.
     pub axes: Option<[[f64; 3]; 3]>,
-    /// Whether an energy is polyconvex by construction; it cannot follow data that soften. Such laws can be used and
-    /// exported, but training refuses them so far.
+    /// Whether an energy is polyconvex by construction: elliptic everywhere, but it cannot follow data that soften. Its
+    /// symmetry is orthotropic, transverse or isotropic, its activations are softplus, elu or linear.
     #[serde(default)]
     pub polyconvex: bool,
     /// Networks trained from different seeds into one law.
@@ -213,8 +213,16 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
             return Err(source.error(&at("outputs"), "`outputs` of an energy", "`kind = \"ann\"`"));
         }
         if energy && model.architecture().activations.contains(&Activation::Relu) {
-            let allowed = "softplus, tanh, sigmoid, silu or elu (its stress is a derivative)";
+            let allowed = match model.polyconvex {
+                true => "softplus, elu or linear (convex, and its stress is a derivative)",
+                false => "softplus, tanh, sigmoid, silu or elu (its stress is a derivative)",
+            };
             return Err(source.error(&at("hidden"), "relu in an energy", allowed));
+        }
+        let symmetry = model.symmetry.unwrap_or(Symmetry::Orthotropic);
+        if model.polyconvex && symmetry.polyconvex_invariants().is_none() {
+            let allowed = "orthotropic, transverse or isotropic for a polyconvex energy";
+            return Err(source.error(&at("symmetry"), format!("{symmetry:?}").to_lowercase(), allowed));
         }
         let mut header = Header::new(model.law(), &[], model.members);
         if (1..=1000).contains(&model.members) {

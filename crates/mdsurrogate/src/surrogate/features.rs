@@ -155,7 +155,10 @@ mod tests {
                 let (up, down) = (law.features(&(at + step)).values, law.features(&(at - step)).values);
                 for k in 0..law.header().kind.inputs() {
                     // rounding 1e-16/1e-5; cubic at most
-                    assert!(((up[k] - down[k]) / 2e-5 - slopes[k][a] * law.inverse[k]).abs() < 1e-9, "{symmetry:?} {k} {a}");
+                    assert!(
+                        ((up[k] - down[k]) / 2e-5 - slopes[k][a] * law.inverse[k]).abs() < 1e-9,
+                        "{symmetry:?} {k} {a}"
+                    );
                 }
             }
         }

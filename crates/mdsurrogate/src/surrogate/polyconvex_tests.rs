@@ -137,7 +137,7 @@ fn trained_on_softening_data() {
     };
     for symmetry in [Symmetry::Orthotropic, Symmetry::Transverse, Symmetry::Isotropic] {
         let (bound, lost, law) = train(Kind::polyconvex_energy(symmetry));
-        let stopped = |layer: &crate::network::Layer<f64>| layer.weights.iter().any(|weight| *weight == 0.0);
+        let stopped = |layer: &crate::network::Layer<f64>| layer.weights.contains(&0.0);
         assert!(lost == 0 && law.members()[0].layers().iter().any(stopped), "{symmetry:?}: {lost}");
         let (free, lost, _) = train(Kind::energy(symmetry));
         // what the bound costs, and that the data are not elliptic

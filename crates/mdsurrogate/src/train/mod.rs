@@ -259,8 +259,7 @@ impl Training {
                 return diverged(self, batch + 1, step.loss);
             }
             self.state.adam.step(rate, &mut self.state.weights, &self.layout, &step.gradients);
-            // bounds by projection: simplest, since weights in steps, states and files are the same numbers, and as good
-            // as weights written as softplus(r) or r² (measured: docs/guide/src/theory/surrogate.md)
+            // projected Adam: weights in steps, states and files are the same numbers; softplus(r) was not better
             self.layout.project(&self.header.kind, &mut self.state.weights);
             for (sum, square) in squares.iter_mut().zip(step.squares) {
                 *sum += square;

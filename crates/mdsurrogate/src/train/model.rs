@@ -33,7 +33,7 @@ enum Taken {
     /// S(I) = Σ_k ∂N/∂x_k · slopes_k, the slopes at I: (1, inputs, 6).
     Stress(TensorData),
     /// Multiples of the invariants, see `Surrogate::rest_of`.
-    Polyconvex(Polyconvex),
+    Polyconvex(Box<Polyconvex>),
 }
 
 /// Matrices from ∂N/∂x at I, with x the invariants, to the multiples of the invariants that are added to W.
@@ -135,7 +135,7 @@ impl Model {
                 let inputs = header.kind.inputs();
                 let values: Vec<f32> = at.values[..inputs].iter().map(|value| *value as f32).collect();
                 let taken = match polyconvex {
-                    true => Taken::Polyconvex(Polyconvex::new(law, *symmetry, invariants)),
+                    true => Taken::Polyconvex(Box::new(Polyconvex::new(law, *symmetry, invariants))),
                     false => {
                         let slopes = scaled_slopes(law, &at.slopes[..inputs]);
                         Taken::Stress(TensorData::new(slopes, [1, inputs, 6]))

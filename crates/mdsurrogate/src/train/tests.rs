@@ -141,7 +141,8 @@ fn reruns_and_resumed_runs_have_the_same_bits() {
 fn weights_of_a_polyconvex_energy_keep_their_sign() {
     let rows = rows_of_a_law();
     let rows: Vec<&Row> = rows.iter().collect();
-    let header = header(Kind::polyconvex_energy(Symmetry::Orthotropic), &[(8, Softplus), (8, Softplus)], &rows);
+    let header =
+        header(Kind::polyconvex_energy(Symmetry::Orthotropic), &[(8, Softplus), (8, Softplus)], &rows);
     let settings = Settings { learning_rate: 0.1, epochs: 4, ..SHORT };
     let mut training = Training::new(&header, &rows, &[], settings).unwrap();
     for epoch in 0..4 {
@@ -149,11 +150,12 @@ fn weights_of_a_polyconvex_energy_keep_their_sign() {
         let weights = &training.state().weights;
         // 6 of 7 inputs, then all; the weights of J, the biases and nothing else may have any sign
         let layout = &training.layout;
-        let bounded = weights[..48].iter().chain(&weights[layout.weights(1)]).chain(&weights[layout.weights(2)]);
+        let bounded =
+            weights[..48].iter().chain(&weights[layout.weights(1)]).chain(&weights[layout.weights(2)]);
         assert!(bounded.clone().all(|weight| *weight >= 0.0) && bounded.clone().any(|weight| *weight == 0.0));
         assert!(weights[48..56].iter().any(|weight| *weight < 0.0));
         // what it leads to is a law
-        ensemble(header.clone(), &[weights.clone()]).unwrap();
+        ensemble(header.clone(), std::slice::from_ref(weights)).unwrap();
         if epoch == 1 {
             let state = serde_json::from_str(&serde_json::to_string(training.state()).unwrap()).unwrap();
             training = Training::resume(&header, &rows, &[], settings, state).unwrap();

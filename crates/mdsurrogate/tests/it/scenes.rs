@@ -181,7 +181,10 @@ fn results(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut files: Vec<(String, Vec<u8>)> = fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap())
-        .map(|entry| (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap()))
+        .map(|entry| {
+            let bytes = fs::read(entry.path()).unwrap_or_else(|e| panic!("{}: {e}", entry.path().display()));
+            (entry.file_name().into_string().unwrap(), bytes)
+        })
         .filter(|(name, _)| !name.starts_with("error_against_time"))
         .collect();
     for (name, bytes) in &mut files {
