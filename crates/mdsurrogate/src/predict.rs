@@ -88,11 +88,12 @@ fn write(path: &Path, points: &[Voigt], answers: &[Answer<f64>]) -> Result<(), E
         columns.push(("W".into(), "MJ/m³", column(&|answer| answer.energy.unwrap_or(f64::NAN) / MEGA)));
     }
     columns.push(("spread".into(), "MPa", column(&|answer| answer.spread / MEGA)));
-    let doubts: [(&str, &dyn Fn(&Answer<f64>) -> bool); 4] = [
-        ("outside the box", &|answer| answer.flags.outside.contains(&true)),
-        ("never seen", &|answer| answer.flags.unseen.contains(&true)),
-        ("far from the data", &|answer| answer.flags.far),
-        ("members disagree", &|answer| answer.flags.spread),
+    type Doubt = (&'static str, fn(&Answer<f64>) -> bool);
+    let doubts: [Doubt; 4] = [
+        ("outside the box", |answer| answer.flags.outside.contains(&true)),
+        ("never seen", |answer| answer.flags.unseen.contains(&true)),
+        ("far from the data", |answer| answer.flags.far),
+        ("members disagree", |answer| answer.flags.spread),
     ];
     for (name, doubt) in doubts {
         columns.push((name.into(), "", column(&|answer| f64::from(u8::from(doubt(answer))))));

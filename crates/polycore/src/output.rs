@@ -162,6 +162,21 @@ mod tests {
         }
     }
 
+    /// Files, and folders as HDF5 files are written in; nothing else.
+    #[test]
+    fn what_a_kill_leaves_is_removed() {
+        let directory = tempfile::tempdir().unwrap();
+        let here = directory.path();
+        fs::create_dir(here.join(".b.part")).unwrap();
+        for name in [".a.part", ".b.part/data.h5", "result.part", ".hidden"] {
+            fs::write(here.join(name), "x").unwrap();
+        }
+        remove_unfinished(here);
+        let mut left = names(here);
+        left.sort();
+        assert_eq!(left, [".hidden", "result.part"]);
+    }
+
     #[cfg(unix)]
     #[test]
     fn files_have_ordinary_permissions() {
