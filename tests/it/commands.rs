@@ -56,6 +56,71 @@ fn wrong_usage_is_bad_input() {
     }
 }
 
+/// `| head` closes the pipe early: no reason to fail, and no panic. A full disk is one.
+#[test]
+fn standard_output_that_takes_no_more() {
+    let here = workspace();
+    for (program, arguments) in [
+        ("peri", "schema"),
+        ("peri", "exact law"),
+        ("peri", "completions bash"),
+        ("crystfem", "check cases/ch4/printed-bar/case.toml"),
+        ("mdsurrogate", "info cases/ch3/pa12-data/runs.csv.gz"),
+        ("polycore", "check cases/ch1/rubber-fits/case.toml"),
+    ] {
+        let mut child = command(program, arguments, here);
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        finish(child.stdout(writer).spawn().unwrap()).with_code(0);
+        #[cfg(target_os = "linux")]
+        {
+            let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+            let ended = finish(command(program, arguments, here).stdout(full).spawn().unwrap()).with_code(1);
+            ended.tells("error: cannot write to standard output: No space left on device");
+        }
+    }
+}
+
+/// What cannot be read is bad input, in a scene with its place; answers at strains with a slip in a name are refused.
+#[test]
+fn inputs_of_mdsurrogate_that_cannot_be_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let run = |line: &str| finish(command("mdsurrogate", line, here).spawn().unwrap());
+    let scene = "version = 1\nprogram = \"mdsurrogate\"\ntitle = \"none\"\n[data]\nfiles = [\"none.csv\"]\n";
+    fs::write(here.join("scene.toml"), scene).unwrap();
+    let ended = run("check scene.toml").with_code(2);
+    ended.tells("data.files[0]");
+    ended.tells("none.csv");
+    for line in ["info none.csv", "export none.safetensors out/law", "bench none.safetensors", "md run none"]
+    {
+        run(line).with_code(2).tells("none");
+    }
+    let law = "version = 1\nprogram = \"mdsurrogate\"\ntitle = \"law\"\n[data]\nfiles = [\"rows.csv\"]\n[split]\nby = \"random\"\n\
+               [training]\nepochs = 1\n[[model]]\nkind = \"energy\"\nhidden = [[4, \"softplus\"]]\n";
+    let row = |k: usize| format!("{},1,1,0,0,0,{k},0,0,0,0,0\n", 1.0 + 0.01 * k as f64);
+    let head = "C11,C22,C33,C12,C13,C23,S11,S22,S33,S12,S13,S23\n".to_owned();
+    fs::write(here.join("rows.csv"), head + &(0..20).map(row).collect::<String>()).unwrap();
+    fs::write(here.join("law.toml"), law).unwrap();
+    run("run law.toml").with_code(0);
+    let ask = "predict out/law/energy.safetensors strains.csv --output answers.csv --tangent";
+    fs::write(here.join("strains.csv"), "C11,C22,C33,C21\n1,1,1,0.1\n").unwrap();
+    run(ask).with_code(2).tells("column `C21`");
+    fs::write(here.join("strains.csv"), "C11,C22,C33\n1,1,1\n1,-1,1\n").unwrap();
+    run(ask).with_code(2).tells("point 1 of the list");
+    fs::write(here.join("strains.csv"), "C11,C22,C33,C12\n1,1,1,0\n1,1,1,0.3\n").unwrap();
+    run(ask).with_code(0).shows("2 answers, 1 of them with a doubt");
+    let answers = polycore::output::csv::read(here.join("answers.csv")).unwrap();
+    let column = |name: &str| &answers.iter().find(|(heading, _)| heading == name).unwrap().1;
+    // an energy has no stress at rest; shear was never seen
+    assert_eq!(column("S11 [MPa]")[0], 0.0);
+    assert_eq!(*column("never seen"), [0.0, 1.0]);
+    assert_eq!(column("tangent 11 22 [MPa]"), column("tangent 22 11 [MPa]"));
+    run("export out/law/energy.safetensors new/folder/law").with_code(0);
+    assert!(here.join("new/folder/law.c").is_file());
+    run("export out/law/energy.safetensors new/").with_code(2).tells("name of the function");
+}
+
 #[test]
 fn completions() {
     let here = workspace();

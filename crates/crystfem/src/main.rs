@@ -1,5 +1,8 @@
 //! The `crystfem` command line.
 
+// polycore::say! prints without a panic where nobody reads any more
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 use clap::{CommandFactory, Parser, Subcommand};
 use crystfem::run::{Failure, Options, Progress, SweepOptions, Vary};
 use crystfem::scene::Kind;
@@ -101,7 +104,7 @@ enum Command {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     if let Err(error) = cli.threads.apply() {
-        eprintln!("error: {error}");
+        polycore::command::complain(format_args!("error: {error}\n"));
         return ExitCode::FAILURE;
     }
     let result = match cli.command {
@@ -120,11 +123,13 @@ fn main() -> ExitCode {
         Command::Check { scene } => check(&scene),
         Command::Bench(bench) => bench.print(),
         Command::Schema => {
-            println!("{:#}", crystfem::scene::schema());
+            polycore::say!("{:#}", crystfem::scene::schema());
             Ok(true)
         }
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "crystfem", &mut std::io::stdout());
+            let mut text = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "crystfem", &mut text);
+            polycore::command::print(String::from_utf8_lossy(&text));
             Ok(true)
         }
     };
@@ -141,7 +146,7 @@ fn run(scene: &Scene, kind: Option<Kind>) -> Result<bool, Failure> {
     }
     if scene.explain {
         for line in crystfem::run::explain(&source)? {
-            println!("{line}");
+            polycore::say!("{line}");
         }
     }
     let output = scene.output.clone().unwrap_or_else(|| default_output(&scene.scene));
@@ -179,7 +184,7 @@ fn resume(output: &Path, every: f64) -> Result<bool, Failure> {
     if header.study.is_some()
         && let Some(whole) = output.canonicalize().ok().and_then(|output| output.parent().map(PathBuf::from))
     {
-        println!("{} is a study of the run in {}", output.display(), whole.display());
+        polycore::say!("{} is a study of the run in {}", output.display(), whole.display());
         return resume(&whole, every);
     }
     solve(&Source::new(header.scene_path, header.scene), output, header.quick, every, true)
@@ -213,8 +218,8 @@ fn solve(source: &Source, output: &Path, quick: bool, every: f64, resume: bool) 
 fn check(path: &Path) -> Result<bool, Failure> {
     let source = Source::read(path)?;
     for line in crystfem::run::explain(&source)? {
-        println!("{line}");
+        polycore::say!("{line}");
     }
-    println!("{}: the scene is valid", path.display());
+    polycore::say!("{}: the scene is valid", path.display());
     Ok(true)
 }

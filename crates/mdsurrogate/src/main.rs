@@ -1,5 +1,8 @@
 //! The `mdsurrogate` command line.
 
+// polycore::say! prints without a panic where nobody reads any more
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 use clap::{CommandFactory, Parser, Subcommand};
 use mdsurrogate::Error;
 use mdsurrogate::dataset::{Columns, ReadOptions, read};
@@ -61,7 +64,7 @@ enum Command {
         #[arg(long)]
         instantaneous: bool,
     },
-    /// Molecular dynamics with LAMMPS: plan, prepare, run, resume, collect.
+    /// Molecular dynamics with LAMMPS: write, prepare, run (also to go on), collect.
     #[command(subcommand)]
     Md(md_command::Md),
     /// Write a law (safetensors) as source code or as ONNX.
@@ -100,11 +103,13 @@ fn main() -> ExitCode {
         Command::Predict(predict) => predict.print().map_err(Failure::from),
         Command::Bench(bench) => bench.print().map_err(Failure::from),
         Command::Schema => {
-            println!("{:#}", mdsurrogate::scene::schema());
+            polycore::say!("{:#}", mdsurrogate::scene::schema());
             Ok(true)
         }
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "mdsurrogate", &mut std::io::stdout());
+            let mut text = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "mdsurrogate", &mut text);
+            polycore::command::print(String::from_utf8_lossy(&text));
             Ok(true)
         }
     };
@@ -116,16 +121,18 @@ fn info(file: &Path, instantaneous: bool) -> Result<bool, Error> {
     let set = read(file, &ReadOptions { columns, ..ReadOptions::default() })?;
     let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), "");
     describe(&mut report, "", &set);
-    report.print_table();
-    println!("without variance: {}", set.constant_components().join(", "));
+    polycore::command::print(report.table());
+    polycore::say!("without variance: {}", set.constant_components().join(", "));
     for line in &set.provenance {
-        println!("{line}");
+        polycore::say!("{line}");
     }
     Ok(true)
 }
 
 fn export(law: &Path, output: &Path, form: Form) -> Result<bool, Error> {
-    let name = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    // `out/` names a folder and no function
+    let folder = output.as_os_str().as_encoded_bytes().ends_with(b"/");
+    let name = output.file_name().filter(|_| !folder).unwrap_or_default().to_string_lossy().into_owned();
     let law = Surrogate::read(law)?;
     let files = match form {
         Form::C => {
@@ -135,10 +142,13 @@ fn export(law: &Path, output: &Path, form: Form) -> Result<bool, Error> {
         Form::Fortran => vec![("f90", law.fortran_source(&name)?.into_bytes())],
         Form::Onnx => vec![("onnx", law.onnx())],
     };
+    if let Some(folder) = output.parent() {
+        std::fs::create_dir_all(folder).map_err(Error::io("create", folder))?;
+    }
     for (end, bytes) in files {
         let path = output.with_file_name(format!("{name}.{end}"));
         atomic_write(&path, |file| file.write_all(&bytes))?;
-        println!("{}", path.display());
+        polycore::say!("{}", path.display());
     }
     Ok(true)
 }

@@ -102,7 +102,7 @@ impl Md {
             Self::Prepare(place) => {
                 let (folder, engine) = place.open()?;
                 folder.prepare(&engine)?;
-                println!("reference lengths {:?} Å", folder.reference_lengths()?);
+                polycore::say!("reference lengths {:?} Å", folder.reference_lengths()?);
                 Ok(true)
             }
             Self::Run { place, jobs, index } => {
@@ -113,10 +113,10 @@ impl Md {
                 }
                 folder.prepare(&engine)?;
                 let (all, open) = (folder.plan().runs.len(), folder.open_runs().len());
-                println!("{} of {all} runs are finished", all - open);
+                polycore::say!("{} of {all} runs are finished", all - open);
                 folder.run(&engine, jobs, &|run, result| match result {
-                    Ok(()) => println!("{} finished", run.id),
-                    Err(error) => eprintln!("{}: {error}", run.id),
+                    Ok(()) => polycore::say!("{} finished", run.id),
+                    Err(error) => polycore::command::complain(format_args!("{}: {error}\n", run.id)),
                 })?;
                 join(&place.folder)
             }
@@ -130,7 +130,7 @@ fn join(folder: &Path) -> Result<bool, Error> {
     let count = Folder::open(folder)?.collect()?;
     let table = folder.join("runs.csv");
     hdf5::write(folder.join("runs.h5"), &read(&table, &ReadOptions::default())?, None)?;
-    println!("{count} runs in {} and runs.h5", table.display());
+    polycore::say!("{count} runs in {} and runs.h5", table.display());
     Ok(true)
 }
 
@@ -172,14 +172,14 @@ impl Write {
         }
         let atoms = 148 * protocol.cells.iter().product::<usize>();
         let atom_steps = runs.len() as f64 * protocol.steps as f64 * atoms as f64;
-        println!(
+        polycore::say!(
             "{} runs of {} steps with {atoms} atoms: {atom_steps:.2e} atom-steps, {:.0} core-hours at 15,000 a second",
             runs.len(),
             protocol.steps,
             atom_steps / 15e3 / 3600.0
         );
         Folder::create(&self.folder, Plan { protocol, runs })?;
-        println!("written to {}", self.folder.display());
+        polycore::say!("written to {}", self.folder.display());
         Ok(true)
     }
 }

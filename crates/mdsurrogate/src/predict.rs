@@ -2,7 +2,7 @@
 
 use mdsurrogate::Error;
 use mdsurrogate::kinematics::NAMES;
-use mdsurrogate::surrogate::{Answer, Surrogate, Workspace};
+use mdsurrogate::surrogate::{Answer, Flags, Surrogate, Workspace};
 use polycore::output::csv;
 use polycore::tensor::Voigt;
 use std::path::{Path, PathBuf};
@@ -45,7 +45,11 @@ impl Predict {
         })?;
         write(&self.output, &points, &answers)?;
         let doubtful = answers.iter().filter(|answer| answer.flags.any()).count();
-        println!("{} answers, {doubtful} of them with a doubt: {}", answers.len(), self.output.display());
+        polycore::say!(
+            "{} answers, {doubtful} of them with a doubt: {}",
+            answers.len(),
+            self.output.display()
+        );
         Ok(true)
     }
 }
@@ -88,16 +92,14 @@ fn write(path: &Path, points: &[Voigt], answers: &[Answer<f64>]) -> Result<(), E
         columns.push(("W".into(), "MJ/m³", column(&|answer| answer.energy.unwrap_or(f64::NAN) / MEGA)));
     }
     columns.push(("spread".into(), "MPa", column(&|answer| answer.spread / MEGA)));
-    type Doubt = (&'static str, fn(&Answer<f64>) -> bool);
-    let doubts: [Doubt; 4] = [
-        ("outside the box", |answer| answer.flags.outside.contains(&true)),
-        ("never seen", |answer| answer.flags.unseen.contains(&true)),
-        ("far from the data", |answer| answer.flags.far),
-        ("members disagree", |answer| answer.flags.spread),
-    ];
-    for (name, doubt) in doubts {
-        columns.push((name.into(), "", column(&|answer| f64::from(u8::from(doubt(answer))))));
-    }
+    let mut doubt = |name: &str, raised: &dyn Fn(&Flags) -> bool| {
+        let values = column(&|answer| f64::from(u8::from(raised(&answer.flags))));
+        columns.push((name.into(), "", values));
+    };
+    doubt("outside the box", &|flags| flags.outside.contains(&true));
+    doubt("never seen", &|flags| flags.unseen.contains(&true));
+    doubt("far from the data", &|flags| flags.far);
+    doubt("members disagree", &|flags| flags.spread);
     if answers.iter().any(|answer| answer.tangent.is_some()) {
         for (a, row) in NAMES.iter().enumerate() {
             for (b, name) in NAMES.iter().enumerate() {

@@ -83,20 +83,20 @@ fn solve(source: &Source, output: &Path, quick: bool, every: f64, resume: bool) 
     };
     let finished = run::run(source, &mut options)?;
     bar.finish();
-    finished.report.print_table();
+    polycore::command::print(finished.report.table());
     for remark in &finished.remarks {
-        println!("{remark}");
+        polycore::say!("{remark}");
     }
-    println!("results in {}", output.display());
+    polycore::say!("results in {}", output.display());
     Ok(finished.report.passed())
 }
 
 /// Validates a scene and its data, and prints what it builds.
 pub fn check(path: &Path) -> Result<bool, Failure> {
     for line in run::explain(&Source::read(path)?)? {
-        println!("{line}");
+        polycore::say!("{line}");
     }
-    println!("{}: the scene is valid", path.display());
+    polycore::say!("{}: the scene is valid", path.display());
     Ok(true)
 }
 
@@ -119,11 +119,11 @@ impl Eval {
         let named: Vec<Named> = laws.iter().map(|(name, law)| Named { name, law, seconds: None }).collect();
         let table = judge_laws(&named, &data, &output, &mut report)?;
         report.threads(1).write(&output)?;
-        report.print_table();
+        polycore::command::print(report.table());
         for line in table {
-            println!("{line}");
+            polycore::say!("{line}");
         }
-        println!("results in {}", output.display());
+        polycore::say!("results in {}", output.display());
         Ok(report.passed())
     }
 }

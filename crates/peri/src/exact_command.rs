@@ -70,13 +70,13 @@ impl Exact {
                     }
                     .into());
                 }
-                println!("{:>8} {:>12} {:>12}", "y/a", "σxx/σ∞", "σyy/σ∞");
+                polycore::say!("{:>8} {:>12} {:>12}", "y/a", "σxx/σ∞", "σyy/σ∞");
                 for k in 0..=16 {
                     let y = 1.0 + f64::from(k) * 0.25;
                     let [xx, yy, _] = exact::kirsch(0.0, y, 1.0, 1.0);
-                    println!("{y:>8.2} {xx:>12.6} {yy:>12.6}");
+                    polycore::say!("{y:>8.2} {xx:>12.6} {yy:>12.6}");
                 }
-                println!(
+                polycore::say!(
                     "finite width d/W = {width_ratio}: peak {:.6} (Heywood)",
                     exact::heywood_gross(width_ratio)
                 );
@@ -91,9 +91,15 @@ impl Exact {
                     }
                     .into());
                 }
-                println!(
+                polycore::say!(
                     "{:<18} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}",
-                    "lattice", "C1111", "C1122", "E100", "E110", "ν", "Zener"
+                    "lattice",
+                    "C1111",
+                    "C1122",
+                    "E100",
+                    "E110",
+                    "ν",
+                    "Zener"
                 );
                 for correction in [peri::bonds::VolumeCorrection::None, peri::bonds::VolumeCorrection::Linear]
                 {
@@ -102,9 +108,14 @@ impl Exact {
                         ("3D", calibrate::LatticeModuli::new::<3>(horizon_ratio, correction)),
                     ] {
                         let name = format!("{name} volume {correction:?}");
-                        println!(
+                        polycore::say!(
                             "{name:<18} {:>8.4} {:>8.4} {:>8.4} {:>8.4} {:>8.4} {:>8.4}",
-                            m.c1111, m.c1122, m.e100, m.e110, m.nu, m.zener
+                            m.c1111,
+                            m.c1122,
+                            m.e100,
+                            m.e110,
+                            m.nu,
+                            m.zener
                         );
                     }
                 }
@@ -127,16 +138,16 @@ fn print_law(name: LawName, links: f64, dissociation: f64, to: f64) -> Result<()
         return Err(peri::Error::Parameter { name: "--to", found: to, allowed }.into());
     }
     let built = law.build(links, dissociation, false)?;
-    println!(
+    polycore::say!(
         "law {} with n̄ = {links}, D̂ = {dissociation}; tangent at rest {:.8}",
         law.name(),
         built.tangent()
     );
-    println!("{:>8} {:>14} {:>14} {:>14}", "l", "t/kθ", "t′/kθ", "φ/kθ");
+    polycore::say!("{:>8} {:>14} {:>14} {:>14}", "l", "t/kθ", "t′/kθ", "φ/kθ");
     let from = (0.5 / to).clamp(0.05, 0.5);
     for k in 0..=12 {
         let l = from + (to - from) * f64::from(k) / 12.0;
-        println!(
+        polycore::say!(
             "{l:>8.4} {:>14.6} {:>14.6} {:>14.6}",
             built.tension(l),
             built.tension_derivative(l),
@@ -145,13 +156,21 @@ fn print_law(name: LawName, links: f64, dissociation: f64, to: f64) -> Result<()
     }
     if law.is_chain() {
         let top = Chain::new(links, dissociation)?.strongest();
-        println!("force maximum: λ_b {:.6}, λ̄ {:.4}, T/kθ {:.4}", top.link_stretch, top.stretch, top.force);
+        polycore::say!(
+            "force maximum: λ_b {:.6}, λ̄ {:.4}, T/kθ {:.4}",
+            top.link_stretch,
+            top.stretch,
+            top.force
+        );
         for reading in Reading::ALL {
-            println!("critical stretch of 1.2 √n̄ read as {reading:?}: {:.4}", reading.stretch(1.2, links));
+            polycore::say!(
+                "critical stretch of 1.2 √n̄ read as {reading:?}: {:.4}",
+                reading.stretch(1.2, links)
+            );
         }
     }
     let fit = KernelFit::new(&*built, [from, to], 1e-9)?;
-    println!(
+    polycore::say!(
         "kernel fit over l = {from}..{to}: {}, largest relative error {:.1e}",
         fit.kind(),
         fit.max_error

@@ -1,5 +1,8 @@
 //! The `peri` command line.
 
+// polycore::say! prints without a panic where nobody reads any more
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 use clap::{CommandFactory, Parser, Subcommand};
 use peri::run::{Failure, Options};
 use peri::scene::Scene;
@@ -85,7 +88,7 @@ enum Command {
 fn main() -> ExitCode {
     let cli = Cli::parse();
     if let Err(error) = cli.threads.apply() {
-        eprintln!("error: {error}");
+        polycore::command::complain(format_args!("error: {error}\n"));
         return ExitCode::FAILURE;
     }
     let result = match cli.command {
@@ -98,11 +101,13 @@ fn main() -> ExitCode {
         Command::Exact(exact) => exact.print(),
         Command::Bench(bench) => bench.print(),
         Command::Schema => {
-            println!("{:#}", peri::scene::schema());
+            polycore::say!("{:#}", peri::scene::schema());
             Ok(true)
         }
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "peri", &mut std::io::stdout());
+            let mut text = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "peri", &mut text);
+            polycore::command::print(String::from_utf8_lossy(&text));
             Ok(true)
         }
     };
@@ -176,21 +181,21 @@ fn solve(
     };
     let finished = peri::run::run(source, scene, &mut options)?;
     bar.finish();
-    print!("{}", finished.summary());
-    println!("results in {}", output.display());
+    polycore::command::print(finished.summary());
+    polycore::say!("results in {}", output.display());
     Ok(finished.report.passed())
 }
 
 fn check(path: &Path, quick: bool) -> Result<bool, Failure> {
     let (source, scene) = load(path)?;
     print_explanation(&source, &scene, quick)?;
-    println!("{}: the scene is valid", path.display());
+    polycore::say!("{}: the scene is valid", path.display());
     Ok(true)
 }
 
 fn print_explanation(source: &Source, scene: &Scene, quick: bool) -> Result<(), Failure> {
     for line in peri::run::explanation(source, scene, quick)? {
-        println!("{line}");
+        polycore::say!("{line}");
     }
     Ok(())
 }

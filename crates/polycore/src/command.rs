@@ -3,7 +3,7 @@
 use crate::scene::Failure;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Display;
-use std::io::IsTerminal;
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,17 +12,47 @@ use std::time::{Duration, Instant};
 /// Time between lines of progress where there is no terminal.
 const LOG_EVERY: Duration = Duration::from_secs(10);
 
+/// Whether standard output took less than was printed.
+static CUT_SHORT: AtomicBool = AtomicBool::new(false);
+
+/// Prints a line to standard output as `println!` does, but without its panic: a reader that has seen enough (`| head`)
+/// is no reason to fail; what else goes wrong, a full disk for example, is said once and makes [`command::exit`] fail.
+///
+/// [`command::exit`]: crate::command::exit
+#[macro_export]
+macro_rules! say {
+    ($($part:tt)*) => {
+        $crate::command::print(format_args!("{}\n", format_args!($($part)*)))
+    };
+}
+
+/// Prints a text to standard output as [`say!`](crate::say) does.
+pub fn print(text: impl Display) {
+    let mut output = std::io::stdout().lock();
+    match write!(output, "{text}").and_then(|()| output.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe && !CUT_SHORT.swap(true, Ordering::Relaxed) => {
+            complain(format_args!("error: cannot write to standard output: {error}\n"));
+        }
+        _ => {}
+    }
+}
+
+/// Prints a text to standard error, if that can be.
+pub fn complain(text: impl Display) {
+    let _ = write!(std::io::stderr(), "{text}");
+}
+
 /// The exit code of a command that tells whether it passed; a failure is printed. `code` is that of a run's error.
 pub fn exit<E: Display>(result: Result<bool, Failure<E>>, code: impl Fn(&E) -> u8) -> ExitCode {
     match result {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
+        Ok(true) if !CUT_SHORT.load(Ordering::Relaxed) => ExitCode::SUCCESS,
+        Ok(_) => ExitCode::FAILURE,
         Err(Failure::Scene(error)) => {
-            eprint!("{}", error.render());
+            complain(error.render());
             ExitCode::from(error.exit_code())
         }
         Err(Failure::Run(error)) => {
-            eprintln!("error: {error}");
+            complain(format_args!("error: {error}\n"));
             ExitCode::from(code(&error))
         }
     }
@@ -41,7 +71,7 @@ pub fn is_finished(output: &Path) -> bool {
     let there = |name: &str| output.join(name).is_file();
     let finished = !there(crate::checkpoint::FILE_NAME) && there(crate::report::FILE_NAME);
     if finished {
-        println!("{} is finished: nothing to resume", output.display());
+        say!("{} is finished: nothing to resume", output.display());
     }
     finished
 }
@@ -101,11 +131,11 @@ pub struct Measurement {
 /// Prints measurements, for people or as JSON for programs.
 pub fn print_measurements(rows: &[Measurement], json: bool) {
     if json {
-        println!("{}", serde_json::to_string_pretty(rows).unwrap_or_default());
+        say!("{}", serde_json::to_string_pretty(rows).unwrap_or_default());
         return;
     }
     for Measurement { what, size, threads, value, unit } in rows {
-        println!("{what:<44} {size:>9} {threads:>2} threads {value:>12.4e} {unit}");
+        say!("{what:<44} {size:>9} {threads:>2} threads {value:>12.4e} {unit}");
     }
 }
 
@@ -140,7 +170,7 @@ impl Progress {
             self.bar.set_message(message());
         } else if self.logged.elapsed() >= LOG_EVERY {
             self.logged = Instant::now();
-            eprintln!("{}", message());
+            complain(format_args!("{}\n", message()));
         }
     }
 

@@ -86,10 +86,16 @@ impl Error {
         move |source| Self::Io { operation, path, source }
     }
 
-    /// Exit code of the command lines: 2 for bad input (an unusable output directory or checkpoint), 1 for a failed run.
+    /// Exit code of the command lines: 2 for bad input (what cannot be read, an unusable output directory or
+    /// checkpoint), 1 for a failed run.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::OutputDirectory { .. } | Self::Checkpoint { .. } => crate::scene::EXIT_BAD_INPUT,
+            Self::OutputDirectory { .. } | Self::Checkpoint { .. } | Self::Format { .. } => {
+                crate::scene::EXIT_BAD_INPUT
+            }
+            Self::Io { operation, .. } if operation.starts_with("read") || *operation == "open" => {
+                crate::scene::EXIT_BAD_INPUT
+            }
             _ => 1,
         }
     }

@@ -1,12 +1,16 @@
 //! The `polycore` command line: fits hyperelastic laws to the data that a case names, and tabulates laws.
 
-use std::io::Write;
+// polycore::say! prints without a panic where nobody reads any more
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use polycore::Error;
-use polycore::scene::{EXIT_BAD_INPUT, SceneError};
+use polycore::command::{exit, print};
+use polycore::scene::Failure;
 
 mod cli {
     pub mod draw;
@@ -52,71 +56,38 @@ enum Command {
     },
 }
 
-/// What ends a run early.
-enum Failure {
-    Scene(SceneError),
-    Run(Error),
-    /// A command-line value.
-    Input(String),
-}
-
-impl From<SceneError> for Failure {
-    fn from(error: SceneError) -> Self {
-        Self::Scene(error)
-    }
-}
-
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Self::Run(error)
-    }
-}
-
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
+    let result = match Arguments::parse().command {
         Command::Run { case, output, quick } => run(&case, output, quick),
         Command::Check { case } => check(&case),
-        Command::Exact(arguments) => exact::table(&arguments).map_err(Failure::Input).map(|text| show(&text)),
+        Command::Exact(arguments) => match exact::table(&arguments) {
+            Ok(text) => show(&text),
+            Err(message) => Arguments::command().error(ErrorKind::ValueValidation, message).exit(),
+        },
         Command::Completions { shell } => {
             let mut text = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "polycore", &mut text);
-            Ok(show(&String::from_utf8_lossy(&text)))
+            show(&String::from_utf8_lossy(&text))
         }
     };
-    match outcome {
-        Ok(code) => code,
-        Err(Failure::Scene(error)) => {
-            let code = error.exit_code();
-            eprint!("{}", error.render());
-            code.into()
-        }
-        Err(Failure::Run(error)) => {
-            eprintln!("error: {error}");
-            error.exit_code().into()
-        }
-        Err(Failure::Input(message)) => {
-            eprintln!("error: {message}");
-            EXIT_BAD_INPUT.into()
-        }
-    }
+    exit(result, Error::exit_code)
 }
 
-fn run(path: &Path, output: Option<PathBuf>, quick: bool) -> Result<ExitCode, Failure> {
+fn run(path: &Path, output: Option<PathBuf>, quick: bool) -> Result<bool, Failure<Error>> {
     let case = Case::read(path)?;
     let directory = output.unwrap_or_else(|| Path::new("out").join(case.name()));
     polycore::output::prepare_directory(&directory)?;
     let report = fits::run(&case, &directory, quick)?;
-    println!("{}", directory.join(polycore::report::FILE_NAME).display());
-    Ok(if report.passed() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    polycore::say!("{}", directory.join(polycore::report::FILE_NAME).display());
+    Ok(report.passed())
 }
 
-fn check(path: &Path) -> Result<ExitCode, Failure> {
+fn check(path: &Path) -> Result<bool, Failure<Error>> {
     let case = Case::read(path)?;
-    Ok(show(&case.plan()))
+    show(&case.plan())
 }
 
-/// A closed pipe is no reason to fail.
-fn show(text: &str) -> ExitCode {
-    let _ = std::io::stdout().write_all(text.as_bytes());
-    ExitCode::SUCCESS
+fn show(text: &str) -> Result<bool, Failure<Error>> {
+    print(text);
+    Ok(true)
 }

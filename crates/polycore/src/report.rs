@@ -237,12 +237,6 @@ impl Report {
         text
     }
 
-    /// Prints [`Report::table`] to standard output.
-    pub fn print_table(&self) {
-        // a closed pipe is no reason to fail a run
-        let _ = std::io::stdout().write_all(self.table().as_bytes());
-    }
-
     fn set(&mut self, name: &str, value: Value) -> &mut Self {
         self.values.insert(name.to_owned(), value);
         self.refresh()

@@ -57,7 +57,7 @@ if kind == "torch":
         linear.weight.data, linear.bias.data = weight, bias
         # beyond 20 torch's softplus is x by default: a difference of 2e-9
         layers += [linear, torch.nn.Softplus(threshold=700) if activation == "softplus" else after[activation]()]
-    net = torch.nn.Sequential(*layers)
+    net = torch.nn.Sequential(*layers).requires_grad_(False)
     mean, deviation, output_mean, output_deviation = (
         torch.tensor(header[key], dtype=torch.float64)
         for key in ("input_mean", "input_deviation", "output_mean", "output_deviation")

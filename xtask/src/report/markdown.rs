@@ -7,9 +7,9 @@ use crate::validate::outcome::Outcome;
 /// Sums, thesis map, cases, fronts, cross-checks.
 pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
     let mut text = format!(
-        "# Validation\n\nWritten by `{}`: {}.\nThe same with pictures, every number and its source is \
+        "# Validation\n\nWritten by `cargo xtask validate`: {}.\nThe same with pictures, every number and its source is \
          `target/validation/report.html`.\n",
-        page.command, page.sums
+        page.sums
     );
     let failed: Vec<&Outcome> = outcomes.iter().filter(|outcome| !outcome.passed()).collect();
     for outcome in failed {

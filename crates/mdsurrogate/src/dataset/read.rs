@@ -107,15 +107,12 @@ impl Form {
         let prefixed = |name: &str| format!("{prefix}{name}");
         let stress = || table.columns(STRESSES.map(prefixed));
         if table.has("F12") {
-            let mut names = Vec::with_capacity(9);
-            for (i, j) in (1..=3).flat_map(|i| (1..=3).map(move |j| (i, j))) {
-                names.push(format!("F{i}{j}"));
-            }
-            let mut components = [table.column("F12")?; 9];
-            for (column, name) in components.iter_mut().zip(&names) {
-                *column = table.column(name)?;
-            }
+            let name = |k: usize| format!("F{}{}", k / 3 + 1, k % 3 + 1);
+            let components = table.columns(std::array::from_fn::<_, 9, _>(name))?;
             return Ok(Self::Gradient { components, stress: stress()? });
+        }
+        if !LENGTHS.iter().any(|name| table.has(&prefixed(name))) {
+            return Err(unknown_form(table, options.columns));
         }
         let lengths = table.columns(LENGTHS.map(prefixed))?;
         let tilted = table.has(&prefixed("xy"));
@@ -153,11 +150,11 @@ impl Form {
         let stress = table.numbers(row, self.stress())?;
         let stress = Voigt::from_fn(|a, _| stress[a] * units[a]);
         let at = |error: Error| {
-            Error::file(
-                &table.path,
-                format!("line {}: {error}", table.line(row)),
-                "a deformation with positive determinant",
-            )
+            let (found, allowed) = match error {
+                Error::Parameter { name, found, allowed } => (format!("{name}: {found}"), allowed),
+                other => (other.to_string(), "a deformation with positive determinant".into()),
+            };
+            Error::file(&table.path, format!("line {}: {found}", table.line(row)), allowed)
         };
         match self {
             Self::Box { lengths, tilts, reference, .. } => {
@@ -178,6 +175,24 @@ impl Form {
             }
         }
     }
+}
+
+/// The error of a table without any of the forms of [`read`].
+fn unknown_form(table: &Table, columns: Columns) -> Error {
+    let headings: Vec<&str> = table.headings.iter().map(|(name, _)| name.as_str()).collect();
+    let found = format!("the headings {}", headings.join(", "));
+    let forms =
+        "C11 C22 C33 C12 C13 C23 and S11 … S23, or F11 F12 … F33 or lx ly lz and sxx syy szz sxy sxz syz";
+    let allowed = match columns {
+        _ if headings.len() == 1 => format!("{forms}, separated by commas"),
+        Columns::Averaged if table.has("lx") => {
+            "avg_lx … avg_syz; for lx … syz as they are, `columns = \"instantaneous\"` (`--instantaneous`)"
+                .into()
+        }
+        Columns::Averaged => format!("{forms}, the last two forms with `avg_` before lx … syz"),
+        Columns::Instantaneous => forms.to_owned(),
+    };
+    Error::file(&table.path, found, allowed)
 }
 
 /// The box of the first row in which the file's own F is 1.

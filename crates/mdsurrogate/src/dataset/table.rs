@@ -79,18 +79,16 @@ impl Table {
         self.headings.iter().position(|(other, _)| other == name).map(Column)
     }
 
-    pub fn column(&self, name: &str) -> Result<Column, Error> {
-        self.find(name).ok_or_else(|| Error::MissingColumn {
-            path: self.path.clone(),
-            column: name.to_owned(),
-            similar: nearest(name, self.headings.iter().map(|(name, _)| name.as_str())),
-        })
-    }
-
+    /// All of these columns; one that is missing is not likened to another of them.
     pub fn columns<const N: usize>(&self, names: [String; N]) -> Result<[Column; N], Error> {
         let mut columns = [Column(0); N];
         for (column, name) in columns.iter_mut().zip(&names) {
-            *column = self.column(name)?;
+            let others = self.headings.iter().map(|(other, _)| other).filter(|other| !names.contains(other));
+            *column = self.find(name).ok_or_else(|| Error::MissingColumn {
+                path: self.path.clone(),
+                column: name.clone(),
+                similar: nearest(name, others.map(String::as_str)),
+            })?;
         }
         Ok(columns)
     }

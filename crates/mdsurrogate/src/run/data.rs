@@ -39,8 +39,16 @@ pub fn load(source: &Source, data: &Data, files: &[PathBuf], key: &str) -> Resul
     }
     let folder = source.path.parent().unwrap_or(Path::new(""));
     let mut set = Dataset::default();
-    for file in files {
-        set.append(read(folder.join(file), &options)?)?;
+    for (index, file) in files.iter().enumerate() {
+        let path = folder.join(file);
+        let part = read(&path, &options).map_err(|error| match error {
+            Error::Shared(polycore::Error::Io { source: reason, .. }) => {
+                let allowed = format!("a file that can be read ({reason})");
+                Failure::from(source.error(&format!("{key}[{index}]"), path.display(), allowed))
+            }
+            other => other.into(),
+        })?;
+        set.append(part)?;
     }
     set.check()?;
     Ok(set)
@@ -67,8 +75,14 @@ impl Prepared {
             [] => None,
             files => Some(load(source, &scene.data, files, "data.heldout")?),
         };
-        let split = split(&set, scene.split.by, scene.split.fractions, scene.split.seed)
-            .map_err(|error| source.error("split", error.to_string(), "a split that the data allow"))?;
+        let split = split(&set, scene.split.by, scene.split.fractions, scene.split.seed).map_err(
+            |error| match error {
+                Error::Parameter { found, allowed, .. } | Error::Data { found, allowed, .. } => {
+                    source.error("split", found, allowed)
+                }
+                other => source.error("split", other, "a split that the data allow"),
+            },
+        )?;
         Ok(Self { set, heldout, split })
     }
 

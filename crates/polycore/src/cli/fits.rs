@@ -44,7 +44,7 @@ pub fn run(case: &Case, directory: &Path, quick: bool) -> Result<Report, Error> 
     phases.stop();
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     report.write(directory)?;
-    print!("{}", summary(&case.title, &all, &report.expect));
+    polycore::command::print(summary(&case.title, &all, &report.expect));
     Ok(report)
 }
 

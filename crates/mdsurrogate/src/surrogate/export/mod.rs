@@ -197,14 +197,25 @@ fn invariants_of(law: &Surrogate<f64>) -> Invariants {
     law.header.kind.invariants().unwrap_or(Invariants::new(Symmetry::Triclinic, false))
 }
 
+/// Keywords of C99 (ISO/IEC 9899:1999, 6.4.1) and the function that every program has.
+const KEYWORDS: [&str; 35] = [
+    "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum",
+    "extern", "float", "for", "goto", "if", "inline", "int", "long", "main", "register", "restrict",
+    "return", "short", "signed", "sizeof", "static", "struct", "switch", "typedef", "union", "unsigned",
+    "void", "volatile", "while",
+];
+
 /// # Errors
 /// [`Error::Parameter`] for a name that is no identifier of both C and Fortran.
 fn check_name(name: &str) -> Result<(), Error> {
     let first = name.chars().next().is_some_and(|c| c.is_ascii_alphabetic());
-    if first && name.len() <= 50 && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+    let letters = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    // Fortran reserves no words
+    if first && letters && name.len() <= 50 && !KEYWORDS.contains(&name) {
         return Ok(());
     }
-    Err(Error::parameter("name", name, "a letter, then letters, digits and `_`, up to 50"))
+    let allowed = "a letter, then letters, digits and `_`, up to 50, no keyword of C";
+    Err(Error::parameter("name of the function", format!("`{name}`"), allowed))
 }
 
 /// Numbers of C source, with the shortest text that reads back to the same bits.

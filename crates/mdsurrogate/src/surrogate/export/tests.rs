@@ -116,7 +116,7 @@ fn exported_c_agrees() {
     }
     assert!(far > 0);
     assert_eq!(lines.next(), Some("1"));
-    for name in ["", "1law", "a b", "ä"] {
+    for name in ["", "1law", "a b", "ä", "int"] {
         assert!(laws[0].1.c_source(name).is_err() && laws[0].1.fortran_source(name).is_err());
     }
     assert!(laws[0].1.fortran_source("Umat").is_err());
