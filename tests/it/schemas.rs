@@ -2,6 +2,7 @@
 
 use crate::program::{command, finish, workspace};
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
@@ -198,4 +199,41 @@ fn keys_are_documented() {
         let lengths = &schema["definitions"]["length"];
         assert!(lengths["examples"][0].is_string() && lengths["pattern"].is_string(), "{lengths}");
     }
+}
+
+/// Keys, choices and names that a schema knows, choices in quotes.
+fn words(schema: &Value, found: &mut BTreeSet<String>) {
+    match schema {
+        Value::Object(keys) => {
+            if let Some(Value::Object(properties)) = keys.get("properties") {
+                found.extend(properties.keys().cloned());
+            }
+            let choices = keys.get("enum").and_then(Value::as_array).into_iter().flatten();
+            found.extend(
+                choices.chain(keys.get("const")).filter_map(Value::as_str).map(|s| format!("\"{s}\"")),
+            );
+            keys.values().for_each(|inner| words(inner, found));
+        }
+        Value::Array(list) => list.iter().for_each(|inner| words(inner, found)),
+        _ => {}
+    }
+}
+
+/// The reference pages of `crystfem` leave out no key and no choice: each stands there in backticks, alone or in a line of TOML.
+#[test]
+fn keys_are_in_the_reference() {
+    let pages = ["part.md", "material.md"]
+        .map(|page| fs::read_to_string(workspace().join("docs/guide/src/reference").join(page)).unwrap());
+    let mut named = BTreeSet::new();
+    for line in pages.iter().flat_map(|page| page.lines()) {
+        for code in line.split('`').skip(1).step_by(2) {
+            let word = |letter: char| letter.is_ascii_alphanumeric() || "_-.\"".contains(letter);
+            named.extend(code.split(|letter| !word(letter)).map(str::to_owned));
+        }
+    }
+    let mut known = BTreeSet::new();
+    words(&schema("crystfem"), &mut known);
+    assert!(known.len() > 90 && known.contains("\"tr-bdf2\"") && known.contains("growth_rate"), "{known:?}");
+    let missing: Vec<&String> = known.difference(&named).collect();
+    assert!(missing.is_empty(), "not in the reference: {missing:?}");
 }

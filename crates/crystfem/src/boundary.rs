@@ -25,17 +25,19 @@ impl Schedule {
     /// # Errors
     /// [`Error::Parameter`] where there is none, where times do not ascend, and for values that are not finite.
     pub fn linear(pairs: &[(f64, f64)]) -> Result<Self, Error> {
-        let wrong =
-            |found, allowed: &str| Error::Parameter { name: "schedule", found, allowed: allowed.into() };
+        let wrong = |name, found, allowed: &str| Error::Parameter { name, found, allowed: allowed.into() };
         if pairs.is_empty() {
-            return Err(wrong(0.0, "at least one pair of time and value"));
+            return Err(wrong("number of times", 0.0, "at least one pair of time and value"));
         }
         for (index, &(time, value)) in pairs.iter().enumerate() {
-            if !time.is_finite() || !value.is_finite() {
-                return Err(wrong(if time.is_finite() { value } else { time }, "finite numbers"));
+            if !time.is_finite() {
+                return Err(wrong("time, s", time, "a finite number"));
+            }
+            if !value.is_finite() {
+                return Err(wrong("value", value, "a finite number"));
             }
             if index > 0 && time <= pairs[index - 1].0 {
-                return Err(wrong(time, "a time above the one before"));
+                return Err(wrong("time, s", time, "a time above the one before"));
             }
         }
         Ok(Self {

@@ -10,7 +10,7 @@ use nalgebra::Matrix3;
 pub const MOST: usize = 8;
 
 /// Corners of a hexahedron in natural coordinates, in the order of Abaqus and VTK.
-const CORNERS: [[f64; 3]; 8] = [
+pub const CORNERS: [[f64; 3]; 8] = [
     [-1.0, -1.0, -1.0],
     [1.0, -1.0, -1.0],
     [1.0, 1.0, -1.0],

@@ -18,6 +18,24 @@ pub enum Error {
         /// What is allowed.
         allowed: String,
     },
+    /// A name that is none of those known.
+    #[error("no {what} `{name}`; allowed: {}", known.join(", "))]
+    Unknown {
+        /// What it would name.
+        what: &'static str,
+        /// The name found.
+        name: String,
+        /// Names that there are.
+        known: Vec<String>,
+    },
+    /// An option of the command line cannot be used.
+    #[error("`{option}`: {reason}")]
+    Option {
+        /// The option, as it was written.
+        option: String,
+        /// What is wrong with it, and what is allowed.
+        reason: String,
+    },
     /// A line of a data or mesh file cannot be used.
     #[error("{}:{line}: {what}: found {found:?}; allowed: {allowed}", path.display())]
     File {
@@ -89,7 +107,12 @@ impl Error {
     /// Exit code of the command line: 2 for bad input, 130 for an interrupted run, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Mesh(_) | Self::Parameter { .. } | Self::File { .. } | Self::Data { .. } => 2,
+            Self::Mesh(_)
+            | Self::Parameter { .. }
+            | Self::Unknown { .. }
+            | Self::Option { .. }
+            | Self::File { .. }
+            | Self::Data { .. } => 2,
             Self::Interrupted(_) | Self::SweepInterrupted(_) => 130,
             Self::NotFinite { .. } | Self::NotConverged { .. } => 1,
             Self::Study { error, .. } => error.exit_code(),

@@ -89,6 +89,9 @@ enum Command {
     Check {
         /// The scene (TOML).
         scene: PathBuf,
+        /// As `run --quick` would.
+        #[arg(long)]
+        quick: bool,
     },
     /// Measure error against run time.
     Bench(bench::Bench),
@@ -120,7 +123,7 @@ fn main() -> ExitCode {
             sweep(&scene, &vary, &output, checkpoint_every)
         }
         Command::Resume { output, checkpoint_every } => resume(&output, checkpoint_every),
-        Command::Check { scene } => check(&scene),
+        Command::Check { scene, quick } => check(&scene, quick),
         Command::Bench(bench) => bench.print(),
         Command::Schema => {
             polycore::say!("{:#}", crystfem::scene::schema());
@@ -145,7 +148,7 @@ fn run(scene: &Scene, kind: Option<Kind>) -> Result<bool, Failure> {
         return Err(source.error("program", found, "`crystfem run`, which takes scenes of all kinds").into());
     }
     if scene.explain {
-        for line in crystfem::run::explain(&source)? {
+        for line in crystfem::run::explain(&source, scene.quick)? {
             polycore::say!("{line}");
         }
     }
@@ -215,9 +218,9 @@ fn solve(source: &Source, output: &Path, quick: bool, every: f64, resume: bool) 
     Ok(finished.report.passed())
 }
 
-fn check(path: &Path) -> Result<bool, Failure> {
+fn check(path: &Path, quick: bool) -> Result<bool, Failure> {
     let source = Source::read(path)?;
-    for line in crystfem::run::explain(&source)? {
+    for line in crystfem::run::explain(&source, quick)? {
         polycore::say!("{line}");
     }
     polycore::say!("{}: the scene is valid", path.display());

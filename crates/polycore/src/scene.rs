@@ -119,11 +119,30 @@ impl Source {
     /// `source.error("body.parts[1].radius", "0.6 m, larger than the plate", "less than 0.5 m")`. A path that does
     /// not exist points at its nearest existing parent.
     pub fn error(&self, key: &str, found: impl ToString, allowed: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::value(self, &key, span, &found.to_string(), &allowed.to_string())
+    }
+
+    /// As [`Source::error`], of what already tells what was found and what is allowed: a file that cannot be used.
+    pub fn refused(&self, key: &str, error: impl ToString) -> SceneError {
+        let (key, span) = self.place(key);
+        SceneError::refused(self, key, span, &error.to_string())
+    }
+
+    /// As [`Source::error`], of a name that is none of the known ones; a similar one is proposed.
+    pub fn unknown(&self, key: &str, name: &str, known: &[&str]) -> SceneError {
+        let (key, span) = self.place(key);
+        let what = format!("`{key}`: found `{name}`");
+        SceneError::choice(self, "scene::unknown_choice", key, span, &what, name, known)
+    }
+
+    /// Where the value at a dotted key path is written: its path in the text and its span.
+    fn place(&self, key: &str) -> (String, std::ops::Range<usize>) {
         let root = DeTable::parse(&self.text).ok();
         let origin = root.as_ref().and_then(|root| self.origin(root.get_ref(), key));
-        let key = origin.as_deref().unwrap_or(key);
-        let span = root.as_ref().and_then(|root| locate::span(root.get_ref(), key)).unwrap_or(0..0);
-        SceneError::value(self, key, span, &found.to_string(), &allowed.to_string())
+        let key = origin.unwrap_or_else(|| key.to_owned());
+        let span = root.as_ref().and_then(|root| locate::span(root.get_ref(), &key)).unwrap_or(0..0);
+        (key, span)
     }
 
     fn check_version(&self, root: &Spanned<DeTable<'_>>) -> Result<(), SceneError> {

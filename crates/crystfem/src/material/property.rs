@@ -41,11 +41,11 @@ impl Property {
     /// [`Error::Parameter`] for no rows or unequal columns (with the number of rows), temperatures that do not increase,
     /// and values that are not above 0 and finite.
     pub fn table(name: &'static str, temperatures: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
-        let refuse = |found, allowed: String| Err(Error::Parameter { name, found, allowed });
+        let refuse = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
         if temperatures.is_empty() || temperatures.len() != values.len() {
             let allowed =
                 format!("a value for each of the {} temperatures, at least one", temperatures.len());
-            return refuse(values.len() as f64, allowed);
+            return refuse("number of values", values.len() as f64, allowed);
         }
         for &value in &values {
             positive(name, value)?;
@@ -53,7 +53,8 @@ impl Property {
         for (index, &temperature) in temperatures.iter().enumerate() {
             let before = if index > 0 { temperatures[index - 1] } else { f64::NEG_INFINITY };
             if !(temperature > before && temperature.is_finite()) {
-                return refuse(temperature, format!("temperatures that increase, above {before} K here"));
+                let allowed = format!("temperatures that increase, above {before} K here");
+                return refuse("temperature, K", temperature, allowed);
             }
         }
         let mut integrals = vec![0.0];

@@ -77,10 +77,17 @@ impl Bar {
         };
         count("layers", self.layers)?;
         count("elements per layer", self.elements_per_layer)?;
-        count("elements along an axis", self.layers.saturating_mul(self.elements_per_layer))?;
-        if !(self.layer_height > 0.0 && (self.layer_height * self.layers as f64).is_finite()) {
-            let (name, found) = ("height of a layer", self.layer_height);
-            return Err(Error::Parameter { name, found, allowed: "positive and finite, m".into() });
+        count("layers", self.layers.saturating_mul(self.elements_per_layer))?;
+        let positive = |name, found: f64, most: f64| match found > 0.0 && most.is_finite() {
+            true => Ok(()),
+            false => Err(Error::Parameter { name, found, allowed: "positive and finite, m".into() }),
+        };
+        positive("height of a layer", self.layer_height, self.layer_height * self.layers as f64)?;
+        for size in self.size {
+            positive("extent of the bar", size, size)?;
+        }
+        if let Some(Substrate { thickness, .. }) = self.substrate {
+            positive("thickness of the substrate", thickness, thickness)?;
         }
         let mut lines = [const { Vec::new() }; 3];
         for d in 0..2 {
@@ -194,14 +201,14 @@ mod tests {
         refused(Bar { elements_per_layer: 0, ..bar() }, "elements per layer: found 0");
         refused(Bar { layers: usize::MAX, elements_per_layer: 2, ..bar() }, "layers: found");
         refused(Bar { element_size: 1e-12, ..bar() }, "elements along an axis: found");
-        refused(Bar { size: [-1.0, 1.0], ..bar() }, "length: found -1");
+        refused(Bar { size: [-1.0, 1.0], ..bar() }, "extent of the bar: found -1");
         let small = Substrate { size: [0.01, 0.02], thickness: 4e-3, growth: 1.4 };
         refused(
             Bar { substrate: Some(small), ..bar() },
             "extent of the substrate: found 0.01; allowed: at least",
         );
         let thin = Substrate { size: [0.04, 0.02], thickness: 0.0, growth: 1.4 };
-        refused(Bar { substrate: Some(thin), ..bar() }, "length: found 0");
+        refused(Bar { substrate: Some(thin), ..bar() }, "thickness of the substrate: found 0");
         let shrinking = Substrate { size: [0.04, 0.02], thickness: 1e-3, growth: 0.5 };
         refused(
             Bar { substrate: Some(shrinking), ..bar() },

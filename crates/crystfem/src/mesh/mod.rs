@@ -5,6 +5,7 @@ mod bar;
 pub mod gmsh;
 mod labelled;
 pub mod layers;
+mod locate;
 pub mod path;
 pub mod quality;
 mod split;
@@ -20,6 +21,7 @@ use crate::error::Error;
 
 pub use bar::{Bar, Substrate};
 pub use labelled::ReadMesh;
+pub use locate::Place;
 pub use split::Split;
 pub use structured::{Block, Grid, graded};
 

@@ -160,9 +160,14 @@ impl Surface {
                 nodes.iter().all(|node| (mesh.points[*node as usize][d] - plane).abs() <= near)
             }));
         } else {
-            let named = mesh.surfaces.keys().chain(mesh.element_sets.keys()).map(String::as_str);
-            let all: Vec<&str> = named.chain(["outer"]).chain(BOX_SIDES).collect();
-            return Err(Error::Mesh(format!("no surface `{name}`; allowed: {}", all.join(", "))));
+            let mut known: Vec<String> =
+                mesh.surfaces.keys().chain(mesh.element_sets.keys()).cloned().collect();
+            for own in ["outer"].into_iter().chain(BOX_SIDES) {
+                if !known.iter().any(|name| name == own) {
+                    known.push(own.to_owned());
+                }
+            }
+            return Err(Error::Unknown { what: "surface", name: name.to_owned(), known });
         }
         faces.sort_unstable();
         faces.dedup();

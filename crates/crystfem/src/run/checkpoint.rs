@@ -8,7 +8,7 @@ use polycore::scene::Source;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-const MAGIC: &Magic = b"part-ck2";
+const MAGIC: &Magic = b"part-ck3";
 
 /// The part of a checkpoint that tells the scene; all of it for a run of several studies.
 #[derive(Debug, Serialize, Deserialize)]

@@ -21,7 +21,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
     let births = problem.births.len();
     if births > 0 {
         lines.push(format!(
-            "builds     {births} births of {} elements; what is not printed yet has no equations",
+            "builds     {births} births, {} elements in all; what is not printed yet has no equations",
             task.printed.len()
         ));
     }

@@ -51,27 +51,48 @@ pub fn draw(
     // all frames, or as many as an animation may have, the last among them
     let every = count.div_ceil(FRAMES);
     let shown: Vec<usize> = (0..count).rev().step_by(every).collect::<Vec<_>>().into_iter().rev().collect();
-    let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; 1 + usize::from(field.is_some())];
-    for &frame in &shown {
-        for (values, [low, high]) in frames.values(frame)?.1.iter().zip(&mut ranges) {
-            for &value in values.iter().filter(|value| value.is_finite()) {
-                (*low, *high) = (low.min(value), high.max(value));
-            }
-        }
-    }
-    let strips = frames.strips(scene, &ranges);
     if count > 1 {
-        strips.animate(output.join("process.png"), shown.len(), SHOWN, |k| {
+        let mut ranges = frames.no_ranges();
+        for &frame in &shown {
+            widen(&mut ranges, &frames.values(frame)?);
+        }
+        frames.strips(scene, &ranges).animate(output.join("process.png"), shown.len(), SHOWN, |k| {
             frames.values(shown[k]).map_err(|error| match error {
                 Error::Shared(error) => error,
                 other => polycore::Error::Data { what: "animation".into(), reason: other.to_string() },
             })
         })?;
     }
-    let last = count - 1;
-    let stages = scene.output.stages.min(last.max(1));
-    let at = (1..=stages).map(|stage| frames.values(stage * last / stages));
-    Ok(strips.write(output.join("sections.png"), &at.collect::<Result<Vec<_>, _>>()?)?)
+    let births: Vec<f64> = task.problem.births.iter().map(|birth| birth.time).collect();
+    let stages = stages(&births, &frames.times(), scene.output.stages);
+    let stages = stages.into_iter().map(|frame| frames.values(frame)).collect::<Result<Vec<_>, _>>()?;
+    let mut ranges = frames.no_ranges();
+    stages.iter().for_each(|stage| widen(&mut ranges, stage));
+    Ok(frames.strips(scene, &ranges).write(output.join("sections.png"), &stages)?)
+}
+
+/// Frames to show: the first after some births, which shows fresh material while it is hot, then evenly to the end.
+fn stages(births: &[f64], times: &[f64], wanted: usize) -> Vec<usize> {
+    let last = times.len() - 1;
+    let hot = births.len().min(wanted - 1);
+    let after = |birth: f64| times.partition_point(|&time| time <= birth).min(last);
+    let mut frames: Vec<usize> =
+        (1..=hot).map(|k| after(births[(k * births.len()).div_ceil(hot) - 1])).collect();
+    let (begin, rest) = (frames.last().copied().unwrap_or(0), wanted - hot);
+    frames.extend((1..=rest).map(|k| begin + k * (last - begin) / rest));
+    frames.dedup();
+    // nothing has happened yet in the very first frame
+    frames.retain(|&frame| frame > 0 || last == 0);
+    frames
+}
+
+/// Takes the values of a stage into the ranges of its fields.
+fn widen(ranges: &mut [[f64; 2]], stage: &Stage) {
+    for (values, [low, high]) in stage.1.iter().zip(ranges) {
+        for &value in values.iter().filter(|value| value.is_finite()) {
+            (*low, *high) = (low.min(value), high.max(value));
+        }
+    }
 }
 
 impl Frames<'_> {
@@ -80,6 +101,18 @@ impl Frames<'_> {
             Origin::File(series) => series.len().max(1),
             Origin::End(_) => 1,
         }
+    }
+
+    fn times(&self) -> Vec<f64> {
+        match &self.from {
+            Origin::File(series) if !series.times().is_empty() => series.times().to_vec(),
+            Origin::File(_) => vec![0.0],
+            Origin::End(simulation) => vec![simulation.time()],
+        }
+    }
+
+    fn no_ranges(&self) -> Vec<[f64; 2]> {
+        vec![[f64::INFINITY, f64::NEG_INFINITY]; 1 + usize::from(self.field.is_some())]
     }
 
     fn values(&self, frame: usize) -> Result<Stage, Error> {
@@ -128,5 +161,25 @@ impl Frames<'_> {
             axes: ["x", "z"],
             columns: columns.collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_follow_births() {
+        // eight layers, a frame every 8 s: 4 s after layers 2, 4, 6 and 8, and the end
+        let births: Vec<f64> = (0..8).map(|k| 20.0 * f64::from(k)).collect();
+        let times: Vec<f64> = (0..=50).map(|k| 8.0 * f64::from(k)).collect();
+        assert_eq!(stages(&births, &times, 5), [3, 8, 13, 18, 50]);
+        // fewer layers than stages: each, then evenly
+        assert_eq!(stages(&births[..2], &times, 5), [1, 3, 18, 34, 50]);
+        assert_eq!(stages(&[], &times, 5), [10, 20, 30, 40, 50]);
+        assert_eq!(stages(&births, &times, 1), [50]);
+        // frames further apart than births, and only the end
+        assert_eq!(stages(&births, &[0.0, 80.0, 160.0], 5), [1, 2]);
+        assert_eq!(stages(&births, &[160.0], 5), [0]);
     }
 }

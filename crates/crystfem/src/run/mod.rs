@@ -83,14 +83,14 @@ pub fn run(source: &Source, options: &mut Options) -> Result<Finished, Failure> 
     }
 }
 
-/// What a scene of any kind builds and leaves out, in lines.
+/// What a scene of any kind builds and leaves out, in lines; `quick`: as a run without what is marked `quick = false`.
 ///
 /// # Errors
 /// A fault of the scene.
-pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
+pub fn explain(source: &Source, quick: bool) -> Result<Vec<String>, Failure> {
     match scene::kind(source)? {
-        Kind::Point => Ok(self::point::explain(source, &source.parse::<PointScene>()?)?),
+        Kind::Point => Ok(self::point::explain(source, &source.parse::<PointScene>()?, quick)?),
         Kind::Fit => Ok(self::fit::explain(source, &source.parse::<FitScene>()?)?),
-        Kind::Part => self::part::explain(source, &source.parse::<PartScene>()?),
+        Kind::Part => self::part::explain(source, &source.parse::<PartScene>()?, quick),
     }
 }

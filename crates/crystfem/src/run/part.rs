@@ -51,7 +51,12 @@ pub fn one(
         polycore::output::prepare_run(options.output)?;
         let fields = simulation.field_names().len();
         frames = 0;
-        probes = scene.probe.iter().map(|spec| Probe::new(spec, &task.problem.mesh, fields)).collect();
+        probes = scene
+            .probe
+            .iter()
+            .zip(&task.probes)
+            .map(|(spec, place)| Probe::new(spec, place, fields))
+            .collect();
     }
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let names = simulation.field_names();
@@ -80,9 +85,9 @@ pub fn one(
 ///
 /// # Errors
 /// A fault of the scene.
-pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
+pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<String>, Failure> {
     if !scene.study.is_empty() {
-        return super::suite::explain(source, scene);
+        return super::suite::explain(source, scene, quick);
     }
     scene.check(source)?;
     super::explain::one(source, scene)

@@ -67,7 +67,7 @@ pub fn run(source: &Source, scene: &PointScene, options: &Options) -> Result<Rep
 ///
 /// # Errors
 /// A fault of the scene.
-pub fn explain(source: &Source, scene: &PointScene) -> Result<Vec<String>, SceneError> {
+pub fn explain(source: &Source, scene: &PointScene, quick: bool) -> Result<Vec<String>, SceneError> {
     let mut lines = Vec::new();
     for (name, spec, key) in scene.materials(source)? {
         let material = spec.build(source, &key)?;
@@ -77,7 +77,8 @@ pub fn explain(source: &Source, scene: &PointScene) -> Result<Vec<String>, Scene
         let name = if name.is_empty() { "" } else { &format!(" {name}") };
         lines.push(format!("material{name}: {:?}, {linear}, {melting}, {coupled}", spec.law));
     }
-    for (point, (drive, stepping)) in scene.point.iter().zip(scene.courses(source)?) {
+    let courses = scene.point.iter().zip(scene.courses(source)?);
+    for (point, (drive, stepping)) in courses.filter(|(point, _)| !quick || point.quick) {
         let drive = match drive {
             Drive::Prescribed(history) => {
                 let [from, to] = history.span();

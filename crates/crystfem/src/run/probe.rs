@@ -2,7 +2,7 @@
 
 use super::point::CELSIUS;
 use crate::error::Error;
-use crate::mesh::Mesh;
+use crate::mesh::Place;
 use crate::scene::{PartScene, ProbeSpec};
 use crate::simulation::Simulation;
 use polycore::output::csv;
@@ -18,9 +18,7 @@ const ROWS: usize = 4000;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Probe {
     name: String,
-    node: u32,
-    /// How far the node is from where it was asked for, m.
-    distance: f64,
+    place: Place,
     time: Vec<f64>,
     /// °C.
     temperature: Vec<f64>,
@@ -29,19 +27,11 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// At the node nearest to where it is asked for.
-    pub fn new(spec: &ProbeSpec, mesh: &Mesh, fields: usize) -> Self {
-        let at = spec.at.map(|x| x.si());
-        let distance = |node: usize| {
-            let place = mesh.points[node];
-            (0..3).map(|d| (place[d] - at[d]).powi(2)).sum::<f64>().sqrt()
-        };
-        let nearest = (0..mesh.points.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
-        let node = nearest.unwrap_or(0);
+    /// At a place, of which nothing is recorded yet.
+    pub fn new(spec: &ProbeSpec, place: &Place, fields: usize) -> Self {
         Self {
             name: spec.name.clone(),
-            node: node as u32,
-            distance: distance(node),
+            place: place.clone(),
             time: Vec::new(),
             temperature: Vec::new(),
             fields: vec![Vec::new(); fields],
@@ -51,23 +41,29 @@ impl Probe {
     fn last(&self) -> Option<f64> {
         self.time.last().copied()
     }
+
+    /// Whether an element that holds the place is there.
+    fn exists(&self, simulation: &Simulation) -> bool {
+        self.place.elements().iter().any(|&element| simulation.is_born(element))
+    }
 }
 
-/// Adds a row to every probe whose node exists.
+/// Adds a row to every probe whose place exists.
 pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static str]) {
-    if !probes.iter().any(|probe| simulation.exists(probe.node)) {
+    if !probes.iter().any(|probe| probe.exists(simulation)) {
         return;
     }
     let fields: Vec<Vec<f64>> = names.iter().map(|name| simulation.field(name)).collect();
-    for probe in probes {
-        let Some(temperature) = simulation.temperature(probe.node) else { continue };
+    for probe in probes.iter_mut().filter(|probe| probe.exists(simulation)) {
+        let Some(temperature) = probe.place.value(|node| simulation.temperature(node)) else { continue };
         if probe.last() == Some(simulation.time()) {
             continue;
         }
         probe.time.push(simulation.time());
         probe.temperature.push(temperature - CELSIUS);
         for (list, values) in probe.fields.iter_mut().zip(&fields) {
-            list.push(values[probe.node as usize]);
+            let value = probe.place.value(|node| values.get(node as usize).copied());
+            list.push(value.unwrap_or(f64::NAN));
         }
     }
 }
@@ -81,7 +77,7 @@ pub fn write(
 ) -> Result<(), Error> {
     for probe in probes {
         let name = &probe.name;
-        report.value(&format!("{name}.distance"), probe.distance, "m");
+        report.value(&format!("{name}.distance"), probe.place.distance(), "m");
         let mut columns: Vec<csv::Column> =
             vec![("time", "s", &probe.time), ("temperature", "degC", &probe.temperature)];
         columns.extend(names.iter().zip(&probe.fields).map(|(name, values)| (*name, "", values.as_slice())));

@@ -35,7 +35,8 @@ impl Section {
             return None;
         }
         let spacing = longest / SAMPLES;
-        let count = |d: usize| ((high[d] - low[d]) / spacing).round().max(1.0) as usize;
+        // those whose middle lies inside
+        let count = |d: usize| ((high[d] - low[d]) / spacing - 0.5).ceil().max(1.0) as usize;
         let samples = [count(0), count(2)];
         let middle = 0.5 * (low[1] + high[1]);
         let within = |from: f64, to: f64, d: usize, most: usize| {

@@ -220,9 +220,9 @@ fn compare(scene: &PartScene, rows: &Rows, output: &Path) -> Result<(), polycore
 ///
 /// # Errors
 /// A fault of the scene.
-pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
+pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
-    for index in scene.studies(source, false)? {
+    for index in scene.studies(source, quick)? {
         let study = &scene.study[index];
         lines.push(format!("study {}", study.name));
         if let Some(error) = &study.fails {

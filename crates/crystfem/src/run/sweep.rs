@@ -7,13 +7,16 @@ use crate::error::Error;
 use crate::scene::{Kind, PartScene, kind};
 use polycore::output::picture::{LinePlot, Series};
 use polycore::report::{Phases, Report};
-use polycore::scene::Source;
+use polycore::scene::{SceneError, Source};
+use rayon::prelude::*;
 use std::path::Path;
 use std::str::FromStr;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+/// The table of a sweep, in its folder.
+const TABLE: &str = "sweep.csv";
 /// Runs of a sweep at most.
 const MOST: usize = 10_000;
 
@@ -86,6 +89,7 @@ struct Run {
 /// not end the sweep: its row says so, and the report fails.
 pub fn sweep(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Result<Finished, Failure> {
     let runs = runs(source, vary)?;
+    refuse_other_keys(vary, options.output)?;
     polycore::output::prepare_directory(options.output)?;
     let _ = std::fs::remove_file(options.output.join(polycore::report::FILE_NAME));
     let mut phases = Phases::new();
@@ -100,7 +104,7 @@ pub fn sweep(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Resu
             .map(|(run, outcome)| Row { name: run.name.clone(), settings: run.values.clone(), outcome })
             .collect(),
     };
-    rows.write(&options.output.join("sweep.csv"))?;
+    rows.write(&options.output.join(TABLE))?;
     draw(vary, &rows, options.output)?;
     let mut report = together(source, vary, &rows);
     phases.stop();
@@ -110,13 +114,32 @@ pub fn sweep(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Resu
     Ok(Finished { text: rows.text(), report })
 }
 
+/// The table of a sweep over other keys would be lost.
+fn refuse_other_keys(vary: &[Vary], output: &Path) -> Result<(), Error> {
+    let Ok(mut table) = csv::Reader::from_path(output.join(TABLE)) else { return Ok(()) };
+    let head = table.headers().cloned().unwrap_or_default();
+    let ends = |name: &&str| name.starts_with(STATISTICS[0]) || *name == "steps";
+    let keys: Vec<&str> = head.iter().skip(1).take_while(|name| !ends(name)).collect();
+    if vary.iter().map(|vary| vary.key.as_str()).eq(keys.iter().copied()) {
+        return Ok(());
+    }
+    let reason =
+        format!("found a sweep over {}; allowed: one over the same keys, or another folder", keys.join(", "));
+    Err(Error::Option { option: format!("--output {}", output.display()), reason })
+}
+
 /// The runs of a grid, each checked.
 fn runs(source: &Source, vary: &[Vary]) -> Result<Vec<Run>, Failure> {
     if kind(source)? != Kind::Part {
         return Err(source.error("program", "a scene without a mesh", "a scene of a part").into());
     }
-    if !source.parse::<PartScene>()?.study.is_empty() {
+    let scene = source.parse::<PartScene>()?;
+    if !scene.study.is_empty() {
         return Err(source.error("study", "a sweep of a scene with studies", "a scene without").into());
+    }
+    if let Some(twice) = (1..vary.len()).find(|&k| vary[..k].iter().any(|other| other.key == vary[k].key)) {
+        let reason = "found the key twice; allowed: each key once, with all its values".to_owned();
+        return Err(Error::Option { option: format!("--vary {}", vary[twice].key), reason }.into());
     }
     let count = vary.iter().map(|vary| vary.values.len()).try_fold(1, usize::checked_mul);
     let Some(count) = count.filter(|&count| count <= MOST) else {
@@ -156,14 +179,49 @@ fn runs(source: &Source, vary: &[Vary]) -> Result<Vec<Run>, Failure> {
             quoted(&name),
             set.join(", ")
         );
-        let source = Source::new(&source.path, text);
-        // an unknown key or a value that cannot be shows before anything is computed
-        let scene = source.parse::<PartScene>()?;
-        scene.studies(&source, false)?;
-        scene.of_study(&source, 0)?;
-        runs.push(Run { name, values, source });
+        runs.push(Run { name, values, source: Source::new(&source.path, text) });
     }
-    Ok(runs)
+    // every problem is built once before anything is computed: faults show at once
+    let faults: Vec<Option<SceneError>> = runs.par_iter().map(|run| run.check().err()).collect();
+    let fault = runs.iter().zip(faults).find_map(|(run, fault)| Some((run, fault?)));
+    match fault {
+        None => Ok(runs),
+        Some((run, fault)) => {
+            // what is wrong without any option too is told at its place
+            scene.check(source)?;
+            scene.task(source, scene.mesh.build(source)?.mesh)?;
+            Err(run.of_options(vary, &fault).into())
+        }
+    }
+}
+
+impl Run {
+    fn check(&self) -> Result<(), SceneError> {
+        let scene = self.source.parse::<PartScene>()?;
+        scene.studies(&self.source, false)?;
+        let (source, scene) = scene.of_study(&self.source, 0)?;
+        scene.task(&source, scene.mesh.build(&source)?.mesh).map(|_| ())
+    }
+
+    /// A fault of a scene that nobody wrote, as one of the options that made it: of that at whose key it is, else of all.
+    fn of_options(&self, vary: &[Vary], fault: &SceneError) -> Error {
+        const SET: &str = "study[0].set.";
+        let key = fault.key().unwrap_or_default().trim_start_matches(SET);
+        let at_key = |vary: &&Vary| {
+            key.strip_prefix(vary.key.as_str())
+                .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        };
+        let named: Vec<&Vary> = vary.iter().filter(at_key).collect();
+        let options = vary.iter().zip(&self.values).filter(|(v, _)| named.is_empty() || named.contains(v));
+        let option: Vec<String> =
+            options.map(|(vary, value)| format!("--vary {}={value}", vary.key)).collect();
+        let reason = fault.message().replace(SET, "");
+        let reason = match named[..] {
+            [vary] => reason.trim_start_matches(&format!("`{}`: ", vary.key)).to_owned(),
+            _ => reason,
+        };
+        Error::Option { option: option.join(" "), reason }
+    }
 }
 
 /// `print.layer_time`, `10 s` → `_layer_time-10s`.

@@ -1,8 +1,8 @@
 //! The scene of a fit.
 
-use super::material::located;
+use super::fault::{located, located_in};
+use super::material::KINETICS_KEYS;
 use super::{OutputSpec, Program, check_name};
-use crate::error::Error;
 use crate::fit::{Cooling, DEGREES, Known, Run};
 use crate::kinetics::{Constants, Kinetics};
 use crate::table::{Column, read};
@@ -234,7 +234,9 @@ impl FitSpec {
             activation_energy: known.activation_energy,
             ..example
         };
-        Kinetics::new(trial).map_err(|error| located(source, &key("equilibrium_melting"), &error))?;
+        let block = key("");
+        let block = block.trim_end_matches('.');
+        Kinetics::new(trial).map_err(|error| located_in(source, block, &KINETICS_KEYS, &error))?;
         Ok(known)
     }
 }
@@ -259,6 +261,5 @@ fn table<const N: usize>(
     columns: [Column; N],
 ) -> Result<[Vec<f64>; N], SceneError> {
     let folder = source.path.parent().unwrap_or(Path::new(""));
-    let allowed = "a CSV table of measurements";
-    read(&folder.join(file), columns).map_err(|error: Error| source.error(key, error, allowed))
+    read(&folder.join(file), columns).map_err(|error| located(source, key, &error))
 }

@@ -1,6 +1,7 @@
 //! The material block of a scene.
 
 use super::either::{self, TextOrTable};
+use super::fault::{located, located_in};
 use crate::error::Error;
 use crate::kinetics::{Constants, Kinetics};
 use crate::material::{Conductor, Polymer, Printed, Property, Semicrystalline, Sign, ThermalMaterial};
@@ -151,6 +152,22 @@ const KINETICS: [(&str, Constants); 3] = [
     (KINETICS_NAMES[2], Constants::APPENDIX_B),
 ];
 
+/// Where parameters of the kinetics stand in their block.
+pub(super) const KINETICS_KEYS: [(&str, &str); 6] = [
+    ("growth rate constant K0, 1/s", "growth_rate"),
+    ("nucleation constant K_G, K²", "nucleation"),
+    ("activation energy U, J/mol", "activation_energy"),
+    ("temperature of frozen chains, K", "frozen"),
+    ("equilibrium melting temperature, K", "equilibrium_melting"),
+    ("Avrami exponent n", "avrami_exponent"),
+];
+/// Where parameters of melting stand in their block.
+const MELTING_KEYS: [(&str, &str); 3] = [
+    ("sharpness of melting k_m, 1/K", "sharpness"),
+    ("shape of melting d", "shape"),
+    ("peak of melting, K", "peak"),
+];
+
 impl MaterialSpec {
     /// The material; `key` is where the block stands, e.g. `material`.
     ///
@@ -206,11 +223,17 @@ impl MaterialSpec {
     }
 
     fn conductor(&self, source: &Source, key: &str) -> Result<Conductor, SceneError> {
-        let conductivity = self.conductivity.build("conductivity, W/(m K)");
-        let conductivity = at(source, &format!("{key}.conductivity"), conductivity)?;
-        let heat =
-            at(source, &format!("{key}.specific_heat"), self.specific_heat.build("specific heat, J/(kg K)"))?;
+        let [conductivity, heat] = self.properties(source, key)?;
         at(source, &format!("{key}.density"), Conductor::new(self.density.si(), conductivity, heat))
+    }
+
+    /// Conductivity and specific heat.
+    fn properties(&self, source: &Source, key: &str) -> Result<[Property; 2], SceneError> {
+        let of = |name: &str| format!("{key}.{name}");
+        Ok([
+            self.conductivity.build(source, &of("conductivity"), "conductivity, W/(m K)")?,
+            self.specific_heat.build(source, &of("specific_heat"), "specific heat, J/(kg K)")?,
+        ])
     }
 
     /// The polymer of a `semicrystalline` block.
@@ -228,22 +251,22 @@ impl MaterialSpec {
             Some(MeltingSpec::Named(melting)) => Some(*melting),
             Some(MeltingSpec::Given(given)) => {
                 let built = Melting::new(given.sharpness.si(), given.shape, given.peak.si());
-                Some(at(source, &format!("{key}.melting"), built)?)
+                let block = format!("{key}.melting");
+                Some(built.map_err(|error| located_in(source, &block, &MELTING_KEYS, &error))?)
             }
             None => None,
         };
         let property = |name: &str| format!("{key}.{name}");
         // the density is checked here with the properties, so that the rest speaks of crystals
         self.conductor(source, key)?;
+        let [conductivity, specific_heat] = self.properties(source, key)?;
+        let kinetics = Kinetics::new(constants)
+            .map_err(|error| located_in(source, &property("kinetics"), &KINETICS_KEYS, &error))?;
         let polymer = Polymer {
             density: self.density.si(),
-            conductivity: at(
-                source,
-                &property("conductivity"),
-                self.conductivity.build("conductivity, W/(m K)"),
-            )?,
-            specific_heat: at(source, &property("specific_heat"), self.specific_heat.build("specific heat"))?,
-            kinetics: at(source, &property("kinetics"), Kinetics::new(constants))?,
+            conductivity,
+            specific_heat,
+            kinetics,
             melting,
             ultimate_crystallinity: self.crystallinity.map_or(0.0, Quantity::si),
             latent_heat: self.latent_heat.map(Quantity::si),
@@ -291,14 +314,17 @@ impl GivenKinetics {
 }
 
 impl<D: Dimension + Copy> PropertySpec<D> {
-    fn build(&self, name: &'static str) -> Result<Property, Error> {
+    fn build(&self, source: &Source, key: &str, name: &'static str) -> Result<Property, SceneError> {
         match self {
-            Self::Constant(value) => Property::constant(name, value.si()),
-            Self::Table(table) => Property::table(
-                name,
-                table.temperature.iter().map(|t| t.si()).collect(),
-                table.value.iter().map(|v| v.si()).collect(),
-            ),
+            Self::Constant(value) => at(source, key, Property::constant(name, value.si())),
+            Self::Table(table) => {
+                let temperatures = table.temperature.iter().map(|t| t.si()).collect();
+                let values = table.value.iter().map(|v| v.si()).collect();
+                let keys =
+                    [(name, "value"), ("number of values", "value"), ("temperature, K", "temperature")];
+                Property::table(name, temperatures, values)
+                    .map_err(|error| located_in(source, key, &keys, &error))
+            }
         }
     }
 }
@@ -306,13 +332,6 @@ impl<D: Dimension + Copy> PropertySpec<D> {
 /// Puts a parameter's error at its place in the scene.
 fn at<T>(source: &Source, key: &str, result: Result<T, Error>) -> Result<T, SceneError> {
     result.map_err(|error| located(source, key, &error))
-}
-
-pub(super) fn located(source: &Source, key: &str, error: &Error) -> SceneError {
-    match error {
-        Error::Parameter { name, found, allowed } => source.error(key, format!("{name} = {found}"), allowed),
-        other => source.error(key, other, "a valid value"),
-    }
 }
 
 impl<D: Dimension> TextOrTable for PropertySpec<D> {

@@ -1,12 +1,25 @@
 //! The mesh block of a scene.
 
-use super::material::located;
+use super::fault::{located, located_in};
 use crate::error::Error;
 use crate::mesh::{Bar, Grid, Mesh, Substrate, quality, read};
 use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
 use serde::Deserialize;
 use std::path::PathBuf;
+
+/// Where parameters of a bar stand in its block.
+const BAR_KEYS: [(&str, &str); 9] = [
+    ("extent of the bar", "size"),
+    ("layers", "layers"),
+    ("height of a layer", "layer_height"),
+    ("elements per layer", "elements_per_layer"),
+    ("element size", "element_size"),
+    ("elements along an axis", "element_size"),
+    ("extent of the substrate", "substrate.size"),
+    ("thickness of the substrate", "substrate.thickness"),
+    ("growth of elements", "substrate.growth"),
+];
 
 /// One of a printed bar, a brick, and a file.
 ///
@@ -102,11 +115,14 @@ impl MeshSpec {
         let at = |key: &str, error: Error| located(source, key, &error);
         let mut notes = Vec::new();
         let mesh = if let Some(bar) = &self.bar {
-            bar.build().mesh().map_err(|error| at("mesh.bar", error))?
+            bar.build().mesh().map_err(|error| located_in(source, "mesh.bar", &BAR_KEYS, &error))?
         } else if let Some(brick) = &self.brick {
             let size = brick.size.map(|x| x.si());
             let grid = Grid::uniform([0.0; 3], size, brick.elements);
-            grid.and_then(|grid| grid.mesh("brick")).map_err(|error| at("mesh.brick", error))?
+            grid.and_then(|grid| grid.mesh("brick")).map_err(|error| match error {
+                Error::Mesh(_) => at("mesh.brick.size", error),
+                _ => at("mesh.brick.elements", error),
+            })?
         } else {
             let file = self.file.clone().unwrap_or_default();
             let path = source.path.parent().map_or_else(|| file.clone(), |folder| folder.join(&file));

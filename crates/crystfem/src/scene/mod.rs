@@ -2,6 +2,7 @@
 
 mod convergence;
 mod either;
+mod fault;
 mod fit;
 mod material;
 mod mesh;

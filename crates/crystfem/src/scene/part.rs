@@ -151,13 +151,13 @@ pub struct TimeSpec {
     pub solver_tolerance: Option<TemperatureDifference>,
 }
 
-/// A place: the nearest node.
+/// A place in the mesh; values there are interpolated between the nodes of its element.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeSpec {
     /// Its name: values are `NAME.temperature` and so on.
     pub name: String,
-    /// Where.
+    /// Where: in the mesh, or no further outside than half an element.
     pub at: [Length; 3],
 }
 
@@ -197,7 +197,7 @@ impl PartScene {
             if !self.materials.contains_key(&region.material) {
                 let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
                 let key = format!("region[{index}].material");
-                return Err(source.error(&key, format!("`{}`", region.material), known.join(", ")));
+                return Err(source.unknown(&key, &region.material, &known));
             }
         }
         for (index, boundary) in self.boundary.iter().enumerate() {

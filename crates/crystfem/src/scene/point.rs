@@ -1,6 +1,6 @@
 //! The scene of the material alone, at one point.
 
-use super::material::located;
+use super::fault::located;
 use super::{MaterialSpec, OutputSpec, Program, check_name};
 use crate::error::Error;
 use crate::history::{History, Leg};
@@ -166,13 +166,7 @@ impl PointScene {
                 ));
             }
             for (i, name) in point.materials.iter().flatten().enumerate() {
-                if !self.materials.contains_key(name) {
-                    let known =
-                        self.materials.keys().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
-                    let allowed =
-                        if known.is_empty() { "none: there is only `[material]`".into() } else { known };
-                    return Err(source.error(&key(&format!("materials[{i}]")), format!("`{name}`"), allowed));
-                }
+                self.check_material(source, &key(&format!("materials[{i}]")), name)?;
             }
             courses.push((point.drive(source, &key)?, point.stepping(source, &key)?));
         }
@@ -183,9 +177,11 @@ impl PointScene {
         if self.materials.contains_key(name) {
             return Ok(());
         }
-        let known = self.materials.keys().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
-        let allowed = if known.is_empty() { "nothing: there is only `[material]`".into() } else { known };
-        Err(source.error(key, format!("`{name}`"), allowed))
+        let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
+        if known.is_empty() {
+            return Err(source.error(key, format!("`{name}`"), "nothing: there is only `[material]`"));
+        }
+        Err(source.unknown(key, name, &known))
     }
 }
 
@@ -241,13 +237,7 @@ impl PointSpec {
         if let Some(file) = &self.history {
             let folder = source.path.parent().unwrap_or(Path::new(""));
             let history = History::read(&folder.join(file));
-            return history.map(Drive::Prescribed).map_err(|error| {
-                source.error(
-                    &key("history"),
-                    error,
-                    "a CSV file with the columns `time [s]` and `temperature [degC]`",
-                )
-            });
+            return history.map(Drive::Prescribed).map_err(|error| located(source, &key("history"), &error));
         }
         let cycles = self.cycles.unwrap_or(1);
         if !(1..=100_000).contains(&cycles) {

@@ -1,13 +1,13 @@
 //! From a scene to a problem of heat conduction.
 
-use super::material::located;
+use super::fault::{located, located_in};
 use super::part::{BoundarySpec, PartScene, PrintSpec};
 use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
 use crate::error::Error;
 use crate::mesh::layers::{Layers, groups};
 use crate::mesh::path::{Bead, ToolPath, read_csv, read_gcode};
 use crate::mesh::surface::Surface;
-use crate::mesh::{Face, Mesh};
+use crate::mesh::{Face, Mesh, Place};
 use crate::problem::{Birth, Problem};
 use crate::simulation::Settings;
 use crate::time::Steps;
@@ -22,6 +22,15 @@ const SOLVES: f64 = 1e-7;
 const FIRST: f64 = 1e-6;
 const SMALLEST: f64 = 1e-3;
 
+/// Where parameters of conditions stand in their block.
+const CONDITION_KEYS: [(&str, &str); 5] = [
+    ("prescribed temperature", "temperature"),
+    ("flux", "flux"),
+    ("film coefficient", "film"),
+    ("emissivity", "emissivity"),
+    ("ambient temperature", "ambient"),
+];
+
 /// What a scene asks to solve.
 pub struct Task {
     /// The problem.
@@ -34,6 +43,8 @@ pub struct Task {
     pub printed: Vec<u32>,
     /// Elements of each layer, where there are layers.
     pub layers: Vec<Vec<u32>>,
+    /// Where each probe is.
+    pub probes: Vec<Place>,
     /// What should be looked at.
     pub notes: Vec<String>,
 }
@@ -46,6 +57,7 @@ impl PartScene {
     /// [`Problem::check`] refuses.
     pub fn task(&self, source: &Source, mesh: Mesh) -> Result<Task, SceneError> {
         let mut notes = Vec::new();
+        let probes = self.places(source, &mesh, &mut notes)?;
         let (materials, material_of, temperature_of) = self.regions(source, &mesh)?;
         let conditions = self.conditions(source, &mesh)?;
         let mut heats = Vec::new();
@@ -78,7 +90,34 @@ impl PartScene {
         let problem =
             Problem { mesh, materials, material_of, initial, conditions, sources: heats, births, capacity };
         problem.check().map_err(|error| located(source, "mesh", &error))?;
-        Ok(Task { problem, settings: self.settings(end), end, printed, layers, notes })
+        Ok(Task { problem, settings: self.settings(end), end, printed, layers, probes, notes })
+    }
+
+    /// Where each probe lies in the mesh.
+    fn places(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Place>, SceneError> {
+        let mut places = Vec::new();
+        for (index, probe) in self.probe.iter().enumerate() {
+            let at = probe.at.map(|x| x.si());
+            let Some(place) = mesh.locate(at) else {
+                let [low, high] = mesh.bounds().unwrap_or_default().map(millimetres);
+                let found = format!("{}, outside of the mesh", millimetres(at));
+                let allowed = format!("a place in the mesh, which reaches from {low} to {high}");
+                return Err(source.error(&format!("probe[{index}].at"), found, allowed));
+            };
+            if place.distance() > 0.0 {
+                let (name, distance) = (&probe.name, 1e3 * place.distance());
+                notes.push(format!(
+                    "probe `{name}` lies outside of the mesh: recorded {distance:.4} mm away, in the nearest element"
+                ));
+            }
+            places.push(place);
+        }
+        Ok(places)
     }
 
     #[allow(clippy::type_complexity)]
@@ -128,7 +167,7 @@ impl PartScene {
                 Where::Faces(faces(&format!("{key}.surface"), &spec.surface)?)
             };
             for condition in spec.conditions(source, &key, mesh, place)? {
-                condition.check().map_err(|error| located(source, &key, &error))?;
+                condition.check().map_err(|error| located_in(source, &key, &CONDITION_KEYS, &error))?;
                 conditions.push(condition);
             }
         }
@@ -257,8 +296,15 @@ fn elements(source: &Source, mesh: &Mesh, key: &str, name: Option<&str>) -> Resu
     let Some(name) = name else { return Ok((0..mesh.element_count() as u32).collect()) };
     mesh.element_sets.get(name).cloned().ok_or_else(|| {
         let known: Vec<&str> = mesh.element_sets.keys().map(String::as_str).collect();
-        source.error(key, format!("`{name}`"), format!("an element set of the mesh: {}", known.join(", ")))
+        source.unknown(key, name, &known)
     })
+}
+
+/// A place as a scene would have it.
+fn millimetres(place: [f64; 3]) -> String {
+    // to a nanometre: what was written, not its rounding
+    let [x, y, z] = place.map(|x| (1e9 * x).round() / 1e6);
+    format!("({x}, {y}, {z}) mm")
 }
 
 /// Temperatures at nodes: that of the last element there that is not laid down later; a node that two regions share takes

@@ -1,7 +1,7 @@
 //! Values over time: written as a constant, as a table, or as a CSV file.
 
 use super::either::{self, TextOrTable};
-use super::material::located;
+use super::fault::located;
 use crate::boundary::Schedule;
 use crate::table::{Column, read};
 use polycore::scene::{SceneError, Source};

@@ -34,7 +34,7 @@ fn head(rest: &str) -> String {
 /// What `crystfem check` says of a scene.
 fn complaint(text: &str, folder: &std::path::Path) -> String {
     let source = Source::new(folder.join("case.toml"), text);
-    let result = crate::run::explain(&source);
+    let result = crate::run::explain(&source, false);
     result.map_or_else(|error| error.to_string(), |lines| lines.join("\n"))
 }
 
@@ -182,7 +182,7 @@ fn bad_fits() {
     std::fs::write(folder.path().join("text.csv"), "temperature [degC],alpha\n150,much\n").unwrap();
     let cases: &[(&str, &str, &[&str])] = &[
         ("law = \"nakamura\"", "law = \"nakamora\"", &["did you mean `nakamura`"]),
-        ("file = \"a.csv\"", "file = \"none.csv\"", &["`fit[0].data[0].file`", "none.csv", "a CSV table"]),
+        ("file = \"a.csv\"", "file = \"none.csv\"", &["`fit[0].data[0].file`: cannot read", "none.csv"]),
         ("file = \"a.csv\"", "file = \"rising.csv\"", &["measurement 2", "temperatures that fall"]),
         ("file = \"a.csv\"", "file = \"text.csv\"", &["text.csv:2: column 2, `alpha`: found \"much\""]),
         ("rate = \"1 K/min\"", "rate = \"0 K/min\"", &["`fit[0].data[0].rate`", "above 0"]),

@@ -155,6 +155,11 @@ impl SceneError {
         Self::at(source, "scene::value", Some(key.into()), span, message).label(found).help(help)
     }
 
+    pub(super) fn refused(source: &Source, key: String, span: Range<usize>, what: &str) -> Self {
+        let message = format!("`{key}`: {what}");
+        Self::at(source, "scene::value", Some(key), span, message).label("found here")
+    }
+
     /// Translates serde's words for the reader of a TOML file.
     pub(super) fn from_serde(source: &Source, root: &DeTable<'_>, error: &toml::de::Error) -> Self {
         let span = error.span().unwrap_or(0..0);
@@ -196,14 +201,13 @@ impl SceneError {
 
     fn wrong(source: &Source, key: Option<String>, span: Range<usize>, serde: &str) -> Self {
         let words = translate(serde);
-        let message = match &key {
-            Some(key) => format!("`{key}`: {words}"),
-            None => words,
-        };
-        Self::at(source, "scene::value", key, span, message).label("found here")
+        match key {
+            Some(key) => Self::refused(source, key, span, &words),
+            None => Self::at(source, "scene::value", None, span, words).label("found here"),
+        }
     }
 
-    fn choice(
+    pub(super) fn choice(
         source: &Source,
         code: &'static str,
         key: String,

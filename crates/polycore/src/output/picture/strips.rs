@@ -217,16 +217,17 @@ impl Strips<'_> {
                 canvas.rectangle(at(0) - LINE - TICK_LENGTH, y, TICK_LENGTH, LINE, BLACK);
                 canvas.text(at(0) - LINE - TICK_LENGTH - 4, y, text, Anchor::Right);
             }
-            let name = Text::new(&format!("{} [{}]", self.axes[1], self.unit.0), TICK)?;
-            if name.width <= row {
-                let beside = (MARGIN + line(TICK) / 2) as isize;
-                canvas.text(beside, top(stage) + up as isize / 2, &name, Anchor::Upwards);
-            }
             for column in 0..columns {
                 canvas.frame(at(column), top(stage), across as isize, up as isize, LINE, BLACK);
             }
         }
+        // once for all stages: a thin part is lower than its axis' name is long
         let base = top(stages.len() - 1) + up as isize + LINE;
+        let name = Text::new(&format!("{} [{}]", self.axes[1], self.unit.0), TICK)?;
+        if name.width <= head + stages.len() * row {
+            let middle = ((top(0) + base) / 2).max((name.width / 2) as isize);
+            canvas.text((MARGIN + line(TICK) / 2) as isize, middle, &name, Anchor::Upwards);
+        }
         let bar = base + (2 * line(TICK) + MARGIN) as isize;
         for (column, strip) in self.columns.iter().enumerate() {
             for (place, text) in rightwards.iter().zip(&rightward_texts) {

@@ -1,0 +1,183 @@
+//! Where a place lies in a mesh, for values between nodes.
+
+use super::Mesh;
+use crate::element::{self, CORNERS, MOST};
+use nalgebra::{Matrix3, Vector3};
+
+/// Natural coordinates, and distances over an element's diagonal, that count as none: a place on a node has its value.
+const NEAR: f64 = 1e-9;
+/// Iterations for the natural coordinates in a hexahedron; a parallelepiped needs two.
+const MOST_ITERATIONS: usize = 50;
+/// Part of an element by which a place may lie outside of the mesh.
+const OUTSIDE: f64 = 0.5;
+
+/// A place in a mesh.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Place {
+    /// Nodes and their shape functions there, those that are not 0.
+    weights: Vec<(u32, f64)>,
+    /// Elements that hold it: one, or those that meet there.
+    elements: Vec<u32>,
+    /// How far it is from the place that was asked for, m; 0 inside the mesh.
+    distance: f64,
+}
+
+impl Place {
+    /// Elements that hold it: one, or those that meet there.
+    pub fn elements(&self) -> &[u32] {
+        &self.elements
+    }
+
+    /// How far it is from the place that was asked for, m; 0 inside the mesh.
+    pub fn distance(&self) -> f64 {
+        self.distance
+    }
+
+    /// Σ N_a u_a of a field over nodes; `None` where a node has no value.
+    pub fn value(&self, field: impl Fn(u32) -> Option<f64>) -> Option<f64> {
+        self.weights.iter().map(|&(node, weight)| Some(weight * field(node)?)).sum()
+    }
+}
+
+impl Mesh {
+    /// The elements around a place, m, and the shape functions there. A place outside, but no further than half an
+    /// element's extent along each axis, is moved into the nearest element; `None` beyond.
+    pub fn locate(&self, at: [f64; 3]) -> Option<Place> {
+        let mut found: Vec<(u32, [f64; MOST], f64, f64)> = Vec::new();
+        for number in 0..self.element_count() as u32 {
+            let (corners, nodes) = element::corners(self, number);
+            let corners = &corners[..nodes];
+            let near = (0..3).all(|d| {
+                let ends = corners.iter().map(|corner| corner[d]);
+                let (low, high) = (ends.clone().fold(f64::MAX, f64::min), ends.fold(f64::MIN, f64::max));
+                let around = OUTSIDE * (high - low);
+                (low - around..=high + around).contains(&at[d])
+            });
+            if near {
+                let weights =
+                    if nodes == 8 { in_hexahedron(corners, at) } else { in_tetrahedron(corners, at) };
+                let origin = Vector3::from(corners[0]);
+                let offset = |corner: &[f64; 3]| Vector3::from(*corner) - origin;
+                let reached: Vector3<f64> =
+                    corners.iter().zip(weights).map(|(c, weight)| weight * offset(c)).sum();
+                let diagonal = corners.iter().map(|corner| offset(corner).norm()).fold(0.0, f64::max);
+                let distance = (offset(&at) - reached).norm();
+                found.push((number, weights, distance, NEAR * diagonal));
+            }
+        }
+        let &(nearest, weights, distance, rounding) = found.iter().min_by(|a, b| a.2.total_cmp(&b.2))?;
+        let meets = |(_, _, other, rounding): &&(u32, _, f64, f64)| *other <= distance + rounding;
+        Some(Place {
+            weights: self
+                .nodes(nearest)
+                .iter()
+                .copied()
+                .zip(weights)
+                .filter(|&(_, weight)| weight != 0.0)
+                .collect(),
+            elements: found.iter().filter(meets).map(|(number, ..)| *number).collect(),
+            distance: if distance <= rounding { 0.0 } else { distance },
+        })
+    }
+}
+
+/// Shape functions at natural coordinates, which are taken to the nearest in the element.
+fn of_hexahedron(natural: Vector3<f64>) -> [f64; MOST] {
+    // exact at the ends: a node has the weight 1, and those across a face have 0
+    let natural = natural.map(|x| if x.abs() > 1.0 - NEAR { x.signum() } else { x });
+    CORNERS.map(|corner| (0..3).map(|d| 0.5 * (1.0 + natural[d] * corner[d])).product())
+}
+
+/// By Newton's method from the middle: x(ξ) = Σ N_a(ξ) x_a.
+fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MOST] {
+    let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
+    let mut natural = Vector3::<f64>::zeros();
+    for _ in 0..MOST_ITERATIONS {
+        let (mut left, mut jacobian) = (offset(at), Matrix3::<f64>::zeros());
+        for (corner, signs) in corners.iter().zip(&CORNERS) {
+            let factor = [0, 1, 2].map(|d| 0.5 * (1.0 + natural[d] * signs[d]));
+            left -= factor.iter().product::<f64>() * offset(*corner);
+            let gradient = Vector3::new(
+                0.5 * signs[0] * factor[1] * factor[2],
+                0.5 * signs[1] * factor[0] * factor[2],
+                0.5 * signs[2] * factor[0] * factor[1],
+            );
+            jacobian += offset(*corner) * gradient.transpose();
+        }
+        let Some(step) = jacobian.try_inverse().map(|inverse| inverse * left) else { break };
+        // far outside of a distorted element the map folds: no further than a neighbour's far side
+        natural = (natural + step).map(|x| x.clamp(-3.0, 3.0));
+        if step.amax() <= 1e-14 {
+            break;
+        }
+    }
+    of_hexahedron(natural)
+}
+
+/// Barycentric coordinates, those below 0 taken to 0.
+fn in_tetrahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MOST] {
+    let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
+    let edges = Matrix3::from_columns(&[offset(corners[1]), offset(corners[2]), offset(corners[3])]);
+    let natural = edges.try_inverse().unwrap_or_default() * offset(at);
+    let mut weights = [0.0; MOST];
+    weights[0] = 1.0 - natural.sum();
+    weights[1..4].copy_from_slice(natural.as_slice());
+    let weights = weights.map(|weight| if weight > NEAR { weight } else { 0.0 });
+    let sum: f64 = weights.iter().sum();
+    weights.map(|weight| weight / sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Block, Grid, Split};
+
+    fn meshes() -> [Mesh; 3] {
+        let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 1.0], [5, 3, 2]).unwrap();
+        let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 1.0] };
+        let hexahedra = grid.mesh("brick").unwrap();
+        let distorted = hexahedra.distorted(0.05).unwrap();
+        [hexahedra, distorted, grid.blocks(&[block], Split::FiveTetrahedra).unwrap()]
+    }
+
+    fn linear([x, y, z]: [f64; 3]) -> f64 {
+        1.0 + 2.0 * x - 3.0 * y + 4.0 * z
+    }
+
+    /// Linear fields come back anywhere, and at a node its value to the last bit, held by all elements there.
+    #[test]
+    fn linear_fields_are_exact() {
+        for mesh in meshes() {
+            let field = |node: u32| Some(linear(mesh.points[node as usize]));
+            for k in 0..200 {
+                let share = |step: f64| (f64::from(k) * step).fract();
+                let at = [3.0 * share(0.618), 2.0 * share(0.414), share(0.732)];
+                let place = mesh.locate(at).unwrap();
+                assert_eq!(place.distance(), 0.0, "{at:?}");
+                assert!((place.value(field).unwrap() - linear(at)).abs() < 1e-12, "{at:?}");
+            }
+            for (node, point) in mesh.points.iter().enumerate() {
+                let place = mesh.locate(*point).unwrap();
+                assert_eq!(place.weights, [(node as u32, 1.0)]);
+                let around = (0..mesh.element_count() as u32)
+                    .filter(|element| mesh.nodes(*element).contains(&(node as u32)));
+                assert_eq!(place.elements(), around.collect::<Vec<_>>());
+            }
+        }
+    }
+
+    #[test]
+    fn outside_by_half_an_element_at_most() {
+        let [mesh, ..] = meshes();
+        // elements are 0.6 long
+        let place = mesh.locate([3.2, 1.0, 0.5]).unwrap();
+        assert!((place.distance() - 0.2).abs() < 1e-12);
+        let value = place.value(|node| Some(linear(mesh.points[node as usize]))).unwrap();
+        assert!((value - linear([3.0, 1.0, 0.5])).abs() < 1e-12);
+        assert_eq!(mesh.locate([3.31, 1.0, 0.5]), None);
+        assert_eq!(mesh.locate([1.0, 1.0, 75.0]), None);
+        assert_eq!(mesh.locate([f64::NAN, 1.0, 0.5]), None);
+        assert_eq!(Mesh::default().locate([0.0; 3]), None);
+        assert_eq!(place.value(|node| (node > 0 && node < 20).then_some(1.0)), None);
+    }
+}
