@@ -123,13 +123,13 @@ fn bad_points() {
         (
             "\"0.25 W/(m K)\"",
             "{ temperature = [\"20 degC\"], value = [] }".into(),
-            &["`material.conductivity`", "a value for each of the 1"],
+            &["`material.conductivity.value`", "a value for each of the 1"],
         ),
         ("melting = \"pa12\"", "melting = \"pa11\"".into(), &["did you mean `pa12`"]),
         (
             "melting = \"pa12\"",
             "melting = { sharpness = \"1 1/K\", shape = 0.5, peak = \"177 degC\" }".into(),
-            &["`material.melting`", "1.001"],
+            &["`material.melting.shape`", "1.001"],
         ),
         ("name = \"a\"", "name = \"a/b\"".into(), &["`point[0].name`", "it names files"]),
         (legs, String::new(), &["one of `legs`, `history`, `exchange`, `adiabatic`"]),
