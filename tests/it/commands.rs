@@ -50,6 +50,10 @@ fn wrong_usage_is_bad_input() {
     for threads in ["0", "-1", "5000", "many"] {
         peri(&format!("exact kirsch --threads={threads}"), here).with_code(2).tells("--threads");
     }
+    // negative numbers are values: their range is told
+    peri("exact law --links -5", here).with_code(2).tells("links: found -5");
+    peri("run a.toml --checkpoint-every -1", here).with_code(2).tells("-1 is not within 0 to 1e9");
+    peri("exact kirsch --threads -1", here).with_code(2).tells("-1 is not in 1..=4096");
     for seconds in ["-1", "nan", "inf", "soon"] {
         let line = format!("run a.toml --checkpoint-every={seconds}");
         peri(&line, here).with_code(2).tells("--checkpoint-every");
@@ -236,6 +240,10 @@ fn check_tells_what_is_built_and_what_is_left_out() {
     let ended = peri("check bar.toml", here).with_code(0);
     ended.shows("  builds     320 particles");
     ended.shows("  leaves out body forces");
+    let line = "builds     a crack, (100, 0, 0) – (100, 20, 0) – (100, 0, 40) mm:";
+    let severed = row(&ended.stdout, line)[0] as usize;
+    // pairs that meet the very edge of the crack are on either side of it by rounding
+    assert!((pairs_across_the_crack(19)..=pairs_across_the_crack(20)).contains(&severed), "{severed}");
     for built in ["surface-correction", "volume correction", "prescribed displacements", "the stress pass"] {
         assert!(!ended.stdout.contains(&format!("leaves out {built}")), "{}", ended.stdout);
     }
@@ -253,6 +261,21 @@ fn particles_of_the_plate() -> usize {
     let centre = |cell: i32| -490.0 + 20.0 * f64::from(cell);
     let cells = (0..50).flat_map(|x| (0..50).map(move |y| (centre(x), centre(y))));
     cells.filter(|(x, y)| x * x + y * y >= 3600.0).count()
+}
+
+/// Of the bar's 20 × 4 × 4 cells, 10 mm wide, those pairs within 30.15 mm between which the segment meets x = 100 mm at
+/// y up to `height` mm.
+fn pairs_across_the_crack(height: i32) -> usize {
+    let cells = |from: i32, to: i32| {
+        (from..to).flat_map(|x| (0..16).map(move |k| [x, k / 4, k % 4].map(|cell| 5 + 10 * cell)))
+    };
+    let crosses = |(a, b): ([i32; 3], [i32; 3])| {
+        let square: i32 = (0..3).map(|d| (b[d] - a[d]).pow(2)).sum();
+        // y at x = 100 mm, times the distance along x
+        let y = a[1] * (b[0] - a[0]) + (100 - a[0]) * (b[1] - a[1]);
+        square <= 909 && y <= height * (b[0] - a[0])
+    };
+    cells(0, 10).flat_map(|a| cells(10, 20).map(move |b| (a, b))).filter(|&pair| crosses(pair)).count()
 }
 
 #[test]
@@ -370,7 +393,16 @@ fn a_failed_expectation_is_exit_code_1() {
     let found = report(&here.join("out"));
     assert_eq!((&found["passed"], &found["expect"][0]["pass"]), (&false.into(), &false.into()));
 
+    // a name that no run of the scene gives is refused at once
     fs::write(here.join("plate.toml"), expect("hardy_peek")).unwrap();
+    for verb in ["check plate.toml", "run plate.toml --output refused"] {
+        peri(verb, here).with_code(2).tells("found `hardy_peek`; allowed: `hardy_peak`");
+    }
+    assert!(!here.join("refused").exists());
+
+    // one that it gives only where bonds break fails where none does
+    let whole = expect("first_break").replace("links = 720", "links = 720\ncritical = { stretch = 3.0 }");
+    fs::write(here.join("plate.toml"), whole).unwrap();
     let ended = peri("run plate.toml --output out", here).with_code(1);
     ended.shows("the report has no value of that name");
     assert!(report(&here.join("out"))["expect"][0]["value"].is_null());

@@ -202,6 +202,28 @@ fn links_lead_to_files() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
+/// Examples of the libraries are doctests of the crates: each fence of Rust stands in the head of a `lib.rs`.
+#[test]
+fn rust_examples_are_doctests() {
+    let heads: Vec<String> = ["peri", "mdsurrogate"]
+        .map(|name| {
+            let text = fs::read_to_string(workspace().join(format!("crates/{name}/src/lib.rs"))).unwrap();
+            let lines = text.lines().map_while(|line| line.strip_prefix("//!"));
+            let lines = lines.map(|line| line.strip_prefix(' ').unwrap_or(line));
+            // lines that rustdoc hides
+            lines.filter(|line| !line.starts_with("# ")).collect::<Vec<_>>().join("\n")
+        })
+        .into();
+    let page = fs::read_to_string(workspace().join("docs/guide/src/how-to/library.md")).unwrap();
+    let fences: Vec<&str> =
+        page.split("```rust\n").skip(1).filter_map(|rest| rest.split("\n```").next()).collect();
+    assert_eq!(fences.len(), 2);
+    for fence in fences {
+        let there = |head: &String| head.contains(&format!("```\n{fence}\n```"));
+        assert!(heads.iter().any(there), "no doctest is\n{fence}");
+    }
+}
+
 /// What mdBook would leave out: pages that SUMMARY.md does not name.
 #[test]
 fn every_page_is_in_the_summary() {

@@ -6,6 +6,7 @@
 //! * [`bits`]: the same bits on any number of threads;
 //! * [`killed`]: the same bits after `kill -9`, Ctrl-C and `peri resume`;
 //! * [`front_door`]: scenes, meshes, tables, laws and checkpoints damaged at random;
+//! * [`loads`]: loads, displacements and names of values in reports;
 //! * [`schemas`]: JSON Schemas, by which every case is valid;
 //! * [`documents`]: the commands and links that README and docs show.
 
@@ -15,6 +16,7 @@ mod commands;
 mod documents;
 mod front_door;
 mod killed;
+mod loads;
 mod parts;
 mod program;
 mod results;

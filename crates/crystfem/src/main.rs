@@ -105,7 +105,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = polycore::command::parse::<Cli>();
     if let Err(error) = cli.threads.apply() {
         polycore::command::complain(format_args!("error: {error}\n"));
         return ExitCode::FAILURE;

@@ -92,7 +92,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Cli::parse().command {
+    let result = match polycore::command::parse::<Cli>().command {
         Command::Run(run) => run.run(),
         Command::Resume(resume) => resume.run(),
         Command::Check { scene } => scene_command::check(&scene),

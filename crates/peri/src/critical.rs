@@ -68,7 +68,20 @@ pub struct Context<'a> {
     pub thickness: f64,
 }
 
+/// What [`Critical`] must be given.
+pub const ONE_OF: &str = "exactly one of `percent_over_contour`, `stretch`, `fracture_energy`";
+
 impl Critical {
+    /// Names of the alternatives that are given.
+    pub fn given(&self) -> Vec<&'static str> {
+        let all = [
+            ("percent_over_contour", self.percent_over_contour.is_some()),
+            ("stretch", self.stretch.is_some()),
+            ("fracture_energy", self.fracture_energy.is_some()),
+        ];
+        all.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
+    }
+
     /// The critical bond stretch.
     ///
     /// # Errors
@@ -99,7 +112,7 @@ impl Critical {
             (None, Some(stretch), None) if stretch > 1.0 => Ok(stretch),
             (None, Some(stretch), None) => fault("critical.stretch", stretch, "above 1"),
             (None, None, Some(energy)) => stretch_of_energy(context, energy.si()),
-            _ => fault("critical", f64::NAN, "exactly one of percent_over_contour, stretch, fracture_energy"),
+            _ => fault("critical (number of alternatives)", self.given().len() as f64, ONE_OF),
         }
     }
 }

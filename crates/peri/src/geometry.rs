@@ -190,6 +190,14 @@ pub struct Cut<const D: usize> {
 }
 
 impl<const D: usize> Cut<D> {
+    /// Its two ends in 2D, its four corners in 3D.
+    pub fn corners(&self) -> Vec<[f64; D]> {
+        self.edges.iter().take(D - 1).fold(vec![self.corner], |corners, edge| {
+            let moved = corners.iter().map(|c| std::array::from_fn(|d| c[d] + edge[d]));
+            corners.iter().copied().chain(moved.collect::<Vec<_>>()).collect()
+        })
+    }
+
     /// Whether the segment from `a` to `b` crosses the cut: solves a + s(b − a) = corner + Σ wᵢ edgeᵢ and asks for
     /// 0 < s < 1, 0 ≤ w ≤ 1. A segment parallel to the cut does not cross it.
     pub fn severs(&self, a: [f64; D], b: [f64; D]) -> bool {

@@ -11,34 +11,36 @@
 //! use peri::solver::{AdaptiveDynamicRelaxation, Loads, State, Support, System};
 //! use peri::stress::{BallVolume, Loaded, Measure, piola_on_lattice};
 //!
-//! // a strip of 40 mm × 20 mm × 1 mm, particles 1 mm apart, horizon 3.015 mm; E = 1 MPa
-//! let (spacing, thickness, ratio) = (1e-3, 1e-3, 3.015);
-//! let body = [Operation::Add(Shape::Box { min: [0.0, 0.0], max: [40e-3, 20e-3] })];
-//! let mut bonds = LatticeBonds::new(lattice(&body, spacing, thickness)?, ratio, VolumeCorrection::None, &[])?;
-//! let law = Law::Subtract.build(720.0, 1200.0, false)?;
-//! let modulus = modulus(Space::PlaneStress, 1e6, bonds.horizon(), thickness);
+//! fn main() -> Result<(), peri::Error> {
+//!     // a strip of 40 mm × 20 mm × 1 mm, particles 1 mm apart, horizon 3.015 mm; E = 1 MPa
+//!     let (spacing, thickness, ratio) = (1e-3, 1e-3, 3.015);
+//!     let body = [Operation::Add(Shape::Box { min: [0.0, 0.0], max: [40e-3, 20e-3] })];
+//!     let mut bonds = LatticeBonds::new(lattice(&body, spacing, thickness)?, ratio, VolumeCorrection::None, &[])?;
+//!     let law = Law::Subtract.build(720.0, 1200.0, false)?;
+//!     let modulus = modulus(Space::PlaneStress, 1e6, bonds.horizon(), thickness);
 //!
-//! // three layers at each end: the left held, the right moved by 2 mm along x
-//! let end = |from: f64, to: f64| -> Vec<u32> {
-//!     let inside = |&slot: &u32| (from..to).contains(&bonds.position(slot as usize)[0]);
-//!     bonds.particles().iter().copied().filter(inside).collect()
-//! };
-//! let held = |x| Support { displacement: [Some(x), Some(0.0)], body_force: [0.0; 2] };
-//! let loads = Loads::new(bonds.slots(), &[(end(0.0, 3e-3), held(0.0)), (end(37e-3, 40e-3), held(2e-3))]);
+//!     // three layers at each end: the left held, the right moved by 2 mm along x
+//!     let end = |from: f64, to: f64| -> Vec<u32> {
+//!         let inside = |&slot: &u32| (from..to).contains(&bonds.position(slot as usize)[0]);
+//!         bonds.particles().iter().copied().filter(inside).collect()
+//!     };
+//!     let held = |x| Support { displacement: [Some(x), Some(0.0)], body_force: [0.0; 2] };
+//!     let loads = Loads::new(bonds.slots(), &[(end(0.0, 3e-3), held(0.0)), (end(37e-3, 40e-3), held(2e-3))]);
 //!
-//! let mut state = State::new(bonds.slots());
-//! let mut system = System::new(&mut bonds, &*law, modulus, &loads, &[1.0]);
-//! AdaptiveDynamicRelaxation::default().solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
+//!     let mut state = State::new(bonds.slots());
+//!     let mut system = System::new(&mut bonds, &*law, modulus, &loads, &[1.0]);
+//!     AdaptiveDynamicRelaxation::default().solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
 //!
-//! // σ₁₁ in the middle: about E times 2 mm over the free 34 mm
-//! let met = stretch_range(&bonds, &state.displacement);
-//! let range = [(1.0 + met.low).sqrt() - 1e-3, (1.0 + met.high).sqrt() + 1e-3];
-//! let fit = KernelFit::new(&*law, range, 1e-9)?;
-//! let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus };
-//! let piola = piola_on_lattice(&bonds, &loaded, Measure::Hardy, BallVolume::Particles);
-//! let middle = piola[piola.len() / 2 + 20][0][0];
-//! assert!((middle / 60e3 - 1.0).abs() < 0.1, "{middle} Pa");
-//! # Ok::<(), peri::Error>(())
+//!     // σ₁₁ in the middle: about E times 2 mm over the free 34 mm
+//!     let met = stretch_range(&bonds, &state.displacement);
+//!     let range = [(1.0 + met.low).sqrt() - 1e-3, (1.0 + met.high).sqrt() + 1e-3];
+//!     let fit = KernelFit::new(&*law, range, 1e-9)?;
+//!     let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus };
+//!     let piola = piola_on_lattice(&bonds, &loaded, Measure::Hardy, BallVolume::Particles);
+//!     let middle = piola[piola.len() / 2 + 20][0][0];
+//!     assert!((middle / 60e3 - 1.0).abs() < 0.1, "{middle} Pa");
+//!     Ok(())
+//! }
 //! ```
 
 pub mod bonds;

@@ -15,6 +15,9 @@ pub const FILE_NAME: &str = "checkpoint.bin";
 /// First bytes of a file: program and version of what it holds.
 pub type Magic = [u8; 8];
 
+/// How the magics of the command lines begin, before a hyphen.
+const PROGRAMS: [(&str, &str); 3] = [("mdsg", "mdsurrogate"), ("part", "crystfem"), ("peri", "peri")];
+
 /// Writes a value (postcard, behind magic and checksum).
 ///
 /// # Errors
@@ -41,13 +44,25 @@ pub fn read<T: DeserializeOwned>(path: &Path, magic: &Magic) -> Result<T, Error>
         Err(error) => return Err(Error::io("read", path)(error)),
     };
     let Some((sum, rest)) = bytes.strip_prefix(magic).and_then(|rest| rest.split_first_chunk()) else {
-        return Err(refused(path, "not a checkpoint of this version"));
+        return Err(refused(path, foreign(&bytes, magic)));
     };
     if u64::from_le_bytes(*sum) != checksum(rest) {
         let why = "damaged or cut short: its checksum does not fit; run the scene again";
         return Err(refused(path, why));
     }
     postcard::take_from_bytes(rest).map(|(value, _)| value).map_err(|error| refused(path, error))
+}
+
+/// What a file without the right magic is.
+fn foreign(bytes: &[u8], magic: &Magic) -> String {
+    let name = |magic: &[u8]| magic.split(|&byte| byte == b'-').next().map(<[u8]>::to_vec);
+    let found = bytes.get(..magic.len()).and_then(name);
+    match PROGRAMS.iter().find(|(prefix, _)| found.as_deref() == Some(prefix.as_bytes())) {
+        Some((_, program)) if found != name(magic) => {
+            format!("of a run of `{program}`; `{program} resume` goes on with it")
+        }
+        _ => "not a checkpoint of this version".to_owned(),
+    }
 }
 
 fn refused(path: &Path, why: impl ToString) -> Error {
@@ -101,6 +116,7 @@ mod tests {
         }
         assert!(told(b"").contains("not a checkpoint of this version"));
         assert!(told(b"test-ck0").contains("not a checkpoint of this version"));
+        assert!(told(b"part-ck2 and more").contains("of a run of `crystfem`; `crystfem resume`"));
         std::fs::remove_file(&path).unwrap();
         let none = read::<(String,)>(&path, MAGIC).unwrap_err();
         assert!(none.to_string().contains("there is none") && none.exit_code() == 2);

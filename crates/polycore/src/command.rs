@@ -76,6 +76,20 @@ pub fn is_finished(output: &Path) -> bool {
     finished
 }
 
+/// The command line of a program. Negative numbers are values and no options: the range of each is then told.
+pub fn parse<C: clap::Parser>() -> C {
+    let matches = with_negative_numbers(C::command()).get_matches();
+    C::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut C::command()).exit())
+}
+
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let takes = |arg: clap::Arg| match arg.get_action().takes_values() {
+        true => arg.allow_negative_numbers(true),
+        false => arg,
+    };
+    command.mut_args(takes).mut_subcommands(with_negative_numbers)
+}
+
 /// A time in seconds, for clap.
 ///
 /// # Errors
@@ -189,6 +203,34 @@ mod tests {
         let outputs =
             ["cases/ch2/dent/case.toml", "mine/bar.toml", "bar.toml"].map(Path::new).map(default_output);
         assert_eq!(outputs, ["out/dent", "out/bar", "out/bar"].map(PathBuf::from));
+    }
+
+    #[test]
+    fn negative_numbers_are_values() {
+        #[derive(clap::Parser)]
+        struct Line {
+            #[command(subcommand)]
+            verb: Verb,
+        }
+        #[derive(clap::Subcommand)]
+        enum Verb {
+            Run {
+                #[arg(long, value_parser = seconds)]
+                every: f64,
+                #[arg(long)]
+                quick: bool,
+            },
+        }
+        let parse = |line: &[&str]| {
+            with_negative_numbers(<Line as clap::CommandFactory>::command()).try_get_matches_from(line)
+        };
+        let told = |line: &[&str]| parse(line).unwrap_err().to_string();
+        assert!(told(&["a", "run", "--every", "-1"]).contains("-1 is not within 0 to 1e9"));
+        assert!(told(&["a", "run", "--every", "--quick"]).contains("a value is required"));
+        let matches = parse(&["a", "run", "--every", "2", "--quick"]).unwrap();
+        let Verb::Run { every, quick } =
+            <Line as clap::FromArgMatches>::from_arg_matches(&matches).unwrap().verb;
+        assert_eq!((every, quick), (2.0, true));
     }
 
     #[test]

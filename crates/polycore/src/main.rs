@@ -57,7 +57,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let result = match polycore::command::parse::<Arguments>().command {
         Command::Run { case, output, quick } => run(&case, output, quick),
         Command::Check { case } => check(&case),
         Command::Exact(arguments) => match exact::table(&arguments) {

@@ -73,6 +73,29 @@ pub fn prepare_run(directory: impl AsRef<Path>) -> Result<(), Error> {
     Ok(())
 }
 
+/// Held by the run that writes into a directory, until it is dropped or its process ends in any way.
+#[derive(Debug)]
+pub struct RunLock {
+    _handle: Option<File>,
+}
+
+/// Keeps a second run, or a second `resume`, out of a directory. Where the system or its file system has no such locks,
+/// nothing is kept out.
+///
+/// # Errors
+/// [`Error::OutputDirectory`] (exit code 2) where another run holds it.
+pub fn lock_run(directory: impl AsRef<Path>) -> Result<RunLock, Error> {
+    let directory = directory.as_ref();
+    let handle = File::open(directory).ok();
+    match handle.as_ref().map(File::try_lock) {
+        Some(Err(fs::TryLockError::WouldBlock)) => Err(Error::OutputDirectory {
+            path: directory.to_path_buf(),
+            reason: "another run is writing into it".into(),
+        }),
+        _ => Ok(RunLock { _handle: handle }),
+    }
+}
+
 /// Makes a rename last; best effort, since not every system can synchronise a directory.
 pub(crate) fn sync_directory(directory: &Path) {
     if let Ok(handle) = File::open(directory) {
@@ -175,6 +198,18 @@ mod tests {
         let mut left = names(here);
         left.sort();
         assert_eq!(left, [".hidden", "result.part"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn one_run_at_a_time() {
+        let directory = tempfile::tempdir().unwrap();
+        let first = lock_run(directory.path()).unwrap();
+        let second = lock_run(directory.path()).unwrap_err();
+        assert!(second.to_string().contains("another run is writing into it") && second.exit_code() == 2);
+        drop(first);
+        lock_run(directory.path()).unwrap();
+        assert!(names(directory.path()).is_empty(), "a lock leaves nothing behind");
     }
 
     #[cfg(unix)]

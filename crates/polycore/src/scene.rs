@@ -108,7 +108,10 @@ impl Source {
         T::deserialize(Deserializer::from(root)).map_err(|error| {
             // the first tree went into the deserializer; errors are rare, so parse once more
             match DeTable::parse(&self.text) {
-                Ok(root) => SceneError::from_serde(self, root.get_ref(), &error),
+                Ok(root) => {
+                    let error = wrong_program::<T>(&root).unwrap_or(error);
+                    SceneError::from_serde(self, root.get_ref(), &error)
+                }
                 Err(error) => SceneError::syntax(self, &error),
             }
         })
@@ -129,11 +132,11 @@ impl Source {
         SceneError::refused(self, key, span, &error.to_string())
     }
 
-    /// As [`Source::error`], of a name that is none of the known ones; a similar one is proposed.
+    /// As [`Source::error`], of a name that is none of the known ones; a similar one is proposed, and of many the
+    /// most similar ones are shown.
     pub fn unknown(&self, key: &str, name: &str, known: &[&str]) -> SceneError {
         let (key, span) = self.place(key);
-        let what = format!("`{key}`: found `{name}`");
-        SceneError::choice(self, "scene::unknown_choice", key, span, &what, name, known)
+        SceneError::unknown(self, key, span, name, known)
     }
 
     /// Where the value at a dotted key path is written: its path in the text and its span.
@@ -163,6 +166,15 @@ impl Source {
         };
         if known { Ok(()) } else { Err(SceneError::bad_version(self, value.span())) }
     }
+}
+
+/// The fault of the key `program` alone: where the scene is another program's, all other keys are, too.
+fn wrong_program<T: DeserializeOwned>(root: &Spanned<DeTable<'_>>) -> Option<toml::de::Error> {
+    let (key, value) = root.get_ref().get_key_value("program")?;
+    let mut alone = DeTable::new();
+    alone.insert(key.clone(), value.clone());
+    let error = T::deserialize(Deserializer::from(Spanned::new(root.span(), alone))).err()?;
+    error.message().starts_with("unknown variant").then_some(error)
 }
 
 #[cfg(test)]

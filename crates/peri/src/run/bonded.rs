@@ -6,7 +6,7 @@ use crate::critical::{Context, Critical};
 use crate::error::Error;
 use crate::potential::BondPotential;
 use crate::run::Failure;
-use crate::scene::{Body, Scene, SurfaceCorrection, Variant, with_inclusions};
+use crate::scene::{self, Body, Scene, SurfaceCorrection, Variant, with_inclusions};
 use polycore::scene::Source;
 
 /// A body, its law and their constants.
@@ -50,9 +50,8 @@ impl<const D: usize> Bonded<D> {
         let resolve = |critical: Critical| critical.resolve(&context);
         let fault = |error| match error {
             Error::Parameter { name, found, allowed } => {
-                let found =
-                    if found.is_nan() { "none or several of them".to_owned() } else { found.to_string() };
-                source.error(&format!("material.{name}"), found, allowed)
+                let unit = if name == "critical.fracture_energy" { " J/m²" } else { "" };
+                source.error(&format!("material.{name}"), scene::plain(found) + unit, allowed)
             }
             other => source.error("material.critical", other, "a critical stretch"),
         };

@@ -231,7 +231,7 @@ pub fn plate_width(scene: &Scene) -> Option<f64> {
     let edges = |get: fn(&crate::scene::ShapeSpec) -> &Option<Vec<polycore::units::Length>>| {
         scene
             .body
-            .shapes
+            .shapes()
             .iter()
             .filter(|s| s.add.is_some())
             .filter_map(move |s| Some(get(s).as_ref()?.get(1)?.si()))

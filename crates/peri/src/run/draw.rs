@@ -22,17 +22,18 @@ pub fn maps<const D: usize>(
     output: &Path,
 ) -> Result<(), Error> {
     let Some((measure, field)) = fields.first().filter(|_| D == 2) else { return Ok(()) };
-    let places: Vec<[f64; 2]> = bonds
-        .particles()
-        .iter()
-        .map(|&slot| {
-            let (x, u) = (bonds.position(slot as usize), state.displacement.get(slot as usize));
-            [x[0] + u[0], x[1] + u[1]]
-        })
-        .collect();
+    let slots = bonds.particles().iter().map(|&slot| slot as usize);
+    let rest: Vec<[f64; 2]> =
+        slots.clone().map(|slot| [bonds.position(slot)[0], bonds.position(slot)[1]]).collect();
+    let moved = slots.map(|slot| state.displacement.get(slot));
+    let places: Vec<[f64; 2]> = rest.iter().zip(moved).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect();
+    let largest = field.iter().flatten().flatten().fold(0.0_f64, |most, s| most.max(s.abs()));
     let (scale, unit) = match &scene.exact {
-        Some(ExactSpec::Kirsch { remote_stress, .. }) => (1.0 / remote_stress.si(), "/σ∞"),
-        None => (1.0, " (Pa)"),
+        Some(ExactSpec::Kirsch { remote_stress, .. }) => (1.0 / remote_stress.si(), "/σ∞".to_owned()),
+        None => {
+            let (scale, unit) = stress_unit(largest);
+            (scale, format!(" ({unit})"))
+        }
     };
     let components: Vec<(&str, Vec<f64>)> = [("σ₁₁", 0, 0), ("σ₂₂", 1, 1), ("σ₁₂", 0, 1)]
         .map(|(name, a, b)| (name, field.iter().map(|t| t[a][b] * scale).collect()))
@@ -41,9 +42,23 @@ pub fn maps<const D: usize>(
     for (name, values) in &components {
         let label = format!("{name}{unit}");
         let title = format!("{label}, {}", measure.name());
-        map = map.panel(Panel::new(&title, &label, &places, values, bonds.spacing()));
+        let panel = Panel::new(&title, &label, &places, values, bonds.spacing()).reference(&rest);
+        map = map.panel(panel.bridge(bridge(outcome)));
     }
     map.write(output.join(format!("stress_{}.png", outcome.file_name())))
+}
+
+/// The unit in which pictures show stresses up to `largest`, Pa: 1 over it, and its name.
+pub fn stress_unit(largest: f64) -> (f64, &'static str) {
+    let units = [(1e-9, "GPa"), (1e-6, "MPa"), (1e-3, "kPa")];
+    units.into_iter().find(|(scale, _)| largest * scale >= 0.1).unwrap_or((1.0, "Pa"))
+}
+
+/// How far apart, in spacings, neighbours on a lattice may be that are still bonded: no intact bond was longer. Where
+/// bonds break, the longest met may have broken.
+pub fn bridge(outcome: &Outcome) -> f64 {
+    let most = outcome.get("critical_stretch").or(outcome.get("largest_stretch")).unwrap_or(1.0);
+    (1.02 * most).clamp(1.5, 100.0)
 }
 
 /// Profiles (Fig. 2.7), convergence (Fig. 2.8), error against run time.

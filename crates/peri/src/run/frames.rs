@@ -250,17 +250,16 @@ pub fn stages(
     let Some(spec) = &scene.stress else { return Ok(()) };
     let measure = format!("cauchy_{}", spec.measures[0].name());
     let component = spec.component();
-    let label = match (&spec.component, component) {
+    let index = match (&spec.component, component) {
         (Some(name), Some(_)) => {
-            let index: String =
-                name.chars().filter_map(|c| "₀₁₂₃".chars().nth(c.to_digit(10)? as usize)).collect();
-            format!("σ{index} (MPa)")
+            name.chars().filter_map(|c| "₀₁₂₃".chars().nth(c.to_digit(10)? as usize)).collect()
         }
-        _ => "σ₁ (MPa)".to_owned(),
+        _ => "₁".to_owned(),
     };
     let flat = scene.body.space != crate::calibrate::Space::Solid;
     struct Stage {
         places: Vec<[f64; 2]>,
+        rest: Vec<[f64; 2]>,
         stress: Vec<f64>,
         damage: Vec<f64>,
         title: String,
@@ -273,7 +272,8 @@ pub fn stages(
             frames.data(frame, &measure)?,
             frames.data(frame, "damage")?,
         );
-        let rest = |k: usize| points[k][1] - moved[3 * k + 1];
+        let at_rest = |k: usize| [0, 1, 2].map(|d| points[k][d] - moved[3 * k + d]);
+        let rest = |k: usize| at_rest(k)[1];
         let middle = {
             let (low, high) =
                 (0..points.len()).map(rest).fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
@@ -282,8 +282,7 @@ pub fn stages(
         let keep: Vec<usize> = (0..points.len())
             .filter(|&k| flat || (0.0..spacing).contains(&(rest(k) - middle + 0.01 * spacing)))
             .collect();
-        let place =
-            |&k: &usize| if flat { [points[k][0], points[k][1]] } else { [points[k][0], points[k][2]] };
+        let in_plane = |x: [f64; 3]| if flat { [x[0], x[1]] } else { [x[0], x[2]] };
         let plane = |k: usize| {
             let t = &tensors[9 * k..9 * k + 9];
             if let Some([a, b]) = component {
@@ -293,14 +292,14 @@ pub fn stages(
         };
         let title = title(outcome, frames.times()[frame]);
         stages.push(Stage {
-            places: keep.iter().map(place).collect(),
-            stress: keep.iter().map(|&k| plane(k) * 1e-6).collect(),
+            places: keep.iter().map(|&k| in_plane(points[k])).collect(),
+            rest: keep.iter().map(|&k| in_plane(at_rest(k))).collect(),
+            stress: keep.iter().map(|&k| plane(k)).collect(),
             damage: keep.iter().map(|&k| damage[k]).collect(),
             title,
         });
     }
-    // the longest bond in the picture is as long as the critical stretch lets it be
-    let bridge = 1.6 * outcome.get("critical_stretch").unwrap_or(1.0);
+    let bridge = super::draw::bridge(outcome);
     let mut map = FieldMap::new().lengths("mm", 1e-3).columns(stages.len()).size(420);
     if !flat {
         map = map.axes(["x", "z"]);
@@ -310,14 +309,19 @@ pub fn stages(
     all.sort_by(f64::total_cmp);
     let part = |share: f64| all.get((share * (all.len().max(1) - 1) as f64) as usize).copied().unwrap_or(0.0);
     let (low, high) = (part(0.002).min(0.0), part(0.998).max(0.0));
+    let (scale, unit) = super::draw::stress_unit(high.max(-low));
+    let (low, high, label) = (low * scale, high * scale, format!("σ{index} ({unit})"));
+    for stage in &mut stages {
+        stage.stress.iter_mut().for_each(|stress| *stress *= scale);
+    }
     for stage in &stages {
-        let panel = Panel::new(&stage.title, &label, &stage.places, &stage.stress, spacing).bridge(bridge);
+        let panel = Panel::new(&stage.title, &label, &stage.places, &stage.stress, spacing);
+        let panel = panel.reference(&stage.rest).bridge(bridge);
         map = map.panel(if high > low { panel.range(low, high) } else { panel });
     }
     for stage in &stages {
-        map = map.panel(
-            Panel::new("", "damage", &stage.places, &stage.damage, spacing).range(0.0, 0.6).bridge(bridge),
-        );
+        let panel = Panel::new("", "damage", &stage.places, &stage.damage, spacing);
+        map = map.panel(panel.range(0.0, 0.6).reference(&stage.rest).bridge(bridge));
     }
     map.write(output.join(format!("stages_{}.png", outcome.file_name())))?;
     Ok(())
@@ -327,11 +331,7 @@ pub fn stages(
 fn title(outcome: &Outcome, time: f64) -> String {
     let step = time.ceil() as usize;
     let Some(record) = step.checked_sub(1).and_then(|k| outcome.history.get(k)) else { return String::new() };
-    let place = if outcome.reach > 0.0 {
-        format!("U = {} mm", short(record.factor * outcome.reach * 1e3))
-    } else {
-        format!("load factor {}", short(record.factor))
-    };
+    let place = format!("U = {} mm", short(record.displacement * 1e3));
     let part = time - time.floor();
     if part > 0.0 {
         format!("{place}, equilibrium {:.0}", part / (1.0 - part))

@@ -13,11 +13,6 @@ use std::path::Path;
 type Column = (String, &'static str, Vec<f64>);
 
 impl Outcome {
-    /// Displacement of the grips at a step, m, or the load factor where nothing is prescribed.
-    fn abscissa(&self, factor: f64) -> f64 {
-        if self.reach > 0.0 { factor * self.reach } else { factor }
-    }
-
     fn is_dynamic(&self) -> bool {
         self.history.iter().any(|r| r.time > 0.0)
     }
@@ -30,10 +25,9 @@ impl Outcome {
     /// The steps as columns.
     pub fn columns(&self) -> Vec<Column> {
         let each = |get: &dyn Fn(&Record) -> f64| self.history.iter().map(get).collect();
-        let (name, unit) = if self.reach > 0.0 { ("displacement", "m") } else { ("load_factor", "") };
         let mut columns: Vec<Column> = Vec::new();
         columns.extend([
-            (name.to_owned(), unit, each(&|r| self.abscissa(r.factor))),
+            ("displacement".to_owned(), "m", each(&|r| r.displacement)),
             ("load".to_owned(), "N", each(&|r| r.load)),
         ]);
         if self.is_dynamic() {
@@ -75,27 +69,26 @@ impl Outcome {
     /// Peak, first break, energies at the end.
     pub fn values_of_history(&mut self, scene: &Scene) {
         let Some(last) = self.history.last().cloned() else { return };
-        let peak = self.history.iter().max_by(|a, b| a.load.total_cmp(&b.load)).map(|r| (r.load, r.factor));
-        if let Some((load, factor)) = peak.filter(|_| self.history.len() > 1) {
-            self.value("peak_load", load, "N");
-            self.value("displacement_at_peak", self.abscissa(factor), "m");
+        let peak = self.history.iter().max_by(|a, b| a.load.total_cmp(&b.load)).cloned();
+        if let Some(peak) = peak.filter(|_| self.history.len() > 1) {
+            self.value("peak_load", peak.load, "N");
+            self.value("displacement_at_peak", peak.displacement, "m");
         }
         for at in &scene.output.load_at {
-            let name = format!("load_at_{}mm", (at.si() * 1e9).round() / 1e6);
             if let Some(load) = self.load_at(at.si()) {
-                self.value(&name, load, "N");
+                self.value(&load_at_name(at.si()), load, "N");
             }
         }
         if scene.material.critical.is_some() {
             let first = self.history.iter().find(|r| r.broken > 0).cloned();
             if let Some(first) = first {
-                self.value("first_break", self.abscissa(first.factor), "m");
+                self.value("first_break", first.displacement, "m");
                 self.value("load_at_first_break", first.load, "N");
             }
             self.value("broken_bonds", last.broken as f64, "");
             self.value("detached_particles", last.detached as f64, "");
             self.value("last_load", last.load, "N");
-            self.value("last_displacement", self.abscissa(last.factor), "m");
+            self.value("last_displacement", last.displacement, "m");
         }
         self.value("work_of_loads", last.work, "J");
         self.value("stored_energy", last.stored, "J");
@@ -125,7 +118,7 @@ impl Outcome {
     fn load_at(&self, displacement: f64) -> Option<f64> {
         let mut before = (0.0, 0.0);
         for record in &self.history {
-            let here = (self.abscissa(record.factor), record.load);
+            let here = (record.displacement, record.load);
             if here.0 >= displacement * (1.0 - 1e-12) {
                 let part = (displacement - before.0) / (here.0 - before.0);
                 return Some(before.1 + part.min(1.0) * (here.1 - before.1));
@@ -134,6 +127,11 @@ impl Outcome {
         }
         None
     }
+}
+
+/// What the load at a displacement is called.
+pub fn load_at_name(displacement: f64) -> String {
+    format!("load_at_{}mm", (displacement * 1e9).round() / 1e6)
 }
 
 /// How much the peak load still changes between the two finest spacings of each family, over the finest.
@@ -214,25 +212,33 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
     if several.is_empty() || !scene.output.pictures {
         return Ok(());
     }
-    let displacement = several.iter().all(|o| o.reach > 0.0);
-    let (label, scale) = if displacement { ("displacement (mm)", 1e3) } else { ("load factor", 1.0) };
     let mut plot = LinePlot::new(if scene.title.is_empty() { "Load" } else { &scene.title })
         .size(900.0, 560.0)
-        .axes(label, "load (N)")
+        .axes("displacement (mm)", "load (N)")
         .legend(LegendPlace::TopLeft);
     let from_rest = |values: &[f64], scale: f64| -> Vec<f64> {
         std::iter::once(0.0).chain(values.iter().map(|v| v * scale)).collect()
     };
-    for outcome in &several {
+    // a body in free flight has neither
+    let loaded: Vec<&&Outcome> =
+        several.iter().filter(|o| o.history.iter().any(|r| r.load != 0.0 || r.displacement != 0.0)).collect();
+    for outcome in &loaded {
         let columns = outcome.columns();
-        let (x, y) = (from_rest(&columns[0].2, scale), from_rest(&columns[1].2, 1.0));
+        let (x, y) = (from_rest(&columns[0].2, 1e3), from_rest(&columns[1].2, 1.0));
         plot = plot.series(Series::line(&outcome.name, &x, &y));
     }
-    plot.write(output.join("load_displacement.png"))?;
+    if !loaded.is_empty() {
+        plot.write(output.join("load_displacement.png"))?;
+    }
     peaks(outcomes, output)?;
     for outcome in several.iter().filter(|o| o.history.iter().any(|r| r.broken > 0)) {
         let columns = outcome.columns();
-        let x = from_rest(&columns[0].2, scale);
+        // a body in motion does not stop where its loads do
+        let time = columns.iter().find(|c| c.0 == "time");
+        let (label, x) = match time {
+            Some(time) => ("time (ms)", from_rest(&time.2, 1e3)),
+            None => ("displacement (mm)", from_rest(&columns[0].2, 1e3)),
+        };
         let mut plot = LinePlot::new(&format!("Energies, {}", outcome.name))
             .size(900.0, 560.0)
             .axes(label, "energy (J)")

@@ -7,6 +7,7 @@ mod frames;
 mod history;
 mod outcome;
 
+pub use history::load_at_name;
 pub use outcome::{Outcome, Profile};
 
 use bonded::Bonded;
@@ -88,12 +89,14 @@ fn run_in<const D: usize>(
     if !options.resume {
         for variant in variants.iter().filter(|variant| expected_error(scene, variant).is_none()) {
             let (source, scene) = variant.resolve(source, scene)?;
-            let body = body_of::<D>(&source, &scene, variant)?;
-            loads_of(&source, &scene, &body)?;
-            Bonded::new(&source, &scene, variant, body)?;
+            Built::<D>::new(&source, &scene, variant)?;
         }
     }
     let (mut finished, mut state) = (Vec::new(), None);
+    if !options.resume {
+        polycore::output::prepare_directory(options.output)?;
+    }
+    let _lock = polycore::output::lock_run(options.output)?;
     if options.resume {
         polycore::output::remove_unfinished(options.output);
         let read = checkpoint::read::<D>(options.output)?;
@@ -156,9 +159,8 @@ fn run_variant<const D: usize>(
 ) -> Result<Outcome, Failure> {
     let mut phases = Phases::new();
     phases.start("build");
-    let body = body_of::<D>(source, scene, variant)?;
-    let (loads, loaded) = loads_of(source, scene, &body)?;
-    let Bonded { mut body, law, modulus, critical_stretch } = Bonded::new(source, scene, variant, body)?;
+    let Built { bonded, loads, loaded } = Built::<D>::new(source, scene, variant)?;
+    let Bonded { mut body, law, modulus, critical_stretch } = bonded;
     phases.stop();
     let slots = body.bonds.slots();
     let fresh = state.is_none();
@@ -190,7 +192,6 @@ fn run_variant<const D: usize>(
     }
     let stresses = frames.stresses(&*body.bonds, &state, &mut phases)?;
     outcome.history.clone_from(&state.history);
-    outcome.reach = loads.reach(&*body.bonds);
     outcome.regions = scene::region_names(scene);
     phases.time("compare", || {
         outcome.responses(&*body.bonds, &loads, &state);
@@ -209,6 +210,23 @@ fn run_variant<const D: usize>(
         }
     }
     Ok(outcome)
+}
+
+/// All that a variant is before it is solved.
+struct Built<const D: usize> {
+    bonded: Bonded<D>,
+    loads: Loads<D>,
+    /// Slots in any loading layer.
+    loaded: Vec<bool>,
+}
+
+impl<const D: usize> Built<D> {
+    fn new(source: &Source, scene: &Scene, variant: &Variant) -> Result<Self, Failure> {
+        let body = body_of::<D>(source, scene, variant)?;
+        let (loads, loaded) = loads_of(source, scene, &body)?;
+        scene::check_placement(source, scene, &body, &loads)?;
+        Ok(Self { bonded: Bonded::new(source, scene, variant, body)?, loads, loaded })
+    }
 }
 
 /// What is solved and does not change.
@@ -322,10 +340,8 @@ fn explanation_in<const D: usize>(
             continue;
         }
         let (source, scene) = variant.resolve(source, scene)?;
-        let body = body_of::<D>(&source, &scene, &variant)?;
-        loads_of(&source, &scene, &body)?;
-        let bonded = Bonded::new(&source, &scene, &variant, body)?;
-        lines.extend(scene::explain(&scene, &variant, &*bonded.body.bonds));
+        let built = Built::<D>::new(&source, &scene, &variant)?;
+        lines.extend(scene::explain(&scene, &variant, &built.bonded.body));
     }
     Ok(lines)
 }

@@ -23,8 +23,6 @@ pub struct Outcome {
     pub profiles: Vec<Profile>,
     /// The load steps.
     pub history: Vec<Record>,
-    /// Relative displacement of the grips at factor 1, m; 0 where nothing is prescribed.
-    pub reach: f64,
     /// Names of the regions of prescribed displacement.
     pub regions: Vec<String>,
     /// What must happen, where the scene says so.
@@ -51,16 +49,14 @@ pub struct Profile {
 impl Outcome {
     /// Nothing yet.
     pub fn new(name: String, variant: &Variant) -> Self {
-        let family = name.split_once(' ').map_or(name.clone(), |(_, rest)| rest.to_owned());
         Self {
             name,
             spacing: variant.spacing,
             horizon_ratio: variant.horizon_ratio,
-            family,
+            family: variant.family(),
             values: Vec::new(),
             profiles: Vec::new(),
             history: Vec::new(),
-            reach: 0.0,
             regions: Vec::new(),
             must: None,
             error: None,
@@ -103,24 +99,14 @@ impl Outcome {
         self.value("largest_stretch", (1.0 + state.met.high).sqrt(), "");
     }
 
-    /// Largest displacement, total reaction of the held components, total applied force.
+    /// Largest displacement, force of the held regions, applied force.
     pub fn responses<const D: usize>(&mut self, bonds: &dyn Bonds<D>, loads: &Loads<D>, state: &State<D>) {
         let mut largest = 0.0_f64;
-        let (mut reaction, mut applied) = ([0.0; D], [0.0; D]);
         for &slot in bonds.particles() {
-            let slot = slot as usize;
-            let displacement = state.displacement.get(slot);
+            let displacement = state.displacement.get(slot as usize);
             largest = largest.max(displacement.iter().map(|x| x * x).sum::<f64>().sqrt());
-            let (force, volume, held) = (state.force.get(slot), bonds.volume(slot), loads.held(slot));
-            for d in 0..D {
-                // only the pulled side: over both sides they cancel
-                if held >> d & 1 == 1 && force[d] < 0.0 {
-                    reaction[d] -= force[d] * volume;
-                }
-                let body = loads.body_force.as_ref().map_or(0.0, |field| field.get(slot)[d]);
-                applied[d] += body.max(0.0) * volume;
-            }
         }
+        let (reaction, applied) = (loads.reaction(bonds, &state.force), loads.applied(bonds));
         self.value("largest_displacement", largest, "m");
         for d in 0..D {
             let axis = ["x", "y", "z"][d];

@@ -1,6 +1,7 @@
 //! From a scene to a body. Every rule that spans several keys is checked here, once.
 
 use super::cloud::cloud;
+use super::crack::{cracks, severed};
 use super::variant::Variant;
 use super::{Axis, Scene, ShapeKind, ShapeSpec};
 use crate::bonds::{Bonds, LatticeBonds};
@@ -17,6 +18,8 @@ pub struct Body<const D: usize> {
     pub bounds: ([f64; D], [f64; D]),
     /// Thickness (1 in 3D), m.
     pub thickness: f64,
+    /// How many bonds each crack severs.
+    pub severed: Vec<u64>,
 }
 
 /// Particles a body may have at most, whatever memory there is: slots are counted in 32 bits.
@@ -33,12 +36,24 @@ pub fn body_of<const D: usize>(
     scene: &Scene,
     variant: &Variant,
 ) -> Result<Body<D>, SceneError> {
-    let body = &scene.body;
     let thickness = thickness(source, scene)?;
     let cuts = cracks(source, scene)?;
-    if let Some(points) = &body.points {
-        return cloud(source, scene, variant, points, thickness, &cuts);
-    }
+    let mut body = match &scene.body.points {
+        Some(points) => cloud(source, scene, variant, points, thickness, &cuts)?,
+        None => filled(source, scene, variant, thickness, &cuts)?,
+    };
+    body.severed = severed(source, &*body.bonds, &cuts)?;
+    Ok(body)
+}
+
+/// The lattice in the shapes.
+fn filled<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    variant: &Variant,
+    thickness: f64,
+    cuts: &[Cut<D>],
+) -> Result<Body<D>, SceneError> {
     let operations = operations(source, scene)?;
     let (low, high) = bounds(&operations)
         .ok_or_else(|| source.error("body.shapes", "no shape is added", "at least one shape with `add`"))?;
@@ -53,7 +68,7 @@ pub fn body_of<const D: usize>(
         let found = format!("{} m, with which the volume of a particle is {volume} m³", variant.spacing);
         return Err(source.error(spacing_key(scene), found, "a spacing whose cells have a volume"));
     }
-    let bonds = LatticeBonds::new(lattice, variant.horizon_ratio, variant.volume, &cuts)
+    let bonds = LatticeBonds::new(lattice, variant.horizon_ratio, variant.volume, cuts)
         .map_err(|error| source.error("body.horizon_ratio", error, "a horizon that reaches a neighbour"))?;
     if bonds.directed_bonds() == 0 {
         let found = format!(
@@ -67,7 +82,7 @@ pub fn body_of<const D: usize>(
             "smaller: a body of at least two bonded particles",
         ));
     }
-    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
+    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness, severed: Vec::new() })
 }
 
 fn thickness(source: &Source, scene: &Scene) -> Result<f64, SceneError> {
@@ -152,7 +167,7 @@ pub(super) fn needed<T: Copy>(
 }
 
 fn operations<const D: usize>(source: &Source, scene: &Scene) -> Result<Vec<Operation<D>>, SceneError> {
-    let shapes = &scene.body.shapes;
+    let shapes = scene.body.shapes();
     let each = shapes.iter().enumerate().map(|(index, spec)| {
         let key = format!("body.shapes[{index}]");
         match (spec.add, spec.cut) {
@@ -261,38 +276,4 @@ fn check_shapes<const D: usize>(
         }
     }
     Ok(())
-}
-
-fn cracks<const D: usize>(source: &Source, scene: &Scene) -> Result<Vec<Cut<D>>, SceneError> {
-    let each = scene.body.cracks.iter().enumerate().map(|(index, crack)| {
-        let key = |name: &str| format!("body.cracks[{index}].{name}");
-        let from: [f64; D] = vector(source, &key("from"), &crack.from)?;
-        let to: [f64; D] = vector(source, &key("to"), &crack.to)?;
-        let mut edges = [[0.0; D]; D];
-        edges[0] = std::array::from_fn(|d| to[d] - from[d]);
-        match (&crack.and, D) {
-            (Some(and), 3) => {
-                let and: [f64; D] = vector(source, &key("and"), and)?;
-                edges[1] = std::array::from_fn(|d| and[d] - from[d]);
-            }
-            (None, 2) => {}
-            (Some(_), _) => return Err(source.error(&key("and"), "a third corner", "none in a plane body")),
-            (None, _) => return Err(source.error(&key("and"), "nothing", "a third corner in a solid")),
-        }
-        if edges.iter().take(D - 1).any(|e| e.iter().all(|&x| x == 0.0)) {
-            return Err(source.error(&key("to"), "the same point as `from`", "another point"));
-        }
-        if D == 3 && parallel(edges[0], edges[1]) {
-            return Err(source.error(&key("and"), "a corner on the line `from`–`to`", "a corner beside it"));
-        }
-        Ok(Cut { corner: from, edges })
-    });
-    each.collect()
-}
-
-/// Whether |a × b| vanishes to rounding.
-fn parallel<const D: usize>(a: [f64; D], b: [f64; D]) -> bool {
-    let dot = |a: [f64; D], b: [f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
-    let (aa, bb, ab) = (dot(a, a), dot(b, b), dot(a, b));
-    aa * bb - ab * ab <= 1e-12 * aa * bb
 }

@@ -25,6 +25,7 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
             check_variant(&source, &scene)?;
         }
     }
+    super::expect::check(source, scene)?;
     if variants.is_empty() {
         return Err(source.error(
             "study",
@@ -139,6 +140,9 @@ fn contact(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 }
 
 fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    for (index, at) in scene.output.load_at.iter().enumerate() {
+        positive(source, &format!("output.load_at[{index}]"), at.si(), "m")?;
+    }
     if scene.output.every == Some(0) {
         return Err(source.error("output.every", 0, "at least 1 step"));
     }
@@ -158,11 +162,11 @@ pub(super) fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Re
 
 fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let body = &scene.body;
-    match (body.shapes.is_empty(), &body.points) {
+    match (body.shapes().is_empty(), &body.points) {
         (true, None) => {
             return Err(source.error("body.shapes", "nothing", "at least one shape, or `points`"));
         }
-        (false, Some(_)) => {
+        (_, Some(_)) if body.shapes.is_some() => {
             return Err(source.error("body.points", "`points` beside `shapes`", "one of them"));
         }
         (false, None) => {
@@ -178,7 +182,7 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 return Err(source.error("body.horizon", "`horizon` of a lattice", "`horizon_ratio`"));
             }
         }
-        (true, Some(_)) => {
+        (_, Some(_)) => {
             for (key, given) in [
                 ("body.spacing", body.spacing.is_some()),
                 ("body.horizon_ratio", body.horizon_ratio.is_some()),
@@ -204,7 +208,7 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 }
 
 /// A number as a user would write it.
-fn plain(value: f64) -> String {
+pub fn plain(value: f64) -> String {
     if value == 0.0 || !value.is_finite() || (1e-3..1e5).contains(&value.abs()) {
         value.to_string()
     } else {
@@ -252,6 +256,14 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 ));
             }
             _ => {}
+        }
+    }
+    if let Some(critical) = &material.critical {
+        let given = critical.given();
+        if given.len() != 1 {
+            let found = given.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
+            let found = if found.is_empty() { "none of them".to_owned() } else { found };
+            return Err(source.error("material.critical", found, crate::critical::ONE_OF));
         }
     }
     for (index, inclusion) in material.inclusions.iter().enumerate() {

@@ -51,7 +51,7 @@ pub fn cloud<const D: usize>(
     };
     let low = extreme(f64::min, f64::INFINITY).map(|x| x - half);
     let high = extreme(f64::max, f64::NEG_INFINITY).map(|x| x + half);
-    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
+    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness, severed: Vec::new() })
 }
 
 /// The body where the points lie on a regular lattice: then it needs no neighbour list.
@@ -73,7 +73,12 @@ fn regular<const D: usize>(
     let low = lattice.origin.map(|x| x - 0.5 * lattice.spacing);
     let high: [f64; D] = std::array::from_fn(|d| low[d] + lattice.cells[d] as f64 * lattice.spacing);
     let bonds = LatticeBonds::new(lattice, ratio, variant.volume, cuts).ok()?;
-    (bonds.directed_bonds() > 0).then(|| Body { bonds: Box::new(bonds), bounds: (low, high), thickness })
+    (bonds.directed_bonds() > 0).then(|| Body {
+        bonds: Box::new(bonds),
+        bounds: (low, high),
+        thickness,
+        severed: Vec::new(),
+    })
 }
 
 fn read<const D: usize>(source: &Source, path: &Path) -> Result<Points<D>, SceneError> {

@@ -1,11 +1,13 @@
 //! What a scene will build, and what it leaves out.
 
+use super::check::plain;
 use super::variant::Variant;
-use super::{Method, Scene, SurfaceCorrection};
-use crate::bonds::{Bonds, VolumeCorrection};
+use super::{Body, Method, Scene, SurfaceCorrection};
+use crate::bonds::VolumeCorrection;
 
 /// Lines for `peri check`.
-pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bonds<D>) -> Vec<String> {
+pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, body: &Body<D>) -> Vec<String> {
+    let bonds = &*body.bonds;
     let particles = bonds.particles().len();
     let directed = bonds.directed_bonds();
     let mut lines = vec![format!("variant {}", variant.name())];
@@ -26,6 +28,14 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bon
         bonds.bytes() as f64 / 1e6,
         (bonds.slots() * (3 * D + 1) * 8) as f64 / 1e6
     ));
+    for (crack, severed) in scene.body.cracks.iter().zip(&body.severed) {
+        let corners: Vec<String> = [Some(&crack.from), Some(&crack.to), crack.and.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(|point| point.iter().map(|x| plain(rounded(x.si() * 1e3))).collect::<Vec<_>>().join(", "))
+            .collect();
+        builds(format!("a crack, ({}) mm: {severed} bonds severed", corners.join(") – (")));
+    }
     if scene.material.critical.is_some() {
         builds("bonds that break, damage, a count of the bonds of each particle".to_owned());
     }
@@ -58,6 +68,7 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bon
     omits(variant.volume == VolumeCorrection::Linear, "volume correction");
     omits(scene.stress.is_some(), "the stress pass");
     omits(scene.dynamics.is_some(), "inertia");
+    omits(!scene.body.cracks.is_empty(), "cracks");
     omits(scene.contact.is_some(), "contact (no [contact] in this scene)");
     omits(scene.material.critical.is_some(), "damage and bond breaking (no `critical` in this scene)");
     omits(scene.output.every.is_some(), "fields of the steps before the last");
@@ -67,4 +78,9 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, bonds: &dyn Bon
     omits(scene.output.fields, "VTKHDF fields");
     omits(scene.output.pictures, "pictures");
     lines
+}
+
+/// Without the digits that a change of units leaves behind.
+fn rounded(value: f64) -> f64 {
+    (value * 1e9).round() / 1e9
 }

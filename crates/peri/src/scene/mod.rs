@@ -4,19 +4,24 @@ mod boundary;
 mod build;
 mod check;
 mod cloud;
+mod crack;
+mod expect;
 mod explain;
 mod inclusion;
 mod loads;
 mod method;
+mod placement;
 mod variant;
 
 pub use boundary::{Boundary, Held, Side};
 pub use build::{Body, body_of};
-pub use check::{check, check_variant};
+pub use check::{check, check_variant, plain};
+pub use expect::{quantities, quantities_of};
 pub use explain::explain;
 pub use inclusion::with_inclusions;
 pub use loads::{loads_of, region_names, velocities_of};
 pub use method::{Dynamics, Method, Solver};
+pub use placement::check_placement;
 pub use variant::Variant;
 
 use crate::bonds::VolumeCorrection;
@@ -90,13 +95,19 @@ pub struct BodySpec {
     /// Horizon, with `points`.
     pub horizon: Option<Length>,
     /// Shapes added and cut in order.
-    #[serde(default)]
-    pub shapes: Vec<ShapeSpec>,
+    pub shapes: Option<Vec<ShapeSpec>>,
     /// CSV file with the columns x, y(, z) in m and volume in m³.
     pub points: Option<PathBuf>,
     /// Cracks of zero width.
     #[serde(default)]
     pub cracks: Vec<CrackSpec>,
+}
+
+impl BodySpec {
+    /// The shapes, none where there are points.
+    pub fn shapes(&self) -> &[ShapeSpec] {
+        self.shapes.as_deref().unwrap_or_default()
+    }
 }
 
 /// Default horizon over spacing, as in the thesis.

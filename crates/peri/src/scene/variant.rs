@@ -45,6 +45,12 @@ impl Variant {
         name
     }
 
+    /// Its name without its spacing: variants that differ in nothing else converge together.
+    pub fn family(&self) -> String {
+        let name = self.name();
+        name.split_once(' ').map_or(name.clone(), |(_, rest)| rest.to_owned())
+    }
+
     /// The scene of this variant, with the parts that its study replaces; errors point there.
     ///
     /// # Errors

@@ -102,9 +102,9 @@ impl<const D: usize> Loads<D> {
         (0..D).map(|d| span(d).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Total body force at factor 1 along each axis and direction, the largest of them, N.
-    pub fn applied(&self, bonds: &dyn Bonds<D>) -> f64 {
-        let Some(body) = &self.body_force else { return 0.0 };
+    /// Total body force at factor 1 along each axis, N: of both directions the larger.
+    pub fn applied(&self, bonds: &dyn Bonds<D>) -> [f64; D] {
+        let Some(body) = &self.body_force else { return [0.0; D] };
         let sum = |d: usize, sign: f64| {
             let each = bonds
                 .particles()
@@ -112,7 +112,19 @@ impl<const D: usize> Loads<D> {
                 .map(|&s| (sign * body.get(s as usize)[d]).max(0.0) * bonds.volume(s as usize));
             each.sum::<f64>()
         };
-        (0..D).flat_map(|d| [sum(d, 1.0), sum(d, -1.0)]).fold(0.0, f64::max)
+        std::array::from_fn(|d| sum(d, 1.0).max(sum(d, -1.0)))
+    }
+
+    /// The load, N, and the displacement, m, on which it works, from [`Loads::conjugates`]: the force conjugate to the
+    /// grips' distance `factor` · [`Loads::reach`]; where only forces are prescribed, these, and the mean displacement
+    /// of where they act along them (of both ends together where they pull at both).
+    pub fn response(&self, bonds: &dyn Bonds<D>, factor: f64, (pull, push): (f64, f64)) -> (f64, f64) {
+        let reach = self.reach(bonds);
+        if reach > 0.0 {
+            return (pull / reach, factor * reach);
+        }
+        let applied = self.applied(bonds).iter().map(|x| x * x).sum::<f64>().sqrt();
+        if applied > 0.0 { (factor * applied, push / applied) } else { (0.0, 0.0) }
     }
 
     /// Reaction on each region of prescribed displacement, N; components that are not held give none.
@@ -130,6 +142,31 @@ impl<const D: usize> Loads<D> {
             sum
         };
         self.held_regions.iter().map(of_region).collect()
+    }
+
+    /// Force with which the regions of prescribed displacement hold or pull along each axis, N: their reactions in one
+    /// direction, or in the other if these are more. A particle counts in the first region that has it.
+    pub fn reaction(&self, bonds: &dyn Bonds<D>, force: &Field<D>) -> [f64; D] {
+        let mut counted = vec![false; self.held.len()];
+        let (mut up, mut down) = ([0.0; D], [0.0; D]);
+        for slots in &self.held_regions {
+            let mut sum = [0.0; D];
+            for &slot in slots {
+                let slot = slot as usize;
+                if std::mem::replace(&mut counted[slot], true) {
+                    continue;
+                }
+                let (force, volume) = (force.get(slot), bonds.volume(slot));
+                for d in (0..D).filter(|d| self.held(slot) >> d & 1 == 1) {
+                    sum[d] -= force[d] * volume;
+                }
+            }
+            for d in 0..D {
+                up[d] += sum[d].max(0.0);
+                down[d] += (-sum[d]).max(0.0);
+            }
+        }
+        std::array::from_fn(|d| up[d].max(down[d]))
     }
 
     /// An affine field u_d = a_d + Σ_e B_de X_e to start from: closest to the prescribed displacements where there are

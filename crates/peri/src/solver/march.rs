@@ -126,14 +126,14 @@ fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
 }
 
 fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
-    let [factor, pull, _] = state.balanced;
+    let [factor, pull, push] = state.balanced;
     let met = state.balanced_stretches;
     let table = EnergyTable::new(system.law, system.fitted_part(met));
-    let reach = system.loads.reach(&*system.bonds);
-    let load = if reach > 0.0 { pull / reach } else { factor * system.loads.applied(&*system.bonds) };
+    let (load, displacement) = system.loads.response(&*system.bonds, factor, (pull, push));
     let record = Record {
         factor,
         load,
+        displacement,
         reactions: system.loads.reactions(&*system.bonds, &state.force),
         residual: state.residual,
         iterations: state.step_iterations,

@@ -64,8 +64,10 @@ pub struct System<'a, const D: usize> {
 pub struct Record {
     /// Load factor.
     pub factor: f64,
-    /// Force, N, that does the loads' work: conjugate to the displacement `factor · reach` of [`Loads::reach`].
+    /// Force, N, that does the loads' work on `displacement`, see [`Loads::response`].
     pub load: f64,
+    /// Displacement of the grips against each other, or of where forces act, m.
+    pub displacement: f64,
     /// Reaction on each region of prescribed displacement, N.
     pub reactions: Vec<[f64; 3]>,
     /// Out-of-balance force over its reference.

@@ -359,12 +359,12 @@ impl VelocityVerlet {
         system.count_evaluation(state);
         let stored = stored(system, state, met, table);
         let (factor, _) = self.factor(state.motion.time);
-        let (pull, _) = system.loads.conjugates(&*system.bonds, &state.displacement, &state.force);
-        let reach = system.loads.reach(&*system.bonds);
-        let load = if reach > 0.0 { pull / reach } else { factor * system.loads.applied(&*system.bonds) };
+        let conjugates = system.loads.conjugates(&*system.bonds, &state.displacement, &state.force);
+        let (load, displacement) = system.loads.response(&*system.bonds, factor, conjugates);
         let record = Record {
             factor,
             load,
+            displacement,
             reactions: system.loads.reactions(&*system.bonds, &state.force),
             residual: 0.0,
             iterations: state.step_iterations,

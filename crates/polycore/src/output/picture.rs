@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::Error;
 
 mod axis;
+mod blocks;
 mod canvas;
 mod color;
 mod field;

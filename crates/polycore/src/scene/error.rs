@@ -34,6 +34,12 @@ struct Place {
     text: NamedSource<String>,
 }
 
+/// The command lines of this workspace that run scenes.
+const PROGRAMS: [&str; 4] = ["crystfem", "mdsurrogate", "peri", "polycore"];
+
+/// Longer lists of what is allowed show those alone that are nearest to what was found.
+const MOST_SHOWN: usize = 12;
+
 /// Longer lines are not shown: nobody reads them.
 const LONGEST_LINE: usize = 2000;
 
@@ -187,7 +193,15 @@ impl SceneError {
         if serde.starts_with("unknown variant") {
             let path = parent.unwrap_or_default();
             let what = format!("`{path}`: found `{name}`");
-            return Self::choice(source, "scene::unknown_choice", path, span, &what, name, allowed);
+            let owner =
+                (path == "program").then(|| PROGRAMS.iter().find(|program| **program == name)).flatten();
+            let error = Self::choice(source, "scene::unknown_choice", path, span, &what, name, allowed);
+            return match owner {
+                Some(owner) => {
+                    error.help(Some(format!("this is a scene of `{owner}`: `{owner} run` solves it")))
+                }
+                None => error,
+            };
         }
         if serde.starts_with("missing field") {
             let path = parent.map_or_else(|| name.to_owned(), |path| format!("{path}.{name}"));
@@ -207,7 +221,25 @@ impl SceneError {
         }
     }
 
-    pub(super) fn choice(
+    pub(super) fn unknown(
+        source: &Source,
+        key: String,
+        span: Range<usize>,
+        name: &str,
+        allowed: &[&str],
+    ) -> Self {
+        let mut near: Vec<&str> = allowed.to_vec();
+        if near.len() > MOST_SHOWN {
+            near.sort_by_key(|candidate| strsim::damerau_levenshtein(name, candidate));
+            near.truncate(MOST_SHOWN);
+        }
+        let what = format!("`{key}`: found `{name}`");
+        let error = Self::choice(source, "scene::unknown_choice", key, span, &what, name, &near);
+        let left = allowed.len() - near.len();
+        error.help((left > 0).then(|| format!("{left} more are allowed, less like `{name}`")))
+    }
+
+    fn choice(
         source: &Source,
         code: &'static str,
         key: String,

@@ -122,6 +122,48 @@ fn every_error_names_place_found_and_allowed() {
     }
 }
 
+/// A scene of another program has other keys, which are no faults.
+#[test]
+fn program_comes_next() {
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Ours {
+        #[expect(dead_code)]
+        program: Program,
+    }
+    #[derive(Debug, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    enum Program {
+        Peri,
+    }
+    let told = |text: &str| Source::new("scene.toml", text).parse::<Ours>().unwrap_err();
+    let error = told("version = 1\nbody = 1\nprogram = 'crystfem'\n[surface]\n");
+    assert_eq!((error.key(), error.line()), (Some("program"), Some(3)));
+    assert!(rendered(&error).contains("this is a scene of `crystfem`: `crystfem run` solves it"));
+    let error = told("version = 1\nprogram = 'prei'\n[surface]\n");
+    assert!(error.message().contains("did you mean `peri`?"), "{error}");
+    let error = told("version = 1\nprogram = 'peri'\n[surface]\n");
+    assert_eq!(error.key(), Some("surface"));
+    let error = told("version = 1\n[surface]\n");
+    assert_eq!(error.key(), Some("surface"));
+}
+
+#[test]
+fn unknown_names_show_the_nearest() {
+    let source = Source::new("scene.toml", GOOD);
+    let names: Vec<String> = (0..40).map(|k| format!("value_{k}")).chain(["peak_load".to_owned()]).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let error = source.unknown("load[0].weight", "peek_load", &names);
+    assert_eq!((error.key(), error.line()), (Some("load[0].weight"), Some(12)));
+    let message = error.message();
+    assert!(
+        message.starts_with("`load[0].weight`: found `peek_load`; allowed: `peak_load`, `value_"),
+        "{message}"
+    );
+    assert!(message.ends_with("did you mean `peak_load`?") && message.matches("value_").count() == 11);
+    assert!(rendered(&error).contains("29 more are allowed"));
+}
+
 #[test]
 fn version_comes_first() {
     let missing = fail(&GOOD.replace("version = 1", ""));

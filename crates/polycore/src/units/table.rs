@@ -43,7 +43,15 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
         volume, Volume, of!(volume);
         angle, Angle, [0, 0, 0, 0, 0, 0, 0, 1];
     }
-    let aliases = [("deg", "°"), ("l", "L"), ("ml", "mL"), ("sec", "s"), ("hr", "h"), ("Angstrom", "Å")];
+    let aliases = [
+        ("deg", "°"),
+        ("l", "L"),
+        ("ml", "mL"),
+        ("sec", "s"),
+        ("hr", "h"),
+        ("Angstrom", "Å"),
+        ("angstrom", "Å"),
+    ];
     for (alias, symbol) in aliases {
         if let Some(&entry) = table.get(symbol) {
             table.entry(alias).or_insert(entry);
@@ -99,6 +107,33 @@ pub(super) fn nearest(text: &str) -> Option<String> {
         ("millimeter", "mm"),
         ("millimetre", "mm"),
         ("megapascal", "MPa"),
+        ("kilopascal", "kPa"),
+        ("gigapascal", "GPa"),
+        ("kilonewton", "kN"),
+        ("millinewton", "mN"),
+        ("kilojoule", "kJ"),
+        ("millijoule", "mJ"),
+        ("nanometer", "nm"),
+        ("nanometre", "nm"),
+        ("micrometer", "µm"),
+        ("micrometre", "µm"),
+        ("micron", "µm"),
+        ("centimeter", "cm"),
+        ("centimetre", "cm"),
+        ("kilometer", "km"),
+        ("kilometre", "km"),
+        ("angstrom", "Å"),
+        ("ångström", "Å"),
+        ("ångstrom", "Å"),
+        ("angström", "Å"),
+        ("millisecond", "ms"),
+        ("degree", "deg"),
+        ("radian", "rad"),
+        ("liter", "L"),
+        ("litre", "L"),
+        ("fahrenheit", "degF"),
+        ("percent", "%"),
+        ("hertz", "Hz"),
     ];
     let lower = text.to_lowercase();
     let singular = lower.strip_suffix('s').filter(|s| !s.is_empty()).unwrap_or(&lower);

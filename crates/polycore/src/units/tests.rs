@@ -51,6 +51,12 @@ fn definitions() {
     assert_eq!(si::<RatioDimension>("3 mm/m"), 0.003);
     assert!((si::<AngleDimension>("180 deg") - std::f64::consts::PI).abs() < 1e-15);
     assert_eq!(si::<LengthDimension>("0 mm"), 0.0);
+    for angstrom in ["30 Å", "30 Angstrom", "30 angstrom"] {
+        assert_eq!(si::<LengthDimension>(angstrom), 30e-10);
+    }
+    for (wrong, right) in [("3 Angstroms", "Å"), ("3 Micrometers", "µm"), ("3 kilometre", "km")] {
+        assert!(message::<LengthDimension>(wrong).contains(&format!("did you mean `{right}`?")), "{wrong}");
+    }
 }
 
 #[test]

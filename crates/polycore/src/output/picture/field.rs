@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::axis::{labels, ticks};
+use super::blocks::Blocks;
 use super::canvas::{Anchor, BLACK, Canvas, Text};
 use super::color::{ColorMap, MISSING};
 use super::particles::{Raster, Window};
@@ -29,7 +30,7 @@ const LARGEST_PICTURE: usize = 200_000_000;
 /// let stress: Vec<f64> = positions.iter().map(|[x, y]| x * y).collect();
 /// let map = FieldMap::new()
 ///     .lengths("mm", 1e-3)
-///     .panel(Panel::new("Tension", "σ₁₁ [MPa]", &positions, &stress, 1.0).range(0.0, 60.0));
+///     .panel(Panel::new("Tension", "σ₁₁ (MPa)", &positions, &stress, 1.0).range(0.0, 60.0));
 /// # let directory = tempfile::tempdir().unwrap();
 /// map.write(directory.path().join("stress.png"))?;
 /// # Ok::<(), polycore::Error>(())
@@ -51,6 +52,7 @@ pub struct Panel<'a> {
     positions: &'a [[f64; 2]],
     values: &'a [f64],
     spacing: f64,
+    reference: Option<&'a [[f64; 2]]>,
     bridge: f64,
     colors: ColorMap,
     range: Option<(f64, f64)>,
@@ -66,6 +68,7 @@ impl<'a> Panel<'a> {
             positions,
             values,
             spacing,
+            reference: None,
             bridge: 1.5,
             colors: ColorMap::Viridis,
             range: None,
@@ -81,6 +84,13 @@ impl<'a> Panel<'a> {
     /// Values outside take the colours of the ends, and the bar gets a point there; by default all values are inside.
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
+        self
+    }
+
+    /// Where the particles were before the deformation: those with neighbours one spacing away along the axes are drawn
+    /// as deformed cells, the others as upright blocks.
+    pub fn reference(mut self, positions: &'a [[f64; 2]]) -> Self {
+        self.reference = Some(positions);
         self
     }
 
@@ -121,6 +131,16 @@ impl<'a> Panel<'a> {
         }
         if self.positions.is_empty() {
             return Err(format!("panel `{panel}`: there are no particles"));
+        }
+        if let Some(reference) = self.reference
+            && (reference.len() != self.positions.len()
+                || reference.as_flattened().iter().any(|x| !x.is_finite()))
+        {
+            return Err(format!(
+                "panel `{panel}`: {} reference positions for {} particles, or one is not finite",
+                reference.len(),
+                self.positions.len()
+            ));
         }
         if !(self.spacing > 0.0 && self.spacing.is_finite()) {
             return Err(format!("panel `{panel}`: spacing {} must be positive", self.spacing));
@@ -221,7 +241,8 @@ impl<'a> FieldMap<'a> {
         panel.check()?;
         let window = Window::around(panel.positions, panel.spacing, self.size as f64)
             .ok_or_else(|| format!("panel `{}`: positions are not finite or too far apart", panel.title))?;
-        let raster = window.draw(panel.positions, panel.values, panel.spacing, panel.bridge);
+        let blocks = Blocks::new(panel.positions, panel.reference, panel.spacing, panel.bridge);
+        let raster = window.draw(panel.positions, panel.values, &blocks);
         let (low, high) = panel.limits();
         let bar = Bar::new(panel, low, high, raster.height.max(220))?;
         let axes = self.lengths.as_ref().map(|lengths| Axes::new(&window, &raster, lengths, self.names));
@@ -347,18 +368,32 @@ impl Axes {
         }
         let sizes = [raster.width, raster.height];
         let along = |axis: usize| -> Result<Vec<(isize, Text)>, String> {
+            let ends = [window.low[axis], window.high[axis]].map(|end| end / factor);
+            // a narrow field, too, shows its size: two ticks at least
             let most = (sizes[axis] / 110).clamp(2, 9);
-            let positions = ticks(window.low[axis] / factor, window.high[axis] / factor, most);
+            let tried = (most..most + 5).map(|most| ticks(ends[0], ends[1], most));
+            let positions =
+                tried.reduce(|kept, next| if kept.len() < 2 { next } else { kept }).unwrap_or_default();
             let texts = labels(&positions).into_iter().map(|text| Text::new(&text, TICK));
             let pixel = |tick: f64| {
                 let tick = tick * factor;
                 let length = if axis == 0 { tick - window.low[0] } else { window.high[1] - tick };
                 (length * window.scale).round() as isize
             };
-            positions.iter().zip(texts).map(|(tick, text)| Ok((pixel(*tick), text?))).collect()
+            let all: Vec<(isize, Text)> = positions
+                .iter()
+                .zip(texts)
+                .map(|(tick, text)| Ok((pixel(*tick), text?)))
+                .collect::<Result<_, String>>()?;
+            // labels do not touch: every so many of equidistant ticks
+            let needed =
+                if axis == 0 { all.iter().map(|(_, text)| text.width).max() } else { Some(TICK as usize) };
+            let needed = needed.unwrap_or(0) + TICK as usize / 3;
+            let gap = all.windows(2).map(|pair| pair[0].0.abs_diff(pair[1].0)).min().unwrap_or(needed).max(1);
+            Ok(all.into_iter().step_by(needed.div_ceil(gap)).collect())
         };
         let ticks = [along(0)?, along(1)?];
-        let [across, up] = names.map(|name| Text::new(&format!("{name} [{unit}]"), LABEL));
+        let [across, up] = names.map(|name| Text::new(&format!("{name} ({unit})"), LABEL));
         let names = [across?, up?];
         let widest = ticks[1].iter().map(|(_, text)| text.width).max().unwrap_or(0);
         let line = |size: u32| size as usize * 3 / 2;
@@ -382,5 +417,26 @@ impl Axes {
         canvas.text(x + width / 2, under, &self.names[0], Anchor::Center);
         let beside = x - self.left as isize + LABEL as isize * 3 / 4;
         canvas.text(beside, y + height / 2, &self.names[1], Anchor::Upwards);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A slender specimen, too, tells its size: two labels at least, none over another.
+    #[test]
+    fn narrow_fields_have_ticks() {
+        for (half, width) in [(9.0, 70), (10.5, 62), (10.5, 100), (40.0, 240), (0.9, 120), (1e5, 120)] {
+            let window = Window { low: [-half, 0.0], high: [half, half], scale: width as f64 / (2.0 * half) };
+            let raster = Raster { width, height: width / 2, values: Vec::new() };
+            let axes = Axes::new(&window, &raster, &("mm".to_owned(), 1.0), ["x", "y"]).unwrap();
+            let across = &axes.ticks[0];
+            assert!(across.len() >= 2, "{half} {width}: {}", across.len());
+            for pair in across.windows(2) {
+                let labels = (pair[0].1.width + pair[1].1.width) / 2;
+                assert!(pair[0].0.abs_diff(pair[1].0) > labels, "{half} {width}");
+            }
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! From particles to whole pixels.
 
+use super::blocks::{Block, Blocks};
+
 /// The part of the plane that is drawn, and its resolution.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
@@ -52,18 +54,19 @@ impl Window {
         [0, 1].map(|axis| (((self.high[axis] - self.low[axis]) * self.scale).round() as usize).max(1))
     }
 
-    pub(super) fn draw(&self, positions: &[[f64; 2]], values: &[f64], spacing: f64, bridge: f64) -> Raster {
+    pub(super) fn draw(&self, positions: &[[f64; 2]], values: &[f64], blocks: &Blocks) -> Raster {
         let [width, height] = self.pixels();
         let mut sums = vec![(0.0, 0u32); width * height];
-        let reach = reach(positions, spacing, bridge);
-        for ((position, value), reach) in positions.iter().zip(values).zip(&reach) {
-            // y runs downwards in pictures
-            let x = self.span((position[0] - self.low[0], [reach[0], reach[1]]), width);
-            let y = self.span((self.high[1] - position[1], [reach[3], reach[2]]), height);
-            for row in y {
-                for pixel in &mut sums[row * width..][x.clone()] {
-                    *pixel = (pixel.0 + value, pixel.1 + 1);
+        for ((position, value), block) in positions.iter().zip(values).zip(&blocks.0) {
+            let mut add = |at: usize| sums[at] = (sums[at].0 + value, sums[at].1 + 1);
+            match block {
+                Block::Upright(reach) => {
+                    // y runs downwards in pictures
+                    let x = self.span((position[0] - self.low[0], [reach[0], reach[1]]), width);
+                    let y = self.span((self.high[1] - position[1], [reach[3], reach[2]]), height);
+                    y.for_each(|row| x.clone().for_each(|column| add(row * width + column)));
                 }
+                Block::Cell(corners) => self.cell(*position, corners, [width, height], add),
             }
         }
         let mean = |&(sum, count): &(f64, u32)| (count > 0).then(|| sum / f64::from(count));
@@ -73,6 +76,36 @@ impl Window {
             raster.close_pinholes();
         }
         raster
+    }
+
+    /// The pixels whose centres lie in a quadrilateral, and the one that holds its particle.
+    fn cell(
+        &self,
+        position: [f64; 2],
+        corners: &[[f64; 2]; 4],
+        [width, height]: [usize; 2],
+        mut add: impl FnMut(usize),
+    ) {
+        let place = |p: [f64; 2]| [(p[0] - self.low[0]) * self.scale, (self.high[1] - p[1]) * self.scale];
+        let pixel = |x: f64, limit: usize| (x.max(0.0) as usize).min(limit - 1);
+        let [x, y] = place(position);
+        let middle = [pixel(x, width), pixel(y, height)];
+        let corners = corners.map(place);
+        let ends = |axis: usize, limit: usize| {
+            let along = corners.map(|corner| corner[axis]);
+            let (low, high) =
+                along.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
+            pixel(low, limit)..=pixel(high, limit)
+        };
+        for row in ends(1, height) {
+            for column in ends(0, width) {
+                let centre = [column as f64 + 0.5, row as f64 + 0.5];
+                let [a, b, c, d] = corners;
+                if [column, row] == middle || inside([a, b, c], centre) || inside([a, c, d], centre) {
+                    add(row * width + column);
+                }
+            }
+        }
     }
 
     /// The pixels of a block; at least the one with its centre.
@@ -86,6 +119,16 @@ impl Window {
             middle..middle + 1
         }
     }
+}
+
+/// Whether a triangle, edges included, holds a point.
+fn inside(triangle: [[f64; 2]; 3], point: [f64; 2]) -> bool {
+    let side = |k: usize| {
+        let ([a, b], [c, d]) = (triangle[k], triangle[(k + 1) % 3]);
+        (c - a) * (point[1] - b) - (d - b) * (point[0] - a)
+    };
+    let sides = [side(0), side(1), side(2)];
+    sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0)
 }
 
 impl Raster {
@@ -108,89 +151,6 @@ impl Raster {
     }
 }
 
-/// How far each particle's block reaches to the left, right, down and up: half the way to its neighbour there, or half
-/// a spacing where the next one is farther than `bridge` spacings (a surface, a hole, a crack).
-fn reach(positions: &[[f64; 2]], spacing: f64, bridge: f64) -> Vec<[f64; 4]> {
-    let far = spacing * bridge.max(1.0) * (1.0 + 1e-9);
-    let cells = Cells::new(positions, far);
-    let nearest = |position: &[f64; 2]| {
-        let mut gaps = [f64::INFINITY; 4];
-        cells.around(position, |other| {
-            let d = [other[0] - position[0], other[1] - position[1]];
-            for axis in 0..2 {
-                let (along, across) = (d[axis].abs(), d[1 - axis].abs());
-                // a neighbour in this direction and not a diagonal one
-                if across <= 0.6 * along && along > 1e-3 * spacing {
-                    let side = 2 * axis + usize::from(d[axis] > 0.0);
-                    gaps[side] = gaps[side].min(along);
-                }
-            }
-        });
-        gaps.map(|gap| if gap <= far { gap / 2.0 } else { spacing / 2.0 })
-    };
-    positions.iter().map(nearest).collect()
-}
-
-/// Particles sorted into square cells.
-struct Cells<'a> {
-    positions: &'a [[f64; 2]],
-    low: [f64; 2],
-    size: f64,
-    count: [usize; 2],
-    starts: Vec<usize>,
-    order: Vec<usize>,
-}
-
-impl<'a> Cells<'a> {
-    fn new(positions: &'a [[f64; 2]], size: f64) -> Self {
-        let fold = |axis: usize, start: f64, pick: fn(f64, f64) -> f64| {
-            positions.iter().fold(start, |bound, position| pick(bound, position[axis]))
-        };
-        let low = [0, 1].map(|axis| fold(axis, f64::INFINITY, f64::min));
-        let extent = [0, 1].map(|axis| fold(axis, f64::NEG_INFINITY, f64::max) - low[axis]);
-        // scattered particles must not ask for more cells than there are particles
-        let most = (4.0 * positions.len() as f64).sqrt() + 1.0;
-        let size = size.max(extent[0] / most).max(extent[1] / most);
-        let count = extent.map(|extent| (extent / size) as usize + 1);
-        let mut cells =
-            Self { positions, low, size, count, starts: vec![0; count[0] * count[1] + 1], order: vec![] };
-        let homes: Vec<usize> = positions.iter().map(|position| cells.index(cells.home(position))).collect();
-        for &home in &homes {
-            cells.starts[home + 1] += 1;
-        }
-        for cell in 1..cells.starts.len() {
-            cells.starts[cell] += cells.starts[cell - 1];
-        }
-        let mut next = cells.starts.clone();
-        cells.order = vec![0; positions.len()];
-        for (particle, &home) in homes.iter().enumerate() {
-            cells.order[next[home]] = particle;
-            next[home] += 1;
-        }
-        cells
-    }
-
-    fn home(&self, position: &[f64; 2]) -> [usize; 2] {
-        [0, 1]
-            .map(|axis| (((position[axis] - self.low[axis]) / self.size) as usize).min(self.count[axis] - 1))
-    }
-
-    fn index(&self, home: [usize; 2]) -> usize {
-        home[1] * self.count[0] + home[0]
-    }
-
-    fn around(&self, position: &[f64; 2], mut each: impl FnMut(&[f64; 2])) {
-        let home = self.home(position);
-        for row in home[1].saturating_sub(1)..=(home[1] + 1).min(self.count[1] - 1) {
-            let first = self.index([home[0].saturating_sub(1), row]);
-            let last = self.index([(home[0] + 1).min(self.count[0] - 1), row]);
-            for &particle in &self.order[self.starts[first]..self.starts[last + 1]] {
-                each(&self.positions[particle]);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -203,7 +163,8 @@ mod tests {
     }
 
     fn draw(positions: &[[f64; 2]], values: &[f64], size: f64) -> Raster {
-        Window::around(positions, 1.0, size).unwrap().draw(positions, values, 1.0, 1.5)
+        let blocks = Blocks::new(positions, None, 1.0, 1.5);
+        Window::around(positions, 1.0, size).unwrap().draw(positions, values, &blocks)
     }
 
     /// Each particle of a regular lattice is the same number of pixels: no moiré, whatever its size.
@@ -255,6 +216,53 @@ mod tests {
         let pixels = raster.width / 60;
         let open = raster.values.iter().step_by(raster.width).filter(|value| value.is_none()).count();
         assert_eq!(open, 2 * pixels);
+    }
+
+    /// Deformed cells of a lattice, where upright blocks leave holes: stretched to the double, sheared, turned, and bent.
+    #[test]
+    fn deformed_cells_have_no_holes() {
+        let rest = lattice(60, 40, |i, j| [i, j]);
+        let turn = |x: f64, y: f64, angle: f64| {
+            [x * angle.cos() - y * angle.sin(), x * angle.sin() + y * angle.cos()]
+        };
+        let maps: [&dyn Fn(f64, f64) -> [f64; 2]; 4] = [
+            &|i, j| turn(0.7 * i, 2.0 * j, 0.5),
+            &|i, j| [i + 1.3 * j, 0.8 * j + 0.4 * i],
+            &|i, j| turn(i, j, 0.9),
+            &|i, j| turn(0.0, 30.0 + 2.5 * j, 0.02 * i),
+        ];
+        for map in maps {
+            let positions: Vec<[f64; 2]> = rest.iter().map(|p| map(p[0], p[1])).collect();
+            let blocks = Blocks::new(&positions, Some(&rest), 1.0, 3.0);
+            let raster = Window::around(&positions, 1.0, 720.0).unwrap();
+            let raster = raster.draw(&positions, &vec![1.0; positions.len()], &blocks);
+            for row in raster.values.chunks(raster.width) {
+                // a turned body has its corners within the outermost rows
+                let Some(first) = row.iter().position(Option::is_some) else { continue };
+                let last = row.iter().rposition(Option::is_some).unwrap_or(first);
+                assert!(row[first..=last].iter().all(Option::is_some));
+            }
+        }
+    }
+
+    /// Of a stretched sheet a crack is drawn open, and a lattice at rest as upright blocks would be.
+    #[test]
+    fn deformed_cells_show_cracks() {
+        let rest = lattice(60, 40, |i, j| [i, j]);
+        let torn: Vec<[f64; 2]> =
+            rest.iter().map(|p| [p[0], 1.5 * p[1] + if p[1] < 20.0 { 0.0 } else { 3.0 }]).collect();
+        let draw = |positions: &[[f64; 2]]| {
+            let blocks = Blocks::new(positions, Some(&rest), 1.0, 4.0);
+            let values: Vec<f64> = (0..positions.len()).map(|index| index as f64).collect();
+            Window::around(positions, 1.0, 720.0).unwrap().draw(positions, &values, &blocks)
+        };
+        let raster = draw(&torn);
+        let open = raster.values.iter().step_by(raster.width).filter(|value| value.is_none()).count();
+        let pixels = (raster.width / 60) as f64;
+        assert!((open as f64 - 3.0 * pixels).abs() <= 1.0, "{open} of {pixels}");
+        let whole = draw(&rest);
+        let values: Vec<f64> = (0..rest.len()).map(|index| index as f64).collect();
+        assert_eq!(whole.values, self::draw(&rest, &values, 720.0).values);
     }
 
     #[test]

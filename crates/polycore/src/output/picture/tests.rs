@@ -44,7 +44,7 @@ fn lines() -> LinePlot {
 
 fn convergence() -> LinePlot {
     let h = [4.0, 2.0, 1.0, 0.5];
-    let mut plot = LinePlot::new("Convergence").axes("spacing [mm]", "RMSE").log_x().log_y();
+    let mut plot = LinePlot::new("Convergence").axes("spacing (mm)", "RMSE").log_x().log_y();
     for (name, order) in [("m = 3", 1.0), ("m = 4", 1.5), ("m = 6", 2.0)] {
         plot = plot.series(Series::marked_line(name, &h, &h.map(|h: f64| 0.01 * h.powf(order))));
     }
@@ -55,7 +55,7 @@ fn convergence() -> LinePlot {
 fn errors() -> LinePlot {
     let time = [1.2, 3.4, 5.0, 8.1, 20.0];
     LinePlot::new("Inverse Langevin function: error against time")
-        .axes("time per call [ns]", "largest relative error")
+        .axes("time per call (ns)", "largest relative error")
         .log_x()
         .log_y()
         .series(Series::markers("Cohen", &time[..1], &[4.9e-2]))
@@ -143,7 +143,7 @@ fn field_maps() {
     ));
     let double = FieldMap::new()
         .lengths("mm", 1e-3)
-        .panel(Panel::new("clamped range", "P₂₂ [MPa]", &undeformed, &values, spacing).range(0.0, 2.0))
+        .panel(Panel::new("clamped range", "P₂₂ (MPa)", &undeformed, &values, spacing).range(0.0, 2.0))
         .panel(Panel::new("deformed", "Δσ [Pa]", &deformed, &signed, spacing).colors(ColorMap::Diverging));
     let bare = FieldMap::new()
         .size(300)

@@ -1,0 +1,91 @@
+//! Cracks of zero width, and the bonds that they sever.
+
+use super::Scene;
+use super::build::vector;
+use crate::bonds::{Bonds, CellGrid};
+use crate::geometry::Cut;
+use polycore::scene::{SceneError, Source};
+
+/// The cracks of a scene.
+///
+/// # Errors
+/// As [`super::body_of`].
+pub(super) fn cracks<const D: usize>(source: &Source, scene: &Scene) -> Result<Vec<Cut<D>>, SceneError> {
+    let each = scene.body.cracks.iter().enumerate().map(|(index, crack)| {
+        let key = |name: &str| format!("body.cracks[{index}].{name}");
+        let from: [f64; D] = vector(source, &key("from"), &crack.from)?;
+        let to: [f64; D] = vector(source, &key("to"), &crack.to)?;
+        let mut edges = [[0.0; D]; D];
+        edges[0] = std::array::from_fn(|d| to[d] - from[d]);
+        match (&crack.and, D) {
+            (Some(and), 3) => {
+                let and: [f64; D] = vector(source, &key("and"), and)?;
+                edges[1] = std::array::from_fn(|d| and[d] - from[d]);
+            }
+            (None, 2) => {}
+            (Some(_), _) => return Err(source.error(&key("and"), "a third corner", "none in a plane body")),
+            (None, _) => return Err(source.error(&key("and"), "nothing", "a third corner in a solid")),
+        }
+        if edges.iter().take(D - 1).any(|e| e.iter().all(|&x| x == 0.0)) {
+            return Err(source.error(&key("to"), "the same point as `from`", "another point"));
+        }
+        if D == 3 && parallel(edges[0], edges[1]) {
+            return Err(source.error(&key("and"), "a corner on the line `from`–`to`", "a corner beside it"));
+        }
+        Ok(Cut { corner: from, edges })
+    });
+    each.collect()
+}
+
+/// How many bonds each crack severs, whatever the others do.
+///
+/// # Errors
+/// A crack that severs none.
+pub(super) fn severed<const D: usize>(
+    source: &Source,
+    bonds: &dyn Bonds<D>,
+    cuts: &[Cut<D>],
+) -> Result<Vec<u64>, SceneError> {
+    // bonds as long as the horizon are bonds, whatever the rounding of positions
+    let reach = bonds.horizon() * (1.0 + 1e-9);
+    let count = |(index, cut): (usize, &Cut<D>)| {
+        let corners = cut.corners();
+        let near = |point: &[f64; D]| {
+            (0..D).all(|d| {
+                let low = corners.iter().map(|c| c[d]).fold(f64::INFINITY, f64::min) - reach;
+                let high = corners.iter().map(|c| c[d]).fold(f64::NEG_INFINITY, f64::max) + reach;
+                (low..=high).contains(&point[d])
+            })
+        };
+        let places = bonds.particles().iter().map(|&slot| bonds.position(slot as usize));
+        let places: Vec<[f64; D]> = places.filter(near).collect();
+        let mut severed = 0;
+        if !places.is_empty() {
+            let grid = CellGrid::new(&places, reach);
+            for (own, &here) in places.iter().enumerate() {
+                grid.near(here, reach, |other| {
+                    let square: f64 = (0..D).map(|d| (places[other][d] - here[d]).powi(2)).sum();
+                    severed +=
+                        u64::from(own < other && square <= reach * reach && cut.severs(here, places[other]));
+                });
+            }
+        }
+        if severed == 0 {
+            let found = "a crack that severs no bond";
+            return Err(source.error(
+                &format!("body.cracks[{index}]"),
+                found,
+                "a crack across a part of the body",
+            ));
+        }
+        Ok(severed)
+    };
+    cuts.iter().enumerate().map(count).collect()
+}
+
+/// Whether |a × b| vanishes to rounding.
+fn parallel<const D: usize>(a: [f64; D], b: [f64; D]) -> bool {
+    let dot = |a: [f64; D], b: [f64; D]| (0..D).map(|d| a[d] * b[d]).sum::<f64>();
+    let (aa, bb, ab) = (dot(a, a), dot(b, b), dot(a, b));
+    aa * bb - ab * ab <= 1e-12 * aa * bb
+}
