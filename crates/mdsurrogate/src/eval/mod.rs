@@ -1,7 +1,9 @@
 //! How good a law is: errors on data, and whether it obeys what every elastic solid does.
 
+mod doubts;
 mod physics;
 
+pub use doubts::{Doubts, FLAGS};
 pub use physics::Physics;
 
 use crate::Error;

@@ -1,9 +1,11 @@
 //! Laws judged on the data of a scene: errors, physics, error against time; figures and tables.
 
-use super::{Failure, Prepared, draw};
+use super::{Failure, Prepared, draw, short};
 use crate::dataset::{Path as Path_, Row, noise};
 use crate::error::Error;
-use crate::eval::{Errors, Physics, errors, percentage_error, seconds_of_a_stress, within_rates};
+use crate::eval::{
+    Doubts, Errors, FLAGS, Physics, errors, percentage_error, seconds_of_a_stress, within_rates,
+};
 use crate::surrogate::{Surrogate, Workspace};
 use polycore::output::csv;
 use polycore::report::Report;
@@ -11,6 +13,11 @@ use std::path::Path;
 
 /// Rows at which physics is measured, at most.
 const PROBED: usize = 200;
+
+/// A law whose mean square error is so many times the noise of the data …
+const FAR_ABOVE_NOISE: f64 = 100.0;
+/// … and this part of the mean square stress has learnt too little.
+const FAR_FROM_STRESS: f64 = 0.01;
 
 /// A law with its name.
 pub struct Named<'a> {
@@ -58,7 +65,11 @@ pub fn judge_laws(
         "cycle",
         "stress"
     )];
+    let mut warnings = Vec::new();
     let (mut losses, mut training, mut inference) = (Vec::new(), Vec::new(), Vec::new());
+    // of a row: √ of the floor, which is a sum over components
+    let chance = floor.unwrap_or(0.0).sqrt();
+    let stress_square = test.iter().map(|row| row.s.norm_squared()).sum::<f64>() / test.len().max(1) as f64;
     for Named { name, law, seconds } in laws {
         let sets = [
             ("training", &data.split.train),
@@ -68,10 +79,15 @@ pub fn judge_laws(
         for (set, rows) in sets.into_iter().filter(|(_, rows)| !rows.is_empty()) {
             let found = errors(law, data.rows(rows).into_iter())?;
             record(report, name, set, &found, floor);
+            if set == "test" {
+                doubt(report, name, set, law, &Doubts::of(law, data.rows(rows).into_iter(), chance)?);
+            }
         }
         for run in data.heldout.iter().flat_map(|set| &set.paths) {
             let found = errors(law, run.rows.iter())?;
-            record(report, name, &format!("heldout {}", run.id), &found, floor);
+            let set = format!("heldout {}", run.id);
+            record(report, name, &set, &found, floor);
+            doubt(report, name, &set, law, &Doubts::of(law, run.rows.iter(), chance)?);
         }
         let every = test.len().div_ceil(PROBED).max(1);
         let physics = Physics::of(law, &test.iter().step_by(every).copied().collect::<Vec<_>>())?;
@@ -83,18 +99,28 @@ pub fn judge_laws(
         training.push(seconds.unwrap_or(f64::NAN));
         inference.push(stress);
         table.push(format!(
-            "{:<16} {:>10} {:>8.0} MPa² {:>12} {:>9.1} % {:>6.1} MPa {:>10.1e} {:>10.1e} {:>7.2} µs",
+            "{:<16} {:>10} {:>8} MPa² {:>12} {:>9.1} % {:>6} MPa {:>10.1e} {:>10.1e} {:>7.2} µs",
             name,
             law.header().architecture.parameters() * law.header().members,
-            found.mean_square() / 1e12,
-            floor.map_or("-".into(), |floor| format!("{:.2}", found.mean_square() / floor)),
+            short(found.mean_square() / 1e12),
+            floor.map_or("-".into(), |floor| short(found.mean_square() / floor)),
             found.percentage,
-            physics.rest / 1e6,
+            short(physics.rest / 1e6),
             physics.asymmetry,
             physics.cycle,
             stress * 1e6
         ));
+        let far = floor.is_some_and(|floor| found.mean_square() > FAR_ABOVE_NOISE * floor);
+        if far && found.mean_square() > FAR_FROM_STRESS * stress_square {
+            warnings.push(format!(
+                "{name}: its error on the test rows is {} times the noise of the data and {} of their stress; it has \
+                 not learnt them",
+                short(found.mean_square() / floor.unwrap_or(f64::NAN)),
+                short((found.mean_square() / stress_square).sqrt())
+            ));
+        }
     }
+    table.append(&mut warnings);
     let names: Vec<&str> = laws.iter().map(|law| law.name).collect();
     draw::against_time(&names, &losses, &training, &inference, floor.map(|floor| floor / 1e12), output)?;
     let heldout = look_at_heldout(laws, data)?;
@@ -120,6 +146,27 @@ fn record(report: &mut Report, name: &str, set: &str, errors: &Errors, floor: Op
     report.value(&format!("{name} {set} share outside the training box"), outside, "");
     if let Some(floor) = floor.filter(|floor| *floor > 0.0) {
         report.value(&format!("{name} {set} error over the noise floor"), errors.mean_square() / floor, "");
+    }
+}
+
+/// Shares of badly wrong answers, of those caught, and of the others flagged all the same.
+fn doubt(report: &mut Report, name: &str, set: &str, law: &Surrogate, doubts: &Doubts) {
+    let share = |part: usize, all: usize| part as f64 / all.max(1) as f64;
+    let rows = doubts.bad + doubts.good;
+    report.value(&format!("{name} {set} share badly wrong"), share(doubts.bad, rows), "");
+    let known = if law.header().spread_limit.is_some() { 4 } else { 3 };
+    for (place, flag) in FLAGS.iter().enumerate().take(known) {
+        if doubts.bad > 0 {
+            let caught = share(doubts.caught[place], doubts.bad);
+            report.value(&format!("{name} {set} share of badly wrong caught by {flag}"), caught, "");
+        }
+        if doubts.good > 0 {
+            let alarms = share(doubts.alarms[place], doubts.good);
+            report.value(&format!("{name} {set} false alarms of {flag}"), alarms, "");
+        }
+    }
+    if let Some(correlation) = doubts.correlation {
+        report.value(&format!("{name} {set} rank correlation of spread and error"), correlation, "");
     }
 }
 

@@ -69,6 +69,7 @@ pub fn run(source: &Source, options: &mut Options) -> Result<Finished, Failure> 
         let trained = training::train(source, &scene, &models, &data, options)?;
         phases.start("judge");
         training::record(&trained, options.output, &mut report)?;
+        remarks.extend(training::remarks(&trained, &data));
         let laws: Vec<judge::Named> = trained.iter().map(training::Trained::named).collect();
         remarks.extend(judge_laws(&laws, &data, options.output, &mut report)?);
     }
@@ -83,6 +84,19 @@ pub fn run(source: &Source, options: &mut Options) -> Result<Finished, Failure> 
     // the report is the last file: a checkpoint without it is an unfinished run
     let _ = std::fs::remove_file(options.output.join(polycore::checkpoint::FILE_NAME));
     Ok(Finished { report, remarks })
+}
+
+/// Three significant digits.
+fn short(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    if !(1e-2..1e5).contains(&size) {
+        return format!("{value:.2e}");
+    }
+    let digits = (2.0 - size.log10().floor()).max(0.0);
+    format!("{value:.*}", digits as usize)
 }
 
 /// What a scene builds and leaves out, in lines.
@@ -125,4 +139,24 @@ pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
         lines.push("leaves out training".into());
     }
     Ok(lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn three_digits_of_any_size() {
+        for (value, text) in [
+            (0.0, "0"),
+            (1.2345e-7, "1.23e-7"),
+            (0.012345, "0.0123"),
+            (-2.0, "-2.00"),
+            (310_512.0, "3.11e5"),
+            (12_345.6, "12346"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(short(value), text);
+        }
+    }
 }

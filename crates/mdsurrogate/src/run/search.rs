@@ -1,6 +1,6 @@
 //! A scene's search for hyperparameters: trained, remembered, written as a table like 3.4.
 
-use super::{Failure, Options, Prepared, checkpoint};
+use super::{Failure, Options, Prepared, checkpoint, short};
 use crate::dataset::Row;
 use crate::error::Error;
 use crate::scene::{Scene, SearchSpec};
@@ -160,14 +160,14 @@ impl Oracle for Trainer<'_, '_> {
             let part = (self.epochs as f64 / self.expected as f64).min(1.0);
             (self.options.progress)(part, &|| {
                 format!(
-                    "{} {}: {} at {}, epoch {} of {}, best loss {:.0} MPa²",
+                    "{} {}: {} at {}, epoch {} of {}, best loss {} MPa²",
                     question.method.name(),
                     question.number + 1,
                     candidate.layers(),
                     candidate.learning_rate,
                     training.state().history().len(),
                     question.epochs,
-                    training.state().best_loss()
+                    short(training.state().best_loss())
                 )
             });
         }
@@ -226,13 +226,13 @@ fn write(
     )];
     for (rank, trial) in top.iter().enumerate() {
         lines.push(format!(
-            "{:>4} {:<9} {:>10} {:>13} {:>6} {:>10.0} MPa²  {}{}",
+            "{:>4} {:<9} {:>10} {:>13} {:>6} {:>10} MPa²  {}{}",
             rank + 1,
             trial.method.name(),
             parameters(trial),
             trial.candidate.learning_rate,
             trial.epochs,
-            trial.loss.unwrap_or(f64::NAN),
+            short(trial.loss.unwrap_or(f64::NAN)),
             trial.candidate.layers(),
             if chosen == Some(*trial) { "  ← the fewest parameters" } else { "" }
         ));

@@ -1,7 +1,7 @@
 //! The models of a scene, trained one after the other.
 
 use super::judge::Named;
-use super::{Failure, Options, Prepared, checkpoint};
+use super::{Failure, Options, Prepared, checkpoint, short};
 use crate::error::Error;
 use crate::scene::{ModelSpec, Scene};
 use crate::surrogate::{Header, Surrogate};
@@ -9,6 +9,7 @@ use crate::train::{Settings, State, Training, ensemble};
 use polycore::output::csv;
 use polycore::report::Report;
 use polycore::scene::Source;
+use polycore::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
@@ -59,6 +60,7 @@ pub fn train(
         checkpoint::write(options.output, &run.header, &run.progress)?;
     }
     let (rows, validation) = (data.rows(&data.split.train), data.rows(&data.split.validation));
+    let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
     let mut trained = Vec::new();
     for model in models {
         let mut header =
@@ -88,12 +90,12 @@ pub fn train(
             // also of a diverged training: its best epoch is a law
             if let Err(failure) = result {
                 let begun = &run.progress.states[first.min(run.progress.states.len())..];
-                write(&model.title(), &header, begun, options.output)?;
+                write(&model.title(), &header, begun, &strains, options.output)?;
                 return Err(failure);
             }
         }
         let states = run.progress.states[first..run.done].to_vec();
-        let law = write(&model.title(), &header, &states, options.output)?;
+        let law = write(&model.title(), &header, &states, &strains, options.output)?;
         trained.push(Trained { name: model.title(), law, states });
     }
     Ok(trained)
@@ -131,11 +133,11 @@ impl Run {
             let part = (self.done as f64 + epochs as f64 / f64::from(settings.epochs)) / self.total as f64;
             (options.progress)(part, &|| {
                 let validation =
-                    epoch.validation.map_or(String::new(), |loss| format!(", validation {loss:.0}"));
+                    epoch.validation.map_or(String::new(), |loss| format!(", validation {}", short(loss)));
                 format!(
-                    "{title}: epoch {epochs} of {}, loss {:.0}{validation} MPa², best in epoch {}",
+                    "{title}: epoch {epochs} of {}, loss {}{validation} MPa², best in epoch {}",
                     settings.epochs,
-                    epoch.train,
+                    short(epoch.train),
                     training.state().best_epoch()
                 )
             });
@@ -159,8 +161,14 @@ impl Run {
     }
 }
 
-/// Writes a law of the best epochs, and its learning curves.
-fn write(name: &str, header: &Header, states: &[State], output: &Path) -> Result<Surrogate, Error> {
+/// Writes a law of the best epochs with the limit of its spread, and its learning curves.
+fn write(
+    name: &str,
+    header: &Header,
+    states: &[State],
+    strains: &[Voigt],
+    output: &Path,
+) -> Result<Surrogate, Error> {
     let learnt: Vec<Vec<f32>> =
         states.iter().filter(|state| state.best_epoch() > 0).map(|state| state.best().to_vec()).collect();
     if learnt.is_empty() {
@@ -170,7 +178,7 @@ fn write(name: &str, header: &Header, states: &[State], output: &Path) -> Result
         let end = if states.len() == 1 { String::new() } else { format!("-{}", member + 1) };
         learning_curve(state, &output.join(format!("learning-{name}{end}.csv")))?;
     }
-    let law = ensemble(header.clone(), &learnt)?;
+    let law = ensemble(header.clone(), &learnt)?.with_spread_limit(strains)?;
     law.write(output.join(format!("{name}.safetensors")))?;
     Ok(law)
 }
@@ -193,6 +201,21 @@ fn learning_curve(state: &State, path: &Path) -> Result<(), Error> {
     )?)
 }
 
+/// What no number says about the trainings: invariants that the data do not vary.
+pub fn remarks(trained: &[Trained], data: &Prepared) -> Vec<String> {
+    let rows = data.rows(&data.split.train);
+    let remark = |model: &Trained| {
+        let names = model.law.constrained(&rows);
+        let text = format!(
+            "{}: {} does not vary by itself in these data: how the energy changes with it is not known",
+            model.name,
+            names.join(", ")
+        );
+        (!names.is_empty()).then_some(text)
+    };
+    trained.iter().filter_map(remark).collect()
+}
+
 /// Numbers of the trainings, and Fig. 3.7.
 ///
 /// # Errors
@@ -204,6 +227,9 @@ pub fn record(trained: &[Trained], output: &Path, report: &mut Report) -> Result
         report.work(&format!("epochs of {name}"), epochs as u64);
         report.value(&format!("{name} parameters"), model.law.header().architecture.parameters() as f64, "");
         report.seconds(&format!("training of {name}"), model.states.iter().map(State::seconds).sum());
+        if let Some(limit) = model.law.header().spread_limit {
+            report.value(&format!("{name} spread limit"), limit / 1e6, "MPa");
+        }
         for (member, state) in model.states.iter().enumerate() {
             let end =
                 if model.states.len() == 1 { String::new() } else { format!(", member {}", member + 1) };

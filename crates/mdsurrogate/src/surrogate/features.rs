@@ -9,6 +9,12 @@ use polycore::tensor::Voigt;
 /// Representatives of the training strains in a law ([`Support`]).
 const REPRESENTATIVES: usize = 256;
 
+/// Least deviation of an energy's input, over that which it would have if the components of C varied as they do but
+/// independently of each other. An invariant that varies less, as det C of rubber, is scaled by that: standardised by its own
+/// deviation it would be noise, and W of that noise a stress larger by one over it. It stays an input, since its slope is a
+/// stress also where it is constant: the pressure. A tenth is ten times below any input that tells something by itself.
+const LEAST_DEVIATION: f64 = 0.1;
+
 /// Inputs of a network at a C.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Features {
@@ -23,6 +29,19 @@ impl Surrogate<f64> {
     #[cfg(feature = "train")]
     pub(crate) fn input_scales(&self) -> &[f64] {
         &self.inverse
+    }
+
+    /// Names of an energy's invariants that hardly vary in these rows, those of its training, although C does: scaled by
+    /// what they could vary ([`Header::fitted`]), and unknown where they do vary.
+    pub fn constrained(&self, rows: &[&Row]) -> Vec<&'static str> {
+        let Some(invariants) = self.header.kind.invariants() else { return Vec::new() };
+        let values: Vec<[f64; LANES]> = rows.iter().map(|row| self.features(&row.c).values).collect();
+        let constrained = |k: &usize| {
+            let column: Vec<f64> = values.iter().map(|value| value[*k]).collect();
+            // standardised: 1, or less where the least deviation was taken
+            self.inverse[*k] > 0.0 && moments("inputs", &column).is_ok_and(|[_, own]| own < 0.5)
+        };
+        (0..invariants.count()).filter(constrained).map(|k| invariants.name(k)).collect()
     }
 
     /// The inputs at `c`; those of an `ann` are the components of C themselves and have no slopes.
@@ -62,21 +81,31 @@ impl Header {
         let raw = Surrogate::<f64>::random(header.clone(), 0)?;
         header.architecture = architecture;
         header.check()?;
-        let values: Vec<[f64; LANES]> = rows.iter().map(|row| raw.features(&row.c).values).collect();
+        let features: Vec<Features> = rows.iter().map(|row| raw.features(&row.c)).collect();
         for k in 0..inputs {
-            let column: Vec<f64> = values.iter().map(|value| value[k]).collect();
+            let column: Vec<f64> = features.iter().map(|features| features.values[k]).collect();
             [header.input_mean[k], header.input_deviation[k]] = moments("inputs", &column)?;
         }
-        let mut of_stress = [[0.0; 2]; 6];
+        let (mut of_stress, mut of_strain) = ([[0.0; 2]; 6], [0.0; 6]);
         let mut largest = 0.0f64;
         for a in 0..6 {
             let stress: Vec<f64> = rows.iter().map(|row| row.s[a]).collect();
             let strain: Vec<f64> = rows.iter().map(|row| row.c[a]).collect();
             of_stress[a] = moments("S", &stress)?;
-            largest = largest.max(of_stress[a][1] * moments("C", &strain)?[1]);
+            [_, of_strain[a]] = moments("C", &strain)?;
+            largest = largest.max(of_stress[a][1] * of_strain[a]);
             header.training_box[a] = strain
                 .iter()
                 .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &c| [low.min(c), high.max(c)]);
+        }
+        if header.kind != Kind::Ann {
+            for (k, deviation) in header.input_deviation.iter_mut().enumerate() {
+                let independent = |features: &Features| -> f64 {
+                    (0..6).map(|a| (features.slopes[k][a] * of_strain[a]).powi(2)).sum()
+                };
+                let square = features.iter().map(independent).sum::<f64>() / rows.len() as f64;
+                *deviation = deviation.max(LEAST_DEVIATION * square.sqrt());
+            }
         }
         let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
         header.support = Some(Support::of(&strains, REPRESENTATIVES)?);
@@ -134,7 +163,52 @@ mod tests {
                 let [mean, deviation] = moments("", &column).unwrap();
                 // shear is constant in these rows
                 assert!(mean.abs() < 1e-12 && (deviation == 0.0 || (deviation - 1.0).abs() < 1e-12));
+                assert!(law.constrained(&rows).is_empty());
             }
+        }
+    }
+
+    /// Rubber: det C = 1 but for the last digit that a table has. Its W is that of the other invariants; where the volume of
+    /// the rows varies by itself, nothing changes.
+    #[test]
+    fn an_invariant_without_variance_of_its_own() {
+        let rows = |digits: i32, volume: f64| -> Vec<Row> {
+            let mut random = crate::random::SplitMix64::new(2);
+            let row = |sample: u64| {
+                let noise = polycore::tensor::Tensor::from_fn(|_, _| 0.4 * (random.uniform() - 0.5));
+                let f = polycore::tensor::Tensor::identity() + noise;
+                let scale = ((1.0 + volume * (random.uniform() - 0.5)) / f.determinant()).cbrt();
+                let unit = 10f64.powi(digits);
+                let f = (f * scale).map(|value| (value * unit).round() / unit);
+                let f = polycore::tensor::DeformationGradient::new(f).unwrap();
+                Row::new(sample, f64::NAN, f, Voigt::new(1e6, 0.0, 0.0, 0.0, 0.0, 0.0))
+            };
+            (0..200).map(row).collect()
+        };
+        for (kind, name) in [
+            (Kind::energy(Symmetry::Isotropic), "I3"),
+            (Kind::energy(Symmetry::Transverse), "I3"),
+            (Kind::polyconvex_energy(Symmetry::Orthotropic), "J"),
+        ] {
+            for (digits, volume) in [(4, 0.0), (8, 0.0), (15, 0.0), (8, 0.02)] {
+                let rows = rows(digits, volume);
+                let rows: Vec<&Row> = rows.iter().collect();
+                let architecture = Architecture::new(kind.inputs(), &[], 1);
+                let header = Header::fitted(kind.clone(), architecture, 1, &rows, true).unwrap();
+                let law = Surrogate::<f64>::random(header, 1).unwrap();
+                assert_eq!(law.constrained(&rows), [name], "{kind:?} {digits} {volume}");
+                let k = (0..kind.inputs()).find(|&k| kind.invariants().unwrap().name(k) == name).unwrap();
+                // 1/deviation of the others: one percent of strain is no more than a tenth of a unit
+                let others = (0..kind.inputs()).filter(|&other| other != k);
+                let greatest = others.map(|other| law.inverse[other]).fold(0.0, f64::max);
+                assert!(law.inverse[k] < 20.0 * greatest, "{} {greatest}", law.inverse[k]);
+            }
+            let free = rows(8, 0.6);
+            let free: Vec<&Row> = free.iter().collect();
+            let header =
+                Header::fitted(kind.clone(), Architecture::new(kind.inputs(), &[], 1), 1, &free, true)
+                    .unwrap();
+            assert!(Surrogate::<f64>::random(header, 1).unwrap().constrained(&free).is_empty());
         }
     }
 

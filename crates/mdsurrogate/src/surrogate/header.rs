@@ -102,7 +102,7 @@ pub struct Header {
     /// Representatives of the training strains, farther from which than any training row an answer is flagged.
     #[serde(default)]
     pub support: Option<Support>,
-    /// Spread of the ensemble, Pa, beyond which an answer is flagged.
+    /// Spread of the ensemble, Pa, beyond which an answer is flagged ([`super::Surrogate::with_spread_limit`]).
     pub spread_limit: Option<f64>,
     /// Where data and weights come from.
     #[serde(default)]

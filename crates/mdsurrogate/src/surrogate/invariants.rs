@@ -8,6 +8,7 @@ use crate::network::Real;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Invariants {
     list: &'static [&'static [Monomial<'static>]],
+    names: &'static [&'static str],
     /// The last one is the root of its polynomial: J = √det C.
     root: bool,
 }
@@ -19,12 +20,17 @@ impl Invariants {
             true => symmetry.polyconvex_invariants().unwrap_or_default(),
             false => symmetry.invariants(),
         };
-        Self { list, root: polyconvex }
+        Self { list, names: symmetry.names(polyconvex), root: polyconvex }
     }
 
     /// How many.
     pub fn count(self) -> usize {
         self.list.len()
+    }
+
+    /// What invariant k is called.
+    pub fn name(self, k: usize) -> &'static str {
+        self.names[k]
     }
 
     /// Polynomial k, and whether its root is the input.

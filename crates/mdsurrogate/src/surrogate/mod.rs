@@ -8,6 +8,7 @@
 //! An ensemble of members is one law: its answer is their mean, their spread a measure of doubt.
 
 mod answer;
+mod doubt;
 mod evaluate;
 mod export;
 mod features;

@@ -105,6 +105,20 @@ impl Symmetry {
         }
     }
 
+    /// Names of the invariants, in the material axes.
+    pub(crate) fn names(self, polyconvex: bool) -> &'static [&'static str] {
+        match (self, polyconvex) {
+            (Self::Triclinic, _) => &["C11", "C22", "C33", "C12", "C13", "C23"],
+            (Self::Monoclinic, _) => &["C11", "C22", "C33", "C12", "C13²", "C23²", "C13 C23"],
+            (Self::Orthotropic, false) => &["C11", "C22", "C33", "C12²", "C13²", "C23²", "C12 C13 C23"],
+            (Self::Orthotropic, true) => &["C11", "C22", "C33", "cof C11", "cof C22", "cof C33", "J"],
+            (Self::Transverse, false) => &["I1", "I2", "I3", "C33", "(C²)33"],
+            (Self::Transverse, true) => &["I1", "I2", "C33", "cof C33", "J"],
+            (Self::Isotropic, false) => &["I1", "I2", "I3"],
+            (Self::Isotropic, true) => &["I1", "I2", "J"],
+        }
+    }
+
     /// How a polyconvex energy takes away its stress at rest, which has the form p 1 + Σ s a⊗a in the material axes.
     pub(crate) fn stress_at_rest(self) -> StressAtRest {
         match self {

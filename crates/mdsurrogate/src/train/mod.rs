@@ -2,7 +2,7 @@
 //!
 //! [`Training`] trains one network epoch by epoch. Its [`State`] is all that changes, to the bit: a training that goes
 //! on from a stored state ends with the same weights as an undisturbed one, and so does every rerun. [`ensemble`]
-//! makes a law of several of them.
+//! makes a law of several of them; [`Surrogate::with_spread_limit`] tells it from where on they disagree.
 //!
 //! ```
 //! use mdsurrogate::dataset::{Dataset, Path, Row};

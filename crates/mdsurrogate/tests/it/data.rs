@@ -55,3 +55,36 @@ fn the_random_split_leaks() {
     assert!(random.same_path > 0.5, "{random:?}");
     assert!(by_path.ratio > random.ratio, "{by_path:?} {random:?}");
 }
+
+/// Every row of `cases/ch3/flags` is the derivative of W = K/2 ln(1 + E:D:E/K), by central differences: S = 2 ∂W/∂C.
+#[test]
+fn the_known_law_of_the_flags_case() {
+    let energy = |c: &[f64; 6]| {
+        let e = [0.5 * (c[0] - 1.0), 0.5 * (c[1] - 1.0), 0.5 * (c[2] - 1.0)];
+        let d = [[8e9, 3e9, 4e9], [3e9, 7e9, 4e9], [4e9, 4e9, 60e9]];
+        let mut q = 2e9 * c[3] * c[3] + 3e9 * c[4] * c[4] + 3e9 * c[5] * c[5];
+        for (row, x) in d.iter().zip(e) {
+            q += x * row.iter().zip(e).map(|(stiffness, y)| stiffness * y).sum::<f64>();
+        }
+        0.75e9 * (1.0 + q / 1.5e9).ln()
+    };
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../cases/ch3/flags");
+    for (file, rows, sheared) in [("runs.csv.gz", 2592, false), ("heldout.csv.gz", 1600, true)] {
+        let set = read(folder.join(file), &ReadOptions::default()).unwrap();
+        assert_eq!(set.len(), rows);
+        for row in set.rows() {
+            for a in 0..6 {
+                let moved = |by: f64| {
+                    let mut c: [f64; 6] = row.c.into();
+                    c[a] += by;
+                    energy(&c)
+                };
+                let factor = if a < 3 { 2.0 } else { 1.0 };
+                let stress = factor * (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                // eight decimals of C are 600 Pa; rounding 1e-16 · 1e9/1e-5 = 1e4 Pa, differences h²
+                assert!((row.s[a] - stress).abs() < 1e5, "{} {a}: {} {stress}", row.sample, row.s[a]);
+            }
+        }
+        assert_eq!(set.rows().any(|row| row.c[3] != 0.0), sheared);
+    }
+}

@@ -1,0 +1,125 @@
+//! Whether the flags of a law catch its bad answers, and how many good ones they spoil.
+
+use crate::Error;
+use crate::dataset::Row;
+use crate::surrogate::{Surrogate, Workspace};
+
+/// Wrong by more than this part of the stress is badly wrong.
+const BAD: f64 = 0.1;
+/// If it is also more than so many times the noise of the data, which no law can follow.
+const ABOVE_NOISE: f64 = 3.0;
+
+/// The flags, in the order of the lists of [`Doubts`].
+pub const FLAGS: [&str; 4] = ["any flag", "the box", "the distance", "the spread"];
+
+/// Answers at some rows by whether they are badly wrong and flagged.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Doubts {
+    /// Rows with an error above a tenth of their stress and three times the noise.
+    pub bad: usize,
+    /// The others.
+    pub good: usize,
+    /// How many of the bad have each of [`FLAGS`].
+    pub caught: [usize; 4],
+    /// How many of the good: false alarms.
+    pub alarms: [usize; 4],
+    /// Spearman's rank correlation of the ensemble's spread and the error; none for a single member or two rows.
+    pub correlation: Option<f64>,
+}
+
+impl Doubts {
+    /// Counts them; `noise` is the root mean square of ‖S‖ that the data have by chance, Pa, 0 for none.
+    ///
+    /// # Errors
+    /// Those of [`Surrogate::stress`].
+    pub fn of<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a Row>, noise: f64) -> Result<Self, Error> {
+        let mut memory = Workspace::default();
+        let mut doubts = Self::default();
+        let (mut errors, mut spreads) = (Vec::new(), Vec::new());
+        for row in rows {
+            let answer = law.stress(&row.c, &mut memory)?;
+            let error = (answer.stress - row.s).norm();
+            let flags = answer.flags;
+            let raised = [flags.any(), flags.outside.contains(&true), flags.far, flags.spread];
+            let (count, of) = match error > BAD * row.s.norm() && error > ABOVE_NOISE * noise {
+                true => (&mut doubts.bad, &mut doubts.caught),
+                false => (&mut doubts.good, &mut doubts.alarms),
+            };
+            *count += 1;
+            for (sum, flag) in of.iter_mut().zip(raised) {
+                *sum += usize::from(flag);
+            }
+            errors.push(error);
+            spreads.push(answer.spread);
+        }
+        if law.header().members > 1 && errors.len() > 2 {
+            doubts.correlation = correlation(&ranks(&errors), &ranks(&spreads));
+        }
+        Ok(doubts)
+    }
+}
+
+/// Places in ascending order; equal values share the mean of theirs.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut ranks = vec![0.0; values.len()];
+    let mut first = 0;
+    while first < order.len() {
+        let same = order[first..].iter().take_while(|&&k| values[k] == values[order[first]]).count().max(1);
+        for &k in &order[first..first + same] {
+            ranks[k] = first as f64 + 0.5 * (same as f64 - 1.0);
+        }
+        first += same;
+    }
+    ranks
+}
+
+/// Pearson's; none where one list is constant.
+fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
+    let count = a.len() as f64;
+    let mean = |list: &[f64]| list.iter().sum::<f64>() / count;
+    let (of_a, of_b) = (mean(a), mean(b));
+    let sum = |f: &dyn Fn(f64, f64) -> f64| a.iter().zip(b).map(|(a, b)| f(a - of_a, b - of_b)).sum::<f64>();
+    let root = (sum(&|a, _| a * a) * sum(&|_, b| b * b)).sqrt();
+    (root > 0.0).then(|| sum(&|a, b| a * b) / root)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::tests::rows_of_a_law;
+    use crate::surrogate::{Header, Kind};
+
+    #[test]
+    fn ranks_and_their_correlation() {
+        assert_eq!(ranks(&[3.0, 1.0, 2.0, 1.0]), [3.0, 0.5, 2.0, 0.5]);
+        // 1 − 6 Σd²/n(n² − 1) without ties: d = (1, −1, 0, 0)
+        let found = correlation(&ranks(&[1.0, 2.0, 3.0, 9.0]), &ranks(&[2.0, 1.0, 5.0, 6.0])).unwrap();
+        assert!((found - (1.0 - 12.0 / 60.0)).abs() < 1e-15);
+        assert_eq!(correlation(&[1.0, 2.0], &[3.0, 3.0]), None);
+    }
+
+    /// Laws that answer with nothing, and with the stress of one row.
+    #[test]
+    fn bad_and_good_by_hand() {
+        let rows = rows_of_a_law();
+        let rows: Vec<&Row> = rows[1..40].iter().collect();
+        let mut header = Header::new(Kind::Ann, &[], 2);
+        header.output_deviation = vec![0.0; 6];
+        let law = Surrogate::random(header.clone(), 1).unwrap();
+        let doubts = Doubts::of(&law, rows.iter().copied(), 0.0).unwrap();
+        // no answer but 0: all bad, all outside the box of C = I, the members agree
+        assert_eq!((doubts.bad, doubts.good, doubts.caught), (39, 0, [39, 39, 0, 0]));
+        assert_eq!(doubts.correlation, None);
+        // with a noise as large as the stress nothing is bad
+        let noisy = Doubts::of(&law, rows.iter().copied(), 1e9).unwrap();
+        assert_eq!((noisy.bad, noisy.alarms), (0, [39, 39, 0, 0]));
+        // the answer is right at one row, whose C the box has
+        header.training_box = [[-9.0, 9.0]; 6];
+        header.output_mean = rows[9].s.as_slice().to_vec();
+        let law = Surrogate::random(header, 1).unwrap();
+        let doubts = Doubts::of(&law, rows[9..10].iter().copied(), 0.0).unwrap();
+        assert_eq!((doubts.bad, doubts.good, doubts.alarms), (0, 1, [0; 4]));
+    }
+}
