@@ -101,7 +101,7 @@ impl<'a> Neighbours<'a> {
         if let Some(other) = self.joined(particle, side ^ 1) {
             return self.between(particle, other).map(|x| -0.5 * x);
         }
-        let step = if side % 2 == 0 { -0.5 } else { 0.5 } * self.spacing;
+        let step = if side.is_multiple_of(2) { -0.5 } else { 0.5 } * self.spacing;
         if side < 2 { [step, 0.0] } else { [0.0, step] }
     }
 
