@@ -1,21 +1,29 @@
-//! What users hand in, damaged at random: scenes, meshes, tool paths, tables, laws, checkpoints. No panic, no hang, and
-//! an error that names the place.
+//! What users hand in, damaged at random: scenes, meshes, tool paths, tables, clouds, HDF5, laws, checkpoints. No panic,
+//! no hang, no memory beyond what the file justifies, and an error that names the place.
 //!
 //! 2000 mutations of each kind, the same ones every time; `FRONT_DOOR=100000 cargo test --release -p tests front_door`
 //! takes that many, new ones every time. What it finds is kept in tests/proptest-regressions and tried first.
 
+use crate::allocations;
 use crate::program::workspace;
 use polycore::scene::Source;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+
+mod hdf5;
+mod points;
+mod scenes;
 
 /// Mutations of each kind, unless `FRONT_DOOR` says otherwise.
 const FEW: u32 = 2000;
 /// Longer than any of these may take, on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// Memory that opening a file may take: so much, and so many times its length.
+const MEMORY: [u64; 2] = [32 << 20, 256];
 /// Of a larger file only so much is taken.
 const LARGEST: usize = 64 << 10;
 
@@ -129,6 +137,17 @@ fn apply(bytes: &mut Vec<u8>, change: &Change) {
 
 /// Damages files of a kind and opens them; an error must hold `name`, the place that a user has to look at.
 fn attack(kind: &str, files: &[PathBuf], name: &str, open: impl Fn(&[u8]) -> Result<(), String>) {
+    attack_some(1, kind, files, name, open);
+}
+
+/// One of `share` mutations.
+fn attack_some(
+    share: u32,
+    kind: &str,
+    files: &[PathBuf],
+    name: &str,
+    open: impl Fn(&[u8]) -> Result<(), String>,
+) {
     let corpus: Vec<Vec<u8>> = files
         .iter()
         .map(|file| {
@@ -139,7 +158,11 @@ fn attack(kind: &str, files: &[PathBuf], name: &str, open: impl Fn(&[u8]) -> Res
         .collect();
     assert!(!corpus.is_empty(), "{kind}");
     let asked = std::env::var("FRONT_DOOR").ok().map(|count| count.parse().expect("FRONT_DOOR, a count"));
-    let config = Config { cases: asked.unwrap_or(FEW), source_file: Some(file!()), ..Config::default() };
+    let config = Config {
+        cases: asked.unwrap_or(FEW).div_ceil(share),
+        source_file: Some(file!()),
+        ..Config::default()
+    };
     let mut runner = match asked {
         Some(_) => TestRunner::new(config),
         None => TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha)),
@@ -149,8 +172,10 @@ fn attack(kind: &str, files: &[PathBuf], name: &str, open: impl Fn(&[u8]) -> Res
         let mut bytes = corpus[index].clone();
         changes.iter().for_each(|change| apply(&mut bytes, change));
         let begun = Instant::now();
-        let opened = open(&bytes);
+        let (opened, memory) = allocations::most(|| open(&bytes));
         prop_assert!(begun.elapsed() < PATIENCE, "{:?}", begun.elapsed());
+        let allowed = MEMORY[0] + MEMORY[1] * bytes.len() as u64;
+        prop_assert!(memory <= allowed, "{memory} bytes of memory, {allowed} allowed");
         match opened {
             Err(message) if !message.contains(name) => {
                 Err(TestCaseError::fail(format!("no place: {message}")))
@@ -229,6 +254,13 @@ fn scenes_of_crystfem() {
 }
 
 #[test]
+fn scenes_of_mdsurrogate() {
+    let mut files = cases("mdsurrogate");
+    files.extend(below("crates/mdsurrogate/tests/bad", ".toml"));
+    attack_scenes(&files, |source| source.parse::<mdsurrogate::scene::Scene>()?.check(source));
+}
+
+#[test]
 fn meshes_of_gmsh() {
     let files = below("crates/crystfem/tests/fixtures", ".msh");
     attack("Gmsh", &files, "part.msh", |bytes| {
@@ -288,17 +320,37 @@ fn tables() {
 fn data_of_molecular_dynamics() {
     use mdsurrogate::dataset::{ReadOptions, read};
     let folder = tempfile::tempdir().unwrap();
-    let head = "run_id,kind,rate_x,rate_y,rate_z,sample,time_fs,lx,ly,lz,sxx,syy,szz,sxy,sxz,syz\n";
+    let head = "run_id,kind,rate_x,rate_y,rate_z,sample,time_fs,lx,ly,lz,F11,F22,F33,\
+                avg_lx,avg_ly,avg_lz,avg_sxx,avg_syy,avg_szz,avg_sxy,avg_sxz,avg_syz\n";
     let row = |k: usize| {
-        format!("r{},ux,1e-5,0,0,{k},{k},{},33,64,{k},1,2,3,4,5\n", k / 20, 38.0 + 0.1 * (k % 20) as f64)
+        let (run, stretch) = (k / 20, 1.0 + 0.01 * (k % 20) as f64);
+        let (lx, sxx) = (38.0 * stretch, 100 * k);
+        format!("r{run},ux,1e-5,0,0,{k},{k},{lx},33,64,{stretch},1,1,{lx},33,64,{sxx},1,2,3,4,5\n")
     };
     let path = folder.path().join("a.csv");
     fs::write(&path, head.to_owned() + &(0..60).map(row).collect::<String>()).unwrap();
-    let mut files = vec![path];
-    files.extend(below("cases/ch3", ".csv.gz"));
-    attack_files("data set", &files, "data.csv", |path| {
+    let text = fs::read(&path).unwrap();
+    attack_files("data set", &[path], "data.csv", |path| {
         read(path, &ReadOptions::default()).map(|_| ()).map_err(|error| error.to_string())
     });
+    // one piece, and two, as `cat` joins them
+    let half = 1 + text[..text.len() / 2].iter().rposition(|&byte| byte == b'\n').unwrap();
+    let packed = [&[&text[..]][..], &[&text[..half], &text[half..]]].map(|pieces| {
+        let path = folder.path().join(format!("{}.csv.gz", pieces.len()));
+        fs::write(&path, pieces.iter().flat_map(|piece| gzip(piece)).collect::<Vec<u8>>()).unwrap();
+        read(&path, &ReadOptions::default()).unwrap();
+        path
+    });
+    let files: Vec<PathBuf> = packed.into_iter().chain(below("cases/ch3", ".csv.gz")).collect();
+    attack_files("packed data set", &files, "data.csv.gz", |path| {
+        read(path, &ReadOptions::default()).map(|_| ()).map_err(|error| error.to_string())
+    });
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    packer.write_all(bytes).unwrap();
+    packer.finish().unwrap()
 }
 
 #[test]

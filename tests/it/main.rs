@@ -5,11 +5,13 @@
 //! * [`commands`]: exit codes, help, closed forms, reports and files;
 //! * [`bits`]: the same bits on any number of threads;
 //! * [`killed`]: the same bits after `kill -9`, Ctrl-C and `peri resume`;
-//! * [`front_door`]: scenes, meshes, tables, laws and checkpoints damaged at random;
+//! * [`front_door`]: scenes, meshes, tables, HDF5, laws and checkpoints damaged at random;
 //! * [`loads`]: loads, displacements and names of values in reports;
+//! * [`memory`]: no run takes more memory than is stated, absurd sizes are refused before they are allocated;
 //! * [`schemas`]: JSON Schemas, by which every case is valid;
 //! * [`documents`]: the commands and links that README and docs show.
 
+mod allocations;
 mod bad;
 mod bits;
 mod commands;
@@ -17,6 +19,7 @@ mod documents;
 mod front_door;
 mod killed;
 mod loads;
+mod memory;
 mod parts;
 mod program;
 mod results;

@@ -258,6 +258,16 @@ impl Simulation {
 
     /// How linear systems would be solved from now to a time, and why.
     pub fn choose(&self, until: f64) -> Choice {
+        self.task(until).choose()
+    }
+
+    /// Entries of the factors that a run to a time makes, about; 0 where it makes none.
+    pub fn factors(&self, until: f64) -> f64 {
+        let task = self.task(until);
+        if task.choose().direct { task.factor_entries() } else { 0.0 }
+    }
+
+    fn task(&self, until: f64) -> Task {
         let (equal_steps, dt) = match self.settings.steps {
             Steps::Fixed { dt } => (true, dt),
             Steps::Adaptive { first, .. } => (false, first),
@@ -282,7 +292,7 @@ impl Simulation {
             true => 1.0 + conduction[k] / capacity(k),
             false => 1.0,
         });
-        let task = Task {
+        Task {
             size,
             length: longest / spacing,
             entries: self.system.rows.stored()[2],
@@ -291,8 +301,7 @@ impl Simulation {
             linear: self.system.is_linear(),
             equal_steps,
             wanted: self.settings.solver,
-        };
-        task.choose()
+        }
     }
 
     /// What is solved and what is left out, for a run to a time: one sentence a line.

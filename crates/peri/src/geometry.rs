@@ -148,8 +148,9 @@ pub fn recognise<const D: usize>(points: &[[f64; D]], volumes: &[f64], thickness
     let high: [f64; D] =
         std::array::from_fn(|d| points.iter().map(|p| p[d]).fold(f64::NEG_INFINITY, f64::max));
     let extent: [f64; D] = std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round() + 1.0);
-    // a sparse box would waste more than a neighbour list
-    if extent.iter().product::<f64>() > 8.0 * points.len() as f64 {
+    // a sparse box would waste more than a neighbour list; of a spacing of 0 the extent is no number
+    let sparse = extent.iter().product::<f64>() > 8.0 * points.len() as f64;
+    if sparse || !extent.iter().all(|e| e.is_finite()) {
         return None;
     }
     let cells = extent.map(|e| e as usize);
@@ -260,6 +261,8 @@ mod tests {
         assert!(recognise(&points, &uneven, 0.5).is_none(), "unequal volumes");
         let apart: Vec<[f64; 2]> = points.iter().map(|p| p.map(|x| 2.0 * x)).collect();
         assert!(recognise(&apart, &volumes, 0.5).is_none(), "no next neighbours");
+        let row = [[0.0, 0.0], [1.0, 0.0]];
+        assert!(recognise(&row, &[1e-30; 2], 1e300).is_none(), "a spacing that underflows to 0");
     }
 
     #[test]

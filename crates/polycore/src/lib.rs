@@ -24,6 +24,7 @@ pub mod command;
 pub mod error;
 pub mod hyperelastic;
 pub mod langevin;
+pub mod memory;
 pub mod output;
 pub mod report;
 pub mod scene;

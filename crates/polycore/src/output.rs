@@ -7,6 +7,8 @@ use std::path::Path;
 use crate::Error;
 
 pub mod csv;
+#[cfg(feature = "hdf5")]
+pub mod hdf5;
 #[cfg(feature = "pictures")]
 pub mod picture;
 #[cfg(feature = "hdf5")]

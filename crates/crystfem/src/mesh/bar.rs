@@ -1,7 +1,7 @@
 //! The printed bar on its substrate, Fig. 4.2 of the thesis.
 
 use crate::error::Error;
-use crate::mesh::structured::MAX_NODES;
+use crate::mesh::structured::{MAX_NODES, count as fill, few_enough};
 use crate::mesh::{Block, Face, Grid, Mesh, Split, graded};
 
 /// A bar printed in layers, its lower face at z = 0, its middle at x = y = 0.
@@ -66,8 +66,11 @@ impl Bar {
         Ok(mesh)
     }
 
-    /// The lines of bar and substrate.
-    fn grid(&self) -> Result<Grid, Error> {
+    /// Elements along each axis of the grid through bar and substrate, as real numbers: they may be too many to make.
+    ///
+    /// # Errors
+    /// As [`Bar::mesh`].
+    pub fn elements(&self) -> Result<[f64; 3], Error> {
         let count = |name, found: usize| match (1..MAX_NODES).contains(&found) {
             true => Ok(()),
             false => {
@@ -89,6 +92,32 @@ impl Bar {
         if let Some(Substrate { thickness, .. }) = self.substrate {
             positive("thickness of the substrate", thickness, thickness)?;
         }
+        let mut elements = [0.0, 0.0, self.layers as f64 * self.elements_per_layer as f64];
+        for d in 0..2 {
+            elements[d] = fill(self.size[d], self.element_size, 1.0)?;
+            if let Some(substrate) = &self.substrate {
+                let beside = 0.5 * (substrate.size[d] - self.size[d]);
+                if beside.is_nan() || beside < 0.0 {
+                    let allowed = format!("at least the bar's, {} m", self.size[d]);
+                    let name = "extent of the substrate";
+                    return Err(Error::Parameter { name, found: substrate.size[d], allowed });
+                }
+                if beside > 1e-9 * substrate.size[d] {
+                    elements[d] += 2.0 * fill(beside, self.size[d] / elements[d], substrate.growth)?;
+                }
+            }
+        }
+        if let Some(substrate) = &self.substrate {
+            let step = self.layer_height / self.elements_per_layer as f64;
+            elements[2] += fill(substrate.thickness, step, substrate.growth)?;
+        }
+        few_enough(elements)?;
+        Ok(elements)
+    }
+
+    /// The lines of bar and substrate.
+    fn grid(&self) -> Result<Grid, Error> {
+        self.elements()?;
         let mut lines = [const { Vec::new() }; 3];
         for d in 0..2 {
             let lengths = graded(self.size[d], self.element_size, 1.0)?;
@@ -98,11 +127,6 @@ impl Bar {
                 (0..=count).map(|k| half * ((2 * k) as f64 / count as f64 - 1.0)).collect();
             if let Some(substrate) = &self.substrate {
                 let beside = 0.5 * (substrate.size[d] - self.size[d]);
-                if beside.is_nan() || beside < 0.0 {
-                    let allowed = format!("at least the bar's, {} m", self.size[d]);
-                    let name = "extent of the substrate";
-                    return Err(Error::Parameter { name, found: substrate.size[d], allowed });
-                }
                 if beside > 1e-9 * substrate.size[d] {
                     let outside = away(half, graded(beside, lengths[0], substrate.growth)?);
                     let left = outside.iter().rev().map(|x| -x);

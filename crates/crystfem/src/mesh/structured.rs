@@ -34,6 +34,7 @@ impl Grid {
     /// # Errors
     /// A box without volume, no elements, or more nodes than 2²⁸.
     pub fn uniform(lower: [f64; 3], upper: [f64; 3], elements: [usize; 3]) -> Result<Self, Error> {
+        few_enough(elements.map(|count| count as f64))?;
         let mut lines = [const { Vec::new() }; 3];
         for d in 0..3 {
             let [low, high, count] = [lower[d], upper[d], elements[d] as f64];
@@ -107,11 +108,17 @@ impl Grid {
             // a cell is inside by its middle
             let range: [_; 3] = std::array::from_fn(|d| {
                 let line = &self.lines[d];
-                let middle = |k: usize| 0.5 * (line[k] + line[k + 1]);
-                let cells = line.len() - 1;
-                let first = (0..cells).position(|k| middle(k) > block.lower[d]).unwrap_or(cells);
-                let end = (first..cells).find(|k| middle(*k) > block.upper[d]).unwrap_or(cells);
-                first..end
+                let cells = &line[..line.len() - 1];
+                // middles ascend: of a thousand layers each is found in ten looks
+                let until = |end: f64| {
+                    let (mut low, mut high) = (0, cells.len());
+                    while low < high {
+                        let k = low.midpoint(high);
+                        if 0.5 * (line[k] + line[k + 1]) > end { high = k } else { low = k + 1 }
+                    }
+                    low
+                };
+                until(block.lower[d])..until(block.upper[d])
             });
             if range.iter().any(std::ops::Range::is_empty) {
                 return Err(Error::Mesh(format!("block `{}` holds no element of the grid", block.name)));
@@ -228,13 +235,18 @@ impl Grid {
                 return Err(Error::Mesh(format!("grid lines along {axis} do not ascend: {a} m, then {b} m")));
             }
         }
-        let nodes: f64 = self.lines.iter().map(|line| line.len() as f64).product();
-        if nodes > MAX_NODES as f64 {
-            let allowed = format!("at most {MAX_NODES}");
-            return Err(Error::Parameter { name: "nodes of a structured mesh", found: nodes, allowed });
-        }
-        Ok(())
+        few_enough(self.lines.each_ref().map(|line| line.len() as f64 - 1.0))
     }
+}
+
+/// Refuses elements along each axis whose nodes cannot be numbered.
+pub(crate) fn few_enough(elements: [f64; 3]) -> Result<(), Error> {
+    let nodes: f64 = elements.iter().map(|count| count + 1.0).product();
+    if nodes <= MAX_NODES as f64 {
+        return Ok(());
+    }
+    let allowed = format!("at most {MAX_NODES}");
+    Err(Error::Parameter { name: "nodes of a structured mesh", found: nodes, allowed })
 }
 
 impl Block {
@@ -258,6 +270,14 @@ impl Block {
 /// # Errors
 /// A length or first element that is not positive, a growth below 1, or more than 2²⁸ elements.
 pub fn graded(length: f64, first: f64, growth: f64) -> Result<Vec<f64>, Error> {
+    let count = count(length, first, growth)?;
+    let relative: Vec<f64> = (0..count as i32).map(|k| growth.powi(k)).collect();
+    let sum: f64 = relative.iter().sum();
+    Ok(relative.into_iter().map(|part| length * (part / sum)).collect())
+}
+
+/// How many elements [`graded`] makes.
+pub(crate) fn count(length: f64, first: f64, growth: f64) -> Result<f64, Error> {
     for (name, found) in [("length", length), ("element size", first)] {
         if !(found > 0.0 && found.is_finite()) {
             return Err(Error::Parameter { name, found, allowed: "positive and finite, m".into() });
@@ -277,9 +297,7 @@ pub fn graded(length: f64, first: f64, growth: f64) -> Result<Vec<f64>, Error> {
         let allowed = format!("at most {}", MAX_NODES - 1);
         return Err(Error::Parameter { name: "elements along an axis", found: count.ceil(), allowed });
     }
-    let relative: Vec<f64> = (0..count.ceil().max(1.0) as i32).map(|k| growth.powi(k)).collect();
-    let sum: f64 = relative.iter().sum();
-    Ok(relative.into_iter().map(|part| length * (part / sum)).collect())
+    Ok(count.ceil().max(1.0))
 }
 
 /// Ascending coordinates, those closer than [`SAME`] of the extent taken as one.

@@ -56,7 +56,9 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
     problem.births.clear();
     let simulation = Simulation::new(problem, task.settings)?;
     lines.extend(simulation.explain(task.end).into_iter().map(|line| format!("{when}{line}")));
+    scene.refuse_too_large(source, &simulation, task.end)?;
     lines.push(format!("ends at    {} s", task.end));
+    lines.push(format!("needs      {}", polycore::memory::needs(scene.memory(&simulation, task.end))));
     Ok(lines)
 }
 

@@ -48,6 +48,7 @@ pub fn one(
         (frames, probes) = (saved.frames, saved.probes);
     } else {
         simulation = Simulation::new(task.problem.clone(), task.settings)?;
+        scene.refuse_too_large(source, &simulation, task.end)?;
         polycore::output::prepare_run(options.output)?;
         let fields = simulation.field_names().len();
         frames = 0;

@@ -1,6 +1,7 @@
 //! The mesh block of a scene.
 
 use super::fault::{located, located_in};
+use super::memory;
 use crate::error::Error;
 use crate::mesh::{Bar, Grid, Mesh, Substrate, quality, read};
 use polycore::scene::{SceneError, Source};
@@ -115,9 +116,11 @@ impl MeshSpec {
         let at = |key: &str, error: Error| located(source, key, &error);
         let mut notes = Vec::new();
         let mesh = if let Some(bar) = &self.bar {
+            memory::refuse_mesh(source, "mesh.bar", self.elements(source)?)?;
             bar.build().mesh().map_err(|error| located_in(source, "mesh.bar", &BAR_KEYS, &error))?
         } else if let Some(brick) = &self.brick {
             let size = brick.size.map(|x| x.si());
+            memory::refuse_mesh(source, "mesh.brick.elements", self.elements(source)?)?;
             let grid = Grid::uniform([0.0; 3], size, brick.elements);
             grid.and_then(|grid| grid.mesh("brick")).map_err(|error| match error {
                 Error::Mesh(_) => at("mesh.brick.size", error),
@@ -135,6 +138,23 @@ impl MeshSpec {
         let found = quality::check(&mesh, None).map_err(|error| at("mesh", error))?;
         notes.extend(found.notes);
         Ok(Built { mesh, notes, volume: found.volume })
+    }
+}
+
+impl MeshSpec {
+    /// Elements along each axis of a bar or brick, before anything of it is allocated: they may be too many. None of a
+    /// file.
+    ///
+    /// # Errors
+    /// As [`MeshSpec::build`].
+    pub fn elements(&self, source: &Source) -> Result<[f64; 3], SceneError> {
+        match (&self.bar, &self.brick) {
+            (Some(bar), _) => {
+                bar.build().elements().map_err(|error| located_in(source, "mesh.bar", &BAR_KEYS, &error))
+            }
+            (None, Some(brick)) => Ok(brick.elements.map(|count| count as f64)),
+            (None, None) => Ok([0.0; 3]),
+        }
     }
 }
 

@@ -5,6 +5,7 @@ mod either;
 mod fault;
 mod fit;
 mod material;
+mod memory;
 mod mesh;
 mod part;
 mod point;

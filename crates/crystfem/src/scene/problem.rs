@@ -1,6 +1,7 @@
 //! From a scene to a problem of heat conduction.
 
 use super::fault::{located, located_in};
+use super::memory;
 use super::part::{BoundarySpec, PartScene, PrintSpec};
 use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
 use crate::error::Error;
@@ -75,6 +76,7 @@ impl PartScene {
             (births, layers, by_itself) = (laid.births, laid.layers, laid.end);
         }
         let end = self.time.end.map_or(by_itself, |end| end.si());
+        memory::refuse_times(source, self, end)?;
         if let Some(late) = births.iter().find(|birth| birth.time >= end) {
             let allowed = format!("after the last birth, at {} s", births.last().unwrap_or(late).time);
             return Err(source.error("time.end", format!("{end} s"), allowed));

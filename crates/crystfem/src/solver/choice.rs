@@ -49,6 +49,16 @@ pub struct Task {
 }
 
 impl Task {
+    /// Equations across the longest side.
+    fn across(&self) -> f64 {
+        (self.size as f64 / self.length).max(1.0)
+    }
+
+    /// Entries of the factors, about 11 n √s with s the equations across.
+    pub fn factor_entries(&self) -> f64 {
+        11.0 * self.size as f64 * self.across().sqrt()
+    }
+
     /// Compares the work of both in iterations of conjugate gradients.
     ///
     /// With the diagonal as preconditioner the condition is at most 2·`stiffness` (Gershgorin: λmax ≤ 2; λmin ≥ C/A_ii),
@@ -78,7 +88,7 @@ impl Task {
         let size = self.size as f64;
         let condition = (2.0 * self.stiffness).min(self.length * self.length);
         let iterations = 0.5 * condition.sqrt() * (2.0_f64 / 1e-4).ln();
-        let across = (size / self.length).max(1.0);
+        let across = self.across();
         let stored = 120.0 / (120.0 + 12.0 * self.entries as f64 / size);
         let solve = 3.9 * stored * across.sqrt();
         let factor = 1.4 * stored * across / self.solves.max(1.0);

@@ -9,6 +9,7 @@
 use super::{Dataset, Path, Row, Split, Standardisation};
 use crate::Error;
 use crate::kinematics::{cauchy_of_material, stretch_of};
+use polycore::output::hdf5::dataset;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use rust_hdf5::{H5File, H5Group};
 
@@ -107,7 +108,7 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
             let similar = crate::error::nearest(name, names.iter().map(String::as_str));
             return Err(Error::MissingColumn { path: path.to_path_buf(), column: name.into(), similar });
         }
-        let dataset = file.dataset(name).map_err(none)?;
+        let dataset = dataset(&file, name, size).map_err(none)?;
         let shape = dataset.shape();
         if shape.len() != 2 || shape[1] != columns {
             return Err(fail(format!("dataset `{name}` of shape {shape:?}"), &format!("(N, {columns})")));
@@ -125,7 +126,7 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
         if !names.iter().any(|other| other == name) {
             return Ok(None);
         }
-        let data = file.dataset(name).and_then(|dataset| dataset.read_raw::<i64>()).map_err(none)?;
+        let data = dataset(&file, name, size).and_then(|dataset| dataset.read_raw::<i64>()).map_err(none)?;
         if data.len() != rows || data.iter().any(|value| *value < 0) {
             let found = format!("{} numbers in dataset `{name}`", data.len());
             return Err(fail(found, &format!("{rows}, none negative")));
@@ -147,10 +148,10 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
     let samples = integers("sample", rows)?;
     let of_rows = integers("path", rows)?.unwrap_or_else(|| vec![0; rows]);
     let times = match names.iter().any(|name| name == "time") {
-        true => file.dataset("time").and_then(|dataset| dataset.read_raw::<f64>()).map_err(none)?,
+        true => dataset(&file, "time", size).and_then(|dataset| dataset.read_raw::<f64>()).map_err(none)?,
         false => Vec::new(),
     };
-    let mut set = Dataset { paths: paths(&file, path, &of_rows)?, ..Dataset::default() };
+    let mut set = Dataset { paths: paths(&file, path, size, &of_rows)?, ..Dataset::default() };
     for row in 0..rows {
         let six = |data: &[f64]| Voigt::from_row_slice(&data[6 * row..6 * row + 6]);
         let at = |error: Error| fail(format!("row {row}: {error}"), "a deformation and its stress");
@@ -171,7 +172,7 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
         target.push(Row { sample, time, deformation, cauchy, c, s });
     }
     if names.iter().any(|name| name == "provenance") {
-        let lines = file.dataset("provenance").and_then(|dataset| dataset.read_vlen_strings());
+        let lines = dataset(&file, "provenance", size).and_then(|dataset| dataset.read_vlen_strings());
         set.provenance = lines.map_err(none)?;
     }
     set.provenance.push(format!("{}: {size} bytes, HDF5, {rows} rows", super::read::name_of(path)));
@@ -179,7 +180,7 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
 }
 
 /// Empty paths with their names, kinds and rates.
-fn paths(file: &H5File, path: &std::path::Path, of_rows: &[i64]) -> Result<Vec<Path>, Error> {
+fn paths(file: &H5File, path: &std::path::Path, size: u64, of_rows: &[i64]) -> Result<Vec<Path>, Error> {
     let none = |error: rust_hdf5::Hdf5Error| Error::file(path, format!("damaged HDF5 ({error})"), "HDF5");
     let count = of_rows.iter().max().map_or(0, |last| *last as usize + 1);
     let groups = file.root_group().group_names().map_err(none)?;
@@ -197,10 +198,11 @@ fn paths(file: &H5File, path: &std::path::Path, of_rows: &[i64]) -> Result<Vec<P
         return Ok((0..count).map(blank).collect());
     }
     let strings = |name: &str| {
-        file.dataset(&format!("paths/{name}")).and_then(|dataset| dataset.read_vlen_strings()).map_err(none)
+        let dataset = dataset(file, &format!("paths/{name}"), size);
+        dataset.and_then(|dataset| dataset.read_vlen_strings()).map_err(none)
     };
     let (ids, kinds) = (strings("id")?, strings("kind")?);
-    let rates = file.dataset("paths/rates").and_then(|d| d.read_raw::<f64>()).map_err(none)?;
+    let rates = dataset(file, "paths/rates", size).and_then(|d| d.read_raw::<f64>()).map_err(none)?;
     if kinds.len() != ids.len() || rates.len() != 3 * ids.len() || count > ids.len() {
         let found = format!("{} ids, {} kinds, {} rates", ids.len(), kinds.len(), rates.len());
         return Err(Error::file(path, found, "one id, one kind and three rates a path"));

@@ -69,7 +69,15 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
     } else {
         table(&Table::read(path)?, options)?
     };
-    set.check()?;
+    set.check().map_err(|error| match error {
+        Error::Implausible { place, quantity, found, allowed } => {
+            Error::Implausible { place: format!("{}, {place}", path.display()), quantity, found, allowed }
+        }
+        Error::Data { what, found, allowed } => {
+            Error::Data { what, found: format!("{found} in {}", path.display()), allowed }
+        }
+        other => other,
+    })?;
     Ok(set)
 }
 

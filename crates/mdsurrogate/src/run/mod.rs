@@ -138,6 +138,7 @@ pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
     if scene.model.is_empty() {
         lines.push("leaves out training".into());
     }
+    lines.push(format!("needs      {}", polycore::memory::needs(scene.memory(set.len()))));
     Ok(lines)
 }
 

@@ -7,6 +7,7 @@ use polycore::units::{Length, Stress};
 use serde::Deserialize;
 use std::path::PathBuf;
 
+mod memory;
 mod model;
 mod search;
 
@@ -54,11 +55,16 @@ impl Scene {
         check_models(source, &self.model, &self.training)?;
         match &self.search {
             Some(_) if !self.model.is_empty() => {
-                Err(source.error("search", "`[search]` beside `[[model]]`", "one of them in a scene"))
+                return Err(source.error(
+                    "search",
+                    "`[search]` beside `[[model]]`",
+                    "one of them in a scene",
+                ));
             }
-            Some(search) => search.check(source),
-            None => Ok(()),
+            Some(search) => search.check(source)?,
+            None => {}
         }
+        self.refuse_too_large(source)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Models and their training, as written in a scene.
 
+use super::memory::{MOST_PARAMETERS, parameters};
 use crate::network::{Activation, Architecture};
 use crate::surrogate::{Header, Kind, Surrogate, Symmetry};
 use crate::train::{Loss, Schedule, Settings};
@@ -9,9 +10,6 @@ use std::collections::HashSet;
 
 /// The axes of the data.
 const OWN_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-
-/// Weights and biases of a network that is still trained on one machine: 400 MB of them, their gradients and moments.
-const MOST_PARAMETERS: usize = 20_000_000;
 
 /// A law to train.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -235,10 +233,11 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
             let key = if (1..=1000).contains(&model.members) { "hidden" } else { "members" };
             source.error(&at(key), error, "a network that can be built")
         })?;
-        let parameters = header.architecture.parameters();
+        let parameters = parameters(model);
         if parameters > MOST_PARAMETERS {
-            let allowed = format!("networks of {MOST_PARAMETERS} at most");
-            return Err(source.error(&at("hidden"), format!("{parameters} parameters"), allowed));
+            let found = format!("{parameters} parameters, in networks: {}", model.members);
+            let allowed = format!("networks of {MOST_PARAMETERS} at most, all members together");
+            return Err(source.error(&at("hidden"), found, allowed));
         }
         check_training(source, &at("training"), &model.training)?;
     }

@@ -1,5 +1,6 @@
 //! A search for hyperparameters, as written in a scene.
 
+use super::memory::MOST_PARAMETERS;
 use crate::search::{Method, Space, brackets};
 use crate::surrogate::Header;
 use crate::surrogate::Kind;
@@ -121,6 +122,12 @@ impl SearchSpec {
         // the largest network of the space
         let widest = (self.space.neurons[1], self.space.activations[0]);
         let largest = Header::new(Kind::Ann, &vec![widest; self.space.layers[1]], 1);
-        largest.check().map_err(|error| wrong("space", error))
+        largest.check().map_err(|error| wrong("space", error))?;
+        let parameters = largest.architecture.parameters();
+        if parameters > MOST_PARAMETERS {
+            let found = format!("networks of up to {parameters} parameters");
+            return Err(source.error("search.space", found, format!("{MOST_PARAMETERS} at most")));
+        }
+        Ok(())
     }
 }

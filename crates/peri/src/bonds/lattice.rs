@@ -56,6 +56,28 @@ impl<const D: usize> Stencil<D> {
     }
 }
 
+/// Steps in slots along each axis, empty slots before the first cell, and all slots of a box of cells.
+fn layout<const D: usize>(cells: [usize; D], ratio: f64) -> ([usize; D], usize, usize) {
+    // empty cells between rows, so that nothing within twice the horizon wraps into the next row: stress measures
+    // look that far; odd strides, or rows of a power of two would fall into the same cache sets
+    let far = ratio.floor() as usize;
+    let mut strides = [1; D];
+    for d in 1..D {
+        strides[d] = (strides[d - 1] * (cells[d - 1] + 2 * far)) | 1;
+    }
+    let guard = strides.iter().map(|s| s * far).sum::<usize>().next_multiple_of(TILE);
+    (strides, guard, (2 * guard + strides[D - 1] * cells[D - 1]).next_multiple_of(TILE))
+}
+
+/// Slots of a box of cells and a horizon over the spacing, as a real number: a thin box has many more than cells.
+pub fn storage<const D: usize>(cells: [f64; D], ratio: f64) -> f64 {
+    // larger boxes need no exact number, and have none
+    if cells.iter().product::<f64>() < 1e12 && ratio < 1e3 {
+        return layout(cells.map(|c| c as usize), ratio).2 as f64;
+    }
+    cells.iter().product::<f64>()
+}
+
 /// The bonds of a lattice.
 pub struct LatticeBonds<const D: usize> {
     lattice: Lattice<D>,
@@ -104,15 +126,7 @@ impl<const D: usize> LatticeBonds<D> {
         if stencil.offsets.is_empty() {
             return Err(Error::geometry(format!("a horizon of {ratio} spacings reaches no neighbour")));
         }
-        // empty cells between rows, so that nothing within twice the horizon wraps into the next row: stress measures
-        // look that far; odd strides, or rows of a power of two would fall into the same cache sets
-        let far = ratio.floor() as usize;
-        let mut strides = [1; D];
-        for d in 1..D {
-            strides[d] = (strides[d - 1] * (lattice.cells[d - 1] + 2 * far)) | 1;
-        }
-        let guard = strides.iter().map(|s| s * far).sum::<usize>().next_multiple_of(TILE);
-        let slots = (2 * guard + strides[D - 1] * lattice.cells[D - 1]).next_multiple_of(TILE);
+        let (strides, guard, slots) = layout(lattice.cells, ratio);
         let mut bonds = Self {
             stencil,
             ratio,

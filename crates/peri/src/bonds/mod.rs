@@ -14,7 +14,7 @@ pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
 pub use kernel::StretchRange;
-pub use lattice::{Lattice, LatticeBonds, Stencil};
+pub use lattice::{Lattice, LatticeBonds, Stencil, storage};
 pub use lattice_kernel::TILE;
 
 use crate::field::{CHUNK, Field, chunk_range};

@@ -190,12 +190,15 @@ impl<'a> Frames<'a> {
         let Some(series) = &mut self.series else { return Ok(()) };
         let in_space =
             |v: [f64; D]| -> [f64; 3] { std::array::from_fn(|d| v.get(d).copied().unwrap_or(0.0)) };
-        let (mut points, mut displacement) = (Vec::new(), Vec::new());
-        for &slot in bonds.particles() {
-            let (x, u) = (bonds.position(slot as usize), state.displacement.get(slot as usize));
-            points.push(in_space(std::array::from_fn(|d| x[d] + u[d])));
-            displacement.extend(in_space(u));
-        }
+        // lists of arrays are allocated once; flat ones would grow by doubling
+        let particles = bonds.particles().iter().map(|&slot| slot as usize);
+        let displacement: Vec<[f64; 3]> =
+            particles.clone().map(|slot| in_space(state.displacement.get(slot))).collect();
+        let place = |(slot, u): (usize, &[f64; 3])| -> [f64; 3] {
+            let x = in_space(bonds.position(slot));
+            std::array::from_fn(|d| x[d] + u[d])
+        };
+        let points: Vec<[f64; 3]> = particles.zip(&displacement).map(place).collect();
         let full = |t: &Tensor<D>| -> [f64; 9] {
             std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
         };
@@ -204,10 +207,11 @@ impl<'a> Frames<'a> {
             .iter()
             .flat_map(|(kind, fields)| fields.iter().map(move |(measure, field)| (kind, measure, field)))
             .map(|(kind, measure, field)| {
-                (format!("{kind}_{}", measure.name()), field.iter().flat_map(full).collect())
+                let all: Vec<[f64; 9]> = field.iter().map(full).collect();
+                (format!("{kind}_{}", measure.name()), all.into_flattened())
             })
             .collect();
-        let mut data: Vec<(&str, usize, &[f64])> = vec![("displacement", 3, &displacement)];
+        let mut data: Vec<(&str, usize, &[f64])> = vec![("displacement", 3, displacement.as_flattened())];
         // a cloud's particles are sorted for locality: this is the line of each in the user's file, from 0
         let lines: Option<Vec<f64>> =
             bonds.as_cloud().map(|cloud| cloud.input_order().iter().map(|&line| f64::from(line)).collect());

@@ -2,11 +2,13 @@
 
 use super::cloud::cloud;
 use super::crack::{cracks, severed};
+use super::memory;
 use super::variant::Variant;
 use super::{Axis, Scene, ShapeKind, ShapeSpec};
 use crate::bonds::{Bonds, LatticeBonds};
 use crate::calibrate::Space;
 use crate::geometry::{Cut, Operation, Shape, bounds, cell_counts, lattice};
+use polycore::memory::{available, gib};
 use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
 
@@ -22,10 +24,9 @@ pub struct Body<const D: usize> {
     pub severed: Vec<u64>,
 }
 
-/// Particles a body may have at most, whatever memory there is: slots are counted in 32 bits.
-const MOST_PARTICLES: f64 = 2e9;
-/// Bytes per particle of a whole run: bonds, four fields and their sums, stress.
-const BYTES_PER_PARTICLE: [f64; 2] = [180.0, 300.0];
+/// Cells and slots a body may have at most, whatever memory there is: slots are counted in 32 bits.
+const MOST_CELLS: f64 = 2e9;
+const MOST_SLOTS: f64 = u32::MAX as f64;
 
 /// Builds the body of a variant.
 ///
@@ -54,11 +55,9 @@ fn filled<const D: usize>(
     thickness: f64,
     cuts: &[Cut<D>],
 ) -> Result<Body<D>, SceneError> {
-    let operations = operations(source, scene)?;
-    let (low, high) = bounds(&operations)
-        .ok_or_else(|| source.error("body.shapes", "no shape is added", "at least one shape with `add`"))?;
+    let (operations, low, high) = outline(source, scene)?;
     let counts = cell_counts(low, high, variant.spacing);
-    refuse_too_large(source, scene, counts.iter().product(), D)?;
+    refuse_too_large(source, scene, counts, variant.horizon_ratio)?;
     check_shapes(source, &operations, low, high)?;
     let lattice = lattice(&operations, variant.spacing, thickness).map_err(|error| {
         source.error("body.shapes", error, "a body that contains at least one particle of the lattice")
@@ -82,7 +81,34 @@ fn filled<const D: usize>(
             "smaller: a body of at least two bonded particles",
         ));
     }
+    memory::refuse_too_large(source, scene, spacing_key(scene), &bonds)?;
     Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness, severed: Vec::new() })
+}
+
+/// Bytes that a variant needs at least, as far as its lattice tells, before anything of it is built; 0 for a cloud.
+///
+/// # Errors
+/// As [`body_of`].
+pub fn least_memory<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    variant: &Variant,
+) -> Result<f64, SceneError> {
+    if scene.body.points.is_some() {
+        return Ok(0.0);
+    }
+    let (_, low, high) = outline::<D>(source, scene)?;
+    Ok(memory::of_lattice(scene, cell_counts(low, high, variant.spacing), variant.horizon_ratio).1)
+}
+
+/// Operations on shapes, and the box around what they add.
+type Outline<const D: usize> = (Vec<Operation<D>>, [f64; D], [f64; D]);
+
+fn outline<const D: usize>(source: &Source, scene: &Scene) -> Result<Outline<D>, SceneError> {
+    let operations = operations(source, scene)?;
+    let (low, high) = bounds(&operations)
+        .ok_or_else(|| source.error("body.shapes", "no shape is added", "at least one shape with `add`"))?;
+    Ok((operations, low, high))
 }
 
 fn thickness(source: &Source, scene: &Scene) -> Result<f64, SceneError> {
@@ -101,14 +127,21 @@ fn thickness(source: &Source, scene: &Scene) -> Result<f64, SceneError> {
     }
 }
 
-fn refuse_too_large(source: &Source, scene: &Scene, cells: f64, dimension: usize) -> Result<(), SceneError> {
-    let needed = cells * BYTES_PER_PARTICLE[dimension - 2];
-    let available = available_memory();
-    if cells > MOST_PARTICLES || needed > available {
-        let found = format!("{cells:.3e} lattice cells, which need about {:.1} GiB", needed / GIB);
+/// Refuses a lattice before anything of it is allocated.
+fn refuse_too_large<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    counts: [f64; D],
+    ratio: f64,
+) -> Result<(), SceneError> {
+    let cells: f64 = counts.iter().product();
+    let (slots, needed) = memory::of_lattice(scene, counts, ratio);
+    let available = available();
+    if !(cells <= MOST_CELLS && slots <= MOST_SLOTS && needed <= available) {
+        let found = format!("{cells:.3e} lattice cells, which need about {}", gib(needed));
         let allowed = format!(
-            "at most {MOST_PARTICLES:.0e} cells and {:.1} GiB (the memory available); take a larger spacing",
-            available / GIB
+            "at most {MOST_CELLS:.0e} cells and {} (the memory available); take a larger spacing",
+            gib(available)
         );
         return Err(source.error(spacing_key(scene), found, allowed));
     }
@@ -118,17 +151,6 @@ fn refuse_too_large(source: &Source, scene: &Scene, cells: f64, dimension: usize
 /// Where the spacings stand.
 fn spacing_key(scene: &Scene) -> &'static str {
     if scene.study.iter().any(|study| !study.spacing.is_empty()) { "study" } else { "body.spacing" }
-}
-
-pub(super) const GIB: f64 = (1_u64 << 30) as f64;
-
-/// `MemAvailable` of Linux, or 16 GiB where it is not told.
-pub(super) fn available_memory() -> f64 {
-    let told = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
-        let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?.to_owned();
-        line.split_whitespace().nth(1)?.parse::<f64>().ok()
-    });
-    told.map_or(16.0 * GIB, |kib| kib * 1024.0)
 }
 
 pub(super) fn vector<const D: usize>(

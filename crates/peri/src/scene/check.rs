@@ -8,6 +8,9 @@ use polycore::scene::{SceneError, Source};
 /// Largest horizon ratio: a stencil beyond it has more bonds than any use.
 pub const LARGEST_RATIO: f64 = 20.0;
 
+/// Rows of history of a run in time.
+const MOST_RECORDS: usize = 1_000_000;
+
 /// Stiffest contact, beyond which no method would get anywhere, and stiffest one that L-BFGS can follow.
 const STIFFEST_CONTACT: f64 = 1e4;
 const STIFFEST_OF_LBFGS: f64 = 100.0;
@@ -96,7 +99,9 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             positive(source, "dynamics.density", method.density, "kg/m³")?;
             positive(source, "dynamics.end_time", method.end_time, "s")?;
             positive(source, "dynamics.time_step", method.time_step.unwrap_or(1.0), "s")?;
-            positive(source, "dynamics.records", method.records as f64, "")?;
+            if !(1..=MOST_RECORDS).contains(&method.records) {
+                return Err(source.error("dynamics.records", method.records, format!("1 to {MOST_RECORDS}")));
+            }
             for (key, value, most) in [
                 ("safety", method.safety, 1.0),
                 ("damping", method.damping, 1e12),

@@ -1,19 +1,18 @@
 //! Bodies from a CSV file of points.
 
-use super::build::{Body, GIB, available_memory, needed};
+use super::build::{Body, needed};
+use super::memory;
 use super::variant::Variant;
 use super::{Scene, check};
 use crate::bonds::{Bonds, CloudBonds, LatticeBonds};
 use crate::geometry::{Cut, recognise};
+use polycore::memory::{available, gib};
 use polycore::scene::{SceneError, Source};
 use std::collections::HashMap;
 use std::path::Path;
 
 /// Positions (m) and volumes (m³).
 type Points<const D: usize> = (Vec<[f64; D]>, Vec<f64>);
-
-/// Bytes per directed bond of a cloud: neighbour, stiffness, inverse square, and the lists while they are built.
-const BYTES_PER_BOND: f64 = 28.0;
 
 /// Builds the body of a cloud.
 ///
@@ -33,6 +32,7 @@ pub fn cloud<const D: usize>(
     check::positive(source, "body.horizon", horizon, "m")?;
     let (positions, volumes) = read::<D>(source, &path)?;
     if let Some(body) = regular(&positions, &volumes, thickness, horizon, variant, cuts) {
+        memory::refuse_too_large(source, scene, "body.points", &*body.bonds)?;
         return Ok(body);
     }
     refuse_too_many_bonds(source, &positions, horizon)?;
@@ -45,6 +45,7 @@ pub fn cloud<const D: usize>(
         let found = format!("{horizon} m, which reaches no neighbour");
         return Err(source.error("body.horizon", found, "larger"));
     }
+    memory::refuse_too_large(source, scene, "body.horizon", &bonds)?;
     let half = 0.5 * bonds.spacing();
     let extreme = |pick: fn(f64, f64) -> f64, from: f64| -> [f64; D] {
         std::array::from_fn(|d| positions.iter().map(|p| p[d]).fold(from, pick))
@@ -141,14 +142,11 @@ fn refuse_too_many_bonds<const D: usize>(
     };
     let pairs: f64 = cells.iter().map(|(cell, count)| count * around(cell)).sum();
     let share = if D == 2 { std::f64::consts::PI / 9.0 } else { 4.0 / 3.0 * std::f64::consts::PI / 27.0 };
-    let (bonds, available) = (pairs * share, available_memory());
-    if bonds * BYTES_PER_BOND > available {
-        let found = format!(
-            "{horizon} m, which makes about {bonds:.1e} bonds that need {:.1} GiB",
-            bonds * BYTES_PER_BOND / GIB
-        );
-        let allowed =
-            format!("at most {:.1} GiB (the memory available); take a smaller horizon", available / GIB);
+    let bonds = pairs * share;
+    let (needed, available) = (memory::of_cloud::<D>(positions.len() as f64, bonds), available());
+    if needed > available {
+        let found = format!("{horizon} m, which makes about {bonds:.1e} bonds that need {}", gib(needed));
+        let allowed = format!("at most {} (the memory available); take a smaller horizon", gib(available));
         return Err(source.error("body.horizon", found, allowed));
     }
     Ok(())

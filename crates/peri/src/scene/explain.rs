@@ -36,6 +36,8 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, body: &Body<D>)
             .collect();
         builds(format!("a crack, ({}) mm: {severed} bonds severed", corners.join(") – (")));
     }
+    lines.push(format!("  needs      {}", polycore::memory::needs(super::memory_needed(scene, bonds))));
+    let mut builds = |text: String| lines.push(format!("  builds     {text}"));
     if scene.material.critical.is_some() {
         builds("bonds that break, damage, a count of the bonds of each particle".to_owned());
     }

@@ -6,6 +6,7 @@ use rust_hdf5::{H5Dataset, H5File};
 
 use super::{Layout, format_error};
 use crate::Error;
+use crate::output::hdf5::dataset as checked;
 
 /// An open VTKHDF file of particles or of a mesh; steps are read on demand.
 pub struct Series {
@@ -25,7 +26,8 @@ pub struct Series {
 pub fn read(path: impl AsRef<Path>) -> Result<Series, Error> {
     let path = path.as_ref();
     // tells a missing file from a damaged one
-    std::fs::File::open(path).map_err(Error::io("open", path))?;
+    let size =
+        std::fs::File::open(path).and_then(|file| file.metadata()).map_err(Error::io("open", path))?.len();
     let fail = |reason: &str| format_error(path, reason);
     let hdf5 = |error: rust_hdf5::Hdf5Error| format_error(path, error);
     let file = H5File::open(path).map_err(hdf5)?;
@@ -36,7 +38,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Series, Error> {
         "UnstructuredGrid" => false,
         kind => return Err(fail(&format!("its type is `{kind}`, not `PolyData` or `UnstructuredGrid`"))),
     };
-    let dataset = |name: &str| file.dataset(&format!("VTKHDF/{name}")).map_err(hdf5);
+    let dataset = |name: &str| checked(&file, &format!("VTKHDF/{name}"), size).map_err(hdf5);
     let integers = |name: &str| dataset(name)?.read_raw::<i64>().map_err(hdf5);
     let counts = integers("NumberOfPoints")?;
     let [count] = counts[..] else { return Err(fail("the number of points changes from step to step")) };

@@ -1,0 +1,120 @@
+//! Memory that the run of a part needs: as far as the mesh tells before it is made, and the whole before a step is taken.
+//!
+//! Counted are the arrays that live at once, in bytes; the test `memory` of the workspace compares the sum with what whole
+//! runs take.
+
+use super::PartScene;
+use crate::simulation::Simulation;
+use crate::time::Steps;
+use polycore::memory::{available, gib};
+use polycore::scene::{SceneError, Source};
+
+/// Threads and tables.
+const ALWAYS: f64 = 20e6;
+/// Canvases and letters of pictures, and what each stage adds to them.
+const PICTURES: f64 = 40e6;
+const STAGE: f64 = 12e6;
+/// A node: its place, equation, a dozen vectors of a step and its solver, a checkpoint; an element: its nodes, its sets,
+/// outer faces while they are sought.
+const NODE: f64 = 350.0;
+const ELEMENT: f64 = 150.0;
+/// An element that is printed: births, layers, equations that are made anew.
+const PRINTED: f64 = 300.0;
+/// A stored entry of the conduction matrix, while it is sorted.
+const ENTRY: f64 = 40.0;
+/// A material point, and each of its numbers: old, new, of each stage, rejected, in a checkpoint.
+const POINT: f64 = 64.0;
+const STATE: f64 = 8.0 * 6.0;
+/// A point in an element has a place of its own, gradients, and a share of its element's matrix.
+const POINT_IN_ELEMENT: f64 = 400.0;
+/// An entry of factors: number, place, and its part of the front while they are made.
+const FACTOR: f64 = 16.0;
+/// Fields in a file and in pictures: nodes and cells, and each field as it is computed, packed, and read again.
+const WRITTEN_NODE: f64 = 100.0;
+const WRITTEN_ELEMENT: f64 = 80.0;
+const FIELD: f64 = 64.0;
+/// Most fixed steps, and most times at which fields are written.
+const MOST_STEPS: f64 = 1e9;
+const MOST_FRAMES: f64 = 1e5;
+
+/// Refuses a structured mesh of so many elements along each axis before anything of it is allocated.
+///
+/// # Errors
+/// What is needed and what there is, at `key`.
+pub(super) fn refuse_mesh(source: &Source, key: &str, elements: [f64; 3]) -> Result<(), SceneError> {
+    let nodes: f64 = elements.iter().map(|count| count + 1.0).product();
+    let needed = nodes * NODE + elements.iter().product::<f64>() * ELEMENT;
+    refuse(source, key, &format!("{nodes:.3e} nodes"), needed)
+}
+
+/// Refuses more steps and fields than any run takes.
+///
+/// # Errors
+/// Their number, at the key that makes them so many.
+pub(super) fn refuse_times(source: &Source, scene: &PartScene, end: f64) -> Result<(), SceneError> {
+    let counted = [
+        ("time.step", scene.time.step, "steps", MOST_STEPS),
+        ("output.every", scene.output.every, "times", MOST_FRAMES),
+    ];
+    for (key, each, what, most) in counted {
+        let count = each.map_or(0.0, |each| (end / each.si()).ceil());
+        if count > most {
+            return Err(source.error(
+                key,
+                format!("{count:.1e} {what} up to {end} s"),
+                format!("at most {most:e}"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+impl PartScene {
+    /// Bytes that a run up to `end` needs at most, of all that is printed.
+    pub fn memory(&self, simulation: &Simulation, end: f64) -> f64 {
+        let (mesh, system) = (&simulation.problem().mesh, &simulation.system);
+        let (nodes, elements) = (mesh.points.len() as f64, mesh.element_count() as f64);
+        let fields = 1.0 + simulation.field_names().len() as f64;
+        let mut bytes = ALWAYS + nodes * NODE + elements * ELEMENT;
+        if self.output.pictures {
+            bytes += PICTURES + STAGE * self.output.stages as f64;
+        }
+        if self.print.is_some() {
+            bytes += elements * PRINTED;
+        }
+        bytes += system.rows.stored()[2] as f64 * ENTRY;
+        let states = simulation.behaviours.iter().map(|behaviour| behaviour.states).max().unwrap_or(0) as f64;
+        bytes += system.nodal.material.len() as f64 * (POINT + states * STATE);
+        bytes += system.general.points() as f64 * (POINT_IN_ELEMENT + states * STATE);
+        bytes += simulation.factors(end) * FACTOR;
+        if self.output.fields || self.output.pictures {
+            bytes += nodes * (WRITTEN_NODE + fields * FIELD) + elements * WRITTEN_ELEMENT;
+        }
+        // a row for each step in a list that grows, and a checkpoint of it
+        let Steps::Fixed { dt } = simulation.settings.steps else { return bytes };
+        bytes + 4.0 * 8.0 * (end / dt) * (1.0 + fields) * self.probe.len() as f64
+    }
+
+    /// Refuses a run that does not fit before it takes a step.
+    ///
+    /// # Errors
+    /// What is needed and what there is.
+    pub fn refuse_too_large(
+        &self,
+        source: &Source,
+        simulation: &Simulation,
+        end: f64,
+    ) -> Result<(), SceneError> {
+        let nodes = simulation.problem().mesh.points.len();
+        refuse(source, "mesh", &format!("{nodes} nodes"), self.memory(simulation, end))
+    }
+}
+
+fn refuse(source: &Source, key: &str, what: &str, needed: f64) -> Result<(), SceneError> {
+    let available = available();
+    if needed <= available {
+        return Ok(());
+    }
+    let found = format!("{what}, which need about {}", gib(needed));
+    Err(source.error(key, found, format!("at most {} (the memory available)", gib(available))))
+}

@@ -1,0 +1,113 @@
+//! Memory that a variant needs, stated before it is solved and, as far as its lattice tells, before it is built.
+//!
+//! Counted are the arrays that live at once, in bytes a slot or a particle; the test `memory` of the workspace compares
+//! the sum with what whole runs take.
+
+use super::{Method, Scene};
+use crate::bonds::{Bonds, Stencil, storage};
+use crate::solver::{PreconditionedLbfgs, Record};
+use polycore::memory::{available, gib};
+use polycore::scene::{SceneError, Source};
+
+/// Threads, the fitted law, tables.
+const ALWAYS: f64 = 20e6;
+/// Vector fields of any method: displacement, velocity, force and loads, what a pass sums, and a checkpoint, which is a
+/// copy of the first three in a list that grows.
+const FIELDS: f64 = 10.0;
+/// Fields of L-BFGS beside its pairs, and bytes of its coarse level a particle.
+const FIELDS_OF_LBFGS: f64 = 8.0;
+const COARSE: f64 = 150.0;
+/// Slots and particles of contact: cells, their order, the list of near pairs.
+const CONTACT: f64 = 160.0;
+/// Damage: bonds at the start, what breaks.
+const BREAKING: f64 = 24.0;
+/// A particle in a field file: place, displacement, damage, line; two tensors of nine for each measure; what is packed.
+const WRITTEN: f64 = 64.0;
+const WRITTEN_TENSORS: f64 = 2.0 * 72.0;
+const PACKED: f64 = 160.0;
+/// Canvases and letters of pictures, and a particle in one: its place, its components, its reach, its cell.
+const PICTURES: f64 = 60e6;
+const DRAWN: f64 = 150.0;
+/// A bond of a cloud beside what it keeps: the lists while they are built.
+const BOND_LISTS: f64 = 12.0;
+
+/// Bytes of a lattice's bonds and of the solver's fields: what is known from its box of cells.
+fn of_slots<const D: usize>(scene: &Scene, slots: f64, stencil: usize) -> f64 {
+    let masks = 8.0 * stencil.div_ceil(64) as f64;
+    let vector = 8.0 * D as f64;
+    // a bit for what is occupied, its number, a surface factor twice while it is found
+    let mut each = masks + 8.0 + 2.0 * vector;
+    each += FIELDS * vector;
+    if scene.method() == Method::Lbfgs {
+        each += (FIELDS_OF_LBFGS + 2.0 * PreconditionedLbfgs::default().memory as f64) * vector + COARSE;
+    }
+    if scene.contact.is_some() {
+        each += CONTACT;
+    }
+    if scene.material.critical.is_some() {
+        each += BREAKING;
+    }
+    slots * each
+}
+
+/// Bytes of results, of `particles`.
+fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
+    let tensor = 8.0 * (D * D) as f64;
+    let measures = scene.stress.as_ref().map_or(0, |stress| stress.measures.len()) as f64;
+    let kept = if scene.output.fields { 2.0 } else { 1.0 };
+    let mut each = if measures > 0.0 { (3.0 + kept * measures) * tensor } else { 0.0 };
+    if scene.output.fields {
+        each += WRITTEN + PACKED + WRITTEN_TENSORS * measures;
+    }
+    if scene.output.pictures && D == 2 {
+        each += DRAWN;
+    }
+    let rows = match &scene.dynamics {
+        Some(dynamics) => dynamics.method().records,
+        None => scene.solver.steps,
+    };
+    // a row of history and its copy in a checkpoint
+    let row = size_of::<Record>() + 24 * scene.boundary.len();
+    let canvas = if scene.output.pictures { PICTURES } else { 0.0 };
+    canvas + particles * each + 2.0 * rows as f64 * row as f64
+}
+
+/// Bytes that the run of a variant needs at most, of a body that is built.
+pub fn needed<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> f64 {
+    let (slots, particles) = (bonds.slots() as f64, bonds.particles().len() as f64);
+    let body = match bonds.as_lattice() {
+        Some(lattice) => of_slots::<D>(scene, slots, lattice.stencil().offsets.len()),
+        None => of_slots::<D>(scene, slots, 0) + of_cloud::<D>(particles, bonds.directed_bonds() as f64),
+    };
+    ALWAYS + body + of_results::<D>(scene, particles)
+}
+
+/// Bytes of a cloud: points as they are read, sorted and kept; bonds, where they differ in weight, and their lists.
+pub(super) fn of_cloud<const D: usize>(particles: f64, bonds: f64) -> f64 {
+    let padded = bonds + 8.0 * particles;
+    particles * (6.0 * 8.0 * D as f64 + 96.0) + padded * (4.0 + 8.0 + 8.0 + BOND_LISTS)
+}
+
+/// What a run takes at least, whose lattice has these cells: before any of it is allocated.
+pub(super) fn of_lattice<const D: usize>(scene: &Scene, cells: [f64; D], ratio: f64) -> (f64, f64) {
+    let slots = storage(cells, ratio);
+    (slots, of_slots::<D>(scene, slots, Stencil::<D>::new(ratio).offsets.len()))
+}
+
+/// Refuses a body that is built where its run would not fit.
+///
+/// # Errors
+/// What is needed and what there is, at `key`.
+pub(super) fn refuse_too_large<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    key: &str,
+    bonds: &dyn Bonds<D>,
+) -> Result<(), SceneError> {
+    let (needed, available) = (needed(scene, bonds), available());
+    if needed <= available {
+        return Ok(());
+    }
+    let found = format!("{} particles, whose run needs about {}", bonds.particles().len(), gib(needed));
+    Err(source.error(key, found, format!("at most {} (the memory available)", gib(available))))
+}
