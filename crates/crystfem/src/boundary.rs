@@ -216,9 +216,11 @@ impl Condition {
             },
             Self::Flux { inward, .. } => inward.check("flux"),
             Self::Film { coefficient, ambient, .. } => {
-                let bad = |h: &&f64| !(**h >= 0.0 && h.is_finite());
+                // k/h is less than an atom there: no film, but a surface that is held
+                let bad = |h: &&f64| !(0.0..=1e12).contains(*h);
                 if let Some(&found) = coefficient.values.iter().find(bad) {
-                    return wrong("film coefficient", found, "0 or above, finite");
+                    let allowed = "0 to 1e12 W/(m² K); beyond it, hold the surface by `temperature`";
+                    return wrong("film coefficient", found, allowed);
                 }
                 not_below_zero("ambient temperature", ambient)
             }

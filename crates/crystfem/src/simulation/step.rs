@@ -76,6 +76,8 @@ impl Simulation {
             let Some((tolerance, smallest, largest)) = adaptive else {
                 return Ok(self.accept([dt, end], &attempt?));
             };
+            // the length as it was wished: in time, far from 0, it is rounded and may come out longer
+            let shortest = wanted.min(dt) <= smallest * (1.0 + 1e-9);
             // a wish below this is not granted by a shorter next step only
             const REFUSED: f64 = 0.5;
             let factor = match &attempt {
@@ -83,7 +85,7 @@ impl Simulation {
                     let ratio = attempt.step_ratio.unwrap_or(f64::INFINITY);
                     let error = attempt.error.unwrap_or(0.0) / tolerance;
                     let grow = (SAFETY * error.powf(-1.0 / f64::from(attempt.order))).clamp(0.1, MOST_GROWTH);
-                    if (error <= 1.0 && ratio >= REFUSED) || dt <= smallest * (1.0 + 1e-9) {
+                    if (error <= 1.0 && ratio >= REFUSED) || shortest {
                         // a step cut short by a landing says little about the next
                         let grown = (dt * grow).max(if lands { wanted } else { 0.0 });
                         self.state.next_dt = grown.min(dt * ratio).clamp(smallest, largest);
@@ -93,7 +95,7 @@ impl Simulation {
                 }
                 Err(_) => 0.25,
             };
-            if dt <= smallest * (1.0 + 1e-9) {
+            if shortest {
                 return Ok(self.accept([dt, end], &attempt?));
             }
             self.state.work.rejected += 1;
