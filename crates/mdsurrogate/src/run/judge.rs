@@ -50,7 +50,10 @@ pub fn judge_laws(
     output: &Path,
     report: &mut Report,
 ) -> Result<Vec<String>, Failure> {
-    let floor = noise(&data.set, |row| row.s).map(|noise| noise.floor);
+    // what rounding leaves of smooth data is no noise
+    let largest = data.set.rows().map(|row| row.s.norm_squared()).fold(0.0, f64::max);
+    let floor =
+        noise(&data.set, |row| row.s).map(|noise| noise.floor).filter(|floor| *floor > 1e-24 * largest);
     let test = if data.split.test.is_empty() { &data.split.train } else { &data.split.test };
     let test = data.rows(test);
     let mut table = vec![format!(
@@ -144,7 +147,7 @@ fn record(report: &mut Report, name: &str, set: &str, errors: &Errors, floor: Op
     report.value(&format!("{name} {set} percentage error (3.13)"), errors.percentage, "%");
     let outside = errors.flagged as f64 / errors.rows.max(1) as f64;
     report.value(&format!("{name} {set} share outside the training box"), outside, "");
-    if let Some(floor) = floor.filter(|floor| *floor > 0.0) {
+    if let Some(floor) = floor {
         report.value(&format!("{name} {set} error over the noise floor"), errors.mean_square() / floor, "");
     }
 }
