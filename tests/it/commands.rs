@@ -287,11 +287,13 @@ fn report_of_a_small_plate() {
 quantity = "applied_x"
 reference = 10.0
 tolerance = "0.001 %"
+kind = "closed-form"
 source = "1 kPa on 1 m × 10 mm"
 
 [[expect]]
 quantity = "hardy_peak"
 at_most = 3.0
+kind = "bound"
 source = "a coarse lattice is below Kirsch's peak"
 "#;
     let scene = scenes::plate("\"20 mm\"", "1e-6") + expect;
@@ -384,7 +386,7 @@ fn a_failed_expectation_is_exit_code_1() {
     let here = directory.path();
     let expect = |quantity: &str| {
         let more = format!(
-            "\n[[expect]]\nquantity = \"{quantity}\"\nreference = 3.0\ntolerance = \"1 %\"\nsource = \"wish\"\n"
+            "\n[[expect]]\nquantity = \"{quantity}\"\nreference = 3.0\ntolerance = \"1 %\"\nkind = \"closed-form\"\nsource = \"wish\"\n"
         );
         scenes::plate("\"50 mm\"", "1e-3") + &more
     };

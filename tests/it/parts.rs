@@ -153,6 +153,7 @@ mesh = { brick = { size = ["1 mm", "1 mm", "0 mm"], elements = [1, 1, 1] } }
 [[expect]]
 quantity = "coupled.least_alpha"
 at_least = 0.95
+kind = "bound"
 source = "90 s after the last layer"
 "#
 }

@@ -17,7 +17,7 @@ mod expect;
 mod number;
 mod provenance;
 
-pub use expect::{Bound, Expect, Judgement, Tolerance};
+pub use expect::{Bound, Expect, Judgement, Kind, Tolerance};
 pub use provenance::{Git, Host, Provenance};
 
 /// The name of the file that [`Report::write`] leaves in the output directory.

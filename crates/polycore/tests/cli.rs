@@ -19,6 +19,7 @@ file = "bar.csv"
 quantity = "bar.neo-hookean.shear_modulus"
 reference = 0.5
 tolerance = 1e-6
+kind = "closed-form"
 source = "the data were made with it"
 "#;
 

@@ -141,7 +141,7 @@ pub mod tests {
     pub fn report(value: f64) -> String {
         let mut report = Report::new("peri", "0", "");
         report.value("kt", value, "");
-        let expect = r#"{"quantity": "kt", "reference": 3.0, "tolerance": "1 %", "source": "a | b"}"#;
+        let expect = r#"{"quantity": "kt", "reference": 3.0, "tolerance": "1 %", "kind": "closed-form", "source": "a | b"}"#;
         report.judge(&[serde_json::from_str(expect).expect("an expectation")], false);
         serde_json::to_string(&report).expect("JSON")
     }

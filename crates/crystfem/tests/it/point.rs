@@ -46,6 +46,7 @@ history = "history.csv"
 quantity = "cooling.temperature_at_0.5"
 reference = 152.77
 tolerance = 0.02
+kind = "independent-program"
 source = "formulation.md, kinetics table"
 "#;
 

@@ -15,6 +15,7 @@ use crate::units::Ratio;
 /// quantity = "stress_concentration"   # the name of a scalar of the report
 /// reference = 3.0
 /// tolerance = "1 %"                   # of |reference|; or a plain number, absolute, in the unit of the value
+/// kind = "closed-form"                # what kind of evidence the figure is: see [`Kind`]
 /// source = "Kirsch (1898), infinite plate"
 /// quick = false                       # optional: not judged in --quick runs
 /// ```
@@ -27,10 +28,62 @@ pub struct Expect {
     pub quantity: String,
     /// Between which numbers it must lie.
     pub bound: Bound,
+    /// What kind of evidence the figure is.
+    pub kind: Kind,
     /// Where the figure and its tolerance come from.
     pub source: String,
     /// Judged in `--quick` runs too.
     pub quick: bool,
+}
+
+/// What kind of evidence an expectation is.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// A formula, a series or a count that follows from the problem's statement.
+    ClosedForm,
+    /// A figure of the literature, of an experiment or of a benchmark.
+    Published,
+    /// A figure of a program that shares no code with this one.
+    IndependentProgram,
+    /// An observed order, or a change under refinement.
+    Convergence,
+    /// An inequality that any correct answer meets: a maximum principle, a balance, a range.
+    Bound,
+    /// An earlier figure of this program: it shows a change, and is no evidence.
+    Regression,
+}
+
+impl Kind {
+    /// All kinds, the strongest evidence first.
+    pub const ALL: [Self; 6] = [
+        Self::ClosedForm,
+        Self::Published,
+        Self::IndependentProgram,
+        Self::Convergence,
+        Self::Bound,
+        Self::Regression,
+    ];
+
+    /// Whether a verdict may rest on it: everything but our own earlier figures.
+    pub fn is_evidence(self) -> bool {
+        self != Self::Regression
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ClosedForm => "closed-form",
+            Self::Published => "published",
+            Self::IndependentProgram => "independent-program",
+            Self::Convergence => "convergence",
+            Self::Bound => "bound",
+            Self::Regression => "regression",
+        })
+    }
 }
 
 /// The accepted range.
@@ -158,6 +211,8 @@ struct Written {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     /// In place of a reference: an upper bound.
     at_most: Option<f64>,
+    /// What kind of evidence the figure is.
+    kind: Kind,
     /// Where the figure and its tolerance come from.
     source: String,
     #[serde(default = "yes")]
@@ -173,7 +228,7 @@ impl TryFrom<Written> for Expect {
     type Error = String;
 
     fn try_from(written: Written) -> Result<Self, String> {
-        let Written { quantity, reference, tolerance, at_least, at_most, source, quick } = written;
+        let Written { quantity, reference, tolerance, at_least, at_most, kind, source, quick } = written;
         for (name, number) in [("reference", reference), ("at_least", at_least), ("at_most", at_most)] {
             if let Some(number) = number.filter(|number| !number.is_finite()) {
                 return Err(format!("expectation of `{quantity}`: {name} = {number} is not finite"));
@@ -200,18 +255,18 @@ impl TryFrom<Written> for Expect {
                 ));
             }
         };
-        Ok(Self { quantity, bound, source, quick })
+        Ok(Self { quantity, bound, kind, source, quick })
     }
 }
 
 impl From<Expect> for Written {
     fn from(expect: Expect) -> Self {
-        let Expect { quantity, bound, source, quick } = expect;
+        let Expect { quantity, bound, kind, source, quick } = expect;
         let (reference, tolerance, at_least, at_most) = match bound {
             Bound::Near { reference, tolerance } => (Some(reference), Some(tolerance), None, None),
             Bound::Range { at_least, at_most } => (None, None, at_least, at_most),
         };
-        Self { quantity, reference, tolerance, at_least, at_most, source, quick }
+        Self { quantity, reference, tolerance, at_least, at_most, kind, source, quick }
     }
 }
 

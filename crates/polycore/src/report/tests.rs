@@ -9,7 +9,7 @@ fn expectations(text: &str) -> Result<Vec<Expect>, toml::de::Error> {
 }
 
 fn one(rest: &str) -> Result<Expect, toml::de::Error> {
-    expectations(&format!("[[expect]]\nquantity = 'k'\n{rest}")).map(|mut all| all.remove(0))
+    expectations(&format!("[[expect]]\nquantity = 'k'\nkind = 'bound'\n{rest}")).map(|mut all| all.remove(0))
 }
 
 fn report(value: f64) -> Report {
@@ -76,6 +76,11 @@ fn bad_expectations() {
     ] {
         let error = one(rest).unwrap_err();
         assert!(error.message().contains(part), "{rest}: {error}");
+    }
+    for (kind, part) in [("", "missing field `kind`"), ("kind = 'measured'", "unknown variant `measured`")] {
+        let text = format!("[[expect]]\nquantity = 'k'\nat_most = 2\nsource = 's'\n{kind}");
+        let error = expectations(&text).unwrap_err();
+        assert!(error.message().contains(part), "{kind}: {error}");
     }
 }
 
