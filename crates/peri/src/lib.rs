@@ -52,6 +52,7 @@ pub mod error;
 pub mod exact;
 pub mod field;
 pub mod geometry;
+pub mod integrals;
 pub mod potential;
 mod quadrature;
 pub mod solver;

@@ -70,10 +70,13 @@ impl Prepared {
     /// # Errors
     /// [`load`]; a split that the data do not allow.
     pub fn new(source: &Source, scene: &Scene) -> Result<Self, Failure> {
-        let set = load(source, &scene.data, &scene.data.files, "data.files")?;
-        let heldout = match &scene.data.heldout[..] {
+        let Some(data) = &scene.data else {
+            return Err(source.error("data", "no `[data]`", "`[data]` with `files`").into());
+        };
+        let set = load(source, data, &data.files, "data.files")?;
+        let heldout = match &data.heldout[..] {
             [] => None,
-            files => Some(load(source, &scene.data, files, "data.heldout")?),
+            files => Some(load(source, data, files, "data.heldout")?),
         };
         let split = split(&set, scene.split.by, scene.split.fractions, scene.split.seed).map_err(
             |error| match error {

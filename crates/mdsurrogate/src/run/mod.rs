@@ -1,6 +1,7 @@
 //! Whole scenes: data measured, laws trained, judged, drawn and written, with `report.json` last.
 
 pub mod checkpoint;
+mod crystal;
 mod data;
 mod draw;
 mod judge;
@@ -10,8 +11,9 @@ mod training;
 pub use data::{Prepared, describe, load};
 pub use judge::{Named, judge_laws};
 
+use crate::cell::ATOMS_OF_MONOMER;
 use crate::error::Error;
-use crate::scene::Scene;
+use crate::scene::{CrystalSpec, Scene};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
 use std::path::Path;
@@ -53,37 +55,57 @@ pub fn run(source: &Source, options: &mut Options) -> Result<Finished, Failure> 
     scene.check(source)?;
     let mut phases = Phases::new();
     phases.start("read");
-    let data = Prepared::new(source, &scene)?;
+    let data = scene.data.as_ref().map(|_| Prepared::new(source, &scene)).transpose()?;
     if options.resume {
         polycore::output::remove_unfinished(options.output);
     } else {
         polycore::output::prepare_run(options.output)?;
     }
-    phases.start("measure");
     let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), &source.text);
-    let mut remarks = data.measure(&mut report)?;
-    report.work("rows", data.set.len() as u64).work("paths", data.set.paths.len() as u64);
-    let models: Vec<_> = scene.model.iter().filter(|model| model.quick || !options.quick).collect();
-    if !models.is_empty() {
-        phases.start("train");
-        let trained = training::train(source, &scene, &models, &data, options)?;
-        phases.start("judge");
-        training::record(&trained, options.output, &mut report)?;
-        remarks.extend(training::remarks(&trained, &data));
-        let laws: Vec<judge::Named> = trained.iter().map(training::Trained::named).collect();
-        remarks.extend(judge_laws(&laws, &data, options.output, &mut report)?);
+    let mut remarks = Vec::new();
+    if let Some(spec) = &scene.crystal {
+        phases.start("build");
+        crystal::measure(spec, options.output, &mut report)?;
     }
-    if let Some(spec) = &scene.search {
-        phases.start("search");
-        remarks.extend(search::search(source, &scene, spec, &data, options, &mut report)?);
+    if let Some(data) = &data {
+        learn(source, &scene, data, options, &mut phases, &mut report, &mut remarks)?;
     }
-    phases.start("write");
-    data.write(options.output)?;
     phases.stop();
     report.phases(&phases).threads(1).judge(&scene.expect, options.quick).write(options.output)?;
     // the report is the last file: a checkpoint without it is an unfinished run
     let _ = std::fs::remove_file(options.output.join(polycore::checkpoint::FILE_NAME));
     Ok(Finished { report, remarks })
+}
+
+/// Measures data, trains and judges laws on them, searches.
+fn learn(
+    source: &Source,
+    scene: &Scene,
+    data: &Prepared,
+    options: &mut Options,
+    phases: &mut Phases,
+    report: &mut Report,
+    remarks: &mut Vec<String>,
+) -> Result<(), Failure> {
+    phases.start("measure");
+    remarks.extend(data.measure(report)?);
+    report.work("rows", data.set.len() as u64).work("paths", data.set.paths.len() as u64);
+    let models: Vec<_> = scene.model.iter().filter(|model| model.quick || !options.quick).collect();
+    if !models.is_empty() {
+        phases.start("train");
+        let trained = training::train(source, scene, &models, data, options)?;
+        phases.start("judge");
+        training::record(&trained, options.output, report)?;
+        remarks.extend(training::remarks(&trained, data));
+        let laws: Vec<judge::Named> = trained.iter().map(training::Trained::named).collect();
+        remarks.extend(judge_laws(&laws, data, options.output, report)?);
+    }
+    if let Some(spec) = &scene.search {
+        phases.start("search");
+        remarks.extend(search::search(source, scene, spec, data, options, report)?);
+    }
+    phases.start("write");
+    Ok(data.write(options.output)?)
 }
 
 /// Three significant digits.
@@ -106,16 +128,27 @@ fn short(value: f64) -> String {
 pub fn explain(source: &Source) -> Result<Vec<String>, Failure> {
     let scene = source.parse::<Scene>()?;
     scene.check(source)?;
+    let mut lines = Vec::new();
+    if let Some(CrystalSpec { cells: [x, y, z], levels }) = scene.crystal {
+        let atoms = 4 * ATOMS_OF_MONOMER * x * y * z;
+        lines.push(format!(
+            "builds     {x} × {y} × {z} cells of γ-PA12, {atoms} atoms; a grid of {levels} rates"
+        ));
+    }
+    if scene.data.is_none() {
+        lines.push("leaves out data and training".into());
+        return Ok(lines);
+    }
     let data = Prepared::new(source, &scene)?;
     let (set, split) = (&data.set, &data.split);
-    let mut lines = vec![format!(
+    lines.push(format!(
         "reads      {} rows of {} runs: {} to train, {} to validate, {} to test",
         set.len(),
         set.paths.len(),
         split.train.len(),
         split.validation.len(),
         split.test.len()
-    )];
+    ));
     match &data.heldout {
         Some(heldout) => lines.push(format!("reads      {} held-out runs", heldout.paths.len())),
         None => lines.push("leaves out held-out runs".into()),

@@ -24,7 +24,9 @@ pub struct Scene {
     #[serde(default)]
     pub title: String,
     /// What is read.
-    pub data: Data,
+    pub data: Option<Data>,
+    /// In place of data, or beside them: the crystal, the grid of runs and the networks of the thesis, in numbers.
+    pub crystal: Option<CrystalSpec>,
     /// How it is divided.
     #[serde(default)]
     pub split: SplitSpec,
@@ -52,6 +54,18 @@ impl Scene {
     /// # Errors
     /// What is wrong and where.
     pub fn check(&self, source: &Source) -> Result<(), SceneError> {
+        if self.data.is_none() {
+            if self.crystal.is_none() {
+                return Err(source.error("data", "no `[data]`", "`[data]` with `files`, or `[crystal]`"));
+            }
+            if !self.model.is_empty() || self.search.is_some() {
+                let key = if self.model.is_empty() { "search" } else { "model" };
+                return Err(source.error(key, "laws without data", "`[data]` with `files`"));
+            }
+        }
+        if let Some(crystal) = &self.crystal {
+            crystal.check(source)?;
+        }
         check_models(source, &self.model, &self.training)?;
         match &self.search {
             Some(_) if !self.model.is_empty() => {
@@ -92,6 +106,41 @@ pub struct Data {
     pub reference_lengths: Option<[Length; 3]>,
     /// The unit of stress columns without a unit in their heading; default 1 MPa.
     pub stress_unit: Option<Stress>,
+}
+
+/// The γ-PA12 crystal of Table 3.1 and the grid of Table 3.2.
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CrystalSpec {
+    /// Cells of the supercell along x, y, z; default: the thesis' 8, 4, 2.
+    #[serde(default = "thesis_cells")]
+    pub cells: [usize; 3],
+    /// Levels of rate a direction; default: the thesis' 15.
+    #[serde(default = "thesis_levels")]
+    pub levels: usize,
+}
+
+fn thesis_cells() -> [usize; 3] {
+    crate::md::Protocol::default().cells
+}
+
+fn thesis_levels() -> usize {
+    crate::md::Grid::default().levels
+}
+
+impl CrystalSpec {
+    /// # Errors
+    /// What is wrong and where.
+    fn check(&self, source: &Source) -> Result<(), SceneError> {
+        // pictures of more are black
+        if self.cells.iter().any(|n| !(1..=20).contains(n)) {
+            return Err(source.error("crystal.cells", format!("{:?}", self.cells), "1 to 20 each"));
+        }
+        if !(1..=200).contains(&self.levels) {
+            return Err(source.error("crystal.levels", self.levels, "1 to 200"));
+        }
+        Ok(())
+    }
 }
 
 /// How rows are divided.

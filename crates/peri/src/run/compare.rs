@@ -165,6 +165,11 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
             }
         }
     }
+    if scene.output.integrals {
+        for (name, value) in crate::integrals::NAMES.iter().zip(crate::integrals::all()) {
+            report.value(name, value, "");
+        }
+    }
     for (family, change) in super::history::peak_changes(outcomes) {
         report.value(&format!("peak_load_change[{family}]"), change, "");
     }

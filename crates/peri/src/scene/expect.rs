@@ -72,6 +72,9 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
             names.extend(kinds.map(|kind| format!("{}_{kind}_order[{family}]", measure.name())));
         }
     }
+    if scene.output.integrals {
+        names.extend(crate::integrals::NAMES.map(str::to_owned));
+    }
     names.extend(exact.then(|| "kt_finite_width".to_owned()));
     Ok(names)
 }

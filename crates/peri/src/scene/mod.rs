@@ -294,11 +294,13 @@ pub struct OutputSpec {
     pub stages: usize,
     /// Displacements at which the load becomes a value of the report: `load_at_20mm`.
     pub load_at: Vec<Length>,
+    /// The integrals over the horizon of Appendix A, by quadrature, among the values of the report.
+    pub integrals: bool,
 }
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { pictures: true, fields: true, every: None, stages: 5, load_at: Vec::new() }
+        Self { pictures: true, fields: true, every: None, stages: 5, load_at: Vec::new(), integrals: false }
     }
 }
 
