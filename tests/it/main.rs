@@ -8,6 +8,7 @@
 //! * [`front_door`]: scenes, meshes, tables, HDF5, laws and checkpoints damaged at random;
 //! * [`loads`]: loads, displacements and names of values in reports;
 //! * [`memory`]: no run takes more memory than is stated, absurd sizes are refused before they are allocated;
+//! * [`packages`]: what each crate is built with;
 //! * [`schemas`]: JSON Schemas, by which every case is valid;
 //! * [`documents`]: the commands and links that README and docs show.
 
@@ -20,6 +21,7 @@ mod front_door;
 mod killed;
 mod loads;
 mod memory;
+mod packages;
 mod parts;
 mod program;
 mod results;

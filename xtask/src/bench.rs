@@ -1,13 +1,14 @@
 //! Measurements: a table on the terminal and rows in target/bench/NAME.json.
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use polycore::output::atomic_write;
 use serde::{Deserialize, Serialize};
 
+use crate::stamp::{Stamp, sources};
 use crate::table::{Table, print};
 use crate::workspace::Workspace;
 
@@ -49,6 +50,21 @@ pub struct Row {
     pub value: Option<f64>,
     /// Its unit, empty for a ratio.
     pub unit: String,
+}
+
+/// target/bench/NAME.json.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Bench {
+    /// When, where and from which sources.
+    pub stamp: Stamp,
+    /// What was measured.
+    pub rows: Vec<Row>,
+}
+
+/// What a bench has left; none where it has not run.
+pub fn read(workspace: &Workspace, name: &str) -> Option<Bench> {
+    let text = std::fs::read_to_string(workspace.target().join(format!("bench/{name}.json"))).ok()?;
+    serde_json::from_str(&text).ok()
 }
 
 /// Measures, prints and writes.
@@ -96,8 +112,7 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     // a program's subcommand has a file of its own: crystfem-kinetics.json
     let what = options.arguments.first().filter(|word| !word.starts_with('-') && !options.name.contains('-'));
     let name = what.map_or_else(|| options.name.clone(), |what| format!("{}-{what}", options.name));
-    let path = folder.join(format!("{name}.json"));
-    write(&path, &rows)?;
+    let path = write(workspace, &name, &rows)?;
     if options.json {
         print(&(serde_json::to_string_pretty(&rows).into_diagnostic()? + "\n"));
     } else {
@@ -139,12 +154,20 @@ fn text(rows: &[Row]) -> String {
     table.text()
 }
 
-fn write(path: &Path, rows: &[Row]) -> Result<()> {
-    atomic_write(path, |file| {
-        serde_json::to_writer_pretty(&mut *file, rows)?;
+/// To target/bench/NAME.json, with what tells whether the rows still hold.
+fn write(workspace: &Workspace, name: &str, rows: &[Row]) -> Result<PathBuf> {
+    let path = workspace.results("bench")?.join(format!("{name}.json"));
+    let of = name.split('-').next().unwrap_or(name);
+    let crates = workspace.programs();
+    let measured = crates.iter().find(|program| *program == of).map_or("polycore", String::as_str);
+    let stamp = Stamp::new(workspace.root(), &sources(workspace.root(), &[measured], &["src"]))?;
+    let bench = Bench { stamp, rows: rows.to_vec() };
+    atomic_write(&path, |file| {
+        serde_json::to_writer_pretty(&mut *file, &bench)?;
         file.write_all(b"\n")
     })
-    .into_diagnostic()
+    .into_diagnostic()?;
+    Ok(path)
 }
 
 #[cfg(test)]

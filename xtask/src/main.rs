@@ -7,7 +7,9 @@ use clap::{Parser, Subcommand};
 
 mod bench;
 mod report;
+mod stamp;
 mod table;
+mod test;
 mod tidy;
 mod validate;
 mod workspace;
@@ -24,7 +26,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Run all tests: the command of the README.
+    /// Run all tests: the command of the README; lists at the end what could not be tested here.
     Test {
         /// Passed on to `cargo test`, for example a test's name.
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
@@ -41,7 +43,7 @@ enum Task {
 fn main() -> ExitCode {
     let workspace = Workspace::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".."));
     let passed = match Cli::parse().task {
-        Task::Test { arguments } => test(&workspace, &arguments),
+        Task::Test { arguments } => test::run(&workspace, &arguments),
         Task::Validate(options) => validate::run(&workspace, &options),
         Task::Bench(options) => bench::run(&workspace, &options),
         Task::Tidy => tidy::run(&workspace),
@@ -54,8 +56,4 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
-}
-
-fn test(workspace: &Workspace, arguments: &[String]) -> miette::Result<bool> {
-    workspace.cargo(&["test", "--release", "--workspace"], arguments)
 }

@@ -10,6 +10,7 @@ use polycore::output::atomic_write;
 use polycore::report::{Judgement, Provenance};
 use serde::Serialize;
 
+use crate::test::{self, Records};
 use crate::validate::outcome::Outcome;
 use crate::validate::summary;
 use crate::workspace::Workspace;
@@ -19,7 +20,9 @@ mod cross;
 mod errata;
 mod evidence;
 mod markdown;
+mod others;
 mod pictures;
+mod points;
 mod stability;
 mod thesis;
 mod timing;
@@ -34,6 +37,8 @@ const PICTURES: usize = 6;
 pub struct Sources {
     map: thesis::Map,
     errata: Vec<errata::Erratum>,
+    /// What the last run of the tests measured.
+    records: Records,
     baseline: Option<Baseline>,
 }
 
@@ -47,7 +52,8 @@ impl Sources {
         if !faults.is_empty() {
             return Err(miette!("cases/thesis.toml:\n{}", faults.join("\n")));
         }
-        Ok(Self { map, errata, baseline: baseline.map(Baseline::read).transpose()? })
+        let records = test::read(workspace);
+        Ok(Self { map, errata, records, baseline: baseline.map(Baseline::read).transpose()? })
     }
 }
 
@@ -75,7 +81,9 @@ struct Page {
     versions: Vec<(String, String)>,
     seconds: f64,
     counts: Vec<(String, usize)>,
+    kinds: Vec<(String, usize)>,
     thesis: Vec<thesis::Judged>,
+    others: Vec<others::Other>,
     timing: Vec<timing::Measured>,
     stability: Vec<stability::Trial>,
     errata: Vec<errata::Proven>,
@@ -100,7 +108,7 @@ struct CaseView {
     kept: bool,
     passed: bool,
     complaint: String,
-    rows: Vec<[String; 5]>,
+    rows: Vec<[String; 6]>,
     missed: usize,
     pictures: Vec<Picture>,
     work: Vec<(String, String)>,
@@ -116,8 +124,11 @@ struct Json<'a> {
     date: String,
     machine: String,
     versions: Vec<(String, String)>,
+    /// Expectations by what kind of evidence they are.
+    kinds: BTreeMap<String, usize>,
     cases: Vec<JsonCase<'a>>,
     thesis: Vec<thesis::Judged>,
+    others: Vec<others::Other>,
     timing: Vec<timing::Measured>,
     stability: Vec<stability::Trial>,
     errata: Vec<errata::Proven>,
@@ -194,9 +205,9 @@ fn page(
     outcomes: &[Outcome],
     tier: Tier,
 ) -> Result<Page> {
-    let bench = workspace.target().join("bench");
     let mut gallery = Gallery::default();
-    let thesis = sources.map.judge(outcomes, &mut gallery);
+    let found = thesis::Found { outcomes, records: &sources.records, root: workspace.root() };
+    let thesis = sources.map.judge(&found, &mut gallery);
     let provenance: Vec<&Provenance> =
         outcomes.iter().filter_map(|outcome| Some(&outcome.report.as_ref()?.provenance)).collect();
     let first = provenance.first();
@@ -227,11 +238,13 @@ fn page(
         versions,
         seconds: outcomes.iter().map(|outcome| outcome.seconds).sum(),
         counts,
+        kinds: summary::kinds(outcomes).into_iter().map(|(kind, n)| (kind.to_string(), n)).collect(),
         thesis,
-        timing: timing::measured(&bench, folder, outcomes)?,
+        others: others::figures(outcomes),
+        timing: timing::measured(workspace, folder, outcomes)?,
         stability: stability::trials(outcomes),
-        errata: errata::judge(&sources.errata, &sources.map.erratum, outcomes),
-        cross: cross::checked(&bench),
+        errata: errata::judge(&sources.errata, &sources.map.erratum, &found),
+        cross: cross::checked(workspace),
         difference: sources.baseline.as_ref().map(|baseline| baseline.compare(outcomes)),
         cases: outcomes.iter().map(|outcome| view(workspace, outcome, &mut gallery)).collect(),
     })
@@ -271,7 +284,9 @@ fn json(page: Page, outcomes: &[Outcome]) -> Json<'_> {
         date: page.date,
         machine: page.machine,
         versions: page.versions,
+        kinds: page.kinds.into_iter().collect(),
         cases: outcomes.iter().map(JsonCase::of).collect(),
+        others: page.others,
         thesis: page.thesis.into_iter().map(thesis::Judged::without_pictures).collect(),
         timing: page.timing.into_iter().map(timing::Measured::without_picture).collect(),
         stability: page.stability,

@@ -45,12 +45,13 @@ impl Workspace {
         path.strip_prefix(&self.root).unwrap_or(path).display()
     }
 
-    /// Runs cargo, and tells whether it succeeded.
-    pub fn cargo(&self, arguments: &[&str], more: &[String]) -> Result<bool> {
+    /// Runs cargo with these variables, and tells whether it succeeded.
+    pub fn cargo(&self, arguments: &[&str], more: &[String], variables: &[(&str, &Path)]) -> Result<bool> {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| OsString::from("cargo"));
         let status = Command::new(cargo)
             .args(arguments)
             .args(more)
+            .envs(variables.iter().copied())
             .current_dir(&self.root)
             .status()
             .into_diagnostic()
@@ -65,7 +66,7 @@ impl Workspace {
             let known = self.programs().join(", ");
             return Err(miette!("there is no program `{program}` in crates/ (there are: {known})"));
         }
-        if !self.cargo(&["build", "--release", "--quiet", "--package", program], &[])? {
+        if !self.cargo(&["build", "--release", "--quiet", "--package", program], &[], &[])? {
             return Err(miette!("`cargo build --release --package {program}` failed"));
         }
         Ok(self.target.join("release").join(program).with_extension(std::env::consts::EXE_EXTENSION))
@@ -75,7 +76,8 @@ impl Workspace {
         self.root.join("crates").join(name).join("src/main.rs").is_file()
     }
 
-    fn programs(&self) -> Vec<String> {
+    /// The crates with a command line.
+    pub fn programs(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.root.join("crates")).into_iter().flatten().flatten();
         let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
         let mut names: Vec<String> = names.filter(|name| self.has_program(name)).collect();

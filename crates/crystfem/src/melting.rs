@@ -93,6 +93,7 @@ mod tests {
         {
             assert!((pa12.molten(temperature) - molten).abs() < tolerance, "{temperature}");
         }
+        evidence::near("X_m(450 K) in closed form", pa12.molten(450.0), 0.75316, 5e-6);
         assert!((pa12.molten_slope(450.0) - 0.08467).abs() < 5e-6);
     }
 

@@ -8,7 +8,7 @@ use polycore::command::{Measurement, print_measurements};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Repetitions, of which the least counts: what disturbs a measurement only adds to it.
+/// Repetitions, of which the median counts.
 const REPEATS: usize = 15;
 
 /// Points of one repetition.
@@ -75,31 +75,32 @@ fn measure<T: Real + Scalar>(
         let what = format!("{name}, {precision}, {what}");
         rows.push(Measurement { what, size, threads: 1, value, unit: "ns/point" });
     };
-    let single = least_time(|| {
+    let single = median_time(|| {
         for (c, answer) in points.iter().zip(&mut answers) {
             *answer = law.stress(black_box(c), &mut memory)?;
         }
         Ok(())
     })?;
     row("stress", single);
-    let with_tangent = least_time(|| {
+    let with_tangent = median_time(|| {
         for (c, answer) in points.iter().zip(&mut answers) {
             *answer = law.tangent(black_box(c), &mut memory)?;
         }
         Ok(())
     })?;
     row("stress and tangent", with_tangent);
-    row("stress, batch", least_time(|| law.stresses(black_box(&points), &mut memory, &mut answers))?);
+    row("stress, batch", median_time(|| law.stresses(black_box(&points), &mut memory, &mut answers))?);
     Ok(())
 }
 
 /// Nanoseconds a point.
-fn least_time(mut run: impl FnMut() -> Result<(), Error>) -> Result<f64, Error> {
-    let mut least = f64::INFINITY;
-    for _ in 0..REPEATS {
+fn median_time(mut run: impl FnMut() -> Result<(), Error>) -> Result<f64, Error> {
+    let mut times = [0.0; REPEATS];
+    for time in &mut times {
         let start = Instant::now();
         run()?;
-        least = least.min(start.elapsed().as_secs_f64() * 1e9 / POINTS as f64);
+        *time = start.elapsed().as_secs_f64() * 1e9 / POINTS as f64;
     }
-    Ok(least)
+    times.sort_by(f64::total_cmp);
+    Ok(times[REPEATS / 2])
 }

@@ -175,6 +175,12 @@ mod tests {
                 );
             }
         }
+        let dent = |reading: Reading| reading.stretch(1.2, 720.0);
+        let [r1, r2, r3, r4] = Reading::ALL.map(dent);
+        evidence::near("DENT, critical bond stretch by R1", r1, 32.20, 6e-3);
+        evidence::near("DENT, critical bond stretch by R2", r2, 11.38, 6e-3);
+        evidence::near("DENT, critical bond stretch by R3", r3, 5.849, 6e-4);
+        evidence::near("DENT, critical bond stretch by R4", r4, 2.9442, 6e-5);
     }
 
     #[test]

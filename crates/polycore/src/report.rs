@@ -160,7 +160,7 @@ impl Report {
     /// `quick = false` are left out.
     pub fn judge(&mut self, expectations: &[Expect], quick: bool) -> &mut Self {
         let asked = expectations.iter().filter(|expect| expect.quick || !quick);
-        self.expect = asked.map(|expect| expect.judge(self.values.get(&expect.quantity))).collect();
+        self.expect = asked.map(|expect| expect.judge(&self.values)).collect();
         self.refresh()
     }
 

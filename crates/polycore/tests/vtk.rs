@@ -56,9 +56,7 @@ fn vtk_reads_every_step() {
     let has_vtk =
         Command::new(&python).args(["-c", "import vtk"]).output().is_ok_and(|run| run.status.success());
     if !has_vtk {
-        eprintln!(
-            "skipped: VTK is not installed (`pip install vtk`, or name a Python with it in POLY_VTK_PYTHON)"
-        );
+        evidence::skipped("VTK (`pip install vtk`, or name a Python with it in POLY_VTK_PYTHON)");
         return;
     }
     let directory = tempfile::tempdir().unwrap();

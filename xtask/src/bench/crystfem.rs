@@ -43,7 +43,7 @@ pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result
     let program = workspace.release("crystfem")?;
     let (mut all, mut text, mut passed) = (Vec::new(), String::new(), true);
     let mut take = |name: &str, rows: Vec<Row>| -> Result<()> {
-        write(&folder.join(format!("crystfem-{name}.json")), &rows)?;
+        write(workspace, &format!("crystfem-{name}"), &rows)?;
         all.extend(rows.into_iter().map(|row| Row { what: format!("{name} {}", row.what), ..row }));
         Ok(())
     };

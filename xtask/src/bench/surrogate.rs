@@ -39,7 +39,7 @@ pub fn run(workspace: &Workspace, folder: &Path) -> Result<Vec<Row>> {
             "PyTorch, training",
             "TORCH_PYTHON",
             TRAINING,
-            ["58176", "4", "32", "256"].map(str::to_owned).to_vec(),
+            ["58176", "5", "32", "256"].map(str::to_owned).to_vec(),
         ),
         ("PyTorch, answers", "TORCH_PYTHON", ANSWERS, vec!["torch".to_owned(), law, answers.clone()]),
         ("onnxruntime", "ONNX_PYTHON", ANSWERS, vec!["onnx".to_owned(), path("ann4.onnx"), answers]),

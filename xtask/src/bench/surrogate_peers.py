@@ -1,7 +1,9 @@
 """A law of one `ann` in PyTorch (`torch LAW`) or onnxruntime (`onnx MODEL`) beside the answers of `mdsurrogate predict`:
-differences and microseconds a point, on one thread in doubles, as JSON rows. surrogate_peers.py KIND FILE ANSWERS.csv"""
+differences and microseconds a point (medians), on one thread in doubles, as JSON rows: PyTorch point by point, all points
+at once, and compiled where that works. surrogate_peers.py KIND FILE ANSWERS.csv"""
 import csv
 import json
+import statistics
 import struct
 import sys
 import time
@@ -23,14 +25,15 @@ def row(what, value, unit):
     rows.append({"what": f"{name}, {what}", "size": len(strains), "threads": 1, "value": float(value), "unit": unit})
 
 
-def least_time(run, points):
-    """Microseconds a point, the least of seven."""
+def median_time(run, points):
+    """Microseconds a point, the median of seven; once before, for what is compiled or allocated first."""
+    run()
     times = []
     for _ in range(7):
         since = time.perf_counter()
         run()
         times.append(time.perf_counter() - since)
-    return min(times) / points * 1e6
+    return statistics.median(times) / points * 1e6
 
 
 if kind == "torch":
@@ -70,14 +73,36 @@ if kind == "torch":
     points = torch.tensor(strains)
     with torch.no_grad():
         found = stress(points).numpy()
-        single = least_time(lambda: [stress(point) for point in points], len(points))
-        batch = least_time(lambda: stress(points), len(points))
+        single = median_time(lambda: [stress(point) for point in points], len(points))
+        batch = median_time(lambda: stress(points), len(points))
     slope = torch.func.jacrev(stress)
     jacobians = np.stack([slope(point).numpy() for point in points])
     # ℂ = 2 ∂S/∂C, C12 counted once
     expected = jacobians * np.array([2, 2, 2, 1, 1, 1])
     row("largest difference of tangents over the largest", abs(expected - tangents).max() / abs(tangents).max(), "")
-    row("stress and tangent", least_time(lambda: [(stress(point), slope(point)) for point in points[:64]], 64), "µs/point")
+    row("stress and tangent", median_time(lambda: [(stress(point), slope(point)) for point in points[:64]], 64), "µs/point")
+
+    def both(c):
+        """Stress and its slope from one pass."""
+        s, pull = torch.func.vjp(stress, c)
+        return s, torch.func.vmap(lambda v: pull(v)[0])(torch.eye(6, dtype=torch.float64))
+
+    batched = torch.func.vmap(both)
+    assert torch.allclose(batched(points)[1], torch.tensor(jacobians), rtol=1e-9, atol=1e-9 * abs(jacobians).max())
+    row("stress and tangent by vmap, all at once", median_time(lambda: batched(points), len(points)), "µs/point")
+    compiled = [
+        ("stress, torch.compile, one by one", stress, lambda run: [run(point) for point in points]),
+        ("stress, torch.compile, all at once", stress, lambda run: run(points)),
+        ("stress and tangent by vmap, torch.compile, all at once", batched, lambda run: run(points)),
+    ]
+    for what, run, measure in compiled:
+        try:
+            with torch.no_grad():
+                fast = torch.compile(run)
+                row(what, median_time(lambda: measure(fast), len(points)), "µs/point")
+        except Exception as error:  # no compiler, an unsupported operation: no figure, and the reason
+            reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+            rows.append({"what": f"{name}, {what}: skipped, {reason}", "size": 0, "threads": 1, "value": None, "unit": ""})
 else:
     import onnxruntime
 
@@ -87,8 +112,8 @@ else:
     session = onnxruntime.InferenceSession(file, options, providers=["CPUExecutionProvider"])
     stress = lambda c: session.run(["S"], {"C": c})[0]
     found = stress(strains) / 1e6
-    single = least_time(lambda: [stress(point[None]) for point in strains], len(strains))
-    batch = least_time(lambda: stress(strains), len(strains))
+    single = median_time(lambda: [stress(point[None]) for point in strains], len(strains))
+    batch = median_time(lambda: stress(strains), len(strains))
 
 row("largest difference of stresses over the largest", abs(found - stresses).max() / abs(stresses).max(), "")
 row("stress, one by one", single, "µs/point")

@@ -1,11 +1,9 @@
 //! Comparisons with programs that nobody here wrote. One that was not made is named, with what makes it.
 
-use std::fs;
-use std::path::Path;
-
 use serde::Serialize;
 
-use crate::bench::Row;
+use crate::bench::{self, Bench, Row};
+use crate::workspace::Workspace;
 
 /// A comparison.
 struct Check {
@@ -82,6 +80,8 @@ pub struct Crossed {
     what: String,
     value: String,
     asked: String,
+    /// When, where and from which commit.
+    measured: String,
     verdict: &'static str,
     tone: &'static str,
     command: &'static str,
@@ -90,33 +90,42 @@ pub struct Crossed {
 
 impl Crossed {
     /// For docs/validation.md.
-    pub fn cells(&self) -> [String; 4] {
-        [self.title, &self.value, &self.asked, self.verdict].map(str::to_owned)
+    pub fn cells(&self) -> [String; 5] {
+        [self.title, &self.value, &self.asked, self.verdict, &self.measured].map(str::to_owned)
     }
 }
 
 /// All comparisons, from the rows that benches have left.
-pub fn checked(bench: &Path) -> Vec<Crossed> {
-    CHECKS.iter().map(|check| check.made(bench)).collect()
+pub fn checked(workspace: &Workspace) -> Vec<Crossed> {
+    let made = |check: &Check| {
+        let bench = bench::read(workspace, check.bench);
+        let fresh = bench.as_ref().is_some_and(|bench| bench.stamp.fresh(workspace.root()));
+        check.made(bench.as_ref(), fresh)
+    };
+    CHECKS.iter().map(made).collect()
 }
 
 impl Check {
-    fn made(&self, bench: &Path) -> Crossed {
-        let text = fs::read_to_string(bench.join(format!("{}.json", self.bench))).unwrap_or_default();
-        let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
+    /// `fresh`: the sources that the bench measured have not changed.
+    fn made(&self, bench: Option<&Bench>, fresh: bool) -> Crossed {
         let is_it = |row: &&Row| {
             let what = row.what.to_lowercase();
             self.words.iter().all(|word| what.contains(&word.to_lowercase()))
         };
-        let worst = rows
+        let worst = bench
             .iter()
+            .flat_map(|bench| &bench.rows)
             .filter(is_it)
-            .filter_map(|row| Some((row, row.value?)))
+            // what JSON has no number for is no agreement
+            .map(|row| (row, row.value.unwrap_or(f64::NAN)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let (what, value, verdict, tone) = match worst {
             Some((row, value)) => {
-                let (verdict, tone) =
-                    if value <= self.agree { ("agrees", "good") } else { ("disagrees", "bad") };
+                let (verdict, tone) = match () {
+                    () if value.is_nan() || value > self.agree => ("disagrees", "bad"),
+                    () if !fresh => ("stale", "open"),
+                    () => ("agrees", "good"),
+                };
                 (row.what.clone(), format!("{value:.2e} {}", row.unit), verdict, tone)
             }
             None => (String::new(), String::new(), "skipped", "open"),
@@ -126,6 +135,7 @@ impl Check {
             what,
             value: value.trim_end().to_owned(),
             asked: format!("≤ {:e}", self.agree),
+            measured: bench.map(|bench| bench.stamp.to_string()).unwrap_or_default(),
             verdict,
             tone,
             command: self.command,
@@ -137,21 +147,23 @@ impl Check {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stamp::Stamp;
 
     #[test]
-    fn made_skipped_and_disagreeing() {
-        let folder = tempfile::tempdir().expect("a folder");
+    fn made_skipped_disagreeing_and_stale() {
         let check = &CHECKS[0];
-        assert_eq!(check.made(folder.path()).verdict, "skipped");
-        let write = |value: f64| {
-            let rows = format!(
-                r#"[{{"what": "forces, partial volumes: max |Δf|/rms f", "size": 1, "threads": 1, "value": {value}, "unit": ""}}]"#
-            );
-            fs::write(folder.path().join("peri-peers.json"), rows).expect("rows");
+        assert_eq!(check.made(None, false).verdict, "skipped");
+        let root = tempfile::tempdir().expect("a folder");
+        let bench = |value: f64| {
+            let what = "forces, partial volumes: max |Δf|/rms f".to_owned();
+            let row = Row { what, size: 1, threads: 1, value: Some(value), unit: String::new() };
+            Bench { stamp: Stamp::new(root.path(), &[]).expect("a stamp"), rows: vec![row] }
         };
-        write(3.4e-10);
-        assert_eq!(check.made(folder.path()).verdict, "agrees");
-        write(1e-3);
-        assert_eq!(check.made(folder.path()).verdict, "disagrees");
+        let verdict = |value, fresh| check.made(Some(&bench(value)), fresh).verdict;
+        assert_eq!(verdict(3.4e-10, true), "agrees");
+        assert_eq!(verdict(1e-3, true), "disagrees");
+        assert_eq!(verdict(f64::NAN, true), "disagrees");
+        assert_eq!(verdict(3.4e-10, false), "stale");
+        assert!(check.made(Some(&bench(1.0)), true).measured.contains(", commit "));
     }
 }

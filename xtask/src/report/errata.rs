@@ -5,9 +5,8 @@ use std::fs;
 use miette::{IntoDiagnostic, Result, WrapErr};
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Asserted, Finding, Number, State};
-use super::thesis;
-use crate::validate::outcome::Outcome;
+use super::evidence::{Finding, Measured, Number, verdict};
+use super::thesis::{self, Found};
 use crate::workspace::Workspace;
 
 /// What proves an erratum.
@@ -21,9 +20,9 @@ pub struct Proof {
     /// Quantities that a case expects.
     #[serde(default)]
     pub numbers: Vec<Number>,
-    /// Numbers that tests assert.
+    /// Numbers that tests measure.
     #[serde(default)]
-    pub tests: Vec<Asserted>,
+    pub tests: Vec<Measured>,
 }
 
 /// A row of docs/errata.md.
@@ -41,6 +40,7 @@ pub struct Proven {
     ours: String,
     test: String,
     findings: Vec<Finding>,
+    verdict: &'static str,
     tone: &'static str,
 }
 
@@ -115,22 +115,16 @@ pub fn faults(workspace: &Workspace, rows: &[Erratum], proofs: &[Proof]) -> Vec<
 }
 
 /// Looks the numbers up.
-pub fn judge(rows: &[Erratum], proofs: &[Proof], outcomes: &[Outcome]) -> Vec<Proven> {
+pub fn judge(rows: &[Erratum], proofs: &[Proof], found: &Found) -> Vec<Proven> {
     let judged = |row: &Erratum| {
         let proof = proofs.iter().find(|proof| row.is(proof));
-        let findings: Vec<Finding> = proof.map_or_else(Vec::new, |proof| {
-            let found = proof.numbers.iter().map(|number| number.find(proof.case.as_deref(), outcomes));
-            found.chain(proof.tests.iter().map(Asserted::finding)).collect()
+        let findings = proof.map_or_else(Vec::new, |proof| {
+            found.findings(proof.case.as_deref(), &proof.numbers, &proof.tests)
         });
-        let has = |state| findings.iter().any(|finding| finding.state == state);
-        let tone = match () {
-            () if has(State::Missed) => "bad",
-            () if has(State::Met) || has(State::Asserted) => "good",
-            () => "open",
-        };
+        let (verdict, tone) = verdict(&findings).unwrap_or(("proven", "good"));
         let [place, wrong, ours, test] =
             row.cells.clone().map(|cell| cell.replace('`', "").replace("**", ""));
-        Proven { chapter: row.chapter.clone(), place, wrong, ours, test, findings, tone }
+        Proven { chapter: row.chapter.clone(), place, wrong, ours, test, findings, verdict, tone }
     };
     rows.iter().map(judged).collect()
 }

@@ -1,12 +1,11 @@
-//! What a verdict rests on: quantities that cases are judged by, or numbers that tests assert.
+//! What a verdict rests on: quantities that cases are judged by, or numbers that tests have measured.
 
-use std::fs;
+use std::path::Path;
 
-use miette::{Result, miette};
 use serde::{Deserialize, Serialize};
 
+use crate::test::Records;
 use crate::validate::outcome::Outcome;
-use crate::workspace::Workspace;
 
 /// A quantity of a case, as named in cases/thesis.toml.
 #[derive(Clone, Debug, Deserialize)]
@@ -29,20 +28,16 @@ fn yes() -> bool {
     true
 }
 
-/// A test that asserts a number.
+/// A number that a test measures, as named in cases/thesis.toml.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Asserted {
-    /// `crates/peri/src/calibrate.rs`.
-    pub file: String,
-    /// The function's name.
-    pub test: String,
-    /// What its body says of the number.
-    pub holds: String,
+pub struct Measured {
+    /// The name that the test gives it by crate `evidence`.
+    pub record: String,
     /// In words, with its unit.
     pub what: String,
-    /// The number for a reader.
-    pub number: String,
+    /// The thesis' own figure, where it prints one.
+    pub thesis: Option<String>,
 }
 
 /// A row of numbers: what it is, what was found, what was asked for, how that ended.
@@ -66,16 +61,30 @@ pub struct Finding {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum State {
-    /// By this run, within its tolerance.
+    /// Within its tolerance.
     Met,
+    /// Within the tolerance of our own earlier figure, which is no evidence.
+    Regression,
     /// By this run; nothing is asked of it.
     Found,
-    /// By this run, outside its tolerance; or the case failed.
+    /// Outside its tolerance; or the case failed.
     Missed,
+    /// By a test whose sources have changed since.
+    Stale,
     /// Not in this run.
     NotRun,
-    /// By a test of `cargo xtask test`.
-    Asserted,
+}
+
+/// A verdict on findings, with a tone for the page: what is missed fails, what was met backs, the rest does not.
+pub fn verdict(findings: &[Finding]) -> Option<(&'static str, &'static str)> {
+    let has = |state| findings.iter().any(|finding| finding.state == state);
+    match () {
+        () if has(State::Missed) => Some(("failed", "bad")),
+        () if has(State::Met) => None,
+        () if has(State::Stale) => Some(("stale", "open")),
+        () if has(State::Regression) => Some(("no evidence", "bad")),
+        () => Some(("not in this run", "open")),
+    }
 }
 
 impl Number {
@@ -112,58 +121,81 @@ impl Number {
         let met = judged.iter().all(|judgement| judgement.pass) && outcome.failure.is_none();
         let unit = outcome.unit(&self.quantity);
         let value = if unit.is_empty() { value } else { format!("{value} {unit}") };
-        let state = if met { State::Met } else { State::Missed };
+        let evidence = judged.iter().any(|judgement| judgement.expect.kind.is_evidence());
+        let state = match (met, evidence) {
+            (true, true) => State::Met,
+            (true, false) => State::Regression,
+            (false, _) => State::Missed,
+        };
         Finding { asked: asked.join(", "), ..empty(state, &value) }
     }
 }
 
-impl Asserted {
-    /// The number, as the test asserts it.
-    pub fn finding(&self) -> Finding {
-        Finding {
+impl Measured {
+    /// Looks it up in what tests have left.
+    pub fn find(&self, records: &Records, root: &Path) -> Finding {
+        let empty = |state, from: String| Finding {
             what: self.what.clone(),
-            value: self.number.clone(),
+            value: "not in this run".to_owned(),
             asked: String::new(),
-            thesis: String::new(),
-            from: format!("test {} in {}", self.test, self.file),
-            state: State::Asserted,
-        }
+            thesis: self.thesis.clone().unwrap_or_default(),
+            from,
+            state,
+        };
+        let Some(record) = records.get(&self.record) else {
+            return empty(State::NotRun, "cargo xtask test".to_owned());
+        };
+        let fresh = record.stamp.as_ref().is_some_and(|stamp| stamp.fresh(root));
+        let state = match (record.met, fresh) {
+            (false, _) => State::Missed,
+            (true, true) => State::Met,
+            (true, false) => State::Stale,
+        };
+        let when = record.stamp.as_ref().map(ToString::to_string).unwrap_or_default();
+        let from = format!("test {} in {}, {when}", record.test, record.file);
+        let [value, asked] = record.cells();
+        Finding { value, asked, ..empty(state, from) }
     }
-
-    /// The test exists and says so.
-    pub fn check(&self, workspace: &Workspace) -> Result<()> {
-        let text = fs::read_to_string(workspace.root().join(&self.file))
-            .map_err(|error| miette!("{}: {error}", self.file))?;
-        let body =
-            body(&text, &self.test).ok_or_else(|| miette!("{}: no test `{}`", self.file, self.test))?;
-        if body.contains(&self.holds) {
-            Ok(())
-        } else {
-            Err(miette!("{}: the test `{}` does not say `{}`", self.file, self.test, self.holds))
-        }
-    }
-}
-
-/// The text of a function or a table of a test, up to the bracket that closes it in its own column.
-pub fn body<'a>(text: &'a str, name: &str) -> Option<&'a str> {
-    let start = text.find(&format!("fn {name}(")).or_else(|| text.find(&format!("const {name}: ")))?;
-    let line = text[..start].rfind('\n').map_or(0, |at| at + 1);
-    let indent = text[line..start].chars().take_while(|letter| *letter == ' ').count();
-    let close = |bracket: char| text[start..].find(&format!("\n{}{bracket}", " ".repeat(indent)));
-    let end = ['}', ']'].into_iter().filter_map(close).min().map_or(text.len(), |at| start + at);
-    Some(&text[start..end])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stamp::Stamp;
 
     #[test]
-    fn bodies_of_functions() {
-        let text = "mod tests {\n    fn a() {\n        if x {\n        }\n        1.5\n    }\n    fn b() {\n    2.5 }\n}\n\
-                    const T: [f64; 1] = [\n    7.5,\n];\n8.5";
-        assert!(body(text, "a").is_some_and(|body| body.contains("1.5") && !body.contains("2.5")));
-        assert!(body(text, "T").is_some_and(|body| body.contains("7.5") && !body.contains("8.5")));
-        assert_eq!(body(text, "c"), None);
+    fn records_of_tests() {
+        let root = tempfile::tempdir().expect("a folder");
+        std::fs::write(root.path().join("source"), "1").expect("a source");
+        let text = r#"{"name": "n", "value": 0.5, "at_most": 1, "met": true, "test": "t", "file": "f", "stamp": null}"#;
+        let mut record: crate::test::Record = serde_json::from_str(text).expect("a record");
+        record.stamp = Some(Stamp::new(root.path(), &["source".to_owned()]).expect("a stamp"));
+        let row = Measured { record: "n".to_owned(), what: "w".to_owned(), thesis: None };
+        let state = |record: &crate::test::Record| {
+            let records = Records::from([("n".to_owned(), record.clone())]);
+            row.find(&records, root.path()).state
+        };
+        assert_eq!(state(&record), State::Met);
+        assert_eq!(row.find(&Records::new(), root.path()).state, State::NotRun);
+        std::fs::write(root.path().join("source"), "2").expect("a source");
+        assert_eq!(state(&record), State::Stale);
+        record.met = false;
+        assert_eq!(state(&record), State::Missed);
+    }
+
+    #[test]
+    fn verdicts() {
+        let of = |states: &[State]| {
+            let [what, value, asked, thesis, from] = [""; 5].map(str::to_owned);
+            let finding = Finding { what, value, asked, thesis, from, state: State::Met };
+            let findings: Vec<Finding> =
+                states.iter().map(|&state| Finding { state, ..finding.clone() }).collect();
+            verdict(&findings).map(|(verdict, _)| verdict)
+        };
+        assert_eq!(of(&[State::Met, State::Stale, State::Regression]), None);
+        assert_eq!(of(&[State::Met, State::Missed]), Some("failed"));
+        assert_eq!(of(&[State::Regression, State::Found]), Some("no evidence"));
+        assert_eq!(of(&[State::Regression, State::Stale]), Some("stale"));
+        assert_eq!(of(&[State::Found, State::NotRun]), Some("not in this run"));
     }
 }

@@ -1,8 +1,11 @@
-//! docs/validation.md: what stays the same from day to day, without seconds, dates and machines.
+//! docs/validation.md: what stays the same from day to day, without seconds; dates and machines are those of benches.
+
+use polycore::report::Kind;
 
 use super::Page;
 use crate::table::Table;
 use crate::validate::outcome::Outcome;
+use crate::validate::summary;
 
 /// Sums, thesis map, cases, fronts, cross-checks.
 pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
@@ -16,21 +19,34 @@ pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
         let complaint = outcome.complaint(|path| path.display().to_string());
         text += &format!("\n**{} failed**:\n\n```text\n{complaint}\n```\n", outcome.case);
     }
+    text += "\n## Kinds of evidence\n\n";
+    let mut table = Table::new(["kind", "expectations", "what it is"]);
+    for (kind, count) in summary::kinds(outcomes) {
+        table.push([kind.to_string(), count.to_string(), meaning(kind).to_owned()]);
+    }
+    text += &table.markdown();
     text += "\n## Thesis map\n\n";
     let mut table = Table::new(["thesis", "what", "numbers", "verdict"]);
     page.thesis.iter().for_each(|judged| table.push(judged.cells()));
     text += &table.markdown();
+    if !page.others.is_empty() {
+        text +=
+            "\n## Others' figures\n\nWhat no one here wrote, and ours (cases below `cases/external`).\n\n";
+        let mut table = Table::new(["case", "what", "source", "figure", "ours", "verdict"]);
+        page.others.iter().for_each(|other| table.push(other.cells()));
+        text += &table.markdown();
+    }
     text += "\n## Cases\n\n";
-    let mut table = Table::new(["case", "program", "expectations", "not met"]);
+    let mut table = Table::new(["case", "program", "expectations", "of them regressions", "not met"]);
     for outcome in outcomes {
         let missed = outcome.expect().iter().filter(|judgement| !judgement.pass).count();
-        let counts = [outcome.expect().len(), missed].map(|count| count.to_string());
-        let [all, missed] = counts;
-        table.push([outcome.case.clone(), outcome.program.clone(), all, missed]);
+        let ours = outcome.expect().iter().filter(|judgement| !judgement.expect.kind.is_evidence()).count();
+        let [all, ours, missed] = [outcome.expect().len(), ours, missed].map(|count| count.to_string());
+        table.push([outcome.case.clone(), outcome.program.clone(), all, ours, missed]);
     }
     text += &table.markdown();
     text += "\n## Error against run time\n\nMethods that nothing measured beats in both error and time.\n\n";
-    let mut table = Table::new(["what", "front", "default"]);
+    let mut table = Table::new(["what", "front", "default", "measured"]);
     let mut absent = Vec::new();
     for measured in &page.timing {
         match measured.cells() {
@@ -45,7 +61,18 @@ pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
         text += &format!("\n{title}: not measured, run `{command}`.\n");
     }
     text += "\n## Cross-checks\n\n";
-    let mut table = Table::new(["engine", "largest difference", "asked for", "verdict"]);
+    let mut table = Table::new(["engine", "largest difference", "asked for", "verdict", "measured"]);
     page.cross.iter().for_each(|crossed| table.push(crossed.cells()));
     text + &table.markdown()
+}
+
+fn meaning(kind: Kind) -> &'static str {
+    match kind {
+        Kind::ClosedForm => "a formula, a series, or a count that follows from the problem",
+        Kind::Published => "a figure of the literature, of an experiment, of a benchmark",
+        Kind::IndependentProgram => "a figure of a program that shares no code with ours",
+        Kind::Convergence => "an observed order, a change under refinement",
+        Kind::Bound => "an inequality that any correct answer meets",
+        Kind::Regression => "our own earlier figure: it shows a change, and is no evidence",
+    }
 }

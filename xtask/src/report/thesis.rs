@@ -1,13 +1,16 @@
 //! The thesis map: every numbered figure and table that holds a result, and what became of it here (cases/thesis.toml).
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::path::Path;
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
+use polycore::report::{Expect, Kind};
 use serde::{Deserialize, Serialize};
 
-use super::evidence::{Asserted, Finding, Number, State};
+use super::evidence::{Finding, Measured, Number, verdict};
 use super::pictures::{Gallery, Picture};
+use crate::test::Records;
 use crate::validate::outcome::Outcome;
 use crate::workspace::Workspace;
 
@@ -79,9 +82,9 @@ pub struct Row {
     /// Quantities that the case expects.
     #[serde(default)]
     pub numbers: Vec<Number>,
-    /// Numbers that tests assert.
+    /// Numbers that tests measure.
     #[serde(default)]
-    pub tests: Vec<Asserted>,
+    pub tests: Vec<Measured>,
     /// Pictures among the case's results; of each group the first that exists is shown.
     #[serde(default)]
     pub pictures: Vec<Vec<String>>,
@@ -177,8 +180,26 @@ impl Map {
     }
 
     /// Looks everything up.
-    pub fn judge(&self, outcomes: &[Outcome], gallery: &mut Gallery) -> Vec<Judged> {
-        self.row.iter().map(|row| row.judge(outcomes, gallery)).collect()
+    pub fn judge(&self, found: &Found, gallery: &mut Gallery) -> Vec<Judged> {
+        self.row.iter().map(|row| row.judge(found, gallery)).collect()
+    }
+}
+
+/// What was found: by this run's cases, and by the last run of the tests.
+pub struct Found<'a> {
+    /// Of the cases.
+    pub outcomes: &'a [Outcome],
+    /// Of the tests.
+    pub records: &'a Records,
+    /// Of the workspace.
+    pub root: &'a Path,
+}
+
+impl Found<'_> {
+    /// Looks numbers up.
+    pub fn findings(&self, case: Option<&str>, numbers: &[Number], tests: &[Measured]) -> Vec<Finding> {
+        let found = numbers.iter().map(|number| number.find(case, self.outcomes));
+        found.chain(tests.iter().map(|test| test.find(self.records, self.root))).collect()
     }
 }
 
@@ -187,9 +208,10 @@ pub fn check(
     workspace: &Workspace,
     case: Option<&str>,
     numbers: &[Number],
-    tests: &[Asserted],
+    tests: &[Measured],
     fault: &mut dyn FnMut(String),
 ) {
+    let (mut evidence, mut regressions) = (tests.len(), 0);
     for number in numbers {
         let Some(case) = number.case.as_deref().or(case) else {
             fault(format!("`{}` is of no case", number.quantity));
@@ -197,44 +219,67 @@ pub fn check(
         };
         match expected(workspace, case) {
             Err(error) => fault(error.to_string()),
-            Ok(names) if number.judged && !names.contains(&number.quantity) => {
-                fault(format!("{case} expects no `{}`", number.quantity));
-            }
+            Ok(kinds) if number.judged => match kinds.get(&number.quantity) {
+                None => fault(format!("{case} expects no `{}`", number.quantity)),
+                Some(kinds) if kinds.iter().any(|kind| kind.is_evidence()) => evidence += 1,
+                Some(_) => regressions += 1,
+            },
             Ok(_) => {}
         }
     }
+    if evidence == 0 && regressions > 0 {
+        fault("rests on nothing but our own earlier figures (kind = \"regression\")".to_owned());
+    }
     for test in tests {
-        if let Err(error) = test.check(workspace) {
-            fault(error.to_string());
+        if !named(workspace, &test.record) {
+            fault(format!("no test in crates/ measures \"{}\"", test.record));
         }
     }
 }
 
-/// The quantities that a case expects.
-fn expected(workspace: &Workspace, case: &str) -> Result<BTreeSet<String>> {
+/// The quantities that a case expects, and of what kinds.
+fn expected(workspace: &Workspace, case: &str) -> Result<BTreeMap<String, Vec<Kind>>> {
     let path = workspace.root().join("cases").join(case).join("case.toml");
     let text = fs::read_to_string(&path).map_err(|error| miette!("cases/{case}/case.toml: {error}"))?;
     let table: toml::Table = toml::from_str(&text).map_err(|error| miette!("{case}: {error}"))?;
-    let list = table.get("expect").and_then(toml::Value::as_array);
-    let names = list.into_iter().flatten().filter_map(|expect| expect.get("quantity")?.as_str());
-    Ok(names.map(str::to_owned).collect())
+    let mut kinds = BTreeMap::<String, Vec<Kind>>::new();
+    for expect in table.get("expect").and_then(toml::Value::as_array).into_iter().flatten() {
+        let expect: Expect = expect.clone().try_into().map_err(|error| miette!("{case}: {error}"))?;
+        kinds.entry(expect.quantity).or_default().push(expect.kind);
+    }
+    Ok(kinds)
+}
+
+/// Whether a file below crates/ or tests/ gives a number that name: a link, not a proof.
+fn named(workspace: &Workspace, record: &str) -> bool {
+    let name = format!("\"{record}\"");
+    let mut folders = vec![workspace.root().join("crates"), workspace.root().join("tests")];
+    while let Some(folder) = folders.pop() {
+        for path in fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs")
+                && fs::read_to_string(&path).is_ok_and(|text| text.contains(&name))
+            {
+                return true;
+            }
+        }
+    }
+    false
 }
 
 impl Row {
-    fn judge(&self, outcomes: &[Outcome], gallery: &mut Gallery) -> Judged {
-        let found = self.numbers.iter().map(|number| number.find(self.case.as_deref(), outcomes));
-        let findings: Vec<Finding> = found.chain(self.tests.iter().map(Asserted::finding)).collect();
-        let has = |state| findings.iter().any(|finding| finding.state == state);
-        let backed = has(State::Met) || has(State::Asserted);
-        let (verdict, tone) = match self.verdict {
-            _ if has(State::Missed) => ("failed", "bad"),
-            Verdict::NotFromTheText => ("not reproducible from the text", "fair"),
-            Verdict::Open => ("not yet", "open"),
-            _ if !backed => ("not in this run", "open"),
-            Verdict::Reproduced => ("reproduced", "good"),
-            Verdict::Differs => ("reproduced with a stated difference", "fair"),
+    fn judge(&self, found: &Found, gallery: &mut Gallery) -> Judged {
+        let findings = found.findings(self.case.as_deref(), &self.numbers, &self.tests);
+        let (verdict, tone) = match (self.verdict, verdict(&findings)) {
+            (_, Some(failed @ ("failed", _))) => failed,
+            (Verdict::NotFromTheText, _) => ("not reproducible from the text", "fair"),
+            (Verdict::Open, _) => ("not yet", "open"),
+            (_, Some(unbacked)) => unbacked,
+            (Verdict::Reproduced, None) => ("reproduced", "good"),
+            (Verdict::Differs, None) => ("reproduced with a stated difference", "fair"),
         };
-        let outcome = outcomes.iter().find(|outcome| Some(&outcome.case) == self.case.as_ref());
+        let outcome = found.outcomes.iter().find(|outcome| Some(&outcome.case) == self.case.as_ref());
         let shown = |group: &Vec<String>| {
             let outcome = outcome?;
             group.iter().find_map(|name| gallery.picture(outcome, name))
@@ -289,8 +334,29 @@ mod tests {
         assert_eq!(row("verdict = 'not-from-the-text'\nbecause = '38,000 atoms'"), [""; 0]);
         let number = "verdict = 'reproduced'\ncase = 'ch2/dent'\nnumbers = [{ what = 'w', quantity = 'no' }]";
         assert_eq!(row(number), ["Fig. 2.7: ch2/dent expects no `no`"]);
-        let test = "verdict = 'reproduced'\ntests = [{ file = 'crates/peri/src/calibrate.rs', what = 'w', number = '1', \
-                    test = 'single_point_integrals', holds = 'PI / 13' }]";
-        assert!(row(test)[0].contains("does not say `PI / 13`"));
+        let test = "verdict = 'reproduced'\ntests = [{ record = 'no such', what = 'w' }]";
+        assert_eq!(row(test), ["Fig. 2.7: no test in crates/ measures \"no such\""]);
+    }
+
+    /// A row that rests on our own earlier figures only is refused.
+    #[test]
+    fn regressions_are_no_evidence() {
+        let root = tempfile::tempdir().expect("a folder");
+        let workspace = Workspace::new(root.path().to_path_buf());
+        fs::create_dir_all(root.path().join("cases/c")).expect("a folder");
+        let faults = |kinds: &[&str]| {
+            let expect = |kind: &&str| {
+                format!("[[expect]]\nquantity = 'q'\nat_most = 1\nsource = 's'\nkind = '{kind}'\n")
+            };
+            let text: String = kinds.iter().map(expect).collect();
+            fs::write(root.path().join("cases/c/case.toml"), text).expect("a case");
+            let number: Number = toml::from_str("quantity = 'q'\nwhat = 'w'").expect("a number");
+            let mut faults = Vec::new();
+            check(&workspace, Some("c"), &[number], &[], &mut |text| faults.push(text));
+            faults
+        };
+        assert_eq!(faults(&["bound"]), [""; 0]);
+        assert_eq!(faults(&["regression", "published"]), [""; 0]);
+        assert!(faults(&["regression"])[0].contains("own earlier figures"));
     }
 }

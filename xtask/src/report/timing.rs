@@ -6,12 +6,14 @@ use std::path::Path;
 
 use miette::{IntoDiagnostic, Result};
 use polycore::output::picture::{LinePlot, Series};
-use polycore::report::Value;
 use serde::Serialize;
 
 use super::pictures;
-use crate::bench::Row;
+use super::points::{of_curves, of_table, pairs};
+use crate::bench;
+use crate::stamp::Stamp;
 use crate::validate::outcome::Outcome;
+use crate::workspace::Workspace;
 
 /// Where the points of a subject are.
 enum Source {
@@ -174,6 +176,11 @@ pub struct Measured {
     points: Vec<Point>,
     /// Whether a point of the default is on the front.
     default_on_front: bool,
+    /// When, where and from what a bench measured it; none of what this run's cases measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measured: Option<String>,
+    /// The sources that the bench measured have changed.
+    stale: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     picture: Option<String>,
 }
@@ -199,14 +206,21 @@ impl Measured {
         self
     }
 
-    /// The subject, the methods on its front, and where the default is; for docs/validation.md.
-    pub fn cells(&self) -> Option<[String; 3]> {
+    /// The subject, the methods on its front, where the default is, and by what it was measured; for docs/validation.md.
+    pub fn cells(&self) -> Option<[String; 4]> {
         let mut front: Vec<&str> =
             self.points.iter().filter(|p| p.front).map(|p| p.method.as_str()).collect();
         front.sort_unstable();
         front.dedup();
         let verdict = if self.default_on_front { "on the front" } else { "not on the front" };
-        let cells = [self.title.to_owned(), front.join(", "), format!("{}: {verdict}", self.default)];
+        let stale = if self.stale { "stale; " } else { "" };
+        let measured = self.measured.as_deref().unwrap_or("this run");
+        let cells = [
+            self.title.to_owned(),
+            front.join(", "),
+            format!("{stale}{}: {verdict}", self.default),
+            measured.to_owned(),
+        ];
         (!self.points.is_empty()).then_some(cells)
     }
 
@@ -217,17 +231,18 @@ impl Measured {
 }
 
 /// Everything that was measured, and by what command the rest is; pictures go to `folder`.
-pub fn measured(bench: &Path, folder: &Path, outcomes: &[Outcome]) -> Result<Vec<Measured>> {
-    SUBJECTS.iter().map(|subject| subject.measured(bench, folder, outcomes)).collect()
+pub fn measured(workspace: &Workspace, folder: &Path, outcomes: &[Outcome]) -> Result<Vec<Measured>> {
+    SUBJECTS.iter().map(|subject| subject.measured(workspace, folder, outcomes)).collect()
 }
 
 impl Subject {
-    fn measured(&self, bench: &Path, folder: &Path, outcomes: &[Outcome]) -> Result<Measured> {
+    fn measured(&self, workspace: &Workspace, folder: &Path, outcomes: &[Outcome]) -> Result<Measured> {
+        let mut stamp: Option<Stamp> = None;
         let points = match self.source {
             Source::Bench { name, error, time } => {
-                let text = fs::read_to_string(bench.join(format!("{name}.json"))).unwrap_or_default();
-                let rows: Vec<Row> = serde_json::from_str(&text).unwrap_or_default();
-                pairs(&rows, error, time)
+                let bench = bench::read(workspace, name);
+                stamp = bench.as_ref().map(|bench| bench.stamp.clone());
+                pairs(bench.as_ref().map_or(&[], |bench| &bench.rows), error, time)
             }
             Source::Table { case, file, error, time, scale } => {
                 let outcome = outcomes.iter().find(|outcome| outcome.case == case);
@@ -261,6 +276,8 @@ impl Subject {
             note: self.note,
             points,
             default_on_front,
+            stale: stamp.as_ref().is_some_and(|stamp| !stamp.fresh(workspace.root())),
+            measured: stamp.as_ref().map(Stamp::to_string),
             picture,
         })
     }
@@ -293,61 +310,6 @@ impl Subject {
     }
 }
 
-/// Rows of errors with the rows of times of the same point, of the largest size that has both: name, time, error.
-fn pairs(rows: &[Row], error: &str, time: &str) -> Vec<(String, f64, f64)> {
-    let key = |row: &Row, marker: &str| {
-        let at = row.what.find(marker)?;
-        // `error` must not be found in `terrors`
-        let before = row.what[..at].chars().next_back().is_none_or(|c| c == ' ');
-        let rest = format!("{} {}", &row.what[..at], &row.what[at + marker.len()..]);
-        let rest = rest.split_whitespace().collect::<Vec<_>>().join(" ");
-        before.then(|| rest.trim_end_matches([':', ' ']).to_owned())
-    };
-    let mut points = Vec::new();
-    for row in rows {
-        let Some(name) = key(row, error) else { continue };
-        let same = |other: &&Row| key(other, time).as_ref() == Some(&name);
-        // where a size is that of the problem, partners have the same
-        let partner = rows.iter().filter(same).find(|other| other.size == row.size);
-        let partner = partner.or_else(|| rows.iter().find(same));
-        if let (Some(error), Some(time)) = (row.value, partner.and_then(|row| row.value)) {
-            points.push((row.size, name, time, error));
-        }
-    }
-    // the same name at several sizes: only the largest
-    let largest: BTreeMap<String, u64> = points.iter().fold(BTreeMap::new(), |mut most, (size, name, ..)| {
-        let entry = most.entry(name.clone()).or_insert(*size);
-        *entry = (*entry).max(*size);
-        most
-    });
-    points.retain(|(size, name, ..)| largest.get(name) == Some(size));
-    points.into_iter().map(|(_, name, time, error)| (name, time, error)).collect()
-}
-
-/// Rows `NAME,…` with numbers in two columns.
-fn of_table(text: &str, error: usize, time: usize, scale: f64) -> Vec<(String, f64, f64)> {
-    let point = |line: &str| {
-        let cells: Vec<&str> = line.split(',').collect();
-        let number = |k: usize| cells.get(k)?.trim().parse::<f64>().ok();
-        Some((cells[0].to_owned(), scale * number(time)?, number(error)?))
-    };
-    text.lines().skip(1).filter_map(point).collect()
-}
-
-/// Every point of every curve whose name begins so.
-fn of_curves(outcome: &Outcome, prefix: &str) -> Vec<(String, f64, f64)> {
-    let values = outcome.report.iter().flat_map(|report| &report.values);
-    let mut points = Vec::new();
-    for (name, value) in values {
-        let (Some(name), Value::Curve { columns }) = (name.strip_prefix(prefix), value) else { continue };
-        let seconds = columns.iter().find(|column| column.name == "seconds");
-        let (Some(time), Some(error)) = (seconds, columns.last()) else { continue };
-        let name = name.replace('[', " [");
-        points.extend(time.data.iter().zip(&error.data).map(|(t, e)| (name.clone(), *t, *e)));
-    }
-    points
-}
-
 /// Marks what nothing measured beats in both.
 fn front(points: &mut [Point]) {
     let all: Vec<(f64, f64)> = points.iter().map(|point| (point.time, point.error)).collect();
@@ -362,38 +324,6 @@ fn front(points: &mut [Point]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn row(what: &str, size: u64, value: f64) -> Row {
-        Row { what: what.to_owned(), size, threads: 1, value: Some(value), unit: String::new() }
-    }
-
-    #[test]
-    fn errors_and_times_of_the_same_point() {
-        let rows = [
-            row("adr 1e-2: error", 10, 0.1),
-            row("adr 1e-2: time", 10, 3.0),
-            row("adr 1e-2: error", 20, 0.2),
-            row("adr 1e-2: time", 20, 6.0),
-            row("adr 1e-3: error", 20, 0.02),
-        ];
-        assert_eq!(pairs(&rows, "error", "time"), [("adr 1e-2".to_owned(), 6.0, 0.2)]);
-        let rows = [row("bdf 4: error, smooth", 1, 0.1), row("bdf 4: time, smooth", 1, 8.0)];
-        assert_eq!(pairs(&rows, "error, smooth", "time, smooth"), [("bdf 4".to_owned(), 8.0, 0.1)]);
-        assert_eq!(pairs(&rows, "error, quenched", "time, quenched"), []);
-        // sizes that count repetitions differ
-        let rows = [row("exact: error", 200, 1e-16), row("exact: time", 7, 4.0)];
-        assert_eq!(pairs(&rows, "error", "time"), [("exact".to_owned(), 4.0, 1e-16)]);
-    }
-
-    #[test]
-    fn rows_of_a_table() {
-        let text = "law,error,training [s],one stress [s]\nenergy,2.5,30,1e-6\nANN-4,3,nothing,2e-6\n";
-        assert_eq!(
-            of_table(text, 1, 3, 1e6),
-            [("energy".to_owned(), 1.0, 2.5), ("ANN-4".to_owned(), 2.0, 3.0)]
-        );
-        assert_eq!(of_table(text, 1, 2, 1.0), [("energy".to_owned(), 30.0, 2.5)]);
-    }
 
     #[test]
     fn the_front_is_what_nothing_beats() {

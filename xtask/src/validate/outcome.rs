@@ -82,13 +82,17 @@ impl Outcome {
         self.failure.is_none() && self.expect().iter().all(|judgement| judgement.pass)
     }
 
-    /// Verdict, quantity, value, requirement, source of every expectation, and the failure if there is one.
-    pub fn rows(&self) -> impl Iterator<Item = [String; 5]> {
+    /// Verdict, quantity, value, requirement, kind, source of every expectation, and the failure if there is one.
+    pub fn rows(&self) -> impl Iterator<Item = [String; 6]> {
         let failure = self.failure.as_ref().map(|failure| {
             let [verdict, run, empty] = ["FAIL", "(run)", ""].map(str::to_owned);
-            [verdict, run, failure.clone(), empty.clone(), empty]
+            [verdict, run, failure.clone(), empty.clone(), empty.clone(), empty]
         });
-        self.expect().iter().map(Judgement::row).chain(failure)
+        let row = |judgement: &Judgement| {
+            let [verdict, quantity, value, asked, source] = judgement.row();
+            [verdict, quantity, value, asked, judgement.expect.kind.to_string(), source]
+        };
+        self.expect().iter().map(row).chain(failure)
     }
 
     /// What failed, by how much, and where to look; empty if nothing did.

@@ -90,7 +90,8 @@ fn ozawa_comes_back() {
     }
     let fit = ozawa(&coolings, temperature).unwrap();
     let z = cooling_curve(&pa12(), 1.0, 466.35, temperature, 0.0, 2).z.pop().unwrap();
-    assert!((fit.get("ozawa_exponent").unwrap().value - 2.678).abs() < 1e-3);
+    let exponent = fit.get("ozawa_exponent").unwrap().value;
+    evidence::near("Ozawa's exponent that comes back with q^(−m)", exponent, 2.678, 1e-3);
     assert!((fit.get("cooling_function").unwrap().value / z.powf(2.678) - 1.0).abs() < 1e-3);
     let error = ozawa(&coolings, 455.0).unwrap_err().to_string();
     assert!(error.contains("0 rates with alpha") && error.contains("at least 3"), "{error}");

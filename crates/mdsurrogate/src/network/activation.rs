@@ -202,6 +202,7 @@ mod tests {
             // a fault is not swallowed
             assert!(activation.at(f64::NAN)[0].is_nan(), "{activation:?}");
         }
+        evidence::near("ReLU of −1", Activation::Relu.at(-1.0)[0], 0.0, 0.0);
         // ln 2, and ln(1 + e^-40) = e^-40 to 17 digits
         assert!((Activation::Softplus.at(0.0)[0] - std::f64::consts::LN_2).abs() < 1e-16);
         assert!((Activation::Softplus.at(-40.0)[0] / f64::exp(-40.0) - 1.0).abs() < 1e-15);

@@ -154,7 +154,7 @@ fn a_real_run_where_lammps_is() {
     let engine = match Engine::find(named.as_deref()) {
         Ok(engine) => engine,
         Err(error) => {
-            eprintln!("skipped a_real_run_where_lammps_is: {error}");
+            evidence::skipped(&format!("LAMMPS ({error})"));
             return;
         }
     };
@@ -162,7 +162,7 @@ fn a_real_run_where_lammps_is() {
     let place = directory.path().join("set");
     let folder = Folder::create(&place, Plan { protocol: tiny(), runs: vec![sheared("s")] }).unwrap();
     if let Err(error) = folder.force_field(None, &engine) {
-        eprintln!("skipped a_real_run_where_lammps_is: {error}");
+        evidence::skipped(&format!("LAMMPS ({error})"));
         return;
     }
     folder.prepare(&engine).unwrap();

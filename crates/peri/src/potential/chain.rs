@@ -218,6 +218,7 @@ mod tests {
     /// The implicit relation (2.41) solved directly for λ_b by bisection.
     #[test]
     fn agrees_with_the_implicit_relation_solved_directly() {
+        let mut worst: f64 = 0.0;
         for dissociation in [1200.0, 2300.0] {
             for links in [720.0f64, 90.0, 100.0, 12.5] {
                 let chain = Chain::new(links, dissociation).unwrap();
@@ -232,10 +233,11 @@ mod tests {
                     let found = chain.stretched(ratio * links.sqrt());
                     // the bisection resolves λ_b to ε, and β = 1/(1 − x) loses a factor 1/(1 − x) < 1e3 of it
                     assert!((found.link_stretch / low - 1.0).abs() < 1e-14, "{links} {ratio}");
-                    assert!((found.force / force - 1.0).abs() < 1e-12, "{links} {ratio}");
+                    worst = worst.max((found.force / force - 1.0).abs());
                 }
             }
         }
+        evidence::at_most("closed form of (2.41) against the implicit relation", worst, 1e-12);
     }
 
     proptest! {

@@ -123,7 +123,8 @@ fn tangent_with_the_links_on_the_bond_energy() {
         // rounding, amplified by β′ = 1/(1 − x)² near locking
         assert!((full / point.stiffness - 1.0).abs() < 1e-9, "{stretch}");
     }
-    assert!((tangent(1.0, 1.0, 0.0, 3.0, n) - (3.0 - 9.0 / (n * d + 3.0))).abs() < 1e-14);
+    let correction = 3.0 - tangent(1.0, 1.0, 0.0, 3.0, n);
+    evidence::near("correction of (2.72) with n̄, 9/(n̄D̂ + 3)", correction, 9.0 / (n * d + 3.0), 1e-14);
     assert!((tangent(1.0, 1.0, 0.0, 3.0, 1.0) - (3.0 - 9.0 / (d + 3.0))).abs() < 1e-14);
 }
 
@@ -132,7 +133,7 @@ fn tangent_with_the_links_on_the_bond_energy() {
 fn error_of_cohens_approximant() {
     let error = |x: f64| (x * (3.0 - x * x) / (1.0 - x * x) / polycore::langevin::inverse(x) - 1.0).abs();
     let largest = (1..10_000).map(|k| error(1e-4 * f64::from(k))).fold(0.0, f64::max);
-    assert!((largest - 0.049).abs() < 0.0005, "{largest}");
+    evidence::near("error of Cohen's approximant", largest, 0.049, 0.0005);
 }
 
 /// The stiffest and softest parameters give finite forces from stretch 1e-3 to 1e6.
@@ -199,7 +200,8 @@ fn greatest_force() {
 #[test]
 fn values_of_the_formulation() {
     let chain = Chain::new(720.0, 1200.0).unwrap();
-    assert!((chain.stretched(1.0).force - 3.002_482_393_209_98).abs() < 1e-13);
+    let at_rest = chain.stretched(1.0).force;
+    evidence::near("tension at rest as printed, n̄ = 720, over kθ", at_rest, 3.002_482_393_209_98, 1e-13);
     assert!((chain.stretched(1.0).force - 3.00248239).abs() < 5e-9);
     assert!((Chain::new(100.0, 1200.0).unwrap().stretched(1.0).force - 3.018019).abs() < 5e-7);
     let subtract = Law::Subtract.build(720.0, 1200.0, false).unwrap();
@@ -275,6 +277,8 @@ fn interpolation_errors_of_the_formulation() {
             assert!(*f < 1.3 * e && *f > 0.7 * e, "N = {n}: {found:?} against {:?}", [linear, cubic, asinh]);
         }
     }
+    let linear = worst(&uniform(200), false);
+    evidence::within("error of the linear table, 200 nodes", linear, 0.7 * 1.6e-3, 1.3 * 1.6e-3);
 }
 
 /// Every law on every range a scene is likely to need meets the default bound, by a form no dearer than stated; the fit is

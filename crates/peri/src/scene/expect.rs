@@ -89,9 +89,9 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
     let names = quantities_of(source, scene)?;
     for (index, expect) in scene.expect.iter().enumerate() {
-        if !names.contains(&expect.quantity) {
+        if let Some(name) = expect.names().find(|name| !names.iter().any(|known| known == name)) {
             let allowed: Vec<&str> = names.iter().map(String::as_str).collect();
-            return Err(source.unknown(&format!("expect[{index}].quantity"), &expect.quantity, &allowed));
+            return Err(source.unknown(&format!("expect[{index}].quantity"), name, &allowed));
         }
     }
     Ok(())

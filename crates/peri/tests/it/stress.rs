@@ -95,6 +95,24 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
                     "{path}, {D}D, m = {ratio}, {name} {ball:?}: {f} against {e}"
                 );
             }
+            if (D, ratio, ball) == (2, 3.015, BallVolume::Whole) {
+                match measure {
+                    Measure::Printed => {
+                        evidence::near(
+                            "patch test, m = 3, share of the stress as printed",
+                            found[0],
+                            printed,
+                            TOLERANCE,
+                        );
+                    }
+                    _ => evidence::near(
+                        "patch test, m = 3, share of the stress by hardy",
+                        found[0],
+                        hardy,
+                        TOLERANCE,
+                    ),
+                }
+            }
         }
     }
 }
@@ -328,6 +346,7 @@ fn divergence_is_the_average_force() {
     bonds.set_law(&fit, MODULUS);
     let densities = crate::bodies::forces(&bonds, &built.on_lattice, &u);
     let h = 1e-4;
+    let mut worst: f64 = 0.0;
     for [x, y] in [[0.137, 0.291], [-0.41, 0.17], [1.27, -2.36], [0.013, 0.021]] {
         let at = [middle + x, middle + y];
         let p =
@@ -342,12 +361,10 @@ fn divergence_is_the_average_force() {
         for a in 0..2 {
             let average = average[a] / ball_volume(2, 3.015);
             let divergence = (px[a][0] - mx[a][0] + py[a][1] - my[a][1]) / (2.0 * h);
-            assert!(
-                (divergence - average).abs() < 1e-5 * average.abs(),
-                "at {at:?}, component {a}: {divergence} against {average}"
-            );
+            worst = worst.max((divergence / average - 1.0).abs());
         }
     }
+    evidence::at_most("divergence of the stress by hardy against the average force", worst, 1e-5);
 }
 
 /// Cauchy stress and deformation gradient of a large homogeneous strain: F as imposed, σ = P Fᵀ/J symmetric inside.

@@ -157,8 +157,8 @@ impl Case {
     fn check_expectations(&self) -> Result<(), SceneError> {
         let names = self.quantities();
         for (i, expect) in self.expect.iter().enumerate() {
-            if !names.contains(&expect.quantity) {
-                let found = format!("`{}`, which this scene does not compute", expect.quantity);
+            if let Some(name) = expect.names().find(|name| !names.iter().any(|known| known == name)) {
+                let found = format!("`{name}`, which this scene does not compute");
                 let allowed =
                     "<data>.<law>.rms, .shear_modulus, or a parameter (`polycore check` lists them)";
                 return Err(self.source.error(&format!("expect[{i}].quantity"), found, allowed));

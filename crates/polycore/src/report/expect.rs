@@ -1,5 +1,6 @@
 //! What a case must reproduce, and the judgement whether it did.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -12,7 +13,7 @@ use crate::units::Ratio;
 ///
 /// ```toml
 /// [[expect]]
-/// quantity = "stress_concentration"   # the name of a scalar of the report
+/// quantity = "stress_concentration"   # the name of a scalar of the report, or a quotient of two: "NAME / NAME"
 /// reference = 3.0
 /// tolerance = "1 %"                   # of |reference|; or a plain number, absolute, in the unit of the value
 /// kind = "closed-form"                # what kind of evidence the figure is: see [`Kind`]
@@ -24,7 +25,7 @@ use crate::units::Ratio;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(try_from = "Written", into = "Written")]
 pub struct Expect {
-    /// The name of a scalar of the report.
+    /// The name of a scalar of the report, or a quotient of two: `peak[a] / peak[b]`.
     pub quantity: String,
     /// Between which numbers it must lie.
     pub bound: Bound,
@@ -197,7 +198,7 @@ impl<'de> Deserialize<'de> for Tolerance {
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Expect")]
 struct Written {
-    /// The name of a scalar of the report.
+    /// The name of a scalar of the report, or a quotient of two: `peak[a] / peak[b]`.
     quantity: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     /// The figure to reproduce, with `tolerance`.
@@ -271,16 +272,23 @@ impl From<Expect> for Written {
 }
 
 impl Expect {
-    /// Compares with what the report holds under the name.
-    pub(super) fn judge(&self, found: Option<&Value>) -> Judgement {
-        let (value, message) = match found {
-            Some(Value::Scalar { value, .. }) if value.is_finite() => (Some(*value), None),
-            Some(Value::Scalar { value, .. }) => (Some(*value), Some(format!("the value is {value}"))),
-            Some(Value::Curve { .. }) => {
-                (None, Some("the report has a curve of that name, not a scalar".into()))
-            }
-            None => (None, Some("the report has no value of that name".into())),
+    /// The scalars that it needs: one name, or the two of a quotient.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.quantity.split(QUOTIENT)
+    }
+
+    /// Compares with what the report holds under the name or names.
+    pub(super) fn judge(&self, values: &BTreeMap<String, Value>) -> Judgement {
+        let found = self.names().map(|name| scalar(values, name)).collect::<Result<Vec<f64>, String>>();
+        let (value, message) = match found.as_deref() {
+            Ok([value]) => (Some(*value), None),
+            Ok([over, under]) => (Some(over / under), None),
+            Ok(_) => (None, Some("a quotient has two names".to_owned())),
+            Err(message) => (None, Some(message.clone())),
         };
+        let not_finite =
+            value.filter(|value| !value.is_finite()).map(|value| format!("the value is {value}"));
+        let message = message.or(not_finite);
         let within = |value: f64| match self.bound {
             Bound::Near { reference, tolerance } => {
                 (value - reference).abs() <= tolerance.distance(reference)
@@ -291,6 +299,17 @@ impl Expect {
         };
         let pass = message.is_none() && value.is_some_and(within);
         Judgement { expect: self.clone(), value, pass, message }
+    }
+}
+
+/// Between the names of a quotient.
+const QUOTIENT: &str = " / ";
+
+fn scalar(values: &BTreeMap<String, Value>, name: &str) -> Result<f64, String> {
+    match values.get(name) {
+        Some(Value::Scalar { value, .. }) => Ok(*value),
+        Some(Value::Curve { .. }) => Err("the report has a curve of that name, not a scalar".to_owned()),
+        None => Err("the report has no value of that name".to_owned()),
     }
 }
 

@@ -60,6 +60,26 @@ fn missing_quantities_fail_and_say_so() {
     assert!(report.table().contains("not a scalar"));
 }
 
+/// The value of a quotient is that of its two scalars; one that is missing, or a zero below, fails.
+#[test]
+fn quotients() {
+    for (quantity, rest, pass) in [
+        ("k / m", "reference = 1.5\ntolerance = '1e-12'", true),
+        ("m / k", "at_least = 1", false),
+        ("k / zero", "at_least = 1", false),
+        ("k / q", "at_least = 1", false),
+        ("k / m / m", "at_least = 0", false),
+        ("k/m", "at_least = 0", false),
+    ] {
+        let mut report = report(3.0);
+        report.value("m", 2.0, "MPa").value("zero", 0.0, "");
+        let mut expect = one(&format!("{rest}\nsource = 's'")).unwrap();
+        expect.quantity = quantity.to_owned();
+        report.judge(&[expect], false);
+        assert_eq!(report.expect[0].pass, pass, "{quantity}: {}", report.verdict());
+    }
+}
+
 #[test]
 fn bad_expectations() {
     for (rest, part) in [

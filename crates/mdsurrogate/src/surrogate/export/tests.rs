@@ -12,11 +12,11 @@ use polycore::tensor::{DeformationGradient, Tensor, Voigt, Voigt6x6};
 use std::path::Path;
 use std::process::Command;
 
-/// Whether a program is there; says that `test` is skipped if not.
-fn there(program: &str, test: &str) -> bool {
+/// Whether a program is there; says that the test is skipped if not.
+fn there(program: &str) -> bool {
     let found = Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());
     if !found {
-        eprintln!("skipped {test}: there is no {program}");
+        evidence::skipped(program);
     }
     found
 }
@@ -72,7 +72,7 @@ fn write(path: &Path, text: &str) {
 
 #[test]
 fn exported_c_agrees() {
-    if !there("gcc", "exported_c_agrees") {
+    if !there("gcc") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -127,7 +127,7 @@ fn exported_c_agrees() {
 /// The subroutine against the law, the UMAT against the push-forward in Rust, each law a program of its own.
 #[test]
 fn exported_fortran_agrees() {
-    if !there("gfortran", "exported_fortran_agrees") {
+    if !there("gfortran") {
         return;
     }
     let directory = tempfile::tempdir().unwrap();
@@ -220,7 +220,7 @@ fn exported_onnx_agrees() {
     let python = std::env::var("ONNX_PYTHON").unwrap_or("python3".into());
     let probe = Command::new(&python).args(["-c", "import onnxruntime"]).output();
     if !probe.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped exported_onnx_agrees: {python} has no onnxruntime");
+        evidence::skipped(&format!("onnxruntime in {python} (ONNX_PYTHON names another)"));
         return;
     }
     let directory = tempfile::tempdir().unwrap();

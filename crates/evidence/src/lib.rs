@@ -1,0 +1,124 @@
+//! Numbers that tests measure, kept for the report of `cargo xtask validate`.
+//!
+//! A test says [`near`], [`at_most`] or [`within`] where it would say `assert!`, with a name that cases/thesis.toml
+//! refers to. The test fails as with `assert!`; and under `cargo xtask test`, which names a folder in [`FOLDER`], the
+//! number found is left there, met or not. [`skipped`] leaves there what a test could not find on this machine.
+
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::panic::Location;
+use std::path::Path;
+
+use serde_json::{Map, Value, json};
+
+/// The environment variable that names the folder.
+pub const FOLDER: &str = "EVIDENCE_FOLDER";
+
+/// Asserts that |`value` − `reference`| ≤ `tolerance`.
+///
+/// # Panics
+/// Otherwise.
+#[track_caller]
+pub fn near(name: &str, value: f64, reference: f64, tolerance: f64) {
+    let met = (value - reference).abs() <= tolerance;
+    judge(name, value, json!({ "reference": reference, "tolerance": tolerance }), met);
+}
+
+/// Asserts that `value` ≤ `bound`.
+///
+/// # Panics
+/// Otherwise.
+#[track_caller]
+pub fn at_most(name: &str, value: f64, bound: f64) {
+    judge(name, value, json!({ "at_most": bound }), value <= bound);
+}
+
+/// Asserts that `low` ≤ `value` ≤ `high`.
+///
+/// # Panics
+/// Otherwise.
+#[track_caller]
+pub fn within(name: &str, value: f64, low: f64, high: f64) {
+    judge(name, value, json!({ "at_least": low, "at_most": high }), (low..=high).contains(&value));
+}
+
+/// Says that the running test needs what this machine lacks; the test then returns.
+#[track_caller]
+pub fn skipped(needs: &str) {
+    let test = test();
+    eprintln!("skipped {test}: needs {needs}");
+    leave(&format!("skipped {test}"), json!({ "skipped": test, "needs": needs }));
+}
+
+#[track_caller]
+fn judge(name: &str, value: f64, asked: Value, met: bool) {
+    let place = Location::caller();
+    let mut record = Map::from_iter([
+        ("name".to_owned(), json!(name)),
+        // JSON has no NaN
+        ("value".to_owned(), if value.is_finite() { json!(value) } else { json!(value.to_string()) }),
+        ("met".to_owned(), json!(met)),
+        ("test".to_owned(), json!(test())),
+        ("file".to_owned(), json!(place.file())),
+    ]);
+    let text = asked.to_string();
+    record.extend(asked.as_object().cloned().unwrap_or_default());
+    leave(name, Value::Object(record));
+    assert!(met, "{name}: {value}, asked for {text}");
+}
+
+/// The test harness names its threads by their tests.
+fn test() -> String {
+    std::thread::current().name().unwrap_or("a test").to_owned()
+}
+
+fn leave(key: &str, record: Value) {
+    let Some(folder) = std::env::var_os(FOLDER) else { return };
+    leave_in(Path::new(&folder), key, &record);
+}
+
+/// Written beside and renamed: tests of many processes write at once.
+fn leave_in(folder: &Path, key: &str, record: &Value) {
+    let mut hasher = DefaultHasher::new();
+    key.hash(&mut hasher);
+    let path = folder.join(format!("{:016x}.json", hasher.finish()));
+    let part = folder.join(format!("{:016x}.{}.part", hasher.finish(), std::process::id()));
+    let written = fs::create_dir_all(folder)
+        .and_then(|()| fs::write(&part, format!("{record}\n")))
+        .and_then(|()| fs::rename(&part, &path));
+    assert!(written.is_ok(), "{}: {written:?}", path.display());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_asked_for_is_asserted() {
+        near("tests of evidence: near", 1.0, 1.5, 0.5);
+        within("tests of evidence: within", 1.0, 1.0, 2.0);
+        at_most("tests of evidence: at most", 1.0, 1.0);
+        for wrong in [
+            || near("tests of evidence: not near", 1.0, 1.5, 0.4),
+            || near("tests of evidence: not a number", f64::NAN, 1.5, 0.4),
+            || within("tests of evidence: not within", 2.1, 1.0, 2.0),
+            || at_most("tests of evidence: more", 1.1, 1.0),
+        ] {
+            assert!(std::panic::catch_unwind(wrong).is_err());
+        }
+    }
+
+    #[test]
+    fn records_are_files() {
+        let folder = tempfile::tempdir().expect("a folder");
+        leave_in(folder.path(), "a", &json!({ "value": 1 }));
+        leave_in(folder.path(), "a", &json!({ "value": 2 }));
+        leave_in(folder.path(), "b", &json!({ "value": 3 }));
+        let mut texts: Vec<String> = fs::read_dir(folder.path())
+            .expect("a folder")
+            .map(|entry| fs::read_to_string(entry.expect("an entry").path()).expect("a record"))
+            .collect();
+        texts.sort();
+        assert_eq!(texts, ["{\"value\":2}\n", "{\"value\":3}\n"]);
+    }
+}

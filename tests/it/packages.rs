@@ -1,0 +1,30 @@
+//! What docs/ARCHITECTURE.md says of dependencies.
+
+use crate::program::workspace;
+use std::process::Command;
+
+/// The packages that a crate is built with.
+fn tree(package: &str) -> Vec<String> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let arguments =
+        ["tree", "--offline", "--edges", "normal,build", "--prefix", "none", "--package", package];
+    let output = Command::new(cargo).args(arguments).current_dir(workspace()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    text.lines().filter_map(|line| Some(line.split_whitespace().next()?.to_owned())).collect()
+}
+
+/// The siblings depend on `polycore` only, and the training framework is `mdsurrogate`'s alone.
+#[test]
+fn no_crate_is_built_with_what_it_does_not_need() {
+    let framework = |name: &String| name == "burn" || name.starts_with("burn-");
+    assert!(tree("mdsurrogate").iter().any(framework));
+    for package in ["polycore", "peri", "crystfem"] {
+        let tree = tree(package);
+        assert!(tree.iter().any(|name| name == "polycore"), "{tree:?}");
+        assert!(!tree.iter().any(framework), "{package} is built with burn");
+        for other in ["peri", "crystfem", "mdsurrogate", "evidence"] {
+            assert!(package == other || !tree.iter().any(|name| name == other), "{package}: {other}");
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Figures that no one here wrote, and ours beside them: the cases below cases/external.
+
+use polycore::report::Kind;
+use serde::Serialize;
+
+use crate::validate::outcome::Outcome;
+
+/// The folder of cases/.
+const FOLDER: &str = "external/";
+
+/// A figure and ours.
+#[derive(Serialize)]
+pub struct Other {
+    case: String,
+    anchor: String,
+    title: String,
+    quantity: String,
+    source: String,
+    kind: Kind,
+    figure: String,
+    ours: String,
+    verdict: &'static str,
+    tone: &'static str,
+}
+
+impl Other {
+    /// For docs/validation.md: case, what, source, figure with its tolerance, ours, verdict.
+    pub fn cells(&self) -> [String; 6] {
+        [&self.case, &self.quantity, &self.source, &self.figure, &self.ours, self.verdict].map(str::to_owned)
+    }
+}
+
+/// What closed forms, publications and other programs say, of all cases in the folder.
+pub fn figures(outcomes: &[Outcome]) -> Vec<Other> {
+    let of_others = |kind| matches!(kind, Kind::ClosedForm | Kind::Published | Kind::IndependentProgram);
+    let mut figures = Vec::new();
+    for outcome in outcomes.iter().filter(|outcome| outcome.case.starts_with(FOLDER)) {
+        let name = outcome.case.strip_prefix(FOLDER).unwrap_or(&outcome.case);
+        let judged = outcome.expect().iter().filter(|judgement| of_others(judgement.expect.kind));
+        figures.extend(judged.map(|judgement| {
+            let [_, quantity, value, figure, source] = judgement.row();
+            let unit = outcome.unit(&judgement.expect.quantity);
+            let (verdict, tone) = match (judgement.pass, &outcome.failure) {
+                (true, None) => ("met", "good"),
+                _ => ("missed", "bad"),
+            };
+            Other {
+                case: name.to_owned(),
+                anchor: super::anchor(&outcome.case),
+                title: outcome.title.clone(),
+                quantity,
+                source,
+                kind: judgement.expect.kind,
+                figure,
+                ours: if unit.is_empty() { value } else { format!("{value} {unit}") },
+                verdict,
+                tone,
+            }
+        }));
+    }
+    figures
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::validate::outcome::tests::{outcome, report};
+
+    #[test]
+    fn figures_of_cases_in_the_folder() {
+        let mut outcomes =
+            [outcome(&report(3.0), None), outcome(&report(4.0), None), outcome(&report(3.0), None)];
+        for (outcome, case) in outcomes.iter_mut().zip(["external/a", "external/b", "ch2/c"]) {
+            outcome.case = case.to_owned();
+        }
+        let cells: Vec<[String; 6]> = figures(&outcomes).iter().map(Other::cells).collect();
+        assert_eq!(cells[0], ["a", "kt", "a | b", "3 ± 1 %", "3", "met"]);
+        assert_eq!(cells[1], ["b", "kt", "a | b", "3 ± 1 %", "4", "missed"]);
+        assert_eq!(cells.len(), 2);
+        let mut ours = outcome(&report(3.0).replace("closed-form", "regression"), None);
+        ours.case = "external/d".to_owned();
+        assert!(figures(&[ours]).is_empty());
+    }
+}

@@ -1,0 +1,125 @@
+//! When, where and from which sources something was measured: what tells whether it still holds.
+
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use miette::{IntoDiagnostic, Result, WrapErr};
+use polycore::report::Report;
+use serde::{Deserialize, Serialize};
+
+/// Of a bench's rows, or of a number that a test measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stamp {
+    /// The commit that was checked out.
+    commit: String,
+    /// UTC, ISO 8601.
+    date: String,
+    machine: String,
+    /// Files and folders below the root, whose contents …
+    sources: Vec<String>,
+    /// … had this hash.
+    hash: String,
+}
+
+impl Stamp {
+    /// Of now, for what was measured from `sources`.
+    pub fn new(root: &Path, sources: &[String]) -> Result<Self> {
+        let provenance = Report::new("xtask", env!("CARGO_PKG_VERSION"), "").provenance;
+        let hash = hash(root, sources).into_diagnostic().wrap_err_with(|| sources.join(", "))?;
+        Ok(Self {
+            commit: provenance.git.map_or_else(|| "unknown".to_owned(), |git| git.hash),
+            date: provenance.date,
+            machine: provenance.host.cpu,
+            sources: sources.to_vec(),
+            hash,
+        })
+    }
+
+    /// The sources are what they were.
+    pub fn fresh(&self, root: &Path) -> bool {
+        hash(root, &self.sources).is_ok_and(|now| now == self.hash)
+    }
+}
+
+/// `2026-11-22, commit 0123456789, AMD EPYC`.
+impl fmt::Display for Stamp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let day = self.date.split('T').next().unwrap_or(&self.date);
+        write!(f, "{day}, commit {:.10}, {}", self.commit, self.machine)
+    }
+}
+
+/// The numerics of `polycore`, on which the other crates rest.
+const NUMERICS: [&str; 3] = ["langevin", "tensor", "hyperelastic"];
+
+/// What the numbers of crates depend on: `parts` of their folders (`src`, `tests`), and the numerics of `polycore`.
+pub fn sources(root: &Path, crates: &[&str], parts: &[&str]) -> Vec<String> {
+    let folders =
+        crates.iter().flat_map(|name| parts.iter().map(move |part| format!("crates/{name}/{part}")));
+    let below =
+        NUMERICS.iter().flat_map(|name| ["", ".rs"].map(|end| format!("crates/polycore/src/{name}{end}")));
+    folders.chain(below).filter(|source| root.join(source).exists()).collect()
+}
+
+/// Of the names and contents of all files, in the order of their names: FNV-1a, the same on every machine.
+fn hash(root: &Path, sources: &[String]) -> std::io::Result<String> {
+    let mut files = Vec::new();
+    for source in sources {
+        collect(&root.join(source), &mut files)?;
+    }
+    files.sort();
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut take = |bytes: &[u8]| {
+        for &byte in bytes {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    };
+    for file in files {
+        take(file.strip_prefix(root).unwrap_or(&file).to_string_lossy().as_bytes());
+        take(&[0]);
+        take(&fs::read(&file)?);
+        take(&[0]);
+    }
+    Ok(format!("{hash:016x}"))
+}
+
+fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    if path.is_file() {
+        files.push(path.to_path_buf());
+        return Ok(());
+    }
+    for entry in fs::read_dir(path)? {
+        collect(&entry?.path(), files)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stale_when_a_source_changes() {
+        let root = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, text: &str| {
+            let path = root.path().join(name);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+            fs::write(path, text).expect("a file");
+        };
+        write("crates/peri/src/a/b.rs", "fn b() {}");
+        write("crates/polycore/src/tensor.rs", "");
+        let sources = sources(root.path(), &["peri"], &["src", "tests"]);
+        assert_eq!(sources, ["crates/peri/src", "crates/polycore/src/tensor.rs"]);
+        let stamp = Stamp::new(root.path(), &sources).expect("a stamp");
+        write("crates/crystfem/src/lib.rs", "");
+        assert!(stamp.fresh(root.path()));
+        write("crates/peri/src/a/b.rs", "fn b() { }");
+        assert!(!stamp.fresh(root.path()));
+        write("crates/peri/src/a/b.rs", "fn b() {}");
+        assert!(stamp.fresh(root.path()));
+        write("crates/peri/src/a/c.rs", "");
+        assert!(!stamp.fresh(root.path()), "a new file");
+        assert!(Stamp::new(root.path(), &["crates/none".to_owned()]).is_err());
+    }
+}

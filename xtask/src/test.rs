@@ -1,0 +1,180 @@
+//! `cargo xtask test`: all tests; the numbers that they measure go to target/evidence.json, and what they could not test
+//! here is listed at the end.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use miette::{IntoDiagnostic, Result, WrapErr, miette};
+use polycore::output::atomic_write;
+use polycore::report::Judgement;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::stamp::{Stamp, sources};
+use crate::table::print;
+use crate::workspace::Workspace;
+
+/// As crate `evidence` names it.
+const FOLDER: &str = "EVIDENCE_FOLDER";
+
+/// A number as a test measured it, the file of crate `evidence` in words of Rust.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Record {
+    /// What cases/thesis.toml refers to.
+    pub name: String,
+    /// A number, or `NaN`, `inf`.
+    value: serde_json::Value,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tolerance: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    at_least: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    at_most: Option<f64>,
+    /// As asserted.
+    pub met: bool,
+    /// `calibrate::tests::single_point_integrals`.
+    pub test: String,
+    /// `crates/peri/src/calibrate.rs`.
+    pub file: String,
+    /// Of the run of the tests; none in a file that a test has just left.
+    pub stamp: Option<Stamp>,
+}
+
+/// What a test could not find.
+#[derive(Debug, Deserialize)]
+struct Skip {
+    skipped: String,
+    needs: String,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Left {
+    Skip(Skip),
+    Record(Box<Record>),
+}
+
+/// All records by name.
+pub type Records = BTreeMap<String, Record>;
+
+impl Record {
+    /// The value and what was asked for, for a reader.
+    pub fn cells(&self) -> [String; 2] {
+        let mut expect = json!({ "quantity": self.name, "kind": "bound", "source": "a test" });
+        let asked = [
+            ("reference", self.reference),
+            ("tolerance", self.tolerance),
+            ("at_least", self.at_least),
+            ("at_most", self.at_most),
+        ];
+        for (key, number) in asked {
+            if let Some(number) = number {
+                expect[key] = json!(number);
+            }
+        }
+        let value = self.value.as_f64();
+        let judged = serde_json::from_value(expect).map(|expect| {
+            let [_, _, value, asked, _] = Judgement { expect, value, pass: self.met, message: None }.row();
+            [value, asked]
+        });
+        let mut cells = judged.unwrap_or_default();
+        if value.is_none() {
+            cells[0] = self.value.as_str().unwrap_or_default().to_owned();
+        }
+        cells
+    }
+}
+
+/// Runs the tests; `arguments` go to `cargo test`.
+pub fn run(workspace: &Workspace, arguments: &[String]) -> Result<bool> {
+    let folder = workspace.results("evidence")?;
+    fs::remove_dir_all(&folder).into_diagnostic()?;
+    fs::create_dir_all(&folder).into_diagnostic()?;
+    let command = ["test", "--release", "--workspace"];
+    let passed = workspace.cargo(&command, arguments, &[(FOLDER, &folder)])?;
+    let (new, skips) = collect(&folder)?;
+    // a choice of tests leaves the numbers of the others
+    let mut records = if arguments.is_empty() { Records::new() } else { read(workspace) };
+    let mut stamps = BTreeMap::<String, Stamp>::new();
+    for mut record in new {
+        let crate_of = record.file.split('/').nth(1).filter(|_| record.file.starts_with("crates/"));
+        let key = crate_of.unwrap_or_default().to_owned();
+        if !stamps.contains_key(&key) {
+            let crates = crate_of.map_or_else(|| workspace.programs(), |name| vec![name.to_owned()]);
+            let crates: Vec<&str> = crates.iter().map(String::as_str).collect();
+            let sources = sources(workspace.root(), &crates, &["src", "tests"]);
+            stamps.insert(key.clone(), Stamp::new(workspace.root(), &sources)?);
+        }
+        record.stamp = stamps.get(&key).cloned();
+        records.insert(record.name.clone(), record);
+    }
+    atomic_write(workspace.target().join("evidence.json"), |file| {
+        Ok(serde_json::to_writer_pretty(file, &records.values().collect::<Vec<_>>())?)
+    })
+    .into_diagnostic()?;
+    print(&untested(&skips));
+    Ok(passed)
+}
+
+/// The records of the last runs; none where there was no run.
+pub fn read(workspace: &Workspace) -> Records {
+    let text = fs::read_to_string(workspace.target().join("evidence.json")).unwrap_or_default();
+    let records: Vec<Record> = serde_json::from_str(&text).unwrap_or_default();
+    records.into_iter().map(|record| (record.name.clone(), record)).collect()
+}
+
+/// What tests have left in the folder.
+fn collect(folder: &Path) -> Result<(Vec<Record>, Vec<Skip>)> {
+    let (mut records, mut skips) = (Vec::new(), Vec::new());
+    for entry in fs::read_dir(folder).into_diagnostic()? {
+        let path = entry.into_diagnostic()?.path();
+        if path.extension().is_none_or(|extension| extension != "json") {
+            continue;
+        }
+        let text =
+            fs::read_to_string(&path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+        match serde_json::from_str(&text).map_err(|error| miette!("{}: {error}", path.display()))? {
+            Left::Skip(skip) => skips.push(skip),
+            Left::Record(record) => records.push(*record),
+        }
+    }
+    skips.sort_by(|a, b| a.skipped.cmp(&b.skipped));
+    Ok((records, skips))
+}
+
+/// What was not tested; empty if everything was.
+fn untested(skips: &[Skip]) -> String {
+    let lines = skips.iter().map(|skip| format!("  {}: needs {}\n", skip.skipped, skip.needs));
+    let lines: String = lines.collect();
+    if lines.is_empty() { lines } else { format!("not tested here:\n{lines}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_tests_leave() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("a file");
+        write("1.json", r#"{"skipped": "export::fortran", "needs": "gfortran"}"#);
+        write(
+            "2.json",
+            r#"{"name": "n", "value": 1.5, "reference": 1.4, "tolerance": 0.2, "met": true, "test": "t", "file": "crates/peri/src/a.rs"}"#,
+        );
+        write(
+            "3.json",
+            r#"{"name": "m", "value": "NaN", "at_most": 1e-12, "met": false, "test": "t", "file": "crates/peri/src/a.rs"}"#,
+        );
+        write("4.17.part", "{");
+        let (mut records, skips) = collect(folder.path()).expect("records");
+        records.sort_by(|a, b| a.name.cmp(&b.name));
+        assert_eq!(records[1].cells(), ["1.5", "1.4 ± 0.2"]);
+        assert_eq!(records[0].cells(), ["NaN", "≤ 1.00000e-12"]);
+        assert_eq!(untested(&skips), "not tested here:\n  export::fortran: needs gfortran\n");
+        assert_eq!(untested(&[]), "");
+    }
+}
