@@ -116,7 +116,8 @@ impl Eval {
         });
         polycore::output::prepare_run(&output)?;
         let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), &source.text);
-        let named: Vec<Named> = laws.iter().map(|(name, law)| Named { name, law, seconds: None }).collect();
+        let named: Vec<Named> =
+            laws.iter().map(|(name, law)| Named { name, law, runs: &[], seconds: None }).collect();
         let table = judge_laws(&named, &data, &output, &mut report)?;
         report.threads(1).write(&output)?;
         polycore::command::print(report.table());

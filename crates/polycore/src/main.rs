@@ -16,7 +16,9 @@ mod cli {
     pub mod draw;
     pub mod exact;
     pub mod fits;
+    pub mod material;
     pub mod scene;
+    pub mod trials;
 }
 
 use cli::{exact, fits, scene::Case};
@@ -31,11 +33,11 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Run a case: fits, tables, pictures, report.json.
+    /// Run a case: fits, trials, tables, pictures, report.json.
     Run {
         /// The scene, a TOML file.
         case: PathBuf,
-        /// Where the results go; `out/<folder of the case>` if not given.
+        /// Where the results go; `out/NAME` if not given, NAME being the scene's file, or its folder if the file is `case.toml`.
         #[arg(long, short)]
         output: Option<PathBuf>,
         /// Fit and judge, but draw no pictures.
@@ -75,7 +77,7 @@ fn main() -> ExitCode {
 
 fn run(path: &Path, output: Option<PathBuf>, quick: bool) -> Result<bool, Failure<Error>> {
     let case = Case::read(path)?;
-    let directory = output.unwrap_or_else(|| Path::new("out").join(case.name()));
+    let directory = output.unwrap_or_else(|| polycore::command::default_output(path));
     polycore::output::prepare_directory(&directory)?;
     let report = fits::run(&case, &directory, quick)?;
     polycore::say!("{}", directory.join(polycore::report::FILE_NAME).display());

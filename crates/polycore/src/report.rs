@@ -164,7 +164,7 @@ impl Report {
         self.refresh()
     }
 
-    /// Everything asked for was met and every number is finite.
+    /// Everything asked for was met, every trial passed, and every number is finite.
     pub fn passed(&self) -> bool {
         self.passed
     }
@@ -255,7 +255,8 @@ impl Report {
                 }
             }
         }
-        self.passed = self.non_finite.is_empty() && self.expect.iter().all(|judgement| judgement.pass);
+        let judged = self.expect.iter().all(|judgement| judgement.pass);
+        self.passed = self.non_finite.is_empty() && judged && self.trials.iter().all(|trial| trial.passed);
         self
     }
 }

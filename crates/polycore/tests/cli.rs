@@ -55,7 +55,7 @@ fn the_case_of_chapter_1_passes() {
     assert_eq!(result.status.code(), Some(0), "{}{}", text(&result.stdout), text(&result.stderr));
     let report = Report::read(folder.path().join("report.json")).unwrap();
     assert!(report.passed());
-    assert_eq!(report.expect.len(), 6);
+    assert_eq!(report.expect.len(), 8);
     for file in [
         "fits.csv",
         "kawabata_states.csv",
@@ -114,6 +114,112 @@ fn bad_scenes_exit_with_2_and_write_nothing() {
     assert_eq!(polycore(&["run", "no/such/case.toml"]).status.code(), Some(2));
 }
 
+/// Two scenes of one folder have results of their own, the parameters are printed, and so is what `peri` takes.
+#[test]
+fn what_a_newcomer_sees() {
+    let (folder, scene) = folder(SCENE);
+    let other = folder.path().join("chains.toml");
+    std::fs::write(&other, SCENE.replace("neo-hookean", "eight-chain").replace("laws", "cross = true\nlaws"))
+        .unwrap();
+    let mut texts = Vec::new();
+    for name in [scene.file_name(), other.file_name()] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_polycore"));
+        let result = command.current_dir(folder.path()).arg("run").arg(name.unwrap()).arg("--quick").output();
+        texts.push(text(&result.unwrap().stdout));
+    }
+    assert!(folder.path().join("out/chains/report.json").exists());
+    assert_eq!(std::fs::read_dir(folder.path().join("out")).unwrap().count(), 2);
+    assert!(texts[0].contains("neo-hookean           shear_modulus 0.50000 ± "), "{}", texts[0]);
+    assert!(
+        texts[0].contains("youngs_modulus = \"1.5") && texts[0].contains("law = \"pmb\""),
+        "{}",
+        texts[0]
+    );
+    assert!(texts[1].contains("links "), "{}", texts[1]);
+    let blocks = std::fs::read_to_string(folder.path().join("out/chains/materials.toml")).unwrap();
+    assert!(toml::from_str::<toml::Table>(&blocks).unwrap().contains_key("material"), "{blocks}");
+    let plan = text(&polycore(&["check", scene.to_str().unwrap()]).stdout);
+    assert!(plan.contains("no line `# source: …` in it"), "{plan}");
+}
+
+const TRIALS: &str = r#"
+version = 1
+program = "polycore"
+[[trial]]
+name = "locked"
+must = "be refused"
+law = "gent"
+parameters = ["1 MPa", 5.0625]
+mode = "equibiaxial"
+stretch = 2.0
+refused = "locking value 5.0625"
+[[trial]]
+name = "strip"
+must = "be linear in the modulus"
+law = "neo-hookean"
+parameters = ["1 MPa"]
+mode = "pure-shear"
+stretch = 2.0
+[[trial]]
+name = "line"
+must = "go through its datum"
+law = "neo-hookean"
+data = [[2.0, "1.75 MPa"]]
+[[expect]]
+quantity = "strip.nominal"
+reference = 1.875
+tolerance = 1e-12
+kind = "closed-form"
+source = "λ − 1/λ³"
+[[expect]]
+quantity = "line.shear_modulus"
+reference = 1.0
+tolerance = 1e-9
+kind = "closed-form"
+source = "P(2) = 1.75 μ"
+"#;
+
+#[test]
+fn trials_pass_and_fail() {
+    let (folder, scene) = folder(TRIALS);
+    let out = folder.path().join("out");
+    assert_eq!(run(&scene, &out).status.code(), Some(0));
+    let report = Report::read(out.join("report.json")).unwrap();
+    assert_eq!(report.trials.len(), 3);
+    // a law that answers where it must refuse, one that refuses in other words, and a wrong figure
+    for (from, to) in
+        [("5.0625]", "6.0]"), ("locking value", "overflow"), ("reference = 1.875", "reference = 2.0")]
+    {
+        assert!(TRIALS.contains(from), "{from}");
+        std::fs::write(&scene, TRIALS.replacen(from, to, 1)).unwrap();
+        assert_eq!(run(&scene, &out).status.code(), Some(1), "{from}");
+        let report = Report::read(out.join("report.json")).unwrap();
+        assert!(
+            !report.passed() && report.trials.iter().filter(|trial| !trial.passed).count() == 1,
+            "{from}"
+        );
+    }
+    for (from, to, message) in [
+        ("law = \"gent\"", "law = \"gnet\"", "trial[0].law"),
+        ("[\"1 MPa\", 5.0625]", "[\"1 MPa\"]", "shear_modulus, J_m"),
+        ("[\"1 MPa\", 5.0625]", "[1.0, 5.0625]", "without a unit"),
+        ("[\"1 MPa\", 5.0625]", "[\"1 MPa\", \"5 MPa\"]", "with a unit"),
+        ("stretch = 2.0\nrefused", "refused", "no `stretch`"),
+        ("name = \"strip\"", "name = \"locked\"", "a second time"),
+        ("data = [[2.0, \"1.75 MPa\"]]", "", "neither"),
+        ("mode = \"pure-shear\"", "mode = \"shear\"", "unknown variant"),
+        ("\"strip.nominal\"", "\"strip.stress\"", "does not compute"),
+    ] {
+        assert!(TRIALS.contains(from), "{from}");
+        std::fs::write(&scene, TRIALS.replacen(from, to, 1)).unwrap();
+        let result = polycore(&["check", scene.to_str().unwrap()]);
+        let error = text(&result.stderr);
+        assert_eq!(result.status.code(), Some(2), "{from}: {error}");
+        let joined = error.replace(['\n', '│'], " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(joined.contains(message), "{from}: {error}");
+    }
+}
+
 #[test]
 fn check_says_what_run_would_do() {
     let result = polycore(&["check", CASE]);
@@ -121,7 +227,7 @@ fn check_says_what_run_would_do() {
     let text = text(&result.stdout);
     assert!(text.contains("data treloar: 21 states, 20 measured stresses"), "{text}");
     assert!(text.contains("law eight-chain: chain_modulus, links"), "{text}");
-    assert!(text.contains("18 fits, 6 expectations"), "{text}");
+    assert!(text.contains("18 fits, 0 trials, 8 expectations"), "{text}");
 }
 
 #[test]

@@ -169,7 +169,7 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
                 (f, cauchy_of_material(&f, &s))
             }
         };
-        target.push(Row { sample, time, deformation, cauchy, c, s });
+        target.push(Row { sample, time, deformation, cauchy, c, s, nominal: None });
     }
     if names.iter().any(|name| name == "provenance") {
         let lines = dataset(&file, "provenance", size).and_then(|dataset| dataset.read_vlen_strings());

@@ -15,7 +15,7 @@ pub use statistics::{Leak, Noise, leak, noise};
 
 use crate::Error;
 use crate::kinematics::{NAMES, material_pair};
-use polycore::tensor::{DeformationGradient, Voigt};
+use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Stretches between which data are taken for deformations: beyond, a unit is wrong.
@@ -39,13 +39,49 @@ pub struct Row {
     pub c: Voigt,
     /// S (3.3), Pa.
     pub s: Voigt,
+    /// P₁, P₂, Pa, where nominal stresses of an incompressible body with a free third face were measured and no whole
+    /// stress; exactly 0: not measured. σ and S then have what these say, and 0 elsewhere.
+    pub nominal: Option<[f64; 2]>,
 }
 
 impl Row {
     /// A row from F and σ, with C and S after (3.5), (3.6).
     pub fn new(sample: u64, time: f64, deformation: DeformationGradient, cauchy: Voigt) -> Self {
         let (c, s) = material_pair(&deformation, &cauchy);
-        Self { sample, time, deformation, cauchy, c, s }
+        Self { sample, time, deformation, cauchy, c, s, nominal: None }
+    }
+
+    /// A row of an incompressible body with a free third face: λ₁, λ₂ (λ₃ = 1/(λ₁λ₂)), and P₁, P₂ in Pa, 0 where it was
+    /// not measured.
+    ///
+    /// # Errors
+    /// Stretches that are not positive and finite.
+    pub fn of_nominal(sample: u64, [a, b]: [f64; 2], nominal: [f64; 2]) -> Result<Self, Error> {
+        let f = DeformationGradient::new(Tensor::from_diagonal(&[a, b, 1.0 / (a * b)].into()))?;
+        // σᵢ = λᵢ Pᵢ where J = 1
+        let cauchy = Voigt::new(nominal[0] * a, nominal[1] * b, 0.0, 0.0, 0.0, 0.0);
+        Ok(Self { nominal: Some(nominal), ..Self::new(sample, f64::NAN, f, cauchy) })
+    }
+
+    /// What takes a law's S to what was measured, where that is no whole stress: Pᵢ = (λᵢ² Sᵢᵢ − λ₃² S₃₃)/λᵢ, the pressure
+    /// being eliminated by P₃ = 0; zero for what was not measured.
+    pub fn elimination(&self) -> Option<[[f64; 6]; 6]> {
+        let nominal = self.nominal?;
+        let mut map = [[0.0; 6]; 6];
+        for i in (0..2).filter(|&i| nominal[i] != 0.0) {
+            let stretch = self.c[i].sqrt();
+            (map[i][i], map[i][2]) = (stretch, -self.c[2] / stretch);
+        }
+        Some(map)
+    }
+
+    /// What was measured, and what a law's S says of it, Pa: S, or the nominal stresses of [`Row::elimination`].
+    pub fn compared(&self, predicted: &Voigt) -> [Voigt; 2] {
+        let (Some(map), Some([first, second])) = (self.elimination(), self.nominal) else {
+            return [self.s, *predicted];
+        };
+        let sum = |a: usize| map[a].iter().zip(predicted).map(|(weight, stress)| weight * stress).sum();
+        [Voigt::new(first, second, 0.0, 0.0, 0.0, 0.0), Voigt::from_fn(|a, _| sum(a))]
     }
 }
 
@@ -102,6 +138,11 @@ impl Dataset {
             *kinds.entry(path.kind.as_str()).or_default() += 1;
         }
         kinds
+    }
+
+    /// Whether any row has nominal stresses in place of a whole stress ([`Row::nominal`]).
+    pub fn is_nominal(&self) -> bool {
+        self.rows().any(|row| row.nominal.is_some())
     }
 
     /// Appends the runs of another set.
@@ -173,7 +214,11 @@ impl Dataset {
         let mut seen: HashMap<Vec<[u64; 12]>, &str> = HashMap::new();
         for path in &self.paths {
             for row in &path.rows {
-                let stretches = row.deformation.principal_stretches();
+                let mut stretches = row.deformation.principal_stretches();
+                if row.nominal.is_some() {
+                    // the thickness is what incompressibility makes of the others
+                    stretches = [row.c[0].sqrt(), row.c[1].sqrt(), 1.0];
+                }
                 let far = stretches.iter().find(|l| !(STRETCHES[0]..=STRETCHES[1]).contains(*l));
                 if let Some(stretch) = far {
                     return Err(Error::Implausible {

@@ -4,6 +4,7 @@ use super::table::{Column, Table};
 use super::{Dataset, Path, Row};
 use crate::Error;
 use crate::kinematics::{PeriodicBox, cauchy_of_material, stretch_of};
+use polycore::hyperelastic;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -50,7 +51,9 @@ impl Default for ReadOptions {
 /// Forms of a table, told by its headings:
 /// - `lx ly lz` (Å; with `xy xz yz` if the box is tilted) and `sxx syy szz sxy sxz syz` (σ), or the same with `avg_`;
 /// - `F11 F12 … F33` (all nine) and `sxx …` or `avg_sxx …`;
-/// - `C11 C22 C33 C12 C13 C23` and `S11 … S23`.
+/// - `C11 C22 C33 C12 C13 C23` and `S11 … S23`;
+/// - nominal stresses of an incompressible body, as [`hyperelastic::data::Table`] has them: `stretch,nominal_MPa`,
+///   `mode,stretch,nominal_MPa` (a run for each mode) or `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`.
 ///
 /// Optional columns: `run_id` (without it a file is one path), `kind`, `rate_x rate_y rate_z` (1/fs), `sample`,
 /// `time_fs`. Stress is in MPa, or in the unit of its heading. A row whose averaged cells are all empty (the state before a run) is skipped and counted.
@@ -67,7 +70,12 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
         #[cfg(feature = "hdf5")]
         set
     } else {
-        table(&Table::read(path)?, options)?
+        let text = Table::read(path)?;
+        if ["mode", "stretch", "stretch_1"].iter().any(|name| text.has(name)) {
+            nominal(&text)?
+        } else {
+            table(&text, options)?
+        }
     };
     set.check().map_err(|error| match error {
         Error::Implausible { place, quantity, found, allowed } => {
@@ -185,12 +193,53 @@ impl Form {
     }
 }
 
+/// Nominal stresses over stretches: a run for each test, in order of appearance.
+fn nominal(table: &Table) -> Result<Dataset, Error> {
+    let path = &table.path;
+    let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
+    let read = hyperelastic::data::Table::parse("", &text).map_err(|error| {
+        let found = match error {
+            hyperelastic::Error::Data { reason, .. } => reason,
+            other => other.to_string(),
+        };
+        Error::file(path, found, "stretches and nominal stresses of an incompressible body")
+    })?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let mut set = Dataset::default();
+    for state in &read.states {
+        let kind = state.mode.name();
+        let known = set.paths.iter().position(|run| run.kind == kind);
+        let run = known.unwrap_or_else(|| {
+            let id = if table.has("mode") { kind.to_owned() } else { stem.to_string() };
+            set.paths.push(Path { id, kind: kind.to_owned(), rates: [f64::NAN; 3], rows: Vec::new() });
+            set.paths.len() - 1
+        });
+        // a body at rest is a condition, which every law here meets
+        if state.nominal != [0.0; 2] {
+            let rows = &mut set.paths[run].rows;
+            rows.push(Row::of_nominal(rows.len() as u64, state.stretches, state.nominal)?);
+        } else {
+            set.skipped += 1;
+        }
+    }
+    set.paths.retain(|run| !run.rows.is_empty());
+    set.provenance.push(format!(
+        "{}: {}, nominal stresses, {} rows of {} runs, {} at rest or free",
+        name_of(path),
+        table.fingerprint,
+        set.len(),
+        set.paths.len(),
+        set.skipped
+    ));
+    Ok(set)
+}
+
 /// The error of a table without any of the forms of [`read`].
 fn unknown_form(table: &Table, columns: Columns) -> Error {
     let headings: Vec<&str> = table.headings.iter().map(|(name, _)| name.as_str()).collect();
     let found = format!("the headings {}", headings.join(", "));
-    let forms =
-        "C11 C22 C33 C12 C13 C23 and S11 … S23, or F11 F12 … F33 or lx ly lz and sxx syy szz sxy sxz syz";
+    let forms = "C11 C22 C33 C12 C13 C23 and S11 … S23, or F11 F12 … F33 or lx ly lz and sxx syy szz sxy sxz syz, or (rubber) \
+         mode, stretch, nominal_MPa";
     let allowed = match columns {
         _ if headings.len() == 1 => format!("{forms}, separated by commas"),
         Columns::Averaged if table.has("lx") => {

@@ -24,10 +24,14 @@ pub struct Noise {
     pub differences: usize,
 }
 
-/// The noise of a stress, from second differences along the paths; none where no path has three rows.
+/// The noise of a stress, from second differences along the paths; none where no path has three rows, and none of nominal
+/// stresses ([`Row::nominal`]): tables of tests are too coarse and uneven for it.
 ///
 /// `stress` picks it from a row: σ or S.
 pub fn noise(set: &Dataset, stress: fn(&Row) -> Voigt) -> Option<Noise> {
+    if set.is_nominal() {
+        return None;
+    }
     let filter = residual_filter();
     let (mut squares, mut differences) = (Voigt::zeros(), 0);
     let (mut products, mut powers) = (0.0, 0.0);

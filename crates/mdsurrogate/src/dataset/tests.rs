@@ -148,6 +148,40 @@ fn tables_of_c_and_s() {
     assert_eq!(set.constant_components().len(), 12);
 }
 
+/// The pressure of a free face is eliminated: a neo-Hookean S = μ1 has P = μ(λ − λ₃²/λ) in every mode.
+#[test]
+fn nominal_stresses_of_rubber() {
+    let text = "# source: by hand\nmode,stretch,nominal_MPa\nuniaxial,1,0\nuniaxial,2,1\npure-shear,3,1.5\n";
+    let set = read_text(text).unwrap();
+    let ids: Vec<&str> = set.paths.iter().map(|path| path.id.as_str()).collect();
+    assert_eq!((ids, set.skipped, set.len()), (vec!["uniaxial", "pure-shear"], 1, 2));
+    assert!(set.is_nominal() && noise(&set, |row| row.s).is_none());
+    let row = &set.paths[1].rows[0];
+    assert!((row.c - Voigt::new(9.0, 1.0, 1.0 / 9.0, 0.0, 0.0, 0.0)).amax() < 1e-15);
+    let pressure = 7e6;
+    let of = |mu: f64| Voigt::from_fn(|a, _| if a < 3 { mu - pressure / row.c[a] } else { 0.0 });
+    let [measured, predicted] = row.compared(&of(0.4e6));
+    assert_eq!(measured, Voigt::new(1.5e6, 0.0, 0.0, 0.0, 0.0, 0.0));
+    assert!((predicted[0] / (0.4e6 * (3.0 - 1.0 / 27.0)) - 1.0).abs() < 1e-12);
+    // the other stress was not measured
+    assert_eq!(predicted[1], 0.0);
+    // a thickness of 0.05 is no wrong unit, a stretch of 20 is
+    let sheet = |stretch: f64| format!("mode,stretch,nominal_MPa\nequibiaxial,{stretch},2.45\n");
+    assert!(read_text(&sheet(4.45)).is_ok() && read_text(&sheet(20.0)).is_err());
+    let biaxial = "stretch_1,stretch_2,nominal_1_kPa,nominal_2_kPa\n2,1.5,300,200\n";
+    let set = read_text(biaxial).unwrap();
+    assert_eq!((set.paths[0].id.as_str(), set.paths[0].kind.as_str()), ("t", "biaxial"));
+    assert_eq!(set.paths[0].rows[0].nominal, Some([3e5, 2e5]));
+    for (text, message) in [
+        ("stretch,nominal_kg\n1,2\n", "header `stretch,nominal_kg`"),
+        ("mode,stretch,nominal_MPa\nshear,1,2\n", "line 2: mode `shear`"),
+        ("stretch,nominal_MPa\n1,x\n", "line 2: `x` is no number"),
+    ] {
+        let error = read_text(text).unwrap_err().to_string();
+        assert!(error.contains(message), "{error}");
+    }
+}
+
 #[test]
 fn every_fault_of_a_table_is_named() {
     let box_row = "a,0,1,1,1,10,10,10,11,10,10,50,0,0,0,0,0\n";

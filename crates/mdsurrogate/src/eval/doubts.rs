@@ -38,10 +38,11 @@ impl Doubts {
         let (mut errors, mut spreads) = (Vec::new(), Vec::new());
         for row in rows {
             let answer = law.stress(&row.c, &mut memory)?;
-            let error = (answer.stress - row.s).norm();
+            let [measured, predicted] = row.compared(&answer.stress);
+            let error = (predicted - measured).norm();
             let flags = answer.flags;
             let raised = [flags.any(), flags.outside.contains(&true), flags.far, flags.spread];
-            let (count, of) = match error > BAD * row.s.norm() && error > ABOVE_NOISE * noise {
+            let (count, of) = match error > BAD * measured.norm() && error > ABOVE_NOISE * noise {
                 true => (&mut doubts.bad, &mut doubts.caught),
                 false => (&mut doubts.good, &mut doubts.alarms),
             };

@@ -47,9 +47,10 @@ pub fn errors<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a Row>) -> Resul
     let (mut count, mut stressed) = (0, 0);
     for row in rows {
         let answer = law.stress(&row.c, &mut memory)?;
-        let error = answer.stress - row.s;
+        let [measured, predicted] = row.compared(&answer.stress);
+        let error = predicted - measured;
         squares += error.component_mul(&error);
-        if let Some(share) = percentage_error(&row.s, &answer.stress) {
+        if let Some(share) = percentage_error(&measured, &predicted) {
             percentage += share;
             stressed += 1;
         }
@@ -63,6 +64,49 @@ pub fn errors<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a Row>) -> Resul
         percentage: over(percentage, stressed),
         flagged,
     })
+}
+
+/// How well a law follows measured nominal stresses, in the figures that fits to rubber are published with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Agreement {
+    /// Measured stresses.
+    pub count: usize,
+    /// Mean of |P − P̂|, Pa.
+    pub absolute: f64,
+    /// Σ(P − P̂)², Pa².
+    pub squares: f64,
+    /// 1 − Σ(P − P̂)²/Σ(P − P̄)² with P̄ the mean; none where all are the same.
+    pub r2: Option<f64>,
+}
+
+/// The agreement of a law with the nominal stresses among some rows; none without any.
+///
+/// # Errors
+/// Those of [`Surrogate::stress`].
+pub fn agreement<'a>(
+    law: &Surrogate,
+    rows: impl Iterator<Item = &'a Row>,
+) -> Result<Option<Agreement>, Error> {
+    let mut memory = Workspace::default();
+    let mut pairs = Vec::new();
+    for row in rows {
+        let Some(nominal) = row.nominal else { continue };
+        let [measured, predicted] = row.compared(&law.stress(&row.c, &mut memory)?.stress);
+        pairs.extend((0..2).filter(|&i| nominal[i] != 0.0).map(|i| [measured[i], predicted[i]]));
+    }
+    if pairs.is_empty() {
+        return Ok(None);
+    }
+    let count = pairs.len() as f64;
+    let mean = pairs.iter().map(|[measured, _]| measured).sum::<f64>() / count;
+    let squares = pairs.iter().map(|[measured, predicted]| (predicted - measured).powi(2)).sum::<f64>();
+    let variation: f64 = pairs.iter().map(|[measured, _]| (measured - mean).powi(2)).sum();
+    Ok(Some(Agreement {
+        count: pairs.len(),
+        absolute: pairs.iter().map(|[measured, predicted]| (predicted - measured).abs()).sum::<f64>() / count,
+        squares,
+        r2: (variation > 0.0).then(|| 1.0 - squares / variation),
+    }))
 }
 
 /// 100 ‖S − Ŝ‖/‖S‖ (3.13) with the norm of the six components; none where S = 0.

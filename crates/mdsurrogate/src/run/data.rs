@@ -7,6 +7,7 @@ use crate::dataset::{
 use crate::error::Error;
 use crate::kinematics::{ANGSTROM, NAMES, PeriodicBox};
 use crate::scene::{Data, Scene};
+use crate::surrogate::{Kind, Symmetry};
 use polycore::output::csv;
 use polycore::output::picture::{LinePlot, Series};
 use polycore::report::Report;
@@ -86,7 +87,46 @@ impl Prepared {
                 other => source.error("split", other, "a split that the data allow"),
             },
         )?;
-        Ok(Self { set, heldout, split })
+        let data = Self { set, heldout, split };
+        data.check_models(source, scene)?;
+        Ok(data)
+    }
+
+    /// Whether every model can learn from these data.
+    fn check_models(&self, source: &Source, scene: &Scene) -> Result<(), Failure> {
+        if self.set.is_nominal() && scene.search.is_some() {
+            let found = "a search for an ann, which has no pressure to eliminate";
+            return Err(source.error("search", found, "data of whole stresses").into());
+        }
+        for (index, model) in scene.model.iter().enumerate() {
+            let at = |key: &str| format!("model[{index}].{key}");
+            let isotropic = matches!(model.law(), Kind::Energy { symmetry: Symmetry::Isotropic, .. });
+            if self.set.is_nominal() && !isotropic {
+                let key = if model.symmetry.is_some() { "symmetry" } else { "kind" };
+                let allowed = "`kind = \"energy\"` and `symmetry = \"isotropic\"` for nominal stresses of an \
+                               incompressible body";
+                return Err(source.error(&at(key), "another law", allowed).into());
+            }
+            for name in &model.runs {
+                if !self.set.paths.iter().any(|path| path.id == *name) {
+                    let known: Vec<&str> =
+                        self.set.paths.iter().map(|path| path.id.as_str()).take(20).collect();
+                    return Err(source.error(&at("runs"), format!("`{name}`"), known.join(", ")).into());
+                }
+            }
+            if self.rows_of(&self.split.train, &model.runs).is_empty() {
+                let found = "runs without a training row";
+                return Err(source.error(&at("runs"), found, "runs that the split trains on").into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Rows of the set by their numbers, of some runs; of all where none is named.
+    pub fn rows_of(&self, numbers: &[usize], runs: &[String]) -> Vec<&Row> {
+        let paths = self.set.path_of_rows();
+        let of = |row: &&usize| runs.is_empty() || runs.contains(&self.set.paths[paths[**row]].id);
+        self.rows(&numbers.iter().filter(of).copied().collect::<Vec<_>>())
     }
 
     /// Rows of the set by their numbers.
@@ -128,8 +168,12 @@ impl Prepared {
     /// # Errors
     /// I/O errors.
     pub fn write(&self, output: &Path) -> Result<(), Error> {
-        hdf5::write(output.join("data.h5"), &self.set, Some((&self.split, &self.standardisation()?)))?;
-        if let Some(heldout) = &self.heldout {
+        // the layout has no place for what was not measured
+        if !self.set.is_nominal() {
+            let labels = Some((&self.split, &self.standardisation()?));
+            hdf5::write(output.join("data.h5"), &self.set, labels)?;
+        }
+        if let Some(heldout) = self.heldout.as_ref().filter(|set| !set.is_nominal()) {
             hdf5::write(output.join("heldout.h5"), heldout, None)?;
         }
         draw(&self.set, self.heldout.as_ref(), output)

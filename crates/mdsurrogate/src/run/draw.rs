@@ -83,15 +83,15 @@ pub(super) fn heldout(seen: &[Heldout], names: &[&str], output: &Path) -> Result
     for held in seen {
         let component = NAMES[held.axis];
         let c: Vec<f64> = held.run.rows.iter().map(|row| row.c[held.axis]).collect();
-        let measured: Vec<f64> = held.run.rows.iter().map(|row| row.s[held.axis] / 1e6).collect();
+        let (stress, measured) = held.measured();
         let rates = match held.within {
             Some(true) => ", rates within the training range",
             Some(false) => ", rates beyond the training range",
             None => "",
         };
         let mut plot = LinePlot::new(&format!("Held-out run {}{rates}", held.run.id))
-            .axes(&format!("C{component}"), &format!("S{component} (MPa)"))
-            .series(Series::reference("molecular dynamics", &c, &measured));
+            .axes(&format!("C{component}"), &format!("{stress} (MPa)"))
+            .series(Series::reference("measured", &c, &measured));
         for (name, predicted) in names.iter().zip(&held.predicted) {
             let along: Vec<f64> = predicted.iter().map(|stress| stress[held.axis] / 1e6).collect();
             plot = plot.series(Series::line(name, &c, &along));

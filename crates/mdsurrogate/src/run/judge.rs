@@ -4,7 +4,7 @@ use super::{Failure, Prepared, draw, short};
 use crate::dataset::{Path as Path_, Row, noise};
 use crate::error::Error;
 use crate::eval::{
-    Doubts, Errors, FLAGS, Physics, errors, percentage_error, seconds_of_a_stress, within_rates,
+    Doubts, Errors, FLAGS, Physics, agreement, errors, percentage_error, seconds_of_a_stress, within_rates,
 };
 use crate::surrogate::{Surrogate, Workspace};
 use polycore::output::csv;
@@ -25,6 +25,8 @@ pub struct Named<'a> {
     pub name: &'a str,
     /// The law.
     pub law: &'a Surrogate,
+    /// The training runs that it learnt from; empty for all.
+    pub runs: &'a [String],
     /// How long it was trained, where that is known.
     pub seconds: Option<f64>,
 }
@@ -36,8 +38,18 @@ pub(super) struct Heldout<'a> {
     pub axis: usize,
     /// Whether its rates lie within those of the training runs, where that is known.
     pub within: Option<bool>,
-    /// Of each law: S at the rows.
+    /// Of each law: S at the rows, or what was measured there ([`Row::compared`]).
     pub predicted: Vec<Vec<[f64; 6]>>,
+}
+
+impl Heldout<'_> {
+    /// What was measured along the axis, and its name.
+    pub fn measured(&self) -> (String, Vec<f64>) {
+        let rows = &self.run.rows;
+        let letter = if rows.iter().any(|row| row.nominal.is_some()) { "P" } else { "S" };
+        let along = rows.iter().map(|row| row.compared(&row.s)[0][self.axis] / 1e6).collect();
+        (format!("{letter}{}", crate::kinematics::NAMES[self.axis]), along)
+    }
 }
 
 /// Judges laws: values into the report, CSV and pictures into `output`; gives a table in lines.
@@ -73,18 +85,23 @@ pub fn judge_laws(
     // of a row: √ of the floor, which is a sum over components
     let chance = floor.unwrap_or(0.0).sqrt();
     let stress_square = test.iter().map(|row| row.s.norm_squared()).sum::<f64>() / test.len().max(1) as f64;
-    for Named { name, law, seconds } in laws {
+    for Named { name, law, runs, seconds } in laws {
         let sets = [
             ("training", &data.split.train),
             ("validation", &data.split.validation),
             ("test", &data.split.test),
         ];
         for (set, rows) in sets.into_iter().filter(|(_, rows)| !rows.is_empty()) {
-            let found = errors(law, data.rows(rows).into_iter())?;
+            // whatever a law did not learn from it is tested on
+            let rows = if set == "test" { data.rows(rows) } else { data.rows_of(rows, runs) };
+            let found = errors(law, rows.iter().copied())?;
             record(report, name, set, &found, floor);
             if set == "test" {
-                doubt(report, name, set, law, &Doubts::of(law, data.rows(rows).into_iter(), chance)?);
+                doubt(report, name, set, law, &Doubts::of(law, rows.into_iter(), chance)?);
             }
+        }
+        if data.set.is_nominal() {
+            table.extend(by_mode(report, name, law, runs, data)?);
         }
         for run in data.heldout.iter().flat_map(|set| &set.paths) {
             let found = errors(law, run.rows.iter())?;
@@ -141,6 +158,42 @@ pub fn judge_laws(
     Ok(table)
 }
 
+/// R² and mean absolute error of each run with nominal stresses and of all; lines that say so.
+fn by_mode(
+    report: &mut Report,
+    name: &str,
+    law: &Surrogate,
+    runs: &[String],
+    data: &Prepared,
+) -> Result<Vec<String>, Error> {
+    let mut lines = Vec::new();
+    let whole = ("all runs".to_owned(), data.set.paths.iter().collect::<Vec<_>>());
+    let single = data.set.paths.iter().map(|path| (format!("run {}", path.id), vec![path]));
+    for (what, paths) in single.chain([whole]) {
+        let rows = || paths.iter().flat_map(|path| &path.rows);
+        let Some(found) = agreement(law, rows())? else { continue };
+        let doubts = Doubts::of(law, rows(), 0.0)?;
+        doubt(report, name, &what, law, &doubts);
+        let flagged = (doubts.caught[0] + doubts.alarms[0]) as f64 / (doubts.bad + doubts.good) as f64;
+        report.value(&format!("{name} {what} share flagged"), flagged, "");
+        report.value(&format!("{name} {what} mean absolute error"), found.absolute / 1e6, "MPa");
+        let rms = (found.squares / found.count as f64).sqrt() / 1e6;
+        report.value(&format!("{name} {what} rms"), rms, "MPa");
+        if let Some(r2) = found.r2 {
+            report.value(&format!("{name} {what} R2"), r2, "");
+        }
+        let learnt = paths.iter().all(|path| runs.is_empty() || runs.contains(&path.id));
+        lines.push(format!(
+            "{name:<16} {what:<18} R² {:>9}  mean |P − P̂| {:>9} MPa  {}flagged {:.0} %",
+            found.r2.map_or("-".into(), |r2| format!("{r2:.5}")),
+            short(found.absolute / 1e6),
+            if learnt { "learnt, " } else { "" },
+            100.0 * flagged
+        ));
+    }
+    Ok(lines)
+}
+
 fn record(report: &mut Report, name: &str, set: &str, errors: &Errors, floor: Option<f64>) {
     report.value(&format!("{name} {set} error (3.12)"), errors.mean_square() / 1e12, "MPa²");
     report.value(&format!("{name} {set} error per component"), errors.mean_square() / 6e12, "MPa²");
@@ -191,8 +244,9 @@ fn look_at_heldout<'a>(laws: &[Named], data: &'a Prepared) -> Result<Vec<Heldout
     for run in data.heldout.iter().flat_map(|set| &set.paths) {
         let mut predicted = Vec::new();
         for Named { law, .. } in laws {
-            let stress =
-                |row: &Row, memory: &mut _| law.stress(&row.c, memory).map(|answer| answer.stress.into());
+            let stress = |row: &Row, memory: &mut _| {
+                law.stress(&row.c, memory).map(|answer| row.compared(&answer.stress)[1].into())
+            };
             let rows = run.rows.iter().map(|row| stress(row, &mut memory));
             predicted.push(rows.collect::<Result<Vec<[f64; 6]>, Error>>()?);
         }
@@ -209,13 +263,14 @@ fn look_at_heldout<'a>(laws: &[Named], data: &'a Prepared) -> Result<Vec<Heldout
 fn write_heldout(seen: &Heldout, names: &[&str], output: &Path) -> Result<(), Error> {
     let component = crate::kinematics::NAMES[seen.axis];
     let rows = &seen.run.rows;
+    let (stress, measured) = seen.measured();
     let mut columns = vec![
         (format!("C{component}"), "", rows.iter().map(|row| row.c[seen.axis]).collect::<Vec<f64>>()),
-        (format!("S{component}"), "MPa", rows.iter().map(|row| row.s[seen.axis] / 1e6).collect()),
+        (stress.clone(), "MPa", measured),
     ];
     for (name, predicted) in names.iter().zip(&seen.predicted) {
         let along = predicted.iter().map(|stress| stress[seen.axis] / 1e6).collect();
-        columns.push((format!("S{component} of {name}"), "MPa", along));
+        columns.push((format!("{stress} of {name}"), "MPa", along));
         columns.push((format!("percentage error of {name}"), "%", percentages(rows, predicted)));
     }
     let columns: Vec<csv::Column> =
@@ -225,7 +280,8 @@ fn write_heldout(seen: &Heldout, names: &[&str], output: &Path) -> Result<(), Er
 
 /// (3.13) row by row; NaN where there is no stress.
 pub(super) fn percentages(rows: &[Row], predicted: &[[f64; 6]]) -> Vec<f64> {
-    let error =
-        |(row, stress): (&Row, &[f64; 6])| percentage_error(&row.s, &(*stress).into()).unwrap_or(f64::NAN);
+    let error = |(row, stress): (&Row, &[f64; 6])| {
+        percentage_error(&row.compared(&row.s)[0], &(*stress).into()).unwrap_or(f64::NAN)
+    };
     rows.iter().zip(predicted).map(error).collect()
 }

@@ -23,6 +23,7 @@ struct Progress {
 /// A law and how it came to be.
 pub struct Trained {
     name: String,
+    runs: Vec<String>,
     law: Surrogate,
     states: Vec<State>,
 }
@@ -31,7 +32,7 @@ impl Trained {
     /// The law with its training time.
     pub fn named(&self) -> Named<'_> {
         let seconds = self.states.iter().map(State::seconds).sum();
-        Named { name: &self.name, law: &self.law, seconds: Some(seconds) }
+        Named { name: &self.name, law: &self.law, runs: &self.runs, seconds: Some(seconds) }
     }
 }
 
@@ -59,10 +60,11 @@ pub fn train(
     if !options.resume {
         checkpoint::write(options.output, &run.header, &run.progress)?;
     }
-    let (rows, validation) = (data.rows(&data.split.train), data.rows(&data.split.validation));
-    let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
     let mut trained = Vec::new();
     for model in models {
+        let rows = data.rows_of(&data.split.train, &model.runs);
+        let validation = data.rows_of(&data.split.validation, &model.runs);
+        let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
         let mut header =
             Header::fitted(model.law(), model.architecture(), model.members, &rows, model.standardised())?;
         let settings = model.training.over(&scene.training, options.quick);
@@ -96,7 +98,7 @@ pub fn train(
         }
         let states = run.progress.states[first..run.done].to_vec();
         let law = write(&model.title(), &header, &states, &strains, options.output)?;
-        trained.push(Trained { name: model.title(), law, states });
+        trained.push(Trained { name: model.title(), runs: model.runs.clone(), law, states });
     }
     Ok(trained)
 }
@@ -203,9 +205,8 @@ fn learning_curve(state: &State, path: &Path) -> Result<(), Error> {
 
 /// What no number says about the trainings: invariants that the data do not vary.
 pub fn remarks(trained: &[Trained], data: &Prepared) -> Vec<String> {
-    let rows = data.rows(&data.split.train);
     let remark = |model: &Trained| {
-        let names = model.law.constrained(&rows);
+        let names = model.law.constrained(&data.rows_of(&data.split.train, &model.runs));
         let text = format!(
             "{}: {} does not vary by itself in these data: how the energy changes with it is not known",
             model.name,

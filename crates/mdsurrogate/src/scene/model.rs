@@ -31,6 +31,13 @@ pub struct ModelSpec {
     /// symmetry is orthotropic, transverse or isotropic, its activations are softplus, elu or linear.
     #[serde(default)]
     pub polyconvex: bool,
+    /// Whether a polyconvex isotropic energy takes √I₁ = ‖F‖ and √I₂ = ‖cof F‖ for I₁ and I₂: polyconvex too, and less
+    /// stiff (rubber asks for √I₂).
+    #[serde(default)]
+    pub norms: bool,
+    /// Names of the training runs that it learns from; default: all of them. The others are then held out of it.
+    #[serde(default)]
+    pub runs: Vec<String>,
     /// Networks trained from different seeds into one law.
     #[serde(default = "one")]
     pub members: usize,
@@ -147,6 +154,7 @@ impl ModelSpec {
                 symmetry: self.symmetry.unwrap_or(Symmetry::Orthotropic),
                 axes: self.axes.unwrap_or(OWN_AXES),
                 polyconvex: self.polyconvex,
+                norms: self.norms,
             },
         }
     }
@@ -197,6 +205,7 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
             ("symmetry", model.symmetry.is_some()),
             ("axes", model.axes.is_some()),
             ("polyconvex", model.polyconvex),
+            ("norms", model.norms),
         ] {
             if written && !energy {
                 let found = format!("`{key}` of an ann, which has none");
@@ -221,6 +230,10 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
         if model.polyconvex && symmetry.polyconvex_invariants().is_none() {
             let allowed = "orthotropic, transverse or isotropic for a polyconvex energy";
             return Err(source.error(&at("symmetry"), format!("{symmetry:?}").to_lowercase(), allowed));
+        }
+        if model.norms && !(model.polyconvex && symmetry == Symmetry::Isotropic) {
+            let allowed = "`polyconvex = true` and `symmetry = \"isotropic\"` beside it";
+            return Err(source.error(&at("norms"), "norms of another energy", allowed));
         }
         let mut header = Header::new(model.law(), &[], model.members);
         if (1..=1000).contains(&model.members) {

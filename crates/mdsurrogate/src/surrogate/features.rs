@@ -218,7 +218,7 @@ mod tests {
         let (s, c) = 0.4f64.sin_cos();
         let axes = [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]];
         for symmetry in Symmetry::ALL {
-            let kind = Kind::Energy { symmetry, axes, polyconvex: false };
+            let kind = Kind::Energy { symmetry, axes, polyconvex: false, norms: false };
             let mut header = Header::new(kind, &[(4, Tanh)], 1);
             header.input_deviation[0] = 0.3;
             let law = Surrogate::random(header, 1).unwrap();

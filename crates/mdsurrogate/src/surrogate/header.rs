@@ -28,19 +28,28 @@ pub enum Kind {
         /// Whether W is polyconvex by construction: see [`Kind::non_negative`].
         #[serde(default)]
         polyconvex: bool,
+        /// Whether ‖F‖ = √I₁ and ‖cof F‖ = √I₂ are its inputs in place of their squares, of a polyconvex isotropic one:
+        /// convex in F and cof F too, and grows as slowly as with the first power of a stretch.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        norms: bool,
     },
 }
 
 impl Kind {
     /// An energy in the axes of the data.
     pub fn energy(symmetry: Symmetry) -> Self {
-        Self::Energy { symmetry, axes: AXES, polyconvex: false }
+        Self::Energy { symmetry, axes: AXES, polyconvex: false, norms: false }
     }
 
     /// A polyconvex energy in the axes of the data: convex in (F, cof F, J), and so elliptic everywhere; it cannot follow
     /// data that soften (Ball 1976, <https://doi.org/10.1007/BF00279992>).
     pub fn polyconvex_energy(symmetry: Symmetry) -> Self {
-        Self::Energy { symmetry, axes: AXES, polyconvex: true }
+        Self::Energy { symmetry, axes: AXES, polyconvex: true, norms: false }
+    }
+
+    /// A polyconvex isotropic energy of ‖F‖, ‖cof F‖ and J.
+    pub fn energy_of_norms() -> Self {
+        Self::Energy { symmetry: Symmetry::Isotropic, axes: AXES, polyconvex: true, norms: true }
     }
 
     /// Whether this is a polyconvex energy.
@@ -61,7 +70,9 @@ impl Kind {
     pub(crate) fn invariants(&self) -> Option<Invariants> {
         match self {
             Self::Ann => None,
-            Self::Energy { symmetry, polyconvex, .. } => Some(Invariants::new(*symmetry, *polyconvex)),
+            Self::Energy { symmetry, polyconvex, norms, .. } => {
+                Some(Invariants::new(*symmetry, *polyconvex, *norms))
+            }
         }
     }
 
@@ -131,6 +142,12 @@ impl Header {
     /// # Errors
     /// [`Error::Parameter`] for parts that do not fit together or numbers that are not finite.
     pub fn check(&self) -> Result<(), Error> {
+        if let Kind::Energy { symmetry, polyconvex, norms: true, .. } = self.kind
+            && !(polyconvex && symmetry == Symmetry::Isotropic)
+        {
+            let found = format!("norms of a symmetry {symmetry:?}, polyconvex: {polyconvex}").to_lowercase();
+            return Err(Error::parameter("norms", found, "a polyconvex isotropic energy"));
+        }
         if let Kind::Energy { symmetry, polyconvex: true, .. } = self.kind {
             if symmetry.polyconvex_invariants().is_none() {
                 let allowed = "orthotropic, transverse or isotropic for a polyconvex energy";

@@ -9,18 +9,23 @@ use crate::network::Real;
 pub(crate) struct Invariants {
     list: &'static [&'static [Monomial<'static>]],
     names: &'static [&'static str],
-    /// The last one is the root of its polynomial: J = √det C.
-    root: bool,
+    /// From this one on they are the roots of their polynomials: J = √det C is the last of the polyconvex ones.
+    first_root: usize,
 }
 
 impl Invariants {
-    /// Those of a symmetry; the polyconvex ones of those that have none are empty.
-    pub fn new(symmetry: Symmetry, polyconvex: bool) -> Self {
-        let list = match polyconvex {
-            true => symmetry.polyconvex_invariants().unwrap_or_default(),
-            false => symmetry.invariants(),
+    /// Those of a symmetry; the polyconvex ones of those that have none are empty. `norms`: the roots of I₁ and I₂ in
+    /// their place, of a polyconvex isotropic energy.
+    pub fn new(symmetry: Symmetry, polyconvex: bool, norms: bool) -> Self {
+        let (list, names) = match polyconvex {
+            true => (symmetry.polyconvex_invariants().unwrap_or_default(), symmetry.names(true)),
+            false => (symmetry.invariants(), symmetry.names(false)),
         };
-        Self { list, names: symmetry.names(polyconvex), root: polyconvex }
+        match (polyconvex, norms) {
+            (true, true) => Self { list, names: &["√I1", "√I2", "J"], first_root: 0 },
+            (true, false) => Self { list, names, first_root: list.len().saturating_sub(1) },
+            (false, _) => Self { list, names, first_root: list.len() },
+        }
     }
 
     /// How many.
@@ -35,7 +40,7 @@ impl Invariants {
 
     /// Polynomial k, and whether its root is the input.
     pub fn polynomial(self, k: usize) -> (&'static [Monomial<'static>], bool) {
-        (self.list[k], self.root && k + 1 == self.list.len())
+        (self.list[k], k >= self.first_root)
     }
 
     /// Values of the invariants at c.

@@ -28,7 +28,7 @@ pub(super) fn all() -> Vec<(String, Surrogate<f64>)> {
     add("ann × 3".into(), Header::new(Kind::Ann, &[(17, Sigmoid), (8, Softplus)], 3));
     for symmetry in Symmetry::ALL {
         add(format!("energy {symmetry:?}"), Header::new(Kind::energy(symmetry), &smooth, 1));
-        let kind = Kind::Energy { symmetry, axes: turned(), polyconvex: false };
+        let kind = Kind::Energy { symmetry, axes: turned(), polyconvex: false, norms: false };
         add(
             format!("energy {symmetry:?} turned × 2"),
             Header::new(kind, &[(16, Softplus), (16, Softplus)], 2),
@@ -37,9 +37,11 @@ pub(super) fn all() -> Vec<(String, Surrogate<f64>)> {
     for symmetry in [Symmetry::Orthotropic, Symmetry::Transverse, Symmetry::Isotropic] {
         let hidden = [(16, Softplus), (9, Softplus)];
         add(format!("polyconvex {symmetry:?}"), Header::new(Kind::polyconvex_energy(symmetry), &hidden, 1));
-        let kind = Kind::Energy { symmetry, axes: turned(), polyconvex: true };
+        let kind = Kind::Energy { symmetry, axes: turned(), polyconvex: true, norms: false };
         add(format!("polyconvex {symmetry:?} turned × 2"), Header::new(kind, &[(12, Softplus), (7, Elu)], 2));
     }
+    let hidden = [(12, Softplus), (7, Elu)];
+    add("polyconvex, of norms".into(), Header::new(Kind::energy_of_norms(), &hidden, 2));
     laws
 }
 
@@ -336,7 +338,7 @@ fn headers_that_do_not_fit() {
     for axes in
         [[[1.0, 0.0, 0.0]; 3], [[f64::NAN; 3]; 3], [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]]
     {
-        let kind = Kind::Energy { symmetry: Symmetry::Transverse, axes, polyconvex: false };
+        let kind = Kind::Energy { symmetry: Symmetry::Transverse, axes, polyconvex: false, norms: false };
         let error = Surrogate::<f64>::random(Header::new(kind, &[(3, Tanh)], 1), 1).unwrap_err();
         assert!(error.to_string().contains("orthonormal"), "{error}");
     }

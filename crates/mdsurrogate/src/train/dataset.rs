@@ -18,6 +18,8 @@ pub(super) struct Examples {
     slopes: Vec<f32>,
     /// (rows, 6): targets, in units of [`units`].
     s: Vec<f32>,
+    /// (rows, 36): from S to what was measured ([`Row::elimination`]); empty where all rows have whole stresses.
+    maps: Vec<f32>,
     /// Variances of the components of S, MPa².
     variances: [f64; 6],
 }
@@ -28,6 +30,7 @@ pub(super) struct Batch {
     pub x: TensorData,
     pub slopes: Option<TensorData>,
     pub s: TensorData,
+    pub maps: Option<TensorData>,
 }
 
 /// What a network's outputs are multiplied with and added to, to give S in MPa.
@@ -59,24 +62,37 @@ impl Examples {
         let inputs = law.header().kind.inputs();
         let (unit, mean) = units(law.header());
         let energetic = law.header().kind != Kind::Ann;
-        let mut examples =
-            Self { inputs, x: Vec::new(), slopes: Vec::new(), s: Vec::new(), variances: [0.0; 6] };
-        for row in rows {
+        let mut examples = Self {
+            inputs,
+            x: Vec::new(),
+            slopes: Vec::new(),
+            s: Vec::new(),
+            maps: Vec::new(),
+            variances: [0.0; 6],
+        };
+        let nominal = rows.iter().any(|row| row.nominal.is_some());
+        let whole = std::array::from_fn(|a| std::array::from_fn(|b| if a == b { 1.0 } else { 0.0 }));
+        let measured: Vec<_> = rows.iter().map(|row| row.compared(&row.s)[0]).collect();
+        for (row, measured) in rows.iter().zip(&measured) {
             let features = law.features(&row.c);
             examples.x.extend(features.values[..inputs].iter().map(|value| *value as f32));
             if energetic {
                 examples.slopes.extend(scaled_slopes(law, &features.slopes[..inputs]));
             }
             for a in 0..6 {
-                let target = row.s[a] / MEGAPASCAL - mean[a];
+                let target = measured[a] / MEGAPASCAL - mean[a];
                 // a component that never changes has no unit and is not learnt
                 examples.s.push(if unit[a] > 0.0 { (target / unit[a]) as f32 } else { 0.0 });
+            }
+            if nominal {
+                let map: [[f64; 6]; 6] = row.elimination().unwrap_or(whole);
+                examples.maps.extend(map.as_flattened().iter().map(|weight| *weight as f32));
             }
         }
         for (a, variance) in examples.variances.iter_mut().enumerate() {
             let count = rows.len() as f64;
-            let mean = rows.iter().map(|row| row.s[a] / MEGAPASCAL).sum::<f64>() / count;
-            *variance = rows.iter().map(|row| (row.s[a] / MEGAPASCAL - mean).powi(2)).sum::<f64>() / count;
+            let mean = measured.iter().map(|row| row[a] / MEGAPASCAL).sum::<f64>() / count;
+            *variance = measured.iter().map(|row| (row[a] / MEGAPASCAL - mean).powi(2)).sum::<f64>() / count;
         }
         examples
     }
@@ -110,6 +126,7 @@ impl Examples {
             slopes: (!self.slopes.is_empty())
                 .then(|| TensorData::new(gather(&self.slopes, 6 * self.inputs), [count, self.inputs, 6])),
             s: TensorData::new(gather(&self.s, 6), [count, 6]),
+            maps: (!self.maps.is_empty()).then(|| TensorData::new(gather(&self.maps, 36), [count, 6, 6])),
         }
     }
 }

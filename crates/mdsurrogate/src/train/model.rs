@@ -223,6 +223,13 @@ impl Model {
             }
             _ => self.forward(layers, tensor(&batch.x)),
         };
+        let outputs = match &batch.maps {
+            Some(maps) => {
+                let maps = Tensor::<3>::from_data(maps.clone(), device);
+                (outputs.unsqueeze_dim::<3>(1) * maps).sum_dim(2).squeeze_dim::<2>(2)
+            }
+            None => outputs,
+        };
         let error = outputs - tensor(&batch.s);
         (error.clone() * error).sum_dim(0)
     }

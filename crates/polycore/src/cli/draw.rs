@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use polycore::Error;
-use polycore::hyperelastic::data::{State, Table};
+use polycore::hyperelastic::data::{Mode, State, Table};
 use polycore::hyperelastic::fit::{self, Fit};
 use polycore::hyperelastic::{Hyperelastic, Kind, homogeneous};
 use polycore::output::picture::{LinePlot, Series};
@@ -22,19 +22,28 @@ const TESTS: [Test; 3] = [
     Test {
         key: "uniaxial",
         title: "uniaxial tension",
-        holds: |state| state.nominal[1] == 0.0,
+        holds: |state| match state.mode {
+            Mode::Biaxial => state.nominal[1] == 0.0,
+            mode => mode == Mode::Uniaxial,
+        },
         nominal: |law, stretch| homogeneous::uniaxial(law, stretch),
     },
     Test {
         key: "pure-shear",
         title: "pure shear",
-        holds: |state| state.stretches[1] == 1.0 && state.nominal[1] != 0.0,
+        holds: |state| match state.mode {
+            Mode::Biaxial => state.stretches[1] == 1.0 && state.nominal[1] != 0.0,
+            mode => mode == Mode::PureShear,
+        },
         nominal: |law, stretch| Ok(homogeneous::pure_shear(law, stretch)?[0]),
     },
     Test {
         key: "equibiaxial",
         title: "equibiaxial tension",
-        holds: |state| state.stretches[0] == state.stretches[1] && state.nominal[1] != 0.0,
+        holds: |state| match state.mode {
+            Mode::Biaxial => state.stretches[0] == state.stretches[1] && state.nominal[1] != 0.0,
+            mode => mode == Mode::Equibiaxial,
+        },
         nominal: |law, stretch| homogeneous::equibiaxial(law, stretch),
     },
 ];
@@ -61,7 +70,7 @@ pub fn pictures(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Re
                 curves(name, test, &states, &fits).write(path)?;
             }
         }
-        if table.states.iter().any(|state| state.nominal[1] != 0.0) {
+        if table.states.iter().any(|state| state.mode != table.states[0].mode || state.nominal[1] != 0.0) {
             parity(name, table, &fits)?.write(directory.join(format!("{name}_parity_{suffix}.png")))?;
         }
     }

@@ -1,17 +1,17 @@
-//! Runs the fits of a case and writes what they give.
+//! Runs the fits and trials of a case and writes what they give.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use polycore::Error;
-use polycore::hyperelastic::data::Table;
-use polycore::hyperelastic::fit::{Fit, fit};
-use polycore::hyperelastic::homogeneous;
+use polycore::hyperelastic::data::{State, Table};
+use polycore::hyperelastic::fit::{Agreement, Fit, Fitted, fit};
+use polycore::hyperelastic::{self, Hyperelastic, homogeneous};
 use polycore::output;
-use polycore::report::{Judgement, Phases, Report};
+use polycore::report::{Phases, Report};
 
-use super::draw;
 use super::scene::Case;
+use super::{draw, material, trials};
 
 /// Everything printed and written is in MPa.
 pub const MPA: f64 = 1e6;
@@ -29,12 +29,22 @@ pub fn run(case: &Case, directory: &Path, quick: bool) -> Result<Report, Error> 
         }
         phases.start("output");
         for fit in &fits {
-            record(&mut report, name, fit);
+            record(&mut report, name, table, fit)?;
+            for (other, table) in case.data.iter().filter(|(other, _)| case.cross && other != name) {
+                judge_on(&mut report, &format!("{name}.{}.{other}", fit.family.key), &fit.law, table)?;
+            }
         }
         write_states(directory, name, table, &fits)?;
         all.push((name, table, fits));
     }
-    write_fits(directory, &all)?;
+    if !all.is_empty() {
+        write_fits(directory, &all)?;
+        material::write(directory, &all)?;
+    }
+    phases.start("trials");
+    for trial in &case.trials {
+        trials::run(trial, &mut report)?;
+    }
     if !quick {
         phases.start("pictures");
         for (name, table, fits) in &all {
@@ -43,8 +53,9 @@ pub fn run(case: &Case, directory: &Path, quick: bool) -> Result<Report, Error> 
     }
     phases.stop();
     report.phases(&phases).threads(1).judge(&case.expect, quick);
+    trials::judge(&case.trials, &mut report);
     report.write(directory)?;
-    polycore::command::print(summary(&case.title, &all, &report.expect));
+    polycore::command::print(summary(&case.title, &all, &report));
     Ok(report)
 }
 
@@ -53,7 +64,29 @@ fn scaled(value: f64, unit: &str) -> (f64, &'static str) {
     if unit == "Pa" { (value / MPA, "MPa") } else { (value, "") }
 }
 
-fn record(report: &mut Report, data: &str, fit: &Fit) {
+/// rms, mean absolute error and R² of a law on another table than that of its fit; where it locks, how often.
+fn judge_on(report: &mut Report, key: &str, law: &dyn Hyperelastic, table: &Table) -> Result<(), Error> {
+    let locks = |state: &&State| {
+        let [a, b] = state.stretches;
+        matches!(homogeneous::biaxial(law, a, b), Err(hyperelastic::Error::Locked { .. }))
+    };
+    let locked = table.states.iter().filter(locks).count();
+    report.value(&format!("{key}.locked"), locked as f64, "");
+    if locked == 0 {
+        agree(report, key, &Agreement::of(law, table)?);
+    }
+    Ok(())
+}
+
+fn agree(report: &mut Report, key: &str, found: &Agreement) {
+    report.value(&format!("{key}.rms"), found.rms / MPA, "MPa");
+    report.value(&format!("{key}.mae"), found.mae / MPA, "MPa");
+    if let Some(r2) = found.r2 {
+        report.value(&format!("{key}.r2"), r2, "");
+    }
+}
+
+fn record(report: &mut Report, data: &str, table: &Table, fit: &Fit) -> Result<(), Error> {
     let key = format!("{data}.{}", fit.family.key);
     report.value(&format!("{key}.shear_modulus"), fit.law.shear_modulus() / MPA, "MPa");
     for parameter in &fit.parameters {
@@ -64,10 +97,11 @@ fn record(report: &mut Report, data: &str, fit: &Fit) {
             report.value(&name, scaled(error, parameter.unit).0, unit);
         }
     }
-    report.value(&format!("{key}.rms"), fit.rms / MPA, "MPa");
+    agree(report, &key, &Agreement::of(&fit.law, table)?);
     report.work(&format!("{key}.evaluations"), fit.iterations as u64);
     report.work(&format!("{key}.starts"), fit.starts.0 as u64);
     report.work(&format!("{key}.starts_that_agree"), fit.starts.1 as u64);
+    Ok(())
 }
 
 /// `fits.csv`: one line for each number, with its standard error where the data determine it.
@@ -118,27 +152,54 @@ fn write_states(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Re
     output::csv::write(directory.join(format!("{name}_states.csv")), &columns)
 }
 
-/// rms by law and table, then the verdicts.
-fn summary(title: &str, all: &[(&str, &Table, Vec<Fit>)], expect: &[Judgement]) -> String {
-    let mut text = format!("{title}\nrms of the nominal stress, MPa (parameters)\n");
+/// rms by law and table, the parameters, a block for `peri`, trials, then the verdicts.
+fn summary(title: &str, all: &[(&str, &Table, Vec<Fit>)], report: &Report) -> String {
+    let mut text = format!("{title}\n");
     let laws = all.first().map_or(0, |(_, _, fits)| fits.len());
-    let _ = write!(text, "{:<22}{:>4}", "law", "k");
-    for (name, table, _) in all {
-        let _ = write!(text, "{:>16}", format!("{name} ({})", table.measurements()));
+    if laws > 0 {
+        text += "rms of the nominal stress in MPa, over the measured stresses (their number in brackets); k: parameters\n";
+        let _ = write!(text, "{:<22}{:>4}", "law", "k");
+        for (name, table, _) in all {
+            let _ = write!(text, "{:>18}", format!("{name} ({})", table.measurements()));
+        }
+        text.push('\n');
     }
-    text.push('\n');
     for row in 0..laws {
         for (column, (_, _, fits)) in all.iter().enumerate() {
             let fit = &fits[row];
             if column == 0 {
                 let _ = write!(text, "{:<22}{:>4}", fit.family.key, fit.parameters.len());
             }
-            let _ = write!(text, "{:>16.5}", fit.rms / MPA);
+            let _ = write!(text, "{:>18.5}", fit.rms / MPA);
         }
         text.push('\n');
     }
-    for judgement in expect {
+    for (name, _, fits) in all {
+        let _ = writeln!(text, "parameters on {name} (± standard error, - where the data do not tell)");
+        for fit in fits {
+            let list: Vec<String> = fit.parameters.iter().map(shown).collect();
+            let _ = writeln!(text, "  {:<22}{}", fit.family.key, list.join(", "));
+        }
+        text += &material::best(name, fits);
+    }
+    for trial in &report.trials {
+        let verdict = if trial.passed { "pass" } else { "FAIL" };
+        let _ = writeln!(text, "{verdict}  {}: must {}; seen: {}", trial.what, trial.must, trial.seen);
+    }
+    for judgement in &report.expect {
         let _ = writeln!(text, "{}", judgement.row().join("  "));
     }
     text
+}
+
+/// `links 25.46 ± 0.13`.
+fn shown(parameter: &Fitted) -> String {
+    let (value, unit) = scaled(parameter.value, parameter.unit);
+    let number = |value: f64| match value.abs() {
+        size if (1e-3..1e5).contains(&size) || size == 0.0 => format!("{value:.5}"),
+        _ => format!("{value:.4e}"),
+    };
+    let error = parameter.standard_error.map(|error| number(scaled(error, parameter.unit).0));
+    let error = error.unwrap_or_else(|| "-".to_owned());
+    format!("{} {} ± {error} {unit}", parameter.name, number(value)).trim_end().to_owned()
 }

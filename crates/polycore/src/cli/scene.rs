@@ -1,12 +1,15 @@
-//! The scene of a fit: which laws, which data, what is expected.
+//! The scene of fits and trials: which laws, which data, what must happen, what is expected.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use polycore::hyperelastic::{self, FAMILIES, Family, data::Table};
+use polycore::hyperelastic::data::{Mode, Table};
+use polycore::hyperelastic::{self, FAMILIES, Family};
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
+
+use super::trials::Trial;
 
 /// The file as written.
 #[derive(Deserialize)]
@@ -17,7 +20,10 @@ struct Scene {
     _program: Program,
     #[serde(default)]
     title: String,
+    #[serde(default)]
     fit: Fit,
+    #[serde(default)]
+    trial: Vec<Trial>,
     #[serde(default)]
     expect: Vec<Expect>,
 }
@@ -30,11 +36,15 @@ enum Program {
 }
 
 /// What to fit to what.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Fit {
     /// Names of laws; all of them if not given.
     laws: Option<Vec<String>>,
+    /// Whether a law fitted to one table is judged on the others, too.
+    #[serde(default)]
+    cross: bool,
+    #[serde(default)]
     data: Vec<Data>,
 }
 
@@ -46,6 +56,8 @@ struct Data {
     name: String,
     /// The CSV file, relative to the scene.
     file: PathBuf,
+    /// Only the states of this test.
+    mode: Option<Mode>,
 }
 
 /// A scene that was checked, with its data.
@@ -53,7 +65,9 @@ pub struct Case {
     pub source: Source,
     pub title: String,
     pub laws: Vec<&'static Family>,
+    pub cross: bool,
     pub data: Vec<(String, Table)>,
+    pub trials: Vec<Trial>,
     pub expect: Vec<Expect>,
 }
 
@@ -61,7 +75,7 @@ impl Case {
     /// Reads and checks a scene and the tables that it names.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         let source = Source::read(path)?;
-        let Scene { _program: Program::Polycore, title, fit, expect } = source.parse()?;
+        let Scene { _program: Program::Polycore, title, fit, trial, expect } = source.parse()?;
         let laws = match &fit.laws {
             None => FAMILIES.iter().collect(),
             Some(names) => selected(&source, names)?,
@@ -82,9 +96,14 @@ impl Case {
                     "another name",
                 ));
             }
-            let table = Table::read(folder.join(&entry.file)).map_err(|error| {
+            let mut table = Table::read(folder.join(&entry.file)).map_err(|error| {
                 source.error(&key("file"), error, "a CSV table of stretches and nominal stresses")
             })?;
+            if let Some(mode) = entry.mode {
+                table = table.of(mode).map_err(|error| {
+                    source.error(&key("mode"), error, "a test of which the table has a stress")
+                })?;
+            }
             for family in &laws {
                 if table.measurements() < family.parameters.len() {
                     let found = format!("{} measured stresses", table.measurements());
@@ -94,24 +113,17 @@ impl Case {
             }
             data.push((entry.name, table));
         }
-        if data.is_empty() {
+        if data.is_empty() && trial.is_empty() {
             return Err(source.error(
                 "fit.data",
                 "no data",
-                "at least one `[[fit.data]]` with `name` and `file`",
+                "at least one `[[fit.data]]` with `name` and `file`, or a `[[trial]]`",
             ));
         }
-        let case = Self { source, title, laws, data, expect };
+        super::trials::check(&source, &trial)?;
+        let case = Self { source, title, laws, cross: fit.cross, data, trials: trial, expect };
         case.check_expectations()?;
         Ok(case)
-    }
-
-    /// The folder's name, or the file's if it lies in none.
-    pub fn name(&self) -> String {
-        let path = &self.source.path;
-        let absolute = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-        let folder = absolute.parent().and_then(Path::file_name).or(absolute.file_stem());
-        folder.map_or_else(|| "case".to_owned(), |name| name.to_string_lossy().into_owned())
     }
 
     /// What a run will do.
@@ -119,11 +131,9 @@ impl Case {
         let mut text = format!("{}: {}\n", self.source.path.display(), self.title);
         for (name, table) in &self.data {
             let (states, measured) = (table.states.len(), table.measurements());
-            let _ = writeln!(
-                text,
-                "data {name}: {states} states, {measured} measured stresses ({})",
-                table.source
-            );
+            let source =
+                if table.source.is_empty() { "no line `# source: …` in it" } else { &table.source };
+            let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
         }
         for family in &self.laws {
             let names: Vec<_> = family.parameters.iter().map(|parameter| parameter.name).collect();
@@ -131,8 +141,10 @@ impl Case {
         }
         let _ = writeln!(
             text,
-            "{} fits, {} expectations; writes fits.csv, <data>_states.csv, pictures (not with --quick), report.json",
+            "{} fits, {} trials, {} expectations; writes fits.csv, <data>_states.csv, materials.toml, pictures (not with \
+             --quick), report.json",
             self.laws.len() * self.data.len(),
+            self.trials.len(),
             self.expect.len()
         );
         text
@@ -143,13 +155,21 @@ impl Case {
         let mut names = Vec::new();
         for (data, _) in &self.data {
             for family in &self.laws {
-                let fixed = ["rms", "shear_modulus"].into_iter();
+                let fixed = ["rms", "mae", "r2", "shear_modulus"].into_iter();
                 let all = fixed.chain(family.parameters.iter().map(|parameter| parameter.name));
                 // a law may be parameterised by its shear modulus
                 for name in all {
                     names.push(format!("{data}.{}.{name}", family.key));
                 }
+                for (other, _) in self.data.iter().filter(|(other, _)| self.cross && other != data) {
+                    for name in ["rms", "mae", "r2", "locked"] {
+                        names.push(format!("{data}.{}.{other}.{name}", family.key));
+                    }
+                }
             }
+        }
+        for trial in &self.trials {
+            names.extend(trial.quantities());
         }
         names
     }
@@ -159,8 +179,9 @@ impl Case {
         for (i, expect) in self.expect.iter().enumerate() {
             if let Some(name) = expect.names().find(|name| !names.iter().any(|known| known == name)) {
                 let found = format!("`{name}`, which this scene does not compute");
-                let allowed =
-                    "<data>.<law>.rms, .shear_modulus, or a parameter (`polycore check` lists them)";
+                let allowed = "<data>.<law>.rms, .mae, .r2, .shear_modulus, or a parameter (`polycore check` lists them); \
+                     <data>.<law>.<other data>.rms, .mae, .r2, .locked with `cross`; <trial>.nominal, .energy, .refused, \
+                     .rms or a parameter";
                 return Err(self.source.error(&format!("expect[{i}].quantity"), found, allowed));
             }
         }

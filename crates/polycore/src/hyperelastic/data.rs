@@ -9,15 +9,55 @@ use crate::units::Stress;
 /// A table of homogeneous states.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Where the numbers come from: the `# source:` line of the file.
+    /// Where the numbers come from: the `# source:` line of the file; empty without one.
     pub source: String,
     /// The states, in the order of the file.
     pub states: Vec<State>,
 }
 
+/// The test that a state is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// A bar: λ₂ = λ₃ = λ₁^{−1/2}.
+    Uniaxial,
+    /// A sheet, alike in both directions: λ₂ = λ₁.
+    Equibiaxial,
+    /// A wide strip ("planar tension"): λ₂ = 1.
+    PureShear,
+    /// Any λ₁, λ₂.
+    Biaxial,
+}
+
+impl Mode {
+    /// The tests that one stretch describes.
+    pub const TESTS: [Self; 3] = [Self::Uniaxial, Self::Equibiaxial, Self::PureShear];
+
+    /// As tables and scenes write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Uniaxial => "uniaxial",
+            Self::Equibiaxial => "equibiaxial",
+            Self::PureShear => "pure-shear",
+            Self::Biaxial => "biaxial",
+        }
+    }
+
+    /// λ₂ of a test at λ₁; of [`Mode::Biaxial`], which has none, λ₁ too.
+    pub fn second_stretch(self, first: f64) -> f64 {
+        match self {
+            Self::Uniaxial => first.recip().sqrt(),
+            Self::PureShear => 1.0,
+            Self::Equibiaxial | Self::Biaxial => first,
+        }
+    }
+}
+
 /// Two principal stretches (λ₃ = 1/(λ₁λ₂)) and their nominal stresses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State {
+    /// Its test.
+    pub mode: Mode,
     /// λ₁, λ₂.
     pub stretches: [f64; 2],
     /// P₁, P₂ in Pa. **Exactly zero means a free face or a body at rest: a condition, not a measurement.**
@@ -36,10 +76,11 @@ impl Table {
     }
 
     /// Reads CSV text: lines of `#` comments, a header, rows of numbers. The header is `stretch,nominal_UNIT`
-    /// (uniaxial: λ₂ = λ₁^{−1/2}, P₂ = 0) or `stretch_1,stretch_2,nominal_1_UNIT,nominal_2_UNIT`.
+    /// (uniaxial: λ₂ = λ₁^{−1/2}), `mode,stretch,nominal_UNIT` with a [`Mode`] of [`Mode::TESTS`] in each row, of which P₁
+    /// is measured, or `stretch_1,stretch_2,nominal_1_UNIT,nominal_2_UNIT`.
     ///
     /// # Errors
-    /// [`Error::Data`] naming the line: an unknown header or unit, a missing or non-finite number, a stretch that
+    /// [`Error::Data`] naming the line: an unknown header, unit or mode, a missing or non-finite number, a stretch that
     /// is not positive, no measurement at all.
     pub fn parse(name: &str, text: &str) -> Result<Self, Error> {
         let refuse = |reason: String| Error::Data { what: name.to_owned(), reason };
@@ -47,9 +88,10 @@ impl Table {
             csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
         let header = reader.headers().map_err(|error| refuse(error.to_string()))?.clone();
         let columns: Vec<&str> = header.iter().collect();
-        let units: Vec<f64> = match columns[..] {
+        let moded = columns.first() == Some(&"mode");
+        let units: Vec<f64> = match columns[usize::from(moded)..] {
             ["stretch", nominal] => vec![unit(nominal, "nominal_")],
-            ["stretch_1", "stretch_2", first, second] => {
+            ["stretch_1", "stretch_2", first, second] if !moded => {
                 vec![unit(first, "nominal_1_"), unit(second, "nominal_2_")]
             }
             _ => vec![None],
@@ -57,7 +99,8 @@ impl Table {
         .into_iter()
         .collect::<Option<_>>()
         .ok_or_else(|| {
-            let expected = "`stretch,nominal_MPa` or `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`";
+            let expected = "`stretch,nominal_MPa`, `mode,stretch,nominal_MPa` or \
+                            `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`";
             refuse(format!("header `{}`; expected {expected}, or another unit of stress", columns.join(",")))
         })?;
 
@@ -65,18 +108,31 @@ impl Table {
         for record in reader.records() {
             let record = record.map_err(|error| refuse(error.to_string()))?;
             let line = record.position().map_or(0, csv::Position::line);
+            let mut mode = Mode::Uniaxial;
+            if moded {
+                let name = record.get(0).unwrap_or_default();
+                let names = Mode::TESTS.map(|mode| format!("`{}`", mode.name())).join(", ");
+                mode = Mode::TESTS
+                    .into_iter()
+                    .find(|mode| mode.name() == name)
+                    .ok_or_else(|| refuse(format!("line {line}: mode `{name}`; expected {names}")))?;
+            }
             let mut numbers = Vec::with_capacity(4);
-            for field in &record {
+            for field in record.iter().skip(usize::from(moded)) {
                 let number = field.parse::<f64>().ok().filter(|number| number.is_finite());
                 numbers.push(number.ok_or_else(|| refuse(format!("line {line}: `{field}` is no number")))?);
             }
             let state = match numbers[..] {
-                [stretch, nominal] => {
-                    State { stretches: [stretch, stretch.recip().sqrt()], nominal: [nominal * units[0], 0.0] }
-                }
-                [a, b, first, second] => {
-                    State { stretches: [a, b], nominal: [first * units[0], second * units[1]] }
-                }
+                [stretch, nominal] => State {
+                    mode,
+                    stretches: [stretch, mode.second_stretch(stretch)],
+                    nominal: [nominal * units[0], 0.0],
+                },
+                [a, b, first, second] => State {
+                    mode: Mode::Biaxial,
+                    stretches: [a, b],
+                    nominal: [first * units[0], second * units[1]],
+                },
                 // the csv reader has compared the number of fields with the header's
                 _ => continue,
             };
@@ -84,9 +140,23 @@ impl Table {
             states.push(state);
         }
         let source = text.lines().find_map(|line| line.strip_prefix("# source:"));
-        let table = Self { source: source.unwrap_or("not stated").trim().to_owned(), states };
+        let table = Self { source: source.unwrap_or_default().trim().to_owned(), states };
         if table.measurements() == 0 {
             return Err(refuse("holds no stress other than zero".to_owned()));
+        }
+        Ok(table)
+    }
+
+    /// The states of one test.
+    ///
+    /// # Errors
+    /// [`Error::Data`] where no stress of it was measured.
+    pub fn of(&self, mode: Mode) -> Result<Self, Error> {
+        let states = self.states.iter().copied().filter(|state| state.mode == mode).collect();
+        let table = Self { source: self.source.clone(), states };
+        if table.measurements() == 0 {
+            let reason = "holds no stress other than zero".to_owned();
+            return Err(Error::Data { what: format!("mode `{}`", mode.name()), reason });
         }
         Ok(table)
     }
@@ -120,12 +190,22 @@ mod tests {
     fn both_layouts_and_any_unit_of_stress() {
         let uniaxial = Table::parse("t", "# source: me, 2024\nstretch,nominal_kPa\n1,0\n4, 1500\n").unwrap();
         assert_eq!(uniaxial.source, "me, 2024");
-        assert_eq!(uniaxial.states[1], State { stretches: [4.0, 0.5], nominal: [1.5e6, 0.0] });
+        let expected = State { mode: Mode::Uniaxial, stretches: [4.0, 0.5], nominal: [1.5e6, 0.0] };
+        assert_eq!(uniaxial.states[1], expected);
         assert_eq!(uniaxial.measurements(), 1);
         let text = "stretch_1,stretch_2,nominal_1_MPa,nominal_2_N/mm^2\n2,1,0.5,0.25\n";
         let biaxial = Table::parse("t", text).unwrap();
         assert_eq!(biaxial.states[0].nominal, [0.5e6, 0.25e6]);
-        assert_eq!(biaxial.source, "not stated");
+        assert_eq!(biaxial.source, "");
+        let text =
+            "mode,stretch,nominal_MPa\nuniaxial,4,1.5\nequibiaxial,2,1\npure-shear,3,1\npure-shear,1,0\n";
+        let modes = Table::parse("t", text).unwrap();
+        let stretches: Vec<[f64; 2]> = modes.states.iter().map(|state| state.stretches).collect();
+        assert_eq!(stretches, [[4.0, 0.5], [2.0, 2.0], [3.0, 1.0], [1.0, 1.0]]);
+        assert_eq!(modes.measurements(), 3);
+        let strip = modes.of(Mode::PureShear).unwrap();
+        assert_eq!((strip.states.len(), strip.measurements()), (2, 1));
+        assert!(biaxial.of(Mode::Uniaxial).is_err());
     }
 
     #[test]
@@ -137,6 +217,11 @@ mod tests {
             ("stretch,nominal_MPa\n1,0\n2,NaN\n", "line 3: `NaN` is no number"),
             ("stretch,nominal_MPa\n-2,1\n", "line 2: stretch 1 is -2"),
             ("stretch,nominal_MPa\n1,2,3\n", "3 fields"),
+            (
+                "mode,stretch,nominal_MPa\nsimple-shear,1,0\n",
+                "line 2: mode `simple-shear`; expected `uniaxial`",
+            ),
+            ("mode,stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa\n", "header `mode,stretch_1"),
             ("stretch,nominal_MPa\n1,0\n", "no stress other than zero"),
             ("", "header ``"),
         ] {

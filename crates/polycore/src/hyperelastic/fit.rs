@@ -69,6 +69,37 @@ pub fn rms<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<f64, Erro
     Ok((residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64).sqrt())
 }
 
+/// How a law follows the measured stresses of a table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Agreement {
+    /// Root mean square of the residuals, Pa.
+    pub rms: f64,
+    /// Mean of their absolute values, Pa.
+    pub mae: f64,
+    /// 1 − Σr²/Σ(P − P̄)² with P̄ the mean of the measured stresses; none where they are all the same.
+    pub r2: Option<f64>,
+}
+
+impl Agreement {
+    /// Of a law and a table.
+    ///
+    /// # Errors
+    /// As [`residuals`]: at a state beyond locking there is no stress to compare.
+    pub fn of<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<Self, Error> {
+        let residuals = residuals(law, table)?;
+        let count = residuals.len() as f64;
+        let measured = || table.states.iter().flat_map(|state| state.nominal).filter(|data| *data != 0.0);
+        let mean = measured().sum::<f64>() / count;
+        let variation: f64 = measured().map(|data| (data - mean).powi(2)).sum();
+        let squares: f64 = residuals.iter().map(|r| r * r).sum();
+        Ok(Self {
+            rms: (squares / count).sqrt(),
+            mae: residuals.iter().map(|r| r.abs()).sum::<f64>() / count,
+            r2: (variation > 0.0).then(|| 1.0 - squares / variation),
+        })
+    }
+}
+
 /// The best fit of a family to a table.
 ///
 /// # Errors
@@ -291,7 +322,8 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hyperelastic::{FAMILIES, data::State, family};
+    use crate::hyperelastic::data::{Mode, State};
+    use crate::hyperelastic::{FAMILIES, family};
 
     fn treloar() -> Table {
         let text = include_str!("../../../../cases/ch1/rubber-fits/treloar1944_uniaxial.csv");
@@ -351,6 +383,7 @@ mod tests {
             let law = family.law(family.example).unwrap();
             let states = [1.05, 1.2, 1.5, 2.0, 2.6, 3.3, 4.0].into_iter().flat_map(|l: f64| {
                 [l.recip().sqrt(), 1.0, l.sqrt(), l].map(|other| State {
+                    mode: Mode::Biaxial,
                     stretches: [l, other],
                     nominal: homogeneous::biaxial(&law, l, other).unwrap(),
                 })

@@ -194,7 +194,7 @@ impl Language {
 
 /// Those of an energy; the inputs of an `ann` are the components of C.
 fn invariants_of(law: &Surrogate<f64>) -> Invariants {
-    law.header.kind.invariants().unwrap_or(Invariants::new(Symmetry::Triclinic, false))
+    law.header.kind.invariants().unwrap_or(Invariants::new(Symmetry::Triclinic, false, false))
 }
 
 /// Keywords of C99 (ISO/IEC 9899:1999, 6.4.1) and the function that every program has.

@@ -174,7 +174,7 @@ impl Surrogate<f64> {
         (stresses, energies)
     }
 
-    /// The invariants (points, inputs), their derivatives by each component, and a factor on ∂W/∂x where the last is a root:
+    /// The invariants (points, inputs), their derivatives by each component, and a factor on ∂W/∂x where some are roots:
     /// all polynomials as products of one list of monomials with constant matrices.
     fn polynomials(&self, graph: &mut Builder, c: &str) -> (String, Vec<String>, Option<String>) {
         let invariants = invariants_of(self);
@@ -216,21 +216,21 @@ impl Surrogate<f64> {
         };
         let x = polynomial(&[]);
         let slopes: Vec<String> = (0..6).map(|a| polynomial(&[a])).collect();
-        if !invariants.polynomial(count - 1).1 {
+        let is_root = |k: usize| invariants.polynomial(k).1;
+        if !(0..count).any(is_root) {
             return (x, slopes, None);
         }
         // √p in place of p, and ½/√p before its slopes
-        let last = graph.column(&x, count - 1);
-        let volume = graph.node("Sqrt", &[&last]);
-        let mut all: Vec<String> = (0..count - 1).map(|k| graph.column(&x, k)).collect();
-        all.push(volume.clone());
-        let x = graph.concatenated(&all);
         let half = graph.scalar(0.5);
-        let factor = graph.node("Div", &[&half, &volume]);
-        let ones = graph.node("Div", &[&volume, &volume]);
-        let mut factors = vec![ones; count - 1];
-        factors.push(factor);
-        let factors = graph.concatenated(&factors);
+        let (mut all, mut factors) = (Vec::new(), Vec::new());
+        for k in 0..count {
+            let plain = graph.column(&x, k);
+            let value = if is_root(k) { graph.node("Sqrt", &[&plain]) } else { plain };
+            let over = if is_root(k) { &half } else { &value };
+            factors.push(graph.node("Div", &[over, &value]));
+            all.push(value);
+        }
+        let (x, factors) = (graph.concatenated(&all), graph.concatenated(&factors));
         (x, slopes, Some(factors))
     }
 

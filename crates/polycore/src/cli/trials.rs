@@ -1,0 +1,212 @@
+//! Trials: a law at a stretch, or fitted to a few states, with what must happen.
+
+use polycore::Error;
+use polycore::hyperelastic::data::{Mode, State, Table};
+use polycore::hyperelastic::fit::fit;
+use polycore::hyperelastic::{
+    self, Compressible, Hyperelastic, Volumetric, family, homogeneous, plane_stress,
+};
+use polycore::report::{self, Judgement, Report};
+use polycore::scene::{SceneError, Source};
+use polycore::tensor::Tensor2;
+use polycore::units::Stress;
+use serde::Deserialize;
+
+use super::fits::MPA;
+
+/// One trial: with `parameters` a law is asked at a `stretch`, with `data` it is fitted.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Trial {
+    /// Its name in the report.
+    name: String,
+    /// What must happen, in words.
+    must: String,
+    law: String,
+    parameters: Option<Vec<Number>>,
+    #[serde(default = "uniaxial")]
+    mode: Mode,
+    stretch: Option<f64>,
+    /// λ of Lamé of a quadratic volumetric term, with the incompressible law's stress where it is not given.
+    bulk: Option<Stress>,
+    /// λ₁ and P₁ of states in that mode.
+    data: Option<Vec<(f64, Stress)>>,
+    /// Part of the message with which it must be refused.
+    refused: Option<String>,
+}
+
+/// A parameter: a stress with its unit, or a number.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Number {
+    Stress(Stress),
+    Plain(f64),
+}
+
+impl Number {
+    fn si(&self) -> f64 {
+        match self {
+            Self::Stress(stress) => stress.si(),
+            Self::Plain(value) => *value,
+        }
+    }
+}
+
+fn uniaxial() -> Mode {
+    Mode::Uniaxial
+}
+
+/// What a trial came to.
+enum Seen {
+    Stress { nominal: f64, energy: f64 },
+    Fit(Box<hyperelastic::fit::Fit>),
+}
+
+impl Trial {
+    /// Names of the scalars that it may have.
+    pub fn quantities(&self) -> Vec<String> {
+        let parameters = family(&self.law).map_or(&[][..], |family| family.parameters);
+        let fixed = ["nominal", "energy", "refused", "rms", "shear_modulus"].into_iter();
+        let all = fixed.chain(parameters.iter().map(|parameter| parameter.name));
+        all.map(|name| format!("{}.{name}", self.name)).collect()
+    }
+
+    fn attempt(&self) -> Result<Seen, hyperelastic::Error> {
+        let family = family(&self.law)?;
+        if let Some(data) = &self.data {
+            let state = |(stretch, nominal): &(f64, Stress)| State {
+                mode: self.mode,
+                stretches: [*stretch, self.mode.second_stretch(*stretch)],
+                nominal: [nominal.si(), 0.0],
+            };
+            let table = Table { source: String::new(), states: data.iter().map(state).collect() };
+            return Ok(Seen::Fit(Box::new(fit(family, &table)?)));
+        }
+        let values: Vec<f64> = self.parameters.iter().flatten().map(Number::si).collect();
+        let law = family.law(&values)?;
+        let first = self.stretch.unwrap_or(1.0);
+        let second = self.mode.second_stretch(first);
+        let Some(bulk) = self.bulk else {
+            let nominal = homogeneous::biaxial(&law, first, second)?[0];
+            let stretches = homogeneous::incompressible(first, second)?;
+            return Ok(Seen::Stress { nominal, energy: law.energy_at(stretches)? });
+        };
+        let law = Compressible::new(law, Volumetric::Quadratic { lame: bulk.si() })?;
+        let state = plane_stress(&law, &Tensor2::new(first, 0.0, 0.0, second))?;
+        Ok(Seen::Stress { nominal: first * state.stress[0], energy: law.energy(&state.deformation)? })
+    }
+}
+
+/// Rules of the list.
+///
+/// # Errors
+/// What is wrong and where.
+pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
+    for (i, trial) in trials.iter().enumerate() {
+        let key = |field: &str| format!("trial[{i}].{field}");
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if trial.name.is_empty() || !trial.name.chars().all(plain) {
+            return Err(source.error(
+                &key("name"),
+                format!("`{}`", trial.name),
+                "letters, digits, `-` and `_`",
+            ));
+        }
+        if trials[..i].iter().any(|other| other.name == trial.name) {
+            return Err(source.error(
+                &key("name"),
+                format!("`{}` a second time", trial.name),
+                "another name",
+            ));
+        }
+        let Ok(family) = family(&trial.law) else {
+            let all: Vec<&str> = hyperelastic::FAMILIES.iter().map(|family| family.key).collect();
+            return Err(source.error(&key("law"), format!("`{}`", trial.law), all.join(", ")));
+        };
+        if trial.data.is_some() == trial.parameters.is_some() {
+            let found = if trial.data.is_some() { "`data` beside `parameters`" } else { "neither" };
+            return Err(source.error(&key("law"), found, "`parameters` and `stretch`, or `data` to fit"));
+        }
+        if trial.data.is_some() && (trial.stretch.is_some() || trial.bulk.is_some()) {
+            let found = "`stretch` or `bulk` beside `data`";
+            return Err(source.error(&key("data"), found, "`data` alone: the law is fitted"));
+        }
+        let Some(parameters) = &trial.parameters else { continue };
+        if parameters.len() != family.parameters.len() {
+            let names: Vec<_> = family.parameters.iter().map(|parameter| parameter.name).collect();
+            return Err(source.error(
+                &key("parameters"),
+                format!("{} of them", parameters.len()),
+                names.join(", "),
+            ));
+        }
+        for (given, parameter) in parameters.iter().zip(family.parameters) {
+            if matches!(given, Number::Stress(_)) != (parameter.unit == "Pa") {
+                let (found, allowed) = match parameter.unit {
+                    "Pa" => (format!("`{}` without a unit", parameter.name), "a stress, as \"0.3 MPa\""),
+                    _ => (format!("`{}` with a unit", parameter.name), "a number without unit"),
+                };
+                return Err(source.error(&key("parameters"), found, allowed));
+            }
+        }
+        if trial.stretch.is_none() {
+            return Err(source.error(&key("parameters"), "no `stretch` beside it", "`stretch = 2.0`"));
+        }
+    }
+    Ok(())
+}
+
+/// Makes a trial and records what was seen.
+///
+/// # Errors
+/// What fails without being asked to.
+pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
+    let key = |name: &str| format!("{}.{name}", trial.name);
+    let seen = trial.attempt();
+    let mut passed = true;
+    let text = match (seen, &trial.refused) {
+        (Err(error), Some(part)) => {
+            let error = error.to_string();
+            passed = error.contains(part.as_str());
+            report.value(&key("refused"), f64::from(u8::from(passed)), "");
+            format!("refused: {error}")
+        }
+        (Err(error), None) => return Err(error.into()),
+        (Ok(seen), refused) => {
+            if refused.is_some() {
+                passed = false;
+                report.value(&key("refused"), 0.0, "");
+            }
+            match seen {
+                Seen::Stress { nominal, energy } => {
+                    report.value(&key("nominal"), nominal / MPA, "MPa");
+                    report.value(&key("energy"), energy / MPA, "MJ/m³");
+                    format!("P = {:e} MPa, W = {:e} MJ/m³", nominal / MPA, energy / MPA)
+                }
+                Seen::Fit(fit) => {
+                    report.value(&key("rms"), fit.rms / MPA, "MPa");
+                    report.value(&key("shear_modulus"), fit.law.shear_modulus() / MPA, "MPa");
+                    for parameter in &fit.parameters {
+                        let (scale, unit) = if parameter.unit == "Pa" { (MPA, "MPa") } else { (1.0, "") };
+                        report.value(&key(parameter.name), parameter.value / scale, unit);
+                    }
+                    format!("rms {:e} MPa", fit.rms / MPA)
+                }
+            }
+        }
+    };
+    let (what, must) = (trial.name.clone(), trial.must.clone());
+    report.trials.push(report::Trial { what, must, seen: text, iterations: None, passed });
+    Ok(())
+}
+
+/// A trial fails with any expectation on it.
+pub fn judge(trials: &[Trial], report: &mut Report) {
+    for (trial, seen) in trials.iter().zip(&mut report.trials) {
+        let own = trial.quantities();
+        let fails = |judged: &&Judgement| {
+            !judged.pass && judged.expect.names().any(|name| own.iter().any(|o| o == name))
+        };
+        seen.passed &= !report.expect.iter().any(|judged| fails(&judged));
+    }
+}
