@@ -7,17 +7,44 @@ use std::sync::Arc;
 /// Stefan–Boltzmann constant, W/(m² K⁴) (CODATA 2018).
 pub const STEFAN_BOLTZMANN: f64 = 5.670_374_419e-8;
 
-/// A value over time, linear between given times and constant outside of them.
+/// A value over time: linear between given times and constant outside of them, or swinging.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     times: Vec<f64>,
+    /// At the times; of a swing its two ends.
     values: Vec<f64>,
+    /// Of a swing, s.
+    period: Option<f64>,
 }
 
 impl Schedule {
     /// The same value always.
     pub fn constant(value: f64) -> Self {
-        Self { times: vec![0.0], values: vec![value] }
+        Self { times: vec![0.0], values: vec![value], period: None }
+    }
+
+    /// A sine between two values that passes their middle upwards at t = 0.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for values that are not finite, a high one below the low one, and a period that is not above
+    /// 0 and finite.
+    pub fn swing(low: f64, high: f64, period: f64) -> Result<Self, Error> {
+        let wrong = |name, found, allowed: String| Err(Error::Parameter { name, found, allowed });
+        if !low.is_finite() {
+            return wrong("low value", low, "a finite number".into());
+        }
+        if !(high >= low && high.is_finite()) {
+            return wrong("high value", high, format!("{low} (the low one) or above, finite"));
+        }
+        if !(period > 0.0 && period.is_finite()) {
+            return wrong("period, s", period, "above 0, finite".into());
+        }
+        Ok(Self { times: Vec::new(), values: vec![low, high], period: Some(period) })
+    }
+
+    /// Of a swing, s.
+    pub fn period(&self) -> Option<f64> {
+        self.period
     }
 
     /// Through (time, value) pairs. Steps land on their times.
@@ -43,11 +70,17 @@ impl Schedule {
         Ok(Self {
             times: pairs.iter().map(|pair| pair.0).collect(),
             values: pairs.iter().map(|pair| pair.1).collect(),
+            period: None,
         })
     }
 
     /// Value at a time, s.
     pub fn at(&self, time: f64) -> f64 {
+        if let (Some(period), [low, high]) = (self.period, &self.values[..]) {
+            // whole periods first: the sine of a large argument loses digits
+            let turn = (time / period).fract() * std::f64::consts::TAU;
+            return 0.5 * (low + high) + 0.5 * (high - low) * turn.sin();
+        }
         let next = self.times.partition_point(|&t| t <= time);
         if next == 0 {
             return self.values[0];
@@ -105,6 +138,14 @@ impl Field {
         match self {
             Self::Uniform(schedule) => schedule.breaks(),
             Self::Function(_) => &[],
+        }
+    }
+
+    /// Period of a swing, s.
+    pub fn period(&self) -> Option<f64> {
+        match self {
+            Self::Uniform(schedule) => schedule.period(),
+            Self::Function(_) => None,
         }
     }
 
@@ -199,6 +240,17 @@ impl Condition {
         }
     }
 
+    /// Shortest period of its swings, s.
+    pub fn period(&self) -> Option<f64> {
+        let periods = match self {
+            Self::Temperature { value, .. } => [value.period(), None],
+            Self::Flux { inward, .. } => [inward.period(), None],
+            Self::Film { coefficient, ambient, .. } => [coefficient.period(), ambient.period()],
+            Self::Radiation { ambient, .. } => [ambient.period(), None],
+        };
+        periods.into_iter().flatten().min_by(f64::total_cmp)
+    }
+
     /// # Errors
     /// [`Error::Parameter`] for values out of their domain.
     pub(crate) fn check(&self) -> Result<(), Error> {
@@ -268,6 +320,32 @@ mod tests {
         for wrong in [&[][..], &[(0.0, f64::NAN)], &[(1.0, 2.0), (1.0, 3.0)], &[(f64::INFINITY, 1.0)]] {
             assert!(Schedule::linear(wrong).is_err());
         }
+    }
+
+    #[test]
+    fn swings() {
+        let swing = Schedule::swing(200.0, 400.0, 80.0).unwrap();
+        for (time, value) in [
+            (0.0, 300.0),
+            (20.0, 400.0),
+            (32.0, 300.0 + 100.0 * (0.8 * std::f64::consts::PI).sin()),
+            (60.0, 200.0),
+            (8e15, 300.0),
+        ] {
+            assert!((swing.at(time) - value).abs() < 1e-12, "{time}: {}", swing.at(time));
+        }
+        assert!(swing.breaks().is_empty() && swing.period() == Some(80.0));
+        for (low, high, period) in
+            [(f64::NAN, 1.0, 1.0), (2.0, 1.0, 1.0), (1.0, f64::INFINITY, 1.0), (1.0, 2.0, 0.0)]
+        {
+            assert!(Schedule::swing(low, high, period).is_err());
+        }
+        // whichever end is out of the domain is named
+        let cold = Condition::Temperature {
+            nodes: vec![0],
+            value: Field::Uniform(Schedule::swing(-1.0, 9.0, 1.0).unwrap()),
+        };
+        assert!(cold.check().unwrap_err().to_string().contains("found -1"));
     }
 
     #[test]

@@ -79,6 +79,12 @@ impl Problem {
         times
     }
 
+    /// Shortest period of what swings, s: steps must be shorter.
+    pub(crate) fn shortest_period(&self) -> Option<f64> {
+        let conditions = self.conditions.iter().filter_map(Condition::period);
+        conditions.chain(self.sources.iter().filter_map(|s| s.power.period())).min_by(f64::total_cmp)
+    }
+
     /// Checks everything that can be checked before a run.
     ///
     /// # Errors

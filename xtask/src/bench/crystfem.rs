@@ -1,4 +1,5 @@
-//! `crystfem`: error against run time of its kinetics, time integrators and linear solvers; then the [`brick`].
+//! `crystfem`: error against run time of its kinetics, time integrators and linear solvers; then the [`brick`], on equal elements and on
+//! a distorted mesh.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,8 +14,9 @@ use crate::workspace::Workspace;
 /// Elements along an edge of the brick unless the user gives others: 20 000, 100 000, 300 000, 1 000 000 nodes.
 const EDGES: &str = "26,45,66,99";
 
-/// The part with other programs.
+/// The parts with other programs: the brick, and the same with inner nodes moved, so that no two elements are equal.
 const BRICK: &str = "brick";
+const DISTORTED: &str = "distorted";
 
 /// One curve: its name, and at each length of steps or tolerance what was measured.
 type Curve = (String, Vec<(String, BTreeMap<String, f64>)>);
@@ -22,7 +24,7 @@ type Curve = (String, Vec<(String, BTreeMap<String, f64>)>);
 /// Rows, tables, and whether other programs agree on the brick. `arguments` are names of parts (default: all) and edges
 /// of the brick. Rows and pictures of each part go to `folder`.
 pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result<(Vec<Row>, String, bool)> {
-    let known = || PARTS.iter().map(|part| part.name).chain([BRICK]);
+    let known = || PARTS.iter().map(|part| part.name).chain([BRICK, DISTORTED]);
     let (mut names, mut edges) = (Vec::new(), EDGES.to_owned());
     for argument in arguments {
         match known().find(|name| *name == argument.as_str()) {
@@ -54,10 +56,10 @@ pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result
         part.draw(folder, &curves)?;
         take(part.name, rows)?;
     }
-    if wanted(BRICK) {
-        let brick = brick::run(&program, workspace, folder, &edges)?;
-        (text, passed) = (text + &brick.text, brick.passed);
-        take(BRICK, brick.rows)?;
+    for name in [BRICK, DISTORTED].into_iter().filter(|name| wanted(name)) {
+        let brick = brick::run(&program, workspace, folder, name == DISTORTED, &edges)?;
+        (text, passed) = (text + &brick.text, passed && brick.passed);
+        take(name, brick.rows)?;
     }
     Ok((all, text, passed))
 }

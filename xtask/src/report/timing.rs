@@ -134,6 +134,33 @@ const SUBJECTS: &[Subject] = &[
         note: "The same with 50 s a step.",
     },
     Subject {
+        title: "Crystallization with births, over the step",
+        source: Source::Case { case: "ch4/error-against-time", curves: "error_against_time_step-" },
+        split: "\n",
+        default: "adaptive",
+        axes: ["s of the solution", "rms error of the layers' mean α"],
+        command: "cargo xtask validate --case cases/ch4/error-against-time",
+        note: "A bar of three layers that crystallizes, melts and gives off heat while it is printed; a point for each step or tolerance. The truth is the same program at a tolerance of 1e-4 K.",
+    },
+    Subject {
+        title: "Crystallization with births, over the mesh",
+        source: Source::Case { case: "ch4/error-against-time", curves: "error_against_time_mesh-" },
+        split: "\n",
+        default: "hex8",
+        axes: ["s of the solution", "rms error of the layers' mean α"],
+        command: "cargo xtask validate --case cases/ch4/error-against-time",
+        note: "The same bar on grids of 1 to 6 elements a layer; six tetrahedra fill a cell. The truth is hexahedra, 12 a layer.",
+    },
+    Subject {
+        title: "Latent heat",
+        source: Source::Case { case: "ch4/freezing", curves: "error_against_time_latent-" },
+        split: "\n",
+        default: "width-of-mesh",
+        axes: ["s of the solution", "rms error, K"],
+        command: "cargo xtask validate --case cases/ch4/freezing",
+        note: "Freezing with latent heat as a peak of c(T), against Neumann's closed form; a point for each mesh, or each tolerance.",
+    },
+    Subject {
         title: "Surrogate models: training",
         source: Source::Table {
             case: "ch3/train-default",

@@ -35,12 +35,20 @@ pub struct Options {
     /// Lumped capacity in place of consistent.
     #[arg(long)]
     lumped: bool,
+    /// Move inner nodes by up to this part of an edge, smoothly, so that no two elements are equal.
+    #[arg(long, default_value_t = 0.0, value_parser = amplitude)]
+    distorted: f64,
     /// Write the mesh here, as CalculiX reads it (`.inp`).
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Write the nodes and their temperatures at the end here (CSV).
     #[arg(long, value_name = "FILE")]
     temperatures: Option<PathBuf>,
+}
+
+fn amplitude(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    if (0.0..=0.2).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 0 to 0.2")) }
 }
 
 /// Rows of one run.
@@ -91,6 +99,7 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
 
 fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
     let mesh = Grid::uniform([0.0; 3], [EDGE; 3], [options.elements; 3])?.mesh("brick")?;
+    let mesh = if options.distorted > 0.0 { mesh.distorted(options.distorted)? } else { mesh };
     let property = Property::constant;
     let material = Arc::new(Conductor::new(1010.0, property("k", 0.25)?, property("c", 2200.0)?)?);
     let surface = || Where::Outer { except: mesh.surfaces["bottom"].clone() };

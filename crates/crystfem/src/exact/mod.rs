@@ -3,12 +3,14 @@
 //! Arguments outside their domain (negative times or conductivities, what is not a number) give NaN or the limit named;
 //! nothing panics.
 
+mod benchmark;
 mod cooling;
 mod front;
 mod half_space;
 mod manufactured;
 mod wall;
 
+pub use benchmark::{CooledPlate, SwingingSlab, radiating_rod};
 pub use cooling::{adiabatic_rise, lumped_film, lumped_radiation};
 pub use front::{Freezing, stefan_root};
 pub use half_space::{Contact, HalfSpace};

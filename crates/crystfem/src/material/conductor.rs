@@ -2,14 +2,16 @@
 
 use super::{Point, Property, Response, ThermalMaterial};
 use crate::error::Error;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
-/// A conductor without state: U = ∫c dT, f = −k(T) ∇T.
+/// A conductor without state: U = ∫c dT, f = −k(T) D ∇T, D diagonal: along beads a part conducts better than across.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conductor {
     density: f64,
     conductivity: Property,
     specific_heat: Property,
+    /// D, along x, y, z.
+    directions: Vector3<f64>,
 }
 
 impl Conductor {
@@ -19,10 +21,24 @@ impl Conductor {
     /// [`Error::Parameter`] unless the density is above 0 and finite.
     pub fn new(density: f64, conductivity: Property, specific_heat: Property) -> Result<Self, Error> {
         if density > 0.0 && density.is_finite() {
-            return Ok(Self { density, conductivity, specific_heat });
+            return Ok(Self { density, conductivity, specific_heat, directions: Vector3::repeat(1.0) });
         }
         let allowed = "above 0 and finite".to_owned();
         Err(Error::Parameter { name: "density, kg/m³", found: density, allowed })
+    }
+
+    /// The same with factors on the conductivity along x, y and z.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] unless each is above 0 and finite.
+    pub fn with_directions(self, factors: [f64; 3]) -> Result<Self, Error> {
+        match factors.into_iter().find(|factor| !(*factor > 0.0 && factor.is_finite())) {
+            None => Ok(Self { directions: factors.into(), ..self }),
+            Some(found) => {
+                let allowed = "above 0 and finite".to_owned();
+                Err(Error::Parameter { name: "factor on the conductivity", found, allowed })
+            }
+        }
     }
 
     /// ∫c dT from the reference temperature, J/kg.
@@ -39,12 +55,13 @@ impl Conductor {
     pub(super) fn conduct(&self, at: &Point) -> Result<Response, Error> {
         let temperature = checked(at)?;
         let [conductivity, slope] = self.conductivity.with_slope(temperature);
+        let gradient = self.directions.component_mul(&at.gradient);
         Ok(Response {
             energy: self.specific_heat.integral(temperature),
             d_energy_d_temperature: self.specific_heat.at(temperature),
-            flux: -conductivity * at.gradient,
-            d_flux_d_temperature: -slope * at.gradient,
-            d_flux_d_gradient: Matrix3::from_diagonal_element(-conductivity),
+            flux: -conductivity * gradient,
+            d_flux_d_temperature: -slope * gradient,
+            d_flux_d_gradient: Matrix3::from_diagonal(&(-conductivity * self.directions)),
             step_ratio: None,
         })
     }

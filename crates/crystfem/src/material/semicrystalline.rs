@@ -71,6 +71,14 @@ impl Semicrystalline {
         })
     }
 
+    /// The same with factors on the conductivity along x, y and z.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] unless each is above 0 and finite.
+    pub fn with_directions(self, factors: [f64; 3]) -> Result<Self, Error> {
+        Ok(Self { conductor: self.conductor.with_directions(factors)?, ..self })
+    }
+
     /// Growth and melting.
     pub fn crystallization(&self) -> &Crystallization {
         &self.crystallization

@@ -42,6 +42,7 @@ fn all() -> Vec<Box<dyn ThermalMaterial>> {
         Box::new(pa12_of(Constants::TABLE_4_1_COLUMN_2, Some(209e3))),
         Box::new(Printed::new(plain(), Sign::Printed, false)),
         Box::new(Printed::new(plain(), Sign::Mended, true)),
+        Box::new(tabulated().with_directions([1.0, 0.4, 1e-3]).unwrap()),
     ]
 }
 
@@ -84,6 +85,19 @@ fn tangents() {
                 }
             }
         }
+    }
+}
+
+/// D k ∇T; factors that are none are named.
+#[test]
+fn conductivity_along_axes() {
+    let material = pa12(None).with_directions([2.0, 1.0, 1e-6]).unwrap();
+    let mut new = [0.0];
+    let found = material.respond(&point(400.0, 0.0, 1.0), &[0.1], &mut new).unwrap();
+    let isotropic = pa12(None).respond(&point(400.0, 0.0, 1.0), &[0.1], &mut new).unwrap().flux;
+    assert_eq!(found.flux, isotropic.component_mul(&Vector3::new(2.0, 1.0, 1e-6)));
+    for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(plain().with_directions([1.0, wrong, 1.0]).is_err());
     }
 }
 

@@ -19,6 +19,8 @@ pub struct Bar {
     pub element_size: f64,
     /// What it is printed on; `None`: the bar alone.
     pub substrate: Option<Substrate>,
+    /// What fills the cells.
+    pub cells: Split,
 }
 
 /// A plate below the bar, its upper face at z = 0.
@@ -33,7 +35,7 @@ pub struct Substrate {
 }
 
 impl Bar {
-    /// Conforming hexahedra: element sets `bar`, `layer-1` … `layer-N`, `substrate`; surfaces and node sets on the sides
+    /// Conforming elements: element sets `bar`, `layer-1` … `layer-N`, `substrate`; surfaces and node sets on the sides
     /// of the box around all, [`crate::mesh::BOX_SIDES`] (`bottom` is the substrate's lower face), and `interface`,
     /// the bar's lower face.
     ///
@@ -55,12 +57,12 @@ impl Bar {
             let (lower, upper) = ([-x, -y, -substrate.thickness], [x, y, 0.0]);
             blocks.push(Block { name: "substrate".into(), lower, upper });
         }
-        let mut mesh = grid.blocks(&blocks, Split::Hexahedra)?;
+        let mut mesh = grid.blocks(&blocks, self.cells)?;
         let under =
             |face: &Face| mesh.face_nodes(*face).iter().all(|node| mesh.points[*node as usize][2] == 0.0);
         let first = &mesh.element_sets["layer-1"];
         let interface: Vec<Face> =
-            first.iter().map(|element| Face { element: *element, side: 0 }).filter(under).collect();
+            first.iter().flat_map(|&element| mesh.faces_of(element)).filter(under).collect();
         mesh.node_sets.insert("interface".into(), mesh.nodes_of(&interface));
         mesh.surfaces.insert("interface".into(), interface);
         Ok(mesh)
@@ -174,6 +176,7 @@ mod tests {
             elements_per_layer: 2,
             element_size: 5e-4,
             substrate: Some(Substrate { size: [0.04, 0.02], thickness: 4e-3, growth: 1.4 }),
+            cells: Split::Hexahedra,
         }
     }
 
@@ -211,6 +214,17 @@ mod tests {
         let mesh = Bar { substrate: Some(same), ..bar() }.mesh().unwrap();
         assert_eq!(mesh.element_count(), 40 * 8 * 18);
         assert_eq!(mesh.bricks().unwrap().sizes.len(), 1);
+    }
+
+    #[test]
+    fn a_bar_of_tetrahedra() {
+        let mesh = Bar { cells: Split::SixTetrahedra, ..bar() }.mesh().unwrap();
+        let quality = quality::check(&mesh, None).unwrap();
+        let exact = 0.02 * 0.004 * 8.0 * 2e-4 + 0.04 * 0.02 * 4e-3;
+        assert!((quality.volume / exact - 1.0).abs() < 1e-12);
+        assert_eq!(mesh.element_sets["layer-8"].len(), 6 * 40 * 8 * 2);
+        assert_eq!(mesh.surfaces["interface"].len(), 2 * 40 * 8);
+        assert_eq!(mesh.node_sets["interface"].len(), 41 * 9);
     }
 
     #[test]

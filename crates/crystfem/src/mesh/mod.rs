@@ -11,6 +11,7 @@ pub mod quality;
 mod split;
 mod structured;
 pub mod surface;
+mod tube;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,6 +25,7 @@ pub use labelled::ReadMesh;
 pub use locate::Place;
 pub use split::Split;
 pub use structured::{Block, Grid, graded};
+pub use tube::Tube;
 
 /// A face of an element: the element's number and the side, 0–5 of a hexahedron or 0–3 of a tetrahedron, numbered as in
 /// Abaqus (S1 is side 0).
@@ -104,6 +106,11 @@ impl Mesh {
     /// Number of sides of an element: 6 or 4.
     pub fn side_count(&self, element: u32) -> u8 {
         if (element as usize) < self.hexahedra.len() { 6 } else { 4 }
+    }
+
+    /// Faces of an element.
+    pub fn faces_of(&self, element: u32) -> impl Iterator<Item = Face> + use<> {
+        (0..self.side_count(element)).map(move |side| Face { element, side })
     }
 
     /// Nodes of a face, anticlockwise seen from outside; empty where there is no such face.

@@ -3,7 +3,8 @@
 use crate::mesh::{Face, HEXAHEDRON_SIDES, Mesh, TETRAHEDRON_SIDES};
 
 /// What fills the cells of a grid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Split {
     /// One hexahedron.
     #[default]
@@ -12,6 +13,17 @@ pub enum Split {
     FiveTetrahedra,
     /// Six tetrahedra around the diagonal from the first corner to the opposite one (Kuhn's division).
     SixTetrahedra,
+}
+
+impl Split {
+    /// Elements of a cell.
+    pub fn count(self) -> usize {
+        match self {
+            Self::Hexahedra => 1,
+            Self::FiveTetrahedra => FIVE[0].len(),
+            Self::SixTetrahedra => SIX.len(),
+        }
+    }
 }
 
 const SIX: [[usize; 4]; 6] =
@@ -24,11 +36,10 @@ const FIVE: [[[usize; 4]; 5]; 2] = [
 
 /// Splits each hexahedron; sets and surfaces follow. `odd` tells the parity of each cell.
 pub(super) fn split(mesh: Mesh, odd: &[bool], into: Split) -> Mesh {
-    let count = match into {
-        Split::Hexahedra => return mesh,
-        Split::FiveTetrahedra => 5,
-        Split::SixTetrahedra => 6,
-    };
+    if into == Split::Hexahedra {
+        return mesh;
+    }
+    let count = into.count() as u32;
     let parts = |element: usize| match into {
         Split::SixTetrahedra => &SIX[..],
         _ => &FIVE[usize::from(odd[element])][..],
@@ -75,6 +86,7 @@ mod tests {
             let mesh = grid.blocks(&blocks, into).unwrap();
             assert_eq!(mesh.tetrahedra.len(), 12 * count);
             assert_eq!(mesh.element_sets["brick"].len(), 12 * count);
+            assert_eq!(into.count() * 12, mesh.element_count());
             let quality = quality::check(&mesh, None).unwrap();
             assert!((quality.volume - 12.0).abs() < 1e-13);
             assert!(quality.notes.is_empty(), "{:?}", quality.notes);

@@ -317,6 +317,7 @@ mod tests {
             elements_per_layer: 2,
             element_size: 1e-3,
             substrate: Some(substrate),
+            cells: Split::Hexahedra,
         }
         .mesh()
         .unwrap();

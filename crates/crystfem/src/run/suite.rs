@@ -137,6 +137,24 @@ fn together(source: &Source, scene: &PartScene, rows: &Rows) -> Report {
             report.value(&format!("{}.order", spec.name), order, "");
         }
     }
+    let of = |name: &String| rows.rows.iter().find(|row| row.name == *name)?.outcome.as_ref().ok();
+    for spec in &scene.error_against_time {
+        let truth = spec.truth.as_ref().and_then(of);
+        let mut points = Vec::new();
+        for study in &spec.studies {
+            let Some(own) = of(study) else { continue };
+            if let Some(error) = spec.error(own, truth) {
+                report.value(&format!("{}.error_of_{study}", spec.name), error, "");
+                points.push((own.seconds.get("solve").copied().unwrap_or(f64::NAN), error));
+            }
+        }
+        if points.is_empty() {
+            continue;
+        }
+        let (seconds, errors): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+        let columns = [("seconds", "s", seconds), ("error", "", errors)];
+        report.curve(&format!("error_against_time_{}", spec.name), &columns);
+    }
     report
 }
 

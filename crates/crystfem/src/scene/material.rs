@@ -48,6 +48,8 @@ pub struct MaterialSpec {
     pub density: Density,
     /// Conductivity k.
     pub conductivity: PropertySpec<ConductivityDimension>,
+    /// Factors on the conductivity along x, y and z; default 1.
+    pub conductivity_factors: Option<[f64; 3]>,
     /// Specific heat c.
     pub specific_heat: PropertySpec<SpecificHeatDimension>,
     /// Kinetics, of `semicrystalline`.
@@ -224,7 +226,10 @@ impl MaterialSpec {
 
     fn conductor(&self, source: &Source, key: &str) -> Result<Conductor, SceneError> {
         let [conductivity, heat] = self.properties(source, key)?;
-        at(source, &format!("{key}.density"), Conductor::new(self.density.si(), conductivity, heat))
+        let conductor = Conductor::new(self.density.si(), conductivity, heat);
+        let conductor = at(source, &format!("{key}.density"), conductor)?;
+        let factors = format!("{key}.conductivity_factors");
+        at(source, &factors, conductor.with_directions(self.conductivity_factors.unwrap_or([1.0; 3])))
     }
 
     /// Conductivity and specific heat.
@@ -257,7 +262,7 @@ impl MaterialSpec {
             None => None,
         };
         let property = |name: &str| format!("{key}.{name}");
-        // the density is checked here with the properties, so that the rest speaks of crystals
+        // density and factors are checked here with the properties, so that the rest speaks of crystals
         self.conductor(source, key)?;
         let [conductivity, specific_heat] = self.properties(source, key)?;
         let kinetics = Kinetics::new(constants)
@@ -272,7 +277,9 @@ impl MaterialSpec {
             latent_heat: self.latent_heat.map(Quantity::si),
             seed: self.initial_alpha.map_or(0.0, Quantity::si),
         };
-        Semicrystalline::new(polymer).map_err(|error| {
+        let built = Semicrystalline::new(polymer);
+        let factors = self.conductivity_factors.unwrap_or([1.0; 3]);
+        built.and_then(|built| built.with_directions(factors)).map_err(|error| {
             let name = match &error {
                 Error::Parameter { name: "latent heat, J/kg", .. } => "latent_heat",
                 Error::Parameter { name: "initial relative crystallinity", .. } => "initial_alpha",

@@ -37,13 +37,19 @@ const FIELD: f64 = 64.0;
 const MOST_STEPS: f64 = 1e9;
 const MOST_FRAMES: f64 = 1e5;
 
-/// Refuses a structured mesh of so many elements along each axis before anything of it is allocated.
+/// Refuses a structured mesh of so many cells along each axis, with so many elements each, before anything of it is
+/// allocated.
 ///
 /// # Errors
 /// What is needed and what there is, at `key`.
-pub(super) fn refuse_mesh(source: &Source, key: &str, elements: [f64; 3]) -> Result<(), SceneError> {
-    let nodes: f64 = elements.iter().map(|count| count + 1.0).product();
-    let needed = nodes * NODE + elements.iter().product::<f64>() * ELEMENT;
+pub(super) fn refuse_mesh(
+    source: &Source,
+    key: &str,
+    cells: [f64; 3],
+    each: usize,
+) -> Result<(), SceneError> {
+    let nodes: f64 = cells.iter().map(|count| count + 1.0).product();
+    let needed = nodes * NODE + each as f64 * cells.iter().product::<f64>() * ELEMENT;
     refuse(source, key, &format!("{nodes:.3e} nodes"), needed)
 }
 

@@ -3,9 +3,9 @@
 use super::fault::{located, located_in};
 use super::memory;
 use crate::error::Error;
-use crate::mesh::{Bar, Grid, Mesh, Substrate, quality, read};
+use crate::mesh::{Bar, Block, Grid, Mesh, Split, Substrate, Tube, quality, read};
 use polycore::scene::{SceneError, Source};
-use polycore::units::Length;
+use polycore::units::{Angle, Length};
 use serde::Deserialize;
 use std::path::PathBuf;
 
@@ -22,7 +22,17 @@ const BAR_KEYS: [(&str, &str); 9] = [
     ("growth of elements", "substrate.growth"),
 ];
 
-/// One of a printed bar, a brick, and a file.
+/// Where parameters of a tube stand in its block.
+const TUBE_KEYS: [(&str, &str); 6] = [
+    ("radius of the bore", "radii"),
+    ("outer radius", "radii"),
+    ("angle of the sector", "angle"),
+    ("angle of an element", "elements"),
+    ("length of the tube", "length"),
+    ("elements along an axis", "elements"),
+];
+
+/// One of a printed bar, a brick, a sector of a tube, and a file.
 ///
 /// ```toml
 /// [mesh.bar]
@@ -40,6 +50,8 @@ pub struct MeshSpec {
     pub bar: Option<BarSpec>,
     /// A box of equal elements.
     pub brick: Option<BrickSpec>,
+    /// A sector of a hollow cylinder.
+    pub tube: Option<TubeSpec>,
     /// A Gmsh `.msh` (4.1) or an Abaqus or CalculiX `.inp`.
     pub file: Option<PathBuf>,
     /// Length of a unit of the file; default 1 m.
@@ -62,6 +74,9 @@ pub struct BarSpec {
     pub element_size: Length,
     /// What it is printed on.
     pub substrate: Option<SubstrateSpec>,
+    /// What fills the cells of the grid; default hexahedra.
+    #[serde(default)]
+    pub cells: Split,
 }
 
 /// See [`Substrate`].
@@ -82,7 +97,24 @@ pub struct SubstrateSpec {
 pub struct BrickSpec {
     /// Extents.
     pub size: [Length; 3],
-    /// Elements along each axis.
+    /// Elements along each axis; tetrahedra fill each of these cells.
+    pub elements: [usize; 3],
+    /// What fills the cells; default hexahedra.
+    #[serde(default)]
+    pub cells: Split,
+}
+
+/// See [`Tube`].
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TubeSpec {
+    /// Radii of the bore and of the outside.
+    pub radii: [Length; 2],
+    /// Angle of the sector, from y = 0 on.
+    pub angle: Angle,
+    /// Length along z.
+    pub length: Length,
+    /// Elements along the radius, around, and along z.
     pub elements: [usize; 3],
 }
 
@@ -102,13 +134,11 @@ impl MeshSpec {
     /// # Errors
     /// A [`SceneError`] for none or several of the alternatives, and for what the mesh refuses.
     pub fn build(&self, source: &Source) -> Result<Built, SceneError> {
-        let given = [self.bar.is_some(), self.brick.is_some(), self.file.is_some()]
-            .into_iter()
-            .filter(|&x| x)
-            .count();
+        let kinds = [self.bar.is_some(), self.brick.is_some(), self.tube.is_some(), self.file.is_some()];
+        let given = kinds.into_iter().filter(|&x| x).count();
         if given != 1 {
             let found = if given == 0 { "nothing".to_owned() } else { format!("{given} meshes") };
-            return Err(source.error("mesh", found, "one of `bar`, `brick`, `file`"));
+            return Err(source.error("mesh", found, "one of `bar`, `brick`, `tube`, `file`"));
         }
         if self.unit.is_some() && self.file.is_none() {
             return Err(source.error("mesh.unit", "a unit without a file", "nothing"));
@@ -116,16 +146,20 @@ impl MeshSpec {
         let at = |key: &str, error: Error| located(source, key, &error);
         let mut notes = Vec::new();
         let mesh = if let Some(bar) = &self.bar {
-            memory::refuse_mesh(source, "mesh.bar", self.elements(source)?)?;
+            memory::refuse_mesh(source, "mesh.bar", self.elements(source)?, bar.cells.count())?;
             bar.build().mesh().map_err(|error| located_in(source, "mesh.bar", &BAR_KEYS, &error))?
         } else if let Some(brick) = &self.brick {
             let size = brick.size.map(|x| x.si());
-            memory::refuse_mesh(source, "mesh.brick.elements", self.elements(source)?)?;
+            memory::refuse_mesh(source, "mesh.brick.elements", self.elements(source)?, brick.cells.count())?;
             let grid = Grid::uniform([0.0; 3], size, brick.elements);
-            grid.and_then(|grid| grid.mesh("brick")).map_err(|error| match error {
+            let blocks = [Block { name: "brick".into(), lower: [0.0; 3], upper: size }];
+            grid.and_then(|grid| grid.blocks(&blocks, brick.cells)).map_err(|error| match error {
                 Error::Mesh(_) => at("mesh.brick.size", error),
                 _ => at("mesh.brick.elements", error),
             })?
+        } else if let Some(tube) = &self.tube {
+            memory::refuse_mesh(source, "mesh.tube.elements", self.elements(source)?, 1)?;
+            tube.build().mesh().map_err(|error| located_in(source, "mesh.tube", &TUBE_KEYS, &error))?
         } else {
             let file = self.file.clone().unwrap_or_default();
             let path = source.path.parent().map_or_else(|| file.clone(), |folder| folder.join(&file));
@@ -142,18 +176,20 @@ impl MeshSpec {
 }
 
 impl MeshSpec {
-    /// Elements along each axis of a bar or brick, before anything of it is allocated: they may be too many. None of a
-    /// file.
+    /// Cells along each axis of a bar, brick or tube, before anything of it is allocated: they may be too many. None of
+    /// a file.
     ///
     /// # Errors
     /// As [`MeshSpec::build`].
     pub fn elements(&self, source: &Source) -> Result<[f64; 3], SceneError> {
-        match (&self.bar, &self.brick) {
-            (Some(bar), _) => {
+        match (&self.bar, &self.brick, &self.tube) {
+            (Some(bar), ..) => {
                 bar.build().elements().map_err(|error| located_in(source, "mesh.bar", &BAR_KEYS, &error))
             }
-            (None, Some(brick)) => Ok(brick.elements.map(|count| count as f64)),
-            (None, None) => Ok([0.0; 3]),
+            (None, Some(BrickSpec { elements, .. }), _) | (None, None, Some(TubeSpec { elements, .. })) => {
+                Ok(elements.map(|count| count as f64))
+            }
+            (None, None, None) => Ok([0.0; 3]),
         }
     }
 }
@@ -171,6 +207,19 @@ impl BarSpec {
                 thickness: substrate.thickness.si(),
                 growth: substrate.growth.unwrap_or(1.5),
             }),
+            cells: self.cells,
+        }
+    }
+}
+
+impl TubeSpec {
+    fn build(&self) -> Tube {
+        let [inner, outer] = &self.radii;
+        Tube {
+            radii: [inner.si(), outer.si()],
+            angle: self.angle.si(),
+            length: self.length.si(),
+            elements: self.elements,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Scenes, as written in TOML. Only what a scene names is built.
 
 mod convergence;
+mod curve;
 mod either;
 mod fault;
 mod fit;
@@ -14,9 +15,10 @@ mod schedule;
 mod study;
 
 pub use convergence::ConvergenceSpec;
+pub use curve::CurveSpec;
 pub use fit::{DataSpec, FitLaw, FitScene, FitSpec, Job};
 pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
-pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec};
+pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec, TubeSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, PointScene, PointSpec};
 pub use problem::Task;

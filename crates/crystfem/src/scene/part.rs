@@ -1,6 +1,8 @@
 //! The scene of a body in time: mesh, materials, layers, what acts on it.
 
-use super::{ConvergenceSpec, MaterialSpec, MeshSpec, Program, ScheduleSpec, StudySpec, check_name};
+use super::{
+    ConvergenceSpec, CurveSpec, MaterialSpec, MeshSpec, Program, ScheduleSpec, StudySpec, check_name,
+};
 use crate::problem::Capacity;
 use crate::simulation::LinearSolver;
 use crate::time::Scheme;
@@ -52,6 +54,9 @@ pub struct PartScene {
     /// Limits and orders of quantities over studies.
     #[serde(default)]
     pub convergence: Vec<ConvergenceSpec>,
+    /// Error against run time over studies.
+    #[serde(default)]
+    pub error_against_time: Vec<CurveSpec>,
     /// What the results must be.
     #[serde(default)]
     pub expect: Vec<Expect>,
@@ -105,6 +110,10 @@ pub struct BoundarySpec {
     /// Surfaces that are left out of `outer`.
     #[serde(default)]
     pub except: Vec<String>,
+    /// Lower corner of a box: only faces of the surface whose middle lies in it count; default: no bound.
+    pub min: Option<[Length; 3]>,
+    /// Its upper corner.
+    pub max: Option<[Length; 3]>,
     /// Prescribed temperature.
     pub temperature: Option<ScheduleSpec<TemperatureDimension>>,
     /// Heat flux into the body.
@@ -248,6 +257,13 @@ impl PartScene {
 }
 
 impl BoundarySpec {
+    /// Corners of the box that limits the surface, m.
+    pub fn corners(&self) -> Option<[[f64; 3]; 2]> {
+        let corner = |of: &Option<[Length; 3]>, none: f64| of.map_or([none; 3], |of| of.map(|x| x.si()));
+        let bounded = self.min.is_some() || self.max.is_some();
+        bounded.then(|| [corner(&self.min, f64::NEG_INFINITY), corner(&self.max, f64::INFINITY)])
+    }
+
     fn check(&self, source: &Source, key: &str) -> Result<(), SceneError> {
         let exchange = self.film.is_some() || self.emissivity.is_some();
         let given = [self.temperature.is_some(), self.flux.is_some(), exchange];
@@ -261,6 +277,12 @@ impl BoundarySpec {
                 false => ("`ambient` of another condition", "nothing"),
             };
             return Err(source.error(&format!("{key}.ambient"), found, allowed));
+        }
+        if self.temperature.is_some() && self.surface == "outer" && self.corners().is_some() {
+            let key = format!("{key}.surface");
+            let allowed =
+                "a named surface or a side: prescribed temperatures act on nodes, inside as outside";
+            return Err(source.error(&key, "a part of `outer` with a `temperature`", allowed));
         }
         if !self.except.is_empty() && self.surface != "outer" {
             let key = format!("{key}.except");

@@ -92,7 +92,8 @@ impl PartScene {
         let problem =
             Problem { mesh, materials, material_of, initial, conditions, sources: heats, births, capacity };
         problem.check().map_err(|error| located(source, "mesh", &error))?;
-        Ok(Task { problem, settings: self.settings(end), end, printed, layers, probes, notes })
+        let settings = self.settings(end, problem.shortest_period());
+        Ok(Task { problem, settings, end, printed, layers, probes, notes })
     }
 
     /// Where each probe lies in the mesh.
@@ -156,14 +157,39 @@ impl PartScene {
             let region = surface.region(mesh, name);
             region.map(|region| surface.all_in(&region)).map_err(|error| located(source, key, &error))
         };
+        let middle = |face: &Face| {
+            let nodes = mesh.face_nodes(*face);
+            let sum = |d: usize| nodes.iter().map(|node| mesh.points[*node as usize][d]).sum::<f64>();
+            [0, 1, 2].map(|d| sum(d) / nodes.len() as f64)
+        };
         let mut conditions = Vec::new();
         for (index, spec) in self.boundary.iter().enumerate() {
             let key = format!("boundary[{index}]");
-            let place = if spec.surface == "outer" {
-                let mut except = Vec::new();
-                for name in &spec.except {
-                    except.extend(faces(&format!("{key}.except"), name)?);
+            let mut except = Vec::new();
+            for name in &spec.except {
+                except.extend(faces(&format!("{key}.except"), name)?);
+            }
+            let place = if let Some([min, max]) = spec.corners() {
+                let mut inside = faces(&format!("{key}.surface"), &spec.surface)?;
+                inside.retain(|face| {
+                    let at = middle(face);
+                    (0..3).all(|d| (min[d]..=max[d]).contains(&at[d])) && !except.contains(face)
+                });
+                if inside.is_empty() {
+                    let found = format!(
+                        "no face of `{}` from {} to {}",
+                        spec.surface,
+                        millimetres(min),
+                        millimetres(max)
+                    );
+                    return Err(source.error(
+                        &format!("{key}.min"),
+                        found,
+                        "a box that holds the middle of one",
+                    ));
                 }
+                Where::Faces(inside)
+            } else if spec.surface == "outer" {
                 Where::Outer { except }
             } else {
                 Where::Faces(faces(&format!("{key}.surface"), &spec.surface)?)
@@ -176,17 +202,23 @@ impl PartScene {
         Ok(conditions)
     }
 
-    fn settings(&self, end: f64) -> Settings {
+    /// Adaptive steps are an eighth of the shortest period of what swings at most: longer ones would leap over it.
+    fn settings(&self, end: f64, period: Option<f64>) -> Settings {
         let time = &self.time;
+        let most = period.map_or(f64::INFINITY, |period| period / 8.0);
         let steps = match time.step {
             Some(step) => Steps::Fixed { dt: step.si() },
             None => {
-                let first = time.first_step.map_or(FIRST * end, |first| first.si());
+                let first = time.first_step.map_or(FIRST * end, |first| first.si()).min(most);
                 Steps::Adaptive {
                     tolerance: time.tolerance.map_or(TOLERANCE, |tolerance| tolerance.si()),
                     first,
                     smallest: SMALLEST * first,
-                    largest: time.longest_step.map_or(f64::INFINITY, |longest| longest.si()).max(first),
+                    largest: time
+                        .longest_step
+                        .map_or(f64::INFINITY, |longest| longest.si())
+                        .min(most)
+                        .max(first),
                 }
             }
         };

@@ -1,7 +1,7 @@
-//! Values over time: written as a constant, as a table, or as a CSV file.
+//! Values over time: written as a constant, as a table, as a CSV file, or as a swing.
 
 use super::either::{self, TextOrTable};
-use super::fault::located;
+use super::fault::{located, located_in};
 use crate::boundary::Schedule;
 use crate::table::{Column, read};
 use polycore::scene::{SceneError, Source};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
 
 /// A constant (`"80 degC"`), a table (`{ time = […], value = […] }`) or a file (`{ file = "chamber.csv" }`): linear
-/// between the given times and constant outside of them.
+/// between the given times and constant outside of them; or a swing (`{ low = …, high = …, period = … }`).
 #[derive(Clone, Debug)]
 pub enum ScheduleSpec<D> {
     /// The same always.
@@ -32,20 +32,33 @@ pub struct TimesSpec<D> {
     pub value: Vec<Quantity<D>>,
     /// Or a CSV file with the columns `time [unit]` and `value [unit]`.
     pub file: Option<PathBuf>,
+    /// Or a sine between `low` and `high` that passes their middle upwards at t = 0.
+    pub low: Option<Quantity<D>>,
+    /// See `low`.
+    pub high: Option<Quantity<D>>,
+    /// Of the sine.
+    pub period: Option<Time>,
 }
+
+/// Where parameters of a swing stand in its block.
+const SWING_KEYS: [(&str, &str); 3] = [("low value", "low"), ("high value", "high"), ("period, s", "period")];
 
 impl<D: Dimension + Copy> ScheduleSpec<D> {
     /// The schedule, in SI units.
     ///
     /// # Errors
-    /// A file beside a table, a table with a gap, times that do not increase, and a file that is no such table.
+    /// Several of table, file and swing, a swing without one of its keys, a table with a gap, times that do not increase, and a file that is no such table.
     pub fn build(&self, source: &Source, key: &str) -> Result<Schedule, SceneError> {
         let over = match self {
             Self::Constant(value) => return Ok(Schedule::constant(value.si())),
             Self::Over(over) => over,
         };
+        let table = !(over.time.is_empty() && over.value.is_empty());
+        if let Some(swing) = over.swing(source, key, table)? {
+            return Ok(swing);
+        }
         let (times, values) = match &over.file {
-            Some(_) if !(over.time.is_empty() && over.value.is_empty()) => {
+            Some(_) if table => {
                 return Err(source.error(key, "a file beside a table", "one of them"));
             }
             Some(file) => {
@@ -67,11 +80,31 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
     }
 }
 
+impl<D: Dimension + Copy> TimesSpec<D> {
+    /// The swing, where it is one; `table`: there is a table beside it.
+    fn swing(&self, source: &Source, key: &str, table: bool) -> Result<Option<Schedule>, SceneError> {
+        if self.low.is_none() && self.high.is_none() && self.period.is_none() {
+            return Ok(None);
+        }
+        if table || self.file.is_some() {
+            return Err(source.error(key, "a swing beside a table or a file", "one of them"));
+        }
+        let missing =
+            |name: &str| source.error(&format!("{key}.{name}"), "nothing", "`low`, `high` and `period`");
+        let low = self.low.ok_or_else(|| missing("low"))?;
+        let high = self.high.ok_or_else(|| missing("high"))?;
+        let period = self.period.ok_or_else(|| missing("period"))?;
+        let swing = Schedule::swing(low.si(), high.si(), period.si());
+        swing.map(Some).map_err(|error| located_in(source, key, &SWING_KEYS, &error))
+    }
+}
+
 impl<D: Dimension> TextOrTable for ScheduleSpec<D> {
     type Table = TimesSpec<D>;
 
     fn expected() -> String {
-        format!("{}, e.g. \"{}\", {{ time = […], value = […] }} or {{ file = … }}", D::NAME, D::EXAMPLE)
+        let others = "{ time = […], value = […] }, { file = … } or { low = …, high = …, period = … }";
+        format!("{}, e.g. \"{}\", {others}", D::NAME, D::EXAMPLE)
     }
 
     fn from_text<E: serde::de::Error>(text: &str) -> Result<Self, E> {
@@ -92,7 +125,7 @@ impl<D: Dimension> schemars::JsonSchema for ScheduleSpec<D> {
         let constant = generator.subschema_for::<Quantity<D>>();
         let time = generator.subschema_for::<Time>();
         schemars::json_schema!({
-            "description": "a constant, or values over time: linear between the times, constant outside of them",
+            "description": "a constant, or values over time: linear between the times, constant outside of them, or a sine",
             "anyOf": [constant, {
                 "type": "object",
                 "properties": {
@@ -102,6 +135,9 @@ impl<D: Dimension> schemars::JsonSchema for ScheduleSpec<D> {
                         "type": "string",
                         "description": "Or a CSV file with the columns `time [unit]` and `value [unit]`.",
                     },
+                    "low": { "anyOf": [constant], "description": "Or a sine from here to `high`, its middle upwards at t = 0." },
+                    "high": { "anyOf": [constant], "description": "Other end of the sine." },
+                    "period": { "anyOf": [time], "description": "Of the sine." },
                 },
                 "additionalProperties": false,
             }],

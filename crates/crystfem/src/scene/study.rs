@@ -78,7 +78,7 @@ impl PartScene {
     ///
     /// # Errors
     /// Names that name no folder or two studies, a quick run of nothing, and those of
-    /// [`Self::check_convergence`].
+    /// [`Self::check_convergence`] and [`Self::check_curves`].
     pub fn studies(&self, source: &Source, quick: bool) -> Result<Vec<usize>, SceneError> {
         for (index, study) in self.study.iter().enumerate() {
             let key = format!("study[{index}].name");
@@ -89,6 +89,7 @@ impl PartScene {
             }
         }
         self.check_convergence(source)?;
+        self.check_curves(source)?;
         let asked: Vec<usize> =
             (0..self.study.len()).filter(|&index| !quick || self.study[index].quick != Some(false)).collect();
         if asked.is_empty() && !self.study.is_empty() {

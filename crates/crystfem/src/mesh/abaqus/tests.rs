@@ -52,6 +52,7 @@ fn what_is_written_is_read_back() {
         elements_per_layer: 1,
         element_size: 2e-3,
         substrate: Some(Substrate { size: [0.03, 0.01], thickness: 1e-3, growth: 1.7 }),
+        cells: Split::Hexahedra,
     };
     let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [1.0; 3] };
     let grid = Grid::uniform([0.0; 3], [1.0; 3], [3, 2, 2]).unwrap();
