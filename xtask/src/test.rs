@@ -97,13 +97,25 @@ pub fn run(workspace: &Workspace, arguments: &[String]) -> Result<bool> {
     let passed = workspace.cargo(&command, arguments, &[(FOLDER, &folder)])?;
     let (new, skips) = collect(&folder)?;
     // a choice of tests leaves the numbers of the others
-    let mut records = if arguments.is_empty() { Records::new() } else { read(workspace) };
+    let before = if arguments.is_empty() { Records::new() } else { read(workspace) };
+    let records = stamped(workspace, before, new)?;
+    atomic_write(workspace.target().join("evidence.json"), |file| {
+        Ok(serde_json::to_writer_pretty(file, &records.values().collect::<Vec<_>>())?)
+    })
+    .into_diagnostic()?;
+    print(&untested(&skips));
+    Ok(passed)
+}
+
+/// Earlier records, and new ones with stamps of their crates' sources.
+fn stamped(workspace: &Workspace, mut records: Records, new: Vec<Record>) -> Result<Records> {
     let mut stamps = BTreeMap::<String, Stamp>::new();
     for mut record in new {
-        let crate_of = record.file.split('/').nth(1).filter(|_| record.file.starts_with("crates/"));
-        let key = crate_of.unwrap_or_default().to_owned();
+        let of = record.file.strip_prefix("crates/").and_then(|rest| rest.split('/').next());
+        let key = of.unwrap_or_default().to_owned();
         if !stamps.contains_key(&key) {
-            let crates = crate_of.map_or_else(|| workspace.programs(), |name| vec![name.to_owned()]);
+            // tests of whole programs are of all crates
+            let crates = of.map_or_else(|| workspace.programs(), |name| vec![name.to_owned()]);
             let crates: Vec<&str> = crates.iter().map(String::as_str).collect();
             let sources = sources(workspace.root(), &crates, &["src", "tests"]);
             stamps.insert(key.clone(), Stamp::new(workspace.root(), &sources)?);
@@ -111,12 +123,7 @@ pub fn run(workspace: &Workspace, arguments: &[String]) -> Result<bool> {
         record.stamp = stamps.get(&key).cloned();
         records.insert(record.name.clone(), record);
     }
-    atomic_write(workspace.target().join("evidence.json"), |file| {
-        Ok(serde_json::to_writer_pretty(file, &records.values().collect::<Vec<_>>())?)
-    })
-    .into_diagnostic()?;
-    print(&untested(&skips));
-    Ok(passed)
+    Ok(records)
 }
 
 /// The records of the last runs; none where there was no run.
@@ -155,6 +162,36 @@ fn untested(skips: &[Skip]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// New records replace those of the same name; each is stale when its own crate changes, and only then.
+    #[test]
+    fn records_have_the_stamp_of_their_crate() {
+        let root = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, text: &str| {
+            let path = root.path().join(name);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+            fs::write(path, text).expect("a file");
+        };
+        write("crates/peri/src/main.rs", "1");
+        write("crates/crystfem/src/main.rs", "1");
+        let workspace = Workspace::new(root.path().to_path_buf());
+        let record = |name: &str, value: f64, file: &str| -> Record {
+            let text =
+                json!({ "name": name, "value": value, "at_most": 5, "met": true, "test": "t", "file": file });
+            serde_json::from_value(text).expect("a record")
+        };
+        let old = record("a", 1.0, "crates/peri/src/a.rs");
+        let kept = record("b", 1.0, "crates/crystfem/src/b.rs");
+        let before = stamped(&workspace, Records::new(), vec![old, kept]).expect("records");
+        let new = vec![record("a", 2.0, "crates/peri/src/a.rs"), record("c", 3.0, "tests/it/c.rs")];
+        let records = stamped(&workspace, before, new).expect("records");
+        assert_eq!(records["a"].cells()[0], "2");
+        let fresh =
+            |name: &str| records[name].stamp.as_ref().is_some_and(|stamp| stamp.fresh(workspace.root()));
+        assert_eq!(["a", "b", "c"].map(fresh), [true, true, true]);
+        write("crates/crystfem/src/main.rs", "2");
+        assert_eq!(["a", "b", "c"].map(fresh), [true, false, false]);
+    }
 
     #[test]
     fn what_tests_leave() {
