@@ -2,7 +2,7 @@
 
 use mdsurrogate::Error;
 use mdsurrogate::dataset::{ReadOptions, hdf5, read};
-use mdsurrogate::md::{Engine, Folder, Grid, Plan, Protocol, Run};
+use mdsurrogate::md::{Engine, Folder, Grid, Plan, Protocol, Run, Stepwise};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -69,6 +69,10 @@ pub struct Write {
     /// Steps between samples.
     #[arg(long, default_value_t = 100)]
     every: u64,
+    /// Pull in steps, as for Fig. 3.5: in each interval between samples so many steps in which its strain is put on, then
+    /// so many of NVT with the box held, and averages over the rest of the interval.
+    #[arg(long, num_args = 2, value_names = ["PULL", "RELAX"])]
+    stepwise: Option<Vec<u64>>,
     /// Temperature, K.
     #[arg(long, default_value_t = 300.0)]
     temperature: f64,
@@ -159,6 +163,10 @@ impl Write {
             snapshots: self.snapshots,
             gap: self.gap,
             seed: self.seed,
+            stepwise: self.stepwise.as_deref().and_then(|steps| match steps {
+                [pull, relax] => Some(Stepwise { pull: *pull, relax: *relax }),
+                _ => None,
+            }),
         };
         protocol.check()?;
         let grid = Grid {

@@ -1,6 +1,7 @@
 //! `mdsurrogate predict`: what a law answers at the strains of a table.
 
 use mdsurrogate::Error;
+use mdsurrogate::dataset::read_strains;
 use mdsurrogate::kinematics::NAMES;
 use mdsurrogate::surrogate::{Answer, Flags, Surrogate, Workspace};
 use polycore::output::csv;
@@ -15,7 +16,8 @@ const MEGA: f64 = 1e6;
 pub struct Predict {
     /// The law (safetensors).
     law: PathBuf,
-    /// The strains (CSV): columns C11, C22, C33 and, where there is shear, C12, C13, C23 (C = FᵀF; C12 counted once).
+    /// The strains (CSV): columns C11, C22, C33 and, where there is shear, C12, C13, C23 (C = FᵀF; C12 counted once), or
+    /// stretch_1, stretch_2, stretch_3 as in tables of data; other columns are left alone.
     table: PathBuf,
     /// The answers (CSV): S and its spread in MPa, W in MJ/m³ of an energy, and a 1 for each doubt.
     #[arg(long, short)]
@@ -29,7 +31,7 @@ impl Predict {
     /// Answers and writes.
     pub fn print(self) -> Result<bool, Error> {
         let law = Surrogate::<f64>::read(&self.law)?;
-        let points = strains(&self.table)?;
+        let points = read_strains(&self.table)?;
         let mut answers = vec![Answer::default(); points.len()];
         let mut memory = Workspace::default();
         let asked = if self.tangent {
@@ -54,31 +56,6 @@ impl Predict {
     }
 }
 
-/// The six components of C in each row; shear that has no column is 0, other columns are left alone.
-fn strains(path: &Path) -> Result<Vec<Voigt>, Error> {
-    let known = NAMES.map(|name| format!("C{name}"));
-    let table = csv::read(path)?;
-    let mut points = vec![Voigt::zeros(); table.first().map_or(0, |(_, column)| column.len())];
-    // a slip in a name must not become a shear of 0
-    if let Some((heading, _)) =
-        table.iter().find(|(name, _)| name.starts_with(['C', 'c']) && !known.contains(name))
-    {
-        let found = format!("column `{heading}`");
-        return Err(Error::File { path: path.to_path_buf(), found, allowed: known.join(", ") });
-    }
-    for (a, name) in known.iter().enumerate() {
-        match table.iter().find(|(heading, _)| heading == name) {
-            Some((_, column)) => points.iter_mut().zip(column).for_each(|(point, &value)| point[a] = value),
-            None if a < 3 => {
-                let (path, column) = (path.to_path_buf(), name.clone());
-                return Err(Error::MissingColumn { path, column, similar: None });
-            }
-            None => {}
-        }
-    }
-    Ok(points)
-}
-
 fn write(path: &Path, points: &[Voigt], answers: &[Answer<f64>]) -> Result<(), Error> {
     let column = |value: &dyn Fn(&Answer<f64>) -> f64| answers.iter().map(value).collect::<Vec<f64>>();
     let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
@@ -97,6 +74,9 @@ fn write(path: &Path, points: &[Voigt], answers: &[Answer<f64>]) -> Result<(), E
         columns.push((name.into(), "", values));
     };
     doubt("outside the box", &|flags| flags.outside.contains(&true));
+    for (a, name) in NAMES.iter().enumerate() {
+        doubt(&format!("C{name} outside"), &|flags| flags.outside[a]);
+    }
     doubt("never seen", &|flags| flags.unseen.contains(&true));
     doubt("far from the data", &|flags| flags.far);
     doubt("members disagree", &|flags| flags.spread);

@@ -190,6 +190,45 @@ const SUBJECTS: &[Subject] = &[
         command: "cargo xtask validate --case cases/ch3/train-default",
         note: "The same laws, one stress at a time.",
     },
+    Subject {
+        title: "Surrogate models on a known law: training",
+        source: Source::Table {
+            case: "ch3/known-law",
+            file: "error_against_time.csv",
+            error: 1,
+            time: 2,
+            scale: 1.0,
+        },
+        split: "_",
+        default: "energy",
+        axes: ["s of training", "error (3.12) on unseen runs, MPa²"],
+        command: "cargo xtask validate --case cases/ch3/known-law",
+        note: "An orthotropic, softening law without noise; of each kind five networks, the larger trained for longer.",
+    },
+    Subject {
+        title: "Surrogate models on a known law: inference",
+        source: Source::Table {
+            case: "ch3/known-law",
+            file: "error_against_time.csv",
+            error: 1,
+            time: 3,
+            scale: 1e6,
+        },
+        split: "_",
+        default: "energy",
+        axes: ["µs per stress", "error (3.12) on unseen runs, MPa²"],
+        command: "cargo xtask validate --case cases/ch3/known-law",
+        note: "The same networks, one stress at a time.",
+    },
+    Subject {
+        title: "Searches for hyperparameters",
+        source: Source::Case { case: "ch3/search-methods", curves: "error_against_time_" },
+        split: "\n",
+        default: "hyperband",
+        axes: ["s of training", "best validation loss (3.12) so far, MPa²"],
+        command: "cargo xtask validate --case cases/ch3/search-methods",
+        note: "γ-PA12, a part of Table 3.3; medians of three seeds at equal epochs, against candidates at random.",
+    },
 ];
 
 /// A subject as measured.

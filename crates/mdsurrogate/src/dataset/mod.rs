@@ -6,12 +6,14 @@ mod read;
 mod split;
 mod standardise;
 mod statistics;
+mod strains;
 mod table;
 
 pub use read::{Columns, ReadOptions, read};
 pub use split::{Fractions, Method, Split, split};
 pub use standardise::Standardisation;
 pub use statistics::{Leak, Noise, leak, noise};
+pub use strains::read_strains;
 
 use crate::Error;
 use crate::kinematics::{NAMES, material_pair};
@@ -23,6 +25,9 @@ pub const STRETCHES: [f64; 2] = [0.1, 10.0];
 
 /// Root mean squares of the stress, Pa, that are taken for stresses of a solid: beyond, a unit is wrong.
 pub const STRESSES: [f64; 2] = [1e2, 1e12];
+
+/// So many times what nine of ten rows stay below, a stress is an outlier.
+pub const OUTLIER: f64 = 1e3;
 
 /// One sample: a state of deformation and its stress.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -201,7 +206,7 @@ impl Dataset {
     /// Whether the numbers can be deformations and stresses of a solid in the units they were read in.
     ///
     /// # Errors
-    /// [`Error::Data`] for no row at all or a run that repeats another; [`Error::Implausible`] for stretches beyond [`STRETCHES`] or a root mean square of
+    /// [`Error::Data`] for no row at all or a run that repeats another; [`Error::Implausible`] for a stress beyond [`OUTLIER`], for stretches beyond [`STRETCHES`] or a root mean square of
     /// the stress beyond [`STRESSES`] (a stress of exactly zero passes: it is reported as constant).
     pub fn check(&self) -> Result<(), Error> {
         if self.is_empty() {
@@ -240,6 +245,7 @@ impl Dataset {
                 });
             }
         }
+        self.refuse_outliers()?;
         let squares: f64 = self.rows().map(|row| row.cauchy.norm_squared()).sum();
         let root = (squares / (6 * self.len()) as f64).sqrt();
         if root != 0.0 && !(STRESSES[0]..=STRESSES[1]).contains(&root) {
@@ -249,6 +255,31 @@ impl Dataset {
                 found: format!("{root:.4e} Pa"),
                 allowed: "that of a solid lies between 100 Pa and 1 TPa",
             });
+        }
+        Ok(())
+    }
+}
+
+impl Dataset {
+    /// A stress a thousand times that which nine of ten rows stay below is no measurement, and would be all that is
+    /// learnt.
+    fn refuse_outliers(&self) -> Result<(), Error> {
+        let mut sizes: Vec<f64> = self.rows().map(|row| row.cauchy.norm()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let usual = sizes[(9 * sizes.len() / 10).min(sizes.len() - 1)];
+        for path in &self.paths {
+            let far = |row: &&Row| row.cauchy.norm() > OUTLIER * usual;
+            if let Some(row) = path.rows.iter().find(far).filter(|_| usual > 0.0) {
+                return Err(Error::Implausible {
+                    place: format!("run `{}`, sample {}", path.id, row.sample),
+                    quantity: "norm of the stress".into(),
+                    found: format!(
+                        "{:.4e} Pa, where nine of ten rows have at most {usual:.4e} Pa",
+                        row.cauchy.norm()
+                    ),
+                    allowed: "a row may have a thousand times that at most: such an outlier would be all that is learnt",
+                });
+            }
         }
         Ok(())
     }

@@ -114,6 +114,14 @@ impl Form {
     fn new(table: &Table, options: &ReadOptions) -> Result<Self, Error> {
         if table.has("C11") {
             let names = |letter: &str| crate::kinematics::NAMES.map(|name| format!("{letter}{name}"));
+            let all = names("C").into_iter().chain(names("S"));
+            if let Some(missing) = all.into_iter().find(|name| !table.has(name)) {
+                let mut allowed = "C11 C22 C33 C12 C13 C23 and S11 S22 S33 S12 S13 S23".to_owned();
+                if missing.ends_with(['2', '3']) && !missing.ends_with("22") && !missing.ends_with("33") {
+                    allowed += "; where there is no shear, add columns of zeros";
+                }
+                return Err(Error::file(&table.path, format!("no column `{missing}`"), allowed));
+            }
             return Ok(Self::Material { c: table.columns(names("C"))?, s: table.columns(names("S"))? });
         }
         let prefix = match options.columns {
@@ -140,7 +148,7 @@ impl Form {
         Ok(Self::Box { lengths, tilts, reference, stress: stress()? })
     }
 
-    fn stress(&self) -> &[Column; 6] {
+    fn stress(&self) -> &[Column] {
         match self {
             Self::Box { stress, .. } | Self::Gradient { stress, .. } => stress,
             Self::Material { s, .. } => s,
@@ -163,8 +171,11 @@ impl Form {
         row: usize,
         units: &[f64; 6],
     ) -> Result<(DeformationGradient, Voigt), Error> {
-        let stress = table.numbers(row, self.stress())?;
-        let stress = Voigt::from_fn(|a, _| stress[a] * units[a]);
+        // stresses without a column are 0
+        let mut stress = Voigt::zeros();
+        for ((value, column), unit) in stress.iter_mut().zip(self.stress()).zip(units) {
+            *value = table.number(row, *column)? * unit;
+        }
         let at = |error: Error| {
             let (found, allowed) = match error {
                 Error::Parameter { name, found, allowed } => (format!("{name}: {found}"), allowed),

@@ -357,3 +357,53 @@ pub(crate) fn neo_hookean(c: &Voigt) -> Voigt {
     let half_log = 0.5 * c.determinant().ln();
     voigt::from_stress(&(1e9 * (Tensor::identity() - inverse) + 2e9 * half_log * inverse))
 }
+
+/// A missing shear column is answered with what to do, not with a stress's name.
+#[test]
+fn columns_without_shear() {
+    let error = read_text("C11,C22,C33,S11,S22,S33\n1,1,1,0,0,0\n").unwrap_err().to_string();
+    assert!(error.contains("no column `C12`") && error.contains("add columns of zeros"), "{error}");
+    assert!(!error.contains("did you mean"), "{error}");
+}
+
+/// One row a million times the others is refused with its place; a stress that grows steeply is not.
+#[test]
+fn an_outlier_is_named() {
+    let rows = |last: f64| {
+        let row = |k: usize| {
+            let s = if k == 30 { last } else { k as f64 };
+            format!("r,{},1,1,0,0,0,{s},0,0,0,0,0\n", 1.0 + 0.01 * k as f64)
+        };
+        MATERIAL.to_owned() + &(0..40).map(row).collect::<String>()
+    };
+    let error = read_text(&rows(3e7)).unwrap_err().to_string();
+    assert!(error.contains("run `r`, sample 30: norm of the stress"), "{error}");
+    assert!(read_text(&rows(3e3)).is_ok());
+}
+
+/// Strains of any table: what it was trained on, too.
+#[test]
+fn strains_of_tables() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("t.csv");
+    let of = |text: &str| {
+        std::fs::write(&path, text).unwrap();
+        read_strains(&path)
+    };
+    let trained = of(&(MATERIAL.to_owned() + "r0,1.1,1,1,0.1,0,0,5,0,0,0,0,0\n")).unwrap();
+    assert_eq!(trained, [Voigt::new(1.1, 1.0, 1.0, 0.1, 0.0, 0.0)]);
+    assert!(
+        (of("name,stretch\nx,4\n").unwrap()[0] - Voigt::new(16.0, 0.25, 0.25, 0.0, 0.0, 0.0)).norm() < 1e-12
+    );
+    for (text, part) in [
+        ("C11,C22,C33\n", "headings without rows"),
+        ("mode,stretch\nequibiaxial,4\n", "beside a mode"),
+        ("stretch_1\n-2\n", "a positive stretch"),
+        ("stretch_1,stretch_3\n2,1\n", "stretch_3 without stretch_2"),
+        ("C11,C22,C33,C21\n1,1,1,0\n", "column `C21`"),
+        ("C11,C33\n1,1\n", "`C22` is missing"),
+    ] {
+        let error = of(text).unwrap_err();
+        assert!(error.to_string().contains(part) && error.exit_code() == 2, "{error}");
+    }
+}

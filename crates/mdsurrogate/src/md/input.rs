@@ -129,17 +129,12 @@ jump            SELF again
 
 /// A deformation run from `data`: instantaneous values in `out`.inst, interval means in `out`.mean.
 ///
-/// Each edge with a rate follows l = L₀(1 + rate·t), each tilt xy = ly₀·rate·t; every other edge has its own barostat.
+/// Each edge with a rate follows l = L₀(1 + rate·t), each tilt xy = ly₀·rate·t; every other edge has its own barostat. With
+/// [`Protocol::stepwise`] the same strains are reached at the end of each interval; the means are those of its last part.
 pub fn deform(protocol: &Protocol, run: &Run, data: &str, out: &str) -> String {
     let Protocol { time_step, temperature: t, steps, every, .. } = protocol;
     let (thermostat, barostat) = (100.0 * time_step, 1000.0 * time_step);
     let sheared = run.rates[3..].iter().any(Option::is_some);
-    let mut pull = String::new();
-    for (axis, rate) in AXES.iter().zip(run.rates) {
-        if let Some(rate) = rate {
-            let _ = write!(pull, " {axis} erate {rate:e}");
-        }
-    }
     let mut bath = String::new();
     for axis in (0..3).filter(|&axis| run.rates[axis].is_none()) {
         let _ = write!(bath, " {} 1 1 {barostat}", AXES[axis]);
@@ -149,6 +144,9 @@ pub fn deform(protocol: &Protocol, run: &Run, data: &str, out: &str) -> String {
         // the tilts belong to `fix deform`
         bath.push_str(" scalexy no scalexz no scaleyz no");
     }
+    let bath = format!("fix             bath all {ensemble} temp {t} {t} {thermostat}{bath}\n");
+    // a flipped box would make F jump
+    let flip = if sheared { " flip no" } else { "" };
     let mut values = String::from("c_thermo_temp v_pe");
     for name in ["lx", "ly", "lz", "xy", "xz", "yz"] {
         let _ = write!(values, " v_{name}");
@@ -160,6 +158,63 @@ pub fn deform(protocol: &Protocol, run: &Run, data: &str, out: &str) -> String {
         .iter()
         .map(|name| format!("variable        {name} equal {name}\n"))
         .collect();
+    let averaged = protocol.stepwise.map_or(*every, |step| every - step.pull - step.relax);
+    let samples = format!(
+        "fix             now all ave/time 1 1 {every} {values} file {out}.inst format \" %.10g\"
+fix             mean all ave/time 1 {averaged} {every} {values} file {out}.mean format \" %.10g\"
+"
+    );
+    let pulled: Vec<(usize, f64)> =
+        run.rates.iter().enumerate().filter_map(|(axis, rate)| Some((axis, (*rate)?))).collect();
+    let loading = match protocol.stepwise {
+        None => {
+            let mut pull = String::new();
+            for (axis, rate) in &pulled {
+                let _ = write!(pull, " {} erate {rate:e}", AXES[*axis]);
+            }
+            format!(
+                "fix             pull all deform 1{pull} remap x units box{flip}
+{bath}{samples}run             {steps}
+"
+            )
+        }
+        Some(step) => {
+            let interval = *every as f64 * time_step;
+            // the edge of tilt xy, yz or xz is that of its second letter's box length
+            let edges = ["ly", "lz", "lz"];
+            let (mut first, mut each, mut pull) = (String::new(), String::new(), String::new());
+            for (axis, rate) in &pulled {
+                let (name, part) = (AXES[*axis], rate * interval);
+                if *axis < 3 {
+                    // l(k)/l(k − 1)
+                    let factor = format!("(1+{part:e}*v_k)/(1+{part:e}*(v_k-1))");
+                    let _ = writeln!(each, "variable        f{name} equal {factor}");
+                    let _ = write!(pull, " {name} scale ${{f{name}}}");
+                } else {
+                    let edge = edges[*axis - 3];
+                    let _ = writeln!(first, "variable        d{name} equal $({edge})*{part:e}");
+                    let _ = write!(pull, " {name} delta ${{d{name}}}");
+                }
+            }
+            format!(
+                "{first}{samples}label           again
+variable        k loop {intervals}
+{each}fix             pull all deform 1{pull} remap x units box{flip}
+{bath}run             {stretching}
+unfix           pull
+unfix           bath
+fix             bath all nvt temp {t} {t} {thermostat}
+run             {held}
+unfix           bath
+next            k
+jump            SELF again
+",
+                intervals = steps / every,
+                stretching = step.pull,
+                held = every - step.pull,
+            )
+        }
+    };
     head(data)
         + if sheared { "change_box      all triclinic\n" } else { "" }
         + &field("5")
@@ -168,13 +223,6 @@ pub fn deform(protocol: &Protocol, run: &Run, data: &str, out: &str) -> String {
 reset_timestep  0
 {variables}thermo          {every}
 thermo_style    custom step temp pe press pxx pyy pzz pxy pxz pyz lx ly lz xy xz yz
-fix             pull all deform 1{pull} remap x units box{flip}
-fix             bath all {ensemble} temp {t} {t} {thermostat}{bath}
-fix             now all ave/time 1 1 {every} {values} file {out}.inst format \" %.10g\"
-fix             mean all ave/time 1 {every} {every} {values} file {out}.mean format \" %.10g\"
-run             {steps}
-",
-            // a flipped box would make F jump
-            flip = if sheared { " flip no" } else { "" }
+{loading}"
         )
 }

@@ -48,6 +48,21 @@ pub struct Protocol {
     pub gap: u64,
     /// Seed of the first velocities.
     pub seed: u32,
+    /// Pull in steps, one in each interval of samples, instead of at a constant rate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stepwise: Option<Stepwise>,
+}
+
+/// The quasi-static loading of Fig. 3.5 (§3.2): in each interval a part of the final strain is put on, the box is held and
+/// the atoms relax at constant volume, and the stress is averaged over what is left of the interval. The thesis' parts are
+/// 1 %, and its averages 5 ps: intervals of 10,000 steps and what pulling and relaxing take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stepwise {
+    /// Steps in which the strain of an interval is put on, the other edges on their barostats.
+    pub pull: u64,
+    /// Steps of NVT before the averages begin.
+    pub relax: u64,
 }
 
 impl Default for Protocol {
@@ -66,6 +81,7 @@ impl Default for Protocol {
             snapshots: 6,
             gap: 300,
             seed: 1201,
+            stepwise: None,
         }
     }
 }
@@ -99,6 +115,13 @@ impl Protocol {
         }
         if self.equilibration < 4 {
             return Err(Error::parameter("equilibration", self.equilibration, "at least 4 steps"));
+        }
+        if let Some(Stepwise { pull, relax }) = self.stepwise
+            && (pull == 0 || pull.saturating_add(relax) >= self.every)
+        {
+            let found = format!("{pull} steps of pulling and {relax} of relaxing in {}", self.every);
+            let allowed = "at least 1 step of pulling, and fewer than an interval in all";
+            return Err(Error::parameter("stepwise", found, allowed));
         }
         if self.cells.contains(&0) || self.cells.iter().any(|n| *n > 1000) {
             return Err(Error::parameter("cells", format!("{:?}", self.cells), "1 to 1000 each"));

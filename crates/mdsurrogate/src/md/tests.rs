@@ -54,6 +54,48 @@ fn general_paths() {
     assert!(input::deform(&Protocol::default(), &all, "d", "o").contains("all nvt temp"));
 }
 
+/// §3.2: a hundred parts of the final strain, each relaxed, then 5 ps of averages; lengths as at a constant rate at the end
+/// of each interval.
+#[test]
+fn pulling_in_steps() {
+    let stepwise = Some(Stepwise { pull: 100, relax: 2000 });
+    let protocol = Protocol { steps: 1_210_000, every: 12_100, stepwise, ..Protocol::default() };
+    protocol.check().unwrap();
+    let run = Run::parse("z=2.5e-7,yz=1e-7", "p".into(), 0).unwrap();
+    let text = input::deform(&protocol, &run, "d", "o");
+    for line in [
+        "variable        k loop 100\n",
+        "variable        fz equal (1+1.5125e-3*v_k)/(1+1.5125e-3*(v_k-1))\n",
+        "variable        dyz equal $(lz)*6.05e-4\n",
+        "fix             pull all deform 1 z scale ${fz} yz delta ${dyz} remap x units box flip no\n",
+        "fix             bath all npt temp 300 300 50 x 1 1 500 y 1 1 500 scalexy no scalexz no scaleyz no\nrun             100\n",
+        "fix             bath all nvt temp 300 300 50\nrun             12000\n",
+        "fix             mean all ave/time 1 10000 12100 ",
+        "fix             now all ave/time 1 1 12100 ",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    // an old plan has no such key, and a constant rate none in its new one
+    let plain = serde_json::to_string(&Protocol::default()).unwrap();
+    assert!(!plain.contains("stepwise"));
+    assert_eq!(serde_json::from_str::<Protocol>(&plain).unwrap(), Protocol::default());
+    for (pull, relax) in [(0, 5), (100, 12_000), (u64::MAX, 5)] {
+        let bad = Protocol { stepwise: Some(Stepwise { pull, relax }), ..protocol.clone() };
+        assert!(bad.check().is_err(), "{pull} {relax}");
+    }
+}
+
+/// LAMMPS runs in the set's folder: an engine beside the caller must be found from there.
+#[test]
+fn an_engine_is_named_from_anywhere() {
+    let directory = tempfile::tempdir_in(".").unwrap();
+    let path = directory.path().join("lmp");
+    std::fs::write(&path, "").unwrap();
+    let relative = std::path::Path::new(directory.path().file_name().unwrap()).join("lmp");
+    let Ok(Engine::Executable(found)) = Engine::find(Some(&relative)) else { panic!("no engine") };
+    assert!(found.is_absolute() && found.is_file(), "{}", found.display());
+}
+
 #[test]
 fn what_cannot_be_run() {
     let good = Protocol::default();

@@ -1,15 +1,13 @@
 //! The data of a scene: read, measured, divided, drawn, written as HDF5.
 
-use super::Failure;
+use super::{Failure, uniaxial};
 use crate::dataset::{
-    Dataset, Noise, ReadOptions, Row, Split, Standardisation, hdf5, leak, noise, read, split,
+    Dataset, Method, Noise, ReadOptions, Row, Split, Standardisation, hdf5, leak, noise, read, split,
 };
 use crate::error::Error;
 use crate::kinematics::{ANGSTROM, NAMES, PeriodicBox};
 use crate::scene::{Data, Scene};
 use crate::surrogate::{Kind, Symmetry};
-use polycore::output::csv;
-use polycore::output::picture::{LinePlot, Series};
 use polycore::report::Report;
 use polycore::scene::Source;
 use polycore::tensor::Voigt;
@@ -63,6 +61,8 @@ pub struct Prepared {
     pub heldout: Option<Dataset>,
     /// Which rows of `set` are for what.
     pub split: Split,
+    /// The same by the other method, where a model asks for it.
+    pub second: Option<Split>,
 }
 
 impl Prepared {
@@ -79,17 +79,28 @@ impl Prepared {
             [] => None,
             files => Some(load(source, data, files, "data.heldout")?),
         };
-        let split = split(&set, scene.split.by, scene.split.fractions, scene.split.seed).map_err(
-            |error| match error {
+        let divide = |by: Method| {
+            split(&set, by, scene.split.fractions, scene.split.seed).map_err(|error| match error {
                 Error::Parameter { found, allowed, .. } | Error::Data { found, allowed, .. } => {
                     source.error("split", found, allowed)
                 }
                 other => source.error("split", other, "a split that the data allow"),
-            },
-        )?;
-        let data = Self { set, heldout, split };
+            })
+        };
+        let own = divide(scene.split.by)?;
+        let other = scene.model.iter().filter_map(|model| model.split).find(|by| *by != scene.split.by);
+        let second = other.map(divide).transpose()?;
+        let data = Self { set, heldout, split: own, second };
         data.check_models(source, scene)?;
         Ok(data)
+    }
+
+    /// The split of a model.
+    pub fn split_of(&self, model: Option<Method>) -> &Split {
+        match (&self.second, model) {
+            (Some(second), Some(by)) if second.method == by => second,
+            _ => &self.split,
+        }
     }
 
     /// Whether every model can learn from these data.
@@ -114,7 +125,7 @@ impl Prepared {
                     return Err(source.error(&at("runs"), format!("`{name}`"), known.join(", ")).into());
                 }
             }
-            if self.rows_of(&self.split.train, &model.runs).is_empty() {
+            if self.rows_of(&self.split_of(model.split).train, &model.runs).is_empty() {
                 let found = "runs without a training row";
                 return Err(source.error(&at("runs"), found, "runs that the split trains on").into());
             }
@@ -142,6 +153,7 @@ impl Prepared {
     pub fn measure(&self, report: &mut Report) -> Result<Vec<String>, Error> {
         let standardisation = self.standardisation()?;
         describe(report, "", &self.set);
+        uniaxial::measure(report, &self.set);
         measure_split(report, &self.set, &self.split, &standardisation);
         if let Some(heldout) = &self.heldout {
             describe(report, "heldout ", heldout);
@@ -176,7 +188,7 @@ impl Prepared {
         if let Some(heldout) = self.heldout.as_ref().filter(|set| !set.is_nominal()) {
             hdf5::write(output.join("heldout.h5"), heldout, None)?;
         }
-        draw(&self.set, self.heldout.as_ref(), output)
+        uniaxial::draw(&self.set, self.heldout.as_ref(), output)
     }
 }
 
@@ -197,6 +209,9 @@ pub fn describe(report: &mut Report, prefix: &str, set: &Dataset) {
         value(&format!("least C{name}"), low, "");
         value(&format!("greatest C{name}"), high, "");
     }
+    let stretches = || set.rows().flat_map(|row| row.deformation.principal_stretches());
+    value("least principal stretch", stretches().fold(f64::INFINITY, f64::min), "");
+    value("greatest principal stretch", stretches().fold(0.0, f64::max), "");
     let noises = [("cauchy", noise(set, |row| row.cauchy)), ("S", noise(set, |row| row.s))];
     for (letter, noise) in noises {
         let Some(noise) = noise else { continue };
@@ -230,36 +245,4 @@ fn measure_split(report: &mut Report, set: &Dataset, split: &Split, standardisat
         }
         report.work("distances", leak.distances);
     }
-}
-
-/// Stress against engineering strain of the uniaxial runs, one picture a direction as in Fig. 3.5.
-fn draw(set: &Dataset, heldout: Option<&Dataset>, output: &Path) -> Result<(), Error> {
-    for (axis, name) in ["x", "y", "z"].iter().enumerate() {
-        let kind = format!("u{name}");
-        let mut plot = LinePlot::new(&format!("Uniaxial tension in {name}"))
-            .axes("engineering strain", "Cauchy stress (MPa)");
-        let (mut strains, mut stresses, mut rates) = (Vec::new(), Vec::new(), Vec::new());
-        let own = set.paths.iter().filter(|path| path.kind == kind);
-        let kept = heldout.into_iter().flat_map(|set| &set.paths).filter(|path| path.kind == kind);
-        for (path, held) in own.map(|path| (path, false)).chain(kept.map(|path| (path, true))) {
-            let strain: Vec<f64> =
-                path.rows.iter().map(|row| row.deformation.matrix()[(axis, axis)] - 1.0).collect();
-            let stress: Vec<f64> = path.rows.iter().map(|row| row.cauchy[axis] / 1e6).collect();
-            let label = format!("{}: {:.3e}/s", path.id, path.rates[axis]);
-            let series = if held { Series::reference } else { Series::line };
-            plot = plot.series(series(&label, &strain, &stress));
-            rates.extend(std::iter::repeat_n(path.rates[axis], strain.len()));
-            strains.extend(strain);
-            stresses.extend(stress);
-        }
-        if strains.is_empty() {
-            continue;
-        }
-        csv::write(
-            output.join(format!("uniaxial-{name}.csv")),
-            &[("rate", "1/s", &rates), ("strain", "", &strains), ("stress", "MPa", &stresses)],
-        )?;
-        plot.write(output.join(format!("uniaxial-{name}.png")))?;
-    }
-    Ok(())
 }

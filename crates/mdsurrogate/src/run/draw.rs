@@ -1,10 +1,13 @@
 //! Pictures of trained laws: Figs 3.7 and 3.9–3.11 of the thesis, and error against time.
 
 use super::judge::{Heldout, percentages};
+use crate::dataset::Row;
 use crate::error::Error;
 use crate::kinematics::NAMES;
+use crate::surrogate::{Surrogate, Workspace};
 use crate::train::State;
 use polycore::output::picture::{LinePlot, Series};
+use polycore::report::Report;
 use std::io::Write;
 use std::path::Path;
 
@@ -102,4 +105,88 @@ pub(super) fn heldout(seen: &[Heldout], names: &[&str], output: &Path) -> Result
         plot.write(output.join(format!("heldout-{}.png", held.run.id)))?;
     }
     if seen.is_empty() { Ok(()) } else { Ok(errors.write(output.join("percentage-error.png"))?) }
+}
+
+/// Width of a bin of C in which percentage errors are averaged.
+const BIN: f64 = 0.05;
+/// Bins at most: beyond, the first ones are of rubber, and wider.
+const BINS: usize = 12;
+
+/// Fig. 3.11 in numbers: the mean of (3.13) over the rows of all held-out runs pulled along one axis, by bins of C there;
+/// values, a curve a law, and a picture.
+pub(super) fn binned(
+    report: &mut Report,
+    seen: &[Heldout],
+    names: &[&str],
+    output: &Path,
+) -> Result<(), Error> {
+    for axis in 0..3 {
+        // runs of unknown rates need be no tension
+        let runs: Vec<&Heldout> =
+            seen.iter().filter(|held| held.axis == axis && !held.run.rates[axis].is_nan()).collect();
+        let c = |row: &Row| row.c[axis];
+        let greatest = runs.iter().flat_map(|held| &held.run.rows).map(c).fold(1.0, f64::max);
+        if greatest <= 1.0 {
+            continue;
+        }
+        let width = BIN.max((greatest - 1.0) / BINS as f64);
+        let component = NAMES[axis];
+        let mut plot = LinePlot::new("Percentage error (3.13) of held-out runs, by bins")
+            .axes(&format!("C{component}"), "mean percentage error (%)");
+        let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+        for (law, name) in names.iter().enumerate() {
+            let mut sums = vec![(0.0, 0usize); BINS + 1];
+            for held in &runs {
+                let errors = percentages(&held.run.rows, &held.predicted[law]);
+                for (row, error) in held.run.rows.iter().zip(errors).filter(|(_, error)| error.is_finite()) {
+                    let bin = ((c(row) - 1.0) / width).floor().clamp(0.0, BINS as f64) as usize;
+                    sums[bin] = (sums[bin].0 + error, sums[bin].1 + 1);
+                }
+            }
+            let (mut centres, mut means, mut counts) = (Vec::new(), Vec::new(), Vec::new());
+            for (bin, (sum, count)) in sums.iter().enumerate().filter(|(_, (_, count))| *count > 0) {
+                let [low, high] = [bin, bin + 1].map(|k| 1.0 + k as f64 * width);
+                let mean = sum / *count as f64;
+                let range = format!("C{component} {low:.2} to {high:.2}");
+                report.value(&format!("{name} heldout percentage error (3.13), {range}"), mean, "%");
+                centres.push(0.5 * (low + high));
+                means.push(mean);
+                counts.push(*count as f64);
+            }
+            ends = [ends[0].min(1.0), ends[1].max(centres.last().copied().unwrap_or(1.0))];
+            plot = plot.series(Series::marked_line(name, &centres, &means));
+            report.curve(
+                &format!("percentage error over C{component} of {name}"),
+                &[(&format!("C{component}"), "", centres), ("error", "%", means), ("rows", "", counts)],
+            );
+        }
+        plot = plot.series(Series::reference("no stress at all", &ends, &[100.0, 100.0]));
+        plot.write(output.join(format!("percentage-error-C{component}.png")))?;
+    }
+    Ok(())
+}
+
+/// Predicted against measured stress of the test rows, S or nominal, all components: `predicted-LAW.png`.
+pub(super) fn predicted(name: &str, law: &Surrogate, test: &[&Row], output: &Path) -> Result<(), Error> {
+    let mut memory = Workspace::default();
+    let mut pairs = Vec::with_capacity(test.len());
+    for row in test {
+        pairs.push(row.compared(&law.stress(&row.c, &mut memory)?.stress));
+    }
+    let mut plot = LinePlot::new(&format!("{name}: test rows")).axes("S measured (MPa)", "S predicted (MPa)");
+    let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+    for (a, component) in NAMES.iter().enumerate() {
+        let measured: Vec<f64> = pairs.iter().map(|[measured, _]| measured[a] / 1e6).collect();
+        if measured.iter().all(|s| *s == 0.0) {
+            continue;
+        }
+        let answered: Vec<f64> = pairs.iter().map(|[_, predicted]| predicted[a] / 1e6).collect();
+        ends = measured.iter().fold(ends, |[low, high], s| [low.min(*s), high.max(*s)]);
+        plot = plot.series(Series::markers(&format!("S{component}"), &measured, &answered));
+    }
+    if !(ends[0] < ends[1]) {
+        return Ok(());
+    }
+    plot = plot.series(Series::reference("measured", &ends, &ends));
+    Ok(plot.write(output.join(format!("predicted-{name}.png")))?)
 }

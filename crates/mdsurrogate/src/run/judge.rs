@@ -1,7 +1,7 @@
 //! Laws judged on the data of a scene: errors, physics, error against time; figures and tables.
 
 use super::{Failure, Prepared, draw, short};
-use crate::dataset::{Path as Path_, Row, noise};
+use crate::dataset::{Method, Path as Path_, Row, noise};
 use crate::error::Error;
 use crate::eval::{
     Doubts, Errors, FLAGS, Physics, agreement, errors, percentage_error, seconds_of_a_stress, within_rates,
@@ -29,6 +29,8 @@ pub struct Named<'a> {
     pub runs: &'a [String],
     /// How long it was trained, where that is known.
     pub seconds: Option<f64>,
+    /// How its rows were divided, if not as the scene's.
+    pub split: Option<Method>,
 }
 
 /// A held-out run as laws see it.
@@ -66,8 +68,6 @@ pub fn judge_laws(
     let largest = data.set.rows().map(|row| row.s.norm_squared()).fold(0.0, f64::max);
     let floor =
         noise(&data.set, |row| row.s).map(|noise| noise.floor).filter(|floor| *floor > 1e-24 * largest);
-    let test = if data.split.test.is_empty() { &data.split.train } else { &data.split.test };
-    let test = data.rows(test);
     let mut table = vec![format!(
         "{:<16} {:>10} {:>12} {:>12} {:>11} {:>10} {:>10} {:>10} {:>10}",
         "law",
@@ -82,15 +82,15 @@ pub fn judge_laws(
     )];
     let mut warnings = Vec::new();
     let (mut losses, mut training, mut inference) = (Vec::new(), Vec::new(), Vec::new());
+    let mut unseen = Vec::new();
     // of a row: √ of the floor, which is a sum over components
     let chance = floor.unwrap_or(0.0).sqrt();
-    let stress_square = test.iter().map(|row| row.s.norm_squared()).sum::<f64>() / test.len().max(1) as f64;
-    for Named { name, law, runs, seconds } in laws {
-        let sets = [
-            ("training", &data.split.train),
-            ("validation", &data.split.validation),
-            ("test", &data.split.test),
-        ];
+    for Named { name, law, runs, seconds, split } in laws {
+        let split = data.split_of(*split);
+        let test = data.rows(if split.test.is_empty() { &split.train } else { &split.test });
+        let stress_square =
+            test.iter().map(|row| row.s.norm_squared()).sum::<f64>() / test.len().max(1) as f64;
+        let sets = [("training", &split.train), ("validation", &split.validation), ("test", &split.test)];
         for (set, rows) in sets.into_iter().filter(|(_, rows)| !rows.is_empty()) {
             // whatever a law did not learn from it is tested on
             let rows = if set == "test" { data.rows(rows) } else { data.rows_of(rows, runs) };
@@ -116,6 +116,9 @@ pub fn judge_laws(
         report.seconds(&format!("one stress of {name}"), stress);
         let found = errors(law, test.iter().copied())?;
         losses.push(found.mean_square() / 1e12);
+        let others = data.rows(&split.validation).into_iter().chain(data.rows(&split.test));
+        unseen.push(errors(law, others)?.mean_square());
+        draw::predicted(name, law, &test, output)?;
         training.push(seconds.unwrap_or(f64::NAN));
         inference.push(stress);
         table.push(format!(
@@ -141,6 +144,7 @@ pub fn judge_laws(
         }
     }
     table.append(&mut warnings);
+    leaks(laws, &unseen, report);
     let names: Vec<&str> = laws.iter().map(|law| law.name).collect();
     draw::against_time(&names, &losses, &training, &inference, floor.map(|floor| floor / 1e12), output)?;
     let heldout = look_at_heldout(laws, data)?;
@@ -155,6 +159,10 @@ pub fn judge_laws(
         });
     }
     draw::heldout(&heldout, &names, output)?;
+    for held in &heldout {
+        scores_to_beat(report, held, floor);
+    }
+    draw::binned(report, &heldout, &names, output)?;
     Ok(table)
 }
 
@@ -192,6 +200,38 @@ fn by_mode(
         ));
     }
     Ok(lines)
+}
+
+/// The error on validation and test rows of a law trained on another split, over that of the same network on the scene's
+/// split: what is owed to rows beside training rows.
+fn leaks(laws: &[Named], unseen: &[f64], report: &mut Report) {
+    for (other, loss) in laws.iter().zip(unseen).filter(|(law, _)| law.split.is_some()) {
+        let same = |law: &&Named| {
+            let [a, b] = [law.law, other.law].map(Surrogate::header);
+            law.split.is_none() && (&a.kind, &a.architecture) == (&b.kind, &b.architecture)
+        };
+        let of_scene = laws.iter().zip(unseen).find(|(law, _)| same(law));
+        if let Some((law, own)) = of_scene.filter(|(_, own)| **own > 0.0) {
+            let name = format!("{} error on unseen rows over that of {}", other.name, law.name);
+            report.value(&name, loss / own, "");
+        }
+    }
+}
+
+/// (3.13) of no stress at all, 100 % by definition, and of the noise alone, which is what a perfect law has on average.
+fn scores_to_beat(report: &mut Report, held: &Heldout, floor: Option<f64>) {
+    let zero = vec![[0.0; 6]; held.run.rows.len()];
+    let mean = |values: Vec<f64>| {
+        let known: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
+        known.iter().sum::<f64>() / known.len().max(1) as f64
+    };
+    let id = &held.run.id;
+    let nothing = mean(percentages(&held.run.rows, &zero));
+    report.value(&format!("zero stress heldout {id} percentage error (3.13)"), nothing, "%");
+    if let Some(floor) = floor {
+        let noise = held.run.rows.iter().map(|row| 100.0 * floor.sqrt() / row.s.norm()).collect();
+        report.value(&format!("noise heldout {id} percentage error (3.13)"), mean(noise), "%");
+    }
 }
 
 fn record(report: &mut Report, name: &str, set: &str, errors: &Errors, floor: Option<f64>) {

@@ -6,7 +6,10 @@ mod data;
 mod draw;
 mod judge;
 mod search;
+mod searched;
 mod training;
+mod trials;
+mod uniaxial;
 
 pub use data::{Prepared, describe, load};
 pub use judge::{Named, judge_laws};
@@ -91,7 +94,10 @@ fn learn(
     remarks.extend(data.measure(report)?);
     report.work("rows", data.set.len() as u64).work("paths", data.set.paths.len() as u64);
     let models: Vec<_> = scene.model.iter().filter(|model| model.quick || !options.quick).collect();
-    if !models.is_empty() {
+    if !scene.trial.is_empty() {
+        phases.start("trials");
+        trials::run(source, scene, options, report)?;
+    } else if !models.is_empty() {
         phases.start("train");
         let trained = training::train(source, scene, &models, data, options)?;
         phases.start("judge");

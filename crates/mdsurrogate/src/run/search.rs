@@ -4,7 +4,7 @@ use super::{Failure, Options, Prepared, checkpoint, short};
 use crate::dataset::Row;
 use crate::error::Error;
 use crate::scene::{Scene, SearchSpec};
-use crate::search::{Journal, Method, Oracle, Trial, bayesian, hyperband};
+use crate::search::{Journal, Method, Oracle, Trial, at_random, bayesian, hyperband};
 use crate::surrogate::{Header, Kind};
 use crate::train::{Settings, State, Training};
 use polycore::output::atomic_write;
@@ -17,12 +17,22 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-/// Where a search stands.
+/// Where the searches stand.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Progress {
-    journal: Journal,
+    /// Those with the seeds before.
+    done: Vec<Searched>,
+    current: Searched,
     /// Trainings of candidates that may be asked about again, by method and number.
-    states: BTreeMap<(bool, usize), State>,
+    states: BTreeMap<(Method, usize), State>,
+}
+
+/// A search with one seed.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(super) struct Searched {
+    pub journal: Journal,
+    /// Of each trial: seconds of training of its candidate up to then.
+    pub seconds: Vec<f64>,
 }
 
 /// Searches, or goes on with it; gives the table in lines.
@@ -38,46 +48,58 @@ pub fn search(
     report: &mut Report,
 ) -> Result<Vec<String>, Failure> {
     let header = checkpoint::Header::new(source, options.quick);
-    let Progress { mut journal, states } = match options.resume {
+    let Progress { done, current: Searched { mut journal, mut seconds }, states } = match options.resume {
         true => checkpoint::read(options.output)?,
         false => Progress::default(),
     };
     if !options.resume {
         checkpoint::write(options.output, &header, &Progress::default())?;
     }
+    // of a trial that was answered and not yet in the journal
+    seconds.truncate(journal.trials.len());
     let (epochs, trials) = (spec.epochs(options.quick), spec.trials(options.quick));
-    let expected = expected_epochs(spec, epochs, trials);
+    let repeats = spec.repeats(options.quick);
+    let expected = expected_epochs(spec, epochs, trials) * u64::from(repeats);
     let mut trainer = Trainer {
         rows: data.rows(&data.split.train),
         validation: data.rows(&data.split.validation),
         settings: scene.training.over(&Default::default(), options.quick),
         header,
+        done,
         states,
+        seconds,
         saved: Instant::now(),
         epochs: 0,
         expected,
         options,
     };
-    for method in &spec.methods {
-        match method {
-            Method::Hyperband => {
-                hyperband(&spec.space, epochs, spec.eta, spec.seed, &mut journal, &mut trainer)?;
-            }
-            Method::Bayesian => {
-                bayesian(
-                    &spec.space,
-                    [spec.initial, trials],
-                    epochs,
-                    spec.seed.wrapping_add(1),
-                    &mut journal,
-                    &mut trainer,
-                )?;
+    for repeat in trainer.done.len() as u64..u64::from(repeats) {
+        // streams of numbers far enough from each other, and those of a single search what they always were
+        let seed = spec.seed.wrapping_add(1000 * repeat);
+        for method in &spec.methods {
+            let (space, journal, trainer) = (&spec.space, &mut journal, &mut trainer);
+            match method {
+                Method::Hyperband => hyperband(space, epochs, spec.eta, seed, journal, trainer)?,
+                Method::Bayesian => {
+                    let seed = seed.wrapping_add(1);
+                    bayesian(space, [spec.initial, trials], epochs, seed, journal, trainer)?;
+                }
+                Method::Random => {
+                    at_random(space, trials, epochs, seed.wrapping_add(2), journal, trainer)?;
+                }
             }
         }
+        trainer.states.clear();
+        let own =
+            Searched { journal: std::mem::take(&mut journal), seconds: std::mem::take(&mut trainer.seconds) };
+        trainer.done.push(own);
+        trainer.save(&journal)?;
     }
-    let output = trainer.options.output;
-    report.work("trainings of the search", journal.trials.len() as u64);
-    Ok(write(spec, &journal, output, report)?)
+    let Trainer { done, options, .. } = trainer;
+    let count: usize = done.iter().map(|one| one.journal.trials.len()).sum();
+    report.work("trainings of the search", count as u64);
+    super::searched::against_time(spec, &done, report);
+    Ok(write(spec, &done, options.output, report)?)
 }
 
 /// Epochs that a search will train, for its progress.
@@ -85,7 +107,7 @@ fn expected_epochs(spec: &SearchSpec, epochs: u32, trials: usize) -> u64 {
     let mut sum = 0;
     for method in &spec.methods {
         sum += match method {
-            Method::Bayesian => trials as u64 * u64::from(epochs),
+            Method::Bayesian | Method::Random => trials as u64 * u64::from(epochs),
             Method::Hyperband => {
                 let brackets = crate::search::brackets(epochs, spec.eta).unwrap_or_default();
                 let of = |rounds: &Vec<(usize, u32)>| {
@@ -110,7 +132,9 @@ struct Trainer<'a, 'o> {
     validation: Vec<&'a Row>,
     settings: Settings,
     header: checkpoint::Header,
-    states: BTreeMap<(bool, usize), State>,
+    done: Vec<Searched>,
+    states: BTreeMap<(Method, usize), State>,
+    seconds: Vec<f64>,
     saved: Instant,
     epochs: u64,
     expected: u64,
@@ -119,14 +143,17 @@ struct Trainer<'a, 'o> {
 
 #[derive(Serialize)]
 struct Borrowed<'a> {
-    journal: &'a Journal,
-    states: &'a BTreeMap<(bool, usize), State>,
+    done: &'a [Searched],
+    current: (&'a Journal, &'a [f64]),
+    states: &'a BTreeMap<(Method, usize), State>,
 }
 
 impl Trainer<'_, '_> {
     fn save(&mut self, journal: &Journal) -> Result<(), Error> {
         self.saved = Instant::now();
-        checkpoint::write(self.options.output, &self.header, &Borrowed { journal, states: &self.states })
+        // the fields of `Progress`, one after the other
+        let borrowed = Borrowed { done: &self.done, current: (journal, &self.seconds), states: &self.states };
+        checkpoint::write(self.options.output, &self.header, &borrowed)
     }
 }
 
@@ -137,10 +164,10 @@ impl Oracle for Trainer<'_, '_> {
         let settings = Settings {
             epochs: question.epochs,
             learning_rate: candidate.learning_rate,
-            seed: self.settings.seed.wrapping_add(question.number as u64),
+            seed: self.settings.seed.wrapping_add((1000 * self.done.len() + question.number) as u64),
             ..self.settings
         };
-        let key = (question.method == Method::Bayesian, question.number);
+        let key = (question.method, question.number);
         let mut training = match self.states.get(&key) {
             Some(state) => Training::resume(&law, &self.rows, &self.validation, settings, state.clone())?,
             None => Training::new(&law, &self.rows, &self.validation, settings)?,
@@ -153,7 +180,10 @@ impl Oracle for Trainer<'_, '_> {
             }
             match training.epoch() {
                 Ok(_) => {}
-                Err(Error::Diverged { .. }) => return Ok(None),
+                Err(Error::Diverged { .. }) => {
+                    self.seconds.push(training.state().seconds());
+                    return Ok(None);
+                }
                 Err(error) => return Err(error),
             }
             self.epochs += 1;
@@ -172,6 +202,7 @@ impl Oracle for Trainer<'_, '_> {
             });
         }
         let loss = training.state().best_loss();
+        self.seconds.push(training.state().seconds());
         self.states.insert(key, training.state().clone());
         if self.saved.elapsed() >= self.options.checkpoint_every {
             self.save(journal)?;
@@ -181,7 +212,7 @@ impl Oracle for Trainer<'_, '_> {
 
     fn forget(&mut self, method: Method, numbers: &[usize]) {
         for number in numbers {
-            self.states.remove(&(method == Method::Bayesian, *number));
+            self.states.remove(&(method, *number));
         }
     }
 }
@@ -189,11 +220,14 @@ impl Oracle for Trainer<'_, '_> {
 /// The table of the best candidates as CSV and in lines, their losses as a picture and values.
 fn write(
     spec: &SearchSpec,
-    journal: &Journal,
+    done: &[Searched],
     output: &Path,
     report: &mut Report,
 ) -> Result<Vec<String>, Error> {
-    let ranking = journal.ranking();
+    let mut ranking: Vec<&Trial> = done.iter().flat_map(|one| one.journal.ranking()).collect();
+    // stable: a single search keeps its order
+    let worth = |trial: &&Trial| trial.loss.unwrap_or(f64::INFINITY);
+    ranking.sort_by(|a, b| worth(a).total_cmp(&worth(b)));
     let parameters = |trial: &Trial| trial.candidate.architecture().parameters();
     let top: Vec<&Trial> = ranking.iter().copied().filter(|t| t.loss.is_some()).take(spec.top).collect();
     // the thesis takes the least complex of the best ten (§3.3)

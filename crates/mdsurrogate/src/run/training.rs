@@ -2,6 +2,7 @@
 
 use super::judge::Named;
 use super::{Failure, Options, Prepared, checkpoint, short};
+use crate::dataset::Method;
 use crate::error::Error;
 use crate::scene::{ModelSpec, Scene};
 use crate::surrogate::{Header, Surrogate};
@@ -26,13 +27,20 @@ pub struct Trained {
     runs: Vec<String>,
     law: Surrogate,
     states: Vec<State>,
+    split: Option<Method>,
 }
 
 impl Trained {
     /// The law with its training time.
     pub fn named(&self) -> Named<'_> {
         let seconds = self.states.iter().map(State::seconds).sum();
-        Named { name: &self.name, law: &self.law, runs: &self.runs, seconds: Some(seconds) }
+        Named {
+            name: &self.name,
+            law: &self.law,
+            runs: &self.runs,
+            seconds: Some(seconds),
+            split: self.split,
+        }
     }
 }
 
@@ -62,8 +70,9 @@ pub fn train(
     }
     let mut trained = Vec::new();
     for model in models {
-        let rows = data.rows_of(&data.split.train, &model.runs);
-        let validation = data.rows_of(&data.split.validation, &model.runs);
+        let split = data.split_of(model.split);
+        let rows = data.rows_of(&split.train, &model.runs);
+        let validation = data.rows_of(&split.validation, &model.runs);
         let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
         let mut header =
             Header::fitted(model.law(), model.architecture(), model.members, &rows, model.standardised())?;
@@ -74,8 +83,8 @@ pub fn train(
             env!("CARGO_PKG_NAME"),
             env!("CARGO_PKG_VERSION"),
             rows.len(),
-            data.split.method,
-            data.split.seed,
+            split.method,
+            split.seed,
         ));
         let first = run.done;
         for member in 0..model.members {
@@ -98,7 +107,8 @@ pub fn train(
         }
         let states = run.progress.states[first..run.done].to_vec();
         let law = write(&model.title(), &header, &states, &strains, options.output)?;
-        trained.push(Trained { name: model.title(), runs: model.runs.clone(), law, states });
+        let (name, runs, split) = (model.title(), model.runs.clone(), model.split);
+        trained.push(Trained { name, runs, law, states, split });
     }
     Ok(trained)
 }
@@ -206,7 +216,7 @@ fn learning_curve(state: &State, path: &Path) -> Result<(), Error> {
 /// What no number says about the trainings: invariants that the data do not vary.
 pub fn remarks(trained: &[Trained], data: &Prepared) -> Vec<String> {
     let remark = |model: &Trained| {
-        let names = model.law.constrained(&data.rows_of(&data.split.train, &model.runs));
+        let names = model.law.constrained(&data.rows_of(&data.split_of(model.split).train, &model.runs));
         let text = format!(
             "{}: {} does not vary by itself in these data: how the energy changes with it is not known",
             model.name,

@@ -38,6 +38,9 @@ pub struct Scene {
     pub training: TrainingSpec,
     /// A search for hyperparameters of an `ann`.
     pub search: Option<SearchSpec>,
+    /// A stability suite: what must happen with other data or at other strains. The models are trained in trials only.
+    #[serde(default)]
+    pub trial: Vec<TrialSpec>,
     /// What the results must be.
     #[serde(default)]
     pub expect: Vec<Expect>,
@@ -67,6 +70,7 @@ impl Scene {
             crystal.check(source)?;
         }
         check_models(source, &self.model, &self.training)?;
+        check_trials(source, &self.trial, &self.model)?;
         match &self.search {
             Some(_) if !self.model.is_empty() => {
                 return Err(source.error(
@@ -118,6 +122,49 @@ pub struct CrystalSpec {
     /// Levels of rate a direction; default: the thesis' 15.
     #[serde(default = "thesis_levels")]
     pub levels: usize,
+}
+
+/// A trial of a stability suite.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrialSpec {
+    /// Names its row and its value `NAME as it must`.
+    pub name: String,
+    /// What must happen, for the table of the suite.
+    pub must: String,
+    /// In place of the scene's `data.files`.
+    pub files: Option<Vec<PathBuf>>,
+    /// Models by name; default: all.
+    pub models: Option<Vec<String>>,
+    /// The trial must end with an error that contains this.
+    pub refused: Option<String>,
+    /// A C at which the trained laws are asked, as C11, C22, C33, C12, C13, C23.
+    pub at: Option<[f64; 6]>,
+    /// Whether all of their answers there must be flagged, or none.
+    pub flagged: Option<bool>,
+}
+
+fn check_trials(source: &Source, trials: &[TrialSpec], models: &[ModelSpec]) -> Result<(), SceneError> {
+    for (index, trial) in trials.iter().enumerate() {
+        let at = |key: &str| format!("trial[{index}].{key}");
+        if trials[..index].iter().any(|other| other.name == trial.name) {
+            return Err(source.error(
+                &at("name"),
+                format!("`{}` twice", trial.name),
+                "a name for each trial",
+            ));
+        }
+        let titles: Vec<String> = models.iter().map(ModelSpec::title).collect();
+        if let Some(name) = trial.models.iter().flatten().find(|name| !titles.contains(name)) {
+            let known: Vec<&str> = titles.iter().map(String::as_str).collect();
+            return Err(source.unknown(&at("models"), name, &known));
+        }
+        if trial.flagged.is_some() && (trial.at.is_none() || trial.refused.is_some()) {
+            let allowed = "`at`, and no `refused`, beside it";
+            return Err(source.error(&at("flagged"), "`flagged` without an answer", allowed));
+        }
+    }
+    Ok(())
 }
 
 fn thesis_cells() -> [usize; 3] {

@@ -1,6 +1,7 @@
 //! Models and their training, as written in a scene.
 
 use super::memory::{MOST_PARAMETERS, parameters};
+use crate::dataset::Method;
 use crate::network::{Activation, Architecture};
 use crate::surrogate::{Header, Kind, Surrogate, Symmetry};
 use crate::train::{Loss, Schedule, Settings};
@@ -46,6 +47,8 @@ pub struct ModelSpec {
     /// What differs from the scene's `[training]`.
     #[serde(default)]
     pub training: TrainingSpec,
+    /// Divides the rows by another method than the scene's `[split]`, for this model alone.
+    pub split: Option<Method>,
     /// Trained in `--quick` runs too.
     #[serde(default = "yes")]
     pub quick: bool,

@@ -11,7 +11,7 @@ use serde::Deserialize;
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SearchSpec {
-    /// `hyperband`, `bayesian` or both, in this order.
+    /// `hyperband`, `bayesian`, `random` or some of them, in this order.
     #[serde(default = "both")]
     pub methods: Vec<Method>,
     /// Most epochs of a training; the only ones of `bayesian`.
@@ -22,7 +22,7 @@ pub struct SearchSpec {
     /// Of `hyperband`: one of so many candidates is kept for so many times the epochs.
     #[serde(default = "eta")]
     pub eta: u32,
-    /// Trainings of `bayesian`.
+    /// Trainings of `bayesian` and of `random`.
     #[serde(default = "trials")]
     pub trials: usize,
     /// The same in `--quick` runs.
@@ -33,6 +33,11 @@ pub struct SearchSpec {
     /// Names the random choices.
     #[serde(default)]
     pub seed: u64,
+    /// Whole searches with one seed after the other, for medians of their best losses.
+    #[serde(default = "once")]
+    pub repeats: u32,
+    /// The same in `--quick` runs.
+    pub quick_repeats: Option<u32>,
     /// Of the best so many, the one with the fewest parameters is chosen.
     #[serde(default = "top")]
     pub top: usize,
@@ -61,6 +66,10 @@ fn initial() -> usize {
     10
 }
 
+fn once() -> u32 {
+    1
+}
+
 fn top() -> usize {
     10
 }
@@ -76,6 +85,11 @@ impl SearchSpec {
         self.quick_trials.filter(|_| quick).unwrap_or(self.trials)
     }
 
+    /// Searches of a run.
+    pub fn repeats(&self, quick: bool) -> u32 {
+        self.quick_repeats.filter(|_| quick).unwrap_or(self.repeats)
+    }
+
     /// # Errors
     /// What is wrong and where.
     pub fn check(&self, source: &Source) -> Result<(), SceneError> {
@@ -86,10 +100,15 @@ impl SearchSpec {
             };
             source.error(&format!("search.{key}"), found, allowed)
         };
-        if self.methods.is_empty() || (self.methods.len() > 1 && self.methods[1..].contains(&self.methods[0]))
-        {
-            let allowed = "`hyperband`, `bayesian` or both, each once";
+        let twice = |k: usize| self.methods[..k].contains(&self.methods[k]);
+        if self.methods.is_empty() || (0..self.methods.len()).any(twice) {
+            let allowed = "`hyperband`, `bayesian`, `random` or some of them, each once";
             return Err(source.error("search.methods", format!("{:?}", self.methods), allowed));
+        }
+        for (key, repeats) in [("repeats", Some(self.repeats)), ("quick_repeats", self.quick_repeats)] {
+            if let Some(repeats) = repeats.filter(|repeats| !(1..=100).contains(repeats)) {
+                return Err(source.error(&format!("search.{key}"), repeats, "1 to 100"));
+            }
         }
         for (key, epochs) in [("epochs", Some(self.epochs)), ("quick_epochs", self.quick_epochs)] {
             if let Some(epochs) = epochs {

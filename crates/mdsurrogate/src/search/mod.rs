@@ -16,10 +16,13 @@ pub use hyperband::{brackets, hyperband};
 pub use space::{Candidate, Space};
 
 use crate::Error;
+use crate::random::SplitMix64;
 use serde::{Deserialize, Serialize};
 
 /// How candidates are chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Many candidates for few epochs, the best of them for more (Li et al. 2018,
@@ -28,6 +31,9 @@ pub enum Method {
     /// Candidates where a Gaussian process of the losses so far expects the largest improvement (Jones et al. 1998,
     /// <https://doi.org/10.1023/A:1008306431147>).
     Bayesian,
+    /// Candidates at random, all for the most epochs (Bergstra & Bengio 2012,
+    /// <https://jmlr.org/papers/v13/bergstra12a.html>): what the others must beat.
+    Random,
 }
 
 impl Method {
@@ -36,6 +42,7 @@ impl Method {
         match self {
             Self::Hyperband => "hyperband",
             Self::Bayesian => "bayesian",
+            Self::Random => "random",
         }
     }
 }
@@ -82,6 +89,28 @@ impl Journal {
 
 fn worth(trial: &Trial) -> f64 {
     trial.loss.unwrap_or(f64::INFINITY)
+}
+
+/// Asks for `trials` candidates at random, each for `epochs`.
+///
+/// # Errors
+/// [`Space::check`], and what the oracle tells.
+pub fn at_random(
+    space: &Space,
+    trials: usize,
+    epochs: u32,
+    seed: u64,
+    journal: &mut Journal,
+    oracle: &mut dyn Oracle,
+) -> Result<(), Error> {
+    space.check()?;
+    let mut random = SplitMix64::new(seed);
+    for number in 0..trials {
+        let candidate = space.sample(&mut random);
+        ask(oracle, journal, Method::Random, number, &candidate, epochs)?;
+        oracle.forget(Method::Random, &[number]);
+    }
+    Ok(())
 }
 
 /// Whoever trains candidates.

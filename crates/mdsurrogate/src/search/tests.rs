@@ -101,7 +101,8 @@ fn a_search_goes_on_where_it_stopped() {
     let space = Space::default();
     let search = |journal: &mut Journal, oracle: &mut Known| {
         hyperband(&space, 9, 3, 4, journal, oracle)?;
-        bayesian(&space, [4, 9], 9, 4, journal, oracle)
+        bayesian(&space, [4, 9], 9, 4, journal, oracle)?;
+        at_random(&space, 5, 9, 4, journal, oracle)
     };
     let (mut whole, mut oracle) = (Journal::default(), Known::new());
     search(&mut whole, &mut oracle).unwrap();

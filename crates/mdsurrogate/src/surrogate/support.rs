@@ -25,7 +25,8 @@ pub struct Support {
     pub points: Vec<[f64; 6]>,
     /// Inverse standard deviation of each component of C in the training data; 0 where it never changed.
     pub weights: [f64; 6],
-    /// The greatest distance of a training row from its nearest representative, in standard deviations.
+    /// The greatest distance of a training row from its nearest representative, in standard deviations; of few rows,
+    /// most of which are representatives, the greatest distance of a row from its nearest neighbour.
     pub radius: f64,
 }
 
@@ -72,6 +73,15 @@ impl Support {
             for (distance, row) in nearest.iter_mut().zip(rows) {
                 *distance = distance.min(square(row, &rows[farthest]));
             }
+        }
+        // where most rows are representatives themselves, that distance is that of the closest rows, or none, and every
+        // new strain would be far: there the limit is the greatest distance of a row from its neighbour
+        if 2 * points.len() > rows.len() {
+            let others = |k: usize| rows.iter().enumerate().filter(move |(j, _)| *j != k).map(|(_, row)| row);
+            let neighbour =
+                |k: usize| others(k).map(|row| square(row, &rows[k])).fold(f64::INFINITY, f64::min);
+            let greatest = (0..rows.len()).map(neighbour).filter(|d| d.is_finite()).fold(0.0, f64::max);
+            radius = radius.max(greatest);
         }
         Ok(Self { points: points.into_iter().map(Into::into).collect(), weights, radius: radius.sqrt() })
     }
@@ -205,8 +215,13 @@ mod tests {
         // inside the box of both paths, but on neither
         let gap = Voigt::new(1.9, 1.9, 1.0, 0.0, 0.0, 0.0);
         assert!(nearest.distance(&gap.into()) > 5.0 * support.radius);
-        // more representatives than rows: each its own
-        assert_eq!(Support::of(&rows[..5], 100).unwrap().radius, 0.0);
+        // more representatives than rows: rows 0.01 apart, in deviations of √2/100
+        let few = Support::of(&rows[..5], 100).unwrap();
+        assert!(
+            (few.points.len(), few.radius - 0.5f64.sqrt()).0 == 5
+                && (few.radius - 0.5f64.sqrt()).abs() < 1e-9
+        );
+        assert_eq!(Support::of(&rows[..1], 100).unwrap().radius, 0.0);
         assert!(Support::of(&[], 3).is_err() && Support::of(&rows, 0).is_err());
         assert!(Support::of(&[Voigt::repeat(f64::NAN)], 3).is_err());
         for bad in [

