@@ -37,11 +37,36 @@ pub fn run(workspace: &Workspace) -> Result<bool> {
             }
         }
     }
+    findings.extend(unused(workspace.root(), &files)?);
     for finding in &findings {
         print(&format!("{finding}\n"));
     }
     print(&format!("tidy: {} files in git, {} findings\n", files.len(), findings.len()));
     Ok(findings.is_empty())
+}
+
+/// Dependencies that the root manifest declares and no member takes.
+fn unused(root: &Path, files: &[PathBuf]) -> Result<Vec<String>> {
+    let manifest = |path: &Path| -> Result<toml::Table> {
+        let text = fs::read_to_string(root.join(path)).into_diagnostic()?;
+        toml::from_str(&text).into_diagnostic().wrap_err_with(|| path.display().to_string())
+    };
+    let mut declared = manifest(Path::new("Cargo.toml"))?
+        .remove("workspace")
+        .and_then(|workspace| workspace.get("dependencies").and_then(toml::Value::as_table).cloned())
+        .unwrap_or_default();
+    for file in files.iter().filter(|file| file.file_name().is_some_and(|name| name == "Cargo.toml")) {
+        let member = manifest(file)?;
+        for block in ["dependencies", "dev-dependencies", "build-dependencies"] {
+            for name in
+                member.get(block).and_then(toml::Value::as_table).into_iter().flat_map(|block| block.keys())
+            {
+                declared.remove(name);
+            }
+        }
+    }
+    let finding = |name: &String| format!("Cargo.toml: `{name}` is declared and used by no crate");
+    Ok(declared.keys().map(finding).collect())
 }
 
 /// Rust files under crates/*/src and xtask/src.
@@ -69,6 +94,25 @@ fn tracked(root: &Path) -> Result<Vec<PathBuf>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn dependencies_are_used() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("a file");
+        write("Cargo.toml", "[workspace.dependencies]\na = '1'\nb = '1'\nc = '1'\n");
+        fs::create_dir(folder.path().join("m")).expect("a folder");
+        write(
+            "m/Cargo.toml",
+            "[dependencies]\na.workspace = true\n[dev-dependencies]\nc = { workspace = true }\n",
+        );
+        let files = ["Cargo.toml", "m/Cargo.toml"].map(PathBuf::from);
+        let found = unused(folder.path(), &files).expect("manifests");
+        assert_eq!(found, ["Cargo.toml: `b` is declared and used by no crate"]);
+        // and ours
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let files = tracked(&root).expect("files");
+        assert_eq!(unused(&root, &files).expect("manifests"), [""; 0]);
+    }
 
     #[test]
     fn sources() {

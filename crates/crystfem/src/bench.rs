@@ -8,6 +8,7 @@ mod brick;
 mod cube;
 mod integrators;
 mod kinetics;
+mod material;
 mod solvers;
 
 /// Timings, of which the median counts.

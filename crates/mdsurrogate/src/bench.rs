@@ -1,18 +1,16 @@
 //! `mdsurrogate bench`: nanoseconds a point of stress, of tangent and of batches, of the thesis' network and of energies.
 
+use crate::bench_points::{self, POINTS};
 use mdsurrogate::Error;
-use mdsurrogate::network::{Activation::Softplus, Architecture, Real};
-use mdsurrogate::surrogate::{Answer, Header, Kind, Surrogate, Symmetry, Workspace};
-use nalgebra::{SVector, Scalar};
+use mdsurrogate::network::Real;
+use mdsurrogate::surrogate::{Answer, Surrogate, Workspace};
+use nalgebra::Scalar;
 use polycore::command::{Measurement, print_measurements};
 use std::hint::black_box;
 use std::time::Instant;
 
 /// Repetitions, of which the median counts.
 const REPEATS: usize = 15;
-
-/// Points of one repetition.
-const POINTS: usize = 512;
 
 /// What to measure.
 #[derive(clap::Args)]
@@ -47,12 +45,7 @@ impl Bench {
         if let Some(path) = &self.law {
             return Ok(vec![("law".into(), Surrogate::read(path)?)]);
         }
-        let mut ann = Header::new(Kind::Ann, &[], 1);
-        ann.architecture = Architecture::thesis(4)?;
-        let hidden = [(96, Softplus), (96, Softplus)];
-        let energy = Header::new(Kind::energy(Symmetry::Orthotropic), &hidden, 1);
-        let named = [("ann-4", ann), ("energy 2 × 96", energy)];
-        named.into_iter().map(|(name, header)| Ok((name.to_owned(), Surrogate::random(header, 1)?))).collect()
+        bench_points::laws()
     }
 }
 
@@ -62,12 +55,7 @@ fn measure<T: Real + Scalar>(
     law: &Surrogate<T>,
     rows: &mut Vec<Measurement>,
 ) -> Result<(), Error> {
-    let [low, high] = [0.9, 1.3];
-    let point = |k: usize| {
-        let at = |a: usize| low + (high - low) * ((k * (2 * a + 3)) % 97) as f64 / 97.0;
-        SVector::<T, 6>::from_fn(|a, _| T::from_f64(if a < 3 { at(a) } else { 0.1 * (at(a) - 1.0) }))
-    };
-    let points: Vec<_> = (0..POINTS).map(point).collect();
+    let points = bench_points::points::<T>();
     let mut memory = Workspace::default();
     let mut answers = vec![Answer::default(); POINTS];
     let size = law.header().architecture.parameters() as u64;

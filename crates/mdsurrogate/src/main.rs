@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 mod bench;
+mod bench_points;
 mod bench_training;
 mod md_command;
 mod predict;

@@ -1,21 +1,19 @@
 //! `peri bench`: bond evaluations per second, bytes per particle, and the machine's bandwidth beside them.
 
-use peri::bonds::{Bonds, CloudBonds, LatticeBonds, VolumeCorrection, force};
-use peri::calibrate::Space;
+use kernel::RATIO;
+use peri::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
-use peri::geometry::{Operation, Shape, lattice};
-use peri::potential::{KernelFit, Law};
+use peri::potential::Law;
 use peri::run::Failure;
 use polycore::command::{Measurement, print_measurements};
 use std::hint::black_box;
 use std::time::Instant;
 
 mod block;
+mod kernel;
 mod laws;
 mod solvers;
 
-/// Horizon over spacing of every measurement.
-const RATIO: f64 = 3.015;
 /// Repetitions, of which the median counts.
 const REPEATS: usize = 7;
 
@@ -114,9 +112,7 @@ fn measure_dimension<const D: usize>(
     threads: usize,
     rows: &mut Vec<Measurement>,
 ) -> Result<(), Failure> {
-    let side = size.powf(1.0 / D as f64).round();
-    let body = [Operation::Add(Shape::Box { min: [0.0; D], max: [side; D] })];
-    let lattice = lattice(&body, 1.0, 1.0)?;
+    let lattice = kernel::block::<D>(size)?;
     let cells = lattice.cells;
     let points = |index: usize| -> [f64; D] {
         let mut rest = index;
@@ -127,7 +123,7 @@ fn measure_dimension<const D: usize>(
         })
     };
     let total: usize = cells.iter().product();
-    let mut bonds = LatticeBonds::new(lattice, RATIO, VolumeCorrection::None, &[])?;
+    let mut bonds = kernel::bonds(lattice)?;
     // the DENT specimen's stretches, and those of a stiff plate
     for (law, range) in [(Law::Subtract, [0.95, 1.05]), (Law::Subtract, [0.5, 3.0]), (Law::Pmb, [0.95, 1.05])]
     {
@@ -150,15 +146,7 @@ fn measure_bonds<const D: usize>(
     threads: usize,
     rows: &mut Vec<Measurement>,
 ) -> Result<(), Failure> {
-    let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
-    let built = law.build(720.0, 1200.0, false)?;
-    let fit = KernelFit::new(&*built, range, 1e-9)?;
-    bonds.set_law(&fit, peri::calibrate::modulus(space, 1.0, bonds.horizon(), 1.0));
-    let mut displacement = Field::<D>::zeros(bonds.slots());
-    for &slot in bonds.particles() {
-        let x = bonds.position(slot as usize);
-        displacement.set(slot as usize, std::array::from_fn(|d| 1e-3 * (0.37 * x[d]).sin()));
-    }
+    let (fit, displacement) = kernel::loaded(bonds, law, range)?;
     let mut out = Field::zeros(bonds.slots());
     force(bonds, &displacement, &mut out);
     // at least 20 ms a measurement

@@ -207,7 +207,7 @@ fn trials_pass_and_fail() {
         ("stretch = 2.0\nrefused", "refused", "no `stretch`"),
         ("name = \"strip\"", "name = \"locked\"", "a second time"),
         ("data = [[2.0, \"1.75 MPa\"]]", "", "neither"),
-        ("mode = \"pure-shear\"", "mode = \"shear\"", "unknown variant"),
+        ("mode = \"pure-shear\"", "mode = \"shear\"", "allowed: `uniaxial`, `equibiaxial`, `pure-shear`"),
         ("\"strip.nominal\"", "\"strip.stress\"", "does not compute"),
     ] {
         assert!(TRIALS.contains(from), "{from}");

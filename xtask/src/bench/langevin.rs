@@ -15,11 +15,13 @@ use polycore::output::picture::{LinePlot, Series};
 use super::Row;
 use crate::table::Table;
 
+#[path = "../../../crates/polycore/benches/langevin/arguments.rs"]
+mod arguments;
+
+use arguments::{ROW, arguments};
+
 /// Values of 𝓛⁻¹ to 20 digits: `function,argument,value`.
 const REFERENCE: &str = include_str!("../../../crates/polycore/tests/langevin_reference.csv");
-
-/// A row that stays in the first-level cache.
-const ROW: usize = 1024;
 
 /// Rows per repeat, and repeats.
 const ROWS: usize = 200;
@@ -94,13 +96,6 @@ fn error_of_exact() -> Result<(f64, usize)> {
         }
     }
     Ok((largest, count))
-}
-
-/// Uniform in (0, 1) and shuffled, so that no branch can be foreseen.
-fn arguments() -> Vec<f64> {
-    // multiples of the golden section modulo 1: equidistributed, in no order
-    const GOLDEN: f64 = 0.618_033_988_749_894_8;
-    (1..=ROW).map(|k| (GOLDEN * k as f64).fract()).collect()
 }
 
 fn nanoseconds(choice: Inverse, arguments: &[f64]) -> f64 {

@@ -2,10 +2,9 @@
 //!
 //! Rows `SCHEME KELVIN: QUANTITY`: the largest error in α over the curve, the time for all of it, and for a step of KELVIN.
 
-use super::{REPEATS, median};
+use super::{REPEATS, material, median};
 use crystfem::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
-use crystfem::material::{Point, Polymer, Property, Semicrystalline, ThermalMaterial};
-use crystfem::melting::Melting;
+use crystfem::material::ThermalMaterial;
 use crystfem::run::Failure;
 use polycore::command::Measurement;
 use std::hint::black_box;
@@ -41,12 +40,11 @@ pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
             push("step", step, "ns/step");
         }
     }
-    for (name, start) in [("cooling", 425.0), ("heating", 425.0), ("heating above melting", 500.0)] {
+    for (name, start, increment) in material::STEPS {
         for latent in [None, Some(209e3)] {
-            let sign = if name == "cooling" { -1.0 } else { 1.0 };
             let coupled = if latent.is_some() { "with" } else { "without" };
             let what = format!("response, {name} by 0.5 K, {coupled} latent heat");
-            let value = response(kinetics, latent, start, 0.5 * sign)?;
+            let value = response(latent, start, increment)?;
             rows.push(Measurement { what, size: STEPS as u64, threads: 1, value, unit: "ns" });
         }
     }
@@ -54,30 +52,16 @@ pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
 }
 
 /// Nanoseconds of a material's response, tangent and all.
-fn response(
-    kinetics: Kinetics,
-    latent_heat: Option<f64>,
-    start: f64,
-    increment: f64,
-) -> Result<f64, Failure> {
-    let material = Semicrystalline::new(Polymer {
-        density: 1010.0,
-        conductivity: Property::Constant(0.25),
-        specific_heat: Property::Constant(2200.0),
-        kinetics,
-        melting: Some(Melting::PA12),
-        ultimate_crystallinity: 0.25,
-        latent_heat,
-        seed: 0.3,
-    })?;
+fn response(latent_heat: Option<f64>, start: f64, increment: f64) -> Result<f64, Failure> {
+    let polymer = material::polymer(latent_heat)?;
     let mut old = [0.0];
-    material.initial_state(start, &mut old);
-    let at = Point { temperature: start, increment, gradient: Default::default(), dt: 0.5 };
+    polymer.initial_state(start, &mut old);
+    let at = material::point(start, increment);
     let mut times = Vec::new();
     for _ in 0..REPEATS {
         let since = Instant::now();
         for _ in 0..STEPS {
-            black_box(material.respond(black_box(&at), black_box(&old), &mut [0.0])?);
+            black_box(polymer.respond(black_box(&at), black_box(&old), &mut [0.0])?);
         }
         times.push(since.elapsed().as_secs_f64() / STEPS as f64 * 1e9);
     }
