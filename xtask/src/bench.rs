@@ -159,8 +159,9 @@ fn write(workspace: &Workspace, name: &str, rows: &[Row]) -> Result<PathBuf> {
     let path = workspace.results("bench")?.join(format!("{name}.json"));
     let of = name.split('-').next().unwrap_or(name);
     let crates = workspace.programs();
-    let measured = crates.iter().find(|program| *program == of).map_or("polycore", String::as_str);
-    let stamp = Stamp::new(workspace.root(), &sources(workspace.root(), &[measured], &["src"]))?;
+    // `langevin` is of no program: the numerics of `polycore`
+    let measured: Vec<&str> = crates.iter().map(String::as_str).filter(|program| *program == of).collect();
+    let stamp = Stamp::new(workspace.root(), &sources(workspace.root(), &measured, &["src"]))?;
     let bench = Bench { stamp, rows: rows.to_vec() };
     atomic_write(&path, |file| {
         serde_json::to_writer_pretty(&mut *file, &bench)?;
