@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 pub use polycore::checkpoint::FILE_NAME;
 
 /// First bytes of the file: name and version of the format.
-const MAGIC: &polycore::checkpoint::Magic = b"peri-ck5";
+const MAGIC: &polycore::checkpoint::Magic = b"peri-ck6";
 
 /// The state of a run.
 #[derive(Debug, Serialize, Deserialize)]

@@ -199,22 +199,91 @@ impl<const D: usize> Cut<D> {
         })
     }
 
-    /// Whether the segment from `a` to `b` crosses the cut: solves a + s(b − a) = corner + Σ wᵢ edgeᵢ and asks for
-    /// 0 < s < 1, 0 ≤ w ≤ 1. A segment parallel to the cut does not cross it.
-    pub fn severs(&self, a: [f64; D], b: [f64; D]) -> bool {
-        let mut matrix = nalgebra::SMatrix::<f64, D, D>::zeros();
-        let mut right = nalgebra::SVector::<f64, D>::zeros();
-        for d in 0..D {
-            matrix[(d, 0)] = b[d] - a[d];
-            for edge in 0..D - 1 {
-                matrix[(d, edge + 1)] = -self.edges[edge][d];
-            }
-            right[d] = self.corner[d] - a[d];
+    /// Where the segment from `a` to `b` meets the closed cut; `None` where it does not, lies along it or ends on it.
+    fn meets(&self, a: [f64; D], b: [f64; D]) -> Option<Meeting<D>> {
+        let mut columns = [[0.0; D]; D];
+        columns[0] = std::array::from_fn(|d| b[d] - a[d]);
+        (1..D).for_each(|i| columns[i] = self.edges[i - 1].map(|x| -x));
+        let sizes = columns.map(length);
+        let volume = determinant(&columns);
+        if volume.abs() <= NEAR * sizes.iter().product::<f64>() {
+            return None;
         }
-        let Some(inverse) = matrix.try_inverse() else { return false };
-        let solution = inverse * right;
-        solution[0] > 0.0 && solution[0] < 1.0 && (1..D).all(|i| (0.0..=1.0).contains(&solution[i]))
+        let solution: [f64; D] = std::array::from_fn(|i| {
+            let mut replaced = columns;
+            replaced[i] = std::array::from_fn(|d| self.corner[d] - a[d]);
+            determinant(&replaced) / volume
+        });
+        if !(NEAR..=1.0 - NEAR).contains(&solution[0]) {
+            return None;
+        }
+        let mut meeting = Meeting { at: solution[0], rims: Vec::new(), inward: [0.0; D] };
+        for edge in 0..D - 1 {
+            let (place, near) = (solution[edge + 1], NEAR * sizes[0] / sizes[edge + 1]);
+            if !(-near..=1.0 + near).contains(&place) {
+                return None;
+            }
+            if !(near..=1.0 - near).contains(&place) {
+                meeting.rims.push(self.edges[(D - 2) - edge]);
+            }
+            (0..D).for_each(|d| meeting.inward[d] += (0.5 - place) * self.edges[edge][d]);
+        }
+        Some(meeting)
     }
+
+    /// [`severed`] by this cut alone.
+    pub fn severs(&self, a: [f64; D], b: [f64; D]) -> bool {
+        severed(std::slice::from_ref(self), a, b)
+    }
+}
+
+/// Part of a bond's length within which it counts as touching a cut's rim, or as ending on a cut.
+const NEAR: f64 = 1e-9;
+
+fn length<const D: usize>(x: [f64; D]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Of two or three columns.
+fn determinant<const D: usize>(c: &[[f64; D]; D]) -> f64 {
+    let minor = |i: usize, j: usize| c[D - 2][i] * c[D - 1][j] - c[D - 2][j] * c[D - 1][i];
+    if D == 2 { minor(0, 1) } else { (0..D).map(|d| c[0][d] * minor((d + 1) % 3, (d + 2) % 3)).sum() }
+}
+
+/// Where a bond meets a cut.
+struct Meeting<const D: usize> {
+    /// Part of the bond's length.
+    at: f64,
+    /// Directions of the cut's rims there (in 2D its end: any vector); none inside.
+    rims: Vec<[f64; D]>,
+    /// From there towards the cut's middle.
+    inward: [f64; D],
+}
+
+/// Whether cuts sever the bond of `a` and `b`: solves a + s(b − a) = corner + Σ wᵢ edgeᵢ and asks for 0 < s < 1, 0 < w < 1.
+///
+/// The answer is one for the pair, whichever end comes first. A bond through a tip (in 3D: the rim) stays, however the
+/// tip is rounded, unless another cut goes on from there on the bond's other side. A bond parallel to a cut, or that ends
+/// on it, stays.
+pub fn severed<const D: usize>(cuts: &[Cut<D>], a: [f64; D], b: [f64; D]) -> bool {
+    let (a, b) = if a <= b { (a, b) } else { (b, a) };
+    let met: Vec<Meeting<D>> = cuts.iter().filter_map(|cut| cut.meets(a, b)).collect();
+    let side = |rim: &[f64; D], inward: &[f64; D]| {
+        let mut columns = [*inward; D];
+        columns[0] = std::array::from_fn(|d| b[d] - a[d]);
+        if D == 3 {
+            columns[1] = *rim;
+        }
+        let (size, volume) = (columns.map(length).iter().product::<f64>(), determinant(&columns));
+        if volume.abs() > NEAR * size { volume.signum() } else { 0.0 }
+    };
+    met.iter().any(|one| {
+        let goes_on = |rim: &[f64; D]| {
+            let mut near = met.iter().filter(|other| (other.at - one.at).abs() <= NEAR);
+            near.any(|other| side(rim, &one.inward) * side(rim, &other.inward) < 0.0)
+        };
+        one.rims.iter().all(goes_on)
+    })
 }
 
 #[cfg(test)]
@@ -272,6 +341,29 @@ mod tests {
             bar.contains([2.0, 0.0, 0.9]) && !bar.contains([2.1, 0.0, 0.0]) && !bar.contains([0.0, 0.8, 0.8])
         );
         assert_eq!(bar.bounds(), ([-2.0, -1.0, -1.0], [2.0, 1.0, 1.0]));
+    }
+
+    /// Two cuts that meet in a corner are one crack: what passes through the corner from one side to the other goes,
+    /// what only touches it stays.
+    #[test]
+    fn cuts_that_meet_leave_no_gap() {
+        let cut = |from: [f64; 2], to: [f64; 2]| Cut {
+            corner: from,
+            edges: [[to[0] - from[0], to[1] - from[1]], [0.0; 2]],
+        };
+        let straight = [cut([0.0, 0.0], [1.0, 0.0]), cut([2.0, 0.0], [1.0, 0.0])];
+        let bent = [cut([0.0, 0.0], [1.0, 0.0]), cut([1.0, 0.0], [0.0, 0.7])];
+        for (a, b) in [([1.0, -1.0], [1.0, 1.0]), ([0.5, -0.5], [1.5, 0.5]), ([1.5, -0.5], [0.5, 0.5])] {
+            assert!(severed(&straight, a, b) && severed(&straight, b, a), "{a:?} {b:?}");
+            assert!(!severed(&straight[..1], a, b), "a tip");
+        }
+        assert!(!severed(&bent, [1.0, -1.0], [1.0, 1.0]), "beside the corner");
+        assert!(severed(&bent, [0.0, 0.2], [2.0, -0.2]), "out of the corner");
+        let sheet = |edge: [f64; 3]| Cut { corner: [0.0; 3], edges: [edge, [0.0, 0.0, 1.0], [0.0; 3]] };
+        let sheets = [sheet([1.0, 0.0, 0.0]), sheet([-1.0, 0.3, 0.0])];
+        assert!(severed(&sheets, [0.0, 0.5, 0.5], [0.0, -0.5, 0.5]));
+        assert!(!severed(&sheets[..1], [0.0, 0.5, 0.5], [0.0, -0.5, 0.5]));
+        assert!(!severed(&sheets, [0.0, 0.5, 0.0], [0.0, -0.5, 0.0]), "past a rim of both");
     }
 
     #[test]

@@ -67,6 +67,12 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
     parts.concat()
 }
 
+/// One number for a set of bonds: FNV-1a over their ends, in the order of [`overstretched`].
+pub fn fingerprint(bonds: &[Overstretched]) -> u64 {
+    let words = bonds.iter().flat_map(|bond| [bond.slot, bond.index]).flat_map(u32::to_le_bytes);
+    words.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
 /// Parts of the body that hang together by intact bonds, single particles not counted.
 pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> usize {
     let mut root: Vec<u32> = (0..bonds.slots() as u32).collect();

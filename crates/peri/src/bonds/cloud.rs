@@ -4,10 +4,12 @@ use super::cells::CellGrid;
 use super::cloud_kernel::{CloudData, GROUP};
 use super::kernel::StretchRange;
 use super::rows::{CloudKernel, cloud_kernel};
-use super::{Bonds, Neighbour, Overstretched, VolumeCorrection, plain_force, surface_weight};
+use super::{
+    Bonds, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
+};
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
-use crate::geometry::Cut;
+use crate::geometry::{Cut, severed};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
 
@@ -85,10 +87,7 @@ impl<const D: usize> CloudBonds<D> {
                     if other != own && square == 0.0 {
                         twin = Some(other);
                     }
-                    if other != own
-                        && square <= reach * reach
-                        && !cuts.iter().any(|cut| cut.severs(here, sorted[other]))
-                    {
+                    if other != own && square <= reach * reach && !severed(cuts, here, sorted[other]) {
                         list.push(other as u32);
                     }
                 });
@@ -124,7 +123,7 @@ impl<const D: usize> CloudBonds<D> {
         }
         let volumes: Vec<f64> = order.iter().map(|&i| volumes[i as usize]).collect();
         let mean = volumes.iter().sum::<f64>() / volumes.len() as f64 / thickness;
-        Ok(Self {
+        let bonds = Self {
             particles: (0..sorted.len() as u32).collect(),
             position,
             volumes,
@@ -142,7 +141,9 @@ impl<const D: usize> CloudBonds<D> {
             kernel: None,
             table: None,
             directed_bonds,
-        })
+        };
+        refuse_one_sided(&bonds)?;
+        Ok(bonds)
     }
 
     /// Thickness of the body (1 in 3D), m.
@@ -208,6 +209,14 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     fn is_alone(&self, slot: usize) -> bool {
         // padding and broken bonds lead to the particle itself
         self.neighbours[self.starts[slot]..self.starts[slot + 1]].iter().all(|&other| other as usize == slot)
+    }
+
+    fn one_sided(&self) -> Option<[usize; 2]> {
+        self.particles.par_iter().find_map_first(|&slot| {
+            let own = &self.neighbours[self.starts[slot as usize]..self.starts[slot as usize + 1]];
+            let lone = own.iter().find(|&&o| o != slot && !self.is_bonded(o as usize, slot as usize))?;
+            Some([slot as usize, *lone as usize])
+        })
     }
 
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {

@@ -3,10 +3,12 @@
 use super::kernel::StretchRange;
 use super::lattice_kernel::{Class, TILE, Tiles};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
-use super::{Bonds, Neighbour, Overstretched, VolumeCorrection, plain_force, surface_weight};
+use super::{
+    Bonds, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
+};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
-use crate::geometry::Cut;
+use crate::geometry::{Cut, severed};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
 
@@ -150,6 +152,7 @@ impl<const D: usize> LatticeBonds<D> {
         }
         bonds.connect(cuts);
         bonds.classify();
+        refuse_one_sided(&bonds)?;
         Ok(bonds)
     }
 
@@ -254,12 +257,9 @@ impl<const D: usize> LatticeBonds<D> {
             let mut bits = vec![0_u64; words];
             let Some(cell) = self.cell_of(slot).filter(|_| occupied[slot]) else { return bits };
             for (k, offset) in self.stencil.offsets.iter().enumerate() {
-                if self.cell_at(cell, *offset).is_some_and(|there| occupied[there]) {
-                    let from = self.position(slot);
-                    let to = std::array::from_fn(|d| from[d] + f64::from(offset[d]) * self.lattice.spacing);
-                    if !cuts.iter().any(|cut| cut.severs(from, to)) {
-                        bits[k / 64] |= 1 << (k % 64);
-                    }
+                let there = self.cell_at(cell, *offset).filter(|&there| occupied[there]);
+                if there.is_some_and(|there| !severed(cuts, self.position(slot), self.position(there))) {
+                    bits[k / 64] |= 1 << (k % 64);
                 }
             }
             bits
@@ -374,6 +374,18 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
 
     fn is_alone(&self, slot: usize) -> bool {
         self.intact.iter().all(|words| words[slot] == 0)
+    }
+
+    fn one_sided(&self) -> Option<[usize; 2]> {
+        let opposite = self.stencil.offsets.len() - 1;
+        let shifts: Vec<isize> = self.stencil.offsets.iter().map(|&o| self.shift(o)).collect();
+        self.particles.par_iter().find_map_first(|&slot| {
+            let slot = slot as usize;
+            let there = |k: usize| slot.wrapping_add_signed(shifts[k]);
+            let lone = (0..=opposite)
+                .find(|&k| self.is_intact(slot, k) && !self.is_intact(there(k), opposite - k))?;
+            Some([slot, there(lone)])
+        })
     }
 
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {

@@ -9,7 +9,7 @@ mod lattice;
 mod lattice_kernel;
 mod rows;
 
-pub use breaking::{Overstretched, fragments, overstretched};
+pub use breaking::{Overstretched, fingerprint, fragments, overstretched};
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
@@ -17,6 +17,7 @@ pub use kernel::StretchRange;
 pub use lattice::{Lattice, LatticeBonds, Stencil, storage};
 pub use lattice_kernel::TILE;
 
+use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
@@ -61,6 +62,8 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn is_bonded(&self, slot: usize, other: usize) -> bool;
     /// Whether a slot has no intact bond.
     fn is_alone(&self, slot: usize) -> bool;
+    /// The slots of a bond that only the first of them has; `None` where every family is symmetric, as it must be.
+    fn one_sided(&self) -> Option<[usize; 2]>;
     /// Sets the bond law q(e) and its modulus kθ, N/m⁶.
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
     /// Sets per-particle surface-correction factors (one field of `D` components over the slots).
@@ -91,6 +94,13 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn as_cloud(&self) -> Option<&CloudBonds<D>> {
         None
     }
+}
+
+/// Refuses a body in which a bond pulls at one of its ends only: its forces would not sum to zero.
+fn refuse_one_sided<const D: usize>(bonds: &dyn Bonds<D>) -> Result<(), Error> {
+    let Some(pair) = bonds.one_sided() else { return Ok(()) };
+    let [here, there] = pair.map(|slot| bonds.position(slot));
+    Err(Error::geometry(format!("the bond from {here:?} to {there:?} m has no counterpart")))
 }
 
 /// Force densities of the whole body, N/m³.
@@ -195,6 +205,25 @@ mod tests {
     use super::*;
     use crate::geometry::{Operation, Shape, lattice};
     use crate::potential::Law;
+
+    /// What a build asks of every body: a bond severed from one end only is found, and refused.
+    #[test]
+    fn a_one_sided_bond_is_found() {
+        let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [6.0, 5.0] })];
+        let mut regular =
+            LatticeBonds::new(lattice(&body, 1.0, 1.0).unwrap(), 3.015, VolumeCorrection::None, &[]).unwrap();
+        let points: Vec<[f64; 2]> =
+            regular.particles().iter().map(|&s| regular.position(s as usize)).collect();
+        let mut cloud =
+            CloudBonds::new(&points, &[1.0; 30], 1.0, 3.015, VolumeCorrection::None, &[]).unwrap();
+        for bonds in [&mut regular as &mut dyn Bonds<2>, &mut cloud] {
+            assert_eq!(bonds.one_sided(), None);
+            let slot = bonds.particles()[7];
+            bonds.sever(&[Overstretched { slot, index: 3, elongation: 0.0, length: 1.0, weight: 1.0 }]);
+            assert_eq!(bonds.one_sided().map(|pair| pair[1]), Some(slot as usize));
+            assert!(refuse_one_sided(bonds).unwrap_err().to_string().contains("no counterpart"));
+        }
+    }
 
     /// Stretches across the knee of the chain force need a table: the plain loop, on both representations, against the
     /// exact law bond by bond.

@@ -8,6 +8,10 @@ use crate::stress::{Measure, Tensor};
 use polycore::report::Report;
 use polycore::scene::Source;
 
+/// Sums over the whole body that must vanish, see [`crate::solver::Balance`], over its forces; of several variants the
+/// largest is a value of its own.
+pub const BALANCES: [&str; 3] = ["force_imbalance", "moment_imbalance", "reaction_imbalance"];
+
 /// Stress against Kirsch's solution: peak and profile at θ = π/2, RMSE (2.84) over all particles and without the
 /// loading layers.
 pub fn kirsch<const D: usize>(
@@ -169,6 +173,17 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
         for (name, value) in crate::integrals::NAMES.iter().zip(crate::integrals::all()) {
             report.value(name, value, "");
         }
+    }
+    if several {
+        for name in BALANCES {
+            let most = outcomes.iter().filter_map(|o| o.get(name)).reduce(f64::max);
+            if let Some(most) = most {
+                report.value(name, most, "");
+            }
+        }
+    }
+    if let Some(compare) = &scene.output.compare {
+        super::against::add(&mut report, compare, outcomes);
     }
     for (family, change) in super::history::peak_changes(outcomes) {
         report.value(&format!("peak_load_change[{family}]"), change, "");

@@ -2,7 +2,7 @@
 
 use super::outcome::Outcome;
 use crate::scene::Scene;
-use crate::solver::Record;
+use crate::solver::{Balance, Event, Record};
 use polycore::Error;
 use polycore::output::csv;
 use polycore::output::picture::{LegendPlace, LinePlot, Series};
@@ -80,12 +80,17 @@ impl Outcome {
             }
         }
         if scene.material.critical.is_some() {
-            let first = self.history.iter().find(|r| r.broken > 0).cloned();
-            if let Some(first) = first {
-                self.value("first_break", first.displacement, "m");
-                self.value("load_at_first_break", first.load, "N");
+            if let Some(first) = self.history.iter().position(|r| r.broken > 0) {
+                self.value("first_break", self.history[first].displacement, "m");
+                // of the equilibrium before: that at the end of the step may be past the collapse
+                let before = first.checked_sub(1).map_or(0.0, |s| self.history[s].load);
+                let load = self.events.first().filter(|_| !self.is_dynamic()).map_or(before, |e| e.load);
+                self.value("load_at_first_break", load, "N");
             }
             self.value("broken_bonds", last.broken as f64, "");
+            if !self.is_dynamic() {
+                self.value("breaking_events", self.events.len() as f64, "");
+            }
             self.value("detached_particles", last.detached as f64, "");
             self.value("last_load", last.load, "N");
             self.value("last_displacement", last.displacement, "m");
@@ -110,6 +115,16 @@ impl Outcome {
             let error = self.history.iter().map(off).fold(0.0, f64::max) / most;
             self.value("energy_error", error, "");
         }
+        if !self.is_dynamic() {
+            let most =
+                |get: fn(&Balance) -> f64| self.history.iter().map(|r| get(&r.balance)).fold(0.0, f64::max);
+            let size = most(|b| b.size).max(f64::MIN_POSITIVE);
+            let (force, external) = (most(|b| b.force) / size, most(|b| b.external) / size);
+            let moment = most(|b| b.moment / b.arm.max(f64::MIN_POSITIVE)) / size;
+            for (name, value) in super::compare::BALANCES.into_iter().zip([force, moment, external]) {
+                self.value(name, value, "");
+            }
+        }
         let residual = self.history.iter().map(|r| r.residual).fold(0.0, f64::max);
         self.value("largest_residual", residual, "");
     }
@@ -132,6 +147,25 @@ impl Outcome {
 /// What the load at a displacement is called.
 pub fn load_at_name(displacement: f64) -> String {
     format!("load_at_{}mm", (displacement * 1e9).round() / 1e6)
+}
+
+/// Peaks as far as load steps resolve them, a line for each variant with several steps.
+pub fn peak_lines(outcomes: &[Outcome]) -> String {
+    let line = |outcome: &Outcome| {
+        let peak = (0..outcome.history.len())
+            .max_by(|&a, &b| outcome.history[a].load.total_cmp(&outcome.history[b].load))?;
+        let (at, name) = (outcome.history[peak].displacement, &outcome.name);
+        let load = outcome.history[peak].load;
+        let near = [peak.checked_sub(1), Some(peak + 1)].into_iter().flatten();
+        let near: Vec<&Record> = near.filter_map(|step| outcome.history.get(step)).collect();
+        let apart = near.iter().map(|r| (r.displacement - at).abs()).fold(0.0, f64::max);
+        let least = near.iter().map(|r| (r.load - load).abs()).fold(f64::INFINITY, f64::min);
+        (apart > 0.0 && load > 0.0 && !outcome.is_dynamic()).then(|| {
+            let (at, apart) = (at * 1e3, apart * 1e3);
+            format!("{name}: peak {load:.5} N at {at:.5} mm, ± one load step: {apart:.3} mm, {least:.3} N\n")
+        })
+    };
+    outcomes.iter().filter_map(line).collect()
 }
 
 /// How much the peak load still changes between the two finest spacings of each family, over the finest.
@@ -208,6 +242,13 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
         let columns = outcome.columns();
         let views: Vec<_> = columns.iter().map(|(n, u, v)| (n.as_str(), *u, v.as_slice())).collect();
         csv::write(output.join(format!("history_{}.csv", outcome.file_name())), &views)?;
+    }
+    for outcome in outcomes.iter().filter(|outcome| !outcome.events.is_empty()) {
+        let each = |get: &dyn Fn(&Event) -> f64| outcome.events.iter().map(get).collect::<Vec<f64>>();
+        let (step, load) = (each(&|e| e.step as f64 + 1.0), each(&|e| e.load));
+        let bonds = each(&|e| e.bonds as f64);
+        let columns = [("step", "", &step[..]), ("load_before", "N", &load), ("bonds", "", &bonds)];
+        csv::write(output.join(format!("events_{}.csv", outcome.file_name())), &columns)?;
     }
     if several.is_empty() || !scene.output.pictures {
         return Ok(());

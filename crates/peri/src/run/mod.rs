@@ -1,5 +1,6 @@
 //! A whole scene: every variant solved, measured, compared, drawn and judged; restartable at any moment.
 
+mod against;
 mod bonded;
 mod compare;
 mod draw;
@@ -7,6 +8,7 @@ mod frames;
 mod history;
 mod outcome;
 
+pub use compare::BALANCES;
 pub use history::load_at_name;
 pub use outcome::{Outcome, Profile};
 
@@ -61,9 +63,9 @@ impl Finished {
     /// For the terminal: all values of a single variant, a line for each of several, then the judged expectations.
     pub fn summary(&self) -> String {
         if self.outcomes.len() == 1 {
-            self.report.table()
+            self.report.table() + &history::peak_lines(&self.outcomes)
         } else {
-            compare::table(&self.outcomes) + &self.report.verdict()
+            compare::table(&self.outcomes) + &history::peak_lines(&self.outcomes) + &self.report.verdict()
         }
     }
 }
@@ -192,6 +194,7 @@ fn run_variant<const D: usize>(
     }
     let stresses = frames.stresses(&*body.bonds, &state, &mut phases)?;
     outcome.history.clone_from(&state.history);
+    outcome.events.clone_from(&state.events);
     outcome.regions = scene::region_names(scene);
     phases.time("compare", || {
         outcome.responses(&*body.bonds, &loads, &state);
@@ -251,8 +254,7 @@ fn solve<const D: usize>(
     frames: &mut Frames,
 ) -> Result<(), Failure> {
     let Solution { variant, finished, law, modulus, loads, critical_stretch } = *solution;
-    let steps = scene.solver.steps;
-    let factors: Vec<f64> = (1..=steps).map(|s| s as f64 / steps as f64).collect();
+    let factors = scene.solver.factors();
     let name = variant.name();
     let (mut written, mut asked) = (Instant::now(), None);
     let (output, quick, every, interrupted) =

@@ -2,7 +2,7 @@
 
 use crate::bonds::Bonds;
 use crate::scene::Variant;
-use crate::solver::{Loads, Record, State};
+use crate::solver::{Event, Loads, Record, State};
 use polycore::report::Phases;
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +23,8 @@ pub struct Outcome {
     pub profiles: Vec<Profile>,
     /// The load steps.
     pub history: Vec<Record>,
+    /// Bonds that broke together, in their order.
+    pub events: Vec<Event>,
     /// Names of the regions of prescribed displacement.
     pub regions: Vec<String>,
     /// What must happen, where the scene says so.
@@ -57,6 +59,7 @@ impl Outcome {
             values: Vec::new(),
             profiles: Vec::new(),
             history: Vec::new(),
+            events: Vec::new(),
             regions: Vec::new(),
             must: None,
             error: None,

@@ -29,6 +29,14 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
         }
     }
     super::expect::check(source, scene)?;
+    if let Some(name) = scene.output.compare.as_ref().and_then(|compare| compare.variant.as_ref()) {
+        let names: Vec<String> =
+            super::variant::variants(source, scene, false)?.iter().map(Variant::name).collect();
+        if !names.contains(name) {
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            return Err(source.unknown("output.compare.variant", name, &names));
+        }
+    }
     if variants.is_empty() {
         return Err(source.error(
             "study",
@@ -147,6 +155,20 @@ fn contact(source: &Source, scene: &Scene) -> Result<(), SceneError> {
 fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     for (index, at) in scene.output.load_at.iter().enumerate() {
         positive(source, &format!("output.load_at[{index}]"), at.si(), "m")?;
+    }
+    if let Some(compare) = &scene.output.compare {
+        let found = match (&compare.variant, compare.value) {
+            (Some(_), Some(_)) => "both `variant` and `value`",
+            (None, None) => "neither `variant` nor `value`",
+            (None, Some(value)) if !(value.is_finite() && value != 0.0) => {
+                "a value with which nothing compares"
+            }
+            _ => "",
+        };
+        if !found.is_empty() {
+            let allowed = "`variant`, the name of one, or `value`, a number in SI units other than 0";
+            return Err(source.error("output.compare", found, allowed));
+        }
     }
     if scene.output.every == Some(0) {
         return Err(source.error("output.every", 0, "at least 1 step"));
@@ -288,9 +310,18 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             Err(source.error(&format!("solver.{key}"), plain(value), allowed))
         }
     };
-    within("tolerance", solver.tolerance, 1e-12, 0.1)?;
+    within("tolerance", scene.tolerance(), 1e-12, 0.1)?;
     within("fit_bound", scene.fit_bound(), 1e-12, 1e-2)?;
     within("steps", solver.steps as f64, 1.0, 1e6)?;
+    if let Some(path) = &solver.path {
+        if path.is_empty() || !solver.steps.is_multiple_of(path.len()) {
+            let found = format!("{} load factors in {} steps", path.len(), solver.steps);
+            return Err(source.error("solver.path", found, "at least one, and as many steps to each"));
+        }
+        for (index, &factor) in path.iter().enumerate() {
+            within(&format!("path[{index}]"), factor, -1e3, 1e3)?;
+        }
+    }
     within("max_iterations", solver.max_iterations as f64, 1.0, 1e9)?;
     within("mass_safety", solver.mass_safety.unwrap_or(1.1), 1.0, 100.0)?;
     if solver.mass_safety.is_some() && scene.method() != Method::Adr {

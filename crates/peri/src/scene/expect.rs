@@ -2,7 +2,7 @@
 
 use super::variant::variants;
 use super::{ExactSpec, Scene};
-use crate::run::load_at_name;
+use crate::run::{BALANCES, load_at_name};
 use polycore::scene::{SceneError, Source};
 
 /// Scalars that a run of a scene without studies can give; some only where something happens (`first_break`).
@@ -15,8 +15,10 @@ pub fn quantities(scene: &Scene) -> Vec<String> {
     add(true, &["stored_energy", "damped_energy", "largest_residual"]);
     let records = scene.dynamics.as_ref().map_or(scene.solver.steps, |dynamics| dynamics.method().records);
     add(records > 1, &["peak_load", "displacement_at_peak"]);
+    add(scene.dynamics.is_none(), &BALANCES);
     let critical = scene.material.critical.is_some();
     add(critical, &["critical_stretch", "fragments", "first_break", "load_at_first_break", "broken_bonds"]);
+    add(critical && scene.dynamics.is_none(), &["breaking_events"]);
     add(critical, &["detached_particles", "last_load", "last_displacement", "released_energy"]);
     add(scene.contact.is_some(), &["contact_energy", "contacts", "deepest_overlap"]);
     let motion = ["critical_time_step", "time_step", "kinetic_energy", "energy_error"];
@@ -57,7 +59,15 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
         let own = own.into_iter().chain(fails.then(|| "failed_as_it_must".to_owned()));
         match variants.len() {
             1 => names.extend(own),
-            _ => names.extend(own.map(|name| format!("{name}[{}]", variant.name()))),
+            _ => {
+                for name in own {
+                    let compared = scene.output.compare.as_ref().filter(|c| c.quantity == name).is_some();
+                    names.extend(compared.then(|| format!("{name}_error[{}]", variant.name())));
+                    names.extend(compared.then(|| format!("same_events[{}]", variant.name())));
+                    names.extend(BALANCES.contains(&name.as_str()).then(|| name.clone()));
+                    names.push(format!("{name}[{}]", variant.name()));
+                }
+            }
         }
         match families.iter_mut().find(|(family, _)| *family == variant.family()) {
             Some((_, count)) => *count += 1,

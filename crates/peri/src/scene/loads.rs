@@ -82,7 +82,7 @@ fn balanced<const D: usize>(
             size += force.abs();
             held |= loads.held(slot as usize) >> d & 1 == 1;
         }
-        if !held && sum.abs() > scene.solver.tolerance * size {
+        if !held && sum.abs() > scene.tolerance() * size {
             let axis = ["x", "y", "z"][d];
             let found = format!("a total force of {sum:.3e} N along {axis}, along which nothing is held");
             let allowed = "forces in balance, or a `displacement` that holds some region";

@@ -14,6 +14,8 @@ const ALWAYS: f64 = 20e6;
 /// Vector fields of any method: displacement, velocity, force and loads, what a pass sums, and a checkpoint, which is a
 /// copy of the first three in a list that grows.
 const FIELDS: f64 = 10.0;
+/// Equilibria before the last, from which the next is guessed, and their copies in a checkpoint; springs, in a component.
+const PAST: f64 = 6.0;
 /// Fields of L-BFGS beside its pairs, and bytes of its coarse level a particle.
 const FIELDS_OF_LBFGS: f64 = 8.0;
 const COARSE: f64 = 150.0;
@@ -37,7 +39,7 @@ fn of_slots<const D: usize>(scene: &Scene, slots: f64, stencil: usize) -> f64 {
     let vector = 8.0 * D as f64;
     // a bit for what is occupied, its number, a surface factor twice while it is found
     let mut each = masks + 8.0 + 2.0 * vector;
-    each += FIELDS * vector;
+    each += FIELDS * vector + if scene.material.critical.is_some() { PAST * vector } else { 8.0 };
     if scene.method() == Method::Lbfgs {
         each += (FIELDS_OF_LBFGS + 2.0 * PreconditionedLbfgs::default().memory as f64) * vector + COARSE;
     }

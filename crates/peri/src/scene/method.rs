@@ -14,10 +14,12 @@ use serde::Deserialize;
 pub struct Solver {
     /// Method; default: [`Scene::method`].
     pub method: Option<Method>,
-    /// Out-of-balance force over reference force.
-    pub tolerance: f64,
-    /// Load steps from 0 to the full load.
+    /// Out-of-balance force over reference force; default: [`Scene::tolerance`].
+    pub tolerance: Option<f64>,
+    /// Load steps from 0 to the full load, or along the whole path.
     pub steps: usize,
+    /// Load factors that are reached one after the other from 0, in equally many steps each; default: 1.
+    pub path: Option<Vec<f64>>,
     /// Iterations a step may take.
     pub max_iterations: u64,
     /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break.
@@ -36,8 +38,9 @@ impl Default for Solver {
     fn default() -> Self {
         Self {
             method: None,
-            tolerance: 1e-3,
+            tolerance: None,
             steps: 1,
+            path: None,
             max_iterations: 200_000,
             fit_bound: None,
             mass_safety: None,
@@ -45,6 +48,22 @@ impl Default for Solver {
             breaking: Policy::default(),
             stop_below: None,
         }
+    }
+}
+
+impl Solver {
+    /// Load factor at the end of each step.
+    pub fn factors(&self) -> Vec<f64> {
+        let path = self.path.as_deref().unwrap_or(&[1.0]);
+        let each = self.steps / path.len().max(1);
+        let leg = |(index, &end): (usize, &f64)| {
+            let start = index.checked_sub(1).map_or(0.0, |before| path[before]);
+            (1..=each).map(move |step| {
+                let part = step as f64 / each as f64;
+                if step == each { end } else { start + (end - start) * part }
+            })
+        };
+        path.iter().enumerate().flat_map(leg).collect()
     }
 }
 
@@ -72,16 +91,26 @@ impl Method {
 }
 
 impl Scene {
-    /// The method: L-BFGS unless told otherwise, and dynamic relaxation where bonds break, which asks for many
-    /// equilibria near each other, or particles touch, of which the coarse level of L-BFGS knows nothing.
+    /// The method: L-BFGS unless told otherwise, and dynamic relaxation where particles touch, of which the coarse level
+    /// of L-BFGS knows nothing.
     pub fn method(&self) -> Method {
-        let kinks = self.material.critical.is_some() || self.contact.is_some();
-        self.solver.method.unwrap_or(if kinks { Method::Adr } else { Method::Lbfgs })
+        self.solver.method.unwrap_or(if self.contact.is_some() { Method::Adr } else { Method::Lbfgs })
+    }
+
+    /// The tolerance: 1e-3 unless told otherwise; where bonds break that at which those of equilibrium do
+    /// (`cases/ch2/dent-events`), 1e-4 of L-BFGS and 1e-5 of relaxation.
+    pub fn tolerance(&self) -> f64 {
+        let plain = match (self.material.critical.is_some(), self.method()) {
+            (false, _) => 1e-3,
+            (true, Method::Lbfgs) => 1e-4,
+            (true, _) => 1e-5,
+        };
+        self.solver.tolerance.unwrap_or(plain)
     }
 
     /// The quasi-static method with the settings of this scene.
     pub fn equilibria<const D: usize>(&self) -> Box<dyn Equilibrium<D>> {
-        let Solver { tolerance, max_iterations, .. } = self.solver;
+        let (tolerance, max_iterations) = (self.tolerance(), self.solver.max_iterations);
         let accept = self.solver.accept.unwrap_or(0.0);
         match self.method() {
             Method::Lbfgs => {

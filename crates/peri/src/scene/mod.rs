@@ -296,11 +296,33 @@ pub struct OutputSpec {
     pub load_at: Vec<Length>,
     /// The integrals over the horizon of Appendix A, by quadrature, among the values of the report.
     pub integrals: bool,
+    /// What every variant is measured against.
+    pub compare: Option<CompareSpec>,
+}
+
+/// A truth for one result: that of a variant, or a number.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CompareSpec {
+    /// The result, such as `peak_load`.
+    pub quantity: String,
+    /// Name of the variant that is taken as true.
+    pub variant: Option<String>,
+    /// The true value, in SI units.
+    pub value: Option<f64>,
 }
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self { pictures: true, fields: true, every: None, stages: 5, load_at: Vec::new(), integrals: false }
+        Self {
+            pictures: true,
+            fields: true,
+            every: None,
+            stages: 5,
+            load_at: Vec::new(),
+            integrals: false,
+            compare: None,
+        }
     }
 }
 

@@ -139,8 +139,8 @@ impl Relaxation {
         // where bonds soften the quotient is negative and would leave them to swing for ever: a long search is damped
         let late = state.iteration.saturating_sub(LONG) as f64 / LONG as f64;
         let damping = (2.0 * quotient.max(0.0).sqrt()).clamp(LATE_DAMPING * late.min(1.0), 1.9);
-        state.note(&sums);
         let goal = settings.goal();
+        state.note(system, &sums, &goal);
         if state.is_balanced(&goal, broken)? {
             return Ok(true);
         }

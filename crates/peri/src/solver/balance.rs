@@ -1,12 +1,29 @@
-//! When forces balance, for every method alike: ‖F_free‖₂ against the reactions, or the body forces where they are
-//! larger, but not against less than a twentieth of what these have been.
+//! When forces balance, for every method alike: ‖F_free‖₂ against a reference R, the greatest of
+//!
+//! - the reactions ‖F_held‖₂ and the body forces ‖b‖₂;
+//! - a twentieth of what these were in any equilibrium so far, for bodies that are torn;
+//! - a hundredth of what bonds at the grips would pull if the body were strained by min(U/L, 1): δ‖s_held‖₂, with U the
+//!   largest prescribed displacement, L the body's diagonal and s = Σ_J 2kθK w V_J/|ξ|, for bodies that grips move
+//!   without resistance;
+//! - what rounding of displacements alone makes of forces, 4ε‖s u‖₂, over the tolerance.
 
+use super::load::Loads;
 use super::passes::Sums;
-use super::system::State;
+use super::system::{State, System};
+use crate::bonds::Bonds;
 use crate::error::Error;
+use crate::field::CHUNK;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-/// Part of the greatest reference so far below which a reference does not fall.
+/// Part of the greatest reference of an equilibrium below which a reference does not fall.
 const LEAST_REFERENCE: f64 = 0.05;
+/// Part of the grips' bond forces under the strain U/L.
+const LEAST_STRAIN: f64 = 0.01;
+/// Rounding of displacements, in units of the last place, that forces may show.
+const ROUNDING: f64 = 4.0;
+/// Iterations after which the rounding of displacements is asked for anew.
+const LOOK: u64 = 50;
 
 /// How well forces must balance, and how long a search may take.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +34,68 @@ pub struct Goal {
     pub max_iterations: u64,
     /// Residual that will do where all iterations are used.
     pub accept: f64,
+}
+
+/// What a body's forces are measured by, beside its reactions: of the body as it was built.
+#[derive(Clone, Debug, Default)]
+pub struct Scale {
+    /// s of each slot, N/m⁴.
+    springs: Vec<f64>,
+    /// U at load factor 1, m, and L, m.
+    largest: f64,
+    diagonal: f64,
+    /// δ‖s‖₂ over held particles, N/m³, and δ Σ V s over them, N.
+    held: f64,
+    held_sum: f64,
+}
+
+impl Scale {
+    /// Of a body with its loads; `stiffness` is kθK.
+    pub fn new<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, stiffness: f64) -> Self {
+        let of = |&slot: &u32| {
+            let mut sum = 0.0;
+            bonds.neighbours(slot as usize, &mut |bond| sum += 2.0 * stiffness * bond.weight / bond.length);
+            sum
+        };
+        let sums: Vec<f64> = bonds.particles().par_iter().map(of).collect();
+        let mut scale = Self { springs: vec![0.0; bonds.slots()], ..Self::default() };
+        let (mut low, mut high, mut square) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D], 0.0);
+        for (&slot, sum) in bonds.particles().iter().zip(sums) {
+            let slot = slot as usize;
+            scale.springs[slot] = sum;
+            let position = bonds.position(slot);
+            low = std::array::from_fn(|d| low[d].min(position[d]));
+            high = std::array::from_fn(|d| high[d].max(position[d]));
+            if let Some(prescribed) = loads.displacement.as_ref().filter(|_| loads.held(slot) != 0) {
+                let moved = prescribed.get(slot).iter().map(|x| x * x).sum::<f64>().sqrt();
+                scale.largest = scale.largest.max(moved);
+                square += sum * sum;
+                scale.held_sum += bonds.horizon() * bonds.volume(slot) * sum;
+            }
+        }
+        scale.diagonal = (0..D).map(|d| (high[d] - low[d]).powi(2)).sum::<f64>().sqrt();
+        scale.held = bonds.horizon() * square.sqrt();
+        scale
+    }
+
+    /// LEAST_STRAIN · min(U/L, 1) at a load factor.
+    fn strain(&self, factor: f64) -> f64 {
+        LEAST_STRAIN * (self.largest * factor.abs() / self.diagonal.max(f64::MIN_POSITIVE)).min(1.0)
+    }
+
+    /// ‖s u‖₂.
+    fn moved<const D: usize>(&self, state: &State<D>) -> f64 {
+        let u = state.displacement.components();
+        let of = |(chunk, springs): (usize, &[f64])| {
+            let each = springs.iter().enumerate().map(|(k, s)| {
+                let square: f64 = (0..D).map(|d| u[d][chunk * CHUNK + k].powi(2)).sum();
+                s * s * square
+            });
+            each.sum::<f64>()
+        };
+        let parts: Vec<f64> = self.springs.par_chunks(CHUNK).enumerate().map(of).collect();
+        parts.iter().sum::<f64>().sqrt()
+    }
 }
 
 impl Sums {
@@ -31,18 +110,24 @@ impl Sums {
         self.held.sqrt().max(self.external.sqrt())
     }
 
-    /// Out-of-balance force over its reference, with `greatest` the greatest so far.
-    pub fn residual(&self, greatest: f64) -> f64 {
-        let reference = self.reference().max(LEAST_REFERENCE * greatest);
+    /// Out-of-balance force over its reference, which is `floor` at least.
+    pub fn residual(&self, floor: f64) -> f64 {
+        let reference = self.reference().max(floor);
         if self.free == 0.0 { 0.0 } else { self.free.sqrt() / reference.max(f64::MIN_POSITIVE) }
     }
 }
 
 impl<const D: usize> State<D> {
-    /// Takes note of an iterate's sums: its residual, and the greatest reference.
-    pub(super) fn note(&mut self, sums: &Sums) {
-        self.reference = self.reference.max(sums.reference());
-        self.residual = sums.residual(self.reference);
+    /// Takes note of an iterate's sums: its residual, against the floor of its reference.
+    pub(super) fn note(&mut self, system: &System<D>, sums: &Sums, goal: &Goal) {
+        if self.iteration.is_multiple_of(LOOK) || self.floor == 0.0 {
+            let (scale, factor) = (&system.scale, system.factors[self.step]);
+            let rounding = ROUNDING * f64::EPSILON * scale.moved(self) / goal.tolerance;
+            let strained = scale.strain(factor) * scale.held;
+            self.floor = (LEAST_REFERENCE * self.reference).max(strained).max(rounding);
+        }
+        self.present = sums.reference();
+        self.residual = sums.residual(self.floor);
     }
 
     /// Whether the search is over; an iterate in which bonds have just `broken` never ends it.
@@ -50,15 +135,15 @@ impl<const D: usize> State<D> {
     /// # Errors
     /// [`Error::NotConverged`].
     pub(super) fn is_balanced(&mut self, goal: &Goal, broken: bool) -> Result<bool, Error> {
-        if self.residual <= goal.tolerance && !broken {
+        let balanced = self.residual <= goal.tolerance;
+        let spent = self.iteration >= goal.max_iterations;
+        if !broken && (balanced || (spent && self.residual <= goal.accept)) {
+            self.unconverged += u64::from(!balanced);
+            self.reference = self.reference.max(self.present);
             return Ok(true);
         }
-        if self.iteration < goal.max_iterations {
+        if !spent {
             return Ok(false);
-        }
-        if self.residual <= goal.accept && !broken {
-            self.unconverged += 1;
-            return Ok(true);
         }
         Err(Error::NotConverged {
             step: self.step,
@@ -66,5 +151,70 @@ impl<const D: usize> State<D> {
             residual: self.residual,
             needed: goal.tolerance,
         })
+    }
+}
+
+/// Sums over the whole body in equilibrium. The first two vanish by Newton's third law, whatever the residual: bonds and
+/// contact pull both ends with one force, along the line between them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Balance {
+    /// |Σ V F| of the internal forces F, N.
+    pub force: f64,
+    /// |Σ V x × F| about the body's middle with deformed positions x, N·m.
+    pub moment: f64,
+    /// |Σ reactions + Σ loads|, N: what free particles still have out of balance.
+    pub external: f64,
+    /// ½ Σ V |F|, N, and no less than a hundredth of the grips' bond forces under the strain U/L.
+    pub size: f64,
+    /// Half the body's diagonal, m.
+    pub arm: f64,
+}
+
+impl Balance {
+    /// Of a state in equilibrium.
+    pub(super) fn new<const D: usize>(system: &System<D>, state: &State<D>) -> Self {
+        let (bonds, factor) = (&*system.bonds, system.factors[state.step]);
+        let particles = bonds.particles();
+        let middle: [f64; D] = match (particles.first(), particles.last()) {
+            (Some(&a), Some(&b)) => {
+                let ends = [a, b].map(|slot| bonds.position(slot as usize));
+                std::array::from_fn(|d| 0.5 * (ends[0][d] + ends[1][d]))
+            }
+            _ => [0.0; D],
+        };
+        // force, external force, moment (yz, zx, xy), size
+        let of = |slots: &[u32]| {
+            let mut sums = [0.0; 10];
+            for &slot in slots {
+                let slot = slot as usize;
+                let (volume, held) = (bonds.volume(slot), system.loads.held(slot));
+                let body = system.loads.body_force.as_ref().map_or([0.0; D], |b| b.get(slot));
+                let (total, position, moved) =
+                    (state.force.get(slot), bonds.position(slot), state.displacement.get(slot));
+                let internal: [f64; D] = std::array::from_fn(|d| volume * (total[d] - factor * body[d]));
+                let arm: [f64; D] = std::array::from_fn(|d| position[d] + moved[d] - middle[d]);
+                for d in 0..D {
+                    sums[d] += internal[d];
+                    let reaction = if held >> d & 1 == 1 { total[d] } else { 0.0 };
+                    sums[3 + d] += volume * (factor * body[d] - reaction);
+                    for e in 0..d {
+                        sums[5 + d + e] += arm[e] * internal[d] - arm[d] * internal[e];
+                    }
+                }
+                sums[9] += 0.5 * internal.iter().map(|x| x * x).sum::<f64>().sqrt();
+            }
+            sums
+        };
+        let parts: Vec<[f64; 10]> = particles.par_chunks(CHUNK).map(of).collect();
+        let sum = |k: usize| parts.iter().map(|part| part[k]).sum::<f64>();
+        let norm = |from: usize| (from..from + 3).map(|k| sum(k).powi(2)).sum::<f64>().sqrt();
+        let least = system.scale.strain(factor) * system.scale.held_sum;
+        Self {
+            force: norm(0),
+            external: norm(3),
+            moment: norm(6),
+            size: sum(9).max(least),
+            arm: 0.5 * system.scale.diagonal,
+        }
     }
 }

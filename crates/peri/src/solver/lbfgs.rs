@@ -13,9 +13,13 @@ use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use rayon::prelude::*;
 
-/// Rounds of breaking, and iterations of one search, after which the preconditioner is built anew.
-const ROUNDS: u64 = 25;
+/// Searches, load steps, and iterations of one search, after which the preconditioner is built anew …
+const SEARCHES: u64 = 25;
+const STEPS: usize = 10;
 const ITERATIONS: u64 = 200;
+/// … and growth of a search over the first one with it, or over so few iterations.
+const WORN: u64 = 2;
+const FEW: u64 = 10;
 /// σ: part of the first slope that may be left.
 const SLOPE: f64 = 0.9;
 /// Force evaluations of one line search.
@@ -101,6 +105,10 @@ pub struct LimitedMemory<const D: usize> {
     direction: Field<D>,
     /// Whether the coarse level is left out: it has failed to give a descent.
     local_only: bool,
+    /// Searches with this preconditioner, iterations of the first of them, and whether the last took too many.
+    searches: u64,
+    first: u64,
+    worn: bool,
 }
 
 /// A point along a direction.
@@ -133,6 +141,9 @@ impl<const D: usize> LimitedMemory<D> {
             trial_image: Field::zeros(0),
             direction: Field::zeros(0),
             local_only: false,
+            searches: 0,
+            first: 0,
+            worn: false,
         }
     }
 
@@ -158,6 +169,7 @@ impl<const D: usize> LimitedMemory<D> {
         }
         self.memory.clear(true);
         self.local_only = false;
+        (self.searches, self.first, self.worn) = (0, 0, false);
         self.preconditioner.build(system, state, self.settings.weight, self.settings.coarsening.max(2.0));
         Ok(())
     }
@@ -274,7 +286,7 @@ impl<const D: usize> LimitedMemory<D> {
             }
             state.met = state.met.join(rough.met);
             let point = if system.widen(state)? { self.evaluate(system, state) } else { rough };
-            if point.sums.residual(state.reference) <= self.settings.tolerance
+            if point.sums.residual(state.floor) <= self.settings.tolerance
                 || point.slope.abs() <= SLOPE * slope.abs()
             {
                 return Ok(Search::Found(step, point));
@@ -373,14 +385,24 @@ impl<const D: usize> Equilibrium<D> for LimitedMemory<D> {
     ) -> Result<(), Error> {
         let goal = self.settings.goal();
         self.memory.clear(false);
-        if !self.preconditioner.is_built() || (state.iteration == 0 && state.round.is_multiple_of(ROUNDS)) {
+        // a run can be interrupted where it is built
+        // small steps between which bonds break leave the body much as it was; contact and large steps do not
+        let kept = system.breaking.is_some() && system.repulsion().is_none();
+        let fresh = state.round == 0 && (!kept || state.step.is_multiple_of(STEPS));
+        let due = fresh || self.worn || self.searches >= SEARCHES;
+        if !self.preconditioner.is_built() || (state.iteration == 0 && due) {
             self.begin(system, state, watch)?;
         }
+        let before = state.total_iterations;
         let mut point = self.arrive(system, state)?;
         let mut broken = false;
         loop {
-            state.note(&point.sums);
+            state.note(system, &point.sums, &goal);
             if state.is_balanced(&goal, broken)? {
+                let took = state.total_iterations - before;
+                self.first = if self.searches == 0 { took } else { self.first };
+                self.searches += 1;
+                self.worn = took > WORN * self.first.max(FEW);
                 return Ok(());
             }
             broken = false;

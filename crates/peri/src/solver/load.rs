@@ -197,6 +197,8 @@ impl<const D: usize> Loads<D> {
             // lengths in units of the body, so that the pseudo-inverse's threshold means something
             let scale =
                 held.iter().flat_map(|&s| bonds.position(s)).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+            // a body that is moved as a whole stays unstrained to the last bit
+            let first = held.first().map_or(0.0, |&slot| field.get(slot)[d]);
             for &slot in &held {
                 let position = bonds.position(slot);
                 let mut row = nalgebra::Vector4::zeros();
@@ -205,12 +207,12 @@ impl<const D: usize> Loads<D> {
                     row[e + 1] = position[e] / scale;
                 }
                 normal += row * row.transpose();
-                right += row * field.get(slot)[d];
+                right += row * (field.get(slot)[d] - first);
             }
             let count = held.len().max(1) as f64;
             if let Ok(inverse) = (normal / count).pseudo_inverse(1e-10) {
                 let solution = inverse * right / count;
-                result[d][0] = solution[0];
+                result[d][0] = first + solution[0];
                 for e in 0..D {
                     result[d][e + 1] = solution[e + 1] / scale;
                 }

@@ -15,8 +15,9 @@ mod time_step;
 mod verlet;
 
 pub use adr::{AdaptiveDynamicRelaxation, Relaxation};
+pub use balance::Balance;
 pub use lbfgs::{LimitedMemory, PreconditionedLbfgs};
 pub use load::{Loads, Support};
 pub use march::{Equilibrium, Watch, march, stored_energy};
-pub use system::{Breaking, Policy, Record, State, Status, System};
+pub use system::{Breaking, Event, Policy, Record, State, Status, System};
 pub use verlet::{Motion, VelocityVerlet};

@@ -1,8 +1,9 @@
 //! What is solved: a body under its law and loads, bonds that may break, and everything a checkpoint holds of it.
 
+use super::balance::{Balance, Scale};
 use super::load::Loads;
 use super::verlet::Motion;
-use crate::bonds::{Bonds, Overstretched, StretchRange, overstretched, stretch_range};
+use crate::bonds::{Bonds, Overstretched, StretchRange, fingerprint, overstretched, stretch_range};
 use crate::contact::{Contact, Touching};
 use crate::error::Error;
 use crate::field::Field;
@@ -57,6 +58,8 @@ pub struct System<'a, const D: usize> {
     pub fit_bound: f64,
     /// Repulsion of particles without a bond, or a look at how they overlap, where wanted.
     pub contact: Option<Contact<D>>,
+    /// What forces out of balance are measured by.
+    pub(super) scale: Scale,
 }
 
 /// One load step in equilibrium.
@@ -82,6 +85,8 @@ pub struct Record {
     pub detached: u64,
     /// Energy stored in bonds and contact, J.
     pub stored: f64,
+    /// Sums of all forces and moments.
+    pub balance: Balance,
     /// What touches, where that is looked at.
     pub contact: Option<Touching>,
     /// Work of the loads so far, J.
@@ -96,6 +101,19 @@ pub struct Record {
     pub kinetic: f64,
     /// Energy that mass-proportional damping has taken so far, J.
     pub damped: f64,
+}
+
+/// Bonds that broke together.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// Load step, from 0.
+    pub step: usize,
+    /// How many.
+    pub bonds: u64,
+    /// Which ones, as a number: two sets of bonds of one body that differ have different ones.
+    pub fingerprint: u64,
+    /// Load of the equilibrium before, N, see [`Record::load`]; 0 in dynamics.
+    pub load: f64,
 }
 
 /// Everything an interrupted run needs to go on with the same bits.
@@ -132,14 +150,21 @@ pub struct State<const D: usize> {
     pub(super) balanced_stretches: StretchRange,
     /// Largest relative bond tangent max(|t′|, |t|/λ) kθ over the fitted stretches.
     pub(super) tangent: f64,
-    /// Running maximum of the reference force.
+    /// Greatest reference force of an equilibrium.
     pub(super) reference: f64,
+    /// Reference force of the last iterate alone, and what it is at least.
+    pub(super) present: f64,
+    pub(super) floor: f64,
+    /// Displacements of the two equilibria before the last, where no bond has broken since.
+    pub(super) past: Vec<Field<D>>,
     /// Residual of the last iteration.
     pub residual: f64,
     /// Searches for equilibrium that ended above the tolerance.
     pub unconverged: u64,
     /// Bonds broken so far.
     pub broken: u64,
+    /// When they broke.
+    pub events: Vec<Event>,
     /// Particles that have lost all their bonds so far.
     pub detached: u64,
     /// Energy of broken bonds when they broke, J.
@@ -176,9 +201,13 @@ impl<const D: usize> State<D> {
             balanced_stretches: StretchRange::REST,
             tangent: 0.0,
             reference: 0.0,
+            present: 0.0,
+            floor: 0.0,
+            past: Vec::new(),
             residual: 0.0,
             unconverged: 0,
             broken: 0,
+            events: Vec::new(),
             detached: 0,
             released: 0.0,
             work: 0.0,
@@ -233,6 +262,7 @@ impl<'a, const D: usize> System<'a, D> {
             stop_below: 0.0,
             fit_bound: 1e-9,
             contact: None,
+            scale: Scale::default(),
         }
     }
 
@@ -324,7 +354,11 @@ impl<'a, const D: usize> System<'a, D> {
             self.bonds.volume(bond.slot as usize) * bond.weight * bond.length * energy
         };
         state.released += self.modulus * list.iter().map(energy).sum::<f64>();
-        state.broken += list.len() as u64 / 2;
+        let bonds = list.len() as u64 / 2;
+        state.broken += bonds;
+        let [factor, pull, push] = state.balanced;
+        let load = self.loads.response(&*self.bonds, factor, (pull, push)).0;
+        state.events.push(Event { step: state.step, bonds, fingerprint: fingerprint(&list), load });
         self.bonds.sever(&list);
         self.rebuild_contact(&state.displacement);
         state.intact = Some(self.bonds.intact());

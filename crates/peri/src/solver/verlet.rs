@@ -5,6 +5,7 @@
 //! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
 //! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
+use super::balance::Balance;
 use super::leap::{Leap, Sums, Table, chunks_of, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
 use super::march::{Watch, stored_energy};
 use super::system::{Record, State, Status, System};
@@ -372,6 +373,7 @@ impl VelocityVerlet {
             broken: state.broken,
             detached: state.detached,
             stored,
+            balance: Balance::default(),
             contact: system.touching(state),
             work: state.work,
             released: state.released,

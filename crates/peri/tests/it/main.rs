@@ -4,6 +4,7 @@
 mod balance;
 mod bodies;
 mod contact;
+mod cracks;
 mod dynamics;
 mod forces;
 mod homogeneous;
@@ -12,6 +13,7 @@ mod lbfgs;
 mod limits;
 mod pressed;
 mod relaxation;
+mod rigid;
 mod stress;
 mod surface;
 mod time_step;
