@@ -82,7 +82,7 @@ impl CooledPlate {
             let (whole, rest) = wall.root(n);
             let zeta = whole + rest;
             let beta = zeta / a;
-            let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
             // without the growth e^{β(b−y)}/2
             let profile = |left: f64| {
                 let decay = (-2.0 * beta * left).exp();
