@@ -157,17 +157,17 @@ fn solve(
             return;
         }
         let broken = if status.broken > 0 { format!("  broken {}", status.broken) } else { String::new() };
+        let load = status.load.map_or(String::new(), |load| format!("  load {load:.4e} N before"));
         // residuals fall by powers of ten: progress is the share of the decades done
         let decades = (1.0 / status.tolerance).log10();
         let done = (-status.residual.log10()).clamp(0.0, decades) / decades;
         bar.show((status.step as f64 + done) / status.steps as f64, || {
             format!(
-                "{variant}  step {}/{}{broken}  iteration {}  residual {:.2e}  reaction {:.3e}",
+                "{variant}  step {}/{}{broken}  iteration {}  residual {:.2e}{load}",
                 status.step + 1,
                 status.steps,
                 status.iteration,
-                status.residual,
-                status.reaction
+                status.residual
             )
         });
     };

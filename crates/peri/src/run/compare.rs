@@ -7,6 +7,7 @@ use crate::scene::{ExactSpec, Scene};
 use crate::stress::{Measure, Tensor};
 use polycore::report::Report;
 use polycore::scene::Source;
+use std::path::Path;
 
 /// Sums over the whole body that must vanish, see [`crate::solver::Balance`], over its forces; of several variants the
 /// largest is a value of its own.
@@ -206,25 +207,41 @@ fn resolved(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -
     text
 }
 
-/// Variants as lines of a table: size, work, time, then the results that all of them share.
+/// Names and units of the values of all variants, in the order in which they come.
+fn columns(outcomes: &[Outcome]) -> Vec<(&str, &str)> {
+    let mut columns: Vec<(&str, &str)> = Vec::new();
+    for (name, _, unit) in outcomes.iter().flat_map(|o| &o.values) {
+        if !columns.iter().any(|(known, _)| known == name) {
+            columns.push((name, unit));
+        }
+    }
+    columns
+}
+
+/// Variants as lines of a table: size, work, time, then their main results; `study.csv` has all of them.
 pub fn table(outcomes: &[Outcome]) -> String {
     use std::fmt::Write;
-    let shared: Vec<&str> =
-        outcomes.first().map(|o| o.values.iter().map(|v| v.0.as_str()).collect()).unwrap_or_default();
-    let shown: Vec<&str> = shared
+    // once a body is torn, reactions are those of its pieces
+    let torn = outcomes.iter().any(|o| o.history.iter().any(|r| r.broken > 0));
+    let main = ["_peak", "_rmse", "_rmse_inner", "largest_displacement"];
+    let of_loading = ["peak_load", "displacement_at_peak", "first_break", "broken_bonds"];
+    let shown: Vec<(&str, String)> = columns(outcomes)
         .into_iter()
-        .filter(|name| {
-            ["_peak", "_rmse", "_rmse_inner", "largest_displacement", "reaction_x", "reaction_y"]
-                .iter()
-                .any(|end| name.ends_with(end))
+        .filter(|(name, _)| {
+            main.iter().any(|end| name.ends_with(end))
+                || of_loading.contains(name)
+                || (!torn && name.starts_with("reaction_"))
         })
-        .filter(|name| !name.starts_with("printed"))
+        .filter(|(name, _)| !name.starts_with("printed"))
+        .map(|(name, unit)| {
+            (name, if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") })
+        })
         .collect();
     let width = outcomes.iter().map(|o| o.name.len()).max().unwrap_or(0);
     let mut text = String::new();
     let _ = write!(text, "{:<width$} {:>10} {:>10} {:>9}", "variant", "particles", "iterations", "solve (s)");
-    for name in &shown {
-        let _ = write!(text, "  {name}");
+    for (_, heading) in &shown {
+        let _ = write!(text, "  {heading:>10}");
     }
     text.push('\n');
     for outcome in outcomes {
@@ -236,14 +253,77 @@ pub fn table(outcomes: &[Outcome]) -> String {
             outcome.name,
             outcome.seconds_of("solve")
         );
-        for name in &shown {
-            let value = outcome.get(name).unwrap_or(f64::NAN);
-            let column = name.len();
-            let _ = write!(text, "  {value:>column$.5}");
+        for (name, heading) in &shown {
+            let column = heading.chars().count().max(10);
+            let _ = write!(text, "  {:>column$}", outcome.get(name).map_or("-".to_owned(), digits));
         }
         text.push('\n');
     }
     text
+}
+
+/// Six digits.
+fn digits(value: f64) -> String {
+    let size = value.abs();
+    if value != 0.0 && !(1e-4..1e7).contains(&size) {
+        return format!("{value:.5e}");
+    }
+    let after = if value == 0.0 { 0 } else { (5 - size.log10().floor() as i32).clamp(0, 9) };
+    let text = format!("{value:.*}", after as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// What the results do not say by themselves: warnings, runs in which nothing broke, how far a peak is known.
+pub fn notes(outcomes: &[Outcome]) -> String {
+    let mut lines = Vec::new();
+    let several = outcomes.len() > 1;
+    let of = |outcome: &Outcome| if several { format!("{}: ", outcome.name) } else { String::new() };
+    for outcome in outcomes {
+        lines.extend(outcome.warnings.iter().map(|text| format!("warning: {}{text}", of(outcome))));
+        let unbroken = outcome.history.last().is_some_and(|last| last.broken == 0);
+        if let (Some(critical), true) = (outcome.get("critical_stretch"), unbroken) {
+            let largest = outcome.history.iter().map(|r| r.largest_stretch).fold(1.0, f64::max);
+            lines
+                .push(format!("{}largest stretch {largest:.4} of {critical:.4}: nothing broke", of(outcome)));
+        }
+    }
+    for (family, change) in super::history::peak_changes(outcomes) {
+        let members: Vec<&Outcome> = outcomes.iter().filter(|o| o.family == family).collect();
+        let step = members.iter().filter_map(|o| o.step_at_peak()).fold(0.0, f64::max);
+        let known = if step >= change { ": smaller steps first" } else { "" };
+        lines.push(format!(
+            "{family}: the peak load changes by {:.2} % between the two finest spacings; a load step changes it by up to {:.2} %{known}",
+            100.0 * change,
+            100.0 * step
+        ));
+    }
+    lines.iter().map(|line| format!("{line}\n")).collect()
+}
+
+/// All values of all variants, a row for each.
+pub fn study(outcomes: &[Outcome], output: &Path) -> Result<(), polycore::Error> {
+    if outcomes.len() < 2 {
+        return Ok(());
+    }
+    let columns = columns(outcomes);
+    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    let mut text = String::from("variant,spacing [m],horizon_ratio");
+    for (name, unit) in &columns {
+        let heading = if unit.is_empty() { (*name).to_owned() } else { format!("{name} [{unit}]") };
+        text += &format!(",{}", quoted(&heading));
+    }
+    text.push('\n');
+    for outcome in outcomes {
+        text += &format!("{},{:?},{:?}", quoted(&outcome.name), outcome.spacing, outcome.horizon_ratio);
+        for (name, _) in &columns {
+            // empty: this variant has no such value
+            text += &outcome.get(name).map_or(",".to_owned(), |value| format!(",{value:?}"));
+        }
+        text.push('\n');
+    }
+    polycore::output::atomic_write(output.join("study.csv"), |file| {
+        std::io::Write::write_all(file, text.as_bytes())
+    })
 }
 
 /// Width of the plate across the load, from the added boxes.
@@ -264,6 +344,12 @@ pub fn plate_width(scene: &Scene) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn six_digits() {
+        let texts = [0.0, 1234567.8, 0.001234567, 8.9e-5, -15.25, 2e9].map(digits);
+        assert_eq!(texts, ["0", "1234568", "0.00123457", "8.90000e-5", "-15.25", "2.00000e9"]);
+    }
 
     #[test]
     fn order_of_a_power_law() {

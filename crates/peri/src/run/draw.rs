@@ -1,6 +1,7 @@
 //! Pictures and field files of a run.
 
 use super::compare::{families, plate_width, run_time};
+use super::frames::short;
 use super::outcome::Outcome;
 use crate::bonds::Bonds;
 use crate::exact;
@@ -39,9 +40,22 @@ pub fn maps<const D: usize>(
         .map(|(name, a, b)| (name, field.iter().map(|t| t[a][b] * scale).collect()))
         .into();
     let mut map = FieldMap::new().lengths("mm", 1e-3);
+    let [wide, high] = [0, 1].map(|d| {
+        let (low, high) =
+            places.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x[d]), high.max(x[d])));
+        high - low
+    });
+    if wide > 1.8 * high {
+        map = map.columns(1).size(1200);
+    }
     for (name, values) in &components {
         let label = format!("{name}{unit}");
-        let title = format!("{label}, {}", measure.name());
+        // of a body that is torn this is what is left in its pieces
+        let last = outcome.history.last().filter(|last| last.broken > 0);
+        let at = last.map_or(String::new(), |r| {
+            format!(", U = {} mm, F = {} N", short(r.displacement * 1e3), short(r.load))
+        });
+        let title = format!("{label}, {}{at}", measure.name());
         let panel = Panel::new(&title, &label, &places, values, bonds.spacing()).reference(&rest);
         map = map.panel(panel.bridge(bridge(outcome)));
     }

@@ -37,13 +37,15 @@ pub struct Stresses<const D: usize> {
     pub cauchy: Fields<D>,
 }
 
-fn intact<const D: usize>(bonds: &dyn Bonds<D>) -> Vec<u32> {
-    let count = |&slot: &u32| {
-        let mut count = 0;
-        bonds.neighbours(slot as usize, &mut |_| count += 1);
-        count
-    };
-    bonds.particles().iter().map(count).collect()
+/// Intact bonds of a slot.
+pub(super) fn intact<const D: usize>(bonds: &dyn Bonds<D>, slot: usize) -> u32 {
+    let mut count = 0;
+    bonds.neighbours(slot, &mut |_| count += 1);
+    count
+}
+
+fn all_intact<const D: usize>(bonds: &dyn Bonds<D>) -> Vec<u32> {
+    bonds.particles().iter().map(|&slot| intact(bonds, slot as usize)).collect()
 }
 
 /// Whether the fields of the last step of a history are written while the run goes on.
@@ -86,7 +88,7 @@ impl<'a> Frames<'a> {
         state: &State<D>,
         path: PathBuf,
     ) -> Result<Self, Error> {
-        let whole = scene.material.critical.is_some().then(|| intact(bonds));
+        let whole = scene.material.critical.is_some().then(|| all_intact(bonds));
         let every = scene.output.every;
         let done = every.map_or(0, |every| frames_of(every, state));
         let series = match (scene.output.fields, done) {
@@ -144,7 +146,7 @@ impl<'a> Frames<'a> {
     /// Broken bonds over those that the body was built with, particle by particle; cracks are no damage.
     pub fn damage<const D: usize>(&self, bonds: &dyn Bonds<D>) -> Option<Vec<f64>> {
         let whole = self.whole.as_ref()?;
-        let now = intact(bonds);
+        let now = all_intact(bonds);
         let part = |(&whole, &now): (&u32, &u32)| {
             if whole == 0 { 0.0 } else { 1.0 - f64::from(now) / f64::from(whole) }
         };
@@ -218,7 +220,11 @@ impl<'a> Frames<'a> {
         data.extend(lines.iter().map(|lines| ("input_index", 1, lines.as_slice())));
         data.extend(damage.iter().map(|damage| ("damage", 1, damage.as_slice())));
         data.extend(tensors.iter().map(|(name, values)| (name.as_str(), 9, values.as_slice())));
-        series.step(time, &points, &data)?;
+        // between two steps a load is that of neither
+        let record = state.history.last().filter(|_| time.fract() == 0.0);
+        let of = |get: fn(&Record) -> f64| record.map_or(f64::NAN, get);
+        let moments = [("displacement", of(|r| r.displacement)), ("load", of(|r| r.load))];
+        series.moment(time, &points, &data, &moments)?;
         Ok(())
     }
 
@@ -250,7 +256,10 @@ pub fn stages(
     let damages: Vec<f64> = (0..frames.len())
         .map(|k| Ok(frames.data(k, "damage")?.iter().sum()))
         .collect::<Result<_, Error>>()?;
-    let chosen = choose(&damages, scene.output.stages);
+    // the step of the peak load, which the damage does not tell
+    let peak = outcome.history.iter().enumerate().max_by(|a, b| a.1.load.total_cmp(&b.1.load));
+    let peak = peak.and_then(|(k, _)| frames.times().iter().position(|&time| time == (k + 1) as f64));
+    let chosen = choose(&damages, peak, scene.output.stages);
     let Some(spec) = &scene.stress else { return Ok(()) };
     let measure = format!("cauchy_{}", spec.measures[0].name());
     let component = spec.component();
@@ -304,7 +313,13 @@ pub fn stages(
         });
     }
     let bridge = super::draw::bridge(outcome);
-    let mut map = FieldMap::new().lengths("mm", 1e-3).columns(stages.len()).size(420);
+    let [wide, tall] = [0, 1].map(|d| {
+        let ends = |(low, high): (f64, f64), x: &[f64; 2]| (low.min(x[d]), high.max(x[d]));
+        let extent = |stage: &Stage| stage.places.iter().fold((f64::MAX, f64::MIN), ends);
+        stages.iter().map(extent).map(|(low, high)| high - low).fold(0.0, f64::max)
+    });
+    let layout = Layout::of(wide / tall, stages.len());
+    let mut map = FieldMap::new().lengths("mm", 1e-3).columns(layout.columns).size(layout.size);
     if !flat {
         map = map.axes(["x", "z"]);
     }
@@ -314,21 +329,46 @@ pub fn stages(
     let part = |share: f64| all.get((share * (all.len().max(1) - 1) as f64) as usize).copied().unwrap_or(0.0);
     let (low, high) = (part(0.002).min(0.0), part(0.998).max(0.0));
     let (scale, unit) = super::draw::stress_unit(high.max(-low));
-    let (low, high, label) = (low * scale, high * scale, format!("σ{index} ({unit})"));
+    let (low_stress, high_stress, label) = (low * scale, high * scale, format!("σ{index} ({unit})"));
     for stage in &mut stages {
         stage.stress.iter_mut().for_each(|stress| *stress *= scale);
     }
-    for stage in &stages {
-        let panel = Panel::new(&stage.title, &label, &stage.places, &stage.stress, spacing);
-        let panel = panel.reference(&stage.rest).bridge(bridge);
-        map = map.panel(if high > low { panel.range(low, high) } else { panel });
-    }
-    for stage in &stages {
-        let panel = Panel::new("", "damage", &stage.places, &stage.damage, spacing);
-        map = map.panel(panel.range(0.0, 0.6).reference(&stage.rest).bridge(bridge));
+    let kinds = [false, true];
+    let order: Vec<(&Stage, bool)> = if layout.pairs {
+        stages.iter().flat_map(|stage| kinds.map(|damage| (stage, damage))).collect()
+    } else {
+        kinds.iter().flat_map(|&damage| stages.iter().map(move |stage| (stage, damage))).collect()
+    };
+    for (stage, damage) in order {
+        let panel = if damage {
+            Panel::new("", "damage", &stage.places, &stage.damage, spacing).range(0.0, 0.6)
+        } else {
+            let panel = Panel::new(&stage.title, &label, &stage.places, &stage.stress, spacing);
+            if high_stress > low_stress { panel.range(low_stress, high_stress) } else { panel }
+        };
+        map = map.panel(panel.reference(&stage.rest).bridge(bridge));
     }
     map.write(output.join(format!("stages_{}.png", outcome.file_name())))?;
     Ok(())
+}
+
+/// How stages are laid out: side by side, damage under stress; wide bodies one under another, damage beside stress.
+struct Layout {
+    pairs: bool,
+    columns: usize,
+    /// Pixels of a body's longer side.
+    size: usize,
+}
+
+impl Layout {
+    /// For bodies `aspect` times as wide as high.
+    fn of(aspect: f64, stages: usize) -> Self {
+        match aspect {
+            wide if wide > 1.8 => Self { pairs: true, columns: 2, size: 720 },
+            narrow if narrow < 0.5 => Self { pairs: false, columns: stages, size: 720 },
+            _ => Self { pairs: false, columns: stages, size: 420 },
+        }
+    }
 }
 
 /// What a moment of a run is called: a load step's displacement and load, or a place within a step.
@@ -345,18 +385,21 @@ fn title(outcome: &Outcome, time: f64) -> String {
 }
 
 /// Four digits.
-fn short(value: f64) -> String {
+pub(super) fn short(value: f64) -> String {
     let digits = if value == 0.0 { 0 } else { (3 - value.abs().log10().floor() as i32).clamp(0, 6) };
     let text = format!("{value:.*}", digits as usize);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// The last frame before the first break, then frames at even parts of all damage, then the last.
-fn choose(damage: &[f64], count: usize) -> Vec<usize> {
+/// The last frame before the first break, the peak where it is later, then frames at even parts of all damage, then the
+/// last.
+fn choose(damage: &[f64], peak: Option<usize>, count: usize) -> Vec<usize> {
     let last = damage.len() - 1;
     let whole = damage.iter().rposition(|&d| d == 0.0).unwrap_or(0);
     let mut chosen = vec![whole];
-    for part in 1..count.saturating_sub(1) {
+    let peak = peak.filter(|peak| (whole + 1..last).contains(peak) && count > 2);
+    chosen.extend(peak);
+    for part in 1 + chosen.len() - 1..count.saturating_sub(1) {
         let target = damage[last] * part as f64 / (count - 1) as f64;
         let off = |k: usize| (damage[k] - target).abs();
         chosen.extend((whole..=last).min_by(|&a, &b| off(a).total_cmp(&off(b))));
@@ -380,9 +423,11 @@ mod tests {
 
     #[test]
     fn stages_are_chosen_by_damage() {
-        assert_eq!(choose(&[0.0, 0.0, 1.0, 5.0, 6.0, 9.0], 4), [1, 2, 4, 5]);
-        assert_eq!(choose(&[0.0, 0.0], 4), [1]);
-        assert_eq!(choose(&[3.0], 4), [0]);
+        assert_eq!(choose(&[0.0, 0.0, 1.0, 5.0, 6.0, 9.0], None, 4), [1, 2, 4, 5]);
+        // the peak takes the place of the first of them
+        assert_eq!(choose(&[0.0, 0.0, 0.1, 1.0, 5.0, 6.0, 9.0], Some(2), 4), [1, 2, 5, 6]);
+        assert_eq!(choose(&[0.0, 0.0], Some(0), 4), [1]);
+        assert_eq!(choose(&[3.0], None, 4), [0]);
     }
 
     #[test]

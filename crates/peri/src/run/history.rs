@@ -10,7 +10,7 @@ use polycore::report::{Report, Trial};
 use std::path::Path;
 
 /// A column: name, unit, values.
-type Column = (String, &'static str, Vec<f64>);
+type Column = (String, String, Vec<f64>);
 
 impl Outcome {
     fn is_dynamic(&self) -> bool {
@@ -27,41 +27,48 @@ impl Outcome {
         let each = |get: &dyn Fn(&Record) -> f64| self.history.iter().map(get).collect();
         let mut columns: Vec<Column> = Vec::new();
         columns.extend([
-            ("displacement".to_owned(), "m", each(&|r| r.displacement)),
-            ("load".to_owned(), "N", each(&|r| r.load)),
+            ("displacement".to_owned(), "m".to_owned(), each(&|r| r.displacement)),
+            ("load".to_owned(), "N".to_owned(), each(&|r| r.load)),
         ]);
         if self.is_dynamic() {
-            columns.push(("time".to_owned(), "s", each(&|r| r.time)));
-            columns.push(("kinetic".to_owned(), "J", each(&|r| r.kinetic)));
+            columns.push(("time".to_owned(), "s".to_owned(), each(&|r| r.time)));
+            columns.push(("kinetic".to_owned(), "J".to_owned(), each(&|r| r.kinetic)));
         }
         for (index, region) in self.regions.iter().enumerate() {
             for (d, axis) in ["x", "y", "z"].iter().enumerate() {
                 let values: Vec<f64> =
                     self.history.iter().filter_map(|r| Some(r.reactions.get(index)?[d])).collect();
                 if values.len() == self.history.len() && values.iter().any(|&v| v != 0.0) {
-                    columns.push((format!("reaction_{axis} {region}"), "N", values));
+                    columns.push((format!("reaction_{axis} {region}"), "N".to_owned(), values));
                 }
             }
         }
         columns.extend([
-            ("out_of_balance".to_owned(), "", each(&|r| r.residual)),
-            ("iterations".to_owned(), "", each(&|r| r.iterations as f64)),
-            ("equilibria".to_owned(), "", each(&|r| r.rounds as f64)),
-            ("broken_bonds".to_owned(), "", each(&|r| r.broken as f64)),
-            ("detached_particles".to_owned(), "", each(&|r| r.detached as f64)),
-            ("largest_stretch".to_owned(), "", each(&|r| r.largest_stretch)),
-            ("work".to_owned(), "J", each(&|r| r.work)),
-            ("stored".to_owned(), "J", each(&|r| r.stored)),
-            ("released".to_owned(), "J", each(&|r| r.released)),
-            ("damped".to_owned(), "J", each(&|r| self.damped(r))),
+            ("out_of_balance".to_owned(), "".to_owned(), each(&|r| r.residual)),
+            ("iterations".to_owned(), "".to_owned(), each(&|r| r.iterations as f64)),
+            ("equilibria".to_owned(), "".to_owned(), each(&|r| r.rounds as f64)),
+            ("broken_bonds".to_owned(), "".to_owned(), each(&|r| r.broken as f64)),
+            ("detached_particles".to_owned(), "".to_owned(), each(&|r| r.detached as f64)),
+            ("largest_stretch".to_owned(), "".to_owned(), each(&|r| r.largest_stretch)),
+            ("work".to_owned(), "J".to_owned(), each(&|r| r.work)),
+            ("stored".to_owned(), "J".to_owned(), each(&|r| r.stored)),
+            ("released".to_owned(), "J".to_owned(), each(&|r| r.released)),
+            ("damped".to_owned(), "J".to_owned(), each(&|r| self.damped(r))),
         ]);
         let touching: Vec<_> = self.history.iter().filter_map(|r| r.contact).collect();
         if !touching.is_empty() {
             columns.extend([
-                ("contact_energy".to_owned(), "J", touching.iter().map(|t| t.energy).collect()),
-                ("contacts".to_owned(), "", touching.iter().map(|t| t.pairs as f64).collect()),
-                ("overlap".to_owned(), "", touching.iter().map(|t| t.overlap).collect()),
+                ("contact_energy".to_owned(), "J".to_owned(), touching.iter().map(|t| t.energy).collect()),
+                ("contacts".to_owned(), "".to_owned(), touching.iter().map(|t| t.pairs as f64).collect()),
+                ("overlap".to_owned(), "".to_owned(), touching.iter().map(|t| t.overlap).collect()),
             ]);
+        }
+        for (index, (name, unit)) in self.probes.iter().enumerate() {
+            columns.push((
+                name.clone(),
+                unit.clone(),
+                each(&|r| r.seen.get(index).copied().unwrap_or(f64::NAN)),
+            ));
         }
         columns
     }
@@ -129,6 +136,13 @@ impl Outcome {
         self.value("largest_residual", residual, "");
     }
 
+    /// By how much of it the load rises to its peak, or falls from it, in one step.
+    pub(super) fn step_at_peak(&self) -> Option<f64> {
+        let loads: Vec<f64> = std::iter::once(0.0).chain(self.history.iter().map(|r| r.load)).collect();
+        let (at, &peak) = loads.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+        (at > 0 && peak > 0.0).then(|| (peak - loads[at - 1]).abs() / peak)
+    }
+
     /// Load at a displacement between two steps, linearly; from the undeformed body on.
     fn load_at(&self, displacement: f64) -> Option<f64> {
         let mut before = (0.0, 0.0);
@@ -173,7 +187,7 @@ pub fn peak_changes(outcomes: &[Outcome]) -> Vec<(String, f64)> {
     let change = |(family, members): (String, Vec<&Outcome>)| {
         let mut finest = members.iter().rev().map(|o| o.get("peak_load"));
         let (last, before) = (finest.next()??, finest.next()??);
-        Some((family, ((last - before) / last).abs()))
+        (last != 0.0).then(|| (family, ((last - before) / last).abs()))
     };
     super::compare::families(outcomes).into_iter().filter_map(change).collect()
 }
@@ -240,7 +254,7 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
     let several: Vec<&Outcome> = outcomes.iter().filter(|o| o.history.len() > 1).collect();
     for outcome in &several {
         let columns = outcome.columns();
-        let views: Vec<_> = columns.iter().map(|(n, u, v)| (n.as_str(), *u, v.as_slice())).collect();
+        let views: Vec<_> = columns.iter().map(|(n, u, v)| (n.as_str(), u.as_str(), v.as_slice())).collect();
         csv::write(output.join(format!("history_{}.csv", outcome.file_name())), &views)?;
     }
     for outcome in outcomes.iter().filter(|outcome| !outcome.events.is_empty()) {

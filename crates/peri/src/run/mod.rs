@@ -7,6 +7,7 @@ mod draw;
 mod frames;
 mod history;
 mod outcome;
+mod probes;
 
 pub use compare::BALANCES;
 pub use history::load_at_name;
@@ -14,6 +15,7 @@ pub use outcome::{Outcome, Profile};
 
 use bonded::Bonded;
 use frames::Frames;
+use probes::Probes;
 
 use crate::bonds::{Bonds, fragments, stretch_range};
 use crate::calibrate::Space;
@@ -62,10 +64,14 @@ pub struct Finished {
 impl Finished {
     /// For the terminal: all values of a single variant, a line for each of several, then the judged expectations.
     pub fn summary(&self) -> String {
+        let notes = compare::notes(&self.outcomes);
         if self.outcomes.len() == 1 {
-            self.report.table() + &history::peak_lines(&self.outcomes)
+            self.report.table() + &history::peak_lines(&self.outcomes) + &notes
         } else {
-            compare::table(&self.outcomes) + &history::peak_lines(&self.outcomes) + &self.report.verdict()
+            compare::table(&self.outcomes)
+                + &history::peak_lines(&self.outcomes)
+                + &notes
+                + &self.report.verdict()
         }
     }
 }
@@ -136,6 +142,7 @@ fn run_in<const D: usize>(
     }
     let mut report = compare::report(source, scene, &finished, options.quick);
     history::write(scene, &finished, options.output)?;
+    compare::study(&finished, options.output)?;
     history::suite(&mut report, &finished, options.output)?;
     if scene.output.pictures {
         draw::curves(scene, &finished, options.output)?;
@@ -161,9 +168,10 @@ fn run_variant<const D: usize>(
 ) -> Result<Outcome, Failure> {
     let mut phases = Phases::new();
     phases.start("build");
-    let Built { bonded, loads, loaded } = Built::<D>::new(source, scene, variant)?;
+    let Built { bonded, loads, loaded, probes } = Built::<D>::new(source, scene, variant)?;
     let Bonded { mut body, law, modulus, critical_stretch } = bonded;
     phases.stop();
+    let warnings = scene::warnings(scene, &body);
     let slots = body.bonds.slots();
     let fresh = state.is_none();
     let mut state = state.unwrap_or_else(|| State::new(slots));
@@ -176,9 +184,19 @@ fn run_variant<const D: usize>(
         return Err(polycore::Error::Checkpoint { path, why }.into());
     }
     let mut outcome = Outcome::new(variant.name(), variant);
+    outcome.warnings = warnings;
     let path = options.output.join(format!("{}.vtkhdf", outcome.file_name()));
     let mut frames = Frames::new(scene, &*law, modulus, &*body.bonds, &state, path)?;
-    let solution = Solution { variant, finished, law: &*law, modulus, loads: &loads, critical_stretch };
+    let (law_used, loads_used) = (&*law, &loads);
+    let solution = Solution {
+        variant,
+        finished,
+        law: law_used,
+        modulus,
+        loads: loads_used,
+        probes: &probes,
+        critical_stretch,
+    };
     solve(source, scene, &solution, options, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
     let fit = KernelFit::new(&*law, covering(&*body.bonds, &state), scene.fit_bound())?;
@@ -188,7 +206,10 @@ fn run_variant<const D: usize>(
         outcome.value("fragments", fragments(&*body.bonds) as f64, "");
     }
     if scene.dynamics.is_some() {
-        outcome.value("critical_time_step", state.motion.critical_step, "s");
+        // a body that is held everywhere has none
+        if state.motion.critical_step.is_finite() {
+            outcome.value("critical_time_step", state.motion.critical_step, "s");
+        }
         outcome.value("time_step", state.motion.time_step, "s");
         outcome.value("kinetic_energy", state.motion.kinetic, "J");
     }
@@ -199,6 +220,7 @@ fn run_variant<const D: usize>(
     phases.time("compare", || {
         outcome.responses(&*body.bonds, &loads, &state);
         outcome.values_of_history(scene);
+        outcome.values_of_probes(&scene.probe);
         if let Some(exact) = &scene.exact {
             compare::kirsch(&*body.bonds, exact, &stresses.cauchy, &loaded, &mut outcome);
         }
@@ -221,6 +243,7 @@ struct Built<const D: usize> {
     loads: Loads<D>,
     /// Slots in any loading layer.
     loaded: Vec<bool>,
+    probes: Probes<D>,
 }
 
 impl<const D: usize> Built<D> {
@@ -228,7 +251,8 @@ impl<const D: usize> Built<D> {
         let body = body_of::<D>(source, scene, variant)?;
         let (loads, loaded) = loads_of(source, scene, &body)?;
         scene::check_placement(source, scene, &body, &loads)?;
-        Ok(Self { bonded: Bonded::new(source, scene, variant, body)?, loads, loaded })
+        let probes = Probes::new(source, scene, &body)?;
+        Ok(Self { bonded: Bonded::new(source, scene, variant, body)?, loads, loaded, probes })
     }
 }
 
@@ -239,6 +263,7 @@ struct Solution<'a, const D: usize> {
     law: &'a dyn BondPotential,
     modulus: f64,
     loads: &'a Loads<D>,
+    probes: &'a Probes<D>,
     critical_stretch: Option<f64>,
 }
 
@@ -253,7 +278,7 @@ fn solve<const D: usize>(
     phases: &mut Phases,
     frames: &mut Frames,
 ) -> Result<(), Failure> {
-    let Solution { variant, finished, law, modulus, loads, critical_stretch } = *solution;
+    let Solution { variant, finished, law, modulus, loads, probes, critical_stretch } = *solution;
     let factors = scene.solver.factors();
     let name = variant.name();
     let (mut written, mut asked) = (Instant::now(), None);
@@ -278,7 +303,12 @@ fn solve<const D: usize>(
     };
     let contact =
         scene.contact.map(|contact| Contact::new(&*body.bonds, modulus, contact.stiffness)).transpose()?;
+    let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
+    let course = course.map(|formula| |time: f64| formula.in_time(time));
+    let observer = |bonds: &dyn Bonds<D>, state: &State<D>| probes.see(bonds, state);
     let mut system = System::new(&mut *body.bonds, law, modulus, loads, &factors);
+    system.course = course.as_ref().map(|course| course as _);
+    system.observer = (!scene.probe.is_empty()).then_some(&observer as _);
     system.fit_bound = scene.fit_bound();
     system.breaking = critical_stretch.map(|stretch| Breaking { stretch, policy: scene.solver.breaking });
     system.contact = contact;
@@ -343,7 +373,8 @@ fn explanation_in<const D: usize>(
         }
         let (source, scene) = variant.resolve(source, scene)?;
         let built = Built::<D>::new(&source, &scene, &variant)?;
-        lines.extend(scene::explain(&scene, &variant, &built.bonded.body));
+        let Bonded { body, critical_stretch, .. } = &built.bonded;
+        lines.extend(scene::explain(&source, &scene, &variant, body, *critical_stretch)?);
     }
     Ok(lines)
 }

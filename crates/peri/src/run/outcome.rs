@@ -27,6 +27,10 @@ pub struct Outcome {
     pub events: Vec<Event>,
     /// Names of the regions of prescribed displacement.
     pub regions: Vec<String>,
+    /// Columns of what the probes saw, with their units.
+    pub probes: Vec<(String, String)>,
+    /// What is allowed and most likely not meant.
+    pub warnings: Vec<String>,
     /// What must happen, where the scene says so.
     pub must: Option<String>,
     /// The error with which it ended, where the scene expects one.
@@ -61,6 +65,8 @@ impl Outcome {
             history: Vec::new(),
             events: Vec::new(),
             regions: Vec::new(),
+            probes: Vec::new(),
+            warnings: Vec::new(),
             must: None,
             error: None,
             work: Vec::new(),

@@ -1,10 +1,11 @@
 //! Regions of a body and what holds there.
 
+use super::formula::Formula;
 use polycore::units::{Force, Length, Speed, Stress};
 use serde::Deserialize;
 
 /// A region and what holds there.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundary {
     /// Its name in curves and values; default: the side, or `box` and its number.
@@ -25,6 +26,22 @@ pub struct Boundary {
     pub velocity: Option<Vec<Speed>>,
     /// Displacement at the end of the last step, component by component: a length or `"free"`.
     pub displacement: Option<Vec<Held>>,
+    /// The same as formulas of the place, m.
+    pub displacement_field: Option<Vec<HeldBy>>,
+    /// Velocity at the start as formulas of the place, m/s.
+    pub velocity_field: Option<Vec<Formula>>,
+}
+
+impl Boundary {
+    /// Whether displacements are prescribed here.
+    pub fn holds(&self) -> bool {
+        self.displacement.is_some() || self.displacement_field.is_some()
+    }
+
+    /// Whether it gives a velocity at the start.
+    pub fn moves(&self) -> bool {
+        self.velocity.is_some() || self.velocity_field.is_some()
+    }
 }
 
 /// Sides of the bounding box.
@@ -104,5 +121,38 @@ impl<'de> Deserialize<'de> for Held {
             serde::de::Error::custom(format!("{error}; a component that is not prescribed is \"free\""))
         })?;
         Ok(Self::At(length.si()))
+    }
+}
+
+/// A displacement component: prescribed by a formula, or free.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HeldBy {
+    /// Not prescribed.
+    Free,
+    /// Prescribed, m.
+    By(Formula),
+}
+
+impl schemars::JsonSchema for HeldBy {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "HeldBy".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let formula = generator.subschema_for::<Formula>();
+        schemars::json_schema!({
+            "description": "a formula of x, y, z (m), or free: not prescribed",
+            "anyOf": [{ "const": "free" }, formula],
+        })
+    }
+}
+
+impl<'de> Deserialize<'de> for HeldBy {
+    fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(from)?;
+        if text.trim() == "free" {
+            return Ok(Self::Free);
+        }
+        Formula::parse(&text).map(Self::By).map_err(serde::de::Error::custom)
     }
 }

@@ -39,9 +39,9 @@ pub fn body_of<const D: usize>(
 ) -> Result<Body<D>, SceneError> {
     let thickness = thickness(source, scene)?;
     let cuts = cracks(source, scene)?;
-    let mut body = match &scene.body.points {
-        Some(points) => cloud(source, scene, variant, points, thickness, &cuts)?,
-        None => filled(source, scene, variant, thickness, &cuts)?,
+    let mut body = match scene.body.has_points() {
+        true => cloud(source, scene, variant, thickness, &cuts)?,
+        false => filled(source, scene, variant, thickness, &cuts)?,
     };
     body.severed = severed(source, &*body.bonds, &cuts)?;
     Ok(body)
@@ -94,7 +94,7 @@ pub fn least_memory<const D: usize>(
     scene: &Scene,
     variant: &Variant,
 ) -> Result<f64, SceneError> {
-    if scene.body.points.is_some() {
+    if scene.body.has_points() {
         return Ok(0.0);
     }
     let (_, low, high) = outline::<D>(source, scene)?;

@@ -88,6 +88,7 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
     dynamics(source, scene)?;
     contact(source, scene)?;
+    super::probe::check(source, scene)?;
     output(source, scene)
 }
 
@@ -120,10 +121,27 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                     return Err(source.error(&format!("dynamics.{key}"), plain(value), allowed));
                 }
             }
+            if let Some(factor) = &dynamics.factor {
+                if dynamics.ramp.is_some() {
+                    return Err(source.error("dynamics.factor", "`factor` beside `ramp`", "one of them"));
+                }
+                if let Some(found) = factor.other_than("t") {
+                    let found = format!("`{found}` in `{}`", factor.text());
+                    return Err(source.error("dynamics.factor", found, "a formula of `t`, the time in s"));
+                }
+                for part in 0..=16 {
+                    let time = method.end_time * f64::from(part) / 16.0;
+                    let (value, rate) = factor.in_time(time);
+                    if !(value.is_finite() && rate.is_finite()) {
+                        let found = format!("{value}, rising at {rate} 1/s, at {time} s");
+                        return Err(source.error("dynamics.factor", found, "finite values and rates"));
+                    }
+                }
+            }
         }
         None => {}
     }
-    let moving = scene.boundary.iter().position(|b| b.velocity.is_some());
+    let moving = scene.boundary.iter().position(super::Boundary::moves);
     match moving.filter(|_| !explicit) {
         Some(index) => {
             let key = format!("boundary[{index}].velocity");
@@ -189,14 +207,22 @@ pub(super) fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Re
 
 fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let body = &scene.body;
-    match (body.shapes().is_empty(), &body.points) {
-        (true, None) => {
-            return Err(source.error("body.shapes", "nothing", "at least one shape, or `points`"));
+    if body.points.is_some() && body.grid.is_some() {
+        return Err(source.error("body.grid", "`grid` beside `points`", "one of them"));
+    }
+    let name = if body.grid.is_some() { "grid" } else { "points" };
+    match (body.shapes().is_empty(), body.has_points()) {
+        (true, false) => {
+            return Err(source.error("body.shapes", "nothing", "at least one shape, `points` or a `grid`"));
         }
-        (_, Some(_)) if body.shapes.is_some() => {
-            return Err(source.error("body.points", "`points` beside `shapes`", "one of them"));
+        (_, true) if body.shapes.is_some() => {
+            return Err(source.error(
+                &format!("body.{name}"),
+                format!("`{name}` beside `shapes`"),
+                "one of them",
+            ));
         }
-        (false, None) => {
+        (false, false) => {
             let spacing = body
                 .spacing
                 .map(|s| s.si())
@@ -209,7 +235,7 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 return Err(source.error("body.horizon", "`horizon` of a lattice", "`horizon_ratio`"));
             }
         }
-        (_, Some(_)) => {
+        (_, true) => {
             for (key, given) in [
                 ("body.spacing", body.spacing.is_some()),
                 ("body.horizon_ratio", body.horizon_ratio.is_some()),
@@ -218,7 +244,7 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                     return Err(source.error(
                         key,
                         "a lattice's key",
-                        "nothing: `points` bring their own spacing; set `horizon`",
+                        "nothing: points bring their own spacing; set `horizon`",
                     ));
                 }
             }

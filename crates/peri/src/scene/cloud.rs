@@ -1,6 +1,7 @@
 //! Bodies from a CSV file of points.
 
-use super::build::{Body, needed};
+use super::GridSpec;
+use super::build::{Body, needed, ordered, vector};
 use super::memory;
 use super::variant::Variant;
 use super::{Scene, check};
@@ -22,24 +23,34 @@ pub fn cloud<const D: usize>(
     source: &Source,
     scene: &Scene,
     variant: &Variant,
-    points: &Path,
     thickness: f64,
     cuts: &[Cut<D>],
 ) -> Result<Body<D>, SceneError> {
-    let path = source.path.parent().unwrap_or(Path::new("")).join(points);
     let horizon =
         needed(source, "body.horizon", scene.body.horizon, "a length; a cloud needs its `horizon`")?.si();
     check::positive(source, "body.horizon", horizon, "m")?;
-    let (positions, volumes) = read::<D>(source, &path)?;
+    let (positions, volumes, key) = match (&scene.body.points, &scene.body.grid) {
+        (Some(points), _) => {
+            let path = source.path.parent().unwrap_or(Path::new("")).join(points);
+            let (positions, volumes) = read::<D>(source, &path)?;
+            (positions, volumes, "body.points")
+        }
+        (None, Some(spec)) => {
+            let (positions, volumes) = grid(source, spec, thickness)?;
+            (positions, volumes, "body.grid")
+        }
+        (None, None) => return Err(source.error("body.points", "nothing", "`points` or a `grid`")),
+    };
     if let Some(body) = regular(&positions, &volumes, thickness, horizon, variant, cuts) {
-        memory::refuse_too_large(source, scene, "body.points", &*body.bonds)?;
+        memory::refuse_too_large(source, scene, key, &*body.bonds)?;
         return Ok(body);
     }
     refuse_too_many_bonds(source, &positions, horizon)?;
     let bonds =
         CloudBonds::new(&positions, &volumes, thickness, horizon, variant.volume, cuts).map_err(|error| {
-            let found = format!("{}: {error}", path.display());
-            source.error("body.points", found, "distinct points with volumes above 0")
+            let file =
+                scene.body.points.as_ref().map_or(String::new(), |path| format!("{}: ", path.display()));
+            source.error(key, format!("{file}{error}"), "distinct points with volumes above 0")
         })?;
     if bonds.directed_bonds() == 0 {
         let found = format!("{horizon} m, which reaches no neighbour");
@@ -80,6 +91,39 @@ fn regular<const D: usize>(
         thickness,
         severed: Vec::new(),
     })
+}
+
+/// The middles of a grid's cells, the first axis running fastest.
+fn grid<const D: usize>(source: &Source, spec: &GridSpec, thickness: f64) -> Result<Points<D>, SceneError> {
+    let min: [f64; D] = vector(source, "body.grid.min", &spec.min)?;
+    let max: [f64; D] = vector(source, "body.grid.max", &spec.max)?;
+    ordered(source, "body.grid", min, max)?;
+    let cells = <[usize; D]>::try_from(spec.cells.as_slice()).map_err(|_| {
+        source.error("body.grid.cells", format!("{} numbers", spec.cells.len()), format!("{D} numbers"))
+    })?;
+    let count: f64 = cells.iter().map(|&n| n as f64).product();
+    let needed = memory::of_cloud::<D>(count, 0.0);
+    if cells.contains(&0) || needed > available() || count > f64::from(u32::MAX) {
+        let allowed =
+            format!("at least 1 along each axis, and at most {} (the memory available)", gib(available()));
+        return Err(source.error(
+            "body.grid.cells",
+            format!("{cells:?}, which need {}", gib(needed)),
+            allowed,
+        ));
+    }
+    let size: [f64; D] = std::array::from_fn(|d| (max[d] - min[d]) / cells[d] as f64);
+    let volume = size.iter().product::<f64>() * thickness;
+    let place = |index: usize| {
+        let mut left = index;
+        std::array::from_fn(|d| {
+            let k = left % cells[d];
+            left /= cells[d];
+            min[d] + (k as f64 + 0.5) * size[d]
+        })
+    };
+    let count = cells.iter().product();
+    Ok(((0..count).map(place).collect(), vec![volume; count]))
 }
 
 fn read<const D: usize>(source: &Source, path: &Path) -> Result<Points<D>, SceneError> {

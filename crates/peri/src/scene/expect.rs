@@ -23,9 +23,10 @@ pub fn quantities(scene: &Scene) -> Vec<String> {
     add(scene.contact.is_some(), &["contact_energy", "contacts", "deepest_overlap"]);
     let motion = ["critical_time_step", "time_step", "kinetic_energy", "energy_error"];
     add(scene.dynamics.is_some(), &motion);
-    add(scene.boundary.iter().any(|b| b.displacement.is_some()), &["reaction_x", "reaction_y", "reaction_z"]);
+    add(scene.boundary.iter().any(|b| b.holds()), &["reaction_x", "reaction_y", "reaction_z"]);
     let forces = scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some());
     add(forces, &["applied_x", "applied_y", "applied_z"]);
+    names.extend(scene.probe.iter().flat_map(super::Probe::values));
     if scene.body.space != crate::calibrate::Space::Solid {
         names.retain(|name| !name.ends_with("_z"));
     }

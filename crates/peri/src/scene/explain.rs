@@ -4,9 +4,16 @@ use super::check::plain;
 use super::variant::Variant;
 use super::{Body, Method, Scene, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;
+use polycore::scene::{SceneError, Source};
 
 /// Lines for `peri check`.
-pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, body: &Body<D>) -> Vec<String> {
+pub fn explain<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    variant: &Variant,
+    body: &Body<D>,
+    critical: Option<f64>,
+) -> Result<Vec<String>, SceneError> {
     let bonds = &*body.bonds;
     let particles = bonds.particles().len();
     let directed = bonds.directed_bonds();
@@ -36,10 +43,13 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, body: &Body<D>)
             .collect();
         builds(format!("a crack, ({}) mm: {severed} bonds severed", corners.join(") – (")));
     }
+    lines.extend(super::loads::explain(source, scene, body)?);
     lines.push(format!("  needs      {}", polycore::memory::needs(super::memory_needed(scene, bonds))));
     let mut builds = |text: String| lines.push(format!("  builds     {text}"));
-    if scene.material.critical.is_some() {
-        builds("bonds that break, damage, a count of the bonds of each particle".to_owned());
+    if let Some(critical) = critical {
+        builds(format!(
+            "bonds that break at a stretch of {critical:.6}, damage, a count of each particle's bonds"
+        ));
     }
     if scene.method() == Method::Lbfgs {
         builds("ten pairs of steps and gradient changes, a coarse level with its factors".to_owned());
@@ -70,16 +80,17 @@ pub fn explain<const D: usize>(scene: &Scene, variant: &Variant, body: &Body<D>)
     omits(variant.volume == VolumeCorrection::Linear, "volume correction");
     omits(scene.stress.is_some(), "the stress pass");
     omits(scene.dynamics.is_some(), "inertia");
-    omits(!scene.body.cracks.is_empty(), "cracks");
+    omits(!scene.body.cracks.is_empty(), "pre-cut cracks");
     omits(scene.contact.is_some(), "contact (no [contact] in this scene)");
     omits(scene.material.critical.is_some(), "damage and bond breaking (no `critical` in this scene)");
     omits(scene.output.every.is_some(), "fields of the steps before the last");
-    let held = scene.boundary.iter().any(|b| b.displacement.is_some());
+    let held = scene.boundary.iter().any(|b| b.holds());
     omits(held, "prescribed displacements");
     omits(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), "body forces");
     omits(scene.output.fields, "VTKHDF fields");
     omits(scene.output.pictures, "pictures");
-    lines
+    lines.extend(super::warnings(scene, body).into_iter().map(|text| format!("  warning    {text}")));
+    Ok(lines)
 }
 
 /// Without the digits that a change of units leaves behind.

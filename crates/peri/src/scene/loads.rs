@@ -1,7 +1,8 @@
 //! From a scene's boundaries to the loads and supports of a body.
 
 use super::build::{Body, ordered, vector};
-use super::{Boundary, Held, Method, Scene};
+use super::formula::Formula;
+use super::{Boundary, Held, HeldBy, Method, Scene};
 use crate::field::Field;
 use crate::solver::{Loads, Support};
 use polycore::scene::{SceneError, Source};
@@ -29,7 +30,8 @@ pub fn loads_of<const D: usize>(
         let support = support(source, &key, boundary, body, &members, depth)?;
         regions.push((members, support));
     }
-    let loads = Loads::new(body.bonds.slots(), &regions);
+    let mut loads = Loads::new(body.bonds.slots(), &regions);
+    follow_formulas(source, scene, body, &regions, &mut loads)?;
     if scene.method() == Method::Verlet {
         // a body in motion needs neither balance nor hold
         return Ok((loads, loaded));
@@ -57,13 +59,69 @@ pub fn velocities_of<const D: usize>(
 ) -> Result<Field<D>, SceneError> {
     let mut field = Field::zeros(body.bonds.slots());
     for (index, boundary) in scene.boundary.iter().enumerate() {
-        let Some(velocity) = &boundary.velocity else { continue };
+        if !boundary.moves() {
+            continue;
+        }
         let (members, _) = region(source, &format!("boundary[{index}]"), boundary, body)?;
         for slot in members {
-            field.set(slot as usize, std::array::from_fn(|d| velocity.get(d).map_or(0.0, |v| v.si())));
+            let place = body.bonds.position(slot as usize);
+            let mut value = [0.0; D];
+            for (d, value) in value.iter_mut().enumerate() {
+                if let Some(velocity) = boundary.velocity.as_ref().and_then(|v| v.get(d)) {
+                    *value = velocity.si();
+                } else if let Some(formula) = boundary.velocity_field.as_ref().and_then(|v| v.get(d)) {
+                    *value = at(source, &format!("boundary[{index}].velocity_field[{d}]"), formula, place)?;
+                }
+            }
+            field.set(slot as usize, value);
         }
     }
     Ok(field)
+}
+
+/// The value of a formula at a particle.
+fn at<const D: usize>(
+    source: &Source,
+    key: &str,
+    formula: &Formula,
+    place: [f64; D],
+) -> Result<f64, SceneError> {
+    let value = formula.at(place);
+    if value.is_finite() {
+        return Ok(value);
+    }
+    let found = format!("{value} of `{}` at {place:?} m", formula.text());
+    Err(source.error(key, found, "a finite value at every particle of the region"))
+}
+
+/// Prescribed displacements that differ from particle to particle; of two regions the last one holds.
+fn follow_formulas<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+    regions: &[(Vec<u32>, Support<D>)],
+    loads: &mut Loads<D>,
+) -> Result<(), SceneError> {
+    if scene.boundary.iter().all(|boundary| boundary.displacement_field.is_none()) {
+        return Ok(());
+    }
+    let Some(field) = &mut loads.displacement else { return Ok(()) };
+    for ((index, boundary), (members, support)) in scene.boundary.iter().enumerate().zip(regions) {
+        for &slot in members {
+            let mut value = field.get(slot as usize);
+            for (d, value) in value.iter_mut().enumerate() {
+                match boundary.displacement_field.as_ref().and_then(|field| field.get(d)) {
+                    Some(HeldBy::By(formula)) => {
+                        let key = format!("boundary[{index}].displacement_field[{d}]");
+                        *value = at(source, &key, formula, body.bonds.position(slot as usize))?;
+                    }
+                    _ => *value = support.displacement[d].unwrap_or(*value),
+                }
+            }
+            field.set(slot as usize, value);
+        }
+    }
+    Ok(())
 }
 
 /// A body that nothing holds is never at rest under forces that do not balance.
@@ -94,16 +152,72 @@ fn balanced<const D: usize>(
 
 /// What the regions of prescribed displacement are called, in their order.
 pub fn region_names(scene: &Scene) -> Vec<String> {
-    let held = scene.boundary.iter().enumerate().filter(|(_, b)| b.displacement.is_some());
-    let name = |(index, boundary): (usize, &Boundary)| match (&boundary.name, boundary.side) {
+    let held = scene.boundary.iter().enumerate().filter(|(_, b)| b.holds());
+    held.map(|(index, boundary)| name_of(index, boundary)).collect()
+}
+
+/// Lines for `peri check`: which particles a boundary takes, and what is free between two grips.
+pub(super) fn explain<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<Vec<String>, SceneError> {
+    let mut lines = Vec::new();
+    let mut grips = [[None; 2]; 3];
+    for (index, boundary) in scene.boundary.iter().enumerate() {
+        let (members, depth) = region(source, &format!("boundary[{index}]"), boundary, body)?;
+        let layers = match (boundary.side, depth) {
+            (Some(side), Some(depth)) => {
+                let (axis, upper) = side.axis();
+                if boundary.holds() {
+                    grips[axis][usize::from(upper)] = Some(depth);
+                }
+                let layers = (depth / body.bonds.spacing()).round();
+                format!(
+                    "{layers} layer{}, {:.4} mm deep, ",
+                    if layers == 1.0 { "" } else { "s" },
+                    depth * 1e3
+                )
+            }
+            _ => String::new(),
+        };
+        let what = [
+            ("held", boundary.holds()),
+            ("pulled", boundary.traction.is_some() || boundary.force.is_some()),
+            ("moving at the start", boundary.moves()),
+        ];
+        let what: Vec<&str> = what.iter().filter(|(_, given)| *given).map(|(what, _)| *what).collect();
+        let name = name_of(index, boundary);
+        lines.push(format!("  boundary   {name}: {layers}{} particles {}", members.len(), what.join(", ")));
+    }
+    for (axis, depths) in grips.iter().enumerate() {
+        if let [Some(low), Some(high)] = depths
+            && axis < D
+        {
+            let free = body.bounds.1[axis] - body.bounds.0[axis] - low - high;
+            lines.push(format!(
+                "  boundary   {:.4} mm free between {}- and {}+",
+                free * 1e3,
+                AXES[axis],
+                AXES[axis]
+            ));
+        }
+    }
+    Ok(lines)
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Its own name, its side, or its number.
+fn name_of(index: usize, boundary: &Boundary) -> String {
+    match (&boundary.name, boundary.side) {
         (Some(name), _) => name.clone(),
         (None, Some(side)) => side.to_string(),
         (None, None) => format!("box{}", index + 1),
-    };
-    held.map(name).collect()
+    }
 }
 
-fn region<const D: usize>(
+pub(super) fn region<const D: usize>(
     source: &Source,
     key: &str,
     boundary: &Boundary,
@@ -183,6 +297,19 @@ fn support<const D: usize>(
             ))
         }
     };
+    let either = |name: &str, both: bool, other: &str| match both {
+        true => {
+            Err(source.error(&format!("{key}.{name}"), format!("`{name}` beside `{other}`"), "one of them"))
+        }
+        false => Ok(()),
+    };
+    let of_place = |name: &str, formula: &Formula| match formula.other_than(&"xyz"[..D]) {
+        Some(found) => {
+            let allowed = if D == 2 { "`x` and `y`" } else { "`x`, `y` and `z`" };
+            Err(source.error(&format!("{key}.{name}"), format!("`{found}` in `{}`", formula.text()), allowed))
+        }
+        None => Ok(()),
+    };
     let mut support = Support { displacement: [None; D], body_force: [0.0; D] };
     if let Some(traction) = &boundary.traction {
         count("traction", traction.len())?;
@@ -205,14 +332,27 @@ fn support<const D: usize>(
             Held::At(value) => Some(value),
         });
     }
+    if let Some(field) = &boundary.displacement_field {
+        count("displacement_field", field.len())?;
+        either("displacement_field", boundary.displacement.is_some(), "displacement")?;
+        for (d, held) in field.iter().enumerate() {
+            if let HeldBy::By(formula) = held {
+                of_place(&format!("displacement_field[{d}]"), formula)?;
+                support.displacement[d] = Some(0.0);
+            }
+        }
+    }
     if let Some(velocity) = &boundary.velocity {
         count("velocity", velocity.len())?;
     }
-    if boundary.traction.is_none()
-        && boundary.force.is_none()
-        && boundary.displacement.is_none()
-        && boundary.velocity.is_none()
-    {
+    if let Some(field) = &boundary.velocity_field {
+        count("velocity_field", field.len())?;
+        either("velocity_field", boundary.velocity.is_some(), "velocity")?;
+        for (d, formula) in field.iter().enumerate() {
+            of_place(&format!("velocity_field[{d}]"), formula)?;
+        }
+    }
+    if boundary.traction.is_none() && boundary.force.is_none() && !boundary.holds() && !boundary.moves() {
         return Err(source.error(
             key,
             "a region without a condition",

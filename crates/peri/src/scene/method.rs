@@ -1,6 +1,7 @@
 //! What a scene says of its solver: quasi-static methods and explicit dynamics.
 
 use super::Scene;
+use super::formula::Formula;
 use crate::solver::{
     AdaptiveDynamicRelaxation, Equilibrium, LimitedMemory, Policy, PreconditionedLbfgs, Relaxation,
     VelocityVerlet,
@@ -141,6 +142,8 @@ pub struct Dynamics {
     pub end_time: Time,
     /// Time over which the loads rise; default: at once.
     pub ramp: Option<Time>,
+    /// The load factor as a formula of the time `t`, s, in place of `ramp`.
+    pub factor: Option<Formula>,
     /// Largest time step; default: `safety` times the critical one.
     pub time_step: Option<Time>,
     /// Part of the critical time step; default 0.9.

@@ -7,24 +7,30 @@ mod cloud;
 mod crack;
 mod expect;
 mod explain;
+mod formula;
 mod inclusion;
 mod loads;
 mod memory;
 mod method;
 mod placement;
+mod probe;
 mod variant;
+mod warn;
 
-pub use boundary::{Boundary, Held, Side};
+pub use boundary::{Boundary, Held, HeldBy, Side};
 pub use build::{Body, body_of, least_memory};
 pub use check::{check, check_variant, plain};
 pub use expect::{quantities, quantities_of};
 pub use explain::explain;
+pub use formula::Formula;
 pub use inclusion::with_inclusions;
 pub use loads::{loads_of, region_names, velocities_of};
 pub use memory::needed as memory_needed;
 pub use method::{Dynamics, Method, Solver};
 pub use placement::check_placement;
+pub use probe::{Look, Probe};
 pub use variant::Variant;
+pub use warn::warnings;
 
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
@@ -59,6 +65,9 @@ pub struct Scene {
     pub dynamics: Option<Dynamics>,
     /// Repulsion of particles without a bond; without it there is none, and nothing of it is computed.
     pub contact: Option<ContactSpec>,
+    /// What is looked at in every row of the history.
+    #[serde(default)]
+    pub probe: Vec<Probe>,
     /// Stress output; without it no stress is computed.
     pub stress: Option<StressSpec>,
     /// A closed-form solution to compare with.
@@ -94,18 +103,37 @@ pub struct BodySpec {
     pub spacing: Option<Length>,
     /// Horizon over spacing, m = δ/Δx, with `shapes`.
     pub horizon_ratio: Option<f64>,
-    /// Horizon, with `points`.
+    /// Horizon, with `points` or `grid`.
     pub horizon: Option<Length>,
     /// Shapes added and cut in order.
     pub shapes: Option<Vec<ShapeSpec>>,
     /// CSV file with the columns x, y(, z) in m and volume in m³.
     pub points: Option<PathBuf>,
+    /// A box of cells that need not be as wide as high, with `horizon`.
+    pub grid: Option<GridSpec>,
     /// Cracks of zero width.
     #[serde(default)]
     pub cracks: Vec<CrackSpec>,
 }
 
+/// A box of equal cells, a particle in the middle of each.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GridSpec {
+    /// Lower corner.
+    pub min: Vec<Length>,
+    /// Upper corner.
+    pub max: Vec<Length>,
+    /// Cells along each axis.
+    pub cells: Vec<usize>,
+}
+
 impl BodySpec {
+    /// Whether it has points in place of shapes.
+    pub fn has_points(&self) -> bool {
+        self.points.is_some() || self.grid.is_some()
+    }
+
     /// The shapes, none where there are points.
     pub fn shapes(&self) -> &[ShapeSpec] {
         self.shapes.as_deref().unwrap_or_default()

@@ -94,7 +94,7 @@ pub(super) fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Ve
     let mut variants: Vec<Variant> = Vec::new();
     let studies: Vec<&Study> = if scene.study.is_empty() { vec![&own] } else { scene.study.iter().collect() };
     for (index, study) in studies.iter().enumerate() {
-        if scene.body.points.is_some() && !(study.spacing.is_empty() && study.horizon_ratio.is_empty()) {
+        if scene.body.has_points() && !(study.spacing.is_empty() && study.horizon_ratio.is_empty()) {
             return Err(source.error(&format!("study[{index}]"), "spacings of a cloud", "corrections only"));
         }
         let replaces = study.replaced().iter().any(|(_, _, given)| *given);

@@ -157,7 +157,7 @@ impl Relaxation {
             iteration: state.iteration,
             residual: state.residual,
             tolerance: settings.tolerance,
-            reaction: sums.held.sqrt(),
+            load: state.history.last().map(|record| record.load),
             damping,
             broken: state.broken,
             // masses are made anew from the state alone

@@ -155,7 +155,7 @@ impl<const D: usize> LimitedMemory<D> {
     /// Builds the preconditioner for the present state and forgets everything else: from here a run that begins with
     /// this state takes the same way.
     fn begin(&mut self, system: &System<D>, state: &State<D>, watch: &mut Watch<D>) -> Result<(), Error> {
-        watch(&self.status(system, state, 0.0, true), state)?;
+        watch(&self.status(system, state, true), state)?;
         let slots = system.bonds.slots();
         let fields = [
             &mut self.gradient,
@@ -174,14 +174,14 @@ impl<const D: usize> LimitedMemory<D> {
         Ok(())
     }
 
-    fn status(&self, system: &System<D>, state: &State<D>, reaction: f64, restartable: bool) -> Status {
+    fn status(&self, system: &System<D>, state: &State<D>, restartable: bool) -> Status {
         Status {
             step: state.step,
             steps: system.factors.len(),
             iteration: state.iteration,
             residual: state.residual,
             tolerance: self.settings.tolerance,
-            reaction,
+            load: state.history.last().map(|record| record.load),
             damping: 0.0,
             broken: state.broken,
             restartable,
@@ -424,7 +424,7 @@ impl<const D: usize> Equilibrium<D> for LimitedMemory<D> {
                     point = self.arrive(system, state)?;
                 }
             }
-            watch(&self.status(system, state, point.sums.held.sqrt(), false), state)?;
+            watch(&self.status(system, state, false), state)?;
             if state.iteration.is_multiple_of(ITERATIONS) {
                 self.begin(system, state, watch)?;
                 point = self.arrive(system, state)?;

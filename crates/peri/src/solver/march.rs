@@ -173,6 +173,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
         time: 0.0,
         kinetic: 0.0,
         damped: 0.0,
+        seen: system.seen(state),
     };
     state.history.push(record);
 }

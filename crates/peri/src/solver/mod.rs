@@ -19,5 +19,5 @@ pub use balance::Balance;
 pub use lbfgs::{LimitedMemory, PreconditionedLbfgs};
 pub use load::{Loads, Support};
 pub use march::{Equilibrium, Watch, march, stored_energy};
-pub use system::{Breaking, Event, Policy, Record, State, Status, System};
+pub use system::{Breaking, Course, Event, Observer, Policy, Record, State, Status, System};
 pub use verlet::{Motion, VelocityVerlet};

@@ -60,7 +60,17 @@ pub struct System<'a, const D: usize> {
     pub contact: Option<Contact<D>>,
     /// What forces out of balance are measured by.
     pub(super) scale: Scale,
+    /// The load factor and its rate over the time, s, in explicit dynamics, in place of the ramp.
+    pub course: Option<&'a Course<'a>>,
+    /// What is looked at in every row of the history, see [`Record::seen`].
+    pub observer: Option<&'a Observer<'a, D>>,
 }
+
+/// Load factor and its rate, 1/s, at a time, s.
+pub type Course<'a> = dyn Fn(f64) -> (f64, f64) + Sync + 'a;
+
+/// Numbers of a body in a state, for its history.
+pub type Observer<'a, const D: usize> = dyn Fn(&dyn Bonds<D>, &State<D>) -> Vec<f64> + Sync + 'a;
 
 /// One load step in equilibrium.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -101,6 +111,8 @@ pub struct Record {
     pub kinetic: f64,
     /// Energy that mass-proportional damping has taken so far, J.
     pub damped: f64,
+    /// What [`System::observer`] sees.
+    pub seen: Vec<f64>,
 }
 
 /// Bonds that broke together.
@@ -232,8 +244,8 @@ pub struct Status {
     pub residual: f64,
     /// The tolerance on it.
     pub tolerance: f64,
-    /// Norm of the reactions, N/m³ over all held components.
-    pub reaction: f64,
+    /// Load of the last step that is finished, N.
+    pub load: Option<f64>,
     /// Damping coefficient used.
     pub damping: f64,
     /// Bonds broken so far.
@@ -263,6 +275,8 @@ impl<'a, const D: usize> System<'a, D> {
             fit_bound: 1e-9,
             contact: None,
             scale: Scale::default(),
+            course: None,
+            observer: None,
         }
     }
 
@@ -325,6 +339,11 @@ impl<'a, const D: usize> System<'a, D> {
         if let Some(contact) = self.repulsion() {
             contact.force(displacement, chunk, force);
         }
+    }
+
+    /// What the observer sees in a state.
+    pub(super) fn seen(&self, state: &State<D>) -> Vec<f64> {
+        self.observer.map_or_else(Vec::new, |observer| observer(&*self.bonds, state))
     }
 
     /// Counts one evaluation of all forces.

@@ -1,6 +1,6 @@
 //! Explicit dynamics: velocity Verlet, with every energy that the integrator exchanges.
 //!
-//! ρü = f + F(t)b − cρu̇ with the load factor F rising linearly over a ramp; held components follow F(t)d and its rate.
+//! ρü = f + F(t)b − cρu̇ with the load factor F rising linearly over a ramp, or as [`System::course`] says; held components follow F(t)d and its rate.
 //! v₊ = v + ½Δt a, u ← u + Δt v₊, v ← v₊ + ½Δt a, the new a = (f + Fb)/ρ − cv; Swope et al. (1982),
 //! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
 //! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
@@ -160,7 +160,10 @@ impl VelocityVerlet {
     }
 
     /// Load factor at a time, and its rate from there on.
-    fn factor(&self, time: f64) -> (f64, f64) {
+    fn factor<const D: usize>(&self, system: &System<D>, time: f64) -> (f64, f64) {
+        if let Some(course) = system.course {
+            return course(time);
+        }
         if time < self.ramp { (time / self.ramp, 1.0 / self.ramp) } else { (1.0, 0.0) }
     }
 
@@ -171,7 +174,7 @@ impl VelocityVerlet {
         state: &mut State<D>,
         volumes: &[f64],
     ) -> Result<(), Error> {
-        let (factor, rate) = self.factor(0.0);
+        let (factor, rate) = self.factor(system, 0.0);
         for &slot in system.bonds.particles() {
             let slot = slot as usize;
             let held = system.loads.held(slot);
@@ -264,7 +267,7 @@ impl VelocityVerlet {
         end: f64,
     ) -> Result<(), Error> {
         let after = state.motion.time_after(end);
-        let (before, (factor, rate)) = (self.factor(state.motion.time).0, self.factor(after));
+        let (before, (factor, rate)) = (self.factor(system, state.motion.time).0, self.factor(system, after));
         let (density, damping, step) = (self.density, self.damping, state.motion.time_step);
         let leap = Leap { step, density, damping, factors: [before, factor], rate };
         let first = leap_pass(&system.loads, state, volumes, &leap);
@@ -347,7 +350,7 @@ impl VelocityVerlet {
             iteration: state.iteration,
             residual: 1.0 - state.motion.taken as f64 / state.motion.planned as f64,
             tolerance: 0.1,
-            reaction: 0.0,
+            load: state.history.last().map(|record| record.load),
             damping: self.damping,
             broken: state.broken,
             restartable: true,
@@ -359,7 +362,7 @@ impl VelocityVerlet {
         let met = stretch_range(&*system.bonds, &state.displacement);
         system.count_evaluation(state);
         let stored = stored(system, state, met, table);
-        let (factor, _) = self.factor(state.motion.time);
+        let (factor, _) = self.factor(system, state.motion.time);
         let conjugates = system.loads.conjugates(&*system.bonds, &state.displacement, &state.force);
         let (load, displacement) = system.loads.response(&*system.bonds, factor, conjugates);
         let record = Record {
@@ -381,6 +384,7 @@ impl VelocityVerlet {
             time: state.motion.time,
             kinetic: state.motion.kinetic,
             damped: state.motion.damped,
+            seen: system.seen(state),
         };
         state.history.push(record);
     }

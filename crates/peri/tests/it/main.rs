@@ -11,6 +11,7 @@ mod homogeneous;
 mod impact;
 mod lbfgs;
 mod limits;
+mod looks;
 mod pressed;
 mod relaxation;
 mod rigid;

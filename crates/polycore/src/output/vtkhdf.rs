@@ -29,6 +29,13 @@ pub use read::{Series, read};
 /// An array: name, number of components, values `[points · components]`, the components of a point (or cell) together.
 pub type Data<'a> = (&'a str, usize, &'a [f64]);
 
+/// A number of a step as a whole: name and value, NaN where it has none.
+pub type Moment<'a> = (&'a str, f64);
+
+/// Datasets of the group `Steps` that VTK knows, or that say where the steps lie.
+const OF_THE_FORMAT: [&str; 6] =
+    ["Values", "PartOffsets", "NumberOfParts", "PointOffsets", "CellOffsets", "ConnectivityIdOffsets"];
+
 /// What all steps have in common.
 #[derive(Clone, Debug, PartialEq)]
 struct Layout {
@@ -37,6 +44,8 @@ struct Layout {
     arrays: Vec<(String, usize)>,
     cells: usize,
     cell_arrays: Vec<(String, usize)>,
+    /// Names of the numbers of each step.
+    moments: Vec<String>,
 }
 
 impl Layout {
@@ -44,7 +53,7 @@ impl Layout {
     fn of(counts: [usize; 2], point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<Self, Error> {
         let arrays = named("point", counts[0], point_data)?;
         let cell_arrays = named("cell", counts[1], cell_data)?;
-        Ok(Self { points: counts[0], arrays, cells: counts[1], cell_arrays })
+        Ok(Self { points: counts[0], arrays, cells: counts[1], cell_arrays, moments: Vec::new() })
     }
 }
 
@@ -65,6 +74,22 @@ fn named(kind: &str, count: usize, data: &[Data<'_>]) -> Result<Vec<(String, usi
         arrays.push((name.to_owned(), components));
     }
     Ok(arrays)
+}
+
+impl Layout {
+    /// With numbers of each step.
+    fn and(mut self, moments: &[Moment<'_>]) -> Result<Self, Error> {
+        for &(name, _) in moments {
+            if name.is_empty() || name.contains('/') || OF_THE_FORMAT.contains(&name) {
+                let what = format!("number `{name}` of a step");
+                return Err(Error::Data { what, reason: "not a valid name".into() });
+            }
+            self.moments.push(name.to_owned());
+        }
+        // as a reader lists them
+        self.moments.sort();
+        Ok(self)
+    }
 }
 
 /// Points must be there, and finite.

@@ -149,16 +149,12 @@ impl SceneError {
     pub(super) fn bad_version(source: &Source, span: Range<usize>) -> Self {
         let found = source.text.get(span.clone()).unwrap_or_default();
         let message = format!("`version`: found {}; allowed: {VERSION}", shorten(found));
-        let help = Some(format!("this program reads scenes of version {VERSION}"));
-        Self::at(source, "scene::version", Some("version".into()), span, message)
-            .label("found here")
-            .help(help)
+        Self::at(source, "scene::version", Some("version".into()), span, message).label("here")
     }
 
     pub(super) fn value(source: &Source, key: &str, span: Range<usize>, found: &str, allowed: &str) -> Self {
         let message = format!("`{key}`: found {found}; allowed: {allowed}");
-        let help = Some(format!("allowed: {allowed}"));
-        Self::at(source, "scene::value", Some(key.into()), span, message).label(found).help(help)
+        Self::at(source, "scene::value", Some(key.into()), span, message).label("here")
     }
 
     pub(super) fn refused(source: &Source, key: String, span: Range<usize>, what: &str) -> Self {

@@ -26,6 +26,8 @@ pub struct Step<'a> {
     pub points: Option<&'a [f64]>,
     pub arrays: Vec<&'a [f64]>,
     pub cell_arrays: Vec<&'a [f64]>,
+    /// In the order of the layout.
+    pub moments: Vec<f64>,
 }
 
 impl Frames {
@@ -183,5 +185,6 @@ fn append(writer: &mut Writer, from: &Series, step: usize) -> Result<(), Error> 
         points: points.as_ref().map(|points| points.as_flattened()),
         arrays: arrays.iter().map(Vec::as_slice).collect(),
         cell_arrays: cells.iter().map(Vec::as_slice).collect(),
+        moments: layout.moments.iter().map(|name| from.moment(step, name).unwrap_or(f64::NAN)).collect(),
     })
 }

@@ -96,7 +96,7 @@ impl MeshSeries {
         let layout = Layout::of(self.counts, point_data, cell_data)?;
         let [arrays, cell_arrays] =
             [point_data, cell_data].map(|data| data.iter().map(|(_, _, values)| *values).collect());
-        self.frames.step(&layout, &Step { time, points: None, arrays, cell_arrays })
+        self.frames.step(&layout, &Step { time, points: None, arrays, cell_arrays, moments: Vec::new() })
     }
 
     /// Merges all steps into the one transient file and removes the frames; returns its path.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::frames::{Frames, Step};
-use super::{Data, Layout, check_points};
+use super::{Data, Layout, Moment, check_points};
 use crate::Error;
 
 /// Writes the steps of a moving cloud of particles.
@@ -40,11 +40,27 @@ impl ParticleSeries {
     /// # Errors
     /// [`Error::Data`] if the arrays do not fit together, [`Error::Io`] or [`Error::Format`] if writing fails.
     pub fn step(&mut self, time: f64, points: &[[f64; 3]], point_data: &[Data<'_>]) -> Result<(), Error> {
+        self.moment(time, points, point_data, &[])
+    }
+
+    /// The same with numbers of the step as a whole, which become datasets `Steps/NAME`.
+    ///
+    /// # Errors
+    /// As [`ParticleSeries::step`].
+    pub fn moment(
+        &mut self,
+        time: f64,
+        points: &[[f64; 3]],
+        point_data: &[Data<'_>],
+        moments: &[Moment<'_>],
+    ) -> Result<(), Error> {
         check_points(points)?;
-        let layout = Layout::of([points.len(), 0], point_data, &[])?;
+        let layout = Layout::of([points.len(), 0], point_data, &[])?.and(moments)?;
+        let of = |name: &String| moments.iter().find(|m| m.0 == name).map_or(f64::NAN, |m| m.1);
+        let moments = layout.moments.iter().map(of).collect();
         let arrays = point_data.iter().map(|(_, _, values)| *values).collect();
         let points = Some(points.as_flattened());
-        self.frames.step(&layout, &Step { time, points, arrays, cell_arrays: Vec::new() })
+        self.frames.step(&layout, &Step { time, points, arrays, cell_arrays: Vec::new(), moments })
     }
 
     /// Merges all steps into the one transient file and removes the frames; returns its path.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rust_hdf5::{H5Dataset, H5File};
 
-use super::{Layout, format_error};
+use super::{Layout, OF_THE_FORMAT, format_error};
 use crate::Error;
 use crate::output::hdf5::dataset as checked;
 
@@ -16,6 +16,8 @@ pub struct Series {
     /// Where the points of each step begin.
     offsets: Vec<usize>,
     moves: bool,
+    /// Numbers of the steps as a whole.
+    moments: Vec<(String, Vec<f64>)>,
     layout: Layout,
 }
 
@@ -75,8 +77,20 @@ pub fn read(path: impl AsRef<Path>) -> Result<Series, Error> {
     };
     let arrays = arrays_of("PointData", points)?;
     let cell_arrays = if moves { Vec::new() } else { arrays_of("CellData", cells)? };
-    let layout = Layout { points, arrays, cells, cell_arrays };
-    Ok(Series { path: path.to_path_buf(), file, times, offsets, moves, layout })
+    let mut moments = Vec::new();
+    for name in group.group("Steps").and_then(|group| group.dataset_names()).map_err(hdf5)? {
+        if !OF_THE_FORMAT.contains(&name.as_str()) {
+            let values = dataset(&format!("Steps/{name}"))?.read_raw::<f64>().map_err(hdf5)?;
+            if values.len() != times.len() {
+                return Err(fail(&format!("`Steps/{name}` does not fit its {} steps", times.len())));
+            }
+            moments.push((name, values));
+        }
+    }
+    moments.sort_by(|a, b| a.0.cmp(&b.0));
+    let names = moments.iter().map(|(name, _)| name.clone()).collect();
+    let layout = Layout { points, arrays, cells, cell_arrays, moments: names };
+    Ok(Series { path: path.to_path_buf(), file, times, offsets, moves, moments, layout })
 }
 
 impl Series {
@@ -89,6 +103,11 @@ impl Series {
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.times.len()
+    }
+
+    /// A number of a step as a whole.
+    pub fn moment(&self, step: usize, name: &str) -> Option<f64> {
+        self.moments.iter().find(|(other, _)| other == name)?.1.get(step).copied()
     }
 
     /// Particles in every step.

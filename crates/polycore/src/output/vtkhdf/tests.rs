@@ -238,3 +238,29 @@ fn meshes_that_do_not_fit_are_refused() {
     let error = series.step(1.0, &[("temperature", 1, &[0.0; 12])], &[("exists", 1, &[0.0; 3])]);
     assert!(error.unwrap_err().to_string().contains("3 values for 2 cells of 1 components"));
 }
+
+/// Numbers of the steps survive the merging, and a run that goes on; NaN stands for none.
+#[test]
+fn numbers_of_steps() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("a.vtkhdf");
+    let (points, values) = ([[0.0; 3], [1.0, 2.0, 3.0]], [4.0, 5.0]);
+    let write = |series: &mut ParticleSeries, step: usize| {
+        let moments =
+            [("load", 10.0 * step as f64), ("displacement", if step == 1 { f64::NAN } else { 0.5 })];
+        series.moment(step as f64, &points, &[("damage", 1, &values)], &moments).unwrap();
+    };
+    let mut series = ParticleSeries::create(&path).unwrap();
+    (0..2).for_each(|step| write(&mut series, step));
+    drop(series);
+    let mut series = ParticleSeries::resume(&path, 2).unwrap();
+    write(&mut series, 2);
+    series.finish().unwrap();
+    let read = read(&path).unwrap();
+    assert_eq!([0, 1, 2].map(|step| read.moment(step, "load")), [Some(0.0), Some(10.0), Some(20.0)]);
+    assert_eq!(read.moment(2, "displacement"), Some(0.5));
+    assert!(read.moment(1, "displacement").unwrap().is_nan());
+    assert_eq!((read.moment(0, "Values"), read.moment(3, "load")), (None, None));
+    let mut series = ParticleSeries::create(&path).unwrap();
+    assert!(series.moment(0.0, &points, &[], &[("Values", 1.0)]).is_err());
+}

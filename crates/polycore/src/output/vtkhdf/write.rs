@@ -25,6 +25,8 @@ pub struct Writer {
     arrays: Vec<H5Dataset>,
     cell_arrays: Vec<H5Dataset>,
     times: Vec<f64>,
+    /// Step by step, in the order of the layout.
+    moments: Vec<Vec<f64>>,
     steps: usize,
 }
 
@@ -66,7 +68,18 @@ impl Writer {
         let cell_arrays =
             if mesh.is_some() { tables("CellData", &layout.cell_arrays, layout.cells)? } else { Vec::new() };
         let (path, layout) = (path.to_path_buf(), layout.clone());
-        Ok(Self { path, file, group, layout, points, arrays, cell_arrays, times: Vec::new(), steps })
+        Ok(Self {
+            path,
+            file,
+            group,
+            layout,
+            points,
+            arrays,
+            cell_arrays,
+            times: Vec::new(),
+            moments: Vec::new(),
+            steps,
+        })
     }
 
     pub fn step(&mut self, step: &Step<'_>) -> Result<(), Error> {
@@ -84,6 +97,7 @@ impl Writer {
         };
         write().map_err(|error| format_error(&self.path, error))?;
         self.times.push(step.time);
+        self.moments.push(step.moments.clone());
         Ok(())
     }
 
@@ -98,6 +112,10 @@ impl Writer {
         let group = self.group.create_group("Steps")?;
         group.set_attr_numeric("NSteps", &(n as i64))?;
         group.new_dataset::<f64>().shape([n]).create("Values")?.write_raw(&self.times)?;
+        for (index, name) in self.layout.moments.iter().enumerate() {
+            let values: Vec<f64> = self.moments.iter().map(|moments| moments[index]).collect();
+            group.new_dataset::<f64>().shape([n]).create(name)?.write_raw(&values)?;
+        }
         let rows = |count: usize| -> Vec<i64> { (0..n).map(|step| (step * count) as i64).collect() };
         let zeros = vec![0; n];
         // all steps share the one part; counting parts up here makes VTK 9.3 fail

@@ -1,0 +1,241 @@
+//! What a scene has looked at in every row of the history: displacements, strains between marks, rotations, crack tips, wave
+//! fronts.
+
+use super::build::{Body, vector};
+use super::loads::region;
+use super::{Axis, Boundary, Method, Scene, Side};
+use crate::calibrate::Space;
+use polycore::scene::{SceneError, Source};
+use polycore::units::Length;
+use serde::{Deserialize, Serialize};
+
+/// A look at a part of the body.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    /// Its column in the history, and the beginning of its values' names.
+    pub name: String,
+    /// At what.
+    pub look: Look,
+    /// Along which axis; about which, of a rotation.
+    pub axis: Option<Axis>,
+    /// A side of the bounding box; default: the whole body.
+    pub side: Option<Side>,
+    /// Its depth in particles.
+    pub layers: Option<usize>,
+    /// Or a box: lower corner …
+    pub min: Option<Vec<Length>>,
+    /// … and upper corner.
+    pub max: Option<Vec<Length>>,
+    /// Marks of a strain.
+    pub from: Option<Vec<Length>>,
+    /// The other mark.
+    pub to: Option<Vec<Length>>,
+    /// Damage, from and to, of the particles at a crack's tip.
+    pub damage: Option<[f64; 2]>,
+    /// How far from 0 along this axis a crack's tip is found.
+    pub across: Option<Axis>,
+    /// Two places between which a crack's or a front's speed is measured.
+    pub gauges: Option<[Length; 2]>,
+    /// Part of the largest velocity that a front has.
+    pub threshold: Option<f64>,
+}
+
+/// At what a probe looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Look {
+    /// Mean displacement of the region along the axis, m.
+    Displacement,
+    /// Distance of two marks over that at rest, less 1.
+    Strain,
+    /// Rotation of the region about the axis through the origin, rad.
+    Rotation,
+    /// Farthest place along the axis with damage in a range, m.
+    Crack,
+    /// Farthest place along the axis at which the velocity along it is a part of the largest, m.
+    Front,
+}
+
+impl Look {
+    /// Unit of its column.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Displacement | Self::Crack | Self::Front => "m",
+            Self::Rotation => "rad",
+            Self::Strain => "",
+        }
+    }
+}
+
+impl Axis {
+    /// 0, 1 or 2.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+impl Probe {
+    /// Names of its values.
+    pub fn values(&self) -> Vec<String> {
+        let named = |ends: &[&str]| ends.iter().map(|end| format!("{}{end}", self.name)).collect();
+        match self.look {
+            Look::Displacement | Look::Strain => named(&["", "_peak"]),
+            Look::Rotation => named(&["", "_peak", "_frequency", "_rate"]),
+            Look::Crack => named(&["", "_peak", "_speed", "_between_gauges", "_backstep", "_across"]),
+            Look::Front => named(&["", "_peak", "_speed", "_between_gauges", "_backstep"]),
+        }
+    }
+
+    /// Slots of its region, of the whole body where it names none.
+    ///
+    /// # Errors
+    /// As [`super::body_of`].
+    pub fn members<const D: usize>(
+        &self,
+        source: &Source,
+        key: &str,
+        body: &Body<D>,
+    ) -> Result<Vec<u32>, SceneError> {
+        if self.side.is_none() && self.min.is_none() && self.max.is_none() {
+            return Ok(body.bonds.particles().to_vec());
+        }
+        let place = Boundary {
+            side: self.side,
+            layers: self.layers,
+            min: self.min.clone(),
+            max: self.max.clone(),
+            ..Boundary::default()
+        };
+        let (members, _) = region(source, key, &place, body)?;
+        if members.is_empty() {
+            return Err(source.error(key, "a region without particles", "a region that holds at least one"));
+        }
+        Ok(members)
+    }
+
+    /// The particles at the two marks of a strain: the nearest, and all that are as near.
+    ///
+    /// # Errors
+    /// Marks that are one.
+    pub fn marks<const D: usize>(
+        &self,
+        source: &Source,
+        key: &str,
+        body: &Body<D>,
+    ) -> Result<[Vec<u32>; 2], SceneError> {
+        let near = |name: &str, mark: &Option<Vec<Length>>| {
+            let mark = vector::<D>(source, &format!("{key}.{name}"), mark.as_deref().unwrap_or_default())?;
+            let distance = |slot: u32| {
+                let place = body.bonds.position(slot as usize);
+                (0..D).map(|d| (place[d] - mark[d]).powi(2)).sum::<f64>().sqrt()
+            };
+            let particles = body.bonds.particles();
+            let least = particles.iter().map(|&slot| distance(slot)).fold(f64::INFINITY, f64::min);
+            if least > 1.5 * body.bonds.spacing() {
+                let found = format!("{mark:?} m, {least:.3e} m from the nearest particle");
+                return Err(source.error(&format!("{key}.{name}"), found, "a place in the body"));
+            }
+            let most = least + 1e-6 * body.bonds.spacing();
+            Ok(particles.iter().copied().filter(|&slot| distance(slot) <= most).collect::<Vec<u32>>())
+        };
+        let marks = [near("from", &self.from)?, near("to", &self.to)?];
+        if marks[0] == marks[1] {
+            let found = "the same particles as `from`";
+            return Err(source.error(&format!("{key}.to"), found, "marks at least one spacing apart"));
+        }
+        Ok(marks)
+    }
+}
+
+/// Checks what can be judged without a body.
+///
+/// # Errors
+/// The key, what was found and what is allowed.
+pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let dimension = if scene.body.space == Space::Solid { 3 } else { 2 };
+    let mut names: Vec<String> = super::quantities(&Scene { probe: Vec::new(), ..scene.clone() });
+    for (index, probe) in scene.probe.iter().enumerate() {
+        let key = |name: &str| format!("probe[{index}].{name}");
+        let letters = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
+        if probe.name.is_empty() || !probe.name.chars().all(letters) {
+            let found = format!("`{}`", probe.name);
+            return Err(source.error(&key("name"), found, "letters, digits, `_` and `-`"));
+        }
+        for value in probe.values() {
+            if names.contains(&value) {
+                let found = format!("`{}`, of which `{value}` is taken", probe.name);
+                return Err(source.error(&key("name"), found, "a name of its own"));
+            }
+            names.push(value);
+        }
+        let look = probe.look;
+        // name, given, belongs, needed
+        let of_crack = look == Look::Crack;
+        let moving = of_crack || look == Look::Front;
+        for (name, given, belongs, needed) in [
+            ("axis", probe.axis.is_some(), look != Look::Strain, look != Look::Strain),
+            ("from", probe.from.is_some(), look == Look::Strain, look == Look::Strain),
+            ("to", probe.to.is_some(), look == Look::Strain, look == Look::Strain),
+            ("side", probe.side.is_some(), look != Look::Strain, false),
+            ("min", probe.min.is_some(), look != Look::Strain, false),
+            ("max", probe.max.is_some(), look != Look::Strain, false),
+            ("damage", probe.damage.is_some(), of_crack, false),
+            ("across", probe.across.is_some(), of_crack, false),
+            ("gauges", probe.gauges.is_some(), moving, false),
+            ("threshold", probe.threshold.is_some(), look == Look::Front, false),
+        ] {
+            if given && !belongs {
+                let found = format!("`{name}` of a look at `{}`", name_of(look));
+                return Err(source.error(&key(name), found, "nothing"));
+            }
+            if needed && !given {
+                let allowed = format!("a look at `{}` needs its `{name}`", name_of(look));
+                return Err(source.error(&key(name), "nothing", allowed));
+            }
+        }
+        for (name, axis) in [("axis", probe.axis), ("across", probe.across)] {
+            let plane_rotation = look == Look::Rotation && axis == Some(Axis::Z);
+            if axis.is_some_and(|axis| axis.index() >= dimension) && !plane_rotation {
+                return Err(source.error(&key(name), "`z` in a plane body", "`x` or `y`"));
+            }
+        }
+        if look == Look::Rotation && dimension == 2 && probe.axis != Some(Axis::Z) {
+            return Err(source.error(&key("axis"), "an axis in the plane", "`z` in a plane body"));
+        }
+        if of_crack && scene.material.critical.is_none() {
+            let allowed = "nothing, or `material.critical`: without it nothing breaks";
+            return Err(source.error(&key("look"), "`crack`", allowed));
+        }
+        if look == Look::Front && scene.method() != Method::Verlet {
+            return Err(source.error(&key("look"), "`front` without motion", "`solver.method = \"verlet\"`"));
+        }
+        if let Some([low, high]) = probe.damage
+            && !(low > 0.0 && low <= high && high <= 1.0)
+        {
+            return Err(source.error(&key("damage"), format!("{low} to {high}"), "0 < from ≤ to ≤ 1"));
+        }
+        if let Some(threshold) = probe.threshold
+            && !(threshold > 0.0 && threshold < 1.0)
+        {
+            return Err(source.error(&key("threshold"), threshold, "between 0 and 1"));
+        }
+        if let Some([from, to]) = probe.gauges
+            && from.si() >= to.si()
+        {
+            let found = format!("{} m to {} m", from.si(), to.si());
+            return Err(source.error(&key("gauges"), found, "the nearer one first"));
+        }
+    }
+    Ok(())
+}
+
+fn name_of(look: Look) -> &'static str {
+    match look {
+        Look::Displacement => "displacement",
+        Look::Strain => "strain",
+        Look::Rotation => "rotation",
+        Look::Crack => "crack",
+        Look::Front => "front",
+    }
+}

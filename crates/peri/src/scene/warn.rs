@@ -1,0 +1,96 @@
+//! What is allowed and yet most likely not meant.
+
+use super::{Body, Scene};
+use crate::bonds::{Bonds, CellGrid};
+
+/// Grips that move so many horizons in one step jump over what breaks on the way.
+const LONGEST_STEP: f64 = 3.0;
+/// A point's volume as a cube or square, over the distance of its neighbour: between 1/4 and 4 in any even cloud.
+const UNEVEN: f64 = 4.0;
+
+/// One sentence for each.
+pub fn warnings<const D: usize>(scene: &Scene, body: &Body<D>) -> Vec<String> {
+    let bonds = &*body.bonds;
+    [volumes(scene, bonds, body.thickness), thin(bonds), long_steps(scene, bonds)]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// Volumes of a plane cloud that lack the thickness.
+fn volumes<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>, thickness: f64) -> Option<String> {
+    if D == 3 || !scene.body.has_points() {
+        return None;
+    }
+    let slots: Vec<usize> = bonds.particles().iter().map(|&slot| slot as usize).collect();
+    let places: Vec<[f64; D]> = slots.iter().map(|&slot| bonds.position(slot)).collect();
+    let middle = |mut values: Vec<f64>| {
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    };
+    let volume = middle(slots.iter().map(|&slot| bonds.volume(slot)).collect())?;
+    let grid = CellGrid::new(&places, bonds.horizon());
+    let nearest = |own: usize| {
+        let mut least = f64::INFINITY;
+        grid.near(places[own], bonds.horizon(), |other| {
+            if other != own {
+                least = least.min((0..D).map(|d| (places[other][d] - places[own][d]).powi(2)).sum());
+            }
+        });
+        least.sqrt()
+    };
+    // every tenth will do
+    let distance = middle((0..places.len()).step_by(10).map(nearest).collect())?;
+    let side = (volume / thickness).sqrt();
+    (!(1.0 / UNEVEN..=UNEVEN).contains(&(side / distance))).then(|| {
+        format!(
+            "a volume of {volume:.3e} m³ and a thickness of {thickness:.3e} m belong to points {side:.3e} m apart, but they are \
+             {distance:.3e} m apart: do the volumes (in m³) include the thickness?"
+        )
+    })
+}
+
+/// Parts that are one particle wide: there the lattice, not the shape, decides how wide they are.
+fn thin<const D: usize>(bonds: &dyn Bonds<D>) -> Option<String> {
+    let lattice = bonds.as_lattice()?;
+    let spacing = lattice.spacing();
+    let lonely = |&&slot: &&u32| {
+        let mut beside = [false; D];
+        lattice.neighbours(slot as usize, &mut |bond| {
+            for d in 0..D {
+                let along = (bond.bond[d].abs() / spacing - 1.0).abs() < 0.01;
+                beside[d] |= along && bond.length < 1.01 * spacing;
+            }
+        });
+        beside.contains(&false)
+    };
+    let count = bonds.particles().iter().filter(lonely).count();
+    // a body that is one particle thick all over is meant
+    (count > 0 && 2 * count < bonds.particles().len()).then(|| {
+        format!(
+            "{count} particles have no neighbour one spacing ({spacing:.3e} m) away along some axis: a part of the body is one \
+             particle wide, whatever width its shape has"
+        )
+    })
+}
+
+fn long_steps<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<String> {
+    if scene.material.critical.is_none() || scene.dynamics.is_some() {
+        return None;
+    }
+    let prescribed = scene.boundary.iter().flat_map(|boundary| boundary.displacement.iter().flatten());
+    let largest = prescribed.fold(0.0_f64, |most, held| match held {
+        super::Held::At(value) => most.max(value.abs()),
+        super::Held::Free => most,
+    });
+    let step = largest / scene.solver.steps as f64;
+    let horizons = step / bonds.horizon();
+    (horizons > LONGEST_STEP).then(|| {
+        format!(
+            "a step moves a grip by {:.3} mm, {horizons:.0} horizons: what breaks on the way is not seen; `solver.steps` = {:.0} moves it \
+             by one spacing",
+            step * 1e3,
+            largest / bonds.spacing()
+        )
+    })
+}
