@@ -244,7 +244,7 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                     return Err(source.error(
                         key,
                         "a lattice's key",
-                        "nothing: points bring their own spacing; set `horizon`",
+                        "nothing: `points` bring their own spacing; set `horizon`",
                     ));
                 }
             }

@@ -196,14 +196,19 @@ pub(super) fn explain<const D: usize>(
         {
             let free = body.bounds.1[axis] - body.bounds.0[axis] - low - high;
             lines.push(format!(
-                "  boundary   {:.4} mm free between {}- and {}+",
-                free * 1e3,
+                "  boundary   {} mm free between {}- and {}+",
+                mm(free),
                 AXES[axis],
                 AXES[axis]
             ));
         }
     }
     Ok(lines)
+}
+
+/// In mm, without the digits that a change of units leaves behind.
+fn mm(length: f64) -> f64 {
+    (length * 1e9).round() / 1e6
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
