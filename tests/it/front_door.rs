@@ -296,7 +296,7 @@ fn tool_paths() {
     let rows: String = (0..40).map(|k| format!("{k},{},{},{},{}\n", k % 7, k % 5, k / 8, k % 2)).collect();
     let table = write("a.csv", &format!("time [s],x [mm],y [mm],z [mm],print\n{rows}"));
     attack_files("table of moves", &[table], "path.csv", |path| {
-        crystfem::mesh::path::read_csv(path, 1e-3).map(|_| ()).map_err(|error| error.to_string())
+        crystfem::mesh::path::read_csv(path).map(|_| ()).map_err(|error| error.to_string())
     });
 }
 

@@ -1,6 +1,7 @@
 //! States of materials as fields over nodes.
 
 use crate::element::{self, Geometry, MOST};
+use crate::error::Error;
 use crate::simulation::Simulation;
 use crate::system::Points;
 
@@ -18,9 +19,9 @@ impl Simulation {
         names
     }
 
-    /// A quantity of the materials at all nodes of the mesh: the mean of the points there, weighted by mass; NaN where no
+    /// A quantity of the materials at all nodes of the mesh: the mean of the points there, weighted by mass; `None` where no
     /// material has it or nothing exists.
-    pub fn field(&self, name: &str) -> Vec<f64> {
+    pub fn field(&self, name: &str) -> Vec<Option<f64>> {
         let (problem, system) = (&self.problem, &self.system);
         let nodes = problem.mesh.points.len();
         let (mut sum, mut mass) = (vec![0.0; nodes], vec![0.0; nodes]);
@@ -66,7 +67,45 @@ impl Simulation {
                 }
             }
         }
-        sum.iter().zip(&mass).map(|(sum, mass)| if *mass > 0.0 { sum / mass } else { f64::NAN }).collect()
+        sum.iter().zip(&mass).map(|(sum, mass)| (*mass > 0.0).then(|| sum / mass)).collect()
+    }
+
+    /// The first temperature, energy or state variable that is not finite, with its node and the time.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`].
+    pub fn finite(&self) -> Result<(), Error> {
+        let (problem, system, state) = (&self.problem, &self.system, &self.state);
+        let fail = |quantity: &'static str, node: u32| {
+            let [x, y, z] = problem.mesh.points[node as usize].map(|x| (1e9 * x).round() / 1e6);
+            let place = format!("node {node}, ({x}, {y}, {z}) mm");
+            Err(Error::NotFinite { quantity, place, time: state.time })
+        };
+        if let Some(wrong) = state.temperature.iter().position(|t| !t.is_finite()) {
+            return fail("temperature", system.nodes[wrong]);
+        }
+        let wrong = |points: &Points, stride: usize| -> Option<(usize, Option<usize>)> {
+            let in_state = points.state.iter().position(|x| !x.is_finite());
+            let in_energy = || points.energy.iter().position(|x| !x.is_finite()).map(|point| (point, None));
+            in_state.map(|at| (at / stride, Some(at % stride))).or_else(in_energy)
+        };
+        let named = |material: usize, variable: Option<usize>| {
+            let names = problem.materials[material].state_names();
+            variable.and_then(|variable| names.get(variable)).copied().unwrap_or("energy")
+        };
+        let (nodal, general) = (&state.memory.nodal, &state.memory.general);
+        if let Some((point, variable)) = wrong(nodal, system.nodal.stride) {
+            let equation = system.nodal.starts.partition_point(|&first| first as usize <= point) - 1;
+            let material = usize::from(system.nodal.material[point]);
+            return fail(named(material, variable), system.nodes[equation]);
+        }
+        if let Some((point, variable)) = wrong(general, system.general.stride) {
+            let index = system.general.starts.partition_point(|&first| first as usize <= point) - 1;
+            let number = system.general.elements[index];
+            let node = problem.mesh.nodes(number)[point - system.general.starts[index] as usize];
+            return fail(named(usize::from(problem.material_of[number as usize]), variable), node);
+        }
+        Ok(())
     }
 
     /// Volume that each node has of the elements named that exist, m³: the weights of means over them.

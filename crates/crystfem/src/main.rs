@@ -8,7 +8,6 @@ use crystfem::run::{Failure, Options, Progress, SweepOptions, Vary};
 use crystfem::scene::Kind;
 use polycore::command::{Progress as Bar, Threads, default_output, exit, interrupted, is_finished, seconds};
 use polycore::scene::Source;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -175,8 +174,7 @@ fn sweep(scene: &Path, vary: &[Vary], output: &Path, every: f64) -> Result<bool,
 }
 
 fn tell(text: &str, output: &Path) {
-    // a closed pipe is no reason to fail a run
-    let _ = std::io::stdout().write_all(format!("{text}results in {}\n", output.display()).as_bytes());
+    polycore::command::print(format_args!("{text}results in {}\n", output.display()));
 }
 
 fn resume(output: &Path, every: f64) -> Result<bool, Failure> {

@@ -26,7 +26,7 @@ pub enum Capacity {
 pub struct Birth {
     /// Time, s.
     pub time: f64,
-    /// Elements; an element in no birth exists from the start.
+    /// Elements; one in no birth exists from the start, unless it is absent.
     pub elements: Vec<u32>,
     /// Their temperature when they appear, K.
     pub temperature: f64,
@@ -49,6 +49,8 @@ pub struct Problem {
     pub sources: Vec<Source>,
     /// Elements that appear later, in the order of time.
     pub births: Vec<Birth>,
+    /// Elements that never appear.
+    pub absent: Vec<u32>,
     /// Lumped or consistent.
     pub capacity: Capacity,
 }
@@ -65,6 +67,7 @@ impl Problem {
             conditions: Vec::new(),
             sources: Vec::new(),
             births: Vec::new(),
+            absent: Vec::new(),
             capacity: Capacity::Lumped,
         }
     }
@@ -186,6 +189,14 @@ impl Problem {
             });
         }
         let mut born = vec![false; count];
+        for &element in &self.absent {
+            match born.get_mut(element as usize) {
+                Some(born) => *born = true,
+                None => {
+                    return Err(Error::Mesh(format!("absent element {element}; allowed: below {count}")));
+                }
+            }
+        }
         let mut last = 0.0;
         for birth in &self.births {
             if !(birth.time >= last && birth.time.is_finite()) {
@@ -208,7 +219,7 @@ impl Problem {
                     Some(born) if !*born => *born = true,
                     Some(_) => {
                         return Err(Error::Mesh(format!(
-                            "birth at {} s: element {element} is born twice; allowed: once",
+                            "birth at {} s: element {element} is born twice, or absent; allowed: once",
                             birth.time
                         )));
                     }

@@ -119,10 +119,9 @@ impl Simulation {
     pub fn new(problem: Problem, settings: Settings) -> Result<Self, Error> {
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
         let mut state = State { born: vec![0; problem.material_of.len()], jump: true, ..State::default() };
-        for birth in &problem.births {
-            for &element in &birth.elements {
-                state.born[element as usize] = NONE;
-            }
+        let later = problem.births.iter().flat_map(|birth| &birth.elements);
+        for &element in later.chain(&problem.absent) {
+            state.born[element as usize] = NONE;
         }
         if let Steps::Adaptive { first, .. } = settings.steps {
             state.next_dt = first;

@@ -10,6 +10,7 @@ pub struct Column {
     name: &'static str,
     read: fn(&str) -> Result<f64, String>,
     example: &'static str,
+    unit: &'static str,
     least: f64,
     most: f64,
 }
@@ -19,7 +20,13 @@ impl Column {
     pub fn of<D: Dimension>(name: &'static str) -> Self {
         let read =
             |text: &str| text.parse::<Quantity<D>>().map(Quantity::si).map_err(|error| error.to_string());
-        Self { name, read, example: D::EXAMPLE, least: f64::NEG_INFINITY, most: f64::INFINITY }
+        Self { name, read, example: D::EXAMPLE, unit: "", least: f64::NEG_INFINITY, most: f64::INFINITY }
+    }
+
+    /// Takes a heading without a unit in this one.
+    pub fn or_unit(mut self, unit: &'static str) -> Self {
+        self.unit = unit;
+        self
     }
 
     /// Refuses numbers, in SI, outside a range.
@@ -71,7 +78,9 @@ pub fn read_with_lines<const N: usize>(
             .enumerate()
             .filter_map(|(index, heading)| {
                 let (name, unit) = heading.split_once('[').unwrap_or((heading, ""));
-                (name.trim() == column.name).then(|| (index, unit.trim_end_matches(']').trim().to_owned()))
+                let unit = unit.trim_end_matches(']').trim();
+                let unit = if unit.is_empty() { column.unit } else { unit };
+                (name.trim() == column.name).then(|| (index, unit.to_owned()))
             })
             .collect();
         let allowed = format!("one column `{} [unit]`, with numbers like {}", column.name, column.example);

@@ -6,6 +6,14 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// A result is not finite.
+    #[error("{quantity} is not finite at {place}")]
+    NotFinite {
+        /// What.
+        quantity: &'static str,
+        /// The row, or where else.
+        place: String,
+    },
     /// One cell of a table.
     #[error("{}:{line}: column `{column}`: found {found}; allowed: {allowed}", path.display())]
     Cell {
@@ -113,7 +121,7 @@ impl Error {
     /// Exit code of the command line: 2 for bad input, 1 for a failed run.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Diverged { .. } => 1,
+            Self::Diverged { .. } | Self::NotFinite { .. } => 1,
             Self::Interrupted(_) => 130,
             Self::Shared(error) => error.exit_code(),
             _ => polycore::scene::EXIT_BAD_INPUT,

@@ -45,6 +45,14 @@ impl Predict {
             }
             other => other,
         })?;
+        let finite = |answer: &Answer<f64>| {
+            let tangent = answer.tangent.is_none_or(|tangent| tangent.iter().all(|x| x.is_finite()));
+            answer.stress.iter().all(|x| x.is_finite()) && answer.energy.is_none_or(f64::is_finite) && tangent
+        };
+        if let Some(row) = answers.iter().position(|answer| !finite(answer)) {
+            let place = format!("row {} of {}", row + 1, self.table.display());
+            return Err(Error::NotFinite { quantity: "the answer", place });
+        }
         write(&self.output, &points, &answers)?;
         let doubtful = answers.iter().filter(|answer| answer.flags.any()).count();
         polycore::say!(

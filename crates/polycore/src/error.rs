@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum Error {
     /// The operating system refused an operation on a file.
-    #[error("cannot {operation} {}: {source}", path.display())]
+    #[error("cannot {operation} {}: {}{source}", path.display(), plainly(source))]
     Io {
         /// A verb: `create`, `rename`, …
         operation: &'static str,
@@ -79,6 +79,21 @@ pub enum Error {
     Hyperelastic(#[from] crate::hyperelastic::Error),
 }
 
+/// What a user can do something about, before the system's own words.
+fn plainly(error: &io::Error) -> &'static str {
+    match error.kind() {
+        io::ErrorKind::StorageFull => "the disk is full: ",
+        io::ErrorKind::QuotaExceeded => "the quota of the disk is used up: ",
+        io::ErrorKind::FileTooLarge => "the file would be larger than is allowed: ",
+        _ => "",
+    }
+}
+
+/// Whether a file could not be written because there is no more room for it, which is no fault of the input.
+pub(crate) fn no_room(error: &io::Error) -> bool {
+    !plainly(error).is_empty()
+}
+
 impl Error {
     /// For `map_err`: `fs::rename(a, b).map_err(Error::io("rename", b))`.
     pub fn io(operation: &'static str, path: impl AsRef<Path>) -> impl FnOnce(io::Error) -> Self {
@@ -98,5 +113,18 @@ impl Error {
             }
             _ => 1,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_disk_in_plain_words() {
+        let full = Error::io("write", "a.csv")(io::ErrorKind::StorageFull.into());
+        assert!(full.to_string().starts_with("cannot write a.csv: the disk is full: "), "{full}");
+        assert_eq!(full.exit_code(), 1);
+        assert_eq!(Error::io("read", "a.csv")(io::ErrorKind::NotFound.into()).exit_code(), 2);
     }
 }

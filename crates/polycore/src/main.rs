@@ -78,7 +78,7 @@ fn main() -> ExitCode {
 fn run(path: &Path, output: Option<PathBuf>, quick: bool) -> Result<bool, Failure<Error>> {
     let case = Case::read(path)?;
     let directory = output.unwrap_or_else(|| polycore::command::default_output(path));
-    polycore::output::prepare_directory(&directory)?;
+    let _lock = polycore::output::prepare_run(&directory)?;
     let report = fits::run(&case, &directory, quick)?;
     polycore::say!("{}", directory.join(polycore::report::FILE_NAME).display());
     Ok(report.passed())

@@ -44,7 +44,7 @@ pub fn atomic_write(
 /// Makes sure, before any computation, that results can be written into `directory`; creates it if needed.
 ///
 /// # Errors
-/// [`Error::OutputDirectory`] (exit code 2) if it cannot be created or written to.
+/// [`Error::OutputDirectory`] (exit code 2) if it cannot be created or written to; [`Error::Io`] (1) if the disk is full.
 pub fn prepare_directory(directory: impl AsRef<Path>) -> Result<(), Error> {
     let directory = directory.as_ref();
     let fail = |reason: String| Error::OutputDirectory { path: directory.to_path_buf(), reason };
@@ -57,26 +57,42 @@ pub fn prepare_directory(directory: impl AsRef<Path>) -> Result<(), Error> {
         Err(_) => fs::create_dir_all(directory).map_err(|error| fail(error.to_string()))?,
     }
     // permissions do not tell everything (read-only mounts, quotas): try
-    let mut probe = tempfile::tempfile_in(directory).map_err(|error| fail(error.to_string()))?;
-    probe.write_all(b"probe").map_err(|error| fail(error.to_string()))
+    let probe = tempfile::tempfile_in(directory).and_then(|mut probe| probe.write_all(b"probe"));
+    probe.map_err(|error| match crate::error::no_room(&error) {
+        true => Error::io("write into", directory)(error),
+        false => fail(error.to_string()),
+    })
 }
 
-/// The directory of a new run: as [`prepare_directory`], without what an earlier run left, which must not pass for this one's.
+/// The directory of a new run: as [`prepare_directory`], without what an earlier run left, which must not pass for this
+/// one's, and held against a second run.
 ///
 /// # Errors
-/// As [`prepare_directory`].
-pub fn prepare_run(directory: impl AsRef<Path>) -> Result<(), Error> {
+/// As [`prepare_directory`] and [`lock_run`].
+pub fn prepare_run(directory: impl AsRef<Path>) -> Result<RunLock, Error> {
     let directory = directory.as_ref();
     prepare_directory(directory)?;
+    let lock = lock_run(directory)?;
     for old in [crate::checkpoint::FILE_NAME, crate::report::FILE_NAME] {
         let _ = fs::remove_file(directory.join(old));
     }
     remove_unfinished(directory);
-    Ok(())
+    Ok(lock)
+}
+
+/// The directory of a run that goes on: without half-written files, and held against a second run.
+///
+/// # Errors
+/// As [`lock_run`].
+pub fn resume_run(directory: impl AsRef<Path>) -> Result<RunLock, Error> {
+    let lock = lock_run(directory.as_ref())?;
+    remove_unfinished(directory.as_ref());
+    Ok(lock)
 }
 
 /// Held by the run that writes into a directory, until it is dropped or its process ends in any way.
 #[derive(Debug)]
+#[must_use = "the directory is free again where this is dropped"]
 pub struct RunLock {
     _handle: Option<File>,
 }
@@ -209,9 +225,15 @@ mod tests {
         let first = lock_run(directory.path()).unwrap();
         let second = lock_run(directory.path()).unwrap_err();
         assert!(second.to_string().contains("another run is writing into it") && second.exit_code() == 2);
+        assert!(prepare_run(directory.path()).is_err() && resume_run(directory.path()).is_err());
         drop(first);
-        lock_run(directory.path()).unwrap();
+        drop(lock_run(directory.path()).unwrap());
         assert!(names(directory.path()).is_empty(), "a lock leaves nothing behind");
+        fs::write(directory.path().join(".a.part"), "").unwrap();
+        let again = resume_run(directory.path()).unwrap();
+        assert!(names(directory.path()).is_empty() && prepare_run(directory.path()).is_err());
+        drop(again);
+        drop(prepare_run(directory.path()).unwrap());
     }
 
     #[cfg(unix)]

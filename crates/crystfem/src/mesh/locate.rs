@@ -40,6 +40,18 @@ impl Place {
 }
 
 impl Mesh {
+    /// Whether a place, m, lies in an element or on its faces.
+    pub fn holds(&self, element: u32, at: [f64; 3]) -> bool {
+        self.shapes_at(element, at).is_some()
+    }
+
+    /// Shape functions of an element's nodes at a place, m, in it or on its faces; `None` outside.
+    pub fn shapes_at(&self, element: u32, at: [f64; 3]) -> Option<[f64; MOST]> {
+        let (corners, nodes) = element::corners(self, element);
+        let (weights, distance, rounding) = near(corners.get(..nodes).filter(|list| !list.is_empty())?, at)?;
+        (distance <= rounding).then_some(weights)
+    }
+
     /// The elements around a place, m, and the shape functions there. A place outside, but no further than half an
     /// element's extent along each axis, is moved into the nearest element; `None` beyond.
     pub fn locate(&self, at: [f64; 3]) -> Option<Place> {
@@ -47,22 +59,8 @@ impl Mesh {
         for number in 0..self.element_count() as u32 {
             let (corners, nodes) = element::corners(self, number);
             let corners = &corners[..nodes];
-            let near = (0..3).all(|d| {
-                let ends = corners.iter().map(|corner| corner[d]);
-                let (low, high) = (ends.clone().fold(f64::MAX, f64::min), ends.fold(f64::MIN, f64::max));
-                let around = OUTSIDE * (high - low);
-                (low - around..=high + around).contains(&at[d])
-            });
-            if near {
-                let weights =
-                    if nodes == 8 { in_hexahedron(corners, at) } else { in_tetrahedron(corners, at) };
-                let origin = Vector3::from(corners[0]);
-                let offset = |corner: &[f64; 3]| Vector3::from(*corner) - origin;
-                let reached: Vector3<f64> =
-                    corners.iter().zip(weights).map(|(c, weight)| weight * offset(c)).sum();
-                let diagonal = corners.iter().map(|corner| offset(corner).norm()).fold(0.0, f64::max);
-                let distance = (offset(&at) - reached).norm();
-                found.push((number, weights, distance, NEAR * diagonal));
+            if let Some((weights, distance, rounding)) = near(corners, at) {
+                found.push((number, weights, distance, rounding));
             }
         }
         let &(nearest, weights, distance, rounding) = found.iter().min_by(|a, b| a.2.total_cmp(&b.2))?;
@@ -79,6 +77,26 @@ impl Mesh {
             distance: if distance <= rounding { 0.0 } else { distance },
         })
     }
+}
+
+/// Shape functions at the nearest place in an element, how far that is, and what of it is rounding, m; `None` of a place
+/// further outside than half of its box.
+fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; MOST], f64, f64)> {
+    let near = (0..3).all(|d| {
+        let ends = corners.iter().map(|corner| corner[d]);
+        let (low, high) = (ends.clone().fold(f64::MAX, f64::min), ends.fold(f64::MIN, f64::max));
+        let around = OUTSIDE * (high - low);
+        (low - around..=high + around).contains(&at[d])
+    });
+    if !near {
+        return None;
+    }
+    let weights = if corners.len() == 8 { in_hexahedron(corners, at) } else { in_tetrahedron(corners, at) };
+    let origin = Vector3::from(corners[0]);
+    let offset = |corner: &[f64; 3]| Vector3::from(*corner) - origin;
+    let reached: Vector3<f64> = corners.iter().zip(weights).map(|(c, weight)| weight * offset(c)).sum();
+    let diagonal = corners.iter().map(|corner| offset(corner).norm()).fold(0.0, f64::max);
+    Some((weights, (offset(&at) - reached).norm(), NEAR * diagonal))
 }
 
 /// Shape functions at natural coordinates, which are taken to the nearest in the element.

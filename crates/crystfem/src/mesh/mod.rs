@@ -153,6 +153,18 @@ impl Mesh {
         }))
     }
 
+    /// Lower and upper corner of the box around some elements, m; `None` of none.
+    pub fn bounds_of(&self, elements: &[u32]) -> Option<[[f64; 3]; 2]> {
+        let places =
+            elements.iter().flat_map(|&element| self.nodes(element)).map(|&n| self.points[n as usize]);
+        places.map(|place| [place; 2]).reduce(|[mut lower, mut upper], [place, _]| {
+            for d in 0..3 {
+                (lower[d], upper[d]) = (lower[d].min(place[d]), upper[d].max(place[d]));
+            }
+            [lower, upper]
+        })
+    }
+
     /// Nodes on faces, sorted, each once.
     pub fn nodes_of(&self, faces: &[Face]) -> Vec<u32> {
         let mut nodes: Vec<u32> = faces.iter().flat_map(|face| self.face_nodes(*face).to_vec()).collect();

@@ -4,9 +4,12 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::mesh::Mesh;
+use crate::table::{Column, read_with_lines};
+use polycore::units::dimension::{LengthDimension, RatioDimension, TimeDimension};
 
 mod cover;
 mod gcode;
+mod place;
 
 pub use cover::{Activation, Bead};
 pub use gcode::{parse, read_gcode};
@@ -108,17 +111,6 @@ impl ToolPath {
         Ok(Self { moves, notes: Vec::new() })
     }
 
-    /// The same path elsewhere: printers count from a corner of their bed.
-    pub fn shifted(mut self, by: [f64; 3]) -> Self {
-        for one in &mut self.moves {
-            for d in 0..3 {
-                one.from[d] += by[d];
-                one.to[d] += by[d];
-            }
-        }
-        self
-    }
-
     /// When the last move ends, s; 0 without moves.
     pub fn duration(&self) -> f64 {
         self.moves.last().map_or(0.0, |last| last.end)
@@ -134,37 +126,29 @@ impl ToolPath {
     }
 }
 
-/// Reads a path from a CSV table with columns `time` (s, not descending), `x`, `y`, `z` (multiplied by `scale`), and
-/// `print`: not 0 where the move that ends there lays material down. Units in brackets after a name are passed over.
+/// Reads a path from a CSV table with columns `time [unit]` (not descending), `x [unit]`, `y [unit]`, `z [unit]`, in s and m
+/// where a heading has no unit, and `print`: not 0 where the move that ends there lays material down.
 ///
 /// # Errors
-/// What cannot be read as a table of numbers; a missing column; times that descend; what is not finite. Lines count from
-/// the header.
-pub fn read_csv(path: &Path, scale: f64) -> Result<ToolPath, Error> {
-    let table = polycore::output::csv::read(path)?;
-    let column = |name: &str| {
-        let named = |heading: &str| heading.split('[').next().unwrap_or("").trim() == name;
-        table.iter().find(|column| named(&column.0)).map(|column| column.1.as_slice()).ok_or_else(|| {
-            let found: Vec<&str> = table.iter().map(|column| column.0.as_str()).collect();
-            error(path, 1, "columns", found.join(", "), "time, x, y, z, print")
-        })
-    };
-    let [time, x, y, z, print] =
-        [column("time")?, column("x")?, column("y")?, column("z")?, column("print")?];
+/// As [`crate::table::read`]; times that descend.
+pub fn read_csv(path: &Path) -> Result<ToolPath, Error> {
+    let length = |name| Column::of::<LengthDimension>(name).or_unit("m");
+    let columns = [
+        Column::of::<TimeDimension>("time").or_unit("s"),
+        length("x"),
+        length("y"),
+        length("z"),
+        Column::of::<RatioDimension>("print"),
+    ];
+    let ([time, x, y, z, print], lines) = read_with_lines(path, columns)?;
     let mut moves = Vec::with_capacity(time.len());
-    for row in 0..time.len() {
-        let values = [time[row], x[row], y[row], z[row], print[row]];
-        if let Some(value) = values.iter().find(|value| !value.is_finite()) {
-            return Err(error(path, row + 2, "value", value, "a finite number"));
+    for row in 1..time.len() {
+        let (start, end) = (time[row - 1], time[row]);
+        if end < start {
+            return Err(error(path, lines[row], "time", end, format!("{start} s or later")));
         }
-        if row > 0 && time[row] < time[row - 1] {
-            return Err(error(path, row + 2, "time", time[row], format!("{} or later", time[row - 1])));
-        }
-        if row > 0 {
-            let place = |row: usize| [scale * x[row], scale * y[row], scale * z[row]];
-            let (start, end) = (time[row - 1], time[row]);
-            moves.push(Move { from: place(row - 1), to: place(row), start, end, prints: print[row] != 0.0 });
-        }
+        let place = |row: usize| [x[row], y[row], z[row]];
+        moves.push(Move { from: place(row - 1), to: place(row), start, end, prints: print[row] != 0.0 });
     }
     Ok(ToolPath { moves, notes: Vec::new() })
 }

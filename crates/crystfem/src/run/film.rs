@@ -125,7 +125,8 @@ impl Frames<'_> {
             }
             Origin::End(simulation) => {
                 let temperature = shifted(&simulation.temperatures(f64::NAN));
-                let field = self.field.map(|name| simulation.field(name));
+                let or_nan = |x: Option<f64>| x.unwrap_or(f64::NAN);
+                let field = self.field.map(|name| simulation.field(name).into_iter().map(or_nan).collect());
                 let elements = 0..self.mesh.element_count() as u32;
                 let exists = elements.map(|element| simulation.is_born(element)).collect();
                 (simulation.time(), std::iter::once(temperature).chain(field).collect(), exists)

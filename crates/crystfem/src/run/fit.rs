@@ -24,7 +24,7 @@ struct Done {
 /// Runs every fit.
 pub fn run(source: &Source, scene: &FitScene, options: &Options) -> Result<Report, Failure> {
     let jobs = scene.jobs(source)?;
-    polycore::output::prepare_run(options.output)?;
+    let _lock = polycore::output::prepare_run(options.output)?;
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let mut phases = Phases::new();
     let mut done = Vec::new();

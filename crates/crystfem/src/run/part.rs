@@ -40,16 +40,16 @@ pub fn one(
     let built = scene.mesh.build(source)?;
     let task = scene.task(source, built.mesh)?;
     phases.start("solve");
-    let (mut simulation, frames, probes);
+    let (mut simulation, frames, probes, _lock);
     if options.resume {
+        _lock = polycore::output::resume_run(options.output)?;
         let saved = checkpoint::read(options.output)?;
-        polycore::output::remove_unfinished(options.output);
         simulation = Simulation::resume(task.problem.clone(), task.settings, saved.state)?;
         (frames, probes) = (saved.frames, saved.probes);
     } else {
         simulation = Simulation::new(task.problem.clone(), task.settings)?;
         scene.refuse_too_large(source, &simulation, task.end)?;
-        polycore::output::prepare_run(options.output)?;
+        _lock = polycore::output::prepare_run(options.output)?;
         let fields = simulation.field_names().len();
         frames = 0;
         probes = scene
@@ -67,6 +67,10 @@ pub fn one(
     phases.start("write");
     run.record(&simulation, &mut report);
     probe::write(&run.probes, &run.names, options.output, &mut report)?;
+    if !task.layers.is_empty() {
+        let births: Vec<f64> = task.problem.births.iter().map(|birth| birth.time).collect();
+        probe::births(&run.probes, &run.names, &births, &mut report);
+    }
     let path = series.map(MeshSeries::finish).transpose()?;
     if scene.output.pictures {
         phases.start("draw");
@@ -126,7 +130,8 @@ impl Run<'_> {
             checkpoint::write(options.output, &self.header, frames, state, probes)
         };
         if self.frames == 0 {
-            probe::record(&mut self.probes, simulation, &self.names);
+            simulation.finite()?;
+            probe::record(&mut self.probes, simulation, &self.names)?;
             // a run can be resumed from its first moment on
             save(0, simulation.state(), &self.probes)?;
         }
@@ -136,7 +141,7 @@ impl Run<'_> {
             let (probes, names, frames) = (&mut self.probes, &self.names, self.frames);
             let mut result = Ok(());
             let mut observe = |simulation: &Simulation, step: &Record| -> ControlFlow<()> {
-                probe::record(probes, simulation, names);
+                result = simulation.finite().and_then(|()| probe::record(probes, simulation, names));
                 let state = simulation.state();
                 (options.progress)(&Progress {
                     time: state.time,
@@ -146,7 +151,6 @@ impl Run<'_> {
                     of: [1, 1],
                 });
                 let stop = (options.interrupted)();
-                result = finite(simulation);
                 if result.is_ok() && (stop || written.elapsed() >= options.checkpoint_every) {
                     result = save(frames, state, probes);
                     written = Instant::now();
@@ -172,7 +176,8 @@ impl Run<'_> {
     fn frame(&self, simulation: &Simulation, series: &mut MeshSeries) -> Result<(), Error> {
         let temperature: Vec<f64> =
             simulation.temperatures(f64::NAN).into_iter().map(|kelvin| kelvin - CELSIUS).collect();
-        let fields: Vec<Vec<f64>> = self.names.iter().map(|name| simulation.field(name)).collect();
+        let or_nan = |field: Vec<Option<f64>>| field.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect();
+        let fields: Vec<Vec<f64>> = self.names.iter().map(|name| or_nan(simulation.field(name))).collect();
         let mut arrays: Vec<Data> = vec![(TEMPERATURE, 1, temperature.as_slice())];
         arrays.extend(self.names.iter().zip(&fields).map(|(name, values)| (*name, 1, values.as_slice())));
         let elements = self.task.problem.mesh.element_count() as u32;
@@ -192,10 +197,12 @@ impl Run<'_> {
         report.value("heat_given_off", -(exchange.total() + reaction), "J");
         report.value("missing_energy", missing, "J");
         report.value("worst_balance", worst, "");
-        let temperature = simulation.temperatures(f64::NAN);
+        let nodes = 0..self.task.problem.mesh.points.len() as u32;
+        let temperature: Vec<Option<f64>> =
+            nodes.map(|node| simulation.temperature(node).map(|kelvin| kelvin - CELSIUS)).collect();
         let volumes = simulation.volumes(&self.task.printed);
-        summarise(report, "", "temperature", &shifted(&temperature), &volumes, "degC");
-        let fields: Vec<(&str, Vec<f64>)> =
+        summarise(report, "", "temperature", &temperature, &volumes, "degC");
+        let fields: Vec<(&str, Vec<Option<f64>>)> =
             self.names.iter().map(|name| (*name, simulation.field(name))).collect();
         for (name, values) in &fields {
             summarise(report, "", name, values, &volumes, "");
@@ -203,7 +210,7 @@ impl Run<'_> {
         for (layer, elements) in self.task.layers.iter().enumerate() {
             let volumes = simulation.volumes(elements);
             let prefix = format!("layer-{}.", layer + 1);
-            summarise(report, &prefix, "temperature", &shifted(&temperature), &volumes, "degC");
+            summarise(report, &prefix, "temperature", &temperature, &volumes, "degC");
             for (name, values) in &fields {
                 summarise(report, &prefix, name, values, &volumes, "");
             }
@@ -228,23 +235,36 @@ pub fn shifted(kelvin: &[f64]) -> Vec<f64> {
     kelvin.iter().map(|t| t - CELSIUS).collect()
 }
 
-/// Mean by volume, least, largest and standard deviation of a field.
-fn summarise(report: &mut Report, prefix: &str, name: &str, values: &[f64], volumes: &[f64], unit: &str) {
+/// Mean by volume, least, largest and standard deviation of a field over the nodes that have it; a value that is not finite
+/// makes all of them so, which fails the report.
+fn summarise(
+    report: &mut Report,
+    prefix: &str,
+    name: &str,
+    values: &[Option<f64>],
+    volumes: &[f64],
+    unit: &str,
+) {
     let (mut sum, mut volume) = (0.0, 0.0);
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-    let there = || values.iter().zip(volumes).filter(|(value, volume)| **volume > 0.0 && value.is_finite());
+    let there = || {
+        let with_volume = values.iter().zip(volumes).filter(|(_, volume)| **volume > 0.0);
+        with_volume.filter_map(|(value, volume)| Some(((*value)?, *volume)))
+    };
     for (value, weight) in there() {
         sum += value * weight;
         volume += weight;
-        least = least.min(*value);
-        most = most.max(*value);
+        least = least.min(value);
+        most = most.max(value);
     }
     if volume > 0.0 {
         let mean = sum / volume;
         let variance = there().map(|(value, weight)| weight * (value - mean).powi(2)).sum::<f64>() / volume;
+        // `min` and `max` pass over NaN
+        let known = |extreme: f64| if mean.is_finite() { extreme } else { mean };
         report.value(&format!("{prefix}mean_{name}"), mean, unit);
-        report.value(&format!("{prefix}least_{name}"), least, unit);
-        report.value(&format!("{prefix}largest_{name}"), most, unit);
+        report.value(&format!("{prefix}least_{name}"), known(least), unit);
+        report.value(&format!("{prefix}largest_{name}"), known(most), unit);
         let spread = if unit == "degC" { "K" } else { unit };
         report.value(&format!("{prefix}deviation_of_{name}"), variance.sqrt(), spread);
     }
@@ -255,11 +275,4 @@ fn cells(mesh: &Mesh) -> Cells {
     mesh.hexahedra.iter().for_each(|nodes| cells.push(12, nodes));
     mesh.tetrahedra.iter().for_each(|nodes| cells.push(10, nodes));
     cells
-}
-
-/// Names a temperature that is none.
-fn finite(simulation: &Simulation) -> Result<(), Error> {
-    let state = simulation.state();
-    let Some(wrong) = state.temperature.iter().position(|t| !t.is_finite()) else { return Ok(()) };
-    Err(Error::NotFinite { quantity: "temperature", place: format!("equation {wrong}"), time: state.time })
 }

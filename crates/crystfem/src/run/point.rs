@@ -24,7 +24,7 @@ pub fn run(source: &Source, scene: &PointScene, options: &Options) -> Result<Rep
         built.push((name.as_str(), *spec, spec.build(source, key)?));
     }
     let courses = scene.courses(source)?;
-    polycore::output::prepare_run(options.output)?;
+    let _lock = polycore::output::prepare_run(options.output)?;
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let (mut phases, mut runs) = (Phases::new(), Vec::new());
     for (point, (drive, stepping)) in scene.point.iter().zip(courses) {
@@ -40,6 +40,19 @@ pub fn run(source: &Source, scene: &PointScene, options: &Options) -> Result<Rep
             phases.start("integrate");
             let course = Course { material: &**material, drive: drive.clone(), stepping };
             let curves = course.run()?;
+            let broken = non_finite(&course, &curves);
+            match broken.first() {
+                Some((quantity, time)) if !point.non_finite => {
+                    let (quantity, place) = (*quantity, format!("point `{name}`"));
+                    return Err(Error::NotFinite { quantity, place, time: *time }.into());
+                }
+                None if point.non_finite => {
+                    let reason =
+                        "all its values are finite; allowed: some that are not, as `non_finite` says";
+                    return Err(Error::Data { what: format!("point `{name}`"), reason: reason.into() }.into());
+                }
+                _ => report.value(&format!("{name}.non_finite_rows"), broken.len() as f64, ""),
+            };
             record(&mut report, &name, &course, &curves)?;
             phases.start("write");
             write(options.output, &name, &course, &curves)?;
@@ -101,15 +114,27 @@ pub fn explain(source: &Source, scene: &PointScene, quick: bool) -> Result<Vec<S
     Ok(lines)
 }
 
-/// The scalars of a run; temperatures in °C as the thesis has them.
+/// Rows with a value that is not finite: its name and the time.
+fn non_finite(course: &Course, curves: &Curves) -> Vec<(&'static str, f64)> {
+    let names = course.material.field_names();
+    let wrong = |row: usize| {
+        let fields = names.iter().copied().zip(curves.fields[row].iter().copied());
+        let others = [
+            ("temperature", curves.temperature[row]),
+            ("energy", curves.energy[row]),
+            ("rate of crystallization", curves.rate[row]),
+        ];
+        fields.chain(others).find(|(_, value)| !value.is_finite()).map(|(name, _)| name)
+    };
+    (0..curves.time.len()).filter_map(|row| Some((wrong(row)?, curves.time[row]))).collect()
+}
+
+/// The scalars of a run, of a point that must leave the finite numbers those of its finite rows; temperatures in °C as the thesis has them.
 fn record(report: &mut Report, name: &str, course: &Course, curves: &Curves) -> Result<(), Error> {
     let rows = curves.time.len();
     let last = rows - 1;
     let named = |quantity: &str| format!("{name}.{quantity}");
     report.work(&named("steps"), last as u64).work(&named("rejected"), curves.rejected as u64);
-    let finite = |row: &usize| curves.fields[*row].iter().all(|x| x.is_finite());
-    let broken = rows - (0..rows).filter(finite).count();
-    report.value(&named("non_finite_rows"), broken as f64, "");
     let span = |values: &[f64]| {
         values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &x| [low.min(x), high.max(x)])
     };

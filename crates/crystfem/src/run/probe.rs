@@ -48,24 +48,40 @@ impl Probe {
     }
 }
 
-/// Adds a row to every probe whose place exists.
-pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static str]) {
+/// Adds a row to every probe whose place exists; NaN stands for a quantity that no material there has.
+///
+/// # Errors
+/// [`Error::NotFinite`] of a value at a probe.
+pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static str]) -> Result<(), Error> {
     if !probes.iter().any(|probe| probe.exists(simulation)) {
-        return;
+        return Ok(());
     }
-    let fields: Vec<Vec<f64>> = names.iter().map(|name| simulation.field(name)).collect();
+    let time = simulation.time();
+    let fields: Vec<Vec<Option<f64>>> = names.iter().map(|name| simulation.field(name)).collect();
     for probe in probes.iter_mut().filter(|probe| probe.exists(simulation)) {
         let Some(temperature) = probe.place.value(|node| simulation.temperature(node)) else { continue };
-        if probe.last() == Some(simulation.time()) {
+        if probe.last() == Some(time) {
             continue;
         }
-        probe.time.push(simulation.time());
+        let values: Vec<Option<f64>> = fields
+            .iter()
+            .map(|field| probe.place.value(|node| field.get(node as usize).copied().flatten()))
+            .collect();
+        let all = std::iter::once(("temperature", Some(temperature)))
+            .chain(names.iter().copied().zip(values.iter().copied()));
+        for (quantity, value) in all {
+            if value.is_some_and(|value| !value.is_finite()) {
+                let place = format!("probe `{}`", probe.name);
+                return Err(Error::NotFinite { quantity, place, time });
+            }
+        }
+        probe.time.push(time);
         probe.temperature.push(temperature - CELSIUS);
-        for (list, values) in probe.fields.iter_mut().zip(&fields) {
-            let value = probe.place.value(|node| values.get(node as usize).copied());
+        for (list, value) in probe.fields.iter_mut().zip(values) {
             list.push(value.unwrap_or(f64::NAN));
         }
     }
+    Ok(())
 }
 
 /// probe_NAME.csv, the values at the end, and the extremes of temperature.
@@ -83,7 +99,8 @@ pub fn write(
         columns.extend(names.iter().zip(&probe.fields).map(|(name, values)| (*name, "", values.as_slice())));
         csv::write(output.join(format!("probe_{name}.csv")), &columns)?;
         let mut last = |quantity: &str, values: &[f64], unit: &str| {
-            if let Some(last) = values.last().filter(|last| last.is_finite()) {
+            // `record` has refused all others: no material there has it
+            if let Some(last) = values.last().filter(|last| !last.is_nan()) {
                 report.value(&format!("{name}.{quantity}"), *last, unit);
             }
         };
@@ -99,6 +116,34 @@ pub fn write(
         }
     }
     Ok(())
+}
+
+/// What births do to the probes that are there: NAME.jump_at_birth_N, by how much the temperature rises after the N-th birth
+/// before the next one, K, and of each field FIELD_at_birth_N, its value just before, and FIELD_lost_at_birth_N, by how
+/// much it falls below that.
+pub fn births(probes: &[Probe], names: &[&'static str], times: &[f64], report: &mut Report) {
+    for probe in probes {
+        for (number, &birth) in (1..).zip(times) {
+            // a row at the time of a birth shows what was before it
+            let first = probe.time.partition_point(|&time| time <= birth);
+            let next = times.get(number).copied().unwrap_or(f64::INFINITY);
+            let last = probe.time.partition_point(|&time| time <= next);
+            let (Some(before), true) = (first.checked_sub(1), last > first) else { continue };
+            // the row at which the probe itself was born says nothing
+            if probe.time[0] >= birth {
+                continue;
+            }
+            let after = |values: &[f64], pick: fn(f64, f64) -> f64| {
+                values[first..last].iter().copied().fold(values[before], pick) - values[before]
+            };
+            let name = |what: &str| format!("{}.{what}at_birth_{number}", probe.name);
+            report.value(&name("jump_"), after(&probe.temperature, f64::max), "K");
+            for (field, values) in names.iter().zip(&probe.fields).filter(|(_, v)| !v[before].is_nan()) {
+                report.value(&name(&format!("{field}_")), values[before], "");
+                report.value(&name(&format!("{field}_lost_")), -after(values, f64::min), "");
+            }
+        }
+    }
 }
 
 /// Temperatures and fields of all probes over time.

@@ -91,6 +91,7 @@ pub fn sweep(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Resu
     let runs = runs(source, vary)?;
     refuse_other_keys(vary, options.output)?;
     polycore::output::prepare_directory(options.output)?;
+    let _lock = polycore::output::lock_run(options.output)?;
     let _ = std::fs::remove_file(options.output.join(polycore::report::FILE_NAME));
     let mut phases = Phases::new();
     phases.start("solve");

@@ -10,6 +10,7 @@ mod memory;
 mod mesh;
 mod part;
 mod point;
+mod print;
 mod problem;
 mod schedule;
 mod study;

@@ -62,7 +62,7 @@ pub struct PartScene {
     pub expect: Vec<Expect>,
 }
 
-/// Elements of one material. Of two regions that name an element, the later one holds.
+/// Elements of one material. Where regions overlap, the last one wins.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegionSpec {
@@ -90,13 +90,22 @@ pub struct PrintSpec {
     pub layer_time: Option<Time>,
     /// When the first layer, or the path, begins; default 0.
     pub start: Option<Time>,
-    /// G-code (`.gcode`, `.g`, `.nc`) or a CSV table (`time`, `x`, `y`, `z`, `print`; m and s).
+    /// G-code (`.gcode`, `.g`, `.nc`) or a CSV table (`time [s]`, `x [mm]`, `y [mm]`, `z [mm]`, `print`).
     pub path: Option<PathBuf>,
     /// Width of what the path lays down.
     pub bead_width: Option<Length>,
     /// Its height.
     pub bead_height: Option<Length>,
-    /// Elements that the path reaches within this time appear together; default: a hundredth of the path's duration.
+    /// Whether the middle of what the path lays down is put over the middle of `elements`, in x and y.
+    #[serde(default)]
+    pub centre: bool,
+    /// Shifts the path.
+    pub offset: Option<[Length; 3]>,
+    /// Whether gaps between beads are filled, when the last bead at their height is finished; otherwise what no bead covers
+    /// is not printed.
+    #[serde(default)]
+    pub fill: bool,
+    /// Elements that the nozzle passes within one window appear together; default: a hundredth of the path's duration.
     pub window: Option<Time>,
 }
 
@@ -140,7 +149,7 @@ pub struct SourceSpec {
 #[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TimeSpec {
-    /// When to end; default: one layer time after the last layer, or when the path ends.
+    /// When to end; default: one layer time after the last layer, or when the path ends and one window after its last birth.
     pub end: Option<Time>,
     /// Time integrator.
     pub scheme: Scheme,
@@ -302,6 +311,9 @@ impl PrintSpec {
             ("bead_width", self.bead_width.is_some(), path, path),
             ("bead_height", self.bead_height.is_some(), path, path),
             ("window", self.window.is_some(), false, path),
+            ("centre", self.centre, false, path),
+            ("offset", self.offset.is_some(), false, path),
+            ("fill", self.fill, false, path),
             ("elements", self.elements.is_some(), path || self.layer_height.is_some(), true),
         ];
         for (name, given, needed, allowed) in needed {

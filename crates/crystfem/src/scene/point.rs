@@ -82,6 +82,9 @@ pub struct PointSpec {
     pub largest_change: Option<Ratio>,
     /// Largest change of temperature in an adaptive step; default 0.5 K.
     pub largest_temperature_change: Option<TemperatureDifference>,
+    /// Its values leave the finite numbers, and must; otherwise the first that does ends the run.
+    #[serde(default)]
+    pub non_finite: bool,
     /// Part of `--quick` runs.
     #[serde(default = "yes")]
     pub quick: bool,

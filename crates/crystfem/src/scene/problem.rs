@@ -2,14 +2,12 @@
 
 use super::fault::{located, located_in};
 use super::memory;
-use super::part::{BoundarySpec, PartScene, PrintSpec};
+use super::part::{BoundarySpec, PartScene};
+use super::print::Laid;
 use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
-use crate::error::Error;
-use crate::mesh::layers::{Layers, groups};
-use crate::mesh::path::{Bead, ToolPath, read_csv, read_gcode};
 use crate::mesh::surface::Surface;
 use crate::mesh::{Face, Mesh, Place};
-use crate::problem::{Birth, Problem};
+use crate::problem::Problem;
 use crate::simulation::Settings;
 use crate::time::Steps;
 use polycore::scene::{SceneError, Source};
@@ -68,29 +66,43 @@ impl PartScene {
             let power = Field::Uniform(spec.power.build(source, &format!("source[{index}].power"))?);
             heats.push(Heat { elements, power });
         }
-        let mut births = Vec::new();
-        let mut layers = Vec::new();
-        let mut by_itself = 0.0;
-        if let Some(print) = &self.print {
-            let laid = print.laid(source, &mesh, &mut notes)?;
-            (births, layers, by_itself) = (laid.births, laid.layers, laid.end);
-        }
+        let Laid { births, absent, layers, end: by_itself } = match &self.print {
+            Some(print) => print.laid(source, &mesh, &mut notes)?,
+            None => Laid::default(),
+        };
         let end = self.time.end.map_or(by_itself, |end| end.si());
         memory::refuse_times(source, self, end)?;
-        if let Some(late) = births.iter().find(|birth| birth.time >= end) {
-            let allowed = format!("after the last birth, at {} s", births.last().unwrap_or(late).time);
+        if let Some(last) = births.iter().map(|birth| birth.time).reduce(f64::max).filter(|last| *last >= end)
+        {
+            let allowed = format!("after the last birth, at {last} s");
             return Err(source.error("time.end", format!("{end} s"), allowed));
+        }
+        for (spec, place) in self.probe.iter().zip(&probes) {
+            if place.elements().iter().all(|element| absent.binary_search(element).is_ok()) {
+                notes
+                    .push(format!("probe `{}` lies where nothing is printed: it records nothing", spec.name));
+            }
         }
         let mut printed: Vec<u32> = births.iter().flat_map(|birth| birth.elements.iter().copied()).collect();
         printed.sort_unstable();
         if printed.is_empty() {
             printed = (0..mesh.element_count() as u32).collect();
         }
-        let later: HashSet<u32> = births.iter().flat_map(|birth| birth.elements.iter().copied()).collect();
+        let later = births.iter().flat_map(|birth| &birth.elements).chain(&absent).copied();
+        let later: HashSet<u32> = later.collect();
         let initial = initial(&mesh, &temperature_of, &later);
         let capacity = self.time.capacity;
-        let problem =
-            Problem { mesh, materials, material_of, initial, conditions, sources: heats, births, capacity };
+        let problem = Problem {
+            mesh,
+            materials,
+            material_of,
+            initial,
+            conditions,
+            sources: heats,
+            births,
+            absent,
+            capacity,
+        };
         problem.check().map_err(|error| located(source, "mesh", &error))?;
         let settings = self.settings(end, problem.shortest_period());
         Ok(Task { problem, settings, end, printed, layers, probes, notes })
@@ -265,68 +277,13 @@ impl BoundarySpec {
     }
 }
 
-/// What is laid down when.
-struct Laid {
-    births: Vec<Birth>,
-    layers: Vec<Vec<u32>>,
-    /// When it is over, s.
-    end: f64,
-}
-
-impl PrintSpec {
-    fn laid(&self, source: &Source, mesh: &Mesh, notes: &mut Vec<String>) -> Result<Laid, SceneError> {
-        let start = self.start.map_or(0.0, |start| start.si());
-        let schedule = self.temperature.build(source, "print.temperature")?;
-        let temperature = |time: f64| schedule.at(time);
-        let at = |key: &str, error: Error| located(source, key, &error);
-        if let Some(file) = &self.path {
-            let path = source.path.parent().map_or_else(|| file.clone(), |folder| folder.join(file));
-            let table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
-            let tool: ToolPath = if table { read_csv(&path, 1.0) } else { read_gcode(&path) }
-                .map_err(|error| at("print.path", error))?;
-            notes.extend(tool.notes.iter().cloned());
-            let elements = elements(source, mesh, "print.elements", self.elements.as_deref())?;
-            let bead = Bead {
-                width: self.bead_width.map_or(0.0, |width| width.si()),
-                height: self.bead_height.map_or(0.0, |height| height.si()),
-            };
-            let mut activation =
-                tool.activation(mesh, &elements, bead).map_err(|error| at("print.path", error))?;
-            if activation.fill(mesh) > 0 {
-                notes.push(format!("{} elements are never reached by the path", activation.missed.len()));
-            }
-            let window = self.window.map_or(0.01 * tool.duration(), |window| window.si());
-            let groups = groups(&activation.times, window).map_err(|error| at("print.window", error))?;
-            let births = groups
-                .into_iter()
-                .map(|(time, elements)| (start + time, elements))
-                .map(|(time, elements)| Birth { time, elements, temperature: temperature(time) })
-                .collect();
-            return Ok(Laid { births, layers: Vec::new(), end: start + tool.duration() });
-        }
-        let layers = match (&self.elements, self.layer_height) {
-            (Some(set), Some(height)) => {
-                let elements = elements(source, mesh, "print.elements", Some(set))?;
-                Layers::from_height(mesh, &elements, height.si())
-                    .map_err(|error| at("print.layer_height", error))?
-            }
-            _ => Layers::from_sets(mesh, self.layers.as_deref().unwrap_or("layer-"))
-                .map_err(|error| at("print.layers", error))?,
-        };
-        notes.extend(layers.notes);
-        let interval = self.layer_time.map_or(0.0, |time| time.si());
-        let births = layers.elements.iter().enumerate().map(|(layer, elements)| {
-            let time = start + layer as f64 * interval;
-            Birth { time, elements: elements.clone(), temperature: temperature(time) }
-        });
-        let births: Vec<Birth> = births.collect();
-        let end = start + births.len() as f64 * interval;
-        Ok(Laid { births, layers: layers.elements, end })
-    }
-}
-
 /// An element set, or all elements.
-fn elements(source: &Source, mesh: &Mesh, key: &str, name: Option<&str>) -> Result<Vec<u32>, SceneError> {
+pub(super) fn elements(
+    source: &Source,
+    mesh: &Mesh,
+    key: &str,
+    name: Option<&str>,
+) -> Result<Vec<u32>, SceneError> {
     let Some(name) = name else { return Ok((0..mesh.element_count() as u32).collect()) };
     mesh.element_sets.get(name).cloned().ok_or_else(|| {
         let known: Vec<&str> = mesh.element_sets.keys().map(String::as_str).collect();
@@ -335,7 +292,7 @@ fn elements(source: &Source, mesh: &Mesh, key: &str, name: Option<&str>) -> Resu
 }
 
 /// A place as a scene would have it.
-fn millimetres(place: [f64; 3]) -> String {
+pub(super) fn millimetres(place: [f64; 3]) -> String {
     // to a nanometre: what was written, not its rounding
     let [x, y, z] = place.map(|x| (1e9 * x).round() / 1e6);
     format!("({x}, {y}, {z}) mm")

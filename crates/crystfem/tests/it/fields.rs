@@ -28,8 +28,8 @@ fn crystallinity_of_half_a_body() {
         for ((place, alpha), crystallinity) in
             simulation.problem().mesh.points.iter().zip(&alpha).zip(crystallinity)
         {
-            assert_eq!(alpha.is_nan(), place[0] < 1.9e-4);
-            if !alpha.is_nan() {
+            assert_eq!(alpha.is_none(), place[0] < 1.9e-4);
+            if let (Some(alpha), Some(crystallinity)) = (alpha, crystallinity) {
                 // 0.4 mm are of one temperature within 1e-2 K
                 assert!(
                     (0.5..=1.0).contains(alpha) && (crystallinity - 0.25 * alpha).abs() < 1e-12,
@@ -37,7 +37,7 @@ fn crystallinity_of_half_a_body() {
                 );
             }
         }
-        let known = alpha.iter().copied().filter(|alpha| !alpha.is_nan());
+        let known = alpha.iter().copied().flatten();
         assert!(known.clone().fold(0.0, f64::max) - known.fold(1.0, f64::min) < 4e-3);
     }
 }
@@ -54,7 +54,7 @@ fn cooling_rates() {
         let conditions = vec![Condition::Temperature { nodes: (0..8).collect(), value }];
         let problem = Problem { conditions, ..Problem::new(mesh, pa12(None), 473.15) };
         let mut simulation = Simulation::new(problem, Settings::adaptive(0.1)).unwrap();
-        let alpha = |simulation: &Simulation| simulation.field("alpha")[0];
+        let alpha = |simulation: &Simulation| simulation.field("alpha")[0].unwrap();
         for (offset, above) in [(0.02, false), (-0.02, true)] {
             run(&mut simulation, (473.15 - (half + 273.15 + offset)) / slope);
             assert_eq!(alpha(&simulation) > 0.5, above, "{rate} K/min: {}", alpha(&simulation));

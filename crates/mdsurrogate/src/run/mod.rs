@@ -59,11 +59,10 @@ pub fn run(source: &Source, options: &mut Options) -> Result<Finished, Failure> 
     let mut phases = Phases::new();
     phases.start("read");
     let data = scene.data.as_ref().map(|_| Prepared::new(source, &scene)).transpose()?;
-    if options.resume {
-        polycore::output::remove_unfinished(options.output);
-    } else {
-        polycore::output::prepare_run(options.output)?;
-    }
+    let _lock = match options.resume {
+        true => polycore::output::resume_run(options.output)?,
+        false => polycore::output::prepare_run(options.output)?,
+    };
     let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), &source.text);
     let mut remarks = Vec::new();
     if let Some(spec) = &scene.crystal {

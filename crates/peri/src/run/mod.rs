@@ -101,16 +101,13 @@ fn run_in<const D: usize>(
         }
     }
     let (mut finished, mut state) = (Vec::new(), None);
-    if !options.resume {
-        polycore::output::prepare_directory(options.output)?;
-    }
-    let _lock = polycore::output::lock_run(options.output)?;
+    let _lock;
     if options.resume {
-        polycore::output::remove_unfinished(options.output);
+        _lock = polycore::output::resume_run(options.output)?;
         let read = checkpoint::read::<D>(options.output)?;
         (finished, state) = (read.finished, read.state);
     } else {
-        polycore::output::prepare_run(options.output)?;
+        _lock = polycore::output::prepare_run(options.output)?;
         // a run can be resumed from its first moment on
         checkpoint::write::<D>(options.output, source, options.quick, &finished, None)?;
     }

@@ -56,6 +56,9 @@ pub fn run(case: &Case, directory: &Path, quick: bool) -> Result<Report, Error> 
     trials::judge(&case.trials, &mut report);
     report.write(directory)?;
     polycore::command::print(summary(&case.title, &all, &report));
+    for name in &report.non_finite {
+        polycore::say!("FAIL  {name} is not finite");
+    }
     Ok(report)
 }
 

@@ -31,8 +31,8 @@ pub struct Activation {
 }
 
 impl Activation {
-    /// Gives elements never covered the time at which the last bead at their height was finished: gaps between beads
-    /// count as filled. Those with no bead at their height remain missed; their number comes back.
+    /// Gives elements never covered the time at which the last bead at their height was finished, as if gaps between beads
+    /// were filled. Those with no bead at their height remain missed; their number comes back.
     pub fn fill(&mut self, mesh: &Mesh) -> usize {
         let (levels, height) = (&self.levels, self.height);
         let times = &mut self.times;

@@ -7,7 +7,7 @@ use super::{Move, ToolPath, error};
 use crate::error::Error;
 
 /// Reads the moves of a G-code file: G0 and G1 with X, Y, Z, E, F; G4 (wait), G20 and G21 (inch, mm), G28 (home),
-/// G90 and G91, M82 and M83 (absolute, relative), G92 (here is …). A move lays material down if E grows along it.
+/// G90 and G91, M82 and M83 (absolute, relative), G92 (here is …). A move lays material down if E grows along it and it goes across.
 /// Velocity is F all along a move, without acceleration. Other commands are passed over and noted.
 ///
 /// # Errors
@@ -130,7 +130,9 @@ impl Printer {
         }
         let start = self.time;
         self.time += way / self.velocity;
-        let one = Move { from, to: self.place, start, end: self.time, prints: fed > 0.0 };
+        // filament that comes while the nozzle goes up or down alone fills it again after a retraction
+        let across = self.place[0] != from[0] || self.place[1] != from[1];
+        let one = Move { from, to: self.place, start, end: self.time, prints: fed > 0.0 && across };
         Ok((length > 0.0).then_some(one))
     }
 

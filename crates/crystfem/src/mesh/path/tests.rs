@@ -189,16 +189,45 @@ fn a_table_of_moves() {
     let write = |text: &str| {
         let file = folder.join("moves.csv");
         std::fs::write(&file, text).unwrap();
-        read_csv(&file, 1e-3)
+        read_csv(&file)
     };
-    let path = write("time [s],x [mm],y,z,print\n0,0,0,0.2,0\n1,10,0,0.2,1\n1.5,10,5,0.2,0\n").unwrap();
+    let path =
+        write("time [min],x [mm],y [cm],z,print\n0,0,0,2e-4,0\n1,10,0,2e-4,1\n1.5,10,5,2e-4,0\n").unwrap();
     assert_eq!(path.moves.len(), 2);
-    assert_eq!(path.moves[0].to, [0.01, 0.0, 0.2e-3]);
+    assert_eq!(path.moves[0].to, [0.01, 0.0, 2e-4]);
+    assert_eq!((path.moves[1].to, path.moves[1].end), ([0.01, 0.05, 2e-4], 90.0));
     assert!(path.moves[0].prints && !path.moves[1].prints);
     let text = |result: Result<ToolPath, Error>| result.unwrap_err().to_string();
-    assert!(text(write("time,x,y,z\n0,0,0,0\n")).contains("allowed: time, x, y, z, print"));
+    assert!(text(write("time,x,y,z\n0,0,0,0\n")).contains("one column `print"));
+    assert!(text(write("time,x [s],y,z,print\n0,0,0,0,0\n")).contains("a length is needed"));
     assert!(
         text(write("time,x,y,z,print\n1,0,0,0,0\n0,0,0,0,0\n")).contains("moves.csv:3: time: found \"0\"")
     );
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// Two lines of 10 mm along x over a brick that one of them misses by half of its length, the other wholly.
+#[test]
+fn where_a_path_lies() {
+    let (mesh, _) = plate();
+    let all: Vec<u32> = (0..400).collect();
+    let bead = Bead { width: 5e-4, height: 2e-4 };
+    let line = |from: [f64; 2], start: f64| Move {
+        from: [from[0], from[1], 2e-4],
+        to: [from[0] + 0.01, from[1], 2e-4],
+        start,
+        end: start + 1.0,
+        prints: true,
+    };
+    let path =
+        ToolPath { moves: vec![line([0.005, 0.0025], 0.0), line([0.1, 0.0025], 1.0)], notes: Vec::new() };
+    assert!((path.outside(&mesh, &all, bead) - 0.75).abs() < 1e-12);
+    assert_eq!(path.bounds(bead), Some([[0.005, 0.0025, 0.0], [0.11, 0.0025, 2e-4]]));
+    // over the whole bed and one more: nothing above the brick, nothing below it
+    for z in [-1e-3, 1e-2] {
+        assert_eq!(path.clone().shifted([0.0, 0.0, z]).outside(&mesh, &all, bead), 1.0);
+    }
+    let one = ToolPath { moves: vec![line([0.1, 0.3], 0.0)], notes: Vec::new() }.centred(&mesh, &all, bead);
+    assert!(one.outside(&mesh, &all, bead) == 0.0 && (one.moves[0].from[1] - 0.0025).abs() < 1e-15);
+    assert_eq!(ToolPath::default().bounds(bead), None);
 }

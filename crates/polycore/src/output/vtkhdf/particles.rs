@@ -38,7 +38,7 @@ impl ParticleSeries {
     /// points and the same arrays.
     ///
     /// # Errors
-    /// [`Error::Data`] if the arrays do not fit together, [`Error::Io`] or [`Error::Format`] if writing fails.
+    /// [`Error::Data`] if the arrays do not fit together or a value is not finite, [`Error::Io`] if writing fails.
     pub fn step(&mut self, time: f64, points: &[[f64; 3]], point_data: &[Data<'_>]) -> Result<(), Error> {
         self.moment(time, points, point_data, &[])
     }
@@ -58,6 +58,14 @@ impl ParticleSeries {
         let layout = Layout::of([points.len(), 0], point_data, &[])?.and(moments)?;
         let of = |name: &String| moments.iter().find(|m| m.0 == name).map_or(f64::NAN, |m| m.1);
         let moments = layout.moments.iter().map(of).collect();
+        for (name, components, values) in point_data {
+            if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+                let point = at / components;
+                let place = points.get(point).copied().unwrap_or_default();
+                let reason = format!("{} at point {point}, {place:?} m, time {time}", values[at]);
+                return Err(Error::Data { what: format!("point array `{name}` is not finite"), reason });
+            }
+        }
         let arrays = point_data.iter().map(|(_, _, values)| *values).collect();
         let points = Some(points.as_flattened());
         self.frames.step(&layout, &Step { time, points, arrays, cell_arrays: Vec::new(), moments })

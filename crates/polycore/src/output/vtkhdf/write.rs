@@ -6,7 +6,7 @@ use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
 
 use super::frames::Step;
 use super::mesh::Cells;
-use super::{Layout, format_error};
+use super::{Layout, write_error};
 use crate::Error;
 
 /// Rows of a compressed chunk: large enough to compress, small enough to read a step without much waste.
@@ -36,7 +36,7 @@ type Mesh = (Vec<[f64; 3]>, Cells);
 impl Writer {
     /// A file for exactly `steps` steps; of particles where there is no mesh.
     pub fn create(path: &Path, layout: &Layout, mesh: Option<&Mesh>, steps: usize) -> Result<Self, Error> {
-        Self::begin(path, layout, mesh, steps).map_err(|error| format_error(path, error))
+        Self::begin(path, layout, mesh, steps).map_err(|error| write_error(path, error))
     }
 
     fn begin(path: &Path, layout: &Layout, mesh: Option<&Mesh>, steps: usize) -> Hdf5<Self> {
@@ -95,7 +95,7 @@ impl Writer {
             }
             Ok(())
         };
-        write().map_err(|error| format_error(&self.path, error))?;
+        write().map_err(|error| write_error(&self.path, error))?;
         self.times.push(step.time);
         self.moments.push(step.moments.clone());
         Ok(())
@@ -103,7 +103,7 @@ impl Writer {
 
     pub fn close(self) -> Result<(), Error> {
         let path = self.path.clone();
-        self.end().map_err(|error| format_error(&path, error))
+        self.end().map_err(|error| write_error(&path, error))
     }
 
     fn end(self) -> Hdf5<()> {

@@ -1,0 +1,134 @@
+//! What is laid down when: in layers, or along a path.
+
+use super::fault::located;
+use super::part::PrintSpec;
+use super::problem::{elements, millimetres};
+use crate::element::{self, Geometry};
+use crate::error::Error;
+use crate::mesh::Mesh;
+use crate::mesh::layers::{Layers, groups};
+use crate::mesh::path::{Bead, read_csv, read_gcode};
+use crate::problem::Birth;
+use polycore::scene::{SceneError, Source};
+use std::path::Path;
+
+/// What is laid down when.
+#[derive(Default)]
+pub(super) struct Laid {
+    pub births: Vec<Birth>,
+    /// What is never laid down, ascending.
+    pub absent: Vec<u32>,
+    pub layers: Vec<Vec<u32>>,
+    /// When it is over, s.
+    pub end: f64,
+}
+
+impl PrintSpec {
+    pub(super) fn laid(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+        notes: &mut Vec<String>,
+    ) -> Result<Laid, SceneError> {
+        if let Some(file) = &self.path {
+            return self.along(source, mesh, file, notes);
+        }
+        let at = |key: &str, error: Error| located(source, key, &error);
+        let layers = match (&self.elements, self.layer_height) {
+            (Some(set), Some(height)) => {
+                let elements = elements(source, mesh, "print.elements", Some(set))?;
+                Layers::from_height(mesh, &elements, height.si())
+                    .map_err(|error| at("print.layer_height", error))?
+            }
+            _ => Layers::from_sets(mesh, self.layers.as_deref().unwrap_or("layer-"))
+                .map_err(|error| at("print.layers", error))?,
+        };
+        notes.extend(layers.notes);
+        let start = self.start.map_or(0.0, |start| start.si());
+        let interval = self.layer_time.map_or(0.0, |time| time.si());
+        let groups = (0..).zip(&layers.elements);
+        let groups = groups.map(|(layer, elements)| (start + f64::from(layer) * interval, elements.clone()));
+        let births = self.births(source, groups.collect())?;
+        let end = start + births.len() as f64 * interval;
+        Ok(Laid { births, layers: layers.elements, end, absent: Vec::new() })
+    }
+
+    fn births(&self, source: &Source, groups: Vec<(f64, Vec<u32>)>) -> Result<Vec<Birth>, SceneError> {
+        let schedule = self.temperature.build(source, "print.temperature")?;
+        let birth = |(time, elements)| Birth { time, elements, temperature: schedule.at(time) };
+        Ok(groups.into_iter().map(birth).collect())
+    }
+
+    /// Along a path; what its beads do not cover is never printed.
+    fn along(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+        file: &Path,
+        notes: &mut Vec<String>,
+    ) -> Result<Laid, SceneError> {
+        let at = |key: &str, error: Error| located(source, key, &error);
+        let path = source.path.parent().map_or_else(|| file.to_path_buf(), |folder| folder.join(file));
+        let table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+        let tool = if table { read_csv(&path) } else { read_gcode(&path) };
+        let mut tool = tool.map_err(|error| at("print.path", error))?;
+        notes.append(&mut tool.notes);
+        let elements = elements(source, mesh, "print.elements", self.elements.as_deref())?;
+        let bead = Bead {
+            width: self.bead_width.map_or(0.0, |width| width.si()),
+            height: self.bead_height.map_or(0.0, |height| height.si()),
+        };
+        if self.centre {
+            tool = tool.centred(mesh, &elements, bead);
+        }
+        if let Some(offset) = self.offset {
+            tool = tool.shifted(offset.map(|x| x.si()));
+        }
+        let mut activation =
+            tool.activation(mesh, &elements, bead).map_err(|error| at("print.path", error))?;
+        let volume = |list: &[u32]| list.iter().map(|&element| volume(mesh, element)).sum::<f64>();
+        let whole = volume(&elements);
+        let share = |list: &[u32]| 100.0 * (1.0 - volume(list) / whole);
+        let covered = share(&activation.missed);
+        let outside = 100.0 * tool.outside(mesh, &elements, bead);
+        if covered <= 0.0 || activation.missed.len() == elements.len() {
+            let boxed = |bounds: Option<[[f64; 3]; 2]>| {
+                let [low, high] = bounds.unwrap_or_default().map(millimetres);
+                format!("from {low} to {high}")
+            };
+            let found = format!(
+                "a path {} whose beads cover no centre of an element of the part",
+                boxed(tool.bounds(bead))
+            );
+            let allowed = format!(
+                "one that meets the part, which reaches {}; `centre = true` puts the path over it, `offset` anywhere",
+                boxed(mesh.bounds_of(&elements))
+            );
+            return Err(source.error("print.path", found, allowed));
+        }
+        let mut told = format!(
+            "the beads cover {covered:.1} % of the part; {outside:.1} % of their length lies outside of it"
+        );
+        if self.fill {
+            activation.fill(mesh);
+            told += &format!("; with gaps filled {:.1} % is printed", share(&activation.missed));
+        } else if !activation.missed.is_empty() {
+            told += "; what they do not cover is not printed (`fill = true` fills gaps)";
+        }
+        notes.push(told);
+        let start = self.start.map_or(0.0, |start| start.si());
+        let window = self.window.map_or(0.01 * tool.duration(), |window| window.si());
+        let groups = groups(&activation.times, window).map_err(|error| at("print.window", error))?;
+        let births =
+            self.births(source, groups.into_iter().map(|(time, list)| (start + time, list)).collect())?;
+        let last = births.last().map_or(start, |birth| birth.time);
+        let end = (start + tool.duration()).max(last + window);
+        Ok(Laid { births, absent: activation.missed, layers: Vec::new(), end })
+    }
+}
+
+/// Of an element, m³.
+fn volume(mesh: &Mesh, element: u32) -> f64 {
+    let (corners, nodes) = element::corners(mesh, element);
+    Geometry::new(&corners[..nodes]).map_or(0.0, |geometry| geometry.corner_volumes.iter().sum())
+}
