@@ -12,6 +12,7 @@
 //! * [`memory`]: no run takes more memory than is stated, absurd sizes are refused before they are allocated;
 //! * [`packages`]: what each crate is built with;
 //! * [`schemas`]: JSON Schemas, by which every case is valid;
+//! * [`words`]: slips that would pass in silence, and how much is said;
 //! * [`documents`]: the commands and links that README and docs show.
 
 mod allocations;
@@ -31,3 +32,4 @@ mod program;
 mod results;
 mod scenes;
 mod schemas;
+mod words;

@@ -74,6 +74,11 @@ impl Schedule {
         })
     }
 
+    /// The lowest value.
+    pub fn lowest(&self) -> f64 {
+        self.values.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
     /// Value at a time, s.
     pub fn at(&self, time: f64) -> f64 {
         if let (Some(period), [low, high]) = (self.period, &self.values[..]) {

@@ -4,7 +4,7 @@
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
 use clap::{CommandFactory, Parser, Subcommand};
-use crystfem::run::{Failure, Options, Progress, SweepOptions, Vary};
+use crystfem::run::{Failure, Options, Progress, Search, SweepOptions, Vary};
 use crystfem::scene::Kind;
 use polycore::command::{Progress as Bar, Threads, default_output, exit, interrupted, is_finished, seconds};
 use polycore::scene::Source;
@@ -66,9 +66,16 @@ enum Command {
     Sweep {
         /// The scene (TOML), without studies.
         scene: PathBuf,
-        /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid.
-        #[arg(long, value_name = "KEY=VALUE,…", required = true)]
+        /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid, and keys behind one
+        /// another with `;` change together.
+        #[arg(long, value_name = "KEY=VALUE,…", required_unless_present = "search")]
         vary: Vec<Vary>,
+        /// Instead: the least value of a key with which all expectations are met, e.g. print.layer_time=5s..40s.
+        #[arg(long, value_name = "KEY=LOW..HIGH", conflicts_with = "vary")]
+        search: Option<Search>,
+        /// A further value to tell of each run, e.g. layer-*.mean_crystallinity; may be repeated.
+        #[arg(long, value_name = "NAME")]
+        column: Vec<String>,
         /// Directory for results; default: out/NAME-sweep.
         #[arg(long, short)]
         output: Option<PathBuf>,
@@ -113,13 +120,13 @@ fn main() -> ExitCode {
         Command::Run(scene) => run(&scene, None),
         Command::Point(scene) => run(&scene, Some(Kind::Point)),
         Command::Fit(scene) => run(&scene, Some(Kind::Fit)),
-        Command::Sweep { scene, vary, output, checkpoint_every } => {
+        Command::Sweep { scene, vary, search, column, output, checkpoint_every } => {
             let output = output.unwrap_or_else(|| {
                 let mut name = default_output(&scene).into_os_string();
                 name.push("-sweep");
                 name.into()
             });
-            sweep(&scene, &vary, &output, checkpoint_every)
+            sweep(&scene, &vary, search.as_ref(), &column, &output, checkpoint_every)
         }
         Command::Resume { output, checkpoint_every } => resume(&output, checkpoint_every),
         Command::Check { scene, quick } => check(&scene, quick),
@@ -155,7 +162,14 @@ fn run(scene: &Scene, kind: Option<Kind>) -> Result<bool, Failure> {
     solve(&source, &output, scene.quick, scene.checkpoint_every, false)
 }
 
-fn sweep(scene: &Path, vary: &[Vary], output: &Path, every: f64) -> Result<bool, Failure> {
+fn sweep(
+    scene: &Path,
+    vary: &[Vary],
+    search: Option<&Search>,
+    columns: &[String],
+    output: &Path,
+    every: f64,
+) -> Result<bool, Failure> {
     let source = Source::read(scene)?;
     let mut bar = Bar::start();
     let mut progress = |done: usize, all: usize, last: &str| {
@@ -163,11 +177,15 @@ fn sweep(scene: &Path, vary: &[Vary], output: &Path, every: f64) -> Result<bool,
     };
     let mut options = SweepOptions {
         output,
+        columns,
         checkpoint_every: Duration::from_secs_f64(every),
         interrupted: interrupted(),
         progress: &mut progress,
     };
-    let finished = crystfem::run::sweep(&source, vary, &mut options)?;
+    let finished = match search {
+        Some(search) => crystfem::run::search(&source, search, &mut options)?,
+        None => crystfem::run::sweep(&source, vary, &mut options)?,
+    };
     bar.finish();
     tell(&finished.text, output);
     Ok(finished.report.passed())

@@ -198,9 +198,14 @@ impl Report {
 
     /// The scalars, work, times and judged expectations as text.
     pub fn table(&self) -> String {
+        self.table_of(|_| true)
+    }
+
+    /// [`Report::table`] with those values alone that are asked for by name; the number of the others is told.
+    pub fn table_of(&self, shown: impl Fn(&str) -> bool) -> String {
         let mut text = String::new();
         let mut rows = Vec::new();
-        for (name, value) in &self.values {
+        for (name, value) in self.values.iter().filter(|(name, _)| shown(name)) {
             rows.push(match value {
                 Value::Scalar { value, unit } => [name.clone(), number::short(*value), unit.clone()],
                 Value::Curve { columns } => {
@@ -211,6 +216,9 @@ impl Report {
             });
         }
         align(&mut text, &rows);
+        if rows.len() < self.values.len() {
+            let _ = writeln!(text, "{} more values in {FILE_NAME}", self.values.len() - rows.len());
+        }
         let work = self.work.iter().map(|(name, count)| format!("{name} {count}"));
         let seconds = self.seconds.iter().map(|(phase, seconds)| format!("{phase} {seconds:.3} s"));
         let line = work.chain(seconds).collect::<Vec<_>>().join(", ");

@@ -45,7 +45,7 @@ pub fn rates_at(coolings: &[Cooling], temperature: f64) -> (Vec<f64>, Vec<f64>) 
 /// [`Error::Data`] for rates that are not above 0, fewer than three rates with 0.01 ≤ α ≤ 0.99 at this temperature, and
 /// data that do not determine both constants.
 pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
-    let what = format!("fit of Ozawa's law at {temperature} K");
+    let what = format!("fit of Ozawa's law at {temperature} K ({:.2} degC)", temperature - 273.15);
     let refuse = |reason: String| Error::Data { what: what.clone(), reason };
     for cooling in coolings {
         check_finite(&what, "temperature (K)", &cooling.temperatures, 0.0)?;

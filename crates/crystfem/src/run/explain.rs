@@ -2,21 +2,26 @@
 
 use super::Failure;
 use crate::boundary::{Condition, Where};
-use crate::scene::PartScene;
+use crate::scene::{PartScene, millimetres};
 use crate::simulation::Simulation;
 use polycore::scene::Source;
 
-/// The lines of one scene, that is checked.
+/// The lines of one scene, that is checked, and the names of what it reports.
 ///
 /// # Errors
 /// A fault of the scene.
-pub fn one(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
+pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<String>), Failure> {
     let built = scene.mesh.build(source)?;
     let (points, elements) = (built.mesh.points.len(), built.mesh.element_count());
-    let mut lines = vec![format!("builds     {points} nodes, {elements} elements, {:.4e} m³", built.volume)];
+    let [low, high] = built.mesh.bounds().unwrap_or_default().map(millimetres);
+    let mut lines = vec![
+        format!("builds     {points} nodes, {elements} elements, {:.4e} m³", built.volume),
+        format!("builds     a mesh that reaches from {low} to {high}"),
+    ];
     lines.extend(built.notes.iter().map(|note| format!("note       {note}")));
     let task = scene.task(source, built.mesh)?;
     lines.extend(task.notes.iter().map(|note| format!("note       {note}")));
+    let quantities = scene.quantities(&task);
     let mut problem = task.problem;
     let births = problem.births.len();
     if births > 0 {
@@ -59,7 +64,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
     scene.refuse_too_large(source, &simulation, task.end)?;
     lines.push(format!("ends at    {} s", task.end));
     lines.push(format!("needs      {}", polycore::memory::needs(scene.memory(&simulation, task.end))));
-    Ok(lines)
+    Ok((lines, quantities))
 }
 
 /// A condition in words.

@@ -33,7 +33,9 @@ pub fn run(source: &Source, scene: &FitScene, options: &Options) -> Result<Repor
         let fits = solve(spec, job);
         // data that say nothing are a fault of the scene, which names them
         let fits = fits.map_err(|error| match error {
-            Error::Data { what, reason } => source.error(&format!("fit[{index}].data"), reason, what).into(),
+            Error::Data { what, reason } => {
+                source.refused(&format!("fit[{index}].data"), format!("{what}: {reason}")).into()
+            }
             other => Failure::Run(other),
         })?;
         done.extend(fits);

@@ -13,7 +13,8 @@ mod section;
 mod suite;
 mod sweep;
 
-pub use sweep::{SweepOptions, Vary, sweep};
+pub(crate) use rows::STATISTICS;
+pub use sweep::{Search, SweepOptions, Vary, search, sweep};
 
 use crate::error::Error;
 use crate::scene::{self, FitScene, Kind, PartScene, PointScene};

@@ -2,6 +2,7 @@
 
 use super::checkpoint::{self, Header};
 use super::probe::{self, Probe};
+use super::rows::STATISTICS;
 use super::{Failure, Finished, Options, Progress, film, point::CELSIUS};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
@@ -25,7 +26,14 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
         return super::suite::run(source, scene, options);
     }
     scene.check(source)?;
-    one(source, scene, None, options).map(Finished::from)
+    let report = one(source, scene, None, options)?;
+    // what each layer ends with, and does to each probe, is more than a screen holds
+    let of_layer = |name: &str| {
+        let rest = name.strip_prefix("layer-").and_then(|rest| rest.split_once('.'));
+        rest.is_some_and(|(_, quantity)| STATISTICS.iter().any(|statistic| quantity.starts_with(statistic)))
+    };
+    let text = report.table_of(|name| !of_layer(name) && !name.contains("at_birth_"));
+    Ok(Finished { text, report })
 }
 
 /// Runs one scene, or one study of a scene, whose expectations wait for the others.
@@ -39,6 +47,9 @@ pub fn one(
     phases.start("mesh");
     let built = scene.mesh.build(source)?;
     let task = scene.task(source, built.mesh)?;
+    if study.is_none() && !options.resume {
+        scene.check_expectations(source, &scene.quantities(&task), &[])?;
+    }
     phases.start("solve");
     let (mut simulation, frames, probes, _lock);
     if options.resume {
@@ -95,7 +106,9 @@ pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<St
         return super::suite::explain(source, scene, quick);
     }
     scene.check(source)?;
-    super::explain::one(source, scene)
+    let (lines, names) = super::explain::one(source, scene)?;
+    scene.check_expectations(source, &names, &[])?;
+    Ok(lines)
 }
 
 struct Run<'a> {

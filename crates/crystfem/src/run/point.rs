@@ -95,7 +95,16 @@ pub fn explain(source: &Source, scene: &PointScene, quick: bool) -> Result<Vec<S
         let drive = match drive {
             Drive::Prescribed(history) => {
                 let [from, to] = history.span();
-                format!("prescribed temperature, {} segments, {} s", history.segments().count(), to - from)
+                let jumps = history.segments().filter(|one| one.times[0] == one.times[1]).count();
+                let mut told = format!(
+                    "prescribed temperature, {} segments, {} s",
+                    history.segments().count(),
+                    to - from
+                );
+                if jumps > 0 {
+                    told += &format!(", {jumps} of them jumps (neither `rate` nor `duration`)");
+                }
+                told
             }
             Drive::Lumped { exchange: None, duration, .. } => format!("adiabatic, {duration} s"),
             Drive::Lumped { exchange: Some([ambient, constant]), duration, .. } => {

@@ -6,7 +6,7 @@ use crate::mesh::Place;
 use crate::scene::{PartScene, ProbeSpec};
 use crate::simulation::Simulation;
 use polycore::output::csv;
-use polycore::output::picture::{LegendPlace, LinePlot, Series};
+use polycore::output::picture::{LinePlot, Series};
 use polycore::report::Report;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -151,7 +151,7 @@ pub fn draw(probes: &[Probe], names: &[&'static str], scene: &PartScene, output:
     let quantities =
         std::iter::once(("temperature", "T [°C]")).chain(names.iter().map(|name| (*name, *name)));
     for (index, (name, label)) in quantities.enumerate() {
-        let mut plot = LinePlot::new(&scene.title).axes("t [s]", label).legend(LegendPlace::TopRight);
+        let mut plot = LinePlot::new(&scene.title).axes("t [s]", label);
         let mut drawn = false;
         for probe in probes.iter().filter(|probe| probe.time.len() > 1) {
             let values = if index == 0 { &probe.temperature } else { &probe.fields[index - 1] };

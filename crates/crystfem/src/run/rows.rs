@@ -7,6 +7,9 @@ use std::path::Path;
 /// What is told of a field: its mean by volume, its extremes, and its standard deviation, which measures uniformity.
 pub const STATISTICS: [&str; 4] = ["mean_", "least_", "largest_", "deviation_of_"];
 
+/// Heading of the column that says whether a run meets the scene's expectations.
+pub const ENDS: &str = "passed";
+
 /// A run among others.
 pub struct Row {
     /// Its name.
@@ -21,6 +24,8 @@ pub struct Row {
 pub struct Rows {
     /// Headings.
     pub settings: Vec<String>,
+    /// Further values that are asked for, by name; `*` stands for any text.
+    pub columns: Vec<String>,
     /// Rows.
     pub rows: Vec<Row>,
 }
@@ -38,6 +43,25 @@ impl Rows {
         fields.sort_by_key(|name| (name != "temperature", name.clone()));
         fields.dedup();
         fields
+    }
+
+    /// Names of values that the further columns ask for, in the order of the columns, numbers by their size.
+    pub fn asked(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for pattern in &self.columns {
+            let fit = |name: &&String| fits(pattern, name);
+            let mut found: Vec<&String> =
+                self.reports().flat_map(|report| report.values.keys()).filter(fit).collect();
+            found.sort_by_key(|name| natural(name));
+            found.dedup();
+            names.extend(found.into_iter().filter(|name| !names.contains(name)).cloned().collect::<Vec<_>>());
+        }
+        names
+    }
+
+    /// Whether some run has expectations.
+    fn judged(&self) -> bool {
+        self.reports().any(|report| !report.expect.is_empty())
     }
 
     fn reports(&self) -> impl Iterator<Item = &Report> {
@@ -60,6 +84,11 @@ impl Rows {
         let mut head = vec!["run".to_owned()];
         head.extend(self.settings.iter().cloned());
         head.extend(fields.iter().map(|name| format!("{name}: mean (least to largest) ± deviation")));
+        let asked = self.asked();
+        head.extend(asked.iter().map(|name| self.heading(name)));
+        if self.judged() {
+            head.push(ENDS.into());
+        }
         head.push("steps".into());
         let mut table = vec![head];
         for row in &self.rows {
@@ -74,6 +103,12 @@ impl Rows {
                         });
                         format!("{mean} ({least} to {largest}) ± {deviation}")
                     }));
+                    line.extend(asked.iter().map(|name| {
+                        report.scalar(name).map_or_else(|| "–".to_owned(), |value| format!("{value:.4}"))
+                    }));
+                    if self.judged() {
+                        line.push(verdict(report));
+                    }
                     line.push(report.work.get("steps").map(u64::to_string).unwrap_or_default());
                 }
                 Err(failure) => line.push(failure.lines().next().unwrap_or_default().to_owned()),
@@ -100,13 +135,17 @@ impl Rows {
     /// A file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), polycore::Error> {
         let fields = self.fields();
-        let values: Vec<String> = fields
+        let mut values: Vec<String> = fields
             .iter()
             .flat_map(|field| STATISTICS.map(|statistic| format!("{statistic}{field}")))
             .collect();
+        values.extend(self.asked());
         let mut head = vec!["run".to_owned()];
         head.extend(self.settings.iter().cloned());
         head.extend(values.iter().map(|name| self.heading(name)));
+        if self.judged() {
+            head.push(ENDS.to_owned());
+        }
         head.extend(["steps", "failure"].map(str::to_owned));
         atomic_write(path, |file| {
             let mut writer = csv::Writer::from_writer(file);
@@ -119,6 +158,9 @@ impl Rows {
                     let value = report.and_then(|report| report.scalar(name));
                     value.map(|value| format!("{value:?}")).unwrap_or_default()
                 }));
+                if self.judged() {
+                    line.push(report.map(verdict).unwrap_or_default());
+                }
                 let steps = report.and_then(|report| report.work.get("steps"));
                 line.push(steps.map(u64::to_string).unwrap_or_default());
                 line.push(row.outcome.as_ref().err().cloned().unwrap_or_default());
@@ -126,5 +168,49 @@ impl Rows {
             }
             writer.flush()
         })
+    }
+}
+
+/// `yes`, or the quantities that miss what the scene expects of them.
+fn verdict(report: &Report) -> String {
+    let missed: Vec<&str> =
+        report.expect.iter().filter(|one| !one.pass).map(|one| one.expect.quantity.as_str()).collect();
+    if missed.is_empty() { "yes".to_owned() } else { format!("no: {}", missed.join(" ")) }
+}
+
+/// Whether a name fits a pattern in which `*` stands for any text.
+fn fits(pattern: &str, name: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == name,
+        Some((before, after)) => name.strip_prefix(before).is_some_and(|rest| {
+            (0..=rest.len()).filter(|&at| rest.is_char_boundary(at)).any(|at| fits(after, &rest[at..]))
+        }),
+    }
+}
+
+/// A name's pieces of text and numbers, so that `layer-10` comes after `layer-9`.
+fn natural(name: &str) -> Vec<(String, u64)> {
+    let mut pieces = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let digits = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        let end = rest[digits..].find(|c: char| !c.is_ascii_digit()).map_or(rest.len(), |end| digits + end);
+        pieces.push((rest[..digits].to_owned(), rest[digits..end].parse().unwrap_or(0)));
+        rest = &rest[end..];
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns_and_their_order() {
+        assert!(fits("layer-*.mean_alpha", "layer-12.mean_alpha") && fits("a", "a") && fits("*", ""));
+        assert!(!fits("layer-*.mean_alpha", "layer-1.least_alpha") && !fits("a", "ab") && !fits("a*b", "a"));
+        let mut names = ["layer-10.x", "layer-9.x", "layer-9.a"];
+        names.sort_by_key(|name| natural(name));
+        assert_eq!(names, ["layer-9.a", "layer-9.x", "layer-10.x"]);
     }
 }

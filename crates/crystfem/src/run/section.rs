@@ -1,5 +1,6 @@
 //! A section through a mesh, sampled on a regular raster for pictures.
 
+use crate::element::MOST;
 use crate::mesh::Mesh;
 
 /// Samples along the longer side.
@@ -13,23 +14,15 @@ pub struct Section {
     pub low: [f64; 2],
     /// Distance of neighbouring samples, m.
     pub spacing: f64,
-    /// Sample, element, and coordinates in the box around it, 0 to 1.
-    inside: Vec<(usize, u32, [f64; 3])>,
+    /// Sample, element, and the shape functions of its nodes there.
+    inside: Vec<(usize, u32, [f64; MOST])>,
 }
 
 impl Section {
-    /// Through the middle of some elements along y. An element counts as the box around it: exact for bricks, near
-    /// enough for a picture of others. `None` where there is nothing to cut.
+    /// Through the middle of some elements along y, which cuts each as it is: a sample in none stays empty. `None` where there
+    /// is nothing to cut.
     pub fn through_the_middle(mesh: &Mesh, elements: &[u32]) -> Option<Self> {
-        let boxes: Vec<[[f64; 3]; 2]> = elements.iter().map(|&element| bounds(mesh, element)).collect();
-        let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        let [low, high] = boxes.iter().fold(none, |[mut low, mut high], [lower, upper]| {
-            for d in 0..3 {
-                low[d] = low[d].min(lower[d]);
-                high[d] = high[d].max(upper[d]);
-            }
-            [low, high]
-        });
+        let [low, high] = mesh.bounds_of(elements)?;
         let longest = (high[0] - low[0]).max(high[2] - low[2]);
         if !(longest > 0.0 && longest.is_finite()) {
             return None;
@@ -45,65 +38,41 @@ impl Section {
             first.min(most)..last.min(most)
         };
         let mut inside = Vec::new();
-        for (&element, [lower, upper]) in elements.iter().zip(&boxes) {
+        for &element in elements {
+            let Some([lower, upper]) = mesh.bounds_of(&[element]) else { continue };
             if !(lower[1] <= middle && middle < upper[1]) {
                 continue;
             }
             for k in within(lower[2], upper[2], 2, samples[1]) {
                 for i in within(lower[0], upper[0], 0, samples[0]) {
-                    let part = |x: f64, d: usize| (x - lower[d]) / (upper[d] - lower[d]);
                     let x = low[0] + (i as f64 + 0.5) * spacing;
                     let z = low[2] + (k as f64 + 0.5) * spacing;
-                    inside.push((k * samples[0] + i, element, [part(x, 0), part(middle, 1), part(z, 2)]));
+                    if let Some(shapes) = mesh.shapes_at(element, [x, middle, z]) {
+                        inside.push((k * samples[0] + i, element, shapes));
+                    }
                 }
             }
         }
         Some(Self { samples, low: [low[0], low[2]], spacing, inside })
     }
 
-    /// Values of a field over nodes at the samples of elements that exist, NaN elsewhere: trilinear in a hexahedron, the
-    /// mean of a tetrahedron's nodes.
+    /// Values of a field over nodes at the samples of elements that exist, NaN elsewhere.
     pub fn values(&self, mesh: &Mesh, field: &[f64], exists: &dyn Fn(u32) -> bool) -> Vec<f64> {
         let mut values = vec![f64::NAN; self.samples[0] * self.samples[1]];
-        for &(sample, element, [x, y, z]) in self.inside.iter().filter(|(_, element, _)| exists(*element)) {
-            let nodes = mesh.nodes(element);
+        for (sample, element, shapes) in self.inside.iter().filter(|(_, element, _)| exists(*element)) {
+            // a node that does not exist is NaN, and has no part in a sample on the far side
+            let parts = mesh.nodes(*element).iter().zip(shapes).filter(|(_, shape)| **shape != 0.0);
             let at = |node: u32| field.get(node as usize).copied().unwrap_or(f64::NAN);
-            if nodes.len() != 8 {
-                values[sample] = nodes.iter().map(|&node| at(node)).sum::<f64>() / nodes.len() as f64;
-                continue;
-            }
-            let [lower, upper] = bounds(mesh, element);
-            values[sample] = nodes
-                .iter()
-                .map(|&node| {
-                    let place = mesh.points[node as usize];
-                    let near = |d: usize, part: f64| {
-                        if place[d] > 0.5 * (lower[d] + upper[d]) { part } else { 1.0 - part }
-                    };
-                    near(0, x) * near(1, y) * near(2, z) * at(node)
-                })
-                .sum();
+            values[*sample] = parts.map(|(&node, shape)| shape * at(node)).sum();
         }
         values
     }
 }
 
-/// The box around an element.
-fn bounds(mesh: &Mesh, element: u32) -> [[f64; 3]; 2] {
-    let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    mesh.nodes(element).iter().fold(none, |[mut low, mut high], &node| {
-        for d in 0..3 {
-            low[d] = low[d].min(mesh.points[node as usize][d]);
-            high[d] = high[d].max(mesh.points[node as usize][d]);
-        }
-        [low, high]
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::Grid;
+    use crate::mesh::{Block, Grid, Split};
 
     /// A trilinear field comes back at every sample, and nothing where nothing is.
     #[test]
@@ -127,5 +96,29 @@ mod tests {
             assert_eq!(value.is_nan(), place(k)[1] > 0.5, "{k}");
         }
         assert!(Section::through_the_middle(&mesh, &[]).is_none());
+    }
+
+    /// A tetrahedron fills the triangle in which the plane cuts it, and not its box; a brick of them all of it.
+    #[test]
+    fn tetrahedra_are_cut() {
+        let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let one = Mesh { points, tetrahedra: vec![[0, 1, 2, 3]], ..Mesh::default() };
+        let section = Section::through_the_middle(&one, &[0]).unwrap();
+        let filled =
+            section.values(&one, &[1.0; 4], &|_| true).iter().filter(|value| !value.is_nan()).count();
+        let share = filled as f64 / (section.samples[0] * section.samples[1]) as f64;
+        // legs of a half: an eighth of the square
+        assert!((share - 0.125).abs() < 2e-3, "{share}");
+        let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 1.0] };
+        let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 1.0], [5, 3, 2]).unwrap();
+        let mesh = grid.blocks(&[block], Split::FiveTetrahedra).unwrap();
+        let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
+        let section = Section::through_the_middle(&mesh, &all).unwrap();
+        let field: Vec<f64> = mesh.points.iter().map(|[x, y, z]| 1.0 + 2.0 * x - y + 3.0 * z).collect();
+        for (k, value) in section.values(&mesh, &field, &|_| true).iter().enumerate() {
+            let at = |index: usize, d: usize| section.low[d] + (index as f64 + 0.5) * section.spacing;
+            let [x, z] = [at(k % section.samples[0], 0), at(k / section.samples[0], 1)];
+            assert!((value - (2.0 * x + 3.0 * z)).abs() < 1e-9, "{x} {z} {value}");
+        }
     }
 }

@@ -24,12 +24,16 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
     if options.resume {
         _lock = polycore::output::resume_run(options.output)?;
     } else {
+        let mut names = scene.quantities_of_studies();
         for &index in &studies {
-            if scene.study[index].fails.is_none() {
+            let study = &scene.study[index];
+            if study.fails.is_none() {
                 let (source, scene) = scene.of_study(source, index)?;
-                scene.task(&source, scene.mesh.build(&source)?.mesh)?;
+                let task = scene.task(&source, scene.mesh.build(&source)?.mesh)?;
+                names.extend(of_study(&study.name, &scene.quantities(&task)));
             }
         }
+        scene.check_expectations(source, &names, &left_out(scene, &studies))?;
         _lock = polycore::output::prepare_run(options.output)?;
         for &index in &studies {
             // each run takes its own when it begins
@@ -37,7 +41,7 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
         }
         Header::new(source, options.quick, None).write(options.output)?;
     }
-    let mut rows = Rows { settings: Vec::new(), rows: Vec::new() };
+    let mut rows = Rows { settings: Vec::new(), columns: Vec::new(), rows: Vec::new() };
     for (place, &index) in studies.iter().enumerate() {
         let name = scene.study[index].name.clone();
         let outcome = study(source, scene, index, [place + 1, studies.len()], options)?;
@@ -66,6 +70,16 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
     let _ = std::fs::remove_file(options.output.join(polycore::checkpoint::FILE_NAME));
     let text = rows.text() + &report.verdict() + &survivors;
     Ok(Finished { report, text })
+}
+
+fn of_study(study: &str, names: &[String]) -> Vec<String> {
+    names.iter().map(|name| format!("{study}.{name}")).collect()
+}
+
+/// Studies that a quick run leaves out.
+fn left_out<'a>(scene: &'a PartScene, studies: &[usize]) -> Vec<&'a str> {
+    let absent = (0..scene.study.len()).filter(|index| !studies.contains(index));
+    absent.map(|index| scene.study[index].name.as_str()).collect()
 }
 
 /// One study: its report, or the failure that the scene asks for.
@@ -250,8 +264,9 @@ fn compare(scene: &PartScene, rows: &Rows, output: &Path) -> Result<(), polycore
 /// # Errors
 /// A fault of the scene.
 pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<String>, Failure> {
-    let mut lines = Vec::new();
-    for index in scene.studies(source, quick)? {
+    let (mut lines, mut names) = (Vec::new(), scene.quantities_of_studies());
+    let studies = scene.studies(source, quick)?;
+    for &index in &studies {
         let study = &scene.study[index];
         lines.push(format!("study {}", study.name));
         if let Some(error) = &study.fails {
@@ -259,7 +274,10 @@ pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<St
             continue;
         }
         let (source, scene) = scene.of_study(source, index)?;
-        lines.extend(super::explain::one(&source, &scene)?.iter().map(|line| format!("  {line}")));
+        let (own, quantities) = super::explain::one(&source, &scene)?;
+        names.extend(of_study(&study.name, &quantities));
+        lines.extend(own.iter().map(|line| format!("  {line}")));
     }
+    scene.check_expectations(source, &names, &left_out(scene, &studies))?;
     Ok(lines)
 }

@@ -1,11 +1,10 @@
 //! Many runs of one scene over a grid of values: in parallel, one thread each; finished ones are kept.
 
 use super::checkpoint::{self, Header};
-use super::rows::{Row, Rows, STATISTICS};
+use super::rows::{ENDS, Row, Rows, STATISTICS};
 use super::{Failure, Finished, Options, part};
 use crate::error::Error;
 use crate::scene::{Kind, PartScene, kind};
-use polycore::output::picture::{LinePlot, Series};
 use polycore::report::{Phases, Report};
 use polycore::scene::{SceneError, Source};
 use rayon::prelude::*;
@@ -14,6 +13,12 @@ use std::str::FromStr;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
+
+mod search;
+mod table;
+
+pub use search::{Search, search};
+use table::{draw, together};
 
 /// The table of a sweep, in its folder.
 const TABLE: &str = "sweep.csv";
@@ -32,41 +37,72 @@ pub struct Vary {
 impl FromStr for Vary {
     type Err = String;
 
-    /// From `KEY=VALUE,VALUE,…`; commas in brackets, braces and quotes belong to a value.
+    /// From `KEY=VALUE,VALUE,…`; commas in brackets, braces and quotes belong to a value. Keys that change together stand
+    /// behind one another, `KEY=A,B;OTHER=C,D`, with as many values each: the values are then `A;C` and `B;D`.
     fn from_str(text: &str) -> Result<Self, String> {
         let usage = "KEY=VALUE,VALUE,…, e.g. print.layer_time=10s,20s,40s";
-        let (key, list) = text.split_once('=').ok_or_else(|| format!("found `{text}`; allowed: {usage}"))?;
-        let (mut values, mut value, mut depth, mut quoted) = (Vec::new(), String::new(), 0, false);
-        for c in list.chars() {
-            match c {
-                '"' => quoted = !quoted,
-                '[' | '{' if !quoted => depth += 1,
-                ']' | '}' if !quoted => depth -= 1,
-                _ => {}
+        let mut linked = Self { key: String::new(), values: Vec::new() };
+        for part in divided(text, ';') {
+            let (key, list) =
+                part.split_once('=').ok_or_else(|| format!("found `{part}`; allowed: {usage}"))?;
+            let values = divided(list, ',');
+            let key = key.trim();
+            if key.is_empty() || values.iter().any(String::is_empty) {
+                return Err(format!("found `{part}`; allowed: {usage}"));
             }
-            if c == ',' && depth == 0 && !quoted {
-                values.push(std::mem::take(&mut value));
+            if linked.key.is_empty() {
+                linked = Self { key: key.to_owned(), values };
+            } else if linked.values.len() == values.len() {
+                linked.key += &format!(";{key}");
+                linked.values.iter_mut().zip(values).for_each(|(all, value)| *all += &format!(";{value}"));
             } else {
-                value.push(c);
+                let (found, allowed) = (values.len(), linked.values.len());
+                return Err(format!(
+                    "found {found} values of `{key}`; allowed: {allowed}, as the key before it has"
+                ));
             }
         }
-        values.push(value);
-        let values: Vec<String> = values.into_iter().map(|value| value.trim().to_owned()).collect();
-        let key = key.trim().to_owned();
-        if key.is_empty() || values.iter().any(String::is_empty) {
-            return Err(format!("found `{text}`; allowed: {usage}"));
-        }
+        let values = &linked.values;
         if let Some(twice) = (1..values.len()).find(|&k| values[..k].contains(&values[k])) {
             return Err(format!("found `{}` twice; allowed: values that differ", values[twice]));
         }
-        Ok(Self { key, values })
+        Ok(linked)
     }
+}
+
+impl Vary {
+    /// Its keys, several where they change together.
+    fn keys(&self) -> Vec<String> {
+        divided(&self.key, ';')
+    }
+}
+
+/// Pieces between separators that stand in no brackets, braces and quotes.
+fn divided(text: &str, separator: char) -> Vec<String> {
+    let (mut pieces, mut piece, mut depth, mut quoted) = (Vec::new(), String::new(), 0, false);
+    for c in text.chars() {
+        match c {
+            '"' => quoted = !quoted,
+            '[' | '{' if !quoted => depth += 1,
+            ']' | '}' if !quoted => depth -= 1,
+            _ => {}
+        }
+        if c == separator && depth == 0 && !quoted {
+            pieces.push(std::mem::take(&mut piece).trim().to_owned());
+        } else {
+            piece.push(c);
+        }
+    }
+    pieces.push(piece.trim().to_owned());
+    pieces
 }
 
 /// How a sweep behaves towards its user.
 pub struct SweepOptions<'a> {
     /// Where results go; each run in a folder of its own.
     pub output: &'a Path,
+    /// Further values to tell, by name; `*` stands for any text.
+    pub columns: &'a [String],
     /// Time between checkpoints of each run.
     pub checkpoint_every: Duration,
     /// Whether the user asked to stop.
@@ -88,10 +124,33 @@ struct Run {
 /// Faults of the scene or of a key, before anything is run; [`Error::SweepInterrupted`]. What ends a single run does
 /// not end the sweep: its row says so, and the report fails.
 pub fn sweep(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Result<Finished, Failure> {
-    let runs = runs(source, vary)?;
-    refuse_other_keys(vary, options.output)?;
+    let (rows, report) = rows(source, vary, options)?;
+    Ok(Finished { text: rows.text(), report })
+}
+
+/// [`sweep`], and its rows: those asked for first, in their order.
+fn rows(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Result<(Rows, Report), Failure> {
+    let mut runs = runs(source, vary)?;
+    let former = former(vary, options.output)?;
     polycore::output::prepare_directory(options.output)?;
     let _lock = polycore::output::lock_run(options.output)?;
+    // what an earlier sweep of the same scene has finished stays in the table
+    let mut vary = vary.to_vec();
+    for values in former {
+        let name = name(&vary, &values);
+        let run = Run::new(source, &vary, name, values);
+        let known = runs.iter().any(|other| other.name == run.name);
+        if known || run.finished(options.output).is_none() {
+            continue;
+        }
+        for (vary, value) in vary.iter_mut().zip(&run.values) {
+            if !vary.values.contains(value) {
+                vary.values.push(value.clone());
+            }
+        }
+        runs.push(run);
+    }
+    let vary = vary.as_slice();
     let _ = std::fs::remove_file(options.output.join(polycore::report::FILE_NAME));
     let mut phases = Phases::new();
     phases.start("solve");
@@ -99,6 +158,7 @@ pub fn sweep(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Resu
     phases.start("write");
     let rows = Rows {
         settings: vary.iter().map(|vary| vary.key.clone()).collect(),
+        columns: options.columns.to_vec(),
         rows: runs
             .iter()
             .zip(outcomes)
@@ -112,17 +172,19 @@ pub fn sweep(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Resu
     report.phases(&phases).threads(rayon::current_num_threads());
     report.passed &= rows.rows.iter().all(|row| row.outcome.is_ok());
     report.write(options.output)?;
-    Ok(Finished { text: rows.text(), report })
+    Ok((rows, report))
 }
 
-/// The table of a sweep over other keys would be lost.
-fn refuse_other_keys(vary: &[Vary], output: &Path) -> Result<(), Error> {
-    let Ok(mut table) = csv::Reader::from_path(output.join(TABLE)) else { return Ok(()) };
+/// Values of the runs that the table of an earlier sweep has; one over other keys would be lost.
+fn former(vary: &[Vary], output: &Path) -> Result<Vec<Vec<String>>, Error> {
+    let Ok(mut table) = csv::Reader::from_path(output.join(TABLE)) else { return Ok(Vec::new()) };
     let head = table.headers().cloned().unwrap_or_default();
-    let ends = |name: &&str| name.starts_with(STATISTICS[0]) || *name == "steps";
+    let ends = |name: &&str| name.starts_with(STATISTICS[0]) || [ENDS, "steps"].contains(name);
     let keys: Vec<&str> = head.iter().skip(1).take_while(|name| !ends(name)).collect();
     if vary.iter().map(|vary| vary.key.as_str()).eq(keys.iter().copied()) {
-        return Ok(());
+        let values =
+            |row: csv::StringRecord| row.iter().skip(1).take(keys.len()).map(str::to_owned).collect();
+        return Ok(table.records().flatten().map(values).collect());
     }
     let reason =
         format!("found a sweep over {}; allowed: one over the same keys, or another folder", keys.join(", "));
@@ -138,9 +200,10 @@ fn runs(source: &Source, vary: &[Vary]) -> Result<Vec<Run>, Failure> {
     if !scene.study.is_empty() {
         return Err(source.error("study", "a sweep of a scene with studies", "a scene without").into());
     }
-    if let Some(twice) = (1..vary.len()).find(|&k| vary[..k].iter().any(|other| other.key == vary[k].key)) {
+    let keys: Vec<String> = vary.iter().flat_map(Vary::keys).collect();
+    if let Some(twice) = (1..keys.len()).find(|&k| keys[..k].contains(&keys[k])) {
         let reason = "found the key twice; allowed: each key once, with all its values".to_owned();
-        return Err(Error::Option { option: format!("--vary {}", vary[twice].key), reason }.into());
+        return Err(Error::Option { option: format!("--vary {}", keys[twice]), reason }.into());
     }
     let count = vary.iter().map(|vary| vary.values.len()).try_fold(1, usize::checked_mul);
     let Some(count) = count.filter(|&count| count <= MOST) else {
@@ -157,30 +220,12 @@ fn runs(source: &Source, vary: &[Vary]) -> Result<Vec<Run>, Failure> {
             values.insert(0, vary.values[rest % vary.values.len()].clone());
             rest /= vary.values.len();
         }
-        let mut name: String =
-            vary.iter().zip(&values).map(|(vary, value)| named(&vary.key, value)).collect();
-        name = name.trim_start_matches('_').to_owned();
+        let mut name = name(vary, &values);
         let same = runs.iter().filter(|run| run.name == name).count();
         if same > 0 {
             name += &format!("-{}", same + 1);
         }
-        let mut set: Vec<String> = vary
-            .iter()
-            .zip(&values)
-            .map(|(vary, value)| format!("{} = {}", quoted(&vary.key), literal(value)))
-            .collect();
-        for key in ["output.pictures", "output.fields"] {
-            if !vary.iter().any(|vary| vary.key == key) {
-                set.push(format!("{} = false", quoted(key)));
-            }
-        }
-        let text = format!(
-            "{}\n\n# a run of a sweep\n[[study]]\nname = {}\nset = {{ {} }}\n",
-            source.text.trim_end(),
-            quoted(&name),
-            set.join(", ")
-        );
-        runs.push(Run { name, values, source: Source::new(&source.path, text) });
+        runs.push(Run::new(source, vary, name, values));
     }
     // every problem is built once before anything is computed: faults show at once
     let faults: Vec<Option<SceneError>> = runs.par_iter().map(|run| run.check().err()).collect();
@@ -197,6 +242,31 @@ fn runs(source: &Source, vary: &[Vary]) -> Result<Vec<Run>, Failure> {
 }
 
 impl Run {
+    fn new(source: &Source, vary: &[Vary], name: String, values: Vec<String>) -> Self {
+        let keys: Vec<String> = vary.iter().flat_map(Vary::keys).collect();
+        let each = keys.iter().zip(values.iter().flat_map(|value| divided(value, ';')));
+        let mut set: Vec<String> =
+            each.map(|(key, value)| format!("{} = {}", quoted(key), literal(&value))).collect();
+        for key in ["output.pictures", "output.fields"] {
+            if !keys.iter().any(|other| other == key) {
+                set.push(format!("{} = false", quoted(key)));
+            }
+        }
+        let text = format!(
+            "{}\n\n# a run of a sweep\n[[study]]\nname = {}\nset = {{ {} }}\n",
+            source.text.trim_end(),
+            quoted(&name),
+            set.join(", ")
+        );
+        Self { name, values, source: Source::new(&source.path, text) }
+    }
+
+    /// Its report, where it is finished in the folder of a sweep.
+    fn finished(&self, sweep: &Path) -> Option<Report> {
+        let report = Report::read(sweep.join(&self.name).join(polycore::report::FILE_NAME)).ok()?;
+        (report.provenance.scene == self.source.text).then_some(report)
+    }
+
     fn check(&self) -> Result<(), SceneError> {
         let scene = self.source.parse::<PartScene>()?;
         scene.studies(&self.source, false)?;
@@ -209,19 +279,52 @@ impl Run {
         const SET: &str = "study[0].set.";
         let key = fault.key().unwrap_or_default().trim_start_matches(SET);
         let at_key = |vary: &&Vary| {
-            key.strip_prefix(vary.key.as_str())
-                .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+            let within = |rest: &str| rest.is_empty() || rest.starts_with(['.', '[']);
+            vary.keys().iter().any(|own| key.strip_prefix(own.as_str()).is_some_and(within))
         };
         let named: Vec<&Vary> = vary.iter().filter(at_key).collect();
         let options = vary.iter().zip(&self.values).filter(|(v, _)| named.is_empty() || named.contains(v));
         let option: Vec<String> =
             options.map(|(vary, value)| format!("--vary {}={value}", vary.key)).collect();
-        let reason = fault.message().replace(SET, "");
+        let mut reason = fault.message().replace(SET, "");
+        // of a key that the scene has elsewhere
+        if let Some((before, _)) = reason.split_once(" in `study[0].set`")
+            && let Some(name) = before.split('`').nth(1)
+            && let Ok(value) = self.source.parse::<serde_json::Value>()
+        {
+            let mut paths = Vec::new();
+            paths_of(&value, name, "", &mut paths);
+            reason = format!("{before}: a key is a path from the top of the scene");
+            if let Some(path) = paths.first() {
+                reason += &format!("; did you mean `{path}`?");
+            }
+        }
         let reason = match named[..] {
             [vary] => reason.trim_start_matches(&format!("`{}`: ", vary.key)).to_owned(),
             _ => reason,
         };
         Error::Option { option: option.join(" "), reason }
+    }
+}
+
+/// Paths of the keys of a scene that have a name, blocks of studies left out.
+fn paths_of(value: &serde_json::Value, name: &str, above: &str, paths: &mut Vec<String>) {
+    match value {
+        serde_json::Value::Object(table) => {
+            for (key, value) in table.iter().filter(|(key, _)| !(above.is_empty() && *key == "study")) {
+                let path = if above.is_empty() { key.clone() } else { format!("{above}.{key}") };
+                if key == name {
+                    paths.push(path.clone());
+                }
+                paths_of(value, name, &path, paths);
+            }
+        }
+        serde_json::Value::Array(list) => {
+            for (index, value) in list.iter().enumerate() {
+                paths_of(value, name, &format!("{above}[{index}]"), paths);
+            }
+        }
+        _ => {}
     }
 }
 
@@ -262,7 +365,7 @@ fn solve(runs: &[Run], options: &mut SweepOptions) -> Result<Vec<Result<Report, 
         while !interrupted() {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let (Some(run), Some(place)) = (runs.get(index), outcomes.get(index)) else { break };
-            let outcome = one(run, &output.join(&run.name), every, interrupted);
+            let outcome = one(run, output, every, interrupted);
             if let Ok(mut place) = place.lock() {
                 *place = Some(outcome);
             }
@@ -293,134 +396,47 @@ fn solve(runs: &[Run], options: &mut SweepOptions) -> Result<Vec<Result<Report, 
     Ok(told)
 }
 
-/// One run: kept where it is finished, gone on with where it is begun.
+/// One run: kept where it is finished, gone on with where it is begun. The scene's expectations are judged on it.
 fn one(
     run: &Run,
-    output: &Path,
+    sweep: &Path,
     every: Duration,
     interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Result<Report, Failure> {
-    if let Ok(report) = Report::read(output.join(polycore::report::FILE_NAME))
-        && report.provenance.scene == run.source.text
-    {
-        return Ok(report);
-    }
-    let begun = |header: Header| header.scene == run.source.text;
-    let resume = checkpoint::header(output).is_ok_and(begun);
-    let mut progress = |_: &super::Progress| {};
-    let mut options = Options {
-        output,
-        quick: false,
-        checkpoint_every: every,
-        resume,
-        interrupted,
-        progress: &mut progress,
-    };
     let (source, scene) = run.source.parse::<PartScene>()?.of_study(&run.source, 0)?;
-    part::one(&source, &scene, Some(&run.name), &mut options)
-}
-
-/// Every statistic of every run, and as curves against the number of the run.
-fn together(source: &Source, vary: &[Vary], rows: &Rows) -> Report {
-    let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
-    let finished = || rows.rows.iter().filter_map(|row| Some((row, row.outcome.as_ref().ok()?)));
-    let numbers: Vec<f64> =
-        rows.rows.iter().zip(1..).filter(|(row, _)| row.outcome.is_ok()).map(|(_, k)| f64::from(k)).collect();
-    let mut columns = vec![("run".to_owned(), String::new(), numbers)];
-    for (index, vary) in vary.iter().enumerate() {
-        if let Some((values, unit)) = numeric(&vary.values) {
-            let of = |text: &String| values[vary.values.iter().position(|v| v == text).unwrap_or(0)];
-            let list = finished().map(|(row, _)| of(&row.settings[index])).collect();
-            columns.push((vary.key.clone(), unit, list));
-        }
-    }
-    for field in rows.fields() {
-        for statistic in STATISTICS {
-            let name = format!("{statistic}{field}");
-            let list = finished().map(|(_, report)| report.scalar(&name).unwrap_or(0.0)).collect();
-            columns.push((name, String::new(), list));
-        }
-    }
-    let views: Vec<(&str, &str, Vec<f64>)> =
-        columns.iter().map(|(name, unit, list)| (name.as_str(), unit.as_str(), list.clone())).collect();
-    report.curve("sweep", &views);
-    report.value("failed_runs", (rows.rows.len() - finished().count()) as f64, "");
-    report.work("runs", rows.rows.len() as u64);
-    report.work("steps", finished().filter_map(|(_, own)| own.work.get("steps")).sum());
-    report
-}
-
-/// The numbers of values that have one unit, and the unit.
-fn numeric(values: &[String]) -> Option<(Vec<f64>, String)> {
-    let split = |text: &String| -> Option<(f64, String)> {
-        let end = text.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(text.len());
-        Some((text[..end].parse().ok()?, text[end..].trim().to_owned()))
-    };
-    let all: Vec<(f64, String)> = values.iter().map(split).collect::<Option<_>>()?;
-    let unit = all.first()?.1.clone();
-    all.iter().all(|(_, other)| *other == unit).then(|| (all.iter().map(|(x, _)| *x).collect(), unit))
-}
-
-/// sweep_FIELD.png: mean, least and largest at the end (the mean only where several keys vary), and
-/// sweep_deviation_of_FIELD.png, against the first key, with a line for each combination of the others.
-fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
-    let Some(first) = vary.first().filter(|vary| vary.values.len() > 1) else { return Ok(()) };
-    let (places, label) = match numeric(&first.values) {
-        Some((places, unit)) if unit.is_empty() => (places, first.key.clone()),
-        Some((places, unit)) => (places, format!("{} [{}]", first.key, unit.replace("degC", "°C"))),
+    let mut report = match run.finished(sweep) {
+        Some(report) => report,
         None => {
-            let names = first.values.join(", ");
-            ((1..=first.values.len()).map(|k| k as f64).collect(), format!("{}: {names}", first.key))
+            let output = &sweep.join(&run.name);
+            let begun = |header: Header| header.scene == run.source.text;
+            let resume = checkpoint::header(output).is_ok_and(begun);
+            let mut progress = |_: &super::Progress| {};
+            let checkpoint_every = every;
+            let mut options = Options {
+                output,
+                quick: false,
+                checkpoint_every,
+                resume,
+                interrupted,
+                progress: &mut progress,
+            };
+            part::one(&source, &scene, Some(&run.name), &mut options)?
         }
     };
-    let mut others: Vec<String> = rows.rows.iter().map(|row| row.settings[1..].join(", ")).collect();
-    others.dedup();
-    others.sort();
-    others.dedup();
-    for field in rows.fields() {
-        let line = |other: &String, statistic: &str| {
-            let mut points: Vec<(f64, f64)> = rows
-                .rows
-                .iter()
-                .filter(|row| row.settings[1..].join(", ") == *other)
-                .filter_map(|row| {
-                    let value = row.outcome.as_ref().ok()?.scalar(&format!("{statistic}{field}"))?;
-                    Some((places[first.values.iter().position(|v| *v == row.settings[0])?], value))
-                })
-                .collect();
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let name = [statistic.trim_end_matches("_of_").trim_end_matches('_'), other];
-            let name: Vec<&str> = name.into_iter().filter(|part| !part.is_empty()).collect();
-            let name = name.join(", ").replace("degC", " °C");
-            let (x, y): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
-            Series::marked_line(&name, &x, &y)
-        };
-        let plot = |statistics: &[&str], what: &str| {
-            let mut plot = LinePlot::new("At the end").axes(&label, what).size(800.0, 480.0);
-            for other in &others {
-                for statistic in statistics {
-                    plot = plot.series(line(other, statistic));
-                }
-            }
-            plot
-        };
-        let unit = if field == "temperature" {
-            ["temperature [°C]", "deviation of temperature [K]"]
-        } else {
-            ["", ""]
-        };
-        let what = if unit[0].is_empty() { field.as_str() } else { unit[0] };
-        let shown = if others.len() > 1 { &STATISTICS[..1] } else { &STATISTICS[..3] };
-        plot(shown, what).write(output.join(format!("sweep_{field}.png")))?;
-        let deviation = format!("deviation of {field}");
-        let what = if unit[1].is_empty() { deviation.as_str() } else { unit[1] };
-        plot(&STATISTICS[3..], what).write(output.join(format!("sweep_deviation_of_{field}.png")))?;
-    }
-    Ok(())
+    report.judge(&scene.expect, false);
+    Ok(report)
+}
+
+/// `layer_time-10s_film-20W_m_2_K`, of values of keys.
+fn name(vary: &[Vary], values: &[String]) -> String {
+    let each = vary.iter().flat_map(Vary::keys).zip(values.iter().flat_map(|value| divided(value, ';')));
+    let name: String = each.map(|(key, value)| named(&key, &value)).collect();
+    name.trim_start_matches('_').to_owned()
 }
 
 #[cfg(test)]
 mod tests {
+    use super::table::numeric;
     use super::*;
 
     #[test]
@@ -431,7 +447,11 @@ mod tests {
         assert_eq!(values("a=10s, 20 s"), ["10s", "20 s"]);
         assert_eq!(values("a=[1,2],[3,4]"), ["[1,2]", "[3,4]"]);
         assert_eq!(values("a={x=[1,2],y=2},\"p,q\""), ["{x=[1,2],y=2}", "\"p,q\""]);
-        for wrong in ["a", "a=", "=1", "a=1,,2", "a=1,1"] {
+        let linked = of("print.layer_time=5s,10s; time.end = 60s,120s").unwrap();
+        assert_eq!((linked.key.as_str(), linked.keys().len()), ("print.layer_time;time.end", 2));
+        assert_eq!(linked.values, ["5s;60s", "10s;120s"]);
+        assert_eq!(name(&[linked], &["5s;60s".into()]), "layer_time-5s_end-60s");
+        for wrong in ["a", "a=", "=1", "a=1,,2", "a=1,1", "a=1,2;b=3", "a=1;"] {
             assert!(of(wrong).unwrap_err().contains("allowed"), "{wrong}");
         }
     }

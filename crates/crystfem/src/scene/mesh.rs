@@ -22,6 +22,9 @@ const BAR_KEYS: [(&str, &str); 9] = [
     ("growth of elements", "substrate.growth"),
 ];
 
+/// A part larger than this is none that is printed, m: the unit of its file is missing.
+const LARGE: f64 = 2.0;
+
 /// Where parameters of a tube stand in its block.
 const TUBE_KEYS: [(&str, &str); 6] = [
     ("radius of the bore", "radii"),
@@ -166,6 +169,9 @@ impl MeshSpec {
             let unit = self.unit.map_or(1.0, |unit| unit.si());
             let found = read(&path, unit).map_err(|error| at("mesh.file", error))?;
             notes = found.notes;
+            if let Some(suspicion) = self.without_unit(source, &found.mesh) {
+                notes.push(suspicion.message().to_owned());
+            }
             notes.extend(found.quality.notes.clone());
             return Ok(Built { volume: found.quality.volume, mesh: found.mesh, notes });
         };
@@ -176,6 +182,15 @@ impl MeshSpec {
 }
 
 impl MeshSpec {
+    /// Of a mesh of a file without `unit` that is metres large: that the unit may be missing.
+    pub(super) fn without_unit(&self, source: &Source, mesh: &Mesh) -> Option<SceneError> {
+        let [low, high] = mesh.bounds().filter(|_| self.file.is_some() && self.unit.is_none())?;
+        let [x, y, z] = [0, 1, 2].map(|d| ((high[d] - low[d]) * 1e6).round() / 1e6);
+        let found = format!("nothing, and with the file's unit as 1 m the part is {x} × {y} × {z} m");
+        let allowed = "`unit`, e.g. \"1 mm\"; or `unit = \"1 m\"` where it is so large";
+        (x.max(y).max(z) > LARGE).then(|| source.error("mesh.unit", found, allowed))
+    }
+
     /// Cells along each axis of a bar, brick or tube, before anything of it is allocated: they may be too many. None of
     /// a file.
     ///

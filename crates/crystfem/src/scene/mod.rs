@@ -3,6 +3,7 @@
 mod convergence;
 mod curve;
 mod either;
+mod expect;
 mod fault;
 mod fit;
 mod material;
@@ -23,6 +24,7 @@ pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec, TubeSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, PointScene, PointSpec};
 pub use problem::Task;
+pub(crate) use problem::millimetres;
 pub use schedule::{ScheduleSpec, TimesSpec};
 pub use study::StudySpec;
 

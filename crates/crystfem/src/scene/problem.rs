@@ -17,6 +17,8 @@ use std::sync::Arc;
 /// Temporal error in a step, K, and rms error of solves, K, unless a scene says otherwise.
 const TOLERANCE: f64 = 0.1;
 const SOLVES: f64 = 1e-7;
+/// A temperature below which a scene is asked whether it means °C, K.
+const COLD: f64 = 200.0;
 /// First step over the end, and smallest over the first.
 const FIRST: f64 = 1e-6;
 const SMALLEST: f64 = 1e-3;
@@ -59,6 +61,7 @@ impl PartScene {
         let probes = self.places(source, &mesh, &mut notes)?;
         let (materials, material_of, temperature_of) = self.regions(source, &mesh)?;
         let conditions = self.conditions(source, &mesh)?;
+        self.note_cold(source, &mut notes)?;
         let mut heats = Vec::new();
         for (index, spec) in self.source.iter().enumerate() {
             let elements =
@@ -67,7 +70,10 @@ impl PartScene {
             heats.push(Heat { elements, power });
         }
         let Laid { births, absent, layers, end: by_itself } = match &self.print {
-            Some(print) => print.laid(source, &mesh, &mut notes)?,
+            Some(print) => print.laid(source, &mesh, &mut notes).map_err(|fault| {
+                // a file in millimetres that is read in metres has few layers, or lies far away
+                self.mesh.without_unit(source, &mesh).unwrap_or(fault)
+            })?,
             None => Laid::default(),
         };
         let end = self.time.end.map_or(by_itself, |end| end.si());
@@ -106,6 +112,32 @@ impl PartScene {
         problem.check().map_err(|error| located(source, "mesh", &error))?;
         let settings = self.settings(end, problem.shortest_period());
         Ok(Task { problem, settings, end, printed, layers, probes, notes })
+    }
+
+    /// Notes temperatures at which no part is made: numbers in °C that were written as K.
+    fn note_cold(&self, source: &Source, notes: &mut Vec<String>) -> Result<(), SceneError> {
+        let mut written = Vec::new();
+        for (index, region) in self.region.iter().enumerate() {
+            written.push((format!("region[{index}].temperature"), region.temperature.si()));
+        }
+        for (index, boundary) in self.boundary.iter().enumerate() {
+            for (name, given) in [("temperature", &boundary.temperature), ("ambient", &boundary.ambient)] {
+                let key = format!("boundary[{index}].{name}");
+                if let Some(given) = given {
+                    written.push((key.clone(), given.build(source, &key)?.lowest()));
+                }
+            }
+        }
+        if let Some(print) = &self.print {
+            let key = "print.temperature".to_owned();
+            let lowest = print.temperature.build(source, &key)?.lowest();
+            written.push((key, lowest));
+        }
+        for (key, kelvin) in written.into_iter().filter(|(_, kelvin)| *kelvin < COLD) {
+            notes
+                .push(format!("`{key}` is {kelvin} K, which is {:.2} °C: is `degC` meant?", kelvin - 273.15));
+        }
+        Ok(())
     }
 
     /// Where each probe lies in the mesh.
@@ -292,7 +324,7 @@ pub(super) fn elements(
 }
 
 /// A place as a scene would have it.
-pub(super) fn millimetres(place: [f64; 3]) -> String {
+pub(crate) fn millimetres(place: [f64; 3]) -> String {
     // to a nanometre: what was written, not its rounding
     let [x, y, z] = place.map(|x| (1e9 * x).round() / 1e6);
     format!("({x}, {y}, {z}) mm")

@@ -130,6 +130,8 @@ fn arrays_that_do_not_fit_are_refused() {
     assert!(fail(1.0, &points, &[("a", 2, &[1.0, 2.0])]).contains("2 values for 2 points of 2 components"));
     assert!(fail(1.0, &points, &[("a", 0, &[])]).contains("0 components"));
     assert!(fail(1.0, &points, &[a, a]).contains("given twice"));
+    let broken = fail(1.0, &points, &[("a", 1, &[1.0, f64::NAN])]);
+    assert!(broken.contains("`a` is not finite: NaN at point 1, [1.0, 1.0, 1.0] m, time 1"), "{broken}");
     assert!(fail(1.0, &points, &[("x/y", 1, &[1.0, 2.0])]).contains("not a valid name"));
     assert!(fail(1.0, &points, &[]).contains("the steps before have 2 points with a[1]"));
     assert!(fail(1.0, &[[0.0; 3]], &[("a", 1, &[1.0])]).contains("has 1 points"));

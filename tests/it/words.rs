@@ -1,0 +1,151 @@
+//! What `crystfem` says of slips that would pass in silence, and how much it says.
+
+use crate::parts::BAR;
+use crate::program::{Ended, command, finish};
+use std::fs;
+use std::path::Path;
+
+fn crystfem(arguments: &str, here: &Path) -> Ended {
+    finish(command("crystfem", arguments, here).spawn().unwrap())
+}
+
+#[test]
+fn slips_are_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let write = |name: &str, text: &str| fs::write(here.join(name), text).unwrap();
+    // a quantity that no run reports
+    let expect = "\n[[expect]]\nquantity = \"layer-1.min_crystallinity\"\nat_least = 0.2\nkind = \"bound\"\nsource = \"none\"\n";
+    write("expect.toml", &(BAR.to_owned() + expect));
+    for verb in ["check", "run"] {
+        let ended = crystfem(&format!("{verb} expect.toml"), here).with_code(2);
+        ended.tells("`expect[0].quantity`: found `layer-1.min_crystallinity`; allowed: ");
+        ended.tells("`layer-1.mean_crystallinity`");
+    }
+    let studies = "\n[[study]]\nname = \"a\"\n[[study]]\nname = \"b\"\nquick = false\n";
+    write("studies.toml", &(BAR.to_owned() + studies + &expect.replace("layer-1.min", "b.layer-1.min")));
+    crystfem("check studies.toml", here).with_code(2).tells("`b.layer-1.min_crystallinity`");
+    crystfem("check studies.toml --quick", here).with_code(0);
+    // kelvins that were meant as degrees
+    write("cold.toml", &BAR.replace("ambient = \"100 degC\"", "ambient = \"60 K\""));
+    let told = crystfem("check cold.toml", here).with_code(0);
+    told.shows("note       `boundary[1].ambient` is 60 K, which is -213.15 °C: is `degC` meant?");
+    told.shows("builds     a mesh that reaches from (-12, -6, -2) mm to (12, 6, 1.5) mm");
+    // a leg that is a jump
+    write(
+        "point.toml",
+        "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"semicrystalline\"\ndensity = \"1010 kg/m^3\"\n\
+         conductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg K)\"\nkinetics = \"table-4.1-column-1\"\n\
+         crystallinity = 0.25\n[[point]]\nname = \"p\"\nstart = \"200 degC\"\nlegs = [{ to = \"120 degC\" }]\n",
+    );
+    crystfem("check point.toml", here)
+        .with_code(0)
+        .shows("1 segments, 0 s, 1 of them jumps (neither `rate` nor `duration`)");
+    // a key of a sweep without its block
+    write("bar.toml", BAR);
+    let ended = crystfem("sweep bar.toml --vary layer_time=5s", here).with_code(2);
+    ended
+        .tells("`--vary layer_time=5s`: unknown key `layer_time`: a key is a path from the top of the scene");
+    ended.tells("did you mean `print.layer_time`?");
+}
+
+/// A mesh written in millimetres whose unit is not given is metres large.
+#[test]
+fn a_mesh_without_its_unit() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let mesh = "*NODE\n1, 0, 0, 0\n2, 60, 0, 0\n3, 60, 10, 0\n4, 0, 10, 0\n5, 0, 0, 6\n6, 60, 0, 6\n7, 60, 10, 6\n\
+                8, 0, 10, 6\n*ELEMENT, TYPE=C3D8, ELSET=part\n1, 1, 2, 3, 4, 5, 6, 7, 8\n";
+    fs::write(here.join("part.inp"), mesh).unwrap();
+    let scene = |unit: &str, height: &str| {
+        let from = BAR.find("[mesh.bar]").unwrap();
+        let to = BAR.find("[materials.pa12]").unwrap();
+        let text = BAR.replace(&BAR[from..to], &format!("[mesh]\nfile = \"part.inp\"\n{unit}\n"));
+        let text = text.replace("elements = \"bar\"", "elements = \"part\"");
+        let print = format!("layer_time = \"10 s\"\nelements = \"part\"\nlayer_height = \"{height}\"");
+        let text = text
+            .replace("layer_time = \"10 s\"", &print)
+            .replace("[\"0 mm\", \"0 mm\", \"0.75 mm\"]", "[\"1 mm\", \"1 mm\", \"1 mm\"]");
+        fs::write(here.join("part.toml"), text).unwrap();
+    };
+    scene("", "0.5 mm");
+    let ended = crystfem("check part.toml", here).with_code(2);
+    ended.tells("`mesh.unit`: found nothing, and with the file's unit as 1 m the part is 60 × 10 × 6 m");
+    scene("unit = \"1 mm\"", "6 mm");
+    crystfem("check part.toml", here).with_code(0).shows("reaches from (0, 0, 0) mm to (60, 10, 6) mm");
+}
+
+/// A screen holds what is said of a run; the file has all.
+#[test]
+fn few_lines() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let bar = BAR.replace("tolerance = \"1 K\"", "tolerance = \"3 K\"").replace("layers = 3", "layers = 12");
+    fs::write(here.join("bar.toml"), bar.replace("layer_time = \"10 s\"", "layer_time = \"5 s\"")).unwrap();
+    let ended = crystfem("run bar.toml --output out", here).with_code(0);
+    assert!(ended.stdout.lines().count() < 40, "{}", ended.stdout);
+    ended.shows(" more values in report.json");
+}
+
+/// Values of layers and what is expected of each run in the table of a sweep, which a shorter sweep does not lose.
+#[test]
+fn columns_of_a_sweep() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let expect = "\n[[expect]]\nquantity = \"layer-3.least_crystallinity\"\nat_least = 0.2\nkind = \"bound\"\nsource = \"none\"\n";
+    let bar = BAR
+        .replace("tolerance = \"1 K\"", "tolerance = \"3 K\"")
+        .replace("end = \"120 s\"", "end = \"30 s\"");
+    fs::write(here.join("bar.toml"), bar + expect).unwrap();
+    let sweep = |values: &str| {
+        let line = format!(
+            "sweep bar.toml --vary print.layer_time={values} --column layer-*.mean_crystallinity -o out"
+        );
+        crystfem(&line, here).with_code(0);
+        fs::read_to_string(here.join("out/sweep.csv")).unwrap()
+    };
+    let rows = sweep("1s,12s");
+    let head = rows.lines().next().unwrap();
+    assert!(
+        head.contains(
+            "layer-1.mean_crystallinity,layer-2.mean_crystallinity,layer-3.mean_crystallinity,passed,steps"
+        ),
+        "{head}"
+    );
+    // 28 s and 6 s after the third layer
+    assert!(rows.contains(",yes,") && rows.contains(",no: layer-3.least_crystallinity,"), "{rows}");
+    assert_eq!(sweep("12s"), {
+        let lines: Vec<&str> = rows.lines().collect();
+        [lines[0], lines[2], lines[1]].map(|line| line.to_owned() + "\n").concat()
+    });
+    // another scene is another sweep
+    let text = fs::read_to_string(here.join("bar.toml")).unwrap();
+    fs::write(here.join("bar.toml"), text.replace("film = \"15 W", "film = \"16 W")).unwrap();
+    assert_eq!(sweep("12s").lines().count(), 2);
+}
+
+/// Bisection by runs: the answer meets what is expected, a hundredth of the interval less does not, and all is in the table.
+#[test]
+fn the_least_value_that_passes() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    // crystals of the whole bar after a time that is sought, without anything printed: one run is a few steps
+    let bar = BAR
+        .replace("[print]\ntemperature = \"220 degC\"\nlayer_time = \"10 s\"\n", "")
+        .replace("1 K\"", "4 K\"");
+    let expect =
+        "\n[[expect]]\nquantity = \"mean_alpha\"\nat_least = 0.5\nkind = \"bound\"\nsource = \"none\"\n";
+    fs::write(here.join("bar.toml"), bar.clone() + expect).unwrap();
+    let ended = crystfem("sweep bar.toml --search time.end=5s..105s -o out", here).with_code(0);
+    ended.shows(" is the least that meets all that is expected; ");
+    let line = ended.stdout.lines().find(|line| line.starts_with("time.end = ")).unwrap();
+    let numbers: Vec<f64> = line.split([' ', 's']).filter_map(|word| word.parse().ok()).collect();
+    assert!(numbers.len() == 2 && numbers[0] > numbers[1] && numbers[0] - numbers[1] <= 1.0 + 1e-9, "{line}");
+    let rows = fs::read_to_string(here.join("out/sweep.csv")).unwrap();
+    // two ends, and seven halves of 100 s
+    assert_eq!(rows.lines().count(), 1 + 2 + 7, "{rows}");
+    fs::write(here.join("bar.toml"), bar).unwrap();
+    crystfem("sweep bar.toml --search time.end=5s..105s -o none", here)
+        .with_code(2)
+        .tells("without [[expect]]");
+}
