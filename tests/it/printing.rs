@@ -143,8 +143,8 @@ fn a_path_beside_the_part() {
     // half of the wall beside the part: two of its sides lie outside
     scene("offset = [\"-95 mm\", \"-105 mm\", \"0 mm\"]");
     let told = crystfem("check cube.toml", here).with_code(0);
-    // of 76 mm of a layer 19 and twice 9.5 lie at x > 20 mm; 28 elements are under the rest
-    told.shows("the beads cover 7.2 % of the part; 50.0 % of their length lies outside of it");
+    // of 76 mm of a layer 19 and twice 9.5 lie at x > 20 mm; 38 elements are under the rest
+    told.shows("the beads cover 9.5 % of the part; 50.0 % of their length lies outside of it");
     scene("centre = true\nfill = true");
     let told = crystfem("check cube.toml", here).with_code(0);
     told.shows("the beads cover 19.0 % of the part; 0.0 % of their length lies outside of it; with gaps filled 100.0 %");
@@ -156,17 +156,18 @@ fn a_path_beside_the_part() {
 fn a_table_of_moves_with_units() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    fs::write(here.join("line.csv"), "time [s],x [mm],y [mm],z [mm],print\n0,0,10,0.5,0\n2,20,10,0.5,1\n")
-        .unwrap();
-    fs::write(here.join("brick.toml"), BRICK.replace("wall.gcode", "line.csv")).unwrap();
+    let moves = "0,0,10.5,0.5,0\n2,20,10.5,0.5,1\n";
+    fs::write(here.join("line.csv"), format!("time [s],x [mm],y [mm],z [mm],print\n{moves}")).unwrap();
+    let scene = BRICK.replace("wall.gcode\"", "line.csv\"\nwindow = \"0.3 s\"");
+    fs::write(here.join("brick.toml"), scene).unwrap();
     let told = crystfem("check brick.toml", here).with_code(0);
-    told.shows("40 elements in all");
-    told.shows("100 births");
-    // the last element is passed at 1.95 s, which is 98 windows of 20 ms
+    told.shows("20 elements in all");
+    // the last of them is passed at 1.95 s and born at the end of its window, 2.15 s, after the path
+    told.shows("ends at    2.4");
     crystfem("run brick.toml --output out", here).with_code(0);
     // in metres it lies far away
-    fs::write(here.join("line.csv"), "time,x,y,z,print\n0,0,10,0.5,0\n2,20,10,0.5,1\n").unwrap();
+    fs::write(here.join("line.csv"), format!("time,x,y,z,print\n{moves}")).unwrap();
     crystfem("check brick.toml", here)
         .with_code(2)
-        .tells("from (0, 10000, 499.5) mm to (20000, 10000, 500) mm");
+        .tells("from (0, 10500, 499.5) mm to (20000, 10500, 500) mm");
 }

@@ -140,7 +140,7 @@ pub fn births(probes: &[Probe], names: &[&'static str], times: &[f64], report: &
             report.value(&name("jump_"), after(&probe.temperature, f64::max), "K");
             for (field, values) in names.iter().zip(&probe.fields).filter(|(_, v)| !v[before].is_nan()) {
                 report.value(&name(&format!("{field}_")), values[before], "");
-                report.value(&name(&format!("{field}_lost_")), -after(values, f64::min), "");
+                report.value(&name(&format!("{field}_lost_")), after(values, f64::min).abs(), "");
             }
         }
     }

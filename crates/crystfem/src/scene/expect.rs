@@ -45,17 +45,14 @@ impl PartScene {
         names
     }
 
-    /// Names that studies and convergence add to those of the studies' runs, which have their study's name before them.
+    /// Names that studies which must fail add to those of the runs of the others, which have their study's name before them.
     pub fn quantities_of_studies(&self) -> Vec<String> {
         let failing = self.study.iter().filter(|study| study.fails.is_some());
-        let failing = failing.map(|study| format!("{}.failed_as_it_must", study.name));
-        let orders = self.convergence.iter();
-        let orders = orders.flat_map(|spec| ["limit", "order"].map(|what| format!("{}.{what}", spec.name)));
-        failing.chain(orders).collect()
+        failing.map(|study| format!("{}.failed_as_it_must", study.name)).collect()
     }
 
     /// Refuses an expectation of a quantity that no run of the scene reports; those of studies that are left out of it,
-    /// `absent`, are passed over.
+    /// `absent`, and what compares studies are passed over.
     ///
     /// # Errors
     /// The quantity, and names like it.
@@ -67,9 +64,11 @@ impl PartScene {
     ) -> Result<(), SceneError> {
         for (index, expect) in self.expect.iter().enumerate() {
             let quantity = expect.quantity.as_str();
-            let left_out = absent
-                .iter()
-                .any(|study| quantity.strip_prefix(study).is_some_and(|rest| rest.starts_with('.')));
+            let first = quantity.split_once('.').map(|(first, _)| first);
+            // what compares studies has names of its own
+            let of_several =
+                !self.study.is_empty() && !self.study.iter().any(|study| first == Some(study.name.as_str()));
+            let left_out = first.is_some_and(|first| of_several || absent.contains(&first));
             if !left_out && !names.iter().any(|name| name == quantity) {
                 let known: Vec<&str> = names.iter().map(String::as_str).collect();
                 return Err(source.unknown(&format!("expect[{index}].quantity"), quantity, &known));

@@ -9,7 +9,7 @@
 use super::{Dataset, Path, Row, Split, Standardisation};
 use crate::Error;
 use crate::kinematics::{cauchy_of_material, stretch_of};
-use polycore::output::hdf5::dataset;
+use polycore::output::hdf5::{Created, dataset};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use rust_hdf5::{H5File, H5Group};
 
@@ -38,13 +38,13 @@ pub fn write(
         .tempdir_in(folder.unwrap_or(".".as_ref()))
         .map_err(Error::io("create a folder beside", path))?;
     let inside = temporary.path().join("data.h5");
-    fill(&inside, set, split).map_err(|error| Error::file(path, error, "a set that can be written"))?;
+    fill(&inside, set, split).map_err(|error| polycore::output::hdf5::write_error(path, error))?;
     std::fs::File::open(&inside).and_then(|file| file.sync_all()).map_err(Error::io("synchronise", path))?;
     std::fs::rename(&inside, path).map_err(Error::io("write", path))
 }
 
 fn fill(path: &std::path::Path, set: &Dataset, split: Option<(&Split, &Standardisation)>) -> Hdf5<()> {
-    let file = H5File::create(path)?;
+    let file = Created::new(path)?;
     let root = file.root_group();
     file.set_attr_string("format", FORMAT)?;
     file.set_attr_numeric("skipped", &(set.skipped as i64))?;

@@ -1,6 +1,11 @@
-//! Datasets of HDF5 files that others hand in: none is read before its size is believable.
+//! Datasets of HDF5 files that others hand in: none is read before its size is believable. Files that are written, and what
+//! their errors say.
 
+use crate::Error;
 use rust_hdf5::{H5Dataset, H5File, Hdf5Error};
+use std::mem::ManuallyDrop;
+use std::ops::Deref;
+use std::path::Path;
 
 /// Deflate packs at best 1032 bytes into one (Deutsch 1996, RFC 1951: 258 bytes in two bits).
 const BEST_PACKING: f64 = 1032.0;
@@ -31,6 +36,52 @@ pub fn dataset(file: &H5File, name: &str, file_bytes: u64) -> Result<H5Dataset, 
     Ok(dataset)
 }
 
+/// A file that is being written. One that is dropped before it is closed, since a write failed, is left as it is: the library
+/// would try to finish it, and complain on standard error beside the error that is returned.
+pub struct Created(ManuallyDrop<H5File>);
+
+impl Created {
+    /// A new file.
+    ///
+    /// # Errors
+    /// Those of the library.
+    pub fn new(path: &Path) -> Result<Self, Hdf5Error> {
+        Ok(Self(ManuallyDrop::new(H5File::create(path)?)))
+    }
+
+    /// Finishes the file and synchronises it to disk.
+    ///
+    /// # Errors
+    /// Those of the library.
+    pub fn close(self) -> Result<(), Hdf5Error> {
+        ManuallyDrop::into_inner(self.0).close()
+    }
+}
+
+impl Deref for Created {
+    type Target = H5File;
+
+    fn deref(&self) -> &H5File {
+        &self.0
+    }
+}
+
+/// A file that could not be written; the library wraps what the system said, sometimes as text alone.
+pub fn write_error(path: &Path, error: Hdf5Error) -> Error {
+    let told = match error {
+        Hdf5Error::Io(error) => error,
+        other => {
+            let text = other.to_string();
+            let number = text.rsplit_once("(os error ").and_then(|(_, rest)| rest.split(')').next());
+            match number.and_then(|number| number.parse().ok()) {
+                Some(number) => std::io::Error::from_raw_os_error(number),
+                None => std::io::Error::other(text),
+            }
+        }
+    };
+    Error::io("write", path)(told)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -56,5 +107,18 @@ mod tests {
         let read = dataset(&file, "constant", bytes).unwrap().read_raw::<f64>().unwrap();
         assert_eq!((read, bytes < 2_000_000), (data, true));
         assert!(dataset(&file, "neither", bytes).is_err());
+    }
+
+    /// A disk without room is no fault of a file's format.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn no_room_for_a_file() {
+        let wrapped = |text: &str| write_error(Path::new("a.vtkhdf"), Hdf5Error::InvalidState(text.into()));
+        let full = wrapped("hdf5-io error: No space left on device (os error 28)");
+        assert!(full.to_string().starts_with("cannot write a.vtkhdf: the disk is full: "), "{full}");
+        assert_eq!((full.exit_code(), wrapped("something else").exit_code()), (1, 1));
+        let full =
+            write_error(Path::new("a.vtkhdf"), std::io::Error::from(std::io::ErrorKind::StorageFull).into());
+        assert!(full.to_string().contains("the disk is full"));
     }
 }

@@ -152,19 +152,3 @@ fn data_error(path: &Path, reason: String) -> Error {
 fn format_error(path: &Path, reason: impl ToString) -> Error {
     Error::Format { path: path.to_path_buf(), format: "VTKHDF file", reason: reason.to_string() }
 }
-
-/// A file that could not be written; the library wraps what the system said, sometimes as text alone.
-fn write_error(path: &Path, error: rust_hdf5::Hdf5Error) -> Error {
-    let told = match error {
-        rust_hdf5::Hdf5Error::Io(error) => error,
-        other => {
-            let text = other.to_string();
-            let number = text.rsplit_once("(os error ").and_then(|(_, rest)| rest.split(')').next());
-            match number.and_then(|number| number.parse().ok()) {
-                Some(number) => std::io::Error::from_raw_os_error(number),
-                None => std::io::Error::other(text),
-            }
-        }
-    };
-    Error::io("write", path)(told)
-}

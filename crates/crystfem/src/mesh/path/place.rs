@@ -59,7 +59,7 @@ impl ToolPath {
         let mut missed = 0.0;
         for one in self.printing() {
             let own = length(one);
-            let pieces = (own / step).ceil().clamp(1.0, SAMPLES) as u32;
+            let pieces = (own / step - 1e-9).ceil().clamp(1.0, SAMPLES) as u32;
             let outside = (0..pieces).filter(|&k| {
                 let share = (f64::from(k) + 0.5) / f64::from(pieces);
                 let mut at = [0, 1, 2].map(|d| one.from[d] + share * (one.to[d] - one.from[d]));

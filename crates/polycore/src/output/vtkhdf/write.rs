@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
+use rust_hdf5::{DatatypeMessage, H5Dataset, H5Group};
 
+use super::Layout;
 use super::frames::Step;
 use super::mesh::Cells;
-use super::{Layout, write_error};
 use crate::Error;
+use crate::output::hdf5::{Created, write_error};
 
 /// Rows of a compressed chunk: large enough to compress, small enough to read a step without much waste.
 const CHUNK_ROWS: usize = 1 << 16;
@@ -17,7 +18,7 @@ const KINDS: [&str; 4] = ["Vertices", "Lines", "Polygons", "Strips"];
 
 pub struct Writer {
     path: PathBuf,
-    file: H5File,
+    file: Created,
     group: H5Group,
     layout: Layout,
     /// Where points move.
@@ -40,7 +41,7 @@ impl Writer {
     }
 
     fn begin(path: &Path, layout: &Layout, mesh: Option<&Mesh>, steps: usize) -> Hdf5<Self> {
-        let file = H5File::create(path)?;
+        let file = Created::new(path)?;
         let group = file.create_group("VTKHDF")?;
         group.set_attr_array_numeric("Version", &[2i64, 0])?;
         let name: &[u8] = if mesh.is_some() { b"UnstructuredGrid" } else { b"PolyData" };
