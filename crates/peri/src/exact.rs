@@ -1,5 +1,9 @@
 //! Closed-form solutions and homogeneous responses: what results are compared with.
 
+mod plate;
+
+pub use plate::Plate;
+
 use crate::bonds::Stencil;
 use crate::potential::BondPotential;
 use crate::quadrature::mean;

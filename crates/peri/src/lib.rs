@@ -9,7 +9,7 @@
 //! use peri::geometry::{Operation, Shape, lattice};
 //! use peri::potential::{KernelFit, Law};
 //! use peri::solver::{AdaptiveDynamicRelaxation, Loads, State, Support, System};
-//! use peri::stress::{BallVolume, Loaded, Measure, piola_on_lattice};
+//! use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
 //!
 //! fn main() -> Result<(), peri::Error> {
 //!     // a strip of 40 mm × 20 mm × 1 mm, particles 1 mm apart, horizon 3.015 mm; E = 1 MPa
@@ -35,7 +35,7 @@
 //!     let met = stretch_range(&bonds, &state.displacement);
 //!     let range = [(1.0 + met.low).sqrt() - 1e-3, (1.0 + met.high).sqrt() + 1e-3];
 //!     let fit = KernelFit::new(&*law, range, 1e-9)?;
-//!     let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus };
+//!     let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };
 //!     let piola = piola_on_lattice(&bonds, &loaded, Measure::Hardy, BallVolume::Particles);
 //!     let middle = piola[piola.len() / 2 + 20][0][0];
 //!     assert!((middle / 60e3 - 1.0).abs() < 0.1, "{middle} Pa");

@@ -18,6 +18,15 @@ pub(crate) fn mean(a: f64, b: f64, function: impl Fn(f64) -> f64) -> f64 {
         .sum()
 }
 
+/// The nodes on [a, b] and their weights, which sum to b − a.
+pub(crate) fn panel(a: f64, b: f64) -> [(f64, f64); 8] {
+    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
+    std::array::from_fn(|k| {
+        let (node, weight) = RULE[k / 2];
+        (middle + if k % 2 == 0 { -half } else { half } * node, half * weight)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     #[test]

@@ -60,12 +60,12 @@ impl<const D: usize> Stencil<D> {
 
 /// Steps in slots along each axis, empty slots before the first cell, and all slots of a box of cells.
 fn layout<const D: usize>(cells: [usize; D], ratio: f64) -> ([usize; D], usize, usize) {
-    // empty cells between rows, so that nothing within twice the horizon wraps into the next row: stress measures
-    // look that far; odd strides, or rows of a power of two would fall into the same cache sets
+    // empty cells between rows, so that nothing within twice the horizon and a cell wraps into the next row: stress
+    // measures look that far; odd strides, or rows of a power of two would fall into the same cache sets
     let far = ratio.floor() as usize;
     let mut strides = [1; D];
     for d in 1..D {
-        strides[d] = (strides[d - 1] * (cells[d - 1] + 2 * far)) | 1;
+        strides[d] = (strides[d - 1] * (cells[d - 1] + 2 * far + 1)) | 1;
     }
     let guard = strides.iter().map(|s| s * far).sum::<usize>().next_multiple_of(TILE);
     (strides, guard, (2 * guard + strides[D - 1] * cells[D - 1]).next_multiple_of(TILE))

@@ -7,49 +7,68 @@ use crate::scene::{ExactSpec, Scene};
 use crate::stress::{Measure, Tensor};
 use polycore::report::Report;
 use polycore::scene::Source;
+use rayon::prelude::*;
 use std::path::Path;
 
 /// Sums over the whole body that must vanish, see [`crate::solver::Balance`], over its forces; of several variants the
 /// largest is a value of its own.
 pub const BALANCES: [&str; 3] = ["force_imbalance", "moment_imbalance", "reaction_imbalance"];
 
-/// Stress against Kirsch's solution: peak and profile at θ = π/2, RMSE (2.84) over all particles and without the
-/// loading layers.
-pub fn kirsch<const D: usize>(
+/// Stress around a hole against Kirsch's solution or, given, that of this plate: peak and profile at θ = π/2, RMSE (2.84)
+/// over all particles and without the loading layers; of a plate also within 2δ of the hole, and beyond up to five radii.
+pub fn hole<const D: usize>(
     bonds: &dyn Bonds<D>,
     spec: &ExactSpec,
+    plate: Option<&exact::Plate>,
     fields: &[(Measure, Vec<Tensor<D>>)],
     loaded: &[bool],
     outcome: &mut Outcome,
 ) {
-    let ExactSpec::Kirsch { radius, remote_stress } = spec;
-    let (radius, remote) = (radius.si(), remote_stress.si());
+    let (radius, remote) = spec.hole();
     let positions: Vec<[f64; D]> = bonds.particles().iter().map(|&s| bonds.position(s as usize)).collect();
-    let exact: Vec<f64> = positions.iter().map(|p| exact::kirsch(p[0], p[1], radius, 1.0)[0]).collect();
+    let kirsch: Vec<f64> = positions.iter().map(|p| exact::kirsch(p[0], p[1], radius, 1.0)[0]).collect();
+    let truth =
+        plate.map(|plate| positions.par_iter().map(|p| plate.stress(p[0], p[1])[0]).collect::<Vec<f64>>());
+    let exact = truth.as_ref().unwrap_or(&kirsch);
+    let near = radius + 2.0 * bonds.horizon();
+    let inner: Vec<bool> = bonds.particles().iter().map(|&slot| !loaded[slot as usize]).collect();
+    let distance: Vec<f64> = positions.iter().map(|p| p[0].hypot(p[1])).collect();
     let column = column(&positions, bonds.spacing());
     if !column.is_empty() {
-        outcome.value("kirsch_first", mean(&column[0].1, &exact), "");
-        outcome.profiles.push(profile("kirsch", &column, &exact));
+        outcome.value("kirsch_first", mean(&column[0].1, &kirsch), "");
+        outcome.profiles.push(profile("kirsch", &column, &kirsch));
+        if let (Some(plate), Some(truth)) = (plate, &truth) {
+            outcome.value("exact_first", mean(&column[0].1, truth), "");
+            outcome.value("exact_peak", plate.stress(0.0, radius)[0], "");
+            outcome.profiles.push(profile("exact", &column, truth));
+        }
     }
     for (measure, field) in fields {
         let name = measure.name();
         let normal: Vec<f64> = field.iter().map(|s| s[0][0] / remote).collect();
-        let squares = normal.iter().zip(&exact).map(|(s, e)| (s - e) * (s - e));
-        let inner = bonds.particles().iter().map(|&slot| !loaded[slot as usize]);
-        let (mut all, mut within, mut count) = (0.0, 0.0, 0_usize);
-        for (square, inner) in squares.zip(inner) {
-            all += square;
-            if inner {
-                within += square;
-                count += 1;
-            }
+        let rms = |exact: &[f64], wanted: &dyn Fn(usize) -> bool| {
+            let squares = (0..normal.len()).filter(|&i| wanted(i)).map(|i| (normal[i] - exact[i]).powi(2));
+            let (sum, count) = squares.fold((0.0, 0_usize), |(sum, count), square| (sum + square, count + 1));
+            (sum / count.max(1) as f64).sqrt()
+        };
+        let most =
+            (0..normal.len()).filter(|&i| inner[i]).map(|i| normal[i]).fold(f64::NEG_INFINITY, f64::max);
+        outcome.value(&format!("{name}_max"), most, "");
+        for kind in spec.errors() {
+            let of = if kind.ends_with("kirsch") { &kirsch } else { exact };
+            let error = match *kind {
+                "rmse_inner" | "rmse_inner_kirsch" => rms(of, &|i| inner[i]),
+                "rmse_bulk" => rms(of, &|i| distance[i] > near && distance[i] < 5.0 * radius),
+                "rmse_ring" => rms(of, &|i| distance[i] <= near),
+                _ => rms(of, &|_| true),
+            };
+            outcome.value(&format!("{name}_{kind}"), error, "");
         }
-        outcome.value(&format!("{name}_rmse"), (all / normal.len() as f64).sqrt(), "");
-        outcome.value(&format!("{name}_rmse_inner"), (within / count.max(1) as f64).sqrt(), "");
         if !column.is_empty() {
             let profile = profile(name, &column, &normal);
             let peak = profile.value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             outcome.value(&format!("{name}_peak"), peak, "");
+            outcome.value(&format!("{name}_peak_error"), peak / mean(&column[0].1, exact) - 1.0, "");
             outcome.value(&format!("{name}_first"), profile.value[0], "");
             outcome.profiles.push(profile);
         }
@@ -144,29 +163,32 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
             report.seconds(&full(phase, outcome), *seconds);
         }
     }
-    if let (Some(ExactSpec::Kirsch { radius, .. }), Some(stress)) = (&scene.exact, &scene.stress) {
+    if let (Some(problem), Some(stress)) = (&scene.exact, &scene.stress) {
         if let Some(width) = plate_width(scene) {
-            report.value("kt_finite_width", exact::heywood_gross(2.0 * radius.si() / width), "");
+            report.value("kt_finite_width", exact::heywood_gross(2.0 * problem.hole().0 / width), "");
         }
         for (family, members) in families(outcomes) {
             let spacing: Vec<f64> = members.iter().map(|o| o.spacing).collect();
             for measure in &stress.measures {
                 let name = measure.name();
-                for kind in ["rmse", "rmse_inner"] {
-                    let errors: Vec<f64> =
-                        members.iter().filter_map(|o| o.get(&format!("{name}_{kind}"))).collect();
+                let errors_of = |kind: &str| -> Vec<f64> {
+                    members.iter().filter_map(|o| o.get(&format!("{name}_{kind}"))).collect()
+                };
+                for kind in problem.errors() {
+                    let errors = errors_of(kind);
                     if errors.len() == spacing.len() {
                         let order = observed_order(&spacing, &errors);
                         report.value(&format!("{name}_{kind}_order[{family}]"), order, "");
                     }
                 }
                 let seconds: Vec<f64> = members.iter().map(|o| run_time(o, name)).collect();
-                let errors: Vec<f64> =
-                    members.iter().filter_map(|o| o.get(&format!("{name}_rmse"))).collect();
-                report.curve(
-                    &format!("error_against_time_{name}[{family}]"),
-                    &[("spacing", "m", spacing.clone()), ("seconds", "s", seconds), ("rmse", "", errors)],
-                );
+                let columns = [
+                    ("spacing", "m", spacing.clone()),
+                    ("seconds", "s", seconds),
+                    ("rmse", "", errors_of("rmse")),
+                    ("rmse_inner", "", errors_of("rmse_inner")),
+                ];
+                report.curve(&format!("error_against_time_{name}[{family}]"), &columns);
             }
         }
     }
@@ -223,7 +245,7 @@ pub fn table(outcomes: &[Outcome]) -> String {
     use std::fmt::Write;
     // once a body is torn, reactions are those of its pieces
     let torn = outcomes.iter().any(|o| o.history.iter().any(|r| r.broken > 0));
-    let main = ["_peak", "_rmse", "_rmse_inner", "largest_displacement"];
+    let main = ["_peak", "_rmse", "_rmse_inner", "_rmse_ring", "largest_displacement"];
     let of_loading = ["peak_load", "displacement_at_peak", "first_break", "broken_bonds"];
     let shown: Vec<(&str, String)> = columns(outcomes)
         .into_iter()

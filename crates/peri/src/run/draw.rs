@@ -30,7 +30,7 @@ pub fn maps<const D: usize>(
     let places: Vec<[f64; 2]> = rest.iter().zip(moved).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect();
     let largest = field.iter().flatten().flatten().fold(0.0_f64, |most, s| most.max(s.abs()));
     let (scale, unit) = match &scene.exact {
-        Some(ExactSpec::Kirsch { remote_stress, .. }) => (1.0 / remote_stress.si(), "/σ∞".to_owned()),
+        Some(exact) => (1.0 / exact.hole().1, "/σ∞".to_owned()),
         None => {
             let (scale, unit) = stress_unit(largest);
             (scale, format!(" ({unit})"))
@@ -77,24 +77,29 @@ pub fn bridge(outcome: &Outcome) -> f64 {
 
 /// Profiles (Fig. 2.7), convergence (Fig. 2.8), error against run time.
 pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
-    let Some(ExactSpec::Kirsch { radius, .. }) = &scene.exact else { return Ok(()) };
-    let Some(stress) = &scene.stress else { return Ok(()) };
-    let radius = radius.si();
+    let (Some(exact), Some(stress)) = (&scene.exact, &scene.stress) else { return Ok(()) };
+    let (radius, is_plate) = (exact.hole().0, matches!(exact, ExactSpec::PlateWithHole { .. }));
+    let kind = if is_plate { "rmse_inner" } else { "rmse" };
+    let error_axis = if is_plate {
+        "RMSE of σ₁₁/σ∞, loaded layers left out"
+    } else {
+        "RMSE of σ₁₁/σ∞ (2.84)"
+    };
     profiles(scene, outcomes, stress.measures[0].name(), radius, output)?;
     let families = families(outcomes);
     if families.is_empty() {
         return Ok(());
     }
     let mut cost = LinePlot::new("Error against run time").log_x().log_y().size(1000.0, 560.0);
-    cost = cost.axes("build + solve + stress (s)", "RMSE of σ₁₁/σ∞ (2.84)");
+    cost = cost.axes("build + solve + stress (s)", error_axis);
     let mut rows: Vec<Vec<f64>> = vec![Vec::new(); 5];
     for (index, measure) in stress.measures.iter().enumerate().filter(|(_, m)| **m != Measure::Printed) {
         let name = measure.name();
         let mut convergence = LinePlot::new(&format!("Stress error of the plate with a hole, {name}"));
         convergence = convergence.log_x().log_y().size(900.0, 500.0);
-        convergence = convergence.axes("spacing Δx (mm)", "RMSE of σ₁₁/σ∞ (2.84)");
+        convergence = convergence.axes("spacing Δx (mm)", error_axis);
         for (family, members) in &families {
-            let error: Vec<f64> = members.iter().filter_map(|o| o.get(&format!("{name}_rmse"))).collect();
+            let error: Vec<f64> = members.iter().filter_map(|o| o.get(&format!("{name}_{kind}"))).collect();
             let spacing: Vec<f64> = members.iter().map(|o| o.spacing * 1e3).collect();
             let seconds: Vec<f64> = members.iter().map(|o| run_time(o, name)).collect();
             for (row, outcome) in members.iter().enumerate() {
@@ -109,7 +114,7 @@ pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), 
         convergence.write(output.join(format!("convergence_{name}.png")))?;
     }
     cost.write(output.join("error_against_time.png"))?;
-    let names = [("spacing", "mm"), ("horizon_ratio", ""), ("measure", ""), ("run_time", "s"), ("rmse", "")];
+    let names = [("spacing", "mm"), ("horizon_ratio", ""), ("measure", ""), ("run_time", "s"), (kind, "")];
     let columns: Vec<_> =
         names.iter().zip(&rows).map(|((name, unit), data)| (*name, *unit, data.as_slice())).collect();
     csv::write(output.join("convergence.csv"), &columns)
@@ -132,7 +137,7 @@ fn profiles(
         .legend(LegendPlace::TopRight);
     if let Some(width) = plate_width(scene) {
         let peak = exact::heywood_gross(2.0 * radius / width);
-        plot = plot.series(Series::markers(&format!("finite width, Heywood: {peak:.3}"), &[1.0], &[peak]));
+        plot = plot.series(Series::markers(&format!("long strip, Heywood: {peak:.3}"), &[1.0], &[peak]));
     }
     let first = outcomes.first().map(|o| o.family.clone());
     for outcome in outcomes.iter().filter(|o| Some(&o.family) == first.as_ref()) {
@@ -147,6 +152,16 @@ fn profiles(
             csv::write(path, &[("y", "m", &profile.at), ("stress_ratio", "", &profile.value)])?;
         }
     }
-    plot = plot.series(Series::reference("Kirsch, infinite plate", &over_radius(&line), &exact));
+    let kirsch = ("Kirsch, infinite plate", over_radius(&line), exact);
+    let finest = outcomes.iter().rfind(|o| Some(&o.family) == first.as_ref());
+    plot = match finest.and_then(|o| o.profiles.iter().find(|p| p.name == "exact")) {
+        Some(profile) => {
+            let keep = profile.at.iter().filter(|&&y| y <= far).count();
+            let (at, value) = (over_radius(&profile.at[..keep]), &profile.value[..keep]);
+            let plot = plot.series(Series::line(kirsch.0, &kirsch.1, &kirsch.2));
+            plot.series(Series::reference("this plate, series", &at, value))
+        }
+        None => plot.series(Series::reference(kirsch.0, &kirsch.1, &kirsch.2)),
+    };
     plot.write(output.join("profile.png"))
 }

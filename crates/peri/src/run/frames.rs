@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::potential::{BondPotential, KernelFit};
 use crate::scene::Scene;
 use crate::solver::{Record, State};
-use crate::stress::{Loaded, Measure, Tensor, cauchy, deformation_gradients};
+use crate::stress::{Loaded, Measure, Missing, Tensor, cauchy, deformation_gradients};
 use polycore::output::picture::{FieldMap, Panel};
 use polycore::output::vtkhdf::{self, ParticleSeries};
 use polycore::report::Phases;
@@ -27,6 +27,8 @@ pub struct Frames<'a> {
     path: PathBuf,
     /// The last step written.
     written: Option<usize>,
+    /// Slots in which stress measures make up for missing bonds by their window's share in the body.
+    by_window: Vec<bool>,
 }
 
 /// Stresses of a state by every measure that the scene names.
@@ -87,6 +89,7 @@ impl<'a> Frames<'a> {
         bonds: &dyn Bonds<D>,
         state: &State<D>,
         path: PathBuf,
+        by_window: Vec<bool>,
     ) -> Result<Self, Error> {
         let whole = scene.material.critical.is_some().then(|| all_intact(bonds));
         let every = scene.output.every;
@@ -98,7 +101,7 @@ impl<'a> Frames<'a> {
         };
         let last = |every| (1..=state.history.len()).rev().find(|&k| wanted(every, &state.history[..k]));
         let written = every.and_then(last);
-        Ok(Self { scene, law, modulus, whole, series, path, written })
+        Ok(Self { scene, law, modulus, whole, series, path, written, by_window })
     }
 
     /// After a step, or an equilibrium in which bonds broke: writes its fields if the scene wants them.
@@ -169,7 +172,9 @@ impl<'a> Frames<'a> {
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
         for &measure in &spec.measures {
-            let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus: self.modulus };
+            let missing = Missing::WindowAt(&self.by_window);
+            let loaded =
+                Loaded { displacement: &state.displacement, fit: &fit, modulus: self.modulus, missing };
             let started = Instant::now();
             let piola = super::stress(bonds, &loaded, measure, spec.ball);
             stresses.cauchy.push((measure, cauchy(&piola, &gradients)));

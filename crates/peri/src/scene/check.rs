@@ -72,18 +72,23 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error("stress.component", format!("`{found}`"), allowed));
         }
     }
-    if let Some(super::ExactSpec::Kirsch { radius, remote_stress }) = &scene.exact {
-        positive(source, "exact.radius", radius.si(), "m")?;
-        positive(source, "exact.remote_stress", remote_stress.si(), "Pa")?;
+    let lattices = scene.stress.iter().flat_map(|stress| &stress.measures).position(|m| m.needs_lattice());
+    if let Some(index) = lattices.filter(|_| scene.body.points.is_some()) {
+        let found = "a measure of lattices in a cloud";
+        let allowed = "`hardy`, `gaussian`, `spline`, `ball-share`, `one-point` or `printed`";
+        return Err(source.error(&format!("stress.measures[{index}]"), found, allowed));
+    }
+    if let Some(exact) = &scene.exact {
+        let ((radius, remote), name) = (exact.hole(), exact.name());
+        positive(source, "exact.radius", radius, "m")?;
+        positive(source, "exact.remote_stress", remote, "Pa")?;
         if scene.body.space == Space::Solid {
-            return Err(source.error("exact.problem", "kirsch in a solid", "kirsch in a plane body"));
+            let (found, allowed) = (format!("{name} in a solid"), format!("{name} in a plane body"));
+            return Err(source.error("exact.problem", found, allowed));
         }
         if scene.stress.is_none() {
-            return Err(source.error(
-                "exact",
-                "kirsch without [stress]",
-                "a [stress] block with the measures to compare",
-            ));
+            let allowed = "a [stress] block with the measures to compare";
+            return Err(source.error("exact", format!("{name} without [stress]"), allowed));
         }
     }
     dynamics(source, scene)?;

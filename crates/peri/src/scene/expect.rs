@@ -31,10 +31,13 @@ pub fn quantities(scene: &Scene) -> Vec<String> {
         names.retain(|name| !name.ends_with("_z"));
     }
     names.extend(scene.output.load_at.iter().map(|at| load_at_name(at.si())));
-    if let (Some(ExactSpec::Kirsch { .. }), Some(stress)) = (&scene.exact, &scene.stress) {
+    if let (Some(exact), Some(stress)) = (&scene.exact, &scene.stress) {
         names.push("kirsch_first".to_owned());
+        if matches!(exact, ExactSpec::PlateWithHole { .. }) {
+            names.extend(["exact_first", "exact_peak"].map(str::to_owned));
+        }
         for measure in &stress.measures {
-            let kinds = ["first", "peak", "rmse", "rmse_inner"];
+            let kinds = ["first", "peak", "peak_error", "max"].iter().chain(exact.errors());
             names.extend(kinds.map(|kind| format!("{}_{kind}", measure.name())));
         }
     }
@@ -75,18 +78,17 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
             None => families.push((variant.family(), 1)),
         }
     }
-    let exact = scene.exact.is_some();
     for (family, _) in families.iter().filter(|(_, count)| *count > 1) {
         names.push(format!("peak_load_change[{family}]"));
-        for measure in scene.stress.iter().flat_map(|stress| &stress.measures).filter(|_| exact) {
-            let kinds = ["rmse", "rmse_inner"];
+        for measure in scene.stress.iter().flat_map(|stress| &stress.measures) {
+            let kinds = scene.exact.iter().flat_map(|exact| exact.errors());
             names.extend(kinds.map(|kind| format!("{}_{kind}_order[{family}]", measure.name())));
         }
     }
     if scene.output.integrals {
         names.extend(crate::integrals::NAMES.map(str::to_owned));
     }
-    names.extend(exact.then(|| "kt_finite_width".to_owned()));
+    names.extend(scene.exact.as_ref().map(|_| "kt_finite_width".to_owned()));
     Ok(names)
 }
 

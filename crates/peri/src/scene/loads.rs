@@ -7,7 +7,7 @@ use crate::field::Field;
 use crate::solver::{Loads, Support};
 use polycore::scene::{SceneError, Source};
 
-/// Loads and supports of a body, and the slots in any loading layer.
+/// Loads and supports of a body, and the slots where forces act on it, of loads or of holding.
 ///
 /// # Errors
 /// As [`super::body_of`].
@@ -24,7 +24,9 @@ pub fn loads_of<const D: usize>(
         if members.is_empty() {
             return Err(source.error(&key, "a region without particles", "a region that holds at least one"));
         }
-        for &slot in &members {
+        let forced =
+            boundary.traction.is_some() || boundary.force.is_some() || boundary.displacement.is_some();
+        for &slot in members.iter().filter(|_| forced) {
             loaded[slot as usize] = true;
         }
         let support = support(source, &key, boundary, body, &members, depth)?;
@@ -222,6 +224,11 @@ fn name_of(index: usize, boundary: &Boundary) -> String {
     }
 }
 
+/// Layers of particles at a side that a boundary acts on.
+pub(super) fn layers<const D: usize>(boundary: &Boundary, bonds: &dyn crate::bonds::Bonds<D>) -> usize {
+    boundary.layers.unwrap_or((bonds.horizon() / bonds.spacing()).floor() as usize).max(1)
+}
+
 pub(super) fn region<const D: usize>(
     source: &Source,
     key: &str,
@@ -242,7 +249,7 @@ pub(super) fn region<const D: usize>(
             if boundary.layers == Some(0) {
                 return Err(source.error(&format!("{key}.layers"), 0, "at least 1"));
             }
-            let layers = boundary.layers.unwrap_or((body.bonds.horizon() / spacing).floor() as usize).max(1);
+            let layers = layers(boundary, &*body.bonds);
             let depth = layers as f64 * spacing;
             let extent = body.bounds.1[axis] - body.bounds.0[axis];
             if depth > extent * (1.0 + 1e-9) {

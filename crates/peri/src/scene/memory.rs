@@ -79,7 +79,12 @@ pub fn needed<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> f64 {
     let (slots, particles) = (bonds.slots() as f64, bonds.particles().len() as f64);
     let body = match bonds.as_lattice() {
         Some(lattice) => of_slots::<D>(scene, slots, lattice.stencil().offsets.len()),
-        None => of_slots::<D>(scene, slots, 0) + of_cloud::<D>(particles, bonds.directed_bonds() as f64),
+        None => {
+            let directed = bonds.directed_bonds() as f64;
+            // the weights by which bonds are shared out, in lists that grow
+            let shared = if scene.stress.is_some() { 16.0 * directed + 24.0 * particles } else { 0.0 };
+            of_slots::<D>(scene, slots, 0) + of_cloud::<D>(particles, directed) + shared
+        }
     };
     ALWAYS + body + of_results::<D>(scene, particles)
 }

@@ -27,7 +27,7 @@ pub use inclusion::with_inclusions;
 pub use loads::{loads_of, region_names, velocities_of};
 pub use memory::needed as memory_needed;
 pub use method::{Dynamics, Method, Solver};
-pub use placement::check_placement;
+pub use placement::{check_placement, exact_plate};
 pub use probe::{Look, Probe};
 pub use variant::Variant;
 pub use warn::warnings;
@@ -276,7 +276,7 @@ impl Default for ContactSpec {
 pub struct StressSpec {
     /// Measures to compute; the first is drawn.
     pub measures: Vec<Measure>,
-    /// Volume of the averaging ball of the Hardy measure.
+    /// Volume of the averaging ball of `ball-share`.
     #[serde(default)]
     pub ball: BallVolume,
     /// The component that pictures of stages show, e.g. `22`; default: the largest principal stress in the plane.
@@ -306,6 +306,40 @@ pub enum ExactSpec {
         /// Remote stress.
         remote_stress: Stress,
     },
+    /// The same in the body's own rectangle, by [`crate::exact::Plate`]: free hole, tractions `remote_stress` on the sides x+
+    /// and x−, acting in their layers.
+    PlateWithHole {
+        /// Radius of the hole.
+        radius: Length,
+        /// Traction on the sides.
+        remote_stress: Stress,
+    },
+}
+
+impl ExactSpec {
+    /// Radius of the hole, m, and the stress far from it, Pa.
+    pub fn hole(&self) -> (f64, f64) {
+        let (Self::Kirsch { radius, remote_stress } | Self::PlateWithHole { radius, remote_stress }) = self;
+        (radius.si(), remote_stress.si())
+    }
+
+    /// Name in scenes.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Kirsch { .. } => "kirsch",
+            Self::PlateWithHole { .. } => "plate-with-hole",
+        }
+    }
+
+    /// What errors of a measure are called, `MEASURE_…`.
+    pub fn errors(&self) -> &'static [&'static str] {
+        match self {
+            Self::Kirsch { .. } => &["rmse", "rmse_inner"],
+            Self::PlateWithHole { .. } => {
+                &["rmse", "rmse_inner", "rmse_bulk", "rmse_ring", "rmse_kirsch", "rmse_inner_kirsch"]
+            }
+        }
+    }
 }
 
 /// Files to write beside the report.

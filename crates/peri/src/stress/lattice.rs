@@ -1,11 +1,12 @@
 //! On a lattice the bond function depends on offsets only: each measure is, bond by bond of the stencil, a convolution
 //! of that bond's forces with fixed weights.
 
+use super::window::{Averaged, Window, normalise};
 use super::{
     BallVolume, Loaded, Measure, Tensor, ball_volume, cell_fractions, force_over_length, segment_fraction,
 };
 use crate::bonds::{Bonds, LatticeBonds};
-use crate::field::{Field, chunk_range};
+use crate::field::{CHUNK, Field, chunk_range};
 use pulp::Arch;
 use rayon::prelude::*;
 
@@ -25,19 +26,22 @@ pub fn piola<const D: usize>(
     let mut columns: [Field<D>; D] = std::array::from_fn(|_| Field::zeros(slots));
     let mut forces = Field::zeros(slots);
     let mut averages = Field::zeros(slots);
+    let window = measure.is_partition().then(|| Averaged::<D>::new(Window::of(measure), bonds.ratio()));
+    let rim = Rim::new(bonds, state, measure);
     // one direction of every bond; the other adds the same f ⊗ ξ, which the factor ½ of the definition undoes
     for k in 0..bonds.stencil().offsets.len() / 2 {
         let offset = bonds.stencil().offsets[k];
         bond_forces(bonds, state, k, &mut forces);
-        let taps = taps(bonds, offset, measure);
+        let taps = taps(bonds, offset, measure, window.as_ref());
         convolve(&forces, &taps, &mut averages);
+        rim.complete(bonds.shift(offset), &taps, &mut averages);
         let spacing = bonds.lattice().spacing;
         for d in (0..D).filter(|&d| offset[d] != 0) {
             let edge = f64::from(offset[d]) * spacing;
             accumulate(&averages, edge, &mut columns[d]);
         }
     }
-    let volumes = volumes(bonds, measure, ball);
+    let volumes = volumes(bonds, state, measure, ball, window.as_ref());
     let particles = bonds.particles().iter().zip(volumes);
     particles
         .map(|(&slot, volume)| {
@@ -72,12 +76,28 @@ fn bond_forces<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, k: us
 }
 
 /// The weights of a stencil bond for a measure.
-fn taps<const D: usize>(bonds: &LatticeBonds<D>, offset: [i32; D], measure: Measure) -> Vec<Tap> {
-    let ratio = bonds.horizon() / bonds.lattice().spacing;
+fn taps<const D: usize>(
+    bonds: &LatticeBonds<D>,
+    offset: [i32; D],
+    measure: Measure,
+    window: Option<&Averaged<D>>,
+) -> Vec<Tap> {
+    let weights = match (measure, window) {
+        (Measure::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
+        (Measure::HardyScaled, _) => {
+            let mut weights = crossing(bonds.ratio(), offset, measure);
+            normalise(&mut weights);
+            weights
+        }
+        (_, Some(window)) => window.bond_function(offset),
+        _ => crossing(bonds.ratio(), offset, measure),
+    };
+    weights.into_iter().map(|(start, weight)| Tap { shift: bonds.shift(start), weight }).collect()
+}
+
+/// Where a bond begins that crosses the ball about a particle, and the part of it inside (as printed: ½ with both ends there).
+fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> Vec<([i32; D], f64)> {
     let square = ratio * ratio;
-    if measure == Measure::OnePoint {
-        return vec![Tap { shift: 0, weight: 0.5 }, Tap { shift: -bonds.shift(offset), weight: 0.5 }];
-    }
     let reach = 2 * ratio.ceil() as i32;
     let side = (2 * reach + 1) as usize;
     (0..side.pow(D as u32))
@@ -91,30 +111,99 @@ fn taps<const D: usize>(bonds: &LatticeBonds<D>, offset: [i32; D], measure: Meas
                 Measure::Printed => 0.0,
                 _ => segment_fraction(p, q, square),
             };
-            (weight > 0.0).then(|| Tap { shift: bonds.shift(start), weight })
+            (weight > 0.0).then_some((start, weight))
         })
         .collect()
 }
 
+/// Particles so near a surface that bonds of their windows are missing, where existing ones make up for them.
+struct Rim {
+    slots: Vec<u32>,
+    occupied: Vec<bool>,
+}
+
+impl Rim {
+    fn new<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Self {
+        let wanted = |slot: usize| match measure {
+            Measure::HardyBonds => true,
+            Measure::HardyWindow => false,
+            _ => measure.is_partition() && !state.missing.is_window(slot),
+        };
+        let occupied = bonds.occupancy();
+        // no bond that crosses a window begins farther away
+        let reach = (bonds.ratio() + 0.5).floor() as i32 + bonds.ratio().floor() as i32;
+        // axis by axis: whether all within reach along it, and along those before, are occupied
+        let mut whole = occupied.clone();
+        for d in 0..D {
+            let mut offset = [0; D];
+            offset[d] = 1;
+            let stride = bonds.shift(offset);
+            let full = |slot: usize| {
+                let at = |k: i32| slot.wrapping_add_signed(k as isize * stride);
+                (-reach..=reach).all(|k| whole.get(at(k)).copied().unwrap_or(false))
+            };
+            let next: Vec<bool> =
+                (0..whole.len()).into_par_iter().map(|slot| whole[slot] && full(slot)).collect();
+            whole = next;
+        }
+        let particles = bonds.particles().iter().copied();
+        let slots = particles.filter(|&s| !whole[s as usize] && wanted(s as usize)).collect();
+        Self { slots, occupied }
+    }
+
+    /// Divides the averages of a bond by the weights of those whose two particles exist.
+    fn complete<const D: usize>(&self, shift: isize, taps: &[Tap], averages: &mut Field<D>) {
+        let there = |slot: usize| self.occupied.get(slot).copied().unwrap_or(false);
+        let one = |&slot: &u32| -> f64 {
+            let at = |tap: &&Tap| {
+                let start = (slot as usize).wrapping_add_signed(tap.shift);
+                there(start) && there(start.wrapping_add_signed(shift))
+            };
+            taps.iter().filter(at).map(|tap| tap.weight).sum()
+        };
+        let weights: Vec<f64> = self.slots.par_iter().map(one).collect();
+        for (&slot, weight) in self.slots.iter().zip(weights) {
+            let average = averages.get(slot as usize);
+            // where no such bond exists, the average is zero
+            averages.set(slot as usize, average.map(|f| if weight > 0.0 { f / weight } else { 0.0 }));
+        }
+    }
+}
+
+/// Slots that a convolution sums at a time, in registers.
+const BLOCK: usize = 32;
+
 /// averages(p) = Σ weight·forces(p + shift); nothing lies beyond the ends.
 fn convolve<const D: usize>(forces: &Field<D>, taps: &[Tap], averages: &mut Field<D>) {
-    let slots = forces.slots();
     let forces = forces.components();
+    let arch = Arch::new();
     averages.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, out)| {
-        let range = chunk_range(chunk, slots);
         for (d, out) in out.into_iter().enumerate() {
-            out.fill(0.0);
-            for tap in taps {
-                let low = range.start as isize + tap.shift;
-                let skip = (-low).max(0) as usize;
-                let end = (range.end as isize + tap.shift).clamp(0, slots as isize) as usize;
-                let begin = low.max(0) as usize;
-                if begin < end && skip < out.len() {
-                    add_scaled(&mut out[skip..], &forces[d][begin..end], tap.weight);
-                }
+            for (block, out) in out.chunks_mut(BLOCK).enumerate() {
+                arch.dispatch(|| sum_taps(out, forces[d], chunk * CHUNK + block * BLOCK, taps));
             }
         }
     });
+}
+
+/// out[i] = Σ weight·values[start + i + shift].
+#[inline(always)]
+fn sum_taps(out: &mut [f64], values: &[f64], start: usize, taps: &[Tap]) {
+    let mut sum = [0.0; BLOCK];
+    for tap in taps {
+        let there = start.checked_add_signed(tap.shift).and_then(|from| values.get(from..from + BLOCK));
+        if let Some(there) = there {
+            for (sum, value) in sum.iter_mut().zip(there) {
+                *sum += tap.weight * value;
+            }
+        } else {
+            for (index, sum) in sum.iter_mut().enumerate() {
+                let at = (start + index).checked_add_signed(tap.shift);
+                *sum += tap.weight * at.and_then(|at| values.get(at)).copied().unwrap_or(0.0);
+            }
+        }
+    }
+    out.copy_from_slice(&sum[..out.len()]);
 }
 
 /// out += factor·values over the shorter of both.
@@ -137,34 +226,51 @@ fn accumulate<const D: usize>(averages: &Field<D>, edge: f64, column: &mut Field
 }
 
 /// What the sum over bonds is divided by, particle by particle.
-fn volumes<const D: usize>(bonds: &LatticeBonds<D>, measure: Measure, ball: BallVolume) -> Vec<f64> {
+fn volumes<const D: usize>(
+    bonds: &LatticeBonds<D>,
+    state: &Loaded<D>,
+    measure: Measure,
+    ball: BallVolume,
+    window: Option<&Averaged<D>>,
+) -> Vec<f64> {
     let lattice = bonds.lattice();
     let thickness = lattice.volume / lattice.spacing.powi(D as i32);
     let whole = ball_volume(D, bonds.horizon()) * thickness;
-    let count = bonds.particles().len();
-    match (measure, ball) {
-        (Measure::OnePoint, _) => vec![lattice.volume; count],
-        (Measure::Printed, _) | (_, BallVolume::Whole) => vec![whole; count],
-        (Measure::Hardy, BallVolume::Particles) => {
-            let offsets = &bonds.stencil().offsets;
-            let share = 1.0 / (offsets.len() + 1) as f64;
-            let all = offsets.iter().copied().chain([[0; D]]).map(|o| (o, share));
-            shares(bonds, &all.collect::<Vec<_>>()).into_iter().map(|s| s * whole).collect()
-        }
-        (Measure::Hardy, BallVolume::Cells) => {
-            let cells = cell_fractions::<D>(bonds.horizon() / lattice.spacing);
-            shares(bonds, &cells).into_iter().map(|s| s * whole).collect()
-        }
-    }
+    let sites = || {
+        let offsets = &bonds.stencil().offsets;
+        let share = 1.0 / (offsets.len() + 1) as f64;
+        offsets.iter().copied().chain([[0; D]]).map(|o| (o, share)).collect::<Vec<_>>()
+    };
+    let (cells, volume) = match (measure, ball, window) {
+        (Measure::BallShare, BallVolume::Particles, _) => (sites(), whole),
+        (Measure::BallShare, BallVolume::Cells, _) => (cell_fractions::<D>(bonds.ratio()), whole),
+        (Measure::OnePoint, ..) => (Vec::new(), lattice.volume),
+        (Measure::HardyScaled, ..) => (sites(), lattice.volume),
+        (_, _, Some(window)) => (window.cells(), lattice.volume),
+        _ => (Vec::new(), whole),
+    };
+    let shared = |slot: usize| match measure {
+        Measure::HardyWindow => true,
+        Measure::HardyBonds => false,
+        _ => !measure.is_partition() || state.missing.is_window(slot),
+    };
+    shares(bonds, &cells, shared).into_iter().map(|s| s * volume).collect()
 }
 
-/// Sum of the shares of the occupied cells around each particle.
-fn shares<const D: usize>(bonds: &LatticeBonds<D>, cells: &[([i32; D], f64)]) -> Vec<f64> {
+/// Sum of the shares of the occupied cells around each particle; 1 where none is wanted or none is given.
+fn shares<const D: usize>(
+    bonds: &LatticeBonds<D>,
+    cells: &[([i32; D], f64)],
+    wanted: impl Fn(usize) -> bool + Sync,
+) -> Vec<f64> {
     let occupied = bonds.occupancy();
     bonds
         .particles()
         .par_iter()
         .map(|&slot| {
+            if cells.is_empty() || !wanted(slot as usize) {
+                return 1.0;
+            }
             let cell = bonds.cell_of(slot as usize);
             cells
                 .iter()

@@ -6,7 +6,7 @@ use peri::bonds::{Bonds, force};
 use peri::field::Field;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{Breaking, Loads, Policy, Record, State, System, VelocityVerlet};
-use peri::stress::{BallVolume, Loaded, Measure, piola_on_lattice};
+use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
 use std::f64::consts::PI;
 
 pub const DENSITY: f64 = 2.3;
@@ -330,8 +330,8 @@ fn rigid_rotation() {
         force(bonds, &u, &mut out);
         let each = bonds.particles().iter().map(|&s| norm(out.get(s as usize)));
         largest = largest.max(each.fold(0.0, f64::max) / stiffness);
-        let loaded = Loaded { displacement: &u, fit: &fit, modulus: MODULUS };
-        for measure in [Measure::Hardy, Measure::OnePoint] {
+        let loaded = Loaded { displacement: &u, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+        for measure in [Measure::Hardy, Measure::BallShare, Measure::OnePoint] {
             let piola = piola_on_lattice(bonds, &loaded, measure, BallVolume::Particles);
             let each = piola.iter().flatten().flatten().map(|p| p.abs());
             stress = stress.max(each.fold(0.0, f64::max) / youngs);

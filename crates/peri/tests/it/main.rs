@@ -7,6 +7,7 @@ mod contact;
 mod cracks;
 mod dynamics;
 mod forces;
+mod hardy;
 mod homogeneous;
 mod impact;
 mod lbfgs;

@@ -7,7 +7,7 @@ use peri::calibrate::{Space, modulus, poisson_ratio};
 use peri::field::Field;
 use peri::geometry::lattice;
 use peri::potential::{BondPotential, Law};
-use peri::stress::{BallVolume, Loaded, Measure, Tensor, ball_volume, segment_fraction};
+use peri::stress::{BallVolume, Loaded, Measure, Missing, Tensor, ball_volume, segment_fraction};
 use peri::stress::{cauchy, deformation_gradients, piola_in_cloud, piola_on_lattice};
 
 /// Strain at which tables of the linear theory are compared: the bonds' own nonlinearity is of this order, so 5 of it
@@ -40,12 +40,12 @@ fn measured<const D: usize>(
     let modulus = modulus(space(D), 1.0, ratio, 1.0);
     let diagonal = |p: Tensor<D>| [p[0][0] / STRAIN, p[1][1] / STRAIN];
     let field = scatter(built.lattice.slots(), &built.on_lattice, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus };
+    let state = Loaded { displacement: &field, fit: &fit, modulus, missing: Missing::Bonds };
     let stress = piola_on_lattice(&built.lattice, &state, measure, ball);
     let mut results = vec![("lattice", diagonal(stress[particle]))];
     if cloud {
         let field = scatter(built.cloud.slots(), &built.in_cloud, &u);
-        let state = Loaded { displacement: &field, fit: &fit, modulus };
+        let state = Loaded { displacement: &field, fit: &fit, modulus, missing: Missing::Bonds };
         let stress = piola_in_cloud(&built.cloud, &state, measure, ball);
         results.push(("cloud", diagonal(stress[built.in_cloud[particle]])));
     }
@@ -79,12 +79,12 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
     // the whole ball lies in the body: every reading of its volume but the cells' (64 slices in 3D) is exact
     let rows = [
         (Measure::Printed, BallVolume::Whole, [printed, f64::NAN]),
-        (Measure::Hardy, BallVolume::Whole, [hardy, hardy_22]),
-        (Measure::Hardy, BallVolume::Particles, [hardy, hardy_22]),
+        (Measure::BallShare, BallVolume::Whole, [hardy, hardy_22]),
+        (Measure::BallShare, BallVolume::Particles, [hardy, hardy_22]),
         (Measure::OnePoint, BallVolume::Particles, [one_point, one_point_22]),
     ];
     for (measure, ball, expected) in rows {
-        if ball == BallVolume::Particles && measure == Measure::Hardy && !cloud {
+        if ball == BallVolume::Particles && measure == Measure::BallShare && !cloud {
             continue; // long, and the same sums as over the whole ball
         }
         for (path, found) in measured(&built, ratio, middle, measure, ball, cloud) {
@@ -106,7 +106,7 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
                         );
                     }
                     _ => evidence::near(
-                        "patch test, m = 3, share of the stress by hardy",
+                        "patch test, m = 3, share of the stress by ball-share",
                         found[0],
                         hardy,
                         TOLERANCE,
@@ -181,8 +181,8 @@ fn check_surface<const D: usize>(ratio: f64, depth: usize, cells_tolerance: f64,
             std::array::from_fn(|d| if d == 1 { cells[1] as f64 - 0.5 - row as f64 } else { middle });
         let particle = built.points.iter().position(|x| *x == at).unwrap();
         let balls = [
-            (Measure::Hardy, BallVolume::Whole, TOLERANCE),
-            (Measure::Hardy, BallVolume::Cells, TOLERANCE + cells_tolerance),
+            (Measure::BallShare, BallVolume::Whole, TOLERANCE),
+            (Measure::BallShare, BallVolume::Cells, TOLERANCE + cells_tolerance),
             (Measure::OnePoint, BallVolume::Whole, TOLERANCE),
         ];
         for ((measure, ball, tolerance), e) in balls.into_iter().zip(expected) {
@@ -239,7 +239,7 @@ fn ball_inside_thin_bodies() {
             for row in [0, width / 2] {
                 let particle = 15 + 30 * row;
                 let found =
-                    measured(&built, ratio * 0.1, particle, Measure::Hardy, BallVolume::Particles, true);
+                    measured(&built, ratio * 0.1, particle, Measure::BallShare, BallVolume::Particles, true);
                 let [(_, lattice), (_, cloud)] = found[..] else { panic!("two paths") };
                 // roundings of the same sums, in units of Eε ≈ 1; at ratio 3 a particle lies on the ball's surface and
                 // bonds touch it, whose fraction is rounded to √ε
@@ -290,11 +290,11 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
     let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
     let field = scatter(built.lattice.slots(), &built.on_lattice, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS };
-    let on_lattice = piola_on_lattice(&built.lattice, &state, Measure::Hardy, BallVolume::Whole);
+    let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+    let on_lattice = piola_on_lattice(&built.lattice, &state, Measure::BallShare, BallVolume::Whole);
     let field = scatter(built.cloud.slots(), &built.in_cloud, &u);
-    let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS };
-    let in_cloud = piola_in_cloud(&built.cloud, &state, Measure::Hardy, BallVolume::Whole);
+    let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
+    let in_cloud = piola_in_cloud(&built.cloud, &state, Measure::BallShare, BallVolume::Whole);
     let size = |p: &Tensor<D>| p.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
     let scale = on_lattice.iter().map(size).fold(0.0, f64::max);
     let step = if D == 2 { 1 } else { 5 };
@@ -364,7 +364,7 @@ fn divergence_is_the_average_force() {
             worst = worst.max((divergence / average - 1.0).abs());
         }
     }
-    evidence::at_most("divergence of the stress by hardy against the average force", worst, 1e-5);
+    evidence::at_most("divergence of the stress by ball-share against the average force", worst, 1e-5);
 }
 
 /// Cauchy stress and deformation gradient of a large homogeneous strain: F as imposed, σ = P Fᵀ/J symmetric inside.
@@ -382,7 +382,7 @@ fn cauchy_stress_of_a_homogeneous_strain() {
         let field: Field<D> = scatter(built.lattice.slots(), &built.on_lattice, &u);
         let law = Law::Chain.build(720.0, 1200.0, true).unwrap();
         let fit = fit(&*law, [0.5, 2.0]);
-        let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS };
+        let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
         let gradients = deformation_gradients::<D>(&built.lattice, &field);
         for f in &gradients {
             for a in 0..D {
