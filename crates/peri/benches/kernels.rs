@@ -19,7 +19,7 @@ fn dimension<const D: usize>(criterion: &mut Criterion) -> Result<(), Failure> {
         let (_, displacement) = kernel::loaded(&mut bonds, law, range)?;
         let mut out = Field::zeros(bonds.slots());
         let mut group = criterion.benchmark_group("directed bonds");
-        group.throughput(Throughput::Elements(bonds.directed_bonds() as u64));
+        group.throughput(Throughput::Elements(bonds.directed_bonds()));
         let name = format!("{D}D lattice {} {}–{}", law.name(), range[0], range[1]);
         group.bench_function(name, |bencher| bencher.iter(|| force(&bonds, &displacement, &mut out)));
         group.finish();

@@ -250,6 +250,9 @@ fn by_definition(
     sum
 }
 
+/// A window in the plane.
+type Shape2 = fn([f64; 2]) -> f64;
+
 fn ball(x: [f64; 2]) -> f64 {
     f64::from(u8::from(norm(x) < 3.015)) / (std::f64::consts::PI * 3.015_f64.powi(2))
 }
@@ -279,9 +282,9 @@ fn measures_are_their_definitions() {
     let (_, built, pairs, u) = smooth();
     let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
-    let windows: [(Measure, fn([f64; 2]) -> f64); 3] =
+    let windows: [(Measure, Shape2); 3] =
         [(Measure::Hardy, ball), (Measure::Gaussian, gaussian), (Measure::Spline, spline)];
-    let averaged = |window: fn([f64; 2]) -> f64, x: [f64; 2]| {
+    let averaged = |window: Shape2, x: [f64; 2]| {
         let shift = |k: usize| (k as f64 + 0.5) / 16.0 - 0.5;
         (0..256).map(|k| window([x[0] + shift(k % 16), x[1] + shift(k / 16)])).sum::<f64>() / 256.0
     };
@@ -312,7 +315,7 @@ fn divergence_is_the_average_over_the_window() {
     lattice.set_law(&fit, MODULUS);
     let densities = crate::bodies::forces(&lattice, &built.on_lattice, &u);
     let h = 1e-3;
-    for window in [hat as fn([f64; 2]) -> f64, spline] {
+    for window in [hat as Shape2, spline] {
         for at in [[14.637, 14.791], [13.09, 15.67]] {
             let p = |dx: f64, dy: f64| {
                 by_definition(&pairs, &built.points, &*law, &u, [at[0] + dx, at[1] + dy], 2000, &window)
