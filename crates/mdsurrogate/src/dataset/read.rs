@@ -114,8 +114,14 @@ impl Form {
     fn new(table: &Table, options: &ReadOptions) -> Result<Self, Error> {
         if table.has("C11") {
             let names = |letter: &str| crate::kinematics::NAMES.map(|name| format!("{letter}{name}"));
-            let all = names("C").into_iter().chain(names("S"));
-            if let Some(missing) = all.into_iter().find(|name| !table.has(name)) {
+            let all: Vec<String> = names("C").into_iter().chain(names("S")).collect();
+            if let Some(missing) = all.iter().find(|name| !table.has(name)) {
+                let others = table.headings.iter().map(|(name, _)| name).filter(|name| !all.contains(name));
+                let similar = crate::error::nearest(missing, others.map(String::as_str));
+                if similar.is_some() {
+                    let (path, column) = (table.path.clone(), missing.clone());
+                    return Err(Error::MissingColumn { path, column, similar });
+                }
                 let mut allowed = "C11 C22 C33 C12 C13 C23 and S11 S22 S33 S12 S13 S23".to_owned();
                 if missing.ends_with(['2', '3']) && !missing.ends_with("22") && !missing.ends_with("33") {
                     allowed += "; where there is no shear, add columns of zeros";

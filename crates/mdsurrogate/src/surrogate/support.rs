@@ -217,10 +217,7 @@ mod tests {
         assert!(nearest.distance(&gap.into()) > 5.0 * support.radius);
         // more representatives than rows: rows 0.01 apart, in deviations of √2/100
         let few = Support::of(&rows[..5], 100).unwrap();
-        assert!(
-            (few.points.len(), few.radius - 0.5f64.sqrt()).0 == 5
-                && (few.radius - 0.5f64.sqrt()).abs() < 1e-9
-        );
+        assert!(few.points.len() == 5 && (few.radius - 0.5f64.sqrt()).abs() < 1e-9);
         assert_eq!(Support::of(&rows[..1], 100).unwrap().radius, 0.0);
         assert!(Support::of(&[], 3).is_err() && Support::of(&rows, 0).is_err());
         assert!(Support::of(&[Voigt::repeat(f64::NAN)], 3).is_err());
