@@ -184,7 +184,7 @@ pub(super) fn predicted(name: &str, law: &Surrogate, test: &[&Row], output: &Pat
         ends = measured.iter().fold(ends, |[low, high], s| [low.min(*s), high.max(*s)]);
         plot = plot.series(Series::markers(&format!("S{component}"), &measured, &answered));
     }
-    if !(ends[0] < ends[1]) {
+    if ends[0] >= ends[1] {
         return Ok(());
     }
     plot = plot.series(Series::reference("measured", &ends, &ends));
