@@ -54,7 +54,7 @@ fn a_point_that_is_not_finite_ends_the_run() {
     };
     run("coarse", "temperature_step = \"1 K\"\n")
         .with_code(1)
-        .tells("alpha is not finite at point `p`, t = ");
+        .tells("rate of crystallization is not finite at point `p`, t = ");
     run("asked", "temperature_step = \"1 K\"\nnon_finite = true\n").with_code(0);
     assert!(scalar(&report(&here.join("asked")), "p.non_finite_rows") >= 1.0);
     run("fine", "temperature_step = \"0.01 K\"\n").with_code(0);

@@ -219,7 +219,10 @@ mod tests {
         for bonds in [&mut regular as &mut dyn Bonds<2>, &mut cloud] {
             assert_eq!(bonds.one_sided(), None);
             let slot = bonds.particles()[7];
-            bonds.sever(&[Overstretched { slot, index: 3, elongation: 0.0, length: 1.0, weight: 1.0 }]);
+            let mut index = None;
+            bonds.neighbours(slot as usize, &mut |bond| index = index.or(Some(bond.index)));
+            let index = index.unwrap();
+            bonds.sever(&[Overstretched { slot, index, elongation: 0.0, length: 1.0, weight: 1.0 }]);
             assert_eq!(bonds.one_sided().map(|pair| pair[1]), Some(slot as usize));
             assert!(refuse_one_sided(bonds).unwrap_err().to_string().contains("no counterpart"));
         }

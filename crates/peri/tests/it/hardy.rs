@@ -50,8 +50,8 @@ fn strained<const D: usize>(points: &[[f64; D]]) -> Vec<[f64; D]> {
 }
 
 /// In a body with a hole every particle, at edges, corners and the hole, has the stress that its own bonds give where none
-/// is missing.
-fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) {
+/// is missing; the greatest error by `hardy`.
+fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) -> f64 {
     let mut body = Body::<D>::solid(cells, 1.0, ratio);
     let far = 2.0 * ratio;
     let centre = cells.map(|c| c as f64 - far - 1.5);
@@ -66,6 +66,7 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) {
     };
     let inside = built.points.iter().position(whole).expect("a particle with all its bonds");
     let exact = one_point[inside];
+    let mut of_hardy = f64::NAN;
     for &measure in measures {
         let found = on_lattice(&built, &fit, &u, measure, Missing::Bonds);
         // looking one cell far, it finds no bond of some types at corners and at the steps of a hole
@@ -78,28 +79,26 @@ fn patch<const D: usize>(ratio: f64, cells: [usize; D], measures: &[Measure]) {
         let worst = judged.map(|(_, p)| apart(p, &exact) / size(&exact)).fold(0.0, f64::max);
         // displacements of 1 are rounded to 1e-16, those of neighbours differ by 1e-2
         if measure == Measure::Hardy {
-            evidence::at_most(
-                &format!("patch test of hardy up to free edges, {D}D, m = {ratio}"),
-                worst,
-                1e-13,
-            );
+            of_hardy = worst;
         }
         assert!(worst < 1e-13, "{D}D, m = {ratio}, {}: {worst:e}", measure.name());
     }
     // what the old weights miss by: the check can fail
     let old = on_lattice(&built, &fit, &u, Measure::BallShare, Missing::Bonds)[inside];
     assert!(apart(&old, &exact) > 1e-3 * size(&exact));
+    of_hardy
 }
 
 #[test]
 fn any_strain_is_exact_up_to_free_edges() {
+    let mut worst = patch::<3>(3.015, [19; 3], &[Measure::Hardy, Measure::LehoucqSilling]);
     for ratio in [3.015, 4.015, 6.015, 8.015] {
         let side = (4.0 * ratio) as usize + 8;
-        patch::<2>(ratio, [side, side + 3], &ALL);
+        worst = worst.max(patch::<2>(ratio, [side, side + 3], &ALL));
     }
     patch::<2>(2.6, [17, 20], &ALL);
     patch::<2>(4.9, [30, 28], &ALL);
-    patch::<3>(3.015, [19; 3], &[Measure::Hardy, Measure::LehoucqSilling]);
+    evidence::at_most("patch test of hardy up to free edges", worst, 1e-13);
 }
 
 /// `patch_test.py`: σ₁₁ in rows 0–3 below an edge along x over that inside, uniform strain of uniaxial stress along x.

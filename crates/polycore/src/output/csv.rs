@@ -21,10 +21,12 @@ pub fn write(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<(), Error
     }
     atomic_write(path, |file| {
         let mut writer = csv::Writer::from_writer(file);
-        writer.write_record(columns.iter().map(|(name, unit, _)| heading(name, unit)))?;
+        writer.write_record(columns.iter().map(|(name, unit, _)| heading(name, unit))).map_err(plain)?;
         for row in 0..rows {
             // `{:?}` is the shortest text that reads back to the same f64
-            writer.write_record(columns.iter().map(|(_, _, data)| format!("{:?}", data[row])))?;
+            writer
+                .write_record(columns.iter().map(|(_, _, data)| format!("{:?}", data[row])))
+                .map_err(plain)?;
         }
         writer.flush()
     })
@@ -55,6 +57,14 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<f64>)>, Error> {
         }
     }
     Ok(columns)
+}
+
+/// The error of the system inside: its kind says whether there is room on the disk.
+fn plain(error: csv::Error) -> std::io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => std::io::Error::other(format!("{other:?}")),
+    }
 }
 
 fn heading(name: &str, unit: &str) -> String {
