@@ -68,6 +68,12 @@ pub enum Error {
         /// Time, s.
         time: f64,
     },
+    /// A result that the scene says leaves the finite numbers does not.
+    #[error("{place}: all its values are finite; allowed: some that are not, as `non_finite` says")]
+    Finite {
+        /// The point of the scene.
+        place: String,
+    },
     /// An iteration did not end.
     #[error(
         "{method} did not converge at t = {time} s: error {error} K after {iterations} iterations, wanted {wanted} K"
@@ -114,7 +120,7 @@ impl Error {
             | Self::File { .. }
             | Self::Data { .. } => 2,
             Self::Interrupted(_) | Self::SweepInterrupted(_) => 130,
-            Self::NotFinite { .. } | Self::NotConverged { .. } => 1,
+            Self::NotFinite { .. } | Self::Finite { .. } | Self::NotConverged { .. } => 1,
             Self::Study { error, .. } => error.exit_code(),
             Self::Shared(error) => error.exit_code(),
         }

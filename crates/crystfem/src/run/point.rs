@@ -47,9 +47,7 @@ pub fn run(source: &Source, scene: &PointScene, options: &Options) -> Result<Rep
                     return Err(Error::NotFinite { quantity, place, time: *time }.into());
                 }
                 None if point.non_finite => {
-                    let reason =
-                        "all its values are finite; allowed: some that are not, as `non_finite` says";
-                    return Err(Error::Data { what: format!("point `{name}`"), reason: reason.into() }.into());
+                    return Err(Error::Finite { place: format!("point `{name}`") }.into());
                 }
                 _ => report.value(&format!("{name}.non_finite_rows"), broken.len() as f64, ""),
             };

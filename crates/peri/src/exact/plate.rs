@@ -14,12 +14,12 @@ const POWERS: usize = 60;
 /// ν of every plane body here, plane strain read as ν/(1 − ν): central bonds leave no choice.
 const POISSON: f64 = 1.0 / 3.0;
 
-/// Stresses of a plate |x| ≤ half[0], |y| ≤ half[1] with a free hole about the origin under unit tension along x: by
-/// tractions on the edges x = ±half[0] where `layer` is 0, else by the body force 1/layer within a layer of that width
+/// Stresses of a plate |x| ≤ half₁, |y| ≤ half₂ with a free hole about the origin under unit tension along x: by
+/// tractions on the edges x = ±half₁ where `layer` is 0, else by the body force 1/layer within a layer of that width
 /// at each of these edges, as `peri` applies tractions.
 ///
-/// A body force has the particular solution σ = (1, ν, 0)·min(1, (half[0] − |x|)/layer) of uniaxial strain; what is left is
-/// smooth and has tractions σ₁₁ = 1 on x = ±half[0] and σ₂₂ = ν·ramp(x) on y = ±half[1], ramp = max(0, (|x| − half[0] +
+/// A body force has the particular solution σ = (1, ν, 0)·min(1, (half₁ − |x|)/layer) of uniaxial strain; what is left is
+/// smooth and has tractions σ₁₁ = 1 on x = ±half₁ and σ₂₂ = ν·ramp(x) on y = ±half₂, ramp = max(0, (|x| − half₁ +
 /// layer)/layer); subtracting ramp·(1, ν, 0) gives the plate's stress.
 pub struct Plate {
     radius: f64,
@@ -33,7 +33,7 @@ pub struct Plate {
 }
 
 impl Plate {
-    /// Finds the coefficients; lengths in any one unit. None unless 0 < `radius` < both halves and 0 ≤ `layer` < half[0] −
+    /// Finds the coefficients; lengths in any one unit. None unless 0 < `radius` < both halves and 0 ≤ `layer` < half₁ −
     /// `radius`.
     ///
     /// For the square with half = 25/3 radii, where the figures of an independent finite-element program are met (tests):
