@@ -202,9 +202,10 @@ fn links_lead_to_files() {
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }
 
-/// Examples of the libraries are doctests of the crates: each fence of Rust stands in the head of a `lib.rs`.
+/// Examples of the libraries are doctests of the crates, in the head of a `lib.rs`, or programs in their `examples`
+/// ([`crate::examples`] runs them).
 #[test]
-fn rust_examples_are_doctests() {
+fn rust_examples_are_doctests_or_programs() {
     let heads: Vec<String> = ["peri", "mdsurrogate"]
         .map(|name| {
             let text = fs::read_to_string(workspace().join(format!("crates/{name}/src/lib.rs"))).unwrap();
@@ -214,14 +215,21 @@ fn rust_examples_are_doctests() {
             lines.filter(|line| !line.starts_with("# ")).collect::<Vec<_>>().join("\n")
         })
         .into();
-    let page = fs::read_to_string(workspace().join("docs/guide/src/how-to/library.md")).unwrap();
+    let path = workspace().join("docs/guide/src/how-to/library.md");
+    let page = fs::read_to_string(&path).unwrap();
     let fences: Vec<&str> =
         page.split("```rust\n").skip(1).filter_map(|rest| rest.split("\n```").next()).collect();
-    assert_eq!(fences.len(), 2);
-    for fence in fences {
+    let mut programs = 0;
+    for fence in &fences {
+        if let Some(file) = fence.strip_prefix("{{#include ").and_then(|rest| rest.strip_suffix("}}")) {
+            assert!(file.contains("/examples/") && path.with_file_name(file).is_file(), "{file}");
+            programs += 1;
+            continue;
+        }
         let there = |head: &String| head.contains(&format!("```\n{fence}\n```"));
         assert!(heads.iter().any(there), "no doctest is\n{fence}");
     }
+    assert!(programs >= 4 && fences.len() > programs, "{programs} of {}", fences.len());
 }
 
 /// What mdBook would leave out: pages that SUMMARY.md does not name.

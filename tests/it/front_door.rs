@@ -312,7 +312,9 @@ fn tables() {
     });
     let rubber = below("cases/ch1", ".csv");
     attack_files("rubber data", &rubber, "rubber.csv", |path| {
-        polycore::hyperelastic::data::Table::read(path).map(|_| ()).map_err(|error| error.to_string())
+        polycore::constitutive::hyperelastic::data::Table::read(path)
+            .map(|_| ())
+            .map_err(|error| error.to_string())
     });
 }
 

@@ -4,6 +4,7 @@
 //! * [`bad`]: malformed and absurd scenes in `tests/bad/`, each with the message it must get;
 //! * [`commands`]: exit codes, help, closed forms, reports and files;
 //! * [`bits`]: the same bits on any number of threads;
+//! * [`examples`]: the small programs in `crates/*/examples`;
 //! * [`killed`]: the same bits after `kill -9`, Ctrl-C and `peri resume`;
 //! * [`front_door`]: scenes, meshes, tables, HDF5, laws and checkpoints damaged at random;
 //! * [`printing`]: paths that miss the part, gaps, values that are not finite;
@@ -20,6 +21,7 @@ mod bad;
 mod bits;
 mod commands;
 mod documents;
+mod examples;
 mod front_door;
 mod killed;
 mod limits;

@@ -1,4 +1,4 @@
-//! Builds the command lines once and runs them.
+//! Builds the command lines and the examples once and runs them.
 
 use std::collections::HashMap;
 use std::io::Read;
@@ -29,7 +29,7 @@ pub fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// The released executable of a package. Cargo tells where it is: target directories can be anywhere.
+/// The released executable of a package, or an example. Cargo tells where it is: target directories can be anywhere.
 pub fn executable(package: &str) -> &'static Path {
     static BUILT: OnceLock<HashMap<String, PathBuf>> = OnceLock::new();
     &BUILT.get_or_init(build)[package]
@@ -38,7 +38,8 @@ pub fn executable(package: &str) -> &'static Path {
 fn build() -> HashMap<String, PathBuf> {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let mut command = Command::new(cargo);
-    command.args(["build", "--release", "--quiet", "--message-format=json-render-diagnostics"]);
+    command.args(["build", "--release", "--quiet", "--bins", "--examples"]);
+    command.arg("--message-format=json-render-diagnostics");
     command.args(PACKAGES.map(|package| format!("--package={package}")));
     let output = command.current_dir(workspace()).stderr(Stdio::inherit()).output().unwrap();
     assert!(output.status.success(), "cargo build failed");

@@ -51,7 +51,7 @@ impl fmt::Display for Stamp {
 }
 
 /// The numerics of `polycore`, on which the other crates rest.
-const NUMERICS: [&str; 3] = ["langevin", "tensor", "hyperelastic"];
+const NUMERICS: [&str; 4] = ["constitutive", "langevin", "random", "tensor"];
 
 /// What the numbers of crates depend on: `parts` of their folders (`src`, `tests`), and the numerics of `polycore`.
 pub fn sources(root: &Path, crates: &[&str], parts: &[&str]) -> Vec<String> {

@@ -2,31 +2,31 @@
 //! them, for a list of 512 points.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use mdsurrogate::surrogate::{Answer, Workspace};
+use mdsurrogate::surrogate::{Prediction, Workspace};
 use std::hint::black_box;
 
 #[path = "../src/bench_points.rs"]
 mod points;
 
-fn answers(criterion: &mut Criterion) {
+fn predictions(criterion: &mut Criterion) {
     let strains = points::points::<f64>();
     let mut memory = Workspace::default();
-    let mut answers = vec![Answer::default(); points::POINTS];
-    let mut group = criterion.benchmark_group("answers");
+    let mut predictions = vec![Prediction::default(); points::POINTS];
+    let mut group = criterion.benchmark_group("predictions");
     group.throughput(Throughput::Elements(points::POINTS as u64));
     for (name, law) in points::laws().unwrap_or_else(|error| panic!("{error}")) {
         group.bench_function(format!("{name}, stress"), |bencher| {
             bencher.iter(|| strains.iter().all(|c| law.stress(black_box(c), &mut memory).is_ok()));
         });
         group.bench_function(format!("{name}, stress and tangent"), |bencher| {
-            bencher.iter(|| law.tangents(black_box(&strains), &mut memory, &mut answers).is_ok());
+            bencher.iter(|| law.tangents(black_box(&strains), &mut memory, &mut predictions).is_ok());
         });
         group.bench_function(format!("{name}, stress, batch"), |bencher| {
-            bencher.iter(|| law.stresses(black_box(&strains), &mut memory, &mut answers).is_ok());
+            bencher.iter(|| law.stresses(black_box(&strains), &mut memory, &mut predictions).is_ok());
         });
     }
     group.finish();
 }
 
-criterion_group! { name = network; config = Criterion::default().sample_size(20); targets = answers }
+criterion_group! { name = network; config = Criterion::default().sample_size(20); targets = predictions }
 criterion_main!(network);

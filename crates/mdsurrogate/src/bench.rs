@@ -3,7 +3,7 @@
 use crate::bench_points::{self, POINTS};
 use mdsurrogate::Error;
 use mdsurrogate::network::Real;
-use mdsurrogate::surrogate::{Answer, Surrogate, Workspace};
+use mdsurrogate::surrogate::{Prediction, Surrogate, Workspace};
 use nalgebra::Scalar;
 use polycore::command::{Measurement, print_measurements};
 use std::hint::black_box;
@@ -57,27 +57,30 @@ fn measure<T: Real + Scalar>(
 ) -> Result<(), Error> {
     let points = bench_points::points::<T>();
     let mut memory = Workspace::default();
-    let mut answers = vec![Answer::default(); POINTS];
+    let mut predictions = vec![Prediction::default(); POINTS];
     let size = law.header().architecture.parameters() as u64;
     let mut row = |what: &str, value: f64| {
         let what = format!("{name}, {precision}, {what}");
         rows.push(Measurement { what, size, threads: 1, value, unit: "ns/point" });
     };
     let single = median_time(|| {
-        for (c, answer) in points.iter().zip(&mut answers) {
-            *answer = law.stress(black_box(c), &mut memory)?;
+        for (c, prediction) in points.iter().zip(&mut predictions) {
+            *prediction = law.stress(black_box(c), &mut memory)?;
         }
         Ok(())
     })?;
     row("stress", single);
     let with_tangent = median_time(|| {
-        for (c, answer) in points.iter().zip(&mut answers) {
-            *answer = law.tangent(black_box(c), &mut memory)?;
+        for (c, prediction) in points.iter().zip(&mut predictions) {
+            *prediction = law.tangent(black_box(c), &mut memory)?;
         }
         Ok(())
     })?;
     row("stress and tangent", with_tangent);
-    row("stress, batch", median_time(|| law.stresses(black_box(&points), &mut memory, &mut answers))?);
+    row(
+        "stress, batch",
+        median_time(|| Ok(law.stresses(black_box(&points), &mut memory, &mut predictions)?))?,
+    );
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use mdsurrogate::dataset::Row;
 use mdsurrogate::kinematics::cauchy_of_material;
 use mdsurrogate::network::Architecture;
 use mdsurrogate::random::SplitMix64;
-use mdsurrogate::surrogate::{Header, Kind};
+use mdsurrogate::surrogate::Kind;
 use mdsurrogate::train::{Settings, Training};
 use polycore::command::Measurement;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
@@ -28,7 +28,7 @@ pub fn measure() -> Result<Vec<Measurement>, Error> {
         rows.push(Row::new(sample as u64, f64::NAN, f, cauchy_of_material(&f, &s)));
     }
     let rows: Vec<&Row> = rows.iter().collect();
-    let header = Header::fitted(Kind::Ann, Architecture::thesis(4)?, 1, &rows, true)?;
+    let header = mdsurrogate::fitted::header(Kind::Ann, Architecture::thesis(4)?, 1, &rows, true)?;
     let mut measured = Vec::new();
     for batch in BATCHES {
         let settings = Settings { epochs: EPOCHS, batch, ..Settings::default() };

@@ -135,6 +135,18 @@ impl From<polycore::tensor::Error> for Error {
     }
 }
 
+/// What a model refuses is told as this crate tells its own.
+impl From<polycore::constitutive::Error> for Error {
+    fn from(error: polycore::constitutive::Error) -> Self {
+        use polycore::constitutive::Error as Law;
+        match error {
+            Law::Invalid { name, found, allowed } => Self::Parameter { name, found, allowed },
+            Law::File { path, found, allowed } => Self::File { path, found, allowed },
+            other => Self::Shared(other.into()),
+        }
+    }
+}
+
 /// The nearest of some names, if one is near enough to be meant.
 pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> Option<String> {
     let first = |text: &str| text.chars().next();

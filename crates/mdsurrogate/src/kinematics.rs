@@ -4,7 +4,9 @@
 //! pressure vector. Stress is positive in tension: σ = −P.
 
 use crate::Error;
-use polycore::tensor::{DeformationGradient, StressMeasure, Tensor, Voigt, Voigt6x6, voigt};
+use polycore::tensor::{DeformationGradient, StressMeasure, Tensor, Voigt, voigt};
+
+pub use polycore::tensor::voigt::{NAMES, cauchy_of_material, jaumann_tangent};
 
 /// One standard atmosphere, Pa (exact by definition; LAMMPS' `units real` measure pressure in it).
 pub const ATMOSPHERE: f64 = 101_325.0;
@@ -80,32 +82,6 @@ pub fn material_pair(deformation: &DeformationGradient, cauchy: &Voigt) -> (Voig
     (voigt::from_stress(&deformation.right_cauchy_green()), voigt::from_stress(&s))
 }
 
-/// The way back: σ = F S Fᵀ / J.
-pub fn cauchy_of_material(deformation: &DeformationGradient, second_piola_kirchhoff: &Voigt) -> Voigt {
-    use StressMeasure::{Cauchy, SecondPiolaKirchhoff};
-    let s = voigt::to_stress(second_piola_kirchhoff);
-    voigt::from_stress(&deformation.convert_stress(&s, SecondPiolaKirchhoff, Cauchy))
-}
-
-/// What Abaqus' UMAT asks for (DDSDDE at finite strain): the tangent of the Jaumann rate of the Kirchhoff stress over J,
-/// F_iI F_jJ F_kK F_lL ℂ_IJKL / J + ½(σ_ik δ_jl + σ_jk δ_il + σ_il δ_jk + σ_jl δ_ik), in the unit of ℂ, from S and
-/// ℂ = 2 ∂S/∂C (Sun, Chaikof & Levenston 2008, <https://doi.org/10.1115/1.2979872>).
-pub fn jaumann_tangent(
-    deformation: &DeformationGradient,
-    second_piola_kirchhoff: &Voigt,
-    tangent: &Voigt6x6,
-) -> Voigt6x6 {
-    const PAIRS: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [0, 2], [1, 2]];
-    let sigma = voigt::to_stress(&cauchy_of_material(deformation, second_piola_kirchhoff));
-    let delta = |i: usize, j: usize| f64::from(u8::from(i == j));
-    let rate = Voigt6x6::from_fn(|a, b| {
-        let ([i, j], [k, l]) = (PAIRS[a], PAIRS[b]);
-        let (first, second) = (sigma[(i, k)] * delta(j, l), sigma[(j, k)] * delta(i, l));
-        0.5 * (first + second + sigma[(i, l)] * delta(j, k) + sigma[(j, l)] * delta(i, k))
-    });
-    voigt::spatial_tangent(deformation, tangent) + rate
-}
-
 /// The rotation-free F = U = √C of a right Cauchy–Green vector (3.2).
 ///
 /// # Errors
@@ -124,9 +100,6 @@ pub fn stretch_of(c: &Voigt) -> Result<DeformationGradient, Error> {
     let roots = Tensor::from_diagonal(&eigen.eigenvalues.map(f64::sqrt));
     Ok(DeformationGradient::new(eigen.eigenvectors * roots * eigen.eigenvectors.transpose())?)
 }
-
-/// Names of the Voigt components.
-pub const NAMES: [&str; 6] = ["11", "22", "33", "12", "13", "23"];
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,34 @@
-//! From molecular dynamics to a constitutive law: data sets of (C, S), networks, inference.
+//! From molecular dynamics to a constitutive law: data sets of (C, S), training and search of models, their judgement, export.
 //!
-//! The `mdsurrogate` command line reads and measures data ([`mod@dataset`], feature `cli`); the same parts from Rust:
+//! ```
+//! use mdsurrogate::network::Activation::Softplus;
+//! use mdsurrogate::surrogate::{Header, Kind, Prediction, Surrogate, Symmetry, Workspace};
+//! use polycore::tensor::Voigt;
+//!
+//! // random weights in place of a training: an orthotropic energy, an ensemble of two
+//! let header = Header::new(Kind::energy(Symmetry::Orthotropic), &[(32, Softplus), (32, Softplus)], 2);
+//! # let directory = tempfile::tempdir()?;
+//! # let file = directory.path().join("law.safetensors");
+//! Surrogate::random(header, 1)?.write(&file)?;
+//!
+//! // stress, tangent 2 ∂S/∂C and uncertainty at a C in the order 11, 22, 33, 12, 13, 23
+//! let model = Surrogate::read(&file)?;
+//! let found = model.predict(&Voigt::new(1.1, 1.0, 1.0, 0.1, 0.0, 0.0))?;
+//! assert!(found.stress[0] != 0.0 && found.tangent.is_some() && found.spread > 0.0);
+//! assert!(found.flags.unseen[3], "no training data had shear");
+//!
+//! // many points: the same bits at half the cost, and no allocation in calls with the same memory
+//! let points = vec![Voigt::new(1.1, 1.0, 1.0, 0.0, 0.0, 0.0); 100];
+//! let (mut memory, mut predictions) = (Workspace::default(), vec![Prediction::default(); 100]);
+//! model.stresses(&points, &mut memory, &mut predictions)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Models are evaluated by [`polycore::constitutive`], without a training framework, and are laws as any other there
+//! ([`polycore::constitutive::Law`]); [`surrogate`] and [`network`] are its modules. What is added here: [`mod@dataset`], [`fitted`],
+//! `train` and `search` (feature `train`), [`eval`], [`export`], and molecular dynamics in [`md`].
+//!
+//! Data sets are tables of runs:
 //!
 //! ```
 //! use mdsurrogate::dataset::{Fractions, Method, ReadOptions, Standardisation, noise, read, split};
@@ -28,44 +56,17 @@
 //! assert!((noise.deviation[0] - 3f64.sqrt() * 1e6).abs() < 1.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-//!
-//! A law is used without any training framework ([`surrogate`]):
-//!
-//! ```
-//! use mdsurrogate::network::Activation::Softplus;
-//! use mdsurrogate::surrogate::{Answer, Header, Kind, Surrogate, Symmetry, Workspace};
-//!
-//! // an orthotropic energy with random weights, in place of `Surrogate::read("law.safetensors")`
-//! let header = Header::new(Kind::energy(Symmetry::Orthotropic), &[(32, Softplus), (32, Softplus)], 2);
-//! let law = Surrogate::<f64>::random(header, 1)?;
-//! let mut memory = Workspace::default();
-//! let rest = law.stress(&[1.0, 1.0, 1.0, 0.0, 0.0, 0.0].into(), &mut memory)?;
-//! assert_eq!(rest.stress.norm(), 0.0);
-//!
-//! // sheared: stress, the tangent 2 ∂S/∂C, and the doubt that no training data had shear
-//! let answer = law.tangent(&[1.1, 1.0, 1.0, 0.1, 0.0, 0.0].into(), &mut memory)?;
-//! let tangent = answer.tangent.unwrap();
-//! assert!((tangent - tangent.transpose()).norm() < 1e-14 * tangent.norm());
-//! assert!(answer.flags.unseen[3]);
-//!
-//! // many points at once: the same bits, at about half the cost
-//! let points = vec![[1.1, 1.0, 1.0, 0.0, 0.0, 0.0].into(); 100];
-//! let mut answers = vec![Answer::default(); 100];
-//! law.stresses(&points, &mut memory, &mut answers)?;
-//! # Ok::<(), mdsurrogate::Error>(())
-//! ```
 
 pub mod cell;
 pub mod dataset;
 pub mod error;
 pub mod eval;
+pub mod export;
+pub mod fitted;
 pub mod kinematics;
 pub mod md;
-pub mod network;
-pub mod random;
 #[cfg(feature = "train")]
 pub mod search;
-pub mod surrogate;
 #[cfg(feature = "train")]
 pub mod train;
 
@@ -75,3 +76,5 @@ pub mod run;
 pub mod scene;
 
 pub use error::Error;
+pub use polycore::constitutive::{network, surrogate};
+pub use polycore::random;

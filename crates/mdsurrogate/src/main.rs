@@ -6,8 +6,9 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use mdsurrogate::Error;
 use mdsurrogate::dataset::{Columns, ReadOptions, read};
+use mdsurrogate::export::{CSource, c_source, fortran_source, onnx};
 use mdsurrogate::run::{Failure, describe};
-use mdsurrogate::surrogate::{CSource, Surrogate};
+use mdsurrogate::surrogate::Surrogate;
 use polycore::command::exit;
 use polycore::output::atomic_write;
 use polycore::report::Report;
@@ -137,11 +138,11 @@ fn export(law: &Path, output: &Path, form: Form) -> Result<bool, Error> {
     let law = Surrogate::read(law)?;
     let files = match form {
         Form::C => {
-            let CSource { header, source } = law.c_source(&name)?;
+            let CSource { header, source } = c_source(&law, &name)?;
             vec![("h", header.into_bytes()), ("c", source.into_bytes())]
         }
-        Form::Fortran => vec![("f90", law.fortran_source(&name)?.into_bytes())],
-        Form::Onnx => vec![("onnx", law.onnx())],
+        Form::Fortran => vec![("f90", fortran_source(&law, &name)?.into_bytes())],
+        Form::Onnx => vec![("onnx", onnx(&law))],
     };
     if let Some(folder) = output.parent() {
         std::fs::create_dir_all(folder).map_err(Error::io("create", folder))?;

@@ -3,7 +3,7 @@
 use mdsurrogate::Error;
 use mdsurrogate::dataset::read_strains;
 use mdsurrogate::kinematics::NAMES;
-use mdsurrogate::surrogate::{Answer, Flags, Surrogate, Workspace};
+use mdsurrogate::surrogate::{Flags, Prediction, Surrogate, Workspace};
 use polycore::output::csv;
 use polycore::tensor::Voigt;
 use std::path::{Path, PathBuf};
@@ -28,24 +28,24 @@ pub struct Predict {
 }
 
 impl Predict {
-    /// Answers and writes.
+    /// Predictions and writes.
     pub fn print(self) -> Result<bool, Error> {
         let law = Surrogate::<f64>::read(&self.law)?;
         let points = read_strains(&self.table)?;
-        let mut answers = vec![Answer::default(); points.len()];
+        let mut answers = vec![Prediction::default(); points.len()];
         let mut memory = Workspace::default();
         let asked = if self.tangent {
             law.tangents(&points, &mut memory, &mut answers)
         } else {
             law.stresses(&points, &mut memory, &mut answers)
         };
-        asked.map_err(|error| match error {
+        asked.map_err(|error| match Error::from(error) {
             Error::Parameter { name, found, allowed } => {
                 Error::File { path: self.table.clone(), found: format!("{name}: {found}"), allowed }
             }
             other => other,
         })?;
-        let finite = |answer: &Answer<f64>| {
+        let finite = |answer: &Prediction<f64>| {
             let tangent = answer.tangent.is_none_or(|tangent| tangent.iter().all(|x| x.is_finite()));
             answer.stress.iter().all(|x| x.is_finite()) && answer.energy.is_none_or(f64::is_finite) && tangent
         };
@@ -64,8 +64,8 @@ impl Predict {
     }
 }
 
-fn write(path: &Path, points: &[Voigt], answers: &[Answer<f64>]) -> Result<(), Error> {
-    let column = |value: &dyn Fn(&Answer<f64>) -> f64| answers.iter().map(value).collect::<Vec<f64>>();
+fn write(path: &Path, points: &[Voigt], answers: &[Prediction<f64>]) -> Result<(), Error> {
+    let column = |value: &dyn Fn(&Prediction<f64>) -> f64| answers.iter().map(value).collect::<Vec<f64>>();
     let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
     for (a, name) in NAMES.iter().enumerate() {
         columns.push((format!("C{name}"), "", points.iter().map(|point| point[a]).collect()));
@@ -91,7 +91,7 @@ fn write(path: &Path, points: &[Voigt], answers: &[Answer<f64>]) -> Result<(), E
     if answers.iter().any(|answer| answer.tangent.is_some()) {
         for (a, row) in NAMES.iter().enumerate() {
             for (b, name) in NAMES.iter().enumerate() {
-                let value = |answer: &Answer<f64>| answer.tangent.map_or(f64::NAN, |t| t[(a, b)] / MEGA);
+                let value = |answer: &Prediction<f64>| answer.tangent.map_or(f64::NAN, |t| t[(a, b)] / MEGA);
                 columns.push((format!("tangent {row} {name}"), "MPa", column(&value)));
             }
         }

@@ -1,5 +1,6 @@
 //! The error of this crate: what failed, on which file or value.
 
+use crate::constitutive;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -74,9 +75,9 @@ pub enum Error {
     /// A matrix that is no deformation gradient.
     #[error(transparent)]
     Tensor(#[from] crate::tensor::Error),
-    /// A hyperelastic law, fit or table.
+    /// A constitutive law, its fit, table or file.
     #[error(transparent)]
-    Hyperelastic(#[from] crate::hyperelastic::Error),
+    Constitutive(#[from] constitutive::Error),
 }
 
 /// What a user can do something about, before the system's own words.
@@ -106,6 +107,9 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::OutputDirectory { .. } | Self::Checkpoint { .. } | Self::Format { .. } => {
+                crate::scene::EXIT_BAD_INPUT
+            }
+            Self::Constitutive(constitutive::Error::Invalid { .. } | constitutive::Error::File { .. }) => {
                 crate::scene::EXIT_BAD_INPUT
             }
             Self::Io { operation, .. } if operation.starts_with("read") || *operation == "open" => {

@@ -2,7 +2,7 @@
 //! units, scenes, reports and output.
 //!
 //! ```
-//! use polycore::hyperelastic::{EightChain, homogeneous::uniaxial};
+//! use polycore::constitutive::hyperelastic::{EightChain, homogeneous::uniaxial};
 //! use polycore::langevin::inverse;
 //! use polycore::units::Stress;
 //!
@@ -21,11 +21,12 @@
 pub mod checkpoint;
 #[cfg(feature = "command")]
 pub mod command;
+pub mod constitutive;
 pub mod error;
-pub mod hyperelastic;
 pub mod langevin;
 pub mod memory;
 pub mod output;
+pub mod random;
 pub mod report;
 pub mod scene;
 pub mod tensor;

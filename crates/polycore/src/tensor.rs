@@ -60,4 +60,10 @@ pub enum Error {
         /// The value given.
         value: f64,
     },
+    /// C is not finite or not positive definite.
+    #[error("C = {c:?} is not positive definite")]
+    NotPositiveDefinite {
+        /// C₁₁, C₂₂, C₃₃, C₁₂, C₁₃, C₂₃.
+        c: [f64; 6],
+    },
 }

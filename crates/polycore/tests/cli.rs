@@ -235,7 +235,8 @@ fn exact_tables_read_back_as_data() {
     let arguments = ["exact", "neo-hookean", "0.5 MPa", "--from", "2", "--to", "4", "--points", "2"];
     let result = polycore(&arguments);
     assert_eq!(result.status.code(), Some(0), "{}", text(&result.stderr));
-    let table = polycore::hyperelastic::data::Table::parse("exact", &text(&result.stdout)).unwrap();
+    let table =
+        polycore::constitutive::hyperelastic::data::Table::parse("exact", &text(&result.stdout)).unwrap();
     assert_eq!(table.measurements(), 2);
     assert!((table.states[0].nominal[0] - 0.875e6).abs() < 1e-6);
     for bad in [

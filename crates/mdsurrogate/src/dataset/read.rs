@@ -4,7 +4,7 @@ use super::table::{Column, Table};
 use super::{Dataset, Path, Row};
 use crate::Error;
 use crate::kinematics::{PeriodicBox, cauchy_of_material, stretch_of};
-use polycore::hyperelastic;
+use polycore::constitutive::{self, hyperelastic};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -216,7 +216,7 @@ fn nominal(table: &Table) -> Result<Dataset, Error> {
     let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
     let read = hyperelastic::data::Table::parse("", &text).map_err(|error| {
         let found = match error {
-            hyperelastic::Error::Data { reason, .. } => reason,
+            constitutive::Error::Data { reason, .. } => reason,
             other => other.to_string(),
         };
         Error::file(path, found, "stretches and nominal stresses of an incompressible body")

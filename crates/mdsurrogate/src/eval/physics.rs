@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::dataset::Row;
 use crate::surrogate::{Surrogate, Workspace};
+use polycore::constitutive::Law;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
 
 /// Amount of simple shear at which a law is asked for a shear stress.
@@ -80,20 +81,20 @@ impl Physics {
 }
 
 /// ‖σ(RF) − R σ(F) Rᵀ‖/‖σ(F)‖ for a rotation that depends on the row's number.
-fn rotated(law: &Surrogate, row: &Row, index: usize, memory: &mut Workspace<f64>) -> Result<f64, Error> {
+fn rotated(law: &Surrogate, row: &Row, index: usize, memory: &mut Workspace) -> Result<f64, Error> {
     let angle = 0.1 + index as f64;
     let axis = nalgebra::Unit::new_normalize(nalgebra::Vector3::new(angle.sin(), angle.cos(), 0.4));
     let rotation = nalgebra::Rotation3::from_axis_angle(&axis, angle).into_inner();
     let turned = DeformationGradient::new(rotation * row.deformation.matrix())?;
-    let (own, _) = law.cauchy(&row.deformation, memory)?;
-    let (other, _) = law.cauchy(&turned, memory)?;
+    let (own, _) = law.cauchy_stress(&row.deformation, memory)?;
+    let (other, _) = law.cauchy_stress(&turned, memory)?;
     let expected = rotation * voigt::to_stress(&own) * rotation.transpose();
     let norm = own.norm();
     Ok(if norm > 0.0 { (voigt::to_stress(&other) - expected).norm() / norm } else { 0.0 })
 }
 
 /// Work of a closed cycle over the work of its parts.
-fn cycle(law: &Surrogate, memory: &mut Workspace<f64>) -> Result<f64, Error> {
+fn cycle(law: &Surrogate, memory: &mut Workspace) -> Result<f64, Error> {
     let half = |a: usize| {
         let [low, high] = law.header().training_box[a];
         // the side of the box that is further from rest
@@ -125,14 +126,14 @@ mod tests {
     use super::*;
     use crate::dataset::tests::rows_of_a_law;
     use crate::network::{Activation::Softplus, Architecture};
-    use crate::surrogate::{Header, Kind, Symmetry};
+    use crate::surrogate::{Kind, Symmetry};
 
     fn law(kind: Kind) -> Surrogate {
         let rows = rows_of_a_law();
         let rows: Vec<&Row> = rows.iter().collect();
         let architecture =
             Architecture::new(kind.inputs(), &[(16, Softplus), (16, Softplus)], kind.outputs());
-        Surrogate::random(Header::fitted(kind, architecture, 2, &rows, true).unwrap(), 3).unwrap()
+        Surrogate::random(crate::fitted::header(kind, architecture, 2, &rows, true).unwrap(), 3).unwrap()
     }
 
     #[test]

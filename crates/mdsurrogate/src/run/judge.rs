@@ -288,7 +288,7 @@ fn look_at_heldout<'a>(laws: &[Named], data: &'a Prepared) -> Result<Vec<Heldout
                 law.stress(&row.c, memory).map(|answer| row.compared(&answer.stress)[1].into())
             };
             let rows = run.rows.iter().map(|row| stress(row, &mut memory));
-            predicted.push(rows.collect::<Result<Vec<[f64; 6]>, Error>>()?);
+            predicted.push(rows.collect::<Result<Vec<[f64; 6]>, polycore::constitutive::Error>>()?);
         }
         let reach = |axis: usize| run.rows.iter().map(|row| (row.c[axis] - 1.0).abs()).fold(0.0, f64::max);
         let unknown = run.rates.iter().all(|rate| rate.is_nan());

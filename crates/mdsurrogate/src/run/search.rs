@@ -5,7 +5,7 @@ use crate::dataset::Row;
 use crate::error::Error;
 use crate::scene::{Scene, SearchSpec};
 use crate::search::{Journal, Method, Oracle, Trial, at_random, bayesian, hyperband};
-use crate::surrogate::{Header, Kind};
+use crate::surrogate::Kind;
 use crate::train::{Settings, State, Training};
 use polycore::output::atomic_write;
 use polycore::output::picture::{LinePlot, Series};
@@ -160,7 +160,7 @@ impl Trainer<'_, '_> {
 impl Oracle for Trainer<'_, '_> {
     fn loss(&mut self, question: &Trial, journal: &Journal) -> Result<Option<f64>, Error> {
         let candidate = &question.candidate;
-        let law = Header::fitted(Kind::Ann, candidate.architecture(), 1, &self.rows, true)?;
+        let law = crate::fitted::header(Kind::Ann, candidate.architecture(), 1, &self.rows, true)?;
         let settings = Settings {
             epochs: question.epochs,
             learning_rate: candidate.learning_rate,

@@ -74,8 +74,13 @@ pub fn train(
         let rows = data.rows_of(&split.train, &model.runs);
         let validation = data.rows_of(&split.validation, &model.runs);
         let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
-        let mut header =
-            Header::fitted(model.law(), model.architecture(), model.members, &rows, model.standardised())?;
+        let mut header = crate::fitted::header(
+            model.law(),
+            model.architecture(),
+            model.members,
+            &rows,
+            model.standardised(),
+        )?;
         let settings = model.training.over(&scene.training, options.quick);
         header.provenance.clone_from(&data.set.provenance);
         header.provenance.push(format!(
@@ -184,7 +189,7 @@ fn write(
     let learnt: Vec<Vec<f32>> =
         states.iter().filter(|state| state.best_epoch() > 0).map(|state| state.best().to_vec()).collect();
     if learnt.is_empty() {
-        return Surrogate::random(header.clone(), 0);
+        return Ok(Surrogate::random(header.clone(), 0)?);
     }
     for (member, state) in states.iter().enumerate() {
         let end = if states.len() == 1 { String::new() } else { format!("-{}", member + 1) };
@@ -216,7 +221,10 @@ fn learning_curve(state: &State, path: &Path) -> Result<(), Error> {
 /// What no number says about the trainings: invariants that the data do not vary.
 pub fn remarks(trained: &[Trained], data: &Prepared) -> Vec<String> {
     let remark = |model: &Trained| {
-        let names = model.law.constrained(&data.rows_of(&data.split_of(model.split).train, &model.runs));
+        let names = crate::fitted::constrained(
+            &model.law,
+            &data.rows_of(&data.split_of(model.split).train, &model.runs),
+        );
         let text = format!(
             "{}: {} does not vary by itself in these data: how the energy changes with it is not known",
             model.name,

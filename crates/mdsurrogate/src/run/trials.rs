@@ -4,7 +4,7 @@
 use super::{Failure, Options, Prepared, short};
 use crate::error::Error;
 use crate::scene::{ModelSpec, Scene, TrialSpec};
-use crate::surrogate::{Header, Surrogate, Workspace};
+use crate::surrogate::{Surrogate, Workspace};
 use crate::train::{Settings, Training, ensemble};
 use polycore::report::{Report, Trial};
 use polycore::scene::Source;
@@ -65,7 +65,7 @@ fn seen(
         let (law, best) = trained(model, settings, &data, epochs)?;
         let mut part = format!("{}: loss {} MPa²", model.title(), short(best));
         if let Some(c) = trial.at {
-            let answer = law.stress(&Voigt::from(c), &mut Workspace::default())?;
+            let answer = law.stress(&Voigt::from(c), &mut Workspace::default()).map_err(Error::from)?;
             let all = flagged.unwrap_or(true) && answer.flags.any();
             flagged = Some(all);
             let doubt = if answer.flags.any() { "flagged" } else { "not flagged" };
@@ -88,7 +88,7 @@ fn trained(
 ) -> Result<(Surrogate, f64), Failure> {
     let (rows, validation) = (data.rows(&data.split.train), data.rows(&data.split.validation));
     let header =
-        Header::fitted(model.law(), model.architecture(), model.members, &rows, model.standardised())?;
+        crate::fitted::header(model.law(), model.architecture(), model.members, &rows, model.standardised())?;
     let (mut learnt, mut worst) = (Vec::new(), 0.0f64);
     for member in 0..model.members {
         let settings = Settings { seed: settings.seed.wrapping_add(member as u64), ..settings };
@@ -101,5 +101,6 @@ fn trained(
         learnt.push(training.best().to_vec());
     }
     let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
-    Ok((ensemble(header, &learnt)?.with_spread_limit(&strains)?, worst))
+    let law = ensemble(header, &learnt)?.with_spread_limit(&strains).map_err(Error::from)?;
+    Ok((law, worst))
 }

@@ -141,7 +141,7 @@ impl SearchSpec {
         // the largest network of the space
         let widest = (self.space.neurons[1], self.space.activations[0]);
         let largest = Header::new(Kind::Ann, &vec![widest; self.space.layers[1]], 1);
-        largest.check().map_err(|error| wrong("space", error))?;
+        largest.check().map_err(|error| wrong("space", error.into()))?;
         let parameters = largest.architecture.parameters();
         if parameters > MOST_PARAMETERS {
             let found = format!("networks of up to {parameters} parameters");

@@ -54,7 +54,7 @@ pub(super) fn scaled_slopes(law: &Surrogate<f64>, slopes: &[[f64; 6]]) -> Vec<f3
         let input = if law.header().kind.is_polyconvex() { 1.0 } else { *input };
         [0, 1, 2, 3, 4, 5].map(|a| (factor(a) * scale * (slope[a] * input)) as f32)
     };
-    slopes.iter().zip(law.input_scales()).flat_map(row).collect()
+    slopes.iter().zip(law.coefficients().inverse).flat_map(row).collect()
 }
 
 impl Examples {

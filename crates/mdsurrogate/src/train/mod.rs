@@ -22,7 +22,7 @@
 //! }
 //! let rows: Vec<&Row> = rows.iter().collect();
 //! let architecture = Architecture::new(7, &[(16, Softplus)], 1);
-//! let header = Header::fitted(Kind::energy(Symmetry::Orthotropic), architecture, 1, &rows, true)?;
+//! let header = mdsurrogate::fitted::header(Kind::energy(Symmetry::Orthotropic), architecture, 1, &rows, true)?;
 //! let settings = Settings { epochs: 200, batch: 16, ..Settings::default() };
 //! let mut training = Training::new(&header, &rows, &[], settings)?;
 //! while training.ending().is_none() {
@@ -324,5 +324,5 @@ pub fn ensemble(mut header: Header, members: &[Vec<f32>]) -> Result<Surrogate<f6
     let layout = Layout::new(&header.architecture);
     let network = |flat: &Vec<f32>| layout.network(&header.architecture, flat);
     let networks = members.iter().map(network).collect::<Result<Vec<_>, _>>()?;
-    Surrogate::new(header, networks)
+    Ok(Surrogate::new(header, networks)?)
 }

@@ -77,7 +77,7 @@ impl Polyconvex {
             TensorData::new(values.iter().map(|value| *value as f32).collect::<Vec<f32>>(), shape)
         };
         Self {
-            scales: data(law.input_scales(), [1, inputs]),
+            scales: data(law.coefficients().inverse, [1, inputs]),
             along: data(&parts, [inputs, 3]),
             negative: data(&negative, [3, inputs]),
             positive: data(&positive, [3, inputs]),

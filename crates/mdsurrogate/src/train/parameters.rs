@@ -80,6 +80,6 @@ impl Layout {
             let bias = bias.iter().copied().map(f64::from).collect();
             Layer { weights: turned, bias, activation: architecture.activations[l] }
         };
-        Network::new(architecture.clone(), (0..self.shapes.len()).map(layer).collect())
+        Ok(Network::new(architecture.clone(), (0..self.shapes.len()).map(layer).collect())?)
     }
 }

@@ -4,11 +4,12 @@ use crate::kinematics::cauchy_of_material;
 use crate::network::Activation::{Elu, Linear, Relu, Sigmoid, Silu, Softplus, Tanh};
 use crate::network::{Activation, Architecture};
 use crate::surrogate::{Kind, Symmetry, Workspace};
+use polycore::constitutive::verify;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
 
 fn header(kind: Kind, hidden: &[(usize, Activation)], rows: &[&Row]) -> Header {
     let architecture = Architecture::new(kind.inputs(), hidden, kind.outputs());
-    Header::fitted(kind, architecture, 1, rows, true).unwrap()
+    crate::fitted::header(kind, architecture, 1, rows, true).unwrap()
 }
 
 fn trained(header: &Header, rows: &[&Row], settings: Settings) -> Training {
@@ -65,13 +66,13 @@ fn laws(rows: &[&Row]) -> Vec<Header> {
 #[test]
 fn nominal_stresses_without_the_pressure() {
     let modulus = 0.4e6;
-    let row = |k: usize, mode: polycore::hyperelastic::data::Mode| {
+    let row = |k: usize, mode: polycore::constitutive::hyperelastic::data::Mode| {
         let l = 1.1 + 0.1 * k as f64;
         let second = mode.second_stretch(l);
         let nominal = modulus * (l - 1.0 / (l * second).powi(2) / l);
         Row::of_nominal(k as u64, [l, second], [nominal, 0.0]).unwrap()
     };
-    let [bar, sheet, strip] = polycore::hyperelastic::data::Mode::TESTS;
+    let [bar, sheet, strip] = polycore::constitutive::hyperelastic::data::Mode::TESTS;
     let learnt: Vec<Row> = (0..20).flat_map(|k| [row(k, bar), row(k, sheet)]).collect();
     let rows: Vec<&Row> = learnt.iter().collect();
     for kind in [
@@ -410,4 +411,36 @@ fn schedules() {
     assert!((cosine.rate(20) - 0.001).abs() < 1e-15);
     assert!((Settings { epochs: 1, ..cosine }.rate(0) - 0.1).abs() < 1e-15);
     assert_eq!(SHORT.rate(2), 1e-3);
+}
+
+/// The same of laws trained on data that soften, which push weights against their bound.
+#[test]
+fn trained_on_softening_data() {
+    let mut rows = rows_of_a_law();
+    for row in &mut rows {
+        let strain = voigt::strain_of_right_cauchy_green(&row.c);
+        let softer = row.s / (1.0 + strain.norm_squared() / 0.02);
+        *row = Row::new(row.sample, row.time, row.deformation, cauchy_of_material(&row.deformation, &softer));
+    }
+    let rows: Vec<&Row> = rows.iter().collect();
+    let mut random = crate::random::SplitMix64::new(9);
+    let mut train = |kind: Kind| {
+        let header = header(kind, &[(12, Softplus), (12, Softplus)], &rows);
+        let training =
+            trained(&header, &rows, Settings { epochs: 60, learning_rate: 1e-2, ..Settings::default() });
+        let law = ensemble(header, &[training.best().to_vec()]).unwrap();
+        // a trained model is a law as any other
+        let found = verify::Deviations::of(&law, &verify::deformations()[..4]).unwrap();
+        assert!(found.stress.unwrap() < 2e-8 && found.tangent < 2e-8 && found.asymmetry < 1e-14, "{found:?}");
+        assert!(found.stress_at_rest == 0.0 && found.objectivity < 1e-12 && found.bits == 0.0, "{found:?}");
+        (training.state().best_loss(), verify::lost_waves(&law, 200, &mut random).unwrap(), law)
+    };
+    for symmetry in [Symmetry::Orthotropic, Symmetry::Transverse, Symmetry::Isotropic] {
+        let (bound, lost, law) = train(Kind::polyconvex_energy(symmetry));
+        let stopped = |layer: &crate::network::Layer<f64>| layer.weights.contains(&0.0);
+        assert!(lost == 0 && law.members()[0].layers().iter().any(stopped), "{symmetry:?}: {lost}");
+        let (free, lost, _) = train(Kind::energy(symmetry));
+        // what the bound costs, and that the data are not elliptic
+        assert!(lost > 0 && free < 0.5 * bound, "{symmetry:?}: {lost}, {free} {bound} MPa²");
+    }
 }

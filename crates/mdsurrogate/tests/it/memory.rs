@@ -1,7 +1,7 @@
 //! What a finite element code calls millions of times allocates nothing.
 
 use mdsurrogate::network::Activation::{Relu, Softplus};
-use mdsurrogate::surrogate::{Answer, Header, Kind, Surrogate, Symmetry, Workspace};
+use mdsurrogate::surrogate::{Header, Kind, Prediction, Surrogate, Symmetry, Workspace};
 use nalgebra::SVector;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -45,15 +45,15 @@ fn no_allocation_after_the_first_call() {
         let law = Surrogate::<f64>::random(Header::new(kind, &hidden, 3), 1).unwrap();
         let points: Vec<SVector<f64, 6>> =
             (0..20).map(|k| SVector::from([1.0 + 0.01 * f64::from(k), 1.1, 0.9, 0.05, 0.0, 0.1])).collect();
-        let mut answers = vec![Answer::default(); points.len()];
+        let mut predictions = vec![Prediction::default(); points.len()];
         let mut memory = Workspace::default();
         let mut all = || {
             for c in &points {
                 law.stress(c, &mut memory).unwrap();
                 law.tangent(c, &mut memory).unwrap();
             }
-            law.stresses(&points, &mut memory, &mut answers).unwrap();
-            law.tangents(&points, &mut memory, &mut answers).unwrap();
+            law.stresses(&points, &mut memory, &mut predictions).unwrap();
+            law.tangents(&points, &mut memory, &mut predictions).unwrap();
         };
         assert!(allocations(&mut all) > 0);
         assert_eq!(allocations(&mut all), 0);

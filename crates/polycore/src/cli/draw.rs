@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use polycore::Error;
-use polycore::hyperelastic::data::{Mode, State, Table};
-use polycore::hyperelastic::fit::{self, Fit};
-use polycore::hyperelastic::{Hyperelastic, Kind, homogeneous};
+use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::fit::{self, Fit};
+use polycore::constitutive::hyperelastic::{Hyperelastic, Kind, homogeneous};
 use polycore::output::picture::{LinePlot, Series};
 
 use super::fits::MPA;
@@ -15,7 +15,7 @@ struct Test {
     key: &'static str,
     title: &'static str,
     holds: fn(&State) -> bool,
-    nominal: fn(&dyn Hyperelastic, f64) -> Result<f64, polycore::hyperelastic::Error>,
+    nominal: fn(&dyn Hyperelastic, f64) -> Result<f64, polycore::constitutive::Error>,
 }
 
 const TESTS: [Test; 3] = [
@@ -59,7 +59,7 @@ const KINDS: [(Kind, &str); 2] =
 /// biaxial tables.
 pub fn pictures(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Result<(), Error> {
     for (kind, suffix) in KINDS {
-        let fits: Vec<&Fit> = fits.iter().filter(|fit| fit.family.kind == kind).collect();
+        let fits: Vec<&Fit> = fits.iter().filter(|fit| fit.model.kind == kind).collect();
         if fits.is_empty() {
             continue;
         }
@@ -96,7 +96,7 @@ fn curves(name: &str, test: &Test, states: &[&State], fits: &[&Fit]) -> LinePlot
             .iter()
             .map(|l| (test.nominal)(&fit.law, *l).map_or(f64::NAN, |nominal| nominal / MPA))
             .collect();
-        plot = plot.series(Series::line(fit.family.key, &stretches, &nominal));
+        plot = plot.series(Series::line(fit.model.key, &stretches, &nominal));
     }
     plot
 }
@@ -119,7 +119,7 @@ fn parity(name: &str, table: &Table, fits: &[&Fit]) -> Result<LinePlot, Error> {
     for fit in fits {
         let residuals = fit::residuals(&fit.law, table)?;
         let model: Vec<f64> = residuals.iter().zip(&measured).map(|(r, data)| r / MPA + data).collect();
-        plot = plot.series(Series::markers(fit.family.key, &measured, &model));
+        plot = plot.series(Series::markers(fit.model.key, &measured, &model));
     }
     Ok(plot)
 }

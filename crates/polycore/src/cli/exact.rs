@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use polycore::hyperelastic::{Hyperelastic, family, homogeneous};
+use polycore::constitutive::hyperelastic::{Hyperelastic, homogeneous, model};
 use polycore::units::Stress;
 
 use super::fits::MPA;
@@ -58,10 +58,10 @@ pub fn table(arguments: &Arguments) -> Result<String, String> {
 }
 
 fn law(arguments: &Arguments) -> Result<Box<dyn Hyperelastic>, String> {
-    let family = family(&arguments.law).map_err(|error| error.to_string())?;
+    let model = model(&arguments.law).map_err(|error| error.to_string())?;
     let mut values = Vec::new();
     for (i, given) in arguments.parameters.iter().enumerate() {
-        let stress = family.parameters.get(i).is_some_and(|parameter| parameter.unit == "Pa");
+        let stress = model.parameters.get(i).is_some_and(|parameter| parameter.unit == "Pa");
         let value = if stress {
             given.parse::<Stress>().map(Stress::si).map_err(|error| format!("`{given}`: {error}"))?
         } else {
@@ -69,5 +69,5 @@ fn law(arguments: &Arguments) -> Result<Box<dyn Hyperelastic>, String> {
         };
         values.push(value);
     }
-    family.law(&values).map_err(|error| error.to_string())
+    model.law(&values).map_err(|error| error.to_string())
 }

@@ -4,9 +4,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use polycore::Error;
-use polycore::hyperelastic::data::{State, Table};
-use polycore::hyperelastic::fit::{Agreement, Fit, Fitted, fit};
-use polycore::hyperelastic::{self, Hyperelastic, homogeneous};
+use polycore::constitutive;
+use polycore::constitutive::hyperelastic::data::{State, Table};
+use polycore::constitutive::hyperelastic::fit::{Agreement, Fit, Fitted, fit};
+use polycore::constitutive::hyperelastic::{Hyperelastic, homogeneous};
 use polycore::output;
 use polycore::report::{Phases, Report};
 
@@ -24,14 +25,14 @@ pub fn run(case: &Case, directory: &Path, quick: bool) -> Result<Report, Error> 
     for (name, table) in &case.data {
         phases.start("fit");
         let mut fits = Vec::new();
-        for family in &case.laws {
-            fits.push(fit(family, table)?);
+        for model in &case.laws {
+            fits.push(fit(model, table)?);
         }
         phases.start("output");
         for fit in &fits {
             record(&mut report, name, table, fit)?;
             for (other, table) in case.data.iter().filter(|(other, _)| case.cross && other != name) {
-                judge_on(&mut report, &format!("{name}.{}.{other}", fit.family.key), &fit.law, table)?;
+                judge_on(&mut report, &format!("{name}.{}.{other}", fit.model.key), &fit.law, table)?;
             }
         }
         write_states(directory, name, table, &fits)?;
@@ -71,7 +72,7 @@ fn scaled(value: f64, unit: &str) -> (f64, &'static str) {
 fn judge_on(report: &mut Report, key: &str, law: &dyn Hyperelastic, table: &Table) -> Result<(), Error> {
     let locks = |state: &&State| {
         let [a, b] = state.stretches;
-        matches!(homogeneous::biaxial(law, a, b), Err(hyperelastic::Error::Locked { .. }))
+        matches!(homogeneous::biaxial(law, a, b), Err(constitutive::Error::Locked { .. }))
     };
     let locked = table.states.iter().filter(locks).count();
     report.value(&format!("{key}.locked"), locked as f64, "");
@@ -90,7 +91,7 @@ fn agree(report: &mut Report, key: &str, found: &Agreement) {
 }
 
 fn record(report: &mut Report, data: &str, table: &Table, fit: &Fit) -> Result<(), Error> {
-    let key = format!("{data}.{}", fit.family.key);
+    let key = format!("{data}.{}", fit.model.key);
     report.value(&format!("{key}.shear_modulus"), fit.law.shear_modulus() / MPA, "MPa");
     for parameter in &fit.parameters {
         let (value, unit) = scaled(parameter.value, parameter.unit);
@@ -115,7 +116,7 @@ fn write_fits(directory: &Path, all: &[(&str, &Table, Vec<Fit>)]) -> Result<(), 
             let mut line = |quantity: &str, value: f64, error: Option<f64>, unit: &str| {
                 let (value, shown) = scaled(value, unit);
                 let error = error.map_or_else(String::new, |error| scaled(error, unit).0.to_string());
-                let _ = writeln!(text, "{data},{},{quantity},{value},{error},{shown}", fit.family.key);
+                let _ = writeln!(text, "{data},{},{quantity},{value},{error},{shown}", fit.model.key);
             };
             line("rms", fit.rms, None, "Pa");
             for parameter in &fit.parameters {
@@ -147,7 +148,7 @@ fn write_states(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Re
         }
         for i in [0, 1] {
             let nominal = found.iter().map(|nominal| nominal[i] / MPA).collect();
-            columns.push((format!("{}_{}", fit.family.key, i + 1), "MPa", nominal));
+            columns.push((format!("{}_{}", fit.model.key, i + 1), "MPa", nominal));
         }
     }
     let columns: Vec<output::csv::Column<'_>> =
@@ -171,7 +172,7 @@ fn summary(title: &str, all: &[(&str, &Table, Vec<Fit>)], report: &Report) -> St
         for (column, (_, _, fits)) in all.iter().enumerate() {
             let fit = &fits[row];
             if column == 0 {
-                let _ = write!(text, "{:<22}{:>4}", fit.family.key, fit.parameters.len());
+                let _ = write!(text, "{:<22}{:>4}", fit.model.key, fit.parameters.len());
             }
             let _ = write!(text, "{:>18.5}", fit.rms / MPA);
         }
@@ -181,7 +182,7 @@ fn summary(title: &str, all: &[(&str, &Table, Vec<Fit>)], report: &Report) -> St
         let _ = writeln!(text, "parameters on {name} (± standard error, - where the data do not tell)");
         for fit in fits {
             let list: Vec<String> = fit.parameters.iter().map(shown).collect();
-            let _ = writeln!(text, "  {:<22}{}", fit.family.key, list.join(", "));
+            let _ = writeln!(text, "  {:<22}{}", fit.model.key, list.join(", "));
         }
         text += &material::best(name, fits);
     }

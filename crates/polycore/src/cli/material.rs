@@ -5,8 +5,8 @@ use std::io::Write as _;
 use std::path::Path;
 
 use polycore::Error;
-use polycore::hyperelastic::data::Table;
-use polycore::hyperelastic::fit::Fit;
+use polycore::constitutive::hyperelastic::data::Table;
+use polycore::constitutive::hyperelastic::fit::Fit;
 use polycore::output::atomic_write;
 
 use super::fits::MPA;
@@ -21,9 +21,9 @@ const FEWEST_LINKS: f64 = 2.0;
 fn block(fit: &Fit) -> String {
     let modulus = 3.0 * fit.law.shear_modulus() / MPA;
     let links = fit.parameters.iter().find(|parameter| parameter.name == "links");
-    let mut text = format!("[material] # {}: E = 3 mu, exact at small strains\n", fit.family.key);
+    let mut text = format!("[material] # {}: E = 3 mu, exact at small strains\n", fit.model.key);
     let _ = writeln!(text, "youngs_modulus = \"{modulus:.6} MPa\"");
-    let eight = fit.family.key.starts_with(EIGHT_CHAINS);
+    let eight = fit.model.key.starts_with(EIGHT_CHAINS);
     match links.filter(|_| eight) {
         Some(links) if links.standard_error.is_some() && links.value >= FEWEST_LINKS => {
             let _ = writeln!(text, "law = \"chain\"\nlinks = {:.5}", links.value);
@@ -37,7 +37,7 @@ fn block(fit: &Fit) -> String {
 
 /// The block of the eight-chain law with the least rms; without such a one, of the best law.
 pub fn best(data: &str, fits: &[Fit]) -> String {
-    let chains = |fit: &&Fit| fit.family.key.starts_with(EIGHT_CHAINS);
+    let chains = |fit: &&Fit| fit.model.key.starts_with(EIGHT_CHAINS);
     let least = |a: &&Fit, b: &&Fit| a.rms.total_cmp(&b.rms);
     let fit = fits.iter().filter(chains).min_by(least).or(fits.iter().min_by(least));
     fit.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", block(fit)))

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use polycore::hyperelastic::data::{Mode, Table};
-use polycore::hyperelastic::{self, FAMILIES, Family};
+use polycore::constitutive::hyperelastic::data::{Mode, Table};
+use polycore::constitutive::hyperelastic::{self, MODELS, ModelDescriptor};
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
@@ -64,7 +64,7 @@ struct Data {
 pub struct Case {
     pub source: Source,
     pub title: String,
-    pub laws: Vec<&'static Family>,
+    pub laws: Vec<&'static ModelDescriptor>,
     pub cross: bool,
     pub data: Vec<(String, Table)>,
     pub trials: Vec<Trial>,
@@ -77,7 +77,7 @@ impl Case {
         let source = Source::read(path)?;
         let Scene { _program: Program::Polycore, title, fit, trial, expect } = source.parse()?;
         let laws = match &fit.laws {
-            None => FAMILIES.iter().collect(),
+            None => MODELS.iter().collect(),
             Some(names) => selected(&source, names)?,
         };
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -104,10 +104,10 @@ impl Case {
                     source.error(&key("mode"), error, "a test of which the table has a stress")
                 })?;
             }
-            for family in &laws {
-                if table.measurements() < family.parameters.len() {
+            for model in &laws {
+                if table.measurements() < model.parameters.len() {
                     let found = format!("{} measured stresses", table.measurements());
-                    let allowed = format!("at least {} for `{}`", family.parameters.len(), family.key);
+                    let allowed = format!("at least {} for `{}`", model.parameters.len(), model.key);
                     return Err(source.error(&key("file"), found, allowed));
                 }
             }
@@ -135,9 +135,9 @@ impl Case {
                 if table.source.is_empty() { "no line `# source: …` in it" } else { &table.source };
             let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
         }
-        for family in &self.laws {
-            let names: Vec<_> = family.parameters.iter().map(|parameter| parameter.name).collect();
-            let _ = writeln!(text, "law {}: {}", family.key, names.join(", "));
+        for model in &self.laws {
+            let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
+            let _ = writeln!(text, "law {}: {}", model.key, names.join(", "));
         }
         let _ = writeln!(
             text,
@@ -154,16 +154,16 @@ impl Case {
     fn quantities(&self) -> Vec<String> {
         let mut names = Vec::new();
         for (data, _) in &self.data {
-            for family in &self.laws {
+            for model in &self.laws {
                 let fixed = ["rms", "mae", "r2", "shear_modulus"].into_iter();
-                let all = fixed.chain(family.parameters.iter().map(|parameter| parameter.name));
+                let all = fixed.chain(model.parameters.iter().map(|parameter| parameter.name));
                 // a law may be parameterised by its shear modulus
                 for name in all {
-                    names.push(format!("{data}.{}.{name}", family.key));
+                    names.push(format!("{data}.{}.{name}", model.key));
                 }
                 for (other, _) in self.data.iter().filter(|(other, _)| self.cross && other != data) {
                     for name in ["rms", "mae", "r2", "locked"] {
-                        names.push(format!("{data}.{}.{other}.{name}", family.key));
+                        names.push(format!("{data}.{}.{other}.{name}", model.key));
                     }
                 }
             }
@@ -189,17 +189,16 @@ impl Case {
     }
 }
 
-fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static Family>, SceneError> {
-    let mut laws: Vec<&'static Family> = Vec::new();
+fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescriptor>, SceneError> {
+    let mut laws: Vec<&'static ModelDescriptor> = Vec::new();
     for (i, name) in names.iter().enumerate() {
-        let all = || FAMILIES.iter().map(|family| family.key).collect::<Vec<_>>().join(", ");
+        let all = || MODELS.iter().map(|model| model.key).collect::<Vec<_>>().join(", ");
         let key = format!("fit.laws[{i}]");
-        let family =
-            hyperelastic::family(name).map_err(|_| source.error(&key, format!("`{name}`"), all()))?;
-        if laws.iter().any(|law| law.key == family.key) {
+        let model = hyperelastic::model(name).map_err(|_| source.error(&key, format!("`{name}`"), all()))?;
+        if laws.iter().any(|law| law.key == model.key) {
             return Err(source.error(&key, format!("`{name}` a second time"), "every law once"));
         }
-        laws.push(family);
+        laws.push(model);
     }
     if laws.is_empty() {
         return Err(source.error("fit.laws", "no law", "at least one, or no key `laws` for all"));

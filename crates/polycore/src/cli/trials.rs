@@ -1,10 +1,11 @@
 //! Trials: a law at a stretch, or fitted to a few states, with what must happen.
 
 use polycore::Error;
-use polycore::hyperelastic::data::{Mode, State, Table};
-use polycore::hyperelastic::fit::fit;
-use polycore::hyperelastic::{
-    self, Compressible, Hyperelastic, Volumetric, family, homogeneous, plane_stress,
+use polycore::constitutive;
+use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::fit::fit;
+use polycore::constitutive::hyperelastic::{
+    self, Compressible, Hyperelastic, Volumetric, homogeneous, model, plane_stress,
 };
 use polycore::report::{self, Judgement, Report};
 use polycore::scene::{SceneError, Source};
@@ -65,14 +66,14 @@ enum Seen {
 impl Trial {
     /// Names of the scalars that it may have.
     pub fn quantities(&self) -> Vec<String> {
-        let parameters = family(&self.law).map_or(&[][..], |family| family.parameters);
+        let parameters = model(&self.law).map_or(&[][..], |model| model.parameters);
         let fixed = ["nominal", "energy", "refused", "rms", "shear_modulus"].into_iter();
         let all = fixed.chain(parameters.iter().map(|parameter| parameter.name));
         all.map(|name| format!("{}.{name}", self.name)).collect()
     }
 
-    fn attempt(&self) -> Result<Seen, hyperelastic::Error> {
-        let family = family(&self.law)?;
+    fn attempt(&self) -> Result<Seen, constitutive::Error> {
+        let model = model(&self.law)?;
         if let Some(data) = &self.data {
             let state = |(stretch, nominal): &(f64, Stress)| State {
                 mode: self.mode,
@@ -80,10 +81,10 @@ impl Trial {
                 nominal: [nominal.si(), 0.0],
             };
             let table = Table { source: String::new(), states: data.iter().map(state).collect() };
-            return Ok(Seen::Fit(Box::new(fit(family, &table)?)));
+            return Ok(Seen::Fit(Box::new(fit(model, &table)?)));
         }
         let values: Vec<f64> = self.parameters.iter().flatten().map(Number::si).collect();
-        let law = family.law(&values)?;
+        let law = model.law(&values)?;
         let first = self.stretch.unwrap_or(1.0);
         let second = self.mode.second_stretch(first);
         let Some(bulk) = self.bulk else {
@@ -119,8 +120,8 @@ pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
                 "another name",
             ));
         }
-        let Ok(family) = family(&trial.law) else {
-            let all: Vec<&str> = hyperelastic::FAMILIES.iter().map(|family| family.key).collect();
+        let Ok(model) = model(&trial.law) else {
+            let all: Vec<&str> = hyperelastic::MODELS.iter().map(|model| model.key).collect();
             return Err(source.error(&key("law"), format!("`{}`", trial.law), all.join(", ")));
         };
         if trial.data.is_some() == trial.parameters.is_some() {
@@ -132,15 +133,15 @@ pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
             return Err(source.error(&key("data"), found, "`data` alone: the law is fitted"));
         }
         let Some(parameters) = &trial.parameters else { continue };
-        if parameters.len() != family.parameters.len() {
-            let names: Vec<_> = family.parameters.iter().map(|parameter| parameter.name).collect();
+        if parameters.len() != model.parameters.len() {
+            let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
             return Err(source.error(
                 &key("parameters"),
                 format!("{} of them", parameters.len()),
                 names.join(", "),
             ));
         }
-        for (given, parameter) in parameters.iter().zip(family.parameters) {
+        for (given, parameter) in parameters.iter().zip(model.parameters) {
             if matches!(given, Number::Stress(_)) != (parameter.unit == "Pa") {
                 let (found, allowed) = match parameter.unit {
                     "Pa" => (format!("`{}` without a unit", parameter.name), "a stress, as \"0.3 MPa\""),

@@ -1,7 +1,7 @@
 //! The deformation gradient and what follows from it.
 
 use super::decomposition::{adjugate, determinant, principal_frame};
-use super::{Error, PrincipalFrame, Tensor, Tensor2};
+use super::{Error, PrincipalFrame, Tensor, Tensor2, Voigt};
 
 /// F = ∂x/∂X (1.3), finite and with det F > 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,6 +59,24 @@ impl DeformationGradient {
         Self::new(Tensor::from_diagonal(&stretches.into()))
     }
 
+    /// The upper triangular F with FᵀF = C (3.2), Cholesky's: one of the F of this C, which differ by a rotation.
+    ///
+    /// # Errors
+    /// [`Error::NotPositiveDefinite`].
+    pub fn of_right_cauchy_green(c: &Voigt) -> Result<Self, Error> {
+        let first = c[0].sqrt();
+        let (f12, f13) = (c[3] / first, c[4] / first);
+        let second = (c[1] - f12 * f12).sqrt();
+        let f23 = (c[5] - f12 * f13) / second;
+        let third = (c[2] - f13 * f13 - f23 * f23).sqrt();
+        // roots of negative numbers are NaN
+        if [first, second, third, f12, f13, f23].iter().all(|x| x.is_finite()) && third > 0.0 {
+            Self::new(Tensor::new(first, f12, f13, 0.0, second, f23, 0.0, 0.0, third))
+        } else {
+            Err(Error::NotPositiveDefinite { c: (*c).into() })
+        }
+    }
+
     /// Plane strain: F₃₃ = 1, no shear out of the plane.
     ///
     /// # Errors
@@ -67,8 +85,8 @@ impl DeformationGradient {
         Self::new(embed(in_plane, 1.0))
     }
 
-    /// Plane stress with a thickness stretch λ₃ that is known; [`crate::hyperelastic::plane_stress`] finds the one
-    /// that makes S₃₃ vanish.
+    /// Plane stress with a thickness stretch λ₃ that is known; [`crate::constitutive::hyperelastic::plane_stress`]
+    /// finds the one that makes S₃₃ vanish.
     ///
     /// # Errors
     /// As [`DeformationGradient::new`]; [`Error::Stretch`] for λ₃.
@@ -183,6 +201,7 @@ fn gram(component: impl Fn(usize, usize) -> f64) -> Tensor {
 
 #[cfg(test)]
 mod tests {
+    use super::super::voigt;
     use super::*;
 
     fn relative(a: f64, b: f64) -> f64 {
@@ -295,6 +314,24 @@ mod tests {
         ));
         let stretch = DeformationGradient::from_stretches([1.0, -0.5, 1.0]);
         assert_eq!(stretch, Err(Error::Stretch { index: 2, value: -0.5 }));
+    }
+
+    #[test]
+    fn a_deformation_of_its_right_cauchy_green_tensor() {
+        let matrix = Tensor::new(1.3, 0.4, -0.2, 0.1, 0.8, 0.3, -0.3, 0.2, 1.7);
+        let c = DeformationGradient::new(matrix).unwrap().right_cauchy_green();
+        let f = DeformationGradient::of_right_cauchy_green(&voigt::from_stress(&c)).unwrap();
+        assert!((f.right_cauchy_green() - c).amax() < 1e-15 * 4.0, "some roundings of numbers up to 3");
+        for bad in [
+            Voigt::new(1.0, 1.0, 1.0, 1.0, 0.0, 0.0),
+            Voigt::new(-1.0, -1.0, 1.0, 0.0, 0.0, 0.0),
+            Voigt::new(1.0, 1.0, 1.0, 0.0, f64::NAN, 0.0),
+            Voigt::new(0.0, 1.0, 1.0, 0.0, 0.0, 0.0),
+            Voigt::new(1.0, f64::INFINITY, 1.0, 0.0, 0.0, 0.0),
+        ] {
+            let refused = DeformationGradient::of_right_cauchy_green(&bad);
+            assert!(matches!(refused, Err(Error::NotPositiveDefinite { .. })), "{bad}");
+        }
     }
 
     #[test]

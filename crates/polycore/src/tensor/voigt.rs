@@ -8,8 +8,8 @@
 //! - a **tangent** D has the components ℂ_ijkl without factor, ℂ = 2 ∂S/∂C = ∂S/∂E, and dS = D · dE in the vectors
 //!   above. Hence ∂S/∂C₁₁ = ½ D column 1, but ∂S/∂C₁₂ = D column 4.
 
-use super::{DeformationGradient, Tensor};
-use nalgebra::{Matrix6, Vector6};
+use super::{DeformationGradient, StressMeasure, Tensor};
+use nalgebra::{Matrix6, SMatrix, Vector6};
 
 /// Six components in the order [11, 22, 33, 12, 13, 23].
 pub type Voigt = Vector6<f64>;
@@ -18,6 +18,8 @@ pub type Voigt6x6 = Matrix6<f64>;
 
 /// Row and column, from 0, of each Voigt component.
 pub const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+/// Names of the components.
+pub const NAMES: [&str; 6] = ["11", "22", "33", "12", "13", "23"];
 
 /// [S₁₁, S₂₂, S₃₃, S₁₂, S₁₃, S₂₃] of a symmetric tensor (its upper triangle is read). Also for C of (3.2).
 pub fn from_stress(stress: &Tensor) -> Voigt {
@@ -76,6 +78,51 @@ pub fn transform_tangent(tangent: &Voigt6x6, a: &Tensor) -> Voigt6x6 {
 /// The spatial tangent c_ijkl = J⁻¹ F_iI F_jJ F_kK F_lL ℂ_IJKL: the Truesdell rate of σ over the rate of deformation.
 pub fn spatial_tangent(deformation: &DeformationGradient, material_tangent: &Voigt6x6) -> Voigt6x6 {
     transform_tangent(material_tangent, deformation.matrix()) / deformation.jacobian()
+}
+
+/// σ = F S Fᵀ / J of a second Piola–Kirchhoff stress S (3.6).
+pub fn cauchy_of_material(deformation: &DeformationGradient, second_piola_kirchhoff: &Voigt) -> Voigt {
+    use StressMeasure::{Cauchy, SecondPiolaKirchhoff};
+    let s = to_stress(second_piola_kirchhoff);
+    from_stress(&deformation.convert_stress(&s, SecondPiolaKirchhoff, Cauchy))
+}
+
+/// What Abaqus' UMAT asks for (DDSDDE at finite strain): the tangent of the Jaumann rate of the Kirchhoff stress over J,
+/// F_iI F_jJ F_kK F_lL ℂ_IJKL / J + ½(σ_ik δ_jl + σ_jk δ_il + σ_il δ_jk + σ_jl δ_ik), in the unit of ℂ, from S and
+/// ℂ = 2 ∂S/∂C (Sun, Chaikof & Levenston 2008, <https://doi.org/10.1115/1.2979872>).
+pub fn jaumann_tangent(
+    deformation: &DeformationGradient,
+    second_piola_kirchhoff: &Voigt,
+    tangent: &Voigt6x6,
+) -> Voigt6x6 {
+    let sigma = to_stress(&cauchy_of_material(deformation, second_piola_kirchhoff));
+    let delta = |i: usize, j: usize| f64::from(u8::from(i == j));
+    let rate = Voigt6x6::from_fn(|a, b| {
+        let ((i, j), (k, l)) = (PAIRS[a], PAIRS[b]);
+        let (first, second) = (sigma[(i, k)] * delta(j, l), sigma[(j, k)] * delta(i, l));
+        0.5 * (first + second + sigma[(i, l)] * delta(j, k) + sigma[(j, l)] * delta(i, k))
+    });
+    spatial_tangent(deformation, tangent) + rate
+}
+
+/// 𝔸 = ∂P/∂F, 𝔸_iJkL = F_iI F_kK ℂ_IJKL + δ_ik S_JL, in the unit of ℂ, from S and ℂ = 2 ∂S/∂C. Row 3i + J, column
+/// 3k + L.
+pub fn nominal_tangent(
+    deformation: &DeformationGradient,
+    second_piola_kirchhoff: &Voigt,
+    tangent: &Voigt6x6,
+) -> SMatrix<f64, 9, 9> {
+    let f = deformation.matrix();
+    SMatrix::from_fn(|row, column| {
+        let ((i, j), (k, l)) = ((row / 3, row % 3), (column / 3, column % 3));
+        let mut sum = if i == k { second_piola_kirchhoff[index(j, l)] } else { 0.0 };
+        for m in 0..3 {
+            for n in 0..3 {
+                sum += f[(i, m)] * f[(k, n)] * component(tangent, m, j, n, l);
+            }
+        }
+        sum
+    })
 }
 
 fn index(i: usize, j: usize) -> usize {

@@ -1,0 +1,94 @@
+//! A law as Fortran 2008, free form: a plain subroutine, and a UMAT for Abaqus and programs with its interface.
+
+use super::{Language, Model, check_name};
+use crate::Error;
+use crate::surrogate::{Surrogate, UNSEEN};
+use std::fmt::Write;
+
+/// Numbers a line and lines a statement: below the 132 columns and 255 continuations of the standard.
+const NUMBERS: usize = 4;
+const LINES: usize = 100;
+
+/// A model as Fortran: `NAME(c, s, tangent, energy, spread, flags, status)` in the conventions of
+/// [`c_source`](super::c_source), and `umat`, which puts it into the finite strains of Abaqus (see
+/// [`jaumann_tangent`](crate::kinematics::jaumann_tangent)); agrees with Rust to rounding (tested to 1e-12).
+///
+/// `umat` reads `PROPS(1)`, the pascals in a unit of stress (1 without it), sets `STATEV(1)` to the flags and
+/// `STATEV(2)` to the spread where there are so many, and asks for a smaller increment (`PNEWDT` = 0.25) where the
+/// model refuses C.
+///
+/// # Errors
+/// [`Error::Parameter`] for a name that is no identifier of 1 to 50 characters, or `umat`.
+pub fn fortran_source(model: &Surrogate, name: &str) -> Result<String, Error> {
+    check_name(name)?;
+    if name.eq_ignore_ascii_case("umat") {
+        return Err(Error::parameter("name", name, "another name than that of the UMAT itself"));
+    }
+    let law = Model::new(model).description();
+    let mut text =
+        format!("! {name}: a constitutive law C -> S, written by mdsurrogate.\nmodule {name}_law\n");
+    text.push_str("    implicit none\n    private\n    public :: evaluate\n");
+    text.push_str("    integer, parameter :: dp = kind(1.0d0)\n    integer :: entry_\n");
+    for (name, value) in law.sizes() {
+        let _ = writeln!(text, "    integer, parameter :: {name} = {value}");
+    }
+    for (name, value) in [
+        ("SPREAD_LIMIT", law.spread_limit.unwrap_or(f64::MAX)),
+        ("UNSEEN", UNSEEN),
+        ("FARTHEST", law.farthest),
+    ] {
+        let _ = writeln!(text, "    real(dp), parameter :: {name} = {}", Language::Fortran.number(value));
+    }
+    for (name, values) in [("width", &law.widths), ("activation", &law.activations)] {
+        let _ = writeln!(text, "    integer, save :: {name}({})", values.len());
+        let list: Vec<String> = values.iter().map(usize::to_string).collect();
+        list_of(&mut text, name, &list);
+    }
+    for (name, values) in law.lists().into_iter().chain([("weight", &law.weights[..])]) {
+        let _ = writeln!(text, "    real(dp), save :: {name}({})", values.len());
+        let list: Vec<String> = values.iter().map(|value| Language::Fortran.number(*value)).collect();
+        list_of(&mut text, name, &list);
+    }
+    text.push_str("contains\n\n");
+    text.push_str("    recursive subroutine features(c, x, d, dd)\n        real(dp), intent(in) :: c(6)\n");
+    text.push_str("        real(dp), intent(out) :: x(INPUTS), d(INPUTS, 6), dd(INPUTS, 6, 6)\n");
+    for line in law.inputs_with_derivatives(Language::Fortran) {
+        statement(&mut text, &line);
+    }
+    text.push_str("    end subroutine features\n\n");
+    text.push_str(&BODY.replace("NAME", name));
+    Ok(text)
+}
+
+/// `data` statements for a list.
+fn list_of(text: &mut String, name: &str, values: &[String]) {
+    for (block, values) in values.chunks(NUMBERS * LINES).enumerate() {
+        let first = block * NUMBERS * LINES + 1;
+        let last = first + values.len() - 1;
+        let _ = write!(text, "    data ({name}(entry_), entry_ = {first}, {last}) /");
+        for (line, values) in values.chunks(NUMBERS).enumerate() {
+            let end = if line == 0 { " &\n        " } else { ", &\n        " };
+            let _ = write!(text, "{end}{}", values.join(", "));
+        }
+        text.push_str(" /\n");
+    }
+}
+
+/// A statement, continued at sums where it is long.
+fn statement(text: &mut String, line: &str) {
+    text.push_str("        ");
+    let mut column = 8;
+    for (index, part) in line.split(" + ").enumerate() {
+        if index > 0 {
+            let continued = column + part.len() > 110;
+            text.push_str(if continued { " &\n            + " } else { " + " });
+            column = if continued { 14 } else { column + 3 };
+        }
+        text.push_str(part);
+        column += part.len();
+    }
+    text.push('\n');
+}
+
+/// What is the same for all laws.
+const BODY: &str = include_str!("body.f90");

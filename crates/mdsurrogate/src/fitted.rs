@@ -1,0 +1,210 @@
+//! The header of a model that is to be trained: its inputs and outputs scaled by the training rows.
+
+use crate::Error;
+use crate::dataset::Row;
+use crate::network::{Architecture, LANES};
+use crate::surrogate::{Features, Header, Kind, Support, Surrogate};
+use polycore::tensor::Voigt;
+
+/// Representatives of the training strains in a law ([`Support`]).
+const REPRESENTATIVES: usize = 256;
+
+/// Least deviation of an energy's input, over that which it would have if the components of C varied as they do but
+/// independently of each other. An invariant that varies less, as det C of rubber, is scaled by that: standardised by its own
+/// deviation it would be noise, and W of that noise a stress larger by one over it. It stays an input, since its slope is a
+/// stress also where it is constant: the pressure. A tenth is ten times below any input that tells something by itself.
+const LEAST_DEVIATION: f64 = 0.1;
+
+/// Names of an energy's invariants that hardly vary in these rows, those of its training, although C does: scaled by
+/// what they could vary ([`header`]), and unknown where they do vary.
+pub fn constrained(model: &Surrogate, rows: &[&Row]) -> Vec<&'static str> {
+    let Some(invariants) = model.header().kind.invariants() else { return Vec::new() };
+    let values: Vec<[f64; LANES]> = rows.iter().map(|row| model.features(&row.c).values).collect();
+    let constrained = |k: &usize| {
+        let column: Vec<f64> = values.iter().map(|value| value[*k]).collect();
+        // standardised: 1, or less where the least deviation was taken
+        model.coefficients().inverse[*k] > 0.0 && moments("inputs", &column).is_ok_and(|[_, own]| own < 0.5)
+    };
+    (0..invariants.count()).filter(constrained).map(|k| invariants.name(k)).collect()
+}
+
+/// The header of a model of these hidden layers whose inputs are standardised by `rows` (3.8) and whose outputs are
+/// scaled by them: the stress of an `ann` component by component if `standardised`, else in MPa (as in the thesis); an energy by the
+/// largest product of deviations of S and C. The training box is that of the rows.
+///
+/// # Errors
+/// [`Error::Data`] for no row; [`Error::Parameter`] for numbers that are not finite or no network.
+pub fn header(
+    kind: Kind,
+    architecture: Architecture,
+    members: usize,
+    rows: &[&Row],
+    standardised: bool,
+) -> Result<Header, Error> {
+    let mut header = Header::new(kind, &[], members);
+    let inputs = header.kind.inputs();
+    // features of a law without hidden layers are those of any
+    let raw = Surrogate::<f64>::random(header.clone(), 0)?;
+    header.architecture = architecture;
+    header.check()?;
+    let features: Vec<Features> = rows.iter().map(|row| raw.features(&row.c)).collect();
+    for k in 0..inputs {
+        let column: Vec<f64> = features.iter().map(|features| features.values[k]).collect();
+        [header.input_mean[k], header.input_deviation[k]] = moments("inputs", &column)?;
+    }
+    let (mut of_stress, mut of_strain) = ([[0.0; 2]; 6], [0.0; 6]);
+    let mut largest = 0.0f64;
+    for a in 0..6 {
+        let stress: Vec<f64> = rows.iter().map(|row| row.s[a]).collect();
+        let strain: Vec<f64> = rows.iter().map(|row| row.c[a]).collect();
+        of_stress[a] = moments("S", &stress)?;
+        [_, of_strain[a]] = moments("C", &strain)?;
+        largest = largest.max(of_stress[a][1] * of_strain[a]);
+        header.training_box[a] = strain
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &c| [low.min(c), high.max(c)]);
+    }
+    if header.kind != Kind::Ann {
+        for (k, deviation) in header.input_deviation.iter_mut().enumerate() {
+            let independent = |features: &Features| -> f64 {
+                (0..6).map(|a| (features.slopes[k][a] * of_strain[a]).powi(2)).sum()
+            };
+            let square = features.iter().map(independent).sum::<f64>() / rows.len() as f64;
+            *deviation = deviation.max(LEAST_DEVIATION * square.sqrt());
+        }
+    }
+    let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
+    header.support = Some(Support::of(&strains, REPRESENTATIVES)?);
+    match header.kind {
+        Kind::Ann if standardised => {
+            for (a, [mean, deviation]) in of_stress.into_iter().enumerate() {
+                header.output_mean[a] = mean;
+                // a stress that never changes is its mean
+                header.output_deviation[a] = deviation;
+            }
+        }
+        Kind::Ann => {}
+        Kind::Energy { .. } if largest > 0.0 => header.output_deviation[0] = largest,
+        Kind::Energy { .. } => {}
+    }
+    header.check()?;
+    Ok(header)
+}
+
+/// Mean and standard deviation (divisor n); a deviation that rounding leaves of a constant is 0.
+fn moments(what: &'static str, values: &[f64]) -> Result<[f64; 2], Error> {
+    if values.is_empty() {
+        let (found, allowed) = ("no row".into(), "at least one row to learn from".into());
+        return Err(Error::Data { what: "training", found, allowed });
+    }
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    // a second pass about the mean does not cancel
+    let deviation = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
+    if !deviation.is_finite() {
+        return Err(Error::parameter(what, format!("mean {mean}, deviation {deviation}"), "finite numbers"));
+    }
+    Ok([mean, if deviation <= 1e-12 * mean.abs().max(1.0) { 0.0 } else { deviation }])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::tests::rows_of_a_law;
+    use crate::network::Activation::Tanh;
+    use crate::surrogate::Symmetry;
+
+    #[test]
+    fn inputs_have_no_mean_and_unit_deviation() {
+        let rows = rows_of_a_law();
+        let rows: Vec<&Row> = rows.iter().collect();
+        for kind in [Kind::Ann, Kind::energy(Symmetry::Orthotropic), Kind::energy(Symmetry::Isotropic)] {
+            let architecture = Architecture::new(kind.inputs(), &[(4, Tanh)], kind.outputs());
+            let header = super::header(kind, architecture, 1, &rows, true).unwrap();
+            let law = Surrogate::random(header, 1).unwrap();
+            let at: Vec<Features> = rows.iter().map(|row| law.features(&row.c)).collect();
+            for k in 0..law.header().kind.inputs() {
+                let column: Vec<f64> = at.iter().map(|features| features.values[k]).collect();
+                let [mean, deviation] = moments("", &column).unwrap();
+                // shear is constant in these rows
+                assert!(mean.abs() < 1e-12 && (deviation == 0.0 || (deviation - 1.0).abs() < 1e-12));
+                assert!(constrained(&law, &rows).is_empty());
+            }
+        }
+    }
+
+    /// Rubber: det C = 1 but for the last digit that a table has. Its W is that of the other invariants; where the volume of
+    /// the rows varies by itself, nothing changes.
+    #[test]
+    fn an_invariant_without_variance_of_its_own() {
+        let rows = |digits: i32, volume: f64| -> Vec<Row> {
+            let mut random = crate::random::SplitMix64::new(2);
+            let row = |sample: u64| {
+                let noise = polycore::tensor::Tensor::from_fn(|_, _| 0.4 * (random.uniform() - 0.5));
+                let f = polycore::tensor::Tensor::identity() + noise;
+                let scale = ((1.0 + volume * (random.uniform() - 0.5)) / f.determinant()).cbrt();
+                let unit = 10f64.powi(digits);
+                let f = (f * scale).map(|value| (value * unit).round() / unit);
+                let f = polycore::tensor::DeformationGradient::new(f).unwrap();
+                Row::new(sample, f64::NAN, f, Voigt::new(1e6, 0.0, 0.0, 0.0, 0.0, 0.0))
+            };
+            (0..200).map(row).collect()
+        };
+        for (kind, name) in [
+            (Kind::energy(Symmetry::Isotropic), "I3"),
+            (Kind::energy(Symmetry::Transverse), "I3"),
+            (Kind::polyconvex_energy(Symmetry::Orthotropic), "J"),
+        ] {
+            for (digits, volume) in [(4, 0.0), (8, 0.0), (15, 0.0), (8, 0.02)] {
+                let rows = rows(digits, volume);
+                let rows: Vec<&Row> = rows.iter().collect();
+                let architecture = Architecture::new(kind.inputs(), &[], 1);
+                let header = super::header(kind.clone(), architecture, 1, &rows, true).unwrap();
+                let law = Surrogate::<f64>::random(header, 1).unwrap();
+                assert_eq!(constrained(&law, &rows), [name], "{kind:?} {digits} {volume}");
+                let k = (0..kind.inputs()).find(|&k| kind.invariants().unwrap().name(k) == name).unwrap();
+                // 1/deviation of the others: one percent of strain is no more than a tenth of a unit
+                let others = (0..kind.inputs()).filter(|&other| other != k);
+                let greatest = others.map(|other| law.coefficients().inverse[other]).fold(0.0, f64::max);
+                assert!(
+                    law.coefficients().inverse[k] < 20.0 * greatest,
+                    "{} {greatest}",
+                    law.coefficients().inverse[k]
+                );
+            }
+            let free = rows(8, 0.6);
+            let free: Vec<&Row> = free.iter().collect();
+            let header =
+                super::header(kind.clone(), Architecture::new(kind.inputs(), &[], 1), 1, &free, true)
+                    .unwrap();
+            assert!(constrained(&Surrogate::random(header, 1).unwrap(), &free).is_empty());
+        }
+    }
+
+    /// By central differences, also in turned material axes.
+    #[test]
+    fn slopes_are_derivatives_of_the_inputs() {
+        let (s, c) = 0.4f64.sin_cos();
+        let axes = [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]];
+        for symmetry in Symmetry::ALL {
+            let kind = Kind::Energy { symmetry, axes, polyconvex: false, norms: false };
+            let mut header = Header::new(kind, &[(4, Tanh)], 1);
+            header.input_deviation[0] = 0.3;
+            let law = Surrogate::random(header, 1).unwrap();
+            let at = Voigt::new(1.2, 0.9, 1.1, 0.1, -0.2, 0.05);
+            let slopes = law.features(&at).slopes;
+            for a in 0..6 {
+                let step = Voigt::from_fn(|b, _| if a == b { 1e-5 } else { 0.0 });
+                let (up, down) = (law.features(&(at + step)).values, law.features(&(at - step)).values);
+                for k in 0..law.header().kind.inputs() {
+                    // rounding 1e-16/1e-5; cubic at most
+                    assert!(
+                        ((up[k] - down[k]) / 2e-5 - slopes[k][a] * law.coefficients().inverse[k]).abs()
+                            < 1e-9,
+                        "{symmetry:?} {k} {a}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! What laws refuse.
+
+use crate::tensor;
+use std::path::{Path, PathBuf};
+
+/// What a law, a fit, a table or a file of a model refuses.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A material parameter outside its domain.
+    #[error("{law}: {parameter} = {value} is outside {allowed}")]
+    Parameter {
+        /// The law.
+        law: &'static str,
+        /// The parameter.
+        parameter: String,
+        /// The value given.
+        value: f64,
+        /// Where it may lie.
+        allowed: &'static str,
+    },
+    /// The chains are fully extended: energy and stress are infinite from here on.
+    #[error("{law}: {quantity} = {value} has reached the locking value {limit}")]
+    Locked {
+        /// The law.
+        law: &'static str,
+        /// What has grown too large.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// The result leaves the range of `f64`.
+    #[error("{law}: the response at the stretches {stretches:?} leaves the range of f64")]
+    Overflow {
+        /// The law.
+        law: &'static str,
+        /// λ₁, λ₂, λ₃.
+        stretches: [f64; 3],
+    },
+    /// The thesis prints no compressible form of this law.
+    #[error("the thesis prints no compressible form of the {law} law; use the stress-free coupling")]
+    NotPublished {
+        /// The law.
+        law: String,
+    },
+    /// No law of that name.
+    #[error("there is no hyperelastic law `{name}`")]
+    UnknownLaw {
+        /// The name asked for.
+        name: String,
+    },
+    /// An iteration did not converge.
+    #[error("{iteration} did not converge in {steps} steps (residual {residual:e})")]
+    NoConvergence {
+        /// Which one.
+        iteration: &'static str,
+        /// Steps done.
+        steps: usize,
+        /// The last residual.
+        residual: f64,
+    },
+    /// Data that no law can be fitted to.
+    #[error("{what}: {reason}")]
+    Data {
+        /// The file, table or row.
+        what: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A C that is no deformation, or a part of a model that does not fit the others.
+    #[error("{name}: found {found}; allowed: {allowed}")]
+    Invalid {
+        /// What.
+        name: &'static str,
+        /// The value found.
+        found: String,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// A file that holds no model.
+    #[error("{}: found {found}; allowed: {allowed}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        found: String,
+        /// What it should be.
+        allowed: String,
+    },
+    /// The deformation is not admissible.
+    #[error(transparent)]
+    Deformation(#[from] tensor::Error),
+}
+
+impl Error {
+    pub(super) fn invalid(name: &'static str, found: impl ToString, allowed: impl ToString) -> Self {
+        Self::Invalid { name, found: found.to_string(), allowed: allowed.to_string() }
+    }
+
+    #[cfg(feature = "surrogate")]
+    pub(super) fn file(path: &Path, found: impl ToString, allowed: impl ToString) -> Self {
+        Self::File { path: path.to_path_buf(), found: found.to_string(), allowed: allowed.to_string() }
+    }
+}
