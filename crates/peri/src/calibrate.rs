@@ -3,7 +3,7 @@
 //! The dual force f = 2t enters the equation of motion (2.6). With t ≈ 3kθ(l − 1), (2.76) and (2.80) equal the standard
 //! constants of the prototype microelastic material; Poisson's ratio is 1/4 (3D, plane strain) or 1/3 (plane stress).
 
-use crate::bonds::{LatticeBonds, Stencil, VolumeCorrection};
+use crate::bonds::{Bonds, LatticeBonds, Stencil, VolumeCorrection};
 use serde::Deserialize;
 use std::f64::consts::PI;
 
@@ -54,6 +54,14 @@ pub fn modulus(space: Space, youngs_modulus: f64, horizon: f64, thickness: f64) 
         Space::PlaneStress => 3.0 * youngs_modulus / (2.0 * PI * thickness * horizon.powi(3)),
         Space::PlaneStrain => 8.0 * youngs_modulus / (5.0 * PI * thickness * horizon.powi(3)),
     }
+}
+
+/// kθ of bonds in a solid or, in two dimensions, in a sheet of the thickness that its particles have.
+pub fn modulus_in<const D: usize>(bonds: &dyn Bonds<D>, youngs_modulus: f64) -> f64 {
+    let volume = bonds.particles().first().map_or(0.0, |&slot| bonds.volume(slot as usize));
+    let thickness = volume / bonds.spacing().powi(D as i32);
+    let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
+    modulus(space, youngs_modulus, bonds.horizon(), thickness)
 }
 
 /// The factor on kθ for a calibration.

@@ -1,7 +1,7 @@
 //! The energy surface correction: bonds near a free surface are stiffened until a homogeneous strain stores the
 //! energy that the continuum stores. Madenci & Oterkus, Peridynamic Theory and Its Applications (2014), §4.2.
 
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, Property};
 use crate::field::Field;
 use rayon::prelude::*;
 
@@ -28,4 +28,22 @@ pub fn surface_factors<const D: usize>(bonds: &dyn Bonds<D>, modulus: f64, stiff
         factors.set(slot as usize, value);
     }
     factors
+}
+
+/// The factors of bonds, see [`Bonds::set_factors`], from surface correction and from a micromodulus over that of the law:
+/// a bond has the mean of its two ends. `None` where all are 1.
+pub fn bond_factors<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    surface: Option<Field<D>>,
+    micromodulus: &Property,
+) -> Option<Field<D>> {
+    if micromodulus.uniform() == Some(1.0) {
+        return surface;
+    }
+    let mut factors = Field::zeros(bonds.slots());
+    for slot in bonds.particles().iter().map(|&slot| slot as usize) {
+        let surface = surface.as_ref().map_or([1.0; D], |surface| surface.get(slot));
+        factors.set(slot, surface.map(|g| g * micromodulus.at(slot)));
+    }
+    Some(factors)
 }

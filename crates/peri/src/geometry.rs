@@ -1,7 +1,21 @@
 //! Bodies from shapes: boxes, disks, balls, cylinders, added and cut in order; cracks of zero width; point clouds.
 
-use crate::bonds::Lattice;
 use crate::error::Error;
+
+/// Where particles sit: a box of cells, some of them occupied.
+#[derive(Clone, Debug)]
+pub struct Lattice<const D: usize> {
+    /// Edge of a cell = distance of neighbouring particles, m.
+    pub spacing: f64,
+    /// Centre of the first cell, m.
+    pub origin: [f64; D],
+    /// Cells along each axis.
+    pub cells: [usize; D],
+    /// Which cells hold a particle; first axis fastest.
+    pub occupied: Vec<bool>,
+    /// Volume of each particle, m³ (in 2D with the thickness).
+    pub volume: f64,
+}
 
 /// A solid region of dimension `D`; lengths in m.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,6 +7,7 @@
 //! use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection, stretch_range};
 //! use peri::calibrate::{Space, modulus};
 //! use peri::geometry::{Operation, Shape, lattice};
+//! use peri::material::BondMaterial;
 //! use peri::potential::{KernelFit, Law};
 //! use peri::solver::{AdaptiveDynamicRelaxation, Loads, State, Support, System};
 //! use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
@@ -28,7 +29,7 @@
 //!     let loads = Loads::new(bonds.slots(), &[(end(0.0, 3e-3), held(0.0)), (end(37e-3, 40e-3), held(2e-3))]);
 //!
 //!     let mut state = State::new(bonds.slots());
-//!     let mut system = System::new(&mut bonds, &*law, modulus, &loads, &[1.0]);
+//!     let mut system = System::new(&mut bonds, BondMaterial::new(&*law, modulus), &loads, &[1.0]);
 //!     AdaptiveDynamicRelaxation::default().solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
 //!
 //!     // σ₁₁ in the middle: about E times 2 mm over the free 34 mm
@@ -53,6 +54,7 @@ pub mod exact;
 pub mod field;
 pub mod geometry;
 pub mod integrals;
+pub mod material;
 pub mod potential;
 mod quadrature;
 pub mod solver;

@@ -8,6 +8,7 @@ use peri::Error;
 use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::geometry::{Operation, Shape, lattice};
+use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{
     AdaptiveDynamicRelaxation, Equilibrium, LimitedMemory, Loads, PreconditionedLbfgs, Relaxation, State,
@@ -103,7 +104,8 @@ impl Plate {
             Box::new(LimitedMemory::new(PreconditionedLbfgs { tolerance, ..Default::default() }))
         };
         let mut state = State::new(self.bonds.slots());
-        let mut system = System::new(&mut self.bonds, &*self.law, self.modulus, &self.loads, &[1.0]);
+        let mut system =
+            System::new(&mut self.bonds, BondMaterial::new(&*self.law, self.modulus), &self.loads, &[1.0]);
         march(&mut *method, &mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
         Ok(state)
     }

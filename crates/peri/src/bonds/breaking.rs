@@ -1,7 +1,8 @@
 //! Which bonds are stretched beyond what they bear.
 
-use super::{Bonds, StretchRange};
+use super::{Bonds, Property};
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::potential::StretchRange;
 use rayon::prelude::*;
 
 /// A bond, seen from one of its ends, that is to be severed.
@@ -19,14 +20,15 @@ pub struct Overstretched {
     pub weight: f64,
 }
 
-/// All intact bonds with λ² − 1 > `elongation`, each from both of its ends: λ² − 1 = η·(2ξ + η)/|ξ|² has the same bits
-/// from either.
+/// All intact bonds beyond the `critical` stretch of the weaker of their ends, each from both of them: λ² − 1 =
+/// η·(2ξ + η)/|ξ|² has the same bits from either.
 pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
-    elongation: f64,
+    critical: &Property,
 ) -> Vec<Overstretched> {
     let slots = bonds.slots();
+    let least = critical.least() * critical.least() - 1.0;
     let of_chunk = |chunk: usize| {
         let range = chunk_range(chunk, slots);
         // the vectorised kernel finds the items to look into
@@ -37,7 +39,7 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
         bonds.force(displacement, chunk, &mut out, Some(&mut met));
         let mut found = Vec::new();
         // its last bits may differ from those below
-        if met.high * (1.0 + 1e-9) < elongation {
+        if met.high * (1.0 + 1e-9) < least {
             return found;
         }
         for slot in range {
@@ -50,7 +52,8 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
                     e += eta * (2.0 * bond.bond[d] + eta);
                 }
                 let e = e / (bond.length * bond.length);
-                if e > elongation {
+                let critical = critical.weaker(slot, bond.slot);
+                if e > critical * critical - 1.0 {
                     found.push(Overstretched {
                         slot: slot as u32,
                         index: bond.index,

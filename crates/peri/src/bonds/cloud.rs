@@ -2,15 +2,14 @@
 
 use super::cells::CellGrid;
 use super::cloud_kernel::{CloudData, GROUP};
-use super::kernel::StretchRange;
 use super::rows::{CloudKernel, cloud_kernel};
 use super::{
-    Bonds, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
+    Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use crate::geometry::{Cut, severed};
-use crate::potential::KernelFit;
+use crate::potential::{KernelFit, StretchRange};
 use rayon::prelude::*;
 
 /// The bonds of a cloud.
@@ -206,19 +205,6 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         slot != other && self.neighbours[self.starts[slot]..self.starts[slot + 1]].contains(&(other as u32))
     }
 
-    fn is_alone(&self, slot: usize) -> bool {
-        // padding and broken bonds lead to the particle itself
-        self.neighbours[self.starts[slot]..self.starts[slot + 1]].iter().all(|&other| other as usize == slot)
-    }
-
-    fn one_sided(&self) -> Option<[usize; 2]> {
-        self.particles.par_iter().find_map_first(|&slot| {
-            let own = &self.neighbours[self.starts[slot as usize]..self.starts[slot as usize + 1]];
-            let lone = own.iter().find(|&&o| o != slot && !self.is_bonded(o as usize, slot as usize))?;
-            Some([slot as usize, *lone as usize])
-        })
-    }
-
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
         let common = self.volumes[0];
         let alike = self.factors.is_none()
@@ -310,7 +296,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
             + self.factors.as_ref().map_or(0, |f| 8 * D * f.slots())
     }
 
-    fn as_cloud(&self) -> Option<&CloudBonds<D>> {
-        Some(self)
+    fn kind(&self) -> Kind<'_, D> {
+        Kind::Cloud(self)
     }
 }

@@ -1,6 +1,7 @@
 //! The cloud kernel: the neighbours of one particle gathered in groups.
 
-use super::kernel::{Pass, StretchRange, law, load};
+use super::kernel::{Pass, law, load};
+use crate::potential::StretchRange;
 use pulp::Simd;
 
 /// Neighbour lists are padded to a multiple of this with bonds of no stiffness to the particle itself.

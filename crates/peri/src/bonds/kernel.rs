@@ -4,26 +4,8 @@
 //! the force density Σ_J c_IJ q(e) (ξ + η), q = t/(kθ λ), c = 2kθ w V_J/|ξ|, as in Eqs (2.6), (2.47).
 //! q is the rational fit of [`crate::potential::KernelFit`]: no square root, and no division where it is a polynomial.
 
+use crate::potential::StretchRange;
 use pulp::{Arch, Simd, WithSimd};
-
-/// Stretches met, as the extremes of e = λ² − 1.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct StretchRange {
-    /// Smallest e.
-    pub low: f64,
-    /// Largest e.
-    pub high: f64,
-}
-
-impl StretchRange {
-    /// The undeformed state.
-    pub const REST: Self = Self { low: 0.0, high: 0.0 };
-
-    /// The union of both.
-    pub fn join(self, other: Self) -> Self {
-        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
-    }
-}
 
 /// A kernel with everything it reads in place.
 pub trait Pass<const D: usize> {

@@ -1,31 +1,15 @@
 //! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
 
-use super::kernel::StretchRange;
 use super::lattice_kernel::{Class, TILE, Tiles};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::{
-    Bonds, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
+    Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
-use crate::geometry::{Cut, severed};
-use crate::potential::KernelFit;
+use crate::geometry::{Cut, Lattice, severed};
+use crate::potential::{KernelFit, StretchRange};
 use rayon::prelude::*;
-
-/// Where particles sit: a box of cells, some of them occupied.
-#[derive(Clone, Debug)]
-pub struct Lattice<const D: usize> {
-    /// Edge of a cell = distance of neighbouring particles, m.
-    pub spacing: f64,
-    /// Centre of the first cell, m.
-    pub origin: [f64; D],
-    /// Cells along each axis.
-    pub cells: [usize; D],
-    /// Which cells hold a particle; first axis fastest.
-    pub occupied: Vec<bool>,
-    /// Volume of each particle, m³ (in 2D with the thickness).
-    pub volume: f64,
-}
 
 /// The offsets within the horizon, in an order in which bond k and bond (n − 1 − k) are opposite.
 #[derive(Clone, Debug)]
@@ -490,7 +474,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.slots * 8 * self.intact.len() + self.classes.len() + self.particles.len() * 4 + factors
     }
 
-    fn as_lattice(&self) -> Option<&LatticeBonds<D>> {
-        Some(self)
+    fn kind(&self) -> Kind<'_, D> {
+        Kind::Lattice(self)
     }
 }

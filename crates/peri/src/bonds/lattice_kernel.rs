@@ -1,6 +1,7 @@
 //! The lattice kernel: vectors of neighbouring particles, one bond of the stencil at a time, no gather.
 
-use super::kernel::{Pass, StretchRange, law, load};
+use super::kernel::{Pass, law, load};
+use crate::potential::StretchRange;
 use pulp::Simd;
 
 /// Slots per tile: the unit of the lattice kernel's classification. Storage is padded to a multiple of it.

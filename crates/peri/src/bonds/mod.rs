@@ -7,15 +7,18 @@ mod cloud_kernel;
 mod kernel;
 mod lattice;
 mod lattice_kernel;
+mod property;
 mod rows;
 
+pub use crate::geometry::Lattice;
+pub use crate::potential::StretchRange;
 pub use breaking::{Overstretched, fingerprint, fragments, overstretched};
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
-pub use kernel::StretchRange;
-pub use lattice::{Lattice, LatticeBonds, Stencil, storage};
+pub use lattice::{LatticeBonds, Stencil, storage};
 pub use lattice_kernel::TILE;
+pub use property::Property;
 
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
@@ -39,10 +42,16 @@ pub struct Neighbour<const D: usize> {
     pub weight: f64,
 }
 
-/// The bonds of a body of dimension `D`.
-///
-/// Seam for later laws that need a per-point state: a first pass over the families may fill fields that
-/// [`Bonds::force`] of another implementor reads; the solver sees forces only.
+/// The two representations, for what only one of them has.
+pub enum Kind<'a, const D: usize> {
+    /// A regular lattice.
+    Lattice(&'a LatticeBonds<D>),
+    /// A cloud.
+    Cloud(&'a CloudBonds<D>),
+}
+
+/// The bonds of a body of dimension `D`: its particles, who is bonded to whom, and the kernels of bond laws. Whatever else acts
+/// along bonds is a [`crate::material::Material`].
 pub trait Bonds<const D: usize>: Send + Sync {
     /// Storage slots; fields have this length.
     fn slots(&self) -> usize;
@@ -59,11 +68,29 @@ pub trait Bonds<const D: usize>: Send + Sync {
     /// Visits the intact bonds of a slot.
     fn neighbours(&self, slot: usize, visit: &mut dyn FnMut(Neighbour<D>));
     /// Whether an intact bond leads from a slot to another.
-    fn is_bonded(&self, slot: usize, other: usize) -> bool;
+    fn is_bonded(&self, slot: usize, other: usize) -> bool {
+        let mut bonded = false;
+        self.neighbours(slot, &mut |bond| bonded |= bond.slot == other);
+        bonded
+    }
     /// Whether a slot has no intact bond.
-    fn is_alone(&self, slot: usize) -> bool;
+    fn is_alone(&self, slot: usize) -> bool {
+        let mut alone = true;
+        self.neighbours(slot, &mut |_| alone = false);
+        alone
+    }
     /// The slots of a bond that only the first of them has; `None` where every family is symmetric, as it must be.
-    fn one_sided(&self) -> Option<[usize; 2]>;
+    fn one_sided(&self) -> Option<[usize; 2]> {
+        self.particles().par_iter().find_map_first(|&slot| {
+            let mut lone = None;
+            self.neighbours(slot as usize, &mut |bond| {
+                if lone.is_none() && !self.is_bonded(bond.slot, slot as usize) {
+                    lone = Some([slot as usize, bond.slot]);
+                }
+            });
+            lone
+        })
+    }
     /// Sets the bond law q(e) and its modulus kθ, N/m⁶.
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
     /// Sets per-particle surface-correction factors (one field of `D` components over the slots).
@@ -86,13 +113,11 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn directed_bonds(&self) -> u64;
     /// Bytes this representation holds for bonds and particles.
     fn bytes(&self) -> usize;
+    /// Which representation this is.
+    fn kind(&self) -> Kind<'_, D>;
     /// The lattice behind these bonds, if there is one.
     fn as_lattice(&self) -> Option<&LatticeBonds<D>> {
-        None
-    }
-    /// The cloud behind these bonds, if there is one.
-    fn as_cloud(&self) -> Option<&CloudBonds<D>> {
-        None
+        if let Kind::Lattice(lattice) = self.kind() { Some(lattice) } else { None }
     }
 }
 

@@ -1,9 +1,9 @@
 //! From a fitted law to kernel rows of a fixed size, chosen once per scene.
 
 use super::cloud_kernel::{CloudData, CloudPass};
-use super::kernel::{StretchRange, dispatch};
+use super::kernel::dispatch;
 use super::lattice_kernel::{LatticePass, Row, Tiles};
-use crate::potential::KernelFit;
+use crate::potential::{KernelFit, StretchRange};
 
 /// One bond of the stencil: its distance in slots, ξ, and its stiffness 2kθ w V/|ξ|.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,6 @@
 //! Bond energies and tangents as tables over e = λ² − 1.
 
-use super::BondPotential;
-use crate::bonds::StretchRange;
+use super::{BondPotential, StretchRange};
 
 /// Pieces of the table.
 const PIECES: usize = 2048;

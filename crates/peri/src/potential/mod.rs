@@ -4,6 +4,7 @@ mod chain;
 mod energy;
 mod fit;
 mod laws;
+mod range;
 mod ratio;
 #[cfg(test)]
 mod tests;
@@ -12,6 +13,7 @@ pub use chain::{Chain, ChainPoint};
 pub use energy::{EnergyTable, TangentTable};
 pub use fit::KernelFit;
 pub use laws::{BondStretch, LinearBond, NetworkStretch, Printed, Scaled, Shifted};
+pub use range::StretchRange;
 
 use crate::error::Error;
 use serde::Deserialize;

@@ -1,12 +1,13 @@
 //! A body with its bond law, as a variant of a scene asks for them.
 
+use crate::bonds::Property;
 use crate::calibrate;
-use crate::correction::surface_factors;
+use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, Critical};
 use crate::error::Error;
 use crate::potential::BondPotential;
 use crate::run::Failure;
-use crate::scene::{self, Body, Scene, SurfaceCorrection, Variant, with_inclusions};
+use crate::scene::{self, Body, Inclusions, Scene, SurfaceCorrection, Variant};
 use polycore::scene::Source;
 
 /// A body, its law and their constants.
@@ -18,7 +19,7 @@ pub struct Bonded<const D: usize> {
     /// kθ.
     pub modulus: f64,
     /// Where the scene names one.
-    pub critical_stretch: Option<f64>,
+    pub critical_stretch: Option<Property>,
 }
 
 impl<const D: usize> Bonded<D> {
@@ -43,11 +44,15 @@ impl<const D: usize> Bonded<D> {
         let surface = (variant.surface == SurfaceCorrection::Energy).then(|| {
             surface_factors(&*body.bonds, modulus, calibrate::stiffness_1111(space, youngs_modulus))
         });
-        if let Some(factors) = with_inclusions(source, scene, &body, surface)? {
+        let inclusions = Inclusions::new(source, scene, &body)?;
+        if let Some(factors) = bond_factors(&*body.bonds, surface, &inclusions.micromodulus) {
             body.bonds.set_factors(factors);
         }
-        let context = Context { law: &*law, links: material.links, space, modulus, horizon, thickness };
-        let resolve = |critical: Critical| critical.resolve(&context);
+        let resolve = |critical: Critical, stiffness: f64| {
+            let modulus = stiffness * modulus;
+            let context = Context { law: &*law, links: material.links, space, modulus, horizon, thickness };
+            critical.resolve(&context)
+        };
         let fault = |error| match error {
             Error::Parameter { name, found, allowed } => {
                 let unit = if name == "critical.fracture_energy" { " J/m²" } else { "" };
@@ -55,7 +60,14 @@ impl<const D: usize> Bonded<D> {
             }
             other => source.error("material.critical", other, "a critical stretch"),
         };
-        let critical_stretch = material.critical.map(resolve).transpose().map_err(fault)?;
+        let critical_stretch = match material.critical {
+            Some(critical) => {
+                let stretch = resolve(critical, 1.0).map_err(fault)?;
+                let own = |critical, stiffness| resolve(critical, stiffness);
+                Some(inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?)
+            }
+            None => None,
+        };
         Ok(Self { body, law, modulus, critical_stretch })
     }
 }

@@ -1,7 +1,7 @@
 //! Fields of single steps: what is written while a run goes on, and the pictures of its stages.
 
 use super::outcome::Outcome;
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, Kind};
 use crate::error::Error;
 use crate::potential::{BondPotential, KernelFit};
 use crate::scene::Scene;
@@ -220,8 +220,10 @@ impl<'a> Frames<'a> {
             .collect();
         let mut data: Vec<(&str, usize, &[f64])> = vec![("displacement", 3, displacement.as_flattened())];
         // a cloud's particles are sorted for locality: this is the line of each in the user's file, from 0
-        let lines: Option<Vec<f64>> =
-            bonds.as_cloud().map(|cloud| cloud.input_order().iter().map(|&line| f64::from(line)).collect());
+        let lines: Option<Vec<f64>> = match bonds.kind() {
+            Kind::Cloud(cloud) => Some(cloud.input_order().iter().map(|&line| f64::from(line)).collect()),
+            Kind::Lattice(_) => None,
+        };
         data.extend(lines.iter().map(|lines| ("input_index", 1, lines.as_slice())));
         data.extend(damage.iter().map(|damage| ("damage", 1, damage.as_slice())));
         data.extend(tensors.iter().map(|(name, values)| (name.as_str(), 9, values.as_slice())));

@@ -17,11 +17,12 @@ use bonded::Bonded;
 use frames::Frames;
 use probes::Probes;
 
-use crate::bonds::{Bonds, fragments, stretch_range};
+use crate::bonds::{Bonds, Kind, fragments, stretch_range};
 use crate::calibrate::Space;
 use crate::checkpoint;
 use crate::contact::Contact;
 use crate::error::Error;
+use crate::material::{BondMaterial, Property};
 use crate::potential::{BondPotential, KernelFit};
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
 use crate::solver::{Breaking, Loads, State, Status, System, march};
@@ -196,14 +197,14 @@ fn run_variant<const D: usize>(
         modulus,
         loads: loads_used,
         probes: &probes,
-        critical_stretch,
+        critical_stretch: critical_stretch.as_ref(),
     };
     solve(source, scene, &solution, options, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
     let fit = KernelFit::new(&*law, covering(&*body.bonds, &state), scene.fit_bound())?;
     outcome.value("fit_error", fit.max_error, "");
-    if let Some(critical) = critical_stretch {
-        outcome.value("critical_stretch", critical, "");
+    if let Some(critical) = &critical_stretch {
+        outcome.value("critical_stretch", critical.least(), "");
         outcome.value("fragments", fragments(&*body.bonds) as f64, "");
     }
     if scene.dynamics.is_some() {
@@ -265,7 +266,7 @@ struct Solution<'a, const D: usize> {
     modulus: f64,
     loads: &'a Loads<D>,
     probes: &'a Probes<D>,
-    critical_stretch: Option<f64>,
+    critical_stretch: Option<&'a Property>,
 }
 
 #[expect(clippy::too_many_arguments, reason = "one call, of what changes and what does not")]
@@ -307,11 +308,12 @@ fn solve<const D: usize>(
     let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
     let course = course.map(|formula| |time: f64| formula.in_time(time));
     let observer = |bonds: &dyn Bonds<D>, state: &State<D>| probes.see(bonds, state);
-    let mut system = System::new(&mut *body.bonds, law, modulus, loads, &factors);
+    let mut system = System::new(&mut *body.bonds, BondMaterial::new(law, modulus), loads, &factors);
     system.course = course.as_ref().map(|course| course as _);
     system.observer = (!scene.probe.is_empty()).then_some(&observer as _);
     system.fit_bound = scene.fit_bound();
-    system.breaking = critical_stretch.map(|stretch| Breaking { stretch, policy: scene.solver.breaking });
+    system.breaking =
+        critical_stretch.map(|stretch| Breaking { stretch: stretch.clone(), policy: scene.solver.breaking });
     system.contact = contact;
     system.stop_below = scene.solver.stop_below.unwrap_or(0.0);
     phases.start("solve");
@@ -341,12 +343,9 @@ fn stress<const D: usize>(
     measure: crate::stress::Measure,
     ball: crate::stress::BallVolume,
 ) -> Vec<Tensor<D>> {
-    if let Some(lattice) = bonds.as_lattice() {
-        piola_on_lattice(lattice, loaded, measure, ball)
-    } else if let Some(cloud) = bonds.as_cloud() {
-        piola_in_cloud::<D>(cloud, loaded, measure, ball)
-    } else {
-        Vec::new()
+    match bonds.kind() {
+        Kind::Lattice(lattice) => piola_on_lattice(lattice, loaded, measure, ball),
+        Kind::Cloud(cloud) => piola_in_cloud(cloud, loaded, measure, ball),
     }
 }
 
@@ -375,7 +374,8 @@ fn explanation_in<const D: usize>(
         let (source, scene) = variant.resolve(source, scene)?;
         let built = Built::<D>::new(&source, &scene, &variant)?;
         let Bonded { body, critical_stretch, .. } = &built.bonded;
-        lines.extend(scene::explain(&source, &scene, &variant, body, *critical_stretch)?);
+        let critical_stretch = critical_stretch.as_ref().map(Property::least);
+        lines.extend(scene::explain(&source, &scene, &variant, body, critical_stretch)?);
     }
     Ok(lines)
 }

@@ -327,6 +327,14 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     for (index, inclusion) in material.inclusions.iter().enumerate() {
         let key = format!("material.inclusions[{index}].stiffness");
         positive(source, &key, inclusion.stiffness, "")?;
+        if inclusion.critical.is_some() && material.critical.is_none() {
+            let key = format!("material.inclusions[{index}].critical");
+            return Err(source.error(
+                &key,
+                "a critical stretch of a part",
+                "`material.critical` beside it, of the rest",
+            ));
+        }
     }
     Ok(())
 }

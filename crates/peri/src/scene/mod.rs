@@ -23,7 +23,7 @@ pub use check::{check, check_variant, plain};
 pub use expect::{quantities, quantities_of};
 pub use explain::explain;
 pub use formula::Formula;
-pub use inclusion::with_inclusions;
+pub use inclusion::Inclusions;
 pub use loads::{loads_of, region_names, velocities_of};
 pub use memory::needed as memory_needed;
 pub use method::{Dynamics, Method, Solver};
@@ -243,6 +243,8 @@ pub struct Inclusion {
     pub shape: ShapeSpec,
     /// Its stiffness over that of the rest.
     pub stiffness: f64,
+    /// When its bonds break, instead of `material.critical`; a bond across its border breaks as the weaker side does.
+    pub critical: Option<Critical>,
 }
 
 /// Whether bonds near a free surface are stiffened.

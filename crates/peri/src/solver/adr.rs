@@ -4,13 +4,13 @@
 //! with the quotient taken on increments (the displacement-weighted form has negative stiffness in many iterations).
 
 use super::balance::Goal;
-use super::march::{Equilibrium, Watch, march};
+use super::march::{Equilibrium, march};
+use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::passes::{force_pass, move_pass};
-use super::system::{State, Status, System};
-use crate::bonds::{Bonds, StretchRange};
+use super::state::{State, Status, Watch};
+use super::system::System;
+use crate::bonds::Bonds;
 use crate::error::Error;
-use crate::potential::TangentTable;
-use rayon::prelude::*;
 
 /// Iterations between looks at the stretches.
 const LOOK: u64 = 10;
@@ -58,13 +58,9 @@ impl AdaptiveDynamicRelaxation {
 
 /// Iterations between looks at the masses, where bonds differ much in their tangent.
 const REFRESH: u64 = 10;
-/// From this ratio of the largest tangent to that at rest on, every particle has the mass of its own bonds.
-const MUCH: f64 = 1.2;
 /// Iterations after which a search is a long one, and the least damping towards twice as many.
 const LONG: u64 = 3000;
 const LATE_DAMPING: f64 = 0.05;
-/// Least tangent of a bond in its particles' masses, over that at rest.
-const LEAST_TANGENT: f64 = 0.25;
 
 /// The method at work.
 pub struct Relaxation {
@@ -104,12 +100,12 @@ impl Relaxation {
         let look =
             system.breaks_on_the_way() || state.iteration < LOOK || state.iteration.is_multiple_of(LOOK);
         let factor = system.factors[state.step];
+        system.prepare(&state.displacement);
         let own = has_own_mass(system, state);
         if own && (state.iteration.is_multiple_of(REFRESH) || self.own_mass.is_empty()) {
             own_mass(system, state, &mut self.own_mass);
         }
-        let tangent = if own { system.modulus } else { state.tangent };
-        system.update_contact(&state.displacement);
+        let tangent = if own { system.material.bond_law().1 } else { state.tangent };
         if let Some(contact) = system.repulsion() {
             self.contact_mass.clone_from(if own { &self.own_mass } else { &self.unit_mass });
             contact.add_stiffness(&state.displacement, tangent, &mut self.contact_mass);
@@ -187,73 +183,5 @@ impl<const D: usize> Equilibrium<D> for Relaxation {
 
     fn broke(&mut self, system: &System<D>, slots: &[u32]) {
         update_unit_mass(&*system.bonds, slots, &mut self.unit_mass);
-    }
-}
-
-/// Whether bonds differ so much in their tangent that every particle has the mass of its own.
-pub(super) fn has_own_mass<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
-    state.tangent > MUCH * system.modulus * system.law.tangent().abs()
-}
-
-/// Σ_J (2 w V_J/|ξ|)(1 + max_{d≠e} |n_d n_e|): the Gershgorin sum of a particle for a unit bond tangent.
-/// 1 where there is no bond, so that empty slots and detached particles stay at rest.
-pub(super) fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, slots: &[u32], mass: &mut [f64]) {
-    let sums: Vec<f64> = slots
-        .par_iter()
-        .map(|&slot| {
-            let mut sum = 0.0;
-            bonds.neighbours(slot as usize, &mut |bond| {
-                let cosine: [f64; D] = bond.bond.map(|x| (x / bond.length).abs());
-                let mixed = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
-                let mixed = mixed.map(|(d, e)| cosine[d] * cosine[e]).fold(0.0, f64::max);
-                sum += 2.0 * bond.weight / bond.length * (1.0 + mixed);
-            });
-            if sum > 0.0 { sum } else { 1.0 }
-        })
-        .collect();
-    for (&slot, sum) in slots.iter().zip(sums) {
-        mass[slot as usize] = sum;
-    }
-}
-
-/// Σ_J (2 w V_J/|ξ|)·max(|t′|, |t|/λ)(1 + max_{d≠e} |n_d n_e|) with the directions of the deformed bonds.
-pub(super) fn own_mass<const D: usize>(system: &System<D>, state: &State<D>, mass: &mut Vec<f64>) {
-    // bonds crushed to nothing have no bound: the law's own at a thousandth
-    let met = StretchRange { low: state.fitted[0].powi(2) - 1.0, high: state.fitted[1].powi(2) - 1.0 };
-    let table = TangentTable::new(system.law, met);
-    // a bond past its greatest force is soft, but a light particle would leap when it meets a stiff one
-    let least = LEAST_TANGENT * system.law.tangent().abs();
-    let sums: Vec<f64> = system
-        .bonds
-        .particles()
-        .par_iter()
-        .map(|&slot| {
-            let own = state.displacement.get(slot as usize);
-            let mut sum = 0.0;
-            system.bonds.neighbours(slot as usize, &mut |bond| {
-                let other = state.displacement.get(bond.slot);
-                let mut zeta = [0.0; D];
-                let mut square = 0.0;
-                for d in 0..D {
-                    zeta[d] = bond.bond[d] + other[d] - own[d];
-                    square += zeta[d] * zeta[d];
-                }
-                let mut mixed = 0.0_f64;
-                for d in 0..D {
-                    for e in 0..d {
-                        mixed = mixed.max((zeta[d] * zeta[e]).abs());
-                    }
-                }
-                let e = square / (bond.length * bond.length) - 1.0;
-                let tangent = table.value(e).max(least);
-                sum +=
-                    2.0 * bond.weight / bond.length * tangent * (1.0 + mixed / square.max(f64::MIN_POSITIVE));
-            });
-            if sum > 0.0 { sum } else { 1.0 }
-        })
-        .collect();
-    mass.resize(system.bonds.slots(), 1.0);
-    for (&slot, sum) in system.bonds.particles().iter().zip(sums) {
-        mass[slot as usize] = sum;
     }
 }

@@ -3,11 +3,12 @@
 //! condition), found by secants.
 
 use super::balance::Goal;
-use super::march::{Equilibrium, Watch, march};
+use super::march::{Equilibrium, march};
 use super::memory::{Memory, product};
 use super::passes::{Sums, force_pass};
 use super::preconditioner::Preconditioner;
-use super::system::{State, Status, System};
+use super::state::{State, Status, Watch};
+use super::system::System;
 use crate::bonds::{Bonds, StretchRange, stretch_range};
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
@@ -154,8 +155,9 @@ impl<const D: usize> LimitedMemory<D> {
 
     /// Builds the preconditioner for the present state and forgets everything else: from here a run that begins with
     /// this state takes the same way.
-    fn begin(&mut self, system: &System<D>, state: &State<D>, watch: &mut Watch<D>) -> Result<(), Error> {
+    fn begin(&mut self, system: &mut System<D>, state: &State<D>, watch: &mut Watch<D>) -> Result<(), Error> {
         watch(&self.status(system, state, true), state)?;
+        system.prepare(&state.displacement);
         let slots = system.bonds.slots();
         let fields = [
             &mut self.gradient,
@@ -191,7 +193,7 @@ impl<const D: usize> LimitedMemory<D> {
     /// New forces at the present displacement; their gradient goes to `self.trial`.
     fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Point {
         let factor = system.factors[state.step];
-        system.update_contact(&state.displacement);
+        system.prepare(&state.displacement);
         // at rest the velocity leaves the pass' quotients at 0
         let (sums, met) = force_pass(system, state, self.preconditioner.local(), 1.0, factor, true);
         system.count_evaluation(state);
@@ -314,7 +316,7 @@ impl<const D: usize> LimitedMemory<D> {
     fn longest_step(&mut self, system: &System<D>, state: &mut State<D>, most: f64) -> f64 {
         let contact = system.repulsion();
         let longest = contact.map_or(f64::INFINITY, |c| c.longest_step(&state.displacement, &self.direction));
-        if system.law.tension_derivative((1.0 + most).sqrt()) >= 0.0 {
+        if system.material.bond_law().0.tension_derivative((1.0 + most).sqrt()) >= 0.0 {
             return longest;
         }
         scale(&mut self.direction, FAR);

@@ -2,11 +2,10 @@
 //! what a row of history sums.
 
 use super::load::Loads;
-use super::march::stored_energy;
-use super::system::{State, System};
+use super::state::State;
+use super::system::System;
 use crate::bonds::StretchRange;
 use crate::field::{CHUNK, chunk_range};
-use crate::potential::EnergyTable;
 use rayon::prelude::*;
 
 /// Constants of one step from t to t + Δt.
@@ -137,13 +136,17 @@ pub fn kick_pass<const D: usize>(
     parts.into_iter().fold(Sums::default(), Sums::add)
 }
 
-/// Forces with loads of some work items, or of all.
+/// Forces with loads of some work items, or of all; bonds outside of these have not changed.
 pub fn refresh<const D: usize>(
-    system: &System<D>,
+    system: &mut System<D>,
     state: &mut State<D>,
     factor: f64,
     chunks: Option<&[usize]>,
 ) {
+    system.prepare(&state.displacement);
+    // states of particles carry what has changed beyond their bonds
+    let chunks = chunks.filter(|_| !system.material.has_points());
+    let system = &*system;
     let (loads, displacement) = (&*system.loads, &state.displacement);
     let slots = displacement.slots();
     state.force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut f)| {
@@ -293,24 +296,11 @@ pub fn chunks_of(slots: &[u32]) -> Vec<usize> {
     chunks
 }
 
-/// The energies of all stretches that a fit covers, once computed.
-pub type Table = Option<([f64; 2], EnergyTable)>;
-
-/// The energy of all bonds, J. A law costs more to sample than bonds to sum: the table is kept as long as the fit.
-pub fn stored<const D: usize>(
-    system: &System<D>,
-    state: &State<D>,
-    met: StretchRange,
-    table: &mut Table,
-) -> f64 {
+/// The energy of material and contact, J; over all stretches that are fitted, so that the law is sampled once a fit.
+pub fn stored<const D: usize>(system: &mut System<D>, state: &State<D>, met: StretchRange) -> f64 {
     let [low, high] = state.fitted.map(|stretch| stretch * stretch - 1.0);
-    if met.low < low || met.high > high {
-        return stored_energy(system, state, &EnergyTable::new(system.law, met));
-    }
-    if table.as_ref().is_none_or(|(fitted, _)| *fitted != state.fitted) {
-        *table = Some((state.fitted, EnergyTable::new(system.law, StretchRange { low, high })));
-    }
-    table.as_ref().map_or(0.0, |(_, table)| stored_energy(system, state, table))
+    let inside = met.low >= low && met.high <= high;
+    system.stored_energy(state, if inside { StretchRange { low, high } } else { met })
 }
 
 /// Volumes of all slots, 0 where there is no particle.

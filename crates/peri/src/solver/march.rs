@@ -1,15 +1,10 @@
 //! Load step after load step: a first guess, an equilibrium, the bonds that break in it, the next equilibrium.
 
-use super::balance::{Balance, Scale};
-use super::system::{Policy, Record, State, Status, System};
-use crate::bonds::{Bonds, StretchRange};
+use super::scale::{Balance, Scale};
+use super::state::{Record, State, Watch};
+use super::system::System;
+use crate::bonds::Bonds;
 use crate::error::Error;
-use crate::field::CHUNK;
-use crate::potential::EnergyTable;
-use rayon::prelude::*;
-
-/// Sees every iteration, and may stop the run by an error.
-pub type Watch<'a, const D: usize> = dyn FnMut(&Status, &State<D>) -> Result<(), Error> + 'a;
 
 /// A method that finds the equilibrium of a state at the load factor of its step.
 pub trait Equilibrium<const D: usize> {
@@ -41,7 +36,7 @@ pub fn march<const D: usize>(
     watch: &mut Watch<D>,
     finished: &mut dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let stiffness = system.modulus * system.law.tangent();
+    let stiffness = system.stiffness_at_rest();
     // of the body as it was built: an interrupted run must guess as if it had not been
     let predictor = system.loads.affine_predictor(&*system.bonds, stiffness);
     system.scale = Scale::new(&*system.bonds, &system.loads, stiffness);
@@ -148,7 +143,6 @@ fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
 fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let [factor, pull, push] = state.balanced;
     let met = state.balanced_stretches;
-    let table = EnergyTable::new(system.law, system.fitted_part(met));
     let (load, displacement) = system.loads.response(&*system.bonds, factor, (pull, push));
     if state.history.last().map_or(0, |r| r.broken) != state.broken {
         state.past.clear();
@@ -164,7 +158,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
         rounds: state.round,
         broken: state.broken,
         detached: state.detached,
-        stored: stored_energy(system, state, &table),
+        stored: system.stored_energy(state, system.fitted_part(met)),
         balance,
         contact: system.touching(state),
         work: state.work,
@@ -178,49 +172,9 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     state.history.push(record);
 }
 
-/// Σ_I V_I Σ_J w V_J kθ |ξ| φ: the energy of all bonds, J, and that of contact.
-pub fn stored_energy<const D: usize>(system: &System<D>, state: &State<D>, table: &EnergyTable) -> f64 {
-    let of = |slots: &[u32]| {
-        let mut sum = 0.0;
-        for &slot in slots {
-            let own = state.displacement.get(slot as usize);
-            let mut energy = 0.0;
-            system.bonds.neighbours(slot as usize, &mut |bond| {
-                let other = state.displacement.get(bond.slot);
-                let mut e = 0.0;
-                for d in 0..D {
-                    let eta = other[d] - own[d];
-                    e += eta * (2.0 * bond.bond[d] + eta);
-                }
-                energy += bond.weight * bond.length * table.value(e / (bond.length * bond.length));
-            });
-            sum += system.bonds.volume(slot as usize) * energy;
-        }
-        sum
-    };
-    let parts: Vec<f64> = system.bonds.particles().par_chunks(CHUNK).map(of).collect();
-    let bonds = system.modulus * parts.iter().sum::<f64>();
-    match system.repulsion() {
-        Some(contact) => bonds + contact.touching(&state.displacement).energy,
-        None => bonds,
-    }
-}
-
 /// Whether the load has fallen below the part of its largest at which the run is to stop.
 fn severed<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
     let largest = state.history.iter().map(|r| r.load.abs()).fold(0.0, f64::max);
     let last = state.history.last().map_or(0.0, |r| r.load.abs());
     system.stop_below > 0.0 && state.broken > 0 && last < system.stop_below * largest
-}
-
-impl<const D: usize> System<'_, D> {
-    /// Whether bonds break on the way to equilibrium.
-    pub(super) fn breaks_on_the_way(&self) -> bool {
-        self.breaking.is_some_and(|b| b.policy == Policy::EachIteration)
-    }
-
-    /// Whether stretches reach the critical one.
-    pub(super) fn is_overstretched(&self, met: StretchRange) -> bool {
-        self.breaking.is_some_and(|b| met.high > b.stretch * b.stretch - 1.0)
-    }
 }

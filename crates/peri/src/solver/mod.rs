@@ -2,22 +2,32 @@
 
 mod adr;
 mod balance;
+mod breaking;
 mod coarse;
+mod covering;
 mod lbfgs;
 mod leap;
 mod load;
 mod march;
+mod mass;
 mod memory;
+mod motion;
 mod passes;
 mod preconditioner;
+mod scale;
+mod severing;
+mod state;
 mod system;
 mod time_step;
 mod verlet;
 
 pub use adr::{AdaptiveDynamicRelaxation, Relaxation};
-pub use balance::Balance;
+pub use breaking::{Breaking, Policy};
 pub use lbfgs::{LimitedMemory, PreconditionedLbfgs};
 pub use load::{Loads, Support};
-pub use march::{Equilibrium, Watch, march, stored_energy};
-pub use system::{Breaking, Course, Event, Observer, Policy, Record, State, Status, System};
-pub use verlet::{Motion, VelocityVerlet};
+pub use march::{Equilibrium, march};
+pub use motion::Motion;
+pub use scale::Balance;
+pub use state::{Event, Record, State, Status, Watch};
+pub use system::{Course, Observer, System};
+pub use verlet::VelocityVerlet;

@@ -1,7 +1,8 @@
 //! The two passes of an iteration over all slots: new forces with every sum over them, and the move.
 
 use super::load::Loads;
-use super::system::{State, System};
+use super::state::State;
+use super::system::System;
 use crate::bonds::StretchRange;
 use crate::field::{CHUNK, chunk_range};
 use rayon::prelude::*;

@@ -1,10 +1,11 @@
 //! An approximate inverse of the body's stiffness, for gradients of its energy: B g = ω g/(V M) + P A_c⁻¹ Pᵀ g, with the
 //! Gershgorin mass M of dynamic relaxation and a coarse level.
 
-use super::adr::{has_own_mass, own_mass, update_unit_mass};
 use super::coarse::{Body, Coarse, Survey};
 use super::load::Loads;
-use super::system::{State, System};
+use super::mass::{has_own_mass, own_mass, update_unit_mass};
+use super::state::State;
+use super::system::System;
 use crate::bonds::Bonds;
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
@@ -47,9 +48,10 @@ impl<const D: usize> Preconditioner<D> {
         update_unit_mass(bonds, bonds.particles(), &mut self.unit_mass);
         // half the Gershgorin sum is about a particle's own stiffness
         let mut springs = Vec::new();
+        let (law, modulus) = system.material.bond_law();
         let tangent = if has_own_mass(system, state) {
             own_mass(system, state, &mut springs);
-            system.modulus
+            modulus
         } else {
             springs.clone_from(&self.unit_mass);
             state.tangent
@@ -83,7 +85,7 @@ impl<const D: usize> Preconditioner<D> {
             bonds,
             loads: &system.loads,
             displacement: &state.displacement,
-            law: (system.law, system.modulus, state.fitted),
+            law: (law, modulus, state.fitted),
             springs: &springs,
             survey: &survey,
         };

@@ -1,7 +1,8 @@
 //! The critical time step Δt_c = 2/ω_max of explicit dynamics: a bound for every deformation within a range of stretches,
 //! and the sharp value of one deformation.
 
-use super::system::{State, System};
+use super::state::State;
+use super::system::System;
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 
@@ -13,12 +14,10 @@ const PROBE: f64 = 1e-5;
 const ENOUGH: f64 = 1e-2;
 /// Most steps of the Lanczos iteration.
 const MOST_STEPS: usize = 200;
-/// Samples of a law over a range of stretches.
-const SAMPLES: u32 = 200;
 
 /// What bounds the frequencies of a body, and what its bonds can store at most and least.
 #[derive(Clone, Copy, Debug)]
-pub struct Family {
+pub struct BondSums {
     /// max_I Σ_J 2 w V_J/|ξ|: the stiffness of a particle's bonds for a unit tangent kθ t′, m.
     pub stiffness: f64,
     /// Shortest bond, m; ∞ without bonds.
@@ -27,7 +26,7 @@ pub struct Family {
     pub extent: f64,
 }
 
-impl Family {
+impl BondSums {
     /// One visit of all bonds.
     pub fn new<const D: usize>(system: &System<D>) -> Self {
         let of = |slots: &[u32]| {
@@ -53,35 +52,6 @@ impl Family {
     }
 }
 
-/// What a bond law does over a range of stretches, all over kθ.
-#[derive(Clone, Copy, Debug)]
-pub struct LawRange {
-    /// max |t′| + (D − 1)·max(t/λ, 0): D times the mean tangent of bonds in all directions, where it is greatest.
-    pub mean_tangent: f64,
-    /// min |t′|.
-    pub least_tangent: f64,
-    /// min φ ≤ 0.
-    pub least_energy: f64,
-}
-
-impl LawRange {
-    /// Samples the law over the stretches [low, high].
-    pub fn new<const D: usize>(system: &System<D>, [low, high]: [f64; 2]) -> Self {
-        let (mut steepest, mut tension) = (0.0_f64, 0.0_f64);
-        let mut range = Self { mean_tangent: 0.0, least_tangent: f64::INFINITY, least_energy: 0.0 };
-        for k in 0..=SAMPLES {
-            let stretch = low + (high - low) * f64::from(k) / f64::from(SAMPLES);
-            let slope = system.law.tension_derivative(stretch).abs();
-            steepest = steepest.max(slope);
-            tension = tension.max(system.law.tension(stretch) / stretch);
-            range.least_tangent = range.least_tangent.min(slope);
-            range.least_energy = range.least_energy.min(system.law.energy(stretch));
-        }
-        range.mean_tangent = steepest + (D - 1) as f64 * tension;
-        range
-    }
-}
-
 /// 2/ω, ∞ where nothing oscillates.
 pub fn critical(frequency_squared: f64) -> f64 {
     if frequency_squared > 0.0 { 2.0 / frequency_squared.sqrt() } else { f64::INFINITY }
@@ -93,7 +63,7 @@ pub fn critical(frequency_squared: f64) -> f64 {
 /// Volumes are the weights of the inner product in which the tangent is symmetric. The Ritz value is a lower bound; with
 /// its residual, up to a hundredth of it, added it is on the safe side: half of a hundredth above what 200 steps give.
 pub fn largest_frequency_squared<const D: usize>(
-    system: &System<D>,
+    system: &mut System<D>,
     state: &mut State<D>,
     volumes: &[f64],
     density: f64,
@@ -154,7 +124,7 @@ fn largest_pair(diagonal: &[f64], beside: &[f64]) -> (f64, f64) {
 
 /// −(∂f/∂u)x/ρ by a central difference.
 fn tangent<const D: usize>(
-    system: &System<D>,
+    system: &mut System<D>,
     state: &mut State<D>,
     direction: &Field<D>,
     shortest: f64,
@@ -169,6 +139,8 @@ fn tangent<const D: usize>(
         moved.clone_from(&state.displacement);
         combine(moved, [(sign * probe, direction), (0.0, direction)]);
         let moved = &*moved;
+        system.prepare(moved);
+        let system = &*system;
         out.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
             system.internal_force(moved, chunk, &mut out, None);
         });

@@ -5,15 +5,14 @@
 //! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
 //! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
-use super::balance::Balance;
-use super::leap::{Leap, Sums, Table, chunks_of, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
-use super::march::{Watch, stored_energy};
-use super::system::{Record, State, Status, System};
-use super::time_step::{Family, LawRange, critical, largest_frequency_squared};
+use super::leap::{Leap, Sums, chunks_of, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
+use super::motion::Motion;
+use super::scale::Balance;
+use super::state::{Record, State, Status, Watch};
+use super::system::System;
+use super::time_step::{BondSums, critical, largest_frequency_squared};
 use crate::bonds::{Bonds, StretchRange, stretch_range};
 use crate::error::Error;
-use crate::potential::EnergyTable;
-use serde::{Deserialize, Serialize};
 
 /// Part of the energy turned over by which the kinetic energy may exceed what is available before the run is given up:
 /// far above the O(Δt²) error of steps below the critical one, passed within a few steps beyond it.
@@ -42,47 +41,6 @@ pub struct VelocityVerlet {
     pub end_time: f64,
     /// Rows of history, equally far apart; steps are shortened evenly to fall on them.
     pub records: usize,
-}
-
-/// Where the dynamics of a state are; all zero for a body at the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Motion {
-    /// Time, s.
-    pub time: f64,
-    /// Time step, s.
-    pub time_step: f64,
-    /// Critical time step 2/ω_max of the body at the start, s (sharp).
-    pub critical_step: f64,
-    /// Lower bound of the critical time step by Gershgorin's theorem for all stretches covered, s.
-    pub gershgorin_step: f64,
-    /// Estimate of the critical time step for all stretches covered, s: between the two.
-    pub covered_step: f64,
-    /// Kinetic energy, J.
-    pub kinetic: f64,
-    /// Energy that the damping has taken, J.
-    pub damped: f64,
-    begun: bool,
-    /// Longest step in use, s.
-    longest: f64,
-    /// Start of the run of equal steps under way, their number and how many are done.
-    origin: f64,
-    planned: u64,
-    taken: u64,
-    /// Greatest sum of contact stiffness on a particle that is allowed for, N/m⁴.
-    contact: f64,
-    /// Σ-bounds of the unbroken body, see [`Family`].
-    stiffness: f64,
-    shortest: f64,
-    extent: f64,
-    /// ω_max² at the start over the law's tangent there.
-    frequency: f64,
-    /// Least energy that the bonds can hold.
-    floor: f64,
-    /// Largest of what was available and what has gone.
-    turnover: f64,
-    /// Stretches at the last look, and how much they may have changed since.
-    looked: [f64; 2],
-    slack: f64,
 }
 
 impl VelocityVerlet {
@@ -117,7 +75,6 @@ impl VelocityVerlet {
         } else {
             self.begin(system, state, &volumes)?;
         }
-        let mut table = None;
         while state.step < self.records {
             // the last of them is the end time to the bit
             let end = self.end_time * ((state.step + 1) as f64 / self.records as f64);
@@ -128,7 +85,7 @@ impl VelocityVerlet {
                 self.advance(system, state, &volumes, end)?;
                 watch(&self.status(state), state)?;
             }
-            self.record(system, state, &mut table);
+            self.record(system, state);
             state.step += 1;
             (state.iteration, state.step_iterations, state.motion.planned) = (0, 0, 0);
             finished(&*system.bonds, state)?;
@@ -194,7 +151,7 @@ impl VelocityVerlet {
         refresh(system, state, factor, None);
         system.count_evaluation(state);
         let met = state.balanced_stretches;
-        let stored = stored_energy(system, state, &EnergyTable::new(system.law, met));
+        let stored = system.stored_energy(state, met);
         let square = |slot: u32| state.velocity.get(slot as usize).iter().map(|v| v * v).sum::<f64>();
         let particles = system.bonds.particles().iter();
         let kinetic = particles.map(|&slot| volumes[slot as usize] * square(slot)).sum::<f64>();
@@ -204,10 +161,10 @@ impl VelocityVerlet {
         }
         state.work = kinetic + stored + state.released;
         (state.step, state.iteration, state.step_iterations) = (0, 0, 0);
-        let Family { stiffness, shortest, extent } = Family::new(system);
+        let BondSums { stiffness, shortest, extent } = BondSums::new(system);
         let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
         let range = [met.low, met.high].map(|e| (1.0 + e).max(0.0).sqrt());
-        let tangent = LawRange::new(system, range).least_tangent;
+        let tangent = system.material.range(range).least_tangent;
         let contact = system.repulsion().map_or(0.0, |contact| {
             contact.greatest_stiffness(&state.displacement).max(contact.pair_stiffness())
         });
@@ -234,7 +191,7 @@ impl VelocityVerlet {
 
     /// What follows from the stretches that the fitted law covers: bounds of the critical time step and of the energy.
     fn cover<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
-        let law = LawRange::new(system, state.fitted);
+        let (law, modulus) = (system.material.range(state.fitted), system.material.bond_law().1);
         let motion = &mut state.motion;
         // blocks of the tangent's rows: ω² ≤ ‖A_II‖ + Σ‖A_IJ‖ with ‖t′nn + t/λ(1 − nn)‖ ≤ max(|t′|, |t|/λ);
         // Feingold & Varga (1962), doi:10.2140/pjm.1962.12.1241
@@ -244,7 +201,7 @@ impl VelocityVerlet {
         motion.gershgorin_step = critical(bound);
         // nothing free, or a tangent without a positive frequency: the bound alone
         motion.covered_step = critical(if estimate > 0.0 { estimate.min(bound) } else { bound });
-        motion.floor = law.least_energy * system.modulus * motion.extent;
+        motion.floor = law.least_energy * modulus * motion.extent;
         motion.longest = self.time_step.unwrap_or(self.safety * motion.covered_step);
     }
 
@@ -273,8 +230,8 @@ impl VelocityVerlet {
         let first = leap_pass(&system.loads, state, volumes, &leap);
         // two ends, √D components
         state.motion.slack += 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
-        system.update_contact(&state.displacement);
-        let look = state.motion.must_look(state.fitted, system.breaking.map(|b| b.stretch));
+        system.prepare(&state.displacement);
+        let look = state.motion.must_look(state.fitted, system.breaking.as_ref().map(|b| b.stretch.least()));
         let (mut second, met) = force_pass(system, state, volumes, &leap, look);
         system.count_evaluation(state);
         if look {
@@ -358,10 +315,10 @@ impl VelocityVerlet {
     }
 
     /// A row of history.
-    fn record<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>, table: &mut Table) {
+    fn record<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>) {
         let met = stretch_range(&*system.bonds, &state.displacement);
         system.count_evaluation(state);
-        let stored = stored(system, state, met, table);
+        let stored = stored(system, state, met);
         let (factor, _) = self.factor(system, state.motion.time);
         let conjugates = system.loads.conjugates(&*system.bonds, &state.displacement, &state.force);
         let (load, displacement) = system.loads.response(&*system.bonds, factor, conjugates);
@@ -387,37 +344,5 @@ impl VelocityVerlet {
             seen: system.seen(state),
         };
         state.history.push(record);
-    }
-}
-
-impl Motion {
-    /// Equal steps from now to `end`, none longer than allowed.
-    fn plan(&mut self, end: f64) {
-        let left = end - self.time;
-        self.origin = self.time;
-        self.planned = (left / self.longest - 1e-9).ceil().max(1.0) as u64;
-        self.taken = 0;
-        self.time_step = left / self.planned as f64;
-    }
-
-    /// The time at the end of the next step.
-    fn time_after(&self, end: f64) -> f64 {
-        let taken = self.taken + 1;
-        if taken == self.planned { end } else { self.origin + taken as f64 * self.time_step }
-    }
-
-    /// Notes the stretches of a look.
-    fn see(&mut self, met: StretchRange) {
-        self.looked = [met.low, met.high].map(|e| (1.0 + e).max(0.0).sqrt());
-        self.slack = 0.0;
-    }
-
-    /// Whether stretches may have left what is fitted, or reached the critical one. A bond's stretch changes by no more
-    /// than its ends' increments over its length.
-    fn must_look(&self, fitted: [f64; 2], critical: Option<f64>) -> bool {
-        let [low, high] = [self.looked[0] - self.slack, self.looked[1] + self.slack];
-        // NaN looks, too
-        let inside = low >= fitted[0] && high <= fitted[1] && critical.is_none_or(|c| high <= c);
-        !inside
     }
 }

@@ -4,6 +4,7 @@ use peri::bonds::{Bonds, CloudBonds, LatticeBonds, VolumeCorrection, force};
 use peri::correction::surface_factors;
 use peri::field::Field;
 use peri::geometry::{Cut, Operation, Shape, lattice};
+use peri::material::BondMaterial;
 use peri::potential::{BondPotential, KernelFit, Law};
 use peri::solver::{AdaptiveDynamicRelaxation, Loads, State, System};
 
@@ -252,7 +253,7 @@ pub fn relax<const D: usize>(
     state: &mut State<D>,
 ) -> Result<(), peri::Error> {
     let (law, modulus) = law;
-    let mut system = System::new(bonds, law, modulus, loads, factors);
+    let mut system = System::new(bonds, BondMaterial::new(law, modulus), loads, factors);
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 

@@ -4,6 +4,7 @@ use crate::bodies::{Body, MODULUS, Random, hold, norm};
 use peri::Error;
 use peri::bonds::{Bonds, force};
 use peri::field::Field;
+use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{Breaking, Loads, Policy, Record, State, System, VelocityVerlet};
 use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
@@ -19,7 +20,7 @@ pub fn run<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
 ) -> Result<(), Error> {
-    let mut system = System::new(bonds, law, MODULUS, loads, &[]);
+    let mut system = System::new(bonds, BondMaterial::new(law, MODULUS), loads, &[]);
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
@@ -176,8 +177,9 @@ fn energies_balance() {
             ..VelocityVerlet::new(DENSITY, end)
         };
         let mut state = State::new(bonds.slots());
-        let mut system = System::new(bonds, &*law, MODULUS, &loads, &[]);
-        system.breaking = breaking.map(|stretch| Breaking { stretch, policy: Policy::EachIteration });
+        let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
+        system.breaking =
+            breaking.map(|stretch: f64| Breaking { stretch: stretch.into(), policy: Policy::EachIteration });
         solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
         assert_eq!(state.history.len(), 50);
         let last = state.history.last().unwrap();
@@ -254,7 +256,7 @@ fn energy_does_not_drift() {
         let mut state = State::new(bonds.slots());
         shake(bonds, strain, &mut state);
         let loads = Loads::default();
-        let mut system = System::new(bonds, &*law, MODULUS, &loads, &[]);
+        let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
         let step = part * 0.234;
         let solver = VelocityVerlet {
             records: 1000,

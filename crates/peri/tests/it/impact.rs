@@ -5,6 +5,7 @@ use crate::dynamics::DENSITY;
 use peri::Error;
 use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
 use peri::contact::{Contact, STIFFNESS};
+use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{Loads, State, System, VelocityVerlet};
 use std::f64::consts::PI;
@@ -19,7 +20,7 @@ fn run(
 ) -> Result<(), Error> {
     let law = Law::Pmb.build(1.0, 1.0, false).unwrap();
     let contact = Contact::new(bonds, MODULUS, kappa)?;
-    let mut system = System::new(bonds, &*law, MODULUS, loads, &[]);
+    let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), loads, &[]);
     system.contact = Some(contact);
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
@@ -159,7 +160,7 @@ fn neither_threads_nor_restarts_change_a_bit() {
                 state
             });
             let loads = Loads::default();
-            let mut system = System::new(bonds, &*law, MODULUS, &loads, &[]);
+            let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
             system.contact = Some(contact);
             let solver = VelocityVerlet { records: 4, ..VelocityVerlet::new(DENSITY, 2.0) };
             let mut saved = None;

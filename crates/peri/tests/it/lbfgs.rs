@@ -6,6 +6,7 @@ use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::field::Field;
 use peri::geometry::{Cut, Operation, Shape, lattice};
+use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{
     AdaptiveDynamicRelaxation, Breaking, Equilibrium, LimitedMemory, Loads, Policy, PreconditionedLbfgs,
@@ -28,8 +29,9 @@ impl<'a, const D: usize> Problem<'a, D> {
 
     fn solve(&self, bonds: &mut dyn Bonds<D>, method: &mut dyn Equilibrium<D>) -> Result<State<D>, Error> {
         let mut state = State::new(bonds.slots());
-        let mut system = System::new(bonds, self.law, self.modulus, self.loads, self.factors);
-        system.breaking = self.breaking;
+        let mut system =
+            System::new(bonds, BondMaterial::new(self.law, self.modulus), self.loads, self.factors);
+        system.breaking.clone_from(&self.breaking);
         march(method, &mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
         Ok(state)
     }
@@ -189,7 +191,7 @@ fn dent_through_breaking() {
     for fast in [false, true] {
         let (mut bonds, loads, law, modulus) = dent(spacing);
         let mut problem = Problem::new(&*law, modulus, &loads, &factors);
-        problem.breaking = Some(Breaking { stretch: 2.9442, policy: Policy::AtEquilibrium });
+        problem.breaking = Some(Breaking { stretch: 2.9442.into(), policy: Policy::AtEquilibrium });
         let start = std::time::Instant::now();
         let state =
             if fast { problem.minimised(&mut bonds, 1e-4) } else { problem.relaxed(&mut bonds, 1e-4) };
@@ -227,7 +229,7 @@ fn bits_do_not_depend_on_threads() {
             let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 11.7).then(|| (3, [0.2 * x[0], 0.01 * x[0]])));
             let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
             let mut problem = Problem::new(&*law, 1.0, &loads, &[0.5, 1.0]);
-            problem.breaking = Some(Breaking { stretch: 1.5, policy: Policy::AtEquilibrium });
+            problem.breaking = Some(Breaking { stretch: 1.5.into(), policy: Policy::AtEquilibrium });
             let mut state = problem.minimised(bonds, 1e-3);
             assert!(bonds.slots() > 3 * peri::field::CHUNK && state.broken > 0);
             state.history.clear();
@@ -254,11 +256,11 @@ fn restarts_take_the_same_bits() {
         (built, loads)
     };
     let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
-    let breaking = Some(Breaking { stretch: 1.8, policy: Policy::AtEquilibrium });
+    let breaking = Some(Breaking { stretch: 1.8.into(), policy: Policy::AtEquilibrium });
     let run = |state: &mut State<2>, saved: &mut Vec<State<2>>| {
         let (mut built, loads) = build();
-        let mut system = System::new(&mut built.lattice, &*law, MODULUS, &loads, &factors);
-        system.breaking = breaking;
+        let mut system = System::new(&mut built.lattice, BondMaterial::new(&*law, MODULUS), &loads, &factors);
+        system.breaking.clone_from(&breaking);
         let settings = PreconditionedLbfgs { tolerance: 1e-5, ..Default::default() };
         let mut watch = |status: &peri::solver::Status, state: &State<2>| {
             if status.restartable {

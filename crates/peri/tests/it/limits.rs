@@ -6,6 +6,7 @@ use peri::bonds::{Bonds, CloudBonds, Lattice, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
+use peri::material::BondMaterial;
 use peri::potential::{KernelFit, Law};
 use peri::solver::{AdaptiveDynamicRelaxation, Loads, State};
 
@@ -296,7 +297,8 @@ fn what_does_not_converge_says_how_far_it_came() {
     let solver = AdaptiveDynamicRelaxation { tolerance: 1e-12, max_iterations: 15, ..Default::default() };
     let mut last = f64::NAN;
     let mut state = State::new(built.lattice.slots());
-    let mut system = peri::solver::System::new(&mut built.lattice, &*law, 1.0, &loads, &[0.5, 1.0]);
+    let mut system =
+        peri::solver::System::new(&mut built.lattice, BondMaterial::new(&*law, 1.0), &loads, &[0.5, 1.0]);
     let error = solver.solve(
         &mut system,
         &mut state,

@@ -6,13 +6,17 @@ mod bodies;
 mod contact;
 mod cracks;
 mod dynamics;
+mod fields;
 mod forces;
 mod hardy;
 mod homogeneous;
 mod impact;
 mod lbfgs;
 mod limits;
+#[path = "../../examples/linear_solid.rs"]
+mod linear_solid;
 mod looks;
+mod materials;
 mod pressed;
 mod relaxation;
 mod rigid;

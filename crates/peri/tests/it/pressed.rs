@@ -3,6 +3,7 @@
 use crate::bodies::{Body, Built, MODULUS, Slit, distance, hold, rms};
 use peri::bonds::Bonds;
 use peri::contact::{Contact, STIFFNESS, Touching};
+use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{
     AdaptiveDynamicRelaxation, Breaking, Equilibrium, LimitedMemory, Loads, PreconditionedLbfgs, Relaxation,
@@ -32,7 +33,7 @@ impl<const D: usize> Run<'_, D> {
         let contact = self.contact.map(|[stiffness, skin]| {
             Contact::new(self.bonds, MODULUS, stiffness).unwrap().with_skin(skin * spacing)
         });
-        let mut system = System::new(self.bonds, &*law, MODULUS, self.loads, self.factors);
+        let mut system = System::new(self.bonds, BondMaterial::new(&*law, MODULUS), self.loads, self.factors);
         (system.contact, system.breaking) = (contact, self.breaking);
         let mut see = |status: &peri::solver::Status, state: &State<D>| {
             watch(state, status.restartable);
@@ -232,7 +233,7 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
             let loads = loads(bonds);
             let mut state = from.unwrap_or_else(|| State::new(bonds.slots()));
             let mut saved = None;
-            let breaking = Some(Breaking { stretch: 1.17, policy: Default::default() });
+            let breaking = Some(Breaking { stretch: 1.17.into(), policy: Default::default() });
             let (law, contact) = (Law::Subtract, Some([STIFFNESS, skin]));
             let run = Run { bonds, loads: &loads, factors: &[0.4, 0.7, 1.0], law, contact, breaking };
             let lists = run.solve(&mut *methods(1e-2)[which], &mut state, &mut |state, restartable| {
@@ -292,5 +293,7 @@ fn contact_without_touch_changes_no_bit() {
     let mut built = Body::<2>::solid([3, 3], 1.0, 1.5).build();
     let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
     let loads = Loads::default();
-    assert!(System::new(&mut built.lattice, &*law, MODULUS, &loads, &[]).contact.is_none());
+    assert!(
+        System::new(&mut built.lattice, BondMaterial::new(&*law, MODULUS), &loads, &[]).contact.is_none()
+    );
 }

@@ -3,6 +3,7 @@
 use crate::bodies::{Body, MODULUS, hold};
 use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use peri::geometry::{Cut, Operation, Shape, lattice};
+use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{
     AdaptiveDynamicRelaxation, Equilibrium, LimitedMemory, Loads, PreconditionedLbfgs, Relaxation, State,
@@ -33,7 +34,7 @@ fn solve(
     state: &mut State<2>,
 ) -> Result<(), peri::Error> {
     let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
-    let mut system = System::new(bonds, &*law, MODULUS, loads, factors);
+    let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), loads, factors);
     march(method, &mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 

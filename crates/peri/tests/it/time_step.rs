@@ -4,6 +4,7 @@ use crate::bodies::{Body, hold};
 use crate::dynamics::{DENSITY, once, run};
 use peri::Error;
 use peri::bonds::Bonds;
+use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{Breaking, Loads, Motion, Policy, State, System, VelocityVerlet};
 
@@ -100,8 +101,8 @@ fn tear(cloud: bool, pause: Option<u64>) -> State<2> {
         let bonds: &mut dyn Bonds<2> = if cloud { &mut built.cloud } else { &mut built.lattice };
         let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 11.7).then(|| (3, [0.1 * x[0], 0.05 * x[0]])));
         let state = state.get_or_insert_with(|| State::new(bonds.slots()));
-        let mut system = System::new(bonds, &*law, 1.0, &loads, &[]);
-        system.breaking = Some(Breaking { stretch: 1.1, policy: Policy::EachIteration });
+        let mut system = System::new(bonds, BondMaterial::new(&*law, 1.0), &loads, &[]);
+        system.breaking = Some(Breaking { stretch: 1.1.into(), policy: Policy::EachIteration });
         let mut watch = |status: &peri::solver::Status, state: &State<2>| {
             assert!(status.restartable);
             let stop = pause.is_some_and(|steps| state.total_iterations == steps);

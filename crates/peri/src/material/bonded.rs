@@ -1,0 +1,221 @@
+//! Bond laws as materials: no state of a particle, forces by the kernels of [`crate::bonds`].
+
+use super::{Bond, Cover, Family, LawRange, Material, Response};
+use crate::bonds::{Bonds, Overstretched};
+use crate::error::Error;
+use crate::field::{CHUNK, Field};
+use crate::potential::{BondPotential, EnergyTable, KernelFit, StretchRange, TangentTable};
+use rayon::prelude::*;
+
+/// From this ratio of the largest tangent to that at rest on, every particle has the stiffness of its own bonds.
+const MUCH: f64 = 1.2;
+/// Least tangent of a bond in its particles' stiffness, over that at rest.
+const LEAST_TANGENT: f64 = 0.25;
+/// Samples of a law over a range of stretches.
+const SAMPLES: u32 = 200;
+
+/// A bond law with its micromodulus.
+#[derive(Clone, Copy)]
+pub struct BondMaterial<'a> {
+    law: &'a dyn BondPotential,
+    modulus: f64,
+}
+
+impl<'a> BondMaterial<'a> {
+    /// Of a law in units of kθ = `modulus`, N/m⁶.
+    pub fn new(law: &'a dyn BondPotential, modulus: f64) -> Self {
+        Self { law, modulus }
+    }
+
+    /// 2kθ times the factors of a bond.
+    fn scale<const D: usize>(&self, bond: &Bond<D>) -> f64 {
+        2.0 * self.modulus * bond.weight / bond.volume
+    }
+}
+
+impl<const D: usize> Material<D> for BondMaterial<'_> {
+    type Point = ();
+
+    /// 2kθ t(λ) ζ/|ζ|, Eqs (2.6), (2.47).
+    fn force(&self, bond: &Bond<D>, (): &(), (): &()) -> [f64; D] {
+        let size = self.scale(bond) * self.law.tension_at_strain(bond.strain());
+        bond.direction().map(|x| size * x)
+    }
+
+    /// Σ_J kθ |ξ| φ w V_J, Eq. (2.39).
+    fn energy(&self, family: &Family<D>, (): &()) -> f64 {
+        self.modulus * family.sum(|bond| bond.weight * bond.length * self.law.energy(bond.stretch()))
+    }
+
+    /// Σ_J (2kθ w V_J/|ξ|)·max(|t′|, |t|/λ)(1 + max_{d≠e} |n_d n_e|).
+    fn stiffness(&self, family: &Family<D>, _points: &[()]) -> f64 {
+        self.modulus
+            * family.sum(|bond| {
+                let stretch = bond.stretch().max(f64::MIN_POSITIVE);
+                let slope = self.law.tension_derivative(stretch).abs();
+                let tangent = slope.max(self.law.tension(stretch).abs() / stretch);
+                2.0 * bond.weight / bond.length * tangent * (1.0 + mixed(bond.direction()))
+            })
+    }
+
+    fn micromodulus(&self, _bonds: &dyn Bonds<D>) -> f64 {
+        self.modulus * self.law.tangent() / 3.0
+    }
+
+    fn respond<'a>(self, _bonds: &dyn Bonds<D>) -> Box<dyn Response<D> + 'a>
+    where
+        Self: 'a,
+    {
+        Box::new(Kernels { material: self, table: None })
+    }
+}
+
+/// max_{d≠e} |n_d n_e|.
+fn mixed<const D: usize>(n: [f64; D]) -> f64 {
+    let pairs = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
+    pairs.map(|(d, e)| (n[d] * n[e]).abs()).fold(0.0, f64::max)
+}
+
+/// A bond law in the kernels.
+struct Kernels<'a> {
+    material: BondMaterial<'a>,
+    /// Energies over the range of stretches last asked for: a law costs more to sample than bonds to sum.
+    table: Option<(StretchRange, EnergyTable)>,
+}
+
+impl<const D: usize> Response<D> for Kernels<'_> {
+    fn bond_law(&self) -> (&dyn BondPotential, f64) {
+        (self.material.law, self.material.modulus)
+    }
+
+    fn cover(
+        &mut self,
+        bonds: &mut dyn Bonds<D>,
+        _displacement: &Field<D>,
+        cover: &Cover,
+    ) -> Result<f64, Error> {
+        let BondMaterial { law, modulus } = self.material;
+        let mut fit = KernelFit::new(law, cover.stretches, cover.bound)?;
+        if cover.held {
+            fit = fit.held();
+        }
+        bonds.set_law(&fit, modulus);
+        let tangent =
+            |stretch: f64| law.tension_derivative(stretch).abs().max(law.tension(stretch).abs() / stretch);
+        Ok(samples(cover.stretches).map(tangent).fold(0.0, f64::max) * modulus)
+    }
+
+    fn prepare(&mut self, _bonds: &dyn Bonds<D>, _displacement: &Field<D>) {}
+
+    fn has_points(&self) -> bool {
+        false
+    }
+
+    fn force(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
+        bonds.force(displacement, chunk, force, track);
+    }
+
+    /// Σ_I V_I Σ_J w V_J kθ |ξ| φ.
+    fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, met: StretchRange) -> f64 {
+        let BondMaterial { law, modulus } = self.material;
+        if self.table.as_ref().is_none_or(|(range, _)| *range != met) {
+            self.table = Some((met, EnergyTable::new(law, met)));
+        }
+        let Some((_, table)) = &self.table else { return 0.0 };
+        let of = |slots: &[u32]| {
+            let mut sum = 0.0;
+            for &slot in slots {
+                let own = displacement.get(slot as usize);
+                let mut energy = 0.0;
+                bonds.neighbours(slot as usize, &mut |bond| {
+                    let other = displacement.get(bond.slot);
+                    let mut e = 0.0;
+                    for d in 0..D {
+                        let eta = other[d] - own[d];
+                        e += eta * (2.0 * bond.bond[d] + eta);
+                    }
+                    energy += bond.weight * bond.length * table.value(e / (bond.length * bond.length));
+                });
+                sum += bonds.volume(slot as usize) * energy;
+            }
+            sum
+        };
+        let parts: Vec<f64> = bonds.particles().par_chunks(CHUNK).map(of).collect();
+        modulus * parts.iter().sum::<f64>()
+    }
+
+    /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. Beyond what is fitted q is held: the energy grows with half
+    /// of it.
+    fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64> {
+        let law = self.material.law;
+        let energy = |bond: &Overstretched| {
+            let stretch = (1.0 + bond.elongation).sqrt();
+            let mut energy = law.energy(stretch.min(most));
+            if stretch > most {
+                let beyond = bond.elongation - (most * most - 1.0);
+                energy += 0.5 * beyond * law.tension(most) / most;
+            }
+            bonds.volume(bond.slot as usize) * bond.weight * bond.length * energy
+        };
+        Some(self.material.modulus * list.iter().map(energy).sum::<f64>())
+    }
+
+    fn has_own_stiffness(&self, tangent: f64) -> bool {
+        tangent > MUCH * self.material.modulus * self.material.law.tangent().abs()
+    }
+
+    /// Σ_J (2 w V_J/|ξ|)·max(|t′|, |t|/λ)(1 + max_{d≠e} |n_d n_e|) with the directions of the deformed bonds.
+    fn own_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, stretches: [f64; 2]) -> Vec<f64> {
+        let law = self.material.law;
+        // bonds crushed to nothing have no bound: the law's own at a thousandth
+        let [low, high] = stretches.map(|stretch| stretch.powi(2) - 1.0);
+        let table = TangentTable::new(law, StretchRange { low, high });
+        // a bond past its greatest force is soft, but a light particle would leap when it meets a stiff one
+        let least = LEAST_TANGENT * law.tangent().abs();
+        let of = |&slot: &u32| {
+            let own = displacement.get(slot as usize);
+            let mut sum = 0.0;
+            bonds.neighbours(slot as usize, &mut |bond| {
+                let other = displacement.get(bond.slot);
+                let mut zeta = [0.0; D];
+                let mut square = 0.0;
+                for d in 0..D {
+                    zeta[d] = bond.bond[d] + other[d] - own[d];
+                    square += zeta[d] * zeta[d];
+                }
+                let e = square / (bond.length * bond.length) - 1.0;
+                let tangent = table.value(e).max(least);
+                let mixed = mixed(zeta) / square.max(f64::MIN_POSITIVE);
+                sum += 2.0 * bond.weight / bond.length * tangent * (1.0 + mixed);
+            });
+            sum
+        };
+        bonds.particles().par_iter().map(of).collect()
+    }
+
+    fn range(&self, stretches: [f64; 2]) -> LawRange {
+        let law = self.material.law;
+        let (mut steepest, mut tension) = (0.0_f64, 0.0_f64);
+        let mut range = LawRange { mean_tangent: 0.0, least_tangent: f64::INFINITY, least_energy: 0.0 };
+        for stretch in samples(stretches) {
+            let slope = law.tension_derivative(stretch).abs();
+            steepest = steepest.max(slope);
+            tension = tension.max(law.tension(stretch) / stretch);
+            range.least_tangent = range.least_tangent.min(slope);
+            range.least_energy = range.least_energy.min(law.energy(stretch));
+        }
+        range.mean_tangent = steepest + (D - 1) as f64 * tension;
+        range
+    }
+}
+
+fn samples([low, high]: [f64; 2]) -> impl Iterator<Item = f64> {
+    (0..=SAMPLES).map(move |k| low + (high - low) * f64::from(k) / f64::from(SAMPLES))
+}

@@ -1,0 +1,111 @@
+//! Families and bonds, as a material sees them.
+
+use crate::bonds::Bonds;
+use crate::field::Field;
+
+/// A particle with its intact bonds under a displacement.
+pub struct Family<'a, const D: usize> {
+    bonds: &'a dyn Bonds<D>,
+    displacement: &'a Field<D>,
+    slot: usize,
+}
+
+/// An intact bond from a particle I to a particle J.
+#[derive(Clone, Copy, Debug)]
+pub struct Bond<const D: usize> {
+    /// Slot of I.
+    pub from: usize,
+    /// Slot of J.
+    pub to: usize,
+    /// ξ = X_J − X_I, m.
+    pub reference: [f64; D],
+    /// |ξ|, m.
+    pub length: f64,
+    /// u_J − u_I, m.
+    pub change: [f64; D],
+    /// Volume correction times V_J, m³: what sums over a family weigh a bond by.
+    pub volume: f64,
+    /// `volume` times the factors of surface correction and micromodulus, m³.
+    pub weight: f64,
+}
+
+impl<const D: usize> Bond<D> {
+    /// ζ = ξ + η, m.
+    pub fn current(&self) -> [f64; D] {
+        std::array::from_fn(|d| self.reference[d] + self.change[d])
+    }
+
+    /// e = λ² − 1 = η·(2ξ + η)/|ξ|², which loses no digits at small strains.
+    pub fn elongation(&self) -> f64 {
+        let product = |d: usize| self.change[d] * (2.0 * self.reference[d] + self.change[d]);
+        (0..D).map(product).sum::<f64>() / (self.length * self.length)
+    }
+
+    /// Stretch λ = |ζ|/|ξ|.
+    pub fn stretch(&self) -> f64 {
+        (1.0 + self.elongation()).max(0.0).sqrt()
+    }
+
+    /// λ − 1, which loses no digits at small strains.
+    pub fn strain(&self) -> f64 {
+        self.elongation() / (1.0 + self.stretch())
+    }
+
+    /// ζ/|ζ|; zero where both ends are in one place.
+    pub fn direction(&self) -> [f64; D] {
+        let current = self.current();
+        let length = current.iter().map(|x| x * x).sum::<f64>().sqrt();
+        if length > 0.0 { current.map(|x| x / length) } else { [0.0; D] }
+    }
+}
+
+impl<'a, const D: usize> Family<'a, D> {
+    /// The family of the particle in a slot.
+    pub fn new(bonds: &'a dyn Bonds<D>, displacement: &'a Field<D>, slot: usize) -> Self {
+        Self { bonds, displacement, slot }
+    }
+
+    /// Slot of the particle.
+    pub fn slot(&self) -> usize {
+        self.slot
+    }
+
+    /// Reference position of the particle, m.
+    pub fn position(&self) -> [f64; D] {
+        self.bonds.position(self.slot)
+    }
+
+    /// Volume of the particle, m³.
+    pub fn volume(&self) -> f64 {
+        self.bonds.volume(self.slot)
+    }
+
+    /// Horizon δ, m.
+    pub fn horizon(&self) -> f64 {
+        self.bonds.horizon()
+    }
+
+    /// Visits the intact bonds.
+    pub fn each(&self, mut visit: impl FnMut(Bond<D>)) {
+        let own = self.displacement.get(self.slot);
+        self.bonds.neighbours(self.slot, &mut |bond| {
+            let other = self.displacement.get(bond.slot);
+            visit(Bond {
+                from: self.slot,
+                to: bond.slot,
+                reference: bond.bond,
+                length: bond.length,
+                change: std::array::from_fn(|d| other[d] - own[d]),
+                volume: bond.volume,
+                weight: bond.weight,
+            });
+        });
+    }
+
+    /// Σ over the intact bonds.
+    pub fn sum(&self, mut term: impl FnMut(Bond<D>) -> f64) -> f64 {
+        let mut sum = 0.0;
+        self.each(|bond| sum += term(bond));
+        sum
+    }
+}

@@ -1,0 +1,75 @@
+//! What acts between the particles of a body: one trait, which bond laws and state-based materials implement, inside this crate
+//! and outside of it.
+//!
+//! A material has two passes over every displacement. The first, [`Material::prepare`], fills the state of each particle from
+//! its whole family; the second, [`Material::force`], takes the force of each bond from the states of both ends. Bond laws
+//! need no state: their `Point` is `()`, the first pass does not exist, and the second runs in the vectorised kernels of
+//! [`crate::bonds`].
+//!
+//! Solvers know a material as a [`Response`], which [`Material::respond`] makes of it: forces by work items, the energy, bounds
+//! of the stiffness. A material of the first kind needs no word about them.
+
+mod bonded;
+mod family;
+mod pointwise;
+mod response;
+
+pub use bonded::BondMaterial;
+pub use family::{Bond, Family};
+pub use pointwise::Pointwise;
+pub use response::{Cover, LawRange, Response};
+
+pub use crate::bonds::Property;
+
+use crate::bonds::Bonds;
+
+/// A material: the forces between particles follow from an energy E = Σ_I V_I W_I.
+///
+/// With the force state τ_IJ = ∂W_I/∂ζ_IJ/V_J of particle I, N/m⁶, the force density on it is
+/// Σ_J (τ_IJ − τ_JI) V_J, Silling et al. 2007, doi:10.1007/s10659-007-9125-1. A bond that is broken belongs to no family.
+pub trait Material<const D: usize>: Send + Sync {
+    /// What a particle knows of its family: filled by [`Self::prepare`] before each pass over the bonds; `()` for bond laws.
+    ///
+    /// A run that goes on from a checkpoint fills it anew: it must follow from the body as it was built, the displacement and
+    /// the intact bonds alone, and from no history.
+    type Point: Default + Clone + Send + Sync;
+
+    /// The state of a particle of the body as it was built, before any bond breaks: what refers to the whole family, such as
+    /// weighted volumes. Called once, with a displacement of zero.
+    fn begin(&self, family: &Family<D>) -> Self::Point {
+        let _ = family;
+        Self::Point::default()
+    }
+
+    /// The first pass: brings the state of a particle to the present displacement of its family.
+    fn prepare(&self, family: &Family<D>, point: &mut Self::Point) {
+        let _ = (family, point);
+    }
+
+    /// The second pass: τ_IJ − τ_JI, N/m⁶, the force density on particle I = `bond.from` per volume of J = `bond.to`.
+    ///
+    /// Exchanging both ends must turn its sign and nothing else, or momentum is not conserved.
+    fn force(&self, bond: &Bond<D>, own: &Self::Point, other: &Self::Point) -> [f64; D];
+
+    /// Energy density W_I of a particle, J/m³.
+    fn energy(&self, family: &Family<D>, point: &Self::Point) -> f64;
+
+    /// A bound s_I of the stiffness, N/m⁴, with K ≤ 2 Σ_I s_I V_I for the Hessian K = ∂²E/∂u² of the present displacement.
+    /// Half the sum of absolute values in the rows ∂f_I/∂u is one (Gershgorin).
+    ///
+    /// From it follow the fictitious mass of dynamic relaxation, the local part of the preconditioner and the bound ω² ≤ 2s/ρ of
+    /// the time step. `points` are the states of all slots: of the particle, `points[family.slot()]`, and of its neighbours.
+    fn stiffness(&self, family: &Family<D>, points: &[Self::Point]) -> f64;
+
+    /// kθ, N/m⁶, of linear bonds t = 3kθ(λ − 1) that are about as stiff, see [`crate::calibrate::modulus_in`]: the scale of
+    /// forces, of first guesses and of the preconditioner's coarse level. Equilibria do not depend on it.
+    fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64;
+
+    /// The material at work in a body. The default loops over bonds as [`Self::force`] says.
+    fn respond<'a>(self, bonds: &dyn Bonds<D>) -> Box<dyn Response<D> + 'a>
+    where
+        Self: Sized + 'a,
+    {
+        Box::new(Pointwise::new(self, bonds))
+    }
+}

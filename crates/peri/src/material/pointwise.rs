@@ -1,0 +1,152 @@
+//! Materials by plain loops over families: any [`Material`] at work, with the states of all particles.
+
+use super::{Cover, Family, LawRange, Material, Response};
+use crate::bonds::{Bonds, Overstretched};
+use crate::error::Error;
+use crate::field::{CHUNK, Field, chunk_range};
+use crate::potential::{BondPotential, KernelFit, LinearBond, StretchRange};
+use rayon::prelude::*;
+
+/// A material with the states of all particles.
+pub struct Pointwise<M: Material<D>, const D: usize> {
+    material: M,
+    /// Slot by slot.
+    points: Vec<M::Point>,
+    /// kθ of linear bonds about as stiff.
+    modulus: f64,
+    /// Greatest s_I/u_I when stretches last left the covered range.
+    tangent: f64,
+}
+
+impl<M: Material<D>, const D: usize> Pointwise<M, D> {
+    /// At rest in a body as it was built.
+    pub fn new(material: M, bonds: &dyn Bonds<D>) -> Self {
+        let rest = Field::zeros(bonds.slots());
+        let begin = |&slot: &u32| material.begin(&Family::new(bonds, &rest, slot as usize));
+        let begun: Vec<M::Point> = bonds.particles().par_iter().map(begin).collect();
+        let mut points = vec![M::Point::default(); bonds.slots()];
+        for (&slot, point) in bonds.particles().iter().zip(begun) {
+            points[slot as usize] = point;
+        }
+        let modulus = material.micromodulus(bonds);
+        Self { material, points, modulus, tangent: 0.0 }
+    }
+
+    /// The states, slot by slot.
+    pub fn points(&self) -> &[M::Point] {
+        &self.points
+    }
+}
+
+/// The particles of a work item.
+fn particles_of<const D: usize>(bonds: &dyn Bonds<D>, chunk: usize) -> &[u32] {
+    let particles = bonds.particles();
+    let range = chunk_range(chunk, bonds.slots());
+    let place = |slot: usize| particles.partition_point(|&particle| (particle as usize) < slot);
+    &particles[place(range.start)..place(range.end)]
+}
+
+impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
+    fn bond_law(&self) -> (&dyn BondPotential, f64) {
+        (&LinearBond, self.modulus)
+    }
+
+    fn cover(
+        &mut self,
+        bonds: &mut dyn Bonds<D>,
+        displacement: &Field<D>,
+        cover: &Cover,
+    ) -> Result<f64, Error> {
+        // the kernels find stretches, whatever their law
+        let fit = KernelFit::new(&LinearBond, cover.stretches, cover.bound)?;
+        bonds.set_law(&fit, self.modulus);
+        self.prepare(bonds, displacement);
+        let bonds = &*bonds;
+        let of = |&slot: &u32| {
+            let family = Family::new(bonds, displacement, slot as usize);
+            let unit = family.sum(|bond| 2.0 * bond.weight / bond.length);
+            if unit > 0.0 { self.material.stiffness(&family, &self.points) / unit } else { 0.0 }
+        };
+        self.tangent = bonds.particles().par_iter().map(of).reduce(|| 0.0, f64::max);
+        Ok(self.tangent)
+    }
+
+    fn prepare(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
+        if !self.has_points() {
+            return;
+        }
+        let material = &self.material;
+        self.points.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, points)| {
+            for &slot in particles_of(bonds, chunk) {
+                let slot = slot as usize;
+                material.prepare(&Family::new(bonds, displacement, slot), &mut points[slot - chunk * CHUNK]);
+            }
+        });
+    }
+
+    fn has_points(&self) -> bool {
+        size_of::<M::Point>() > 0
+    }
+
+    fn force(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+        mut track: Option<&mut StretchRange>,
+    ) {
+        force.iter_mut().for_each(|component| component.fill(0.0));
+        for &slot in particles_of(bonds, chunk) {
+            let slot = slot as usize;
+            let mut sum = [0.0; D];
+            Family::new(bonds, displacement, slot).each(|bond| {
+                let density = self.material.force(&bond, &self.points[slot], &self.points[bond.to]);
+                for d in 0..D {
+                    sum[d] += density[d] * bond.volume;
+                }
+                if let Some(range) = track.as_deref_mut() {
+                    let e = bond.elongation();
+                    *range = range.join(StretchRange { low: e, high: e });
+                }
+            });
+            for d in 0..D {
+                force[d][slot - chunk * CHUNK] = sum[d];
+            }
+        }
+    }
+
+    fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, _met: StretchRange) -> f64 {
+        self.prepare(bonds, displacement);
+        let of = |slots: &[u32]| {
+            let each = slots.iter().map(|&slot| {
+                let family = Family::new(bonds, displacement, slot as usize);
+                family.volume() * self.material.energy(&family, &self.points[slot as usize])
+            });
+            each.sum::<f64>()
+        };
+        let parts: Vec<f64> = bonds.particles().par_chunks(CHUNK).map(of).collect();
+        parts.iter().sum()
+    }
+
+    fn released(&self, _bonds: &dyn Bonds<D>, _list: &[Overstretched], _most: f64) -> Option<f64> {
+        None
+    }
+
+    fn has_own_stiffness(&self, _tangent: f64) -> bool {
+        true
+    }
+
+    fn own_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, _stretches: [f64; 2]) -> Vec<f64> {
+        let of = |&slot: &u32| {
+            self.material.stiffness(&Family::new(bonds, displacement, slot as usize), &self.points)
+                / self.modulus
+        };
+        bonds.particles().par_iter().map(of).collect()
+    }
+
+    /// Frequencies grow as the bound of the stiffness does.
+    fn range(&self, _stretches: [f64; 2]) -> LawRange {
+        LawRange { mean_tangent: self.tangent, least_tangent: self.tangent, least_energy: 0.0 }
+    }
+}

@@ -1,0 +1,79 @@
+//! What solvers ask of a material at work in a body.
+
+use crate::bonds::{Bonds, Overstretched};
+use crate::error::Error;
+use crate::field::Field;
+use crate::potential::{BondPotential, StretchRange};
+
+/// Stretches over which a law is to be evaluated, and how.
+#[derive(Clone, Copy, Debug)]
+pub struct Cover {
+    /// Stretches [λ_low, λ_high].
+    pub stretches: [f64; 2],
+    /// Largest relative error of a fit.
+    pub bound: f64,
+    /// Whether the law stays what it is at the ends beyond them, as it must where bonds break.
+    pub held: bool,
+}
+
+/// What a material does over a range of stretches, in one unit.
+#[derive(Clone, Copy, Debug)]
+pub struct LawRange {
+    /// max |t′| + (D − 1)·max(t/λ, 0): D times the mean tangent of bonds in all directions, where it is greatest.
+    pub mean_tangent: f64,
+    /// min |t′|.
+    pub least_tangent: f64,
+    /// min φ ≤ 0.
+    pub least_energy: f64,
+}
+
+/// A material at work. Forces are taken by work items, so that a trait object costs nothing.
+pub trait Response<const D: usize>: Send + Sync {
+    /// A bond law and its kθ, N/m⁶, about as stiff as this material: its own where it is one.
+    fn bond_law(&self) -> (&dyn BondPotential, f64);
+
+    /// Brings the law to a range of stretches; a bound of the relative tangent of bonds, N/m⁶: with u_I = Σ_J 2 w V_J/|ξ|
+    /// no particle is stiffer than tangent × u_I.
+    ///
+    /// # Errors
+    /// As [`crate::potential::KernelFit::new`].
+    fn cover(
+        &mut self,
+        bonds: &mut dyn Bonds<D>,
+        displacement: &Field<D>,
+        cover: &Cover,
+    ) -> Result<f64, Error>;
+
+    /// The first pass: to be called before forces of a displacement, and where bonds have changed.
+    fn prepare(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>);
+
+    /// Whether forces of a particle depend on more than its own bonds.
+    fn has_points(&self) -> bool;
+
+    /// Force densities, N/m³, of work item `chunk`; collects the stretches met if asked.
+    fn force(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    );
+
+    /// Energy of the body, J; `met` holds the stretches within which the law itself is to be taken.
+    fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, met: StretchRange) -> f64;
+
+    /// Energy of bonds about to be severed, J, where it does not depend on others; `most` is the largest stretch of the law
+    /// itself. `None`: what the body loses when they are.
+    fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64>;
+
+    /// Whether bonds differ so much in their tangent, of which `tangent` is the greatest, that every particle needs the
+    /// stiffness of its own.
+    fn has_own_stiffness(&self, tangent: f64) -> bool;
+
+    /// Bounds of the stiffness of all particles, in their order, over kθ: s_I of [`super::Material::stiffness`].
+    fn own_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, stretches: [f64; 2]) -> Vec<f64>;
+
+    /// Tangents and energies over a range of stretches.
+    fn range(&self, stretches: [f64; 2]) -> LawRange;
+}

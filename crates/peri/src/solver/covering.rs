@@ -1,0 +1,70 @@
+//! The stretches that a law is evaluated over, and how they follow those that are met.
+
+use super::breaking::{least, most};
+use super::state::State;
+use super::system::System;
+use crate::bonds::stretch_range;
+use crate::error::Error;
+use crate::material::Cover;
+use crate::potential::StretchRange;
+
+impl<const D: usize> System<'_, D> {
+    /// Brings bonds, law and loads to where a state is: at rest, or where an interrupted run was.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] where the state belongs to another body, or as [`crate::potential::KernelFit::new`].
+    pub fn restore(&mut self, state: &mut State<D>) -> Result<(), Error> {
+        if let Some(words) = &state.intact {
+            if !self.bonds.restore(words) {
+                let found = format!("a state of {} words of bonds, which is another body's", words.len());
+                return Err(Error::geometry(found));
+            }
+            let particles = self.bonds.particles().to_vec();
+            self.release(particles.iter().copied());
+        }
+        self.rebuild_contact(&state.displacement);
+        state.fitted[1] = state.fitted[1].min(most(self.breaking.as_ref()));
+        self.fit(state)
+    }
+
+    /// Whether every stretch of the state lies within the fit; widens it otherwise.
+    pub(super) fn covers_stretches(&mut self, state: &mut State<D>) -> Result<bool, Error> {
+        let met = stretch_range(&*self.bonds, &state.displacement);
+        self.count_evaluation(state);
+        state.balanced_stretches = met;
+        state.met = state.met.join(met);
+        Ok(!self.widen(state)?)
+    }
+
+    /// Widens the fitted range where stretches have left it, and the tangent with it.
+    pub(super) fn widen(&mut self, state: &mut State<D>) -> Result<bool, Error> {
+        // bonds crushed below that are extrapolated: no fit covers l → 0
+        let low = (1.0 + state.met.low).max(0.0).sqrt().max(least(self.breaking.as_ref()));
+        let high = (1.0 + state.met.high).sqrt().min(most(self.breaking.as_ref()));
+        if low >= state.fitted[0] && high <= state.fitted[1] {
+            return Ok(false);
+        }
+        // twice the strain met, so that a growing load does not refit at every look
+        state.fitted[0] =
+            state.fitted[0].min((1.0 - 2.0 * (1.0 - low)).max(0.5 * low)).max(least(self.breaking.as_ref()));
+        state.fitted[1] = state.fitted[1].max(1.0 + 2.0 * (high - 1.0)).min(most(self.breaking.as_ref()));
+        self.fit(state)?;
+        Ok(true)
+    }
+
+    /// The part of stretches that the law itself covers; beyond it q is held, and energies grow with e.
+    pub fn fitted_part(&self, met: StretchRange) -> StretchRange {
+        if self.breaking.is_none() {
+            return met;
+        }
+        let (least, most) = (least(self.breaking.as_ref()), most(self.breaking.as_ref()));
+        StretchRange { low: met.low.max(least * least - 1.0), high: met.high.min(most * most - 1.0) }
+    }
+
+    fn fit(&mut self, state: &mut State<D>) -> Result<(), Error> {
+        let (bound, held) = (self.fit_bound, self.breaking.is_some());
+        let cover = Cover { stretches: state.fitted, bound, held };
+        state.tangent = self.material.cover(&mut *self.bonds, &state.displacement, &cover)?;
+        Ok(())
+    }
+}

@@ -1,0 +1,88 @@
+//! What forces are measured by, and what sums of them a row of history holds.
+
+use super::load::Loads;
+use crate::bonds::Bonds;
+use crate::field::{CHUNK, Field};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Part of the grips' bond forces under the strain U/L.
+const LEAST_STRAIN: f64 = 0.01;
+
+/// What a body's forces are measured by, beside its reactions: of the body as it was built.
+#[derive(Clone, Debug, Default)]
+pub struct Scale {
+    /// s of each slot, N/m⁴.
+    springs: Vec<f64>,
+    /// U at load factor 1, m, and L, m.
+    largest: f64,
+    pub(super) diagonal: f64,
+    /// δ‖s‖₂ over held particles, N/m³, and δ Σ V s over them, N.
+    pub(super) held: f64,
+    pub(super) held_sum: f64,
+}
+
+impl Scale {
+    /// Of a body with its loads; `stiffness` is kθK.
+    pub fn new<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, stiffness: f64) -> Self {
+        let of = |&slot: &u32| {
+            let mut sum = 0.0;
+            bonds.neighbours(slot as usize, &mut |bond| sum += 2.0 * stiffness * bond.weight / bond.length);
+            sum
+        };
+        let sums: Vec<f64> = bonds.particles().par_iter().map(of).collect();
+        let mut scale = Self { springs: vec![0.0; bonds.slots()], ..Self::default() };
+        let (mut low, mut high, mut square) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D], 0.0);
+        for (&slot, sum) in bonds.particles().iter().zip(sums) {
+            let slot = slot as usize;
+            scale.springs[slot] = sum;
+            let position = bonds.position(slot);
+            low = std::array::from_fn(|d| low[d].min(position[d]));
+            high = std::array::from_fn(|d| high[d].max(position[d]));
+            if let Some(prescribed) = loads.displacement.as_ref().filter(|_| loads.held(slot) != 0) {
+                let moved = prescribed.get(slot).iter().map(|x| x * x).sum::<f64>().sqrt();
+                scale.largest = scale.largest.max(moved);
+                square += sum * sum;
+                scale.held_sum += bonds.horizon() * bonds.volume(slot) * sum;
+            }
+        }
+        scale.diagonal = (0..D).map(|d| (high[d] - low[d]).powi(2)).sum::<f64>().sqrt();
+        scale.held = bonds.horizon() * square.sqrt();
+        scale
+    }
+
+    /// LEAST_STRAIN · min(U/L, 1) at a load factor.
+    pub(super) fn strain(&self, factor: f64) -> f64 {
+        LEAST_STRAIN * (self.largest * factor.abs() / self.diagonal.max(f64::MIN_POSITIVE)).min(1.0)
+    }
+
+    /// ‖s u‖₂.
+    pub(super) fn moved<const D: usize>(&self, displacement: &Field<D>) -> f64 {
+        let u = displacement.components();
+        let of = |(chunk, springs): (usize, &[f64])| {
+            let each = springs.iter().enumerate().map(|(k, s)| {
+                let square: f64 = (0..D).map(|d| u[d][chunk * CHUNK + k].powi(2)).sum();
+                s * s * square
+            });
+            each.sum::<f64>()
+        };
+        let parts: Vec<f64> = self.springs.par_chunks(CHUNK).enumerate().map(of).collect();
+        parts.iter().sum::<f64>().sqrt()
+    }
+}
+
+/// Sums over the whole body in equilibrium. The first two vanish by Newton's third law, whatever the residual: bonds and
+/// contact pull both ends with one force, along the line between them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Balance {
+    /// |Σ V F| of the internal forces F, N.
+    pub force: f64,
+    /// |Σ V x × F| about the body's middle with deformed positions x, N·m.
+    pub moment: f64,
+    /// |Σ reactions + Σ loads|, N: what free particles still have out of balance.
+    pub external: f64,
+    /// ½ Σ V |F|, N, and no less than a hundredth of the grips' bond forces under the strain U/L.
+    pub size: f64,
+    /// Half the body's diagonal, m.
+    pub arm: f64,
+}

@@ -1,0 +1,60 @@
+//! Bonds that break.
+
+use super::breaking::{Policy, most};
+use super::state::{Event, State};
+use super::system::System;
+use crate::bonds::{fingerprint, overstretched};
+use crate::potential::StretchRange;
+
+impl<const D: usize> System<'_, D> {
+    /// Severs all bonds beyond the critical stretch; the slots of their ends.
+    pub fn break_bonds(&mut self, state: &mut State<D>) -> Vec<u32> {
+        let Some(breaking) = &self.breaking else { return Vec::new() };
+        let list = overstretched(&*self.bonds, &state.displacement, &breaking.stretch);
+        self.count_evaluation(state);
+        if list.is_empty() {
+            return Vec::new();
+        }
+        let released = self.material.released(&*self.bonds, &list, most(self.breaking.as_ref()));
+        // what does not follow bond by bond is what the whole body loses
+        let before = released.is_none().then(|| self.stored_energy(state, state.met));
+        let bonds = list.len() as u64 / 2;
+        state.broken += bonds;
+        let [factor, pull, push] = state.balanced;
+        let load = self.loads.response(&*self.bonds, factor, (pull, push)).0;
+        state.events.push(Event { step: state.step, bonds, fingerprint: fingerprint(&list), load });
+        self.bonds.sever(&list);
+        state.released +=
+            released.unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.met));
+        self.rebuild_contact(&state.displacement);
+        state.intact = Some(self.bonds.intact());
+        let mut slots: Vec<u32> = list.iter().map(|bond| bond.slot).collect();
+        slots.dedup();
+        state.detached += self.release(slots.iter().copied());
+        slots
+    }
+
+    /// Takes the body forces off particles without bonds, which nothing could balance; their number.
+    pub(super) fn release(&mut self, slots: impl Iterator<Item = u32>) -> u64 {
+        let mut count = 0;
+        for slot in slots {
+            if self.bonds.is_alone(slot as usize) {
+                count += 1;
+                if self.loads.body_force.as_ref().is_some_and(|b| b.get(slot as usize) != [0.0; D]) {
+                    self.loads.to_mut().unload(slot as usize);
+                }
+            }
+        }
+        count
+    }
+
+    /// Whether bonds break on the way to equilibrium.
+    pub(super) fn breaks_on_the_way(&self) -> bool {
+        self.breaking.as_ref().is_some_and(|b| b.policy == Policy::EachIteration)
+    }
+
+    /// Whether stretches reach the critical one.
+    pub(super) fn is_overstretched(&self, met: StretchRange) -> bool {
+        self.breaking.as_ref().is_some_and(|b| met.high > b.stretch.least() * b.stretch.least() - 1.0)
+    }
+}

@@ -1,0 +1,194 @@
+//! Where a solution is: everything a checkpoint holds of it.
+
+use super::motion::Motion;
+use super::scale::Balance;
+use crate::contact::Touching;
+use crate::error::Error;
+use crate::field::Field;
+use crate::potential::StretchRange;
+use serde::{Deserialize, Serialize};
+
+/// One load step in equilibrium.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Load factor.
+    pub factor: f64,
+    /// Force, N, that does the loads' work on `displacement`, see [`Loads::response`].
+    pub load: f64,
+    /// Displacement of the grips against each other, or of where forces act, m.
+    pub displacement: f64,
+    /// Reaction on each region of prescribed displacement, N.
+    pub reactions: Vec<[f64; 3]>,
+    /// Out-of-balance force over its reference.
+    pub residual: f64,
+    /// Iterations of this step.
+    pub iterations: u64,
+    /// Equilibria sought: 1, and one more for each time that bonds broke.
+    pub rounds: u64,
+    /// Bonds broken so far.
+    pub broken: u64,
+    /// Particles that have lost all their bonds so far.
+    pub detached: u64,
+    /// Energy stored in bonds and contact, J.
+    pub stored: f64,
+    /// Sums of all forces and moments.
+    pub balance: Balance,
+    /// What touches, where that is looked at.
+    pub contact: Option<Touching>,
+    /// Work of the loads so far, J.
+    pub work: f64,
+    /// Energy that broken bonds held when they broke, J.
+    pub released: f64,
+    /// Largest intact stretch.
+    pub largest_stretch: f64,
+    /// Time, s; 0 without dynamics.
+    pub time: f64,
+    /// Kinetic energy, J.
+    pub kinetic: f64,
+    /// Energy that mass-proportional damping has taken so far, J.
+    pub damped: f64,
+    /// What [`System::observer`] sees.
+    pub seen: Vec<f64>,
+}
+
+/// Bonds that broke together.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// Load step, from 0.
+    pub step: usize,
+    /// How many.
+    pub bonds: u64,
+    /// Which ones, as a number: two sets of bonds of one body that differ have different ones.
+    pub fingerprint: u64,
+    /// Load of the equilibrium before, N, see [`Record::load`]; 0 in dynamics.
+    pub load: f64,
+}
+
+/// Everything an interrupted run needs to go on with the same bits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct State<const D: usize> {
+    /// Displacement, m.
+    pub displacement: Field<D>,
+    /// Velocity, m per (fictitious) second.
+    pub velocity: Field<D>,
+    /// Force density with loads, N/m³: out of balance where free, reaction where held.
+    pub force: Field<D>,
+    /// Load steps finished.
+    pub step: usize,
+    /// Whether this step's first guess is made.
+    pub(super) predicted: bool,
+    /// Equilibria found in this step.
+    pub round: u64,
+    /// Iterations towards the current equilibrium.
+    pub iteration: u64,
+    /// Iterations of the current step.
+    pub step_iterations: u64,
+    /// Iterations of all steps.
+    pub total_iterations: u64,
+    /// Force evaluations so far.
+    pub evaluations: u64,
+    /// Bond evaluations so far: intact directed bonds at each force evaluation.
+    pub bond_evaluations: u64,
+    /// Stretches [λ_low, λ_high] that the fitted law covers.
+    pub fitted: [f64; 2],
+    /// Stretches met, as e = λ² − 1.
+    pub met: StretchRange,
+    /// Stretches at the last equilibrium.
+    pub(super) balanced_stretches: StretchRange,
+    /// Largest relative bond tangent max(|t′|, |t|/λ) kθ over the fitted stretches.
+    pub(super) tangent: f64,
+    /// Greatest reference force of an equilibrium.
+    pub(super) reference: f64,
+    /// Reference force of the last iterate alone, and what it is at least.
+    pub(super) present: f64,
+    pub(super) floor: f64,
+    /// Displacements of the two equilibria before the last, where no bond has broken since.
+    pub(super) past: Vec<Field<D>>,
+    /// Residual of the last iteration.
+    pub residual: f64,
+    /// Searches for equilibrium that ended above the tolerance.
+    pub unconverged: u64,
+    /// Bonds broken so far.
+    pub broken: u64,
+    /// When they broke.
+    pub events: Vec<Event>,
+    /// Particles that have lost all their bonds so far.
+    pub detached: u64,
+    /// Energy of broken bonds when they broke, J.
+    pub released: f64,
+    /// Work of the loads so far, J.
+    pub work: f64,
+    /// Factor, and the loads' conjugate sums, at the last equilibrium.
+    pub(super) balanced: [f64; 3],
+    /// Intact bonds, once any has broken.
+    pub(super) intact: Option<Vec<u64>>,
+    /// Time and energies of explicit dynamics.
+    pub motion: Motion,
+    /// The finished steps.
+    pub history: Vec<Record>,
+}
+
+impl<const D: usize> State<D> {
+    /// The undeformed body.
+    pub fn new(slots: usize) -> Self {
+        Self {
+            displacement: Field::zeros(slots),
+            velocity: Field::zeros(slots),
+            force: Field::zeros(slots),
+            step: 0,
+            predicted: false,
+            round: 0,
+            iteration: 0,
+            step_iterations: 0,
+            total_iterations: 0,
+            evaluations: 0,
+            bond_evaluations: 0,
+            fitted: [0.95, 1.05],
+            met: StretchRange::REST,
+            balanced_stretches: StretchRange::REST,
+            tangent: 0.0,
+            reference: 0.0,
+            present: 0.0,
+            floor: 0.0,
+            past: Vec::new(),
+            residual: 0.0,
+            unconverged: 0,
+            broken: 0,
+            events: Vec::new(),
+            detached: 0,
+            released: 0.0,
+            work: 0.0,
+            balanced: [0.0; 3],
+            intact: None,
+            motion: Motion::default(),
+            history: Vec::new(),
+        }
+    }
+}
+
+/// One iteration, for progress bars and logs.
+#[derive(Clone, Copy, Debug)]
+pub struct Status {
+    /// Load step, from 0.
+    pub step: usize,
+    /// Load steps in all.
+    pub steps: usize,
+    /// Iteration towards the current equilibrium.
+    pub iteration: u64,
+    /// Out-of-balance force over its reference.
+    pub residual: f64,
+    /// The tolerance on it.
+    pub tolerance: f64,
+    /// Load of the last step that is finished, N.
+    pub load: Option<f64>,
+    /// Damping coefficient used.
+    pub damping: f64,
+    /// Bonds broken so far.
+    pub broken: u64,
+    /// Whether the state may be saved here: a run that begins from it takes the same way.
+    pub restartable: bool,
+}
+
+/// Sees every iteration, and may stop the run by an error.
+pub type Watch<'a, const D: usize> = dyn FnMut(&Status, &State<D>) -> Result<(), Error> + 'a;
