@@ -23,6 +23,9 @@ fn no_crate_is_built_with_what_it_does_not_need() {
         let tree = tree(package);
         assert!(tree.iter().any(|name| name == "polycore"), "{tree:?}");
         assert!(!tree.iter().any(framework), "{package} is built with burn");
+        // learnt laws are a feature of polycore that the solvers do not take
+        let learnt = tree.iter().any(|name| name == "safetensors" || name == "ndarray");
+        assert_eq!(learnt, package == "polycore", "{package}");
         for other in ["peri", "crystfem", "mdsurrogate", "evidence"] {
             assert!(package == other || !tree.iter().any(|name| name == other), "{package}: {other}");
         }

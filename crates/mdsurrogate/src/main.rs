@@ -33,7 +33,7 @@ mod scene_command;
   mdsurrogate run cases/ch3/train-default/case.toml     train, judge, draw; results in out/train-default
   mdsurrogate resume out/train-default                  go on after an interruption
   mdsurrogate predict law.safetensors strains.csv -o stresses.csv
-                                                        what a law answers at the strains of a table
+                                                        stress and uncertainty at the strains of a table
   mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      what a table holds
   mdsurrogate schema > mdsurrogate.schema.json          for editors
 
@@ -80,7 +80,7 @@ enum Command {
         #[arg(long, value_enum, default_value_t = Form::C)]
         form: Form,
     },
-    /// Answer at the strains of a table: stress, doubts, tangent.
+    /// Predict stress, tangent and uncertainty at the strains of a table.
     Predict(predict::Predict),
     /// Measure the cost of a stress, a tangent and a batch, in both precisions, on one thread.
     Bench(bench::Bench),

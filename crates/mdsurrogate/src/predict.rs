@@ -1,4 +1,4 @@
-//! `mdsurrogate predict`: what a law answers at the strains of a table.
+//! `mdsurrogate predict`: what a model predicts at the strains of a table.
 
 use mdsurrogate::Error;
 use mdsurrogate::dataset::read_strains;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Pascals in a megapascal.
 const MEGA: f64 = 1e6;
 
-/// A law and where it is asked.
+/// A model and where it is asked.
 #[derive(clap::Args)]
 pub struct Predict {
     /// The law (safetensors).
@@ -19,7 +19,7 @@ pub struct Predict {
     /// The strains (CSV): columns C11, C22, C33 and, where there is shear, C12, C13, C23 (C = FᵀF; C12 counted once), or
     /// stretch_1, stretch_2, stretch_3 as in tables of data; other columns are left alone.
     table: PathBuf,
-    /// The answers (CSV): S and its spread in MPa, W in MJ/m³ of an energy, and a 1 for each doubt.
+    /// The predictions (CSV): S and its spread in MPa, W in MJ/m³ of an energy, and a 1 for each flag.
     #[arg(long, short)]
     output: PathBuf,
     /// Also the 36 components of 2 ∂S/∂C.
@@ -28,16 +28,16 @@ pub struct Predict {
 }
 
 impl Predict {
-    /// Predictions and writes.
+    /// Predicts and writes.
     pub fn print(self) -> Result<bool, Error> {
         let law = Surrogate::<f64>::read(&self.law)?;
         let points = read_strains(&self.table)?;
-        let mut answers = vec![Prediction::default(); points.len()];
+        let mut predictions = vec![Prediction::default(); points.len()];
         let mut memory = Workspace::default();
         let asked = if self.tangent {
-            law.tangents(&points, &mut memory, &mut answers)
+            law.tangents(&points, &mut memory, &mut predictions)
         } else {
-            law.stresses(&points, &mut memory, &mut answers)
+            law.stresses(&points, &mut memory, &mut predictions)
         };
         asked.map_err(|error| match Error::from(error) {
             Error::Parameter { name, found, allowed } => {
@@ -45,53 +45,61 @@ impl Predict {
             }
             other => other,
         })?;
-        let finite = |answer: &Prediction<f64>| {
-            let tangent = answer.tangent.is_none_or(|tangent| tangent.iter().all(|x| x.is_finite()));
-            answer.stress.iter().all(|x| x.is_finite()) && answer.energy.is_none_or(f64::is_finite) && tangent
+        let finite = |prediction: &Prediction<f64>| {
+            let tangent = prediction.tangent.is_none_or(|tangent| tangent.iter().all(|x| x.is_finite()));
+            prediction.stress.iter().all(|x| x.is_finite())
+                && prediction.energy.is_none_or(f64::is_finite)
+                && tangent
         };
-        if let Some(row) = answers.iter().position(|answer| !finite(answer)) {
+        if let Some(row) = predictions.iter().position(|prediction| !finite(prediction)) {
             let place = format!("row {} of {}", row + 1, self.table.display());
-            return Err(Error::NotFinite { quantity: "the answer", place });
+            return Err(Error::NotFinite { quantity: "the prediction", place });
         }
-        write(&self.output, &points, &answers)?;
-        let doubtful = answers.iter().filter(|answer| answer.flags.any()).count();
+        write(&self.output, &points, &predictions)?;
+        let flagged = predictions.iter().filter(|prediction| prediction.flags.any()).count();
         polycore::say!(
-            "{} answers, {doubtful} of them with a doubt: {}",
-            answers.len(),
+            "{} predictions, {flagged} of them flagged: {}",
+            predictions.len(),
             self.output.display()
         );
         Ok(true)
     }
 }
 
-fn write(path: &Path, points: &[Voigt], answers: &[Prediction<f64>]) -> Result<(), Error> {
-    let column = |value: &dyn Fn(&Prediction<f64>) -> f64| answers.iter().map(value).collect::<Vec<f64>>();
+fn write(path: &Path, points: &[Voigt], predictions: &[Prediction<f64>]) -> Result<(), Error> {
+    let column =
+        |value: &dyn Fn(&Prediction<f64>) -> f64| predictions.iter().map(value).collect::<Vec<f64>>();
     let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
     for (a, name) in NAMES.iter().enumerate() {
         columns.push((format!("C{name}"), "", points.iter().map(|point| point[a]).collect()));
     }
     for (a, name) in NAMES.iter().enumerate() {
-        columns.push((format!("S{name}"), "MPa", column(&|answer| answer.stress[a] / MEGA)));
+        columns.push((format!("S{name}"), "MPa", column(&|prediction| prediction.stress[a] / MEGA)));
     }
-    if answers.iter().any(|answer| answer.energy.is_some()) {
-        columns.push(("W".into(), "MJ/m³", column(&|answer| answer.energy.unwrap_or(f64::NAN) / MEGA)));
+    if predictions.iter().any(|prediction| prediction.energy.is_some()) {
+        columns.push((
+            "W".into(),
+            "MJ/m³",
+            column(&|prediction| prediction.energy.unwrap_or(f64::NAN) / MEGA),
+        ));
     }
-    columns.push(("spread".into(), "MPa", column(&|answer| answer.spread / MEGA)));
-    let mut doubt = |name: &str, raised: &dyn Fn(&Flags) -> bool| {
-        let values = column(&|answer| f64::from(u8::from(raised(&answer.flags))));
+    columns.push(("spread".into(), "MPa", column(&|prediction| prediction.spread / MEGA)));
+    let mut flag = |name: &str, raised: &dyn Fn(&Flags) -> bool| {
+        let values = column(&|prediction| f64::from(u8::from(raised(&prediction.flags))));
         columns.push((name.into(), "", values));
     };
-    doubt("outside the box", &|flags| flags.outside.contains(&true));
+    flag("outside the box", &|flags| flags.outside.contains(&true));
     for (a, name) in NAMES.iter().enumerate() {
-        doubt(&format!("C{name} outside"), &|flags| flags.outside[a]);
+        flag(&format!("C{name} outside"), &|flags| flags.outside[a]);
     }
-    doubt("never seen", &|flags| flags.unseen.contains(&true));
-    doubt("far from the data", &|flags| flags.far);
-    doubt("members disagree", &|flags| flags.spread);
-    if answers.iter().any(|answer| answer.tangent.is_some()) {
+    flag("never seen", &|flags| flags.unseen.contains(&true));
+    flag("far from the data", &|flags| flags.far);
+    flag("members disagree", &|flags| flags.spread);
+    if predictions.iter().any(|prediction| prediction.tangent.is_some()) {
         for (a, row) in NAMES.iter().enumerate() {
             for (b, name) in NAMES.iter().enumerate() {
-                let value = |answer: &Prediction<f64>| answer.tangent.map_or(f64::NAN, |t| t[(a, b)] / MEGA);
+                let value =
+                    |prediction: &Prediction<f64>| prediction.tangent.map_or(f64::NAN, |t| t[(a, b)] / MEGA);
                 columns.push((format!("tangent {row} {name}"), "MPa", column(&value)));
             }
         }

@@ -24,6 +24,8 @@
 mod error;
 mod law;
 
+#[cfg(feature = "ndarray")]
+pub mod arrays;
 pub mod hyperelastic;
 #[cfg(feature = "surrogate")]
 pub mod network;

@@ -1,5 +1,5 @@
-//! Shared ground of the polymer-mechanics toolkit: tensors, Langevin statistics, hyperelastic laws,
-//! units, scenes, reports and output.
+//! Shared ground of the polymer-mechanics toolkit: tensors, Langevin statistics, constitutive laws, units, scenes, reports
+//! and output.
 //!
 //! ```
 //! use polycore::constitutive::hyperelastic::{EightChain, homogeneous::uniaxial};

@@ -16,7 +16,9 @@ pub use statistics::{Leak, Noise, leak, noise};
 pub use strains::read_strains;
 
 use crate::Error;
-use crate::kinematics::{NAMES, material_pair};
+use crate::kinematics::{NAMES, cauchy_of_material, material_pair, stretch_of};
+use ndarray::{Array2, ArrayView2};
+use polycore::constitutive::arrays::rows;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -115,6 +117,32 @@ pub struct Dataset {
 }
 
 impl Dataset {
+    /// One run of rows with C, (N, 6), and S, (N, 6) in Pa, in the order 11, 22, 33, 12, 13, 23; F is taken as √C.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for arrays of other shapes, and a C that is not positive definite.
+    pub fn from_arrays(id: &str, c: ArrayView2<'_, f64>, s: ArrayView2<'_, f64>) -> Result<Self, Error> {
+        if c.nrows() != s.nrows() {
+            return Err(Error::parameter("rows of S", s.nrows(), format!("{}, as of C", c.nrows())));
+        }
+        let pairs = rows(c, "C")?.into_iter().zip(rows(s, "S")?);
+        let row = |(sample, (c, s)): (usize, (Voigt, Voigt))| -> Result<Row, Error> {
+            let deformation = stretch_of(&c)?;
+            let cauchy = cauchy_of_material(&deformation, &s);
+            Ok(Row { sample: sample as u64, time: f64::NAN, deformation, cauchy, c, s, nominal: None })
+        };
+        let rows = pairs.enumerate().map(row).collect::<Result<_, _>>()?;
+        let path = Path { id: id.into(), kind: "unknown".into(), rates: [f64::NAN; 3], rows };
+        Ok(Self { paths: vec![path], ..Self::default() })
+    }
+
+    /// C and S of all rows, (N, 6) each; S in Pa.
+    pub fn to_arrays(&self) -> [Array2<f64>; 2] {
+        let rows: Vec<&Row> = self.rows().collect();
+        let array = |of: fn(&Row) -> &Voigt| Array2::from_shape_fn((rows.len(), 6), |(k, a)| of(rows[k])[a]);
+        [array(|row| &row.c), array(|row| &row.s)]
+    }
+
     /// The number of rows.
     pub fn len(&self) -> usize {
         self.paths.iter().map(|path| path.rows.len()).sum()

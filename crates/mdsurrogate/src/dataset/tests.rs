@@ -407,3 +407,19 @@ fn strains_of_tables() {
         assert!(error.to_string().contains(part) && error.exit_code() == 2, "{error}");
     }
 }
+
+#[test]
+fn arrays_there_and_back() {
+    let set = set_of_a_law();
+    let [c, s] = set.to_arrays();
+    assert_eq!((c.dim(), s[[7, 2]]), ((set.len(), 6), set.rows().nth(7).unwrap().s[2]));
+    let back = Dataset::from_arrays("all", c.view(), s.view()).unwrap();
+    for (own, other) in set.rows().zip(back.rows()) {
+        assert_eq!((own.c, own.s), (other.c, other.s));
+        // F is symmetric there, as here
+        assert!((own.cauchy - other.cauchy).amax() <= 1e-12 * own.cauchy.amax());
+    }
+    assert!(Dataset::from_arrays("one", c.view(), s.slice(ndarray::s![1.., ..])).is_err());
+    let error = Dataset::from_arrays("one", c.slice(ndarray::s![.., 1..]), s.view()).unwrap_err().to_string();
+    assert!(error.contains("C: found 5 columns"), "{error}");
+}

@@ -1,10 +1,10 @@
 //! How good a law is: errors on data, and whether it obeys what every elastic solid does.
 
-mod doubts;
 mod physics;
+mod uncertainty;
 
-pub use doubts::{Doubts, FLAGS};
 pub use physics::Physics;
+pub use uncertainty::{FLAGS, Uncertainty};
 
 use crate::Error;
 use crate::dataset::{Dataset, Path, Row};

@@ -90,7 +90,7 @@ int NAME(const double c[6], double s[6], double tangent[36], double *energy, dou
     double minor = c[0] * c[1] - c[3] * c[3];
     double det = c[0] * (c[1] * c[2] - c[5] * c[5]) - c[3] * (c[3] * c[2] - c[5] * c[4])
                + c[4] * (c[3] * c[5] - c[1] * c[4]);
-    unsigned doubts = 0;
+    unsigned raised = 0;
     int a, b, m;
     for (a = 0; a < 6; a++)
         if (!isfinite(c[a])) return 1;
@@ -111,12 +111,12 @@ int NAME(const double c[6], double s[6], double tangent[36], double *energy, dou
     square = sqrt(square / MEMBERS);
     for (a = 0; a < 6; a++) {
         double low = training_box[2 * a], high = training_box[2 * a + 1], slack = low == high ? UNSEEN : 0;
-        if (!(c[a] >= low - slack && c[a] <= high + slack)) doubts |= (1u << a) | (low == high ? 64u << a : 0);
+        if (!(c[a] >= low - slack && c[a] <= high + slack)) raised |= (1u << a) | (low == high ? 64u << a : 0);
         if (!isfinite(mean_stress[a])) return 2;
         for (b = 0; tangent && b < 6; b++)
             if (!isfinite(slope[6 * a + b])) return 2;
     }
-    if (square > SPREAD_LIMIT) doubts |= 1u << 12;
+    if (square > SPREAD_LIMIT) raised |= 1u << 12;
     if (REPRESENTATIVES > 0) {
         double nearest = HUGE_VAL;
         for (m = 0; m < REPRESENTATIVES; m++) {
@@ -127,12 +127,12 @@ int NAME(const double c[6], double s[6], double tangent[36], double *energy, dou
             }
             if (distance < nearest) nearest = distance;
         }
-        if (sqrt(nearest) > FARTHEST) doubts |= 1u << 13;
+        if (sqrt(nearest) > FARTHEST) raised |= 1u << 13;
     }
     for (a = 0; a < 6; a++) s[a] = mean_stress[a];
     for (a = 0; tangent && a < 36; a++) tangent[a] = slope[a];
     if (energy) *energy = w;
     if (spread) *spread = square;
-    if (flags) *flags = doubts;
+    if (flags) *flags = raised;
     return 0;
 }

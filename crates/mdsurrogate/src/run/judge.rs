@@ -4,7 +4,8 @@ use super::{Failure, Prepared, draw, short};
 use crate::dataset::{Method, Path as Path_, Row, noise};
 use crate::error::Error;
 use crate::eval::{
-    Doubts, Errors, FLAGS, Physics, agreement, errors, percentage_error, seconds_of_a_stress, within_rates,
+    Errors, FLAGS, Physics, Uncertainty, agreement, errors, percentage_error, seconds_of_a_stress,
+    within_rates,
 };
 use crate::surrogate::{Surrogate, Workspace};
 use polycore::output::csv;
@@ -97,7 +98,7 @@ pub fn judge_laws(
             let found = errors(law, rows.iter().copied())?;
             record(report, name, set, &found, floor);
             if set == "test" {
-                doubt(report, name, set, law, &Doubts::of(law, rows.into_iter(), chance)?);
+                uncertain(report, name, set, law, &Uncertainty::of(law, rows.into_iter(), chance)?);
             }
         }
         if data.set.is_nominal() {
@@ -107,7 +108,7 @@ pub fn judge_laws(
             let found = errors(law, run.rows.iter())?;
             let set = format!("heldout {}", run.id);
             record(report, name, &set, &found, floor);
-            doubt(report, name, &set, law, &Doubts::of(law, run.rows.iter(), chance)?);
+            uncertain(report, name, &set, law, &Uncertainty::of(law, run.rows.iter(), chance)?);
         }
         let every = test.len().div_ceil(PROBED).max(1);
         let physics = Physics::of(law, &test.iter().step_by(every).copied().collect::<Vec<_>>())?;
@@ -180,9 +181,10 @@ fn by_mode(
     for (what, paths) in single.chain([whole]) {
         let rows = || paths.iter().flat_map(|path| &path.rows);
         let Some(found) = agreement(law, rows())? else { continue };
-        let doubts = Doubts::of(law, rows(), 0.0)?;
-        doubt(report, name, &what, law, &doubts);
-        let flagged = (doubts.caught[0] + doubts.alarms[0]) as f64 / (doubts.bad + doubts.good) as f64;
+        let uncertainty = Uncertainty::of(law, rows(), 0.0)?;
+        uncertain(report, name, &what, law, &uncertainty);
+        let flagged = (uncertainty.caught[0] + uncertainty.alarms[0]) as f64
+            / (uncertainty.bad + uncertainty.good) as f64;
         report.value(&format!("{name} {what} share flagged"), flagged, "");
         report.value(&format!("{name} {what} mean absolute error"), found.absolute / 1e6, "MPa");
         let rms = (found.squares / found.count as f64).sqrt() / 1e6;
@@ -246,22 +248,22 @@ fn record(report: &mut Report, name: &str, set: &str, errors: &Errors, floor: Op
 }
 
 /// Shares of badly wrong answers, of those caught, and of the others flagged all the same.
-fn doubt(report: &mut Report, name: &str, set: &str, law: &Surrogate, doubts: &Doubts) {
+fn uncertain(report: &mut Report, name: &str, set: &str, law: &Surrogate, uncertainty: &Uncertainty) {
     let share = |part: usize, all: usize| part as f64 / all.max(1) as f64;
-    let rows = doubts.bad + doubts.good;
-    report.value(&format!("{name} {set} share badly wrong"), share(doubts.bad, rows), "");
+    let rows = uncertainty.bad + uncertainty.good;
+    report.value(&format!("{name} {set} share badly wrong"), share(uncertainty.bad, rows), "");
     let known = if law.header().spread_limit.is_some() { 4 } else { 3 };
     for (place, flag) in FLAGS.iter().enumerate().take(known) {
-        if doubts.bad > 0 {
-            let caught = share(doubts.caught[place], doubts.bad);
+        if uncertainty.bad > 0 {
+            let caught = share(uncertainty.caught[place], uncertainty.bad);
             report.value(&format!("{name} {set} share of badly wrong caught by {flag}"), caught, "");
         }
-        if doubts.good > 0 {
-            let alarms = share(doubts.alarms[place], doubts.good);
+        if uncertainty.good > 0 {
+            let alarms = share(uncertainty.alarms[place], uncertainty.good);
             report.value(&format!("{name} {set} false alarms of {flag}"), alarms, "");
         }
     }
-    if let Some(correlation) = doubts.correlation {
+    if let Some(correlation) = uncertainty.correlation {
         report.value(&format!("{name} {set} rank correlation of spread and error"), correlation, "");
     }
 }

@@ -1,5 +1,5 @@
 //! The trials of a stability suite: data that are extreme or degenerate, laws asked where they cannot know; each must be
-//! refused with a message, or end with finite numbers, flagged where they are in doubt.
+//! refused with a message, or end with finite numbers, flagged where they are uncertain.
 
 use super::{Failure, Options, Prepared, short};
 use crate::error::Error;

@@ -1,7 +1,7 @@
 //! What laws refuse.
 
 use crate::tensor;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// What a law, a fit, a table or a file of a model refuses.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -100,7 +100,7 @@ impl Error {
     }
 
     #[cfg(feature = "surrogate")]
-    pub(super) fn file(path: &Path, found: impl ToString, allowed: impl ToString) -> Self {
+    pub(super) fn file(path: &std::path::Path, found: impl ToString, allowed: impl ToString) -> Self {
         Self::File { path: path.to_path_buf(), found: found.to_string(), allowed: allowed.to_string() }
     }
 }

@@ -125,6 +125,7 @@ pub struct Workspace(Option<Box<dyn Any + Send>>);
 
 impl Workspace {
     /// Works with the `M` that is kept here, a new one at first.
+    #[inline]
     pub fn with<M: Default + Send + 'static, R>(&mut self, work: impl FnOnce(&mut M) -> R) -> R {
         let kept = self.0.take().and_then(|kept| kept.downcast::<M>().ok());
         let mut memory = kept.unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Whether the flags of a law catch its bad answers, and how many good ones they spoil.
+//! Whether the flags of a model catch its bad predictions, and how many good ones they spoil.
 
 use crate::Error;
 use crate::dataset::Row;
@@ -9,12 +9,12 @@ const BAD: f64 = 0.1;
 /// If it is also more than so many times the noise of the data, which no law can follow.
 const ABOVE_NOISE: f64 = 3.0;
 
-/// The flags, in the order of the lists of [`Doubts`].
+/// The flags, in the order of the lists of [`Uncertainty`].
 pub const FLAGS: [&str; 4] = ["any flag", "the box", "the distance", "the spread"];
 
-/// Answers at some rows by whether they are badly wrong and flagged.
+/// Predictions at some rows by whether they are badly wrong and flagged.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Doubts {
+pub struct Uncertainty {
     /// Rows with an error above a tenth of their stress and three times the noise.
     pub bad: usize,
     /// The others.
@@ -27,14 +27,14 @@ pub struct Doubts {
     pub correlation: Option<f64>,
 }
 
-impl Doubts {
+impl Uncertainty {
     /// Counts them; `noise` is the root mean square of ‖S‖ that the data have by chance, Pa, 0 for none.
     ///
     /// # Errors
     /// Those of [`Surrogate::stress`].
     pub fn of<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a Row>, noise: f64) -> Result<Self, Error> {
         let mut memory = Workspace::default();
-        let mut doubts = Self::default();
+        let mut found = Self::default();
         let (mut errors, mut spreads) = (Vec::new(), Vec::new());
         for row in rows {
             let answer = law.stress(&row.c, &mut memory)?;
@@ -43,8 +43,8 @@ impl Doubts {
             let flags = answer.flags;
             let raised = [flags.any(), flags.outside.contains(&true), flags.far, flags.spread];
             let (count, of) = match error > BAD * measured.norm() && error > ABOVE_NOISE * noise {
-                true => (&mut doubts.bad, &mut doubts.caught),
-                false => (&mut doubts.good, &mut doubts.alarms),
+                true => (&mut found.bad, &mut found.caught),
+                false => (&mut found.good, &mut found.alarms),
             };
             *count += 1;
             for (sum, flag) in of.iter_mut().zip(raised) {
@@ -54,9 +54,9 @@ impl Doubts {
             spreads.push(answer.spread);
         }
         if law.header().members > 1 && errors.len() > 2 {
-            doubts.correlation = correlation(&ranks(&errors), &ranks(&spreads));
+            found.correlation = correlation(&ranks(&errors), &ranks(&spreads));
         }
-        Ok(doubts)
+        Ok(found)
     }
 }
 
@@ -109,18 +109,18 @@ mod tests {
         let mut header = Header::new(Kind::Ann, &[], 2);
         header.output_deviation = vec![0.0; 6];
         let law = Surrogate::random(header.clone(), 1).unwrap();
-        let doubts = Doubts::of(&law, rows.iter().copied(), 0.0).unwrap();
+        let found = Uncertainty::of(&law, rows.iter().copied(), 0.0).unwrap();
         // no answer but 0: all bad, all outside the box of C = I, the members agree
-        assert_eq!((doubts.bad, doubts.good, doubts.caught), (39, 0, [39, 39, 0, 0]));
-        assert_eq!(doubts.correlation, None);
+        assert_eq!((found.bad, found.good, found.caught), (39, 0, [39, 39, 0, 0]));
+        assert_eq!(found.correlation, None);
         // with a noise as large as the stress nothing is bad
-        let noisy = Doubts::of(&law, rows.iter().copied(), 1e9).unwrap();
+        let noisy = Uncertainty::of(&law, rows.iter().copied(), 1e9).unwrap();
         assert_eq!((noisy.bad, noisy.alarms), (0, [39, 39, 0, 0]));
         // the answer is right at one row, whose C the box has
         header.training_box = [[-9.0, 9.0]; 6];
         header.output_mean = rows[9].s.as_slice().to_vec();
         let law = Surrogate::random(header, 1).unwrap();
-        let doubts = Doubts::of(&law, rows[9..10].iter().copied(), 0.0).unwrap();
-        assert_eq!((doubts.bad, doubts.good, doubts.alarms), (0, 1, [0; 4]));
+        let found = Uncertainty::of(&law, rows[9..10].iter().copied(), 0.0).unwrap();
+        assert_eq!((found.bad, found.good, found.alarms), (0, 1, [0; 4]));
     }
 }
