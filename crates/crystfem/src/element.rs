@@ -145,6 +145,21 @@ impl Geometry {
         }
     }
 
+    /// The same with a factor on each column: the result is not symmetric.
+    pub fn add_scaled_conduction(
+        &self,
+        point: usize,
+        conductivity: &Matrix3<f64>,
+        scale: &[f64],
+        matrix: &mut [f64; 64],
+    ) {
+        let mut own = [0.0; 64];
+        self.add_conduction(point, conductivity, &mut own);
+        for (at, (value, own)) in matrix.iter_mut().zip(own).enumerate() {
+            *value += own * scale[at % 8];
+        }
+    }
+
     /// ∫ N_a N_b dV, m³.
     pub fn mass(&self) -> [f64; 64] {
         let shapes = shapes(self.nodes);

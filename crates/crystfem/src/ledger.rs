@@ -41,6 +41,8 @@ pub struct Record {
     pub exchange: Exchange,
     /// Heat that holds prescribed temperatures.
     pub reaction: f64,
+    /// The same with the magnitude of each node's: what goes in at one end and out at the other counts.
+    pub held: f64,
     /// Largest temporal error of a node, K, where steps are adaptive.
     pub error: Option<f64>,
     /// The smallest wish of a material for the next step over this one.
@@ -56,8 +58,7 @@ impl Record {
     /// |[`Self::missing`]| over all heat moved, stored and exchanged, or over that of [`NOTHING`], 10 mK, where
     /// that is more.
     pub fn relative(&self) -> f64 {
-        let scale =
-            (self.moved + self.exchange.gross() + self.reaction.abs()).max(NOTHING * self.sensitivity);
+        let scale = (self.moved + self.exchange.gross() + self.held).max(NOTHING * self.sensitivity);
         if scale > 0.0 { self.missing().abs() / scale } else { 0.0 }
     }
 }

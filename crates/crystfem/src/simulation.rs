@@ -298,6 +298,7 @@ impl Simulation {
             stiffness,
             solves: span / dt,
             linear: self.system.is_linear(),
+            symmetric: self.system.is_symmetric(),
             equal_steps,
             wanted: self.settings.solver,
         }

@@ -46,6 +46,12 @@ impl Conductor {
         self.specific_heat.integral(temperature)
     }
 
+    /// [`ThermalMaterial::potential`].
+    pub(super) fn heat_potential(&self, temperature: f64) -> Option<[f64; 2]> {
+        let conductivity = &self.conductivity;
+        conductivity.jumps().then(|| [conductivity.integral(temperature), conductivity.at(temperature)])
+    }
+
     /// Whether both properties are constant.
     pub(super) fn is_constant(&self) -> bool {
         self.conductivity.is_constant() && self.specific_heat.is_constant()
@@ -105,6 +111,10 @@ impl ThermalMaterial for Conductor {
 
     fn constant_conductivity(&self) -> bool {
         self.conductivity.is_constant()
+    }
+
+    fn potential(&self, temperature: f64) -> Option<[f64; 2]> {
+        self.heat_potential(temperature)
     }
 
     fn respond(&self, at: &Point, _old: &[f64], _new: &mut [f64]) -> Result<Response, Error> {

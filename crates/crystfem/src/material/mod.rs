@@ -76,6 +76,12 @@ pub trait ThermalMaterial: Send + Sync {
     fn constant_conductivity(&self) -> bool {
         self.is_linear()
     }
+    /// Kirchhoff's potential θ = ∫k dT, W/m, and k at a temperature, where k depends on it so steeply that the flux
+    /// of elements must follow from θ at their nodes, f = −D ∇θ (see [`Property::jumps`]); `None`: f is that of
+    /// [`Self::respond`].
+    fn potential(&self, _temperature: f64) -> Option<[f64; 2]> {
+        None
+    }
     /// The response to an increment; `new` is the state at its end.
     ///
     /// # Errors

@@ -115,6 +115,10 @@ impl ThermalMaterial for Printed {
         self.conductor.is_constant()
     }
 
+    fn potential(&self, temperature: f64) -> Option<[f64; 2]> {
+        self.conductor.heat_potential(temperature)
+    }
+
     fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
         let response = self.conductor.conduct(at)?;
         new[0] = f64::from(self.alpha(old[0] as f32, at.temperature, at.increment, at.dt));

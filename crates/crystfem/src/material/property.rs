@@ -5,6 +5,9 @@ use crate::error::Error;
 /// Temperature at which energies are counted from, K: U(T_ref) = 0 for amorphous material.
 pub const REFERENCE_TEMPERATURE: f64 = 273.15;
 
+/// Relative change within 1 K above which a property jumps.
+const STEEPEST: f64 = 0.1;
+
 /// A positive property of temperature.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Property {
@@ -23,6 +26,8 @@ pub struct Table {
     integrals: Vec<f64>,
     /// ∫ from the first temperature to the reference.
     offset: f64,
+    /// See [`Property::jumps`].
+    jumps: bool,
 }
 
 impl Property {
@@ -62,7 +67,11 @@ impl Property {
             let area = 0.5 * (values[i] + values[i - 1]) * (temperatures[i] - temperatures[i - 1]);
             integrals.push(integrals[i - 1] + area);
         }
-        let mut table = Table { temperatures, values, integrals, offset: 0.0 };
+        let jumps = temperatures.windows(2).zip(values.windows(2)).any(|(t, v)| {
+            let change = (v[1] - v[0]).abs() / v[0].min(v[1]);
+            change > STEEPEST * (t[1] - t[0])
+        });
+        let mut table = Table { temperatures, values, integrals, offset: 0.0, jumps };
         table.offset = table.integral(REFERENCE_TEMPERATURE);
         Ok(Self::Table(table))
     }
@@ -89,6 +98,11 @@ impl Property {
             Self::Constant(value) => value * (temperature - REFERENCE_TEMPERATURE),
             Self::Table(table) => table.integral(temperature) - table.offset,
         }
+    }
+
+    /// Whether it changes by more than a tenth of itself within 1 K somewhere.
+    pub fn jumps(&self) -> bool {
+        matches!(self, Self::Table(table) if table.jumps)
     }
 
     /// Whether it is the same everywhere.

@@ -130,6 +130,10 @@ impl ThermalMaterial for Semicrystalline {
         self.conductor.constant_conductivity()
     }
 
+    fn potential(&self, temperature: f64) -> Option<[f64; 2]> {
+        self.conductor.heat_potential(temperature)
+    }
+
     fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
         let mut response = self.conductor.conduct(at)?;
         let grown =

@@ -287,11 +287,11 @@ impl BoundarySpec {
             };
             return Err(source.error(&format!("{key}.ambient"), found, allowed));
         }
-        if self.temperature.is_some() && self.surface == "outer" && self.corners().is_some() {
+        if self.temperature.is_some() && self.surface == "outer" {
             let key = format!("{key}.surface");
             let allowed =
                 "a named surface or a side: prescribed temperatures act on nodes, inside as outside";
-            return Err(source.error(&key, "a part of `outer` with a `temperature`", allowed));
+            return Err(source.error(&key, "`outer` with a `temperature`", allowed));
         }
         if !self.except.is_empty() && self.surface != "outer" {
             let key = format!("{key}.except");

@@ -131,6 +131,7 @@ impl Simulation {
             sensitivity: stages.sensitivity,
             exchange: attempt.exchange,
             reaction: system.fixed.iter().map(|&(equation, _)| residual[equation as usize]).sum(),
+            held: system.fixed.iter().map(|&(equation, _)| residual[equation as usize].abs()).sum(),
             error: attempt.error,
             step_ratio: attempt.step_ratio,
         };

@@ -42,6 +42,8 @@ pub struct Task {
     pub solves: f64,
     /// Whether the scene is linear.
     pub linear: bool,
+    /// Whether the matrix is symmetric.
+    pub symmetric: bool,
     /// Whether steps are all equal.
     pub equal_steps: bool,
     /// What was asked for.
@@ -68,6 +70,12 @@ impl Task {
     /// of 20 000 and 97 000 equations, whose solves took 100 and 180 iterations, their making 800 and 3200).
     pub fn choose(&self) -> Choice {
         let by = |direct, reason: String| Choice { direct, reason };
+        if !self.symmetric {
+            return by(
+                false,
+                "biconjugate gradients: the conductivity jumps, the matrix is not symmetric".into(),
+            );
+        }
         match self.wanted {
             LinearSolver::ConjugateGradients => return by(false, "conjugate gradients: asked for".into()),
             LinearSolver::Direct => return by(true, "factors: asked for".into()),
@@ -118,6 +126,7 @@ mod tests {
             stiffness: 1.5,
             solves: 1000.0,
             linear: true,
+            symmetric: true,
             equal_steps: true,
             wanted: LinearSolver::Auto,
         };
@@ -127,6 +136,7 @@ mod tests {
         assert!(!Task { solves: 1.0, ..long }.choose().direct);
         assert!(!Task { linear: false, ..long }.choose().direct);
         assert!(!Task { equal_steps: false, ..long }.choose().direct);
+        assert!(!Task { symmetric: false, wanted: LinearSolver::Direct, ..long }.choose().direct);
         assert!(!Task { size: 1_000_000, ..long }.choose().direct);
         assert!(Task { wanted: LinearSolver::Direct, ..task }.choose().direct);
         assert!(!Task { wanted: LinearSolver::ConjugateGradients, ..long }.choose().direct);

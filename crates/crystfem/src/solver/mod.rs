@@ -1,10 +1,12 @@
 //! Linear systems of one stage of a step, A δ = r with A = D + M + a·(K + faces).
 
+mod bicgstab;
 mod cg;
 mod choice;
 mod direct;
 mod dissection;
 
+pub use bicgstab::BiconjugateGradients;
 pub use cg::{ConjugateGradients, Ended};
 pub use choice::{Choice, LinearSolver, Task};
 pub use direct::Direct;

@@ -222,6 +222,8 @@ impl System {
             for (equation, &node) in equations.iter_mut().zip(nodes) {
                 *equation = self.equation[node as usize];
             }
+            let material = problem.material_of[number as usize];
+            self.general.potential |= behaviours[usize::from(material)].potential;
             let first = self.general.points();
             self.general.elements.push(number);
             self.general.equations.push(equations);

@@ -5,6 +5,10 @@
 //! beside it, and its energy is counted there; with consistent capacity it has the temperature of the Gauss point.
 //! The matrix takes the symmetric part of −∂f/∂(∇T) and leaves ∂f/∂T out, so that it stays symmetric: Newton's
 //! iteration then converges linearly where k varies, with a rate of the relative change of k over the last iterate.
+//!
+//! Where k jumps, that iteration stalls, and k at points would make the flux of an element depend on which of its points
+//! the jump has passed. There the flux is −D ∇θ with Kirchhoff's θ = ∫k dT at the nodes (Carslaw & Jaeger, §1.6), exact at
+//! nodes of a line at rest; its tangent ∇N_a·D∇N_b k(T_b) is complete, and not symmetric.
 
 use super::rows::Rows;
 use super::{At, Evaluation, Points};
@@ -30,6 +34,8 @@ pub struct General {
     pub equations: Vec<[u32; MOST]>,
     /// State variables stored for each point.
     pub stride: usize,
+    /// Whether a flux follows Kirchhoff's potential: the tangent is then not symmetric.
+    pub potential: bool,
 }
 
 /// What an element adds.
@@ -147,18 +153,33 @@ impl General {
             matrices: at.tangent.then(|| Box::new([[0.0; 64]; 2])),
             ratio: None,
         };
+        // Kirchhoff's potential and k at the nodes, where the flux follows it
+        let mut potential = [[0.0; 2]; MOST];
+        let mut kirchhoff = false;
+        for a in 0..nodes {
+            if let Some(found) = material.potential(end[a]) {
+                (potential[a], kirchhoff) = (found, true);
+            }
+        }
         let first = self.starts[index] as usize;
         for g in 0..nodes {
             let gradients = &geometry.gradients[g];
             let mut gradient = Vector3::zeros();
             for a in 0..nodes {
-                gradient += Vector3::from(gradients[a]) * (end[a] - end[0]);
+                let difference = if kirchhoff { potential[a][0] - potential[0][0] } else { end[a] - end[0] };
+                gradient += Vector3::from(gradients[a]) * difference;
             }
             let (mut from, mut to) = (start[g], end[g]);
             if consistent {
                 from = (0..nodes).map(|a| shapes[g][a] * start[a]).sum();
                 to = (0..nodes).map(|a| shapes[g][a] * end[a]).sum();
             }
+            // k ∇T = ∇θ
+            let own = match material.potential(to) {
+                Some([_, conductivity]) => conductivity,
+                None => 1.0,
+            };
+            gradient /= own;
             let place = Point { temperature: from, increment: to - from, gradient, dt: at.dt };
             let old_state = &old.state[(first + g) * self.stride..];
             let new_state = &mut state[g * self.stride..];
@@ -181,7 +202,12 @@ impl General {
             }
             if let Some(matrices) = &mut part.matrices {
                 let tangent = -0.5 * (response.d_flux_d_gradient + response.d_flux_d_gradient.transpose());
-                geometry.add_conduction(g, &tangent, &mut matrices[0]);
+                if kirchhoff {
+                    let scale: [f64; MOST] = std::array::from_fn(|b| potential[b][1] / own);
+                    geometry.add_scaled_conduction(g, &tangent, &scale, &mut matrices[0]);
+                } else {
+                    geometry.add_conduction(g, &tangent, &mut matrices[0]);
+                }
                 if consistent {
                     for a in 0..nodes {
                         for b in 0..nodes {

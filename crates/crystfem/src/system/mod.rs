@@ -38,6 +38,8 @@ pub struct Behaviour {
     pub capacity: Option<f64>,
     /// Length of the state.
     pub states: usize,
+    /// Whether its flux follows Kirchhoff's potential.
+    pub potential: bool,
 }
 
 impl Behaviour {
@@ -55,7 +57,8 @@ impl Behaviour {
     pub fn of(material: &dyn ThermalMaterial, capacity: Capacity) -> Result<Self, Error> {
         let states = material.state_names().len();
         let linear = material.is_linear();
-        let mut behaviour = Self { conductivity: None, capacity: None, states };
+        let potential = material.potential(300.0).is_some();
+        let mut behaviour = Self { conductivity: None, capacity: None, states, potential };
         if !linear && (capacity == Capacity::Consistent || !material.constant_conductivity()) {
             return Ok(behaviour);
         }
@@ -189,6 +192,11 @@ impl System {
     /// Whether no Newton iteration is needed.
     pub fn is_linear(&self) -> bool {
         !self.nodal.coupled && self.general.is_empty() && !self.surfaces.radiates()
+    }
+
+    /// Whether the tangent is symmetric.
+    pub fn is_symmetric(&self) -> bool {
+        !self.general.potential
     }
 
     /// Sets prescribed temperatures for a time.

@@ -4,7 +4,7 @@ use super::Work;
 use crate::error::Error;
 use crate::ledger::NOTHING;
 use crate::problem::Problem;
-use crate::solver::{ConjugateGradients, Direct, Ended, Operator, norm_squared};
+use crate::solver::{BiconjugateGradients, ConjugateGradients, Direct, Ended, Operator, norm_squared};
 use crate::system::vector::{largest, set, sum};
 use crate::system::{At, Evaluation, Memory, System};
 
@@ -12,6 +12,8 @@ use crate::system::{At, Evaluation, Memory, System};
 const MOST_ITERATIONS: usize = 60;
 /// Halvings of a Newton step at most.
 const MOST_HALVINGS: usize = 7;
+/// Newton steps in a row, where k jumps, that are taken whole though the residual does not fall.
+const MOST_WHOLE: usize = 8;
 /// Corrections of the balance of a linear stage at most.
 const MOST_SHIFTS: usize = 3;
 /// Share of the heat moved that the sum of all residuals may be; the audit promises 1e-10.
@@ -52,6 +54,7 @@ pub struct Stages {
     /// K·1 and M·1 over the free nodes.
     free_sums: [Vec<f64>; 2],
     cg: ConjugateGradients,
+    bicg: BiconjugateGradients,
     /// Whether factors are wanted; they are made when first needed.
     pub direct: bool,
     factors: Option<Direct>,
@@ -103,6 +106,7 @@ impl Stages {
             return self.finite(problem, system, stage, temperature);
         }
         let mut error = f64::INFINITY;
+        let mut best = (f64::INFINITY, 0);
         for iteration in 0..MOST_ITERATIONS {
             self.prepare(system, stage.weight);
             let square = norm_squared(&self.residual, &self.inverse);
@@ -120,12 +124,19 @@ impl Stages {
             let mut part = 1.0;
             let mut trial = std::mem::take(&mut self.trial);
             trial.resize(temperature.len(), 0.0);
+            // across a kink of a convex or concave balance whole steps come back by themselves, from one side; shorter
+            // ones creep towards the kink
+            if square < best.0 {
+                best = (square, iteration);
+            }
+            let whole = !system.is_symmetric() && iteration - best.1 < MOST_WHOLE;
             for halving in 0..=MOST_HALVINGS {
                 let correction = &self.correction;
                 set(&mut trial, |k| temperature[k] + part * correction[k]);
                 let evaluated = self.evaluate(problem, system, stage, &trial, work);
                 let reached = norm_squared(&self.residual, &inverse);
                 let better = reached <= (1.0 - 0.1 * part) * square || reached <= self.floor;
+                let better = better || (whole && reached.is_finite());
                 if evaluated.is_ok() && (better || (halving == MOST_HALVINGS && reached.is_finite())) {
                     break;
                 }
@@ -172,8 +183,11 @@ impl Stages {
                 work.direct_solves += 1;
             }
             _ => {
-                let (inverse, right) = (&self.inverse, &mut self.right);
-                let ended = self.cg.solve(&operator, inverse, right, &mut self.correction, goal, limit(size));
+                let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
+                let ended = match system.is_symmetric() {
+                    true => self.cg.solve(&operator, inverse, right, found, goal, limit(size)),
+                    false => self.bicg.solve(&operator, inverse, right, found, goal, limit(size)),
+                };
                 work.cg_iterations += ended.iterations as u64;
             }
         }
@@ -269,7 +283,7 @@ impl Stages {
         let operator = operator(system, &self.diagonal, stage.weight, &self.evaluation);
         let goal = [self.capacity, tolerance, self.floor];
         let limit = limit(size);
-        let factored = self.direct && {
+        let factored = self.direct && system.is_symmetric() && {
             let made_for = Some((system.generation, stage.weight.to_bits()));
             if self.analysed_for != Some(system.build) {
                 let place = |e: u32| problem.mesh.points[system.nodes[e as usize] as usize];
@@ -296,15 +310,18 @@ impl Stages {
                 *right -= free * image;
             }
         }
+        let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
         let ended = if factored {
             Ended { iterations: 0, error: 0.0, converged: true }
+        } else if system.is_symmetric() {
+            self.cg.solve(&operator, inverse, right, found, goal, limit)
         } else {
-            self.cg.solve(&operator, &self.inverse, &mut self.right, &mut self.correction, goal, limit)
+            self.bicg.solve(&operator, inverse, right, found, goal, limit)
         };
         work.cg_iterations += ended.iterations as u64;
         if !ended.converged {
             return Err(Error::NotConverged {
-                method: "conjugate gradients",
+                method: if system.is_symmetric() { "conjugate gradients" } else { "biconjugate gradients" },
                 time: stage.time,
                 iterations: ended.iterations,
                 error: ended.error,

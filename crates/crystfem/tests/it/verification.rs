@@ -193,3 +193,82 @@ fn conductivity_that_follows_temperature() {
     // exact at nodes up to the quadrature of k over an element
     assert!(errors[2] < 1e-3 && errors[2] < 0.3 * errors[1] + 1e-6, "{errors:?}");
 }
+
+/// k that jumps tenfold at 423.15 K within 1e-6 K, upwards or downwards.
+fn jumping(values: [f64; 2]) -> Conductor {
+    let k = Property::table("k", vec![423.15, 423.15 + 1e-6], values.to_vec()).unwrap();
+    Conductor::new(PA12[1], k, Property::constant("c", PA12[2]).unwrap()).unwrap()
+}
+
+/// At rest between 353.15 and 493.15 K Kirchhoff's θ is linear, whatever the mesh: the flux is θ over the length to
+/// rounding, also beside a wall of constant k with a node in both materials.
+#[test]
+fn conductivity_that_jumps_at_rest() {
+    for (values, cells) in [([0.2, 2.0], 50), ([2.0, 0.2], 50), ([0.2, 2000.0], 7), ([2000.0, 0.2], 8)] {
+        for beside in [false, true] {
+            let mesh = line(0.01, cells);
+            let conditions =
+                vec![held(&mesh, "left", Field::constant(COLD)), held(&mesh, "right", Field::constant(HOT))];
+            let cut = if beside { cells / 2 } else { cells } as u32;
+            let problem = Problem {
+                conditions,
+                materials: vec![Arc::new(jumping(values)), conductor([1.0, 2500.0, 800.0])],
+                material_of: (0..cells as u32).map(|e| u16::from(e >= cut)).collect(),
+                ..Problem::new(mesh, conductor(PA12), 400.0)
+            };
+            let mut simulation = Simulation::new(problem, Settings::backward_euler(1e9)).unwrap();
+            run(&mut simulation, 1e9);
+            // θ from the cold face, and the flux through the cells of the jumping part and of the wall beside it
+            let theta = |t: f64| values[0] * (t.min(423.15) - COLD) + values[1] * (t - 423.15).max(0.0);
+            let h = 0.01 / cells as f64;
+            let flux = |a: u32, x: f64| {
+                let (left, right) = (at(&simulation, x), at(&simulation, x + h));
+                if a < cut { (theta(right) - theta(left)) / h } else { (right - left) / h }
+            };
+            let fluxes: Vec<f64> = (0..cells as u32).map(|a| flux(a, f64::from(a) * h)).collect();
+            let [low, high] = [f64::min, f64::max].map(|f| fluxes.iter().copied().reduce(f).unwrap());
+            println!("{values:?} {beside}: {low} to {high} W/m², {:?}", simulation.state().work);
+            // 1e-7 K of a solve over h
+            assert!(high - low < 1e-6 * high + 2e-7 * values[0].max(values[1]) / h, "{low} to {high}");
+            if !beside {
+                assert!((high / (theta(HOT) / 0.01) - 1.0).abs() < 1e-6 + 1e-6 / 70.0, "{high}");
+            }
+            assert!(simulation.state().ledger.worst < 1e-10);
+        }
+    }
+}
+
+/// The surface of a half-space is held 70 K below the jump, the rest is 70 K above it: Neumann's solution without latent
+/// heat. The flux is exact at nodes; where the jump stands within an element, the error is of order h.
+#[test]
+fn conductivity_that_jumps_in_a_half_space() {
+    for (values, latest) in [([0.2, 2.0], 20.0), ([2.0, 0.2], 20.0)] {
+        let exact = Freezing {
+            conductivity: values,
+            diffusivity: values.map(|k| k / (PA12[1] * PA12[2])),
+            specific_heat: PA12[2],
+            latent_heat: 0.0,
+            melting: 423.15,
+            initial: HOT,
+            surface: COLD,
+        };
+        let errors = [40, 80, 160, 320].map(|elements| {
+            let length = if values[0] < values[1] { 0.04 } else { 0.032 };
+            let mesh = line(length, elements);
+            let conditions = vec![held(&mesh, "left", Field::constant(COLD))];
+            let problem = Problem { conditions, ..Problem::new(mesh, Arc::new(jumping(values)), HOT) };
+            let mut simulation =
+                Simulation::new(problem, Settings { tolerance: 1e-7, ..precise(0.02) }).unwrap();
+            run(&mut simulation, latest);
+            assert!(simulation.state().ledger.worst < 1e-10, "{:?}", simulation.state().ledger);
+            let points = &simulation.problem().mesh.points;
+            let squares = points.iter().zip(simulation.temperatures(0.0)).filter(|(p, _)| p[0] < 8e-3);
+            let count = squares.clone().count() as f64;
+            let sum: f64 = squares.map(|(p, t)| (t - exact.temperature(p[0], latest)).powi(2)).sum();
+            (sum / count).sqrt()
+        });
+        let order = (errors[0] / errors[3]).log2() / 3.0;
+        println!("half-space {values:?}: {errors:?} K, order {order}");
+        assert!(errors[3] < 0.2 && order > 0.9, "{errors:?}, order {order}");
+    }
+}
