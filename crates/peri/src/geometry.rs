@@ -245,6 +245,28 @@ impl<const D: usize> Cut<D> {
         Some(meeting)
     }
 
+    /// A vector of length 1 across it.
+    pub fn normal(&self) -> [f64; D] {
+        let [a, b] = [self.edges[0], self.edges[D - 2]];
+        let across: [f64; D] = match D {
+            2 => std::array::from_fn(|d| if d == 0 { -a[1] } else { a[0] }),
+            _ => std::array::from_fn(|d| a[(d + 1) % D] * b[(d + 2) % D] - a[(d + 2) % D] * b[(d + 1) % D]),
+        };
+        let size = length(across);
+        across.map(|x| x / size)
+    }
+
+    /// Distance of a point from it, m; infinite beside its ends.
+    pub fn distance(&self, point: [f64; D]) -> f64 {
+        let normal = self.normal();
+        let height: f64 = (0..D).map(|d| (point[d] - self.corner[d]) * normal[d]).sum();
+        // a short way through it meets it, unless it passes beside
+        let reach = self.edges.iter().take(D - 1).map(|&edge| length(edge)).fold(height.abs(), f64::max);
+        let [below, above] =
+            [-reach, reach].map(|way| std::array::from_fn(|d| point[d] + (way - height) * normal[d]));
+        if self.meets(below, above).is_some() { height.abs() } else { f64::INFINITY }
+    }
+
     /// [`severed`] by this cut alone.
     pub fn severs(&self, a: [f64; D], b: [f64; D]) -> bool {
         severed(std::slice::from_ref(self), a, b)

@@ -22,6 +22,10 @@ pub struct Body<const D: usize> {
     pub thickness: f64,
     /// How many bonds each crack severs.
     pub severed: Vec<u64>,
+    /// Its cracks.
+    pub cuts: Vec<Cut<D>>,
+    /// The shapes added and cut; empty for points and grids.
+    pub operations: Vec<Operation<D>>,
 }
 
 /// Cells and slots a body may have at most, whatever memory there is: slots are counted in 32 bits.
@@ -44,6 +48,7 @@ pub fn body_of<const D: usize>(
         false => filled(source, scene, variant, thickness, &cuts)?,
     };
     body.severed = severed(source, &*body.bonds, &cuts)?;
+    body.cuts = cuts;
     Ok(body)
 }
 
@@ -82,7 +87,8 @@ fn filled<const D: usize>(
         ));
     }
     memory::refuse_too_large(source, scene, spacing_key(scene), &bonds)?;
-    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness, severed: Vec::new() })
+    let (severed, cuts) = (Vec::new(), Vec::new());
+    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness, severed, cuts, operations })
 }
 
 /// Bytes that a variant needs at least, as far as its lattice tells, before anything of it is built; 0 for a cloud.

@@ -63,7 +63,14 @@ pub fn cloud<const D: usize>(
     };
     let low = extreme(f64::min, f64::INFINITY).map(|x| x - half);
     let high = extreme(f64::max, f64::NEG_INFINITY).map(|x| x + half);
-    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness, severed: Vec::new() })
+    Ok(Body {
+        bonds: Box::new(bonds),
+        bounds: (low, high),
+        thickness,
+        severed: Vec::new(),
+        cuts: Vec::new(),
+        operations: Vec::new(),
+    })
 }
 
 /// The body where the points lie on a regular lattice: then it needs no neighbour list.
@@ -90,6 +97,8 @@ fn regular<const D: usize>(
         bounds: (low, high),
         thickness,
         severed: Vec::new(),
+        cuts: Vec::new(),
+        operations: Vec::new(),
     })
 }
 

@@ -2,19 +2,23 @@
 
 use super::{Body, Scene};
 use crate::bonds::{Bonds, CellGrid};
+use crate::geometry::{Cut, Operation, inside};
 
 /// Grips that move so many horizons in one step jump over what breaks on the way.
 const LONGEST_STEP: f64 = 3.0;
 /// A point's volume as a cube or square, over the distance of its neighbour: between 1/4 and 4 in any even cloud.
 const UNEVEN: f64 = 4.0;
 
+/// Distance from a crack, over the spacing, within which a particle lies on it.
+const ON_CRACK: f64 = 1e-6;
+
 /// One sentence for each.
 pub fn warnings<const D: usize>(scene: &Scene, body: &Body<D>) -> Vec<String> {
     let bonds = &*body.bonds;
-    [volumes(scene, bonds, body.thickness), thin(bonds), long_steps(scene, bonds)]
-        .into_iter()
-        .flatten()
-        .collect()
+    let cracks = body.cuts.iter().enumerate().filter_map(|(index, cut)| on_crack(bonds, index, cut));
+    let voids = (0..body.operations.len()).filter_map(|index| bridged(bonds, &body.operations, index));
+    let once = [volumes(scene, bonds, body.thickness), thin(bonds), long_steps(scene, bonds)];
+    once.into_iter().flatten().chain(cracks).chain(voids).collect()
 }
 
 /// Volumes of a plane cloud that lack the thickness.
@@ -70,6 +74,71 @@ fn thin<const D: usize>(bonds: &dyn Bonds<D>) -> Option<String> {
         format!(
             "{count} particles have no neighbour one spacing ({spacing:.3e} m) away along some axis: a part of the body is one \
              particle wide, whatever width its shape has"
+        )
+    })
+}
+
+/// Particles on a crack: bonds that end on it stay.
+fn on_crack<const D: usize>(bonds: &dyn Bonds<D>, index: usize, cut: &Cut<D>) -> Option<String> {
+    let spacing = bonds.spacing();
+    let places = bonds.particles().iter().map(|&slot| (slot, bonds.position(slot as usize)));
+    let on: Vec<(u32, [f64; D])> =
+        places.filter(|(_, place)| cut.distance(*place) < ON_CRACK * spacing).collect();
+    let &(_, first) = on.first()?;
+    let normal = cut.normal();
+    let along = |bond: &[f64; D]| (0..D).map(|d| bond[d] * normal[d]).sum::<f64>().abs();
+    let mut kept = 0;
+    for &(slot, _) in &on {
+        bonds.neighbours(slot as usize, &mut |bond| {
+            kept += u64::from(along(&bond.bond) > ON_CRACK * spacing);
+        });
+    }
+    let place = first.map(|x| format!("{:.3}", x * 1e3)).join(", ");
+    Some(format!(
+        "{} particles lie on body.cracks[{index}], the first at ({place}) mm, and keep their {kept} bonds to both of its sides: \
+         the crack is bridged; half a spacing ({:.3} mm) beside it lies between the particles",
+        on.len(),
+        0.5e3 * spacing
+    ))
+}
+
+/// A shape cut out that is narrower than the horizon: bonds reach across it.
+fn bridged<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    operations: &[Operation<D>],
+    index: usize,
+) -> Option<String> {
+    let Operation::Cut(shape) = operations.get(index)? else { return None };
+    let (low, high) = shape.bounds();
+    let axis = (0..D).min_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b])))?;
+    let (width, horizon) = (high[axis] - low[axis], bonds.horizon());
+    if width >= horizon {
+        return None;
+    }
+    let middle = 0.5 * (low[axis] + high[axis]);
+    let near = |place: &[f64; D]| {
+        (0..D).all(|d| (low[d] - horizon..=high[d] + horizon).contains(&place[d])) && place[axis] <= low[axis]
+    };
+    let mut across = 0_u64;
+    for &slot in bonds.particles() {
+        let place = bonds.position(slot as usize);
+        if !near(&place) {
+            continue;
+        }
+        bonds.neighbours(slot as usize, &mut |bond| {
+            let part = (middle - place[axis]) / bond.bond[axis];
+            let there = std::array::from_fn(|d| place[d] + part * bond.bond[d]);
+            let beyond = place[axis] + bond.bond[axis] >= high[axis];
+            across += u64::from(beyond && shape.contains(there) && !inside(operations, there));
+        });
+    }
+    (across > 0).then(|| {
+        format!(
+            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} bonds reach across it; a \
+             crack through it severs them",
+            width * 1e3,
+            ["x", "y", "z"][axis],
+            horizon * 1e3
         )
     })
 }

@@ -165,6 +165,32 @@ fn what_is_most_likely_not_meant() {
         thin.contains("particles have no neighbour one spacing (2.000e-3 m) away along some axis"),
         "{thin}"
     );
+    let here = torn("critical = { stretch = 600 }", 40);
+    assert!(!never.contains("lie on body.cracks") && !never.contains("cuts out"), "{never}");
+    // 20 of the rows at y = 1 mm; of 28 neighbours within 3.015 spacings 6 lie along the crack, fewer at its ends
+    let on = notes(
+        &here
+            .replace("-1 mm\", \"0 mm\"", "-1 mm\", \"1 mm\"")
+            .replace("19.9 mm\", \"0 mm", "40.5 mm\", \"1 mm"),
+    );
+    assert!(on.contains("20 particles lie on body.cracks[0], the first at (1.000, 1.000) mm"), "{on}");
+    assert!(on.contains("half a spacing (1.000 mm) beside it"), "{on}");
+    let slot = |height: &str| {
+        let (low, high) = (format!("\"-{height} mm\""), format!("\"{height} mm\""));
+        let cut =
+            format!("]\n# {{ cut = \"box\", min = [\"-1 mm\", {low}], max = [\"19.9 mm\", {high}] }}]\n#");
+        let cut = cut.replacen("]\n# ", ", ", 1);
+        notes(&here.replace("]\ncracks", &format!("{cut}cracks")))
+    };
+    // rows at ±3 mm are two horizons' worth apart: three spacings, 6 mm of 6.03 mm; at 2.9 mm the rows at ±1 mm go
+    let narrow = slot("2.9");
+    assert!(
+        narrow.contains(
+            "body.shapes[1] cuts out 5.800 mm along y, less than the horizon of 6.030 mm: 10 bonds"
+        ),
+        "{narrow}"
+    );
+    assert!(!slot("3.1").contains("cuts out"));
     let points: String =
         (0..200).map(|k| format!("{}e-3,{}e-3,4e-6\n", 2 * (k % 20), 2 * (k / 20))).collect();
     std::fs::write(directory.path().join("points.csv"), format!("x,y,volume\n{points}")).unwrap();
