@@ -219,7 +219,8 @@ fn conductivity_that_jumps_at_rest() {
             let mut simulation = Simulation::new(problem, Settings::backward_euler(1e9)).unwrap();
             run(&mut simulation, 1e9);
             // θ from the cold face, and the flux through the cells of the jumping part and of the wall beside it
-            let theta = |t: f64| values[0] * (t.min(423.15) - COLD) + values[1] * (t - 423.15).max(0.0);
+            let middle = 423.15 + 0.5e-6;
+            let theta = |t: f64| values[0] * (t.min(middle) - COLD) + values[1] * (t - middle).max(0.0);
             let h = 0.01 / cells as f64;
             let flux = |a: u32, x: f64| {
                 let (left, right) = (at(&simulation, x), at(&simulation, x + h));
@@ -267,8 +268,9 @@ fn conductivity_that_jumps_in_a_half_space() {
             let sum: f64 = squares.map(|(p, t)| (t - exact.temperature(p[0], latest)).powi(2)).sum();
             (sum / count).sqrt()
         });
-        let order = (errors[0] / errors[3]).log2() / 3.0;
+        // it swings with the jump's place in its element: two meshes against two that are four times finer
+        let order = ((errors[0] + errors[1]) / (errors[2] + errors[3])).log2() / 2.0;
         println!("half-space {values:?}: {errors:?} K, order {order}");
-        assert!(errors[3] < 0.2 && order > 0.9, "{errors:?}, order {order}");
+        assert!(errors[2] + errors[3] < 0.2 && order > 1.0, "{errors:?}, order {order}");
     }
 }
