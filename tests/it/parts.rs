@@ -213,7 +213,7 @@ fn options_of_a_sweep_are_named() {
         let arguments = format!("sweep {scene}.toml {vary} --output sweep");
         let ended = finish(command("crystfem", &arguments, here).spawn().unwrap()).with_code(2);
         ended.tells(message);
-        assert!(!ended.stderr.contains("study[0]"), "{}", ended.stderr);
+        assert!(!ended.stderr.contains("sweep.set"), "{}", ended.stderr);
         assert!(!here.join("sweep").exists());
     };
     for (vary, message) in [

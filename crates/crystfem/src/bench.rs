@@ -2,7 +2,7 @@
 
 use clap::Subcommand;
 use crystfem::run::Failure;
-use polycore::command::print_measurements;
+use polycore::case::terminal::print_measurements;
 
 mod brick;
 mod cube;

@@ -28,14 +28,6 @@ pub enum Error {
         /// Names that there are.
         known: Vec<String>,
     },
-    /// An option of the command line cannot be used.
-    #[error("`{option}`: {reason}")]
-    Option {
-        /// The option, as it was written.
-        option: String,
-        /// What is wrong with it, and what is allowed.
-        reason: String,
-    },
     /// A line of a data or mesh file cannot be used.
     #[error("{}:{line}: {what}: found {found:?}; allowed: {allowed}", path.display())]
     File {
@@ -90,12 +82,6 @@ pub enum Error {
         /// Tolerance, K.
         wanted: f64,
     },
-    /// The run was asked to stop; its checkpoint is written.
-    #[error("interrupted; resume with `crystfem resume {}`", .0.display())]
-    Interrupted(PathBuf),
-    /// A sweep was asked to stop; what its runs have done is kept.
-    #[error("interrupted; the same command goes on with what is in {}", .0.display())]
-    SweepInterrupted(PathBuf),
     /// One of several studies failed.
     #[error("study {name}: {error}")]
     Study {
@@ -107,24 +93,6 @@ pub enum Error {
     /// Files, output, scenes.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
-}
-
-impl Error {
-    /// Exit code of the command line: 2 for bad input, 130 for an interrupted run, 1 otherwise.
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Mesh(_)
-            | Self::Parameter { .. }
-            | Self::Unknown { .. }
-            | Self::Option { .. }
-            | Self::File { .. }
-            | Self::Data { .. } => 2,
-            Self::Interrupted(_) | Self::SweepInterrupted(_) => 130,
-            Self::NotFinite { .. } | Self::Finite { .. } | Self::NotConverged { .. } => 1,
-            Self::Study { error, .. } => error.exit_code(),
-            Self::Shared(error) => error.exit_code(),
-        }
-    }
 }
 
 impl From<Error> for polycore::scene::Failure<Error> {

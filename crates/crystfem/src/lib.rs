@@ -1,6 +1,6 @@
 //! Heat conduction and crystallization of semicrystalline polymers printed layer by layer.
 //!
-//! The `crystfem` command line solves problems written as scenes (`scene`, feature `cli`); the same parts from Rust:
+//! The `crystfem` command line solves problems written as scenes (`scene`, feature `case`); the same parts from Rust:
 //!
 //! ```
 //! use crystfem::kinetics::{Constants, Kinetics, cooling_curve};
@@ -38,9 +38,9 @@ mod system;
 pub mod table;
 pub mod time;
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "case")]
 pub mod run;
-#[cfg(feature = "cli")]
+#[cfg(feature = "case")]
 pub mod scene;
 
 pub use error::Error;

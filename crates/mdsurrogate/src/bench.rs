@@ -5,7 +5,7 @@ use mdsurrogate::Error;
 use mdsurrogate::network::Real;
 use mdsurrogate::surrogate::{Prediction, Surrogate, Workspace};
 use nalgebra::Scalar;
-use polycore::command::{Measurement, print_measurements};
+use polycore::case::terminal::{Measurement, print_measurements};
 use std::hint::black_box;
 use std::time::Instant;
 

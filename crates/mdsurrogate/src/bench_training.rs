@@ -7,7 +7,7 @@ use mdsurrogate::network::Architecture;
 use mdsurrogate::random::SplitMix64;
 use mdsurrogate::surrogate::Kind;
 use mdsurrogate::train::{Settings, Training};
-use polycore::command::Measurement;
+use polycore::case::terminal::Measurement;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 
 /// Training rows of the thesis: 80 % of 72,720.

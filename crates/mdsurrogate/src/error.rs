@@ -95,9 +95,6 @@ pub enum Error {
         /// Adam's step.
         learning_rate: f64,
     },
-    /// The run was asked to stop; its checkpoint is written.
-    #[error("interrupted; resume with `mdsurrogate resume {}`", .0.display())]
-    Interrupted(PathBuf),
     /// Files, output, scenes, tensors.
     #[error(transparent)]
     Shared(#[from] polycore::Error),
@@ -116,16 +113,6 @@ impl Error {
 
     pub(crate) fn parameter(name: &'static str, found: impl ToString, allowed: impl ToString) -> Self {
         Self::Parameter { name, found: found.to_string(), allowed: allowed.to_string() }
-    }
-
-    /// Exit code of the command line: 2 for bad input, 1 for a failed run.
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Diverged { .. } | Self::NotFinite { .. } => 1,
-            Self::Interrupted(_) => 130,
-            Self::Shared(error) => error.exit_code(),
-            _ => polycore::scene::EXIT_BAD_INPUT,
-        }
     }
 }
 

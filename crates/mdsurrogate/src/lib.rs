@@ -70,9 +70,9 @@ pub mod search;
 #[cfg(feature = "train")]
 pub mod train;
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "case")]
 pub mod run;
-#[cfg(feature = "cli")]
+#[cfg(feature = "case")]
 pub mod scene;
 
 pub use error::Error;

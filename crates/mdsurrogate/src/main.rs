@@ -3,13 +3,11 @@
 // polycore::say! prints without a panic where nobody reads any more
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
-use clap::{CommandFactory, Parser, Subcommand};
 use mdsurrogate::Error;
 use mdsurrogate::dataset::{Columns, ReadOptions, read};
 use mdsurrogate::export::{CSource, c_source, fortran_source, onnx};
-use mdsurrogate::run::{Failure, describe};
+use mdsurrogate::run::{Failure, Mdsurrogate, describe};
 use mdsurrogate::surrogate::Surrogate;
-use polycore::command::exit;
 use polycore::output::atomic_write;
 use polycore::report::Report;
 use std::io::Write;
@@ -19,45 +17,14 @@ use std::process::ExitCode;
 mod bench;
 mod bench_points;
 mod bench_training;
+mod eval_command;
 mod md_command;
 mod predict;
-mod scene_command;
 
-/// From molecular dynamics to a constitutive law.
-#[derive(Parser)]
-#[command(
-    version,
-    about,
-    after_help = "Examples:
-  mdsurrogate check cases/ch3/train-default/case.toml   the scene and its data
-  mdsurrogate run cases/ch3/train-default/case.toml     train, judge, draw; results in out/train-default
-  mdsurrogate resume out/train-default                  go on after an interruption
-  mdsurrogate predict law.safetensors strains.csv -o stresses.csv
-                                                        stress and uncertainty at the strains of a table
-  mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      what a table holds
-  mdsurrogate schema > mdsurrogate.schema.json          for editors
-
-Exit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted."
-)]
-struct Cli {
-    #[command(subcommand)]
-    command: Command,
-}
-
-#[derive(Subcommand)]
+#[derive(clap::Subcommand)]
 enum Command {
-    /// Run a scene: measure and divide its data, train and judge its models or search for better ones, draw.
-    #[command(visible_aliases = ["data", "train", "tune"])]
-    Run(scene_command::Run),
-    /// Go on with an interrupted or killed run.
-    Resume(scene_command::Resume),
-    /// Validate a scene and its data, and print what it builds and leaves out.
-    Check {
-        /// The scene (TOML).
-        scene: PathBuf,
-    },
     /// Judge laws on the data of a scene: errors, physics, held-out runs, error against time.
-    Eval(scene_command::Eval),
+    Eval(eval_command::Eval),
     /// Print what a table (CSV, CSV.GZ, HDF5) holds: runs, ranges, noise.
     Info {
         /// The table.
@@ -84,38 +51,17 @@ enum Command {
     Predict(predict::Predict),
     /// Measure the cost of a stress, a tangent and a batch, in both precisions, on one thread.
     Bench(bench::Bench),
-    /// Print the JSON Schema of scenes, by which editors complete and check them.
-    Schema,
-    /// Print a shell's completion script.
-    Completions {
-        /// The shell.
-        shell: clap_complete::Shell,
-    },
 }
 
 fn main() -> ExitCode {
-    let result = match polycore::command::parse::<Cli>().command {
-        Command::Run(run) => run.run(),
-        Command::Resume(resume) => resume.run(),
-        Command::Check { scene } => scene_command::check(&scene),
+    polycore::case::main::<Mdsurrogate, _>(|command| match command {
         Command::Eval(eval) => eval.run(),
         Command::Info { file, instantaneous } => info(&file, instantaneous).map_err(Failure::from),
         Command::Md(md) => md.run().map_err(Failure::from),
         Command::Export { law, output, form } => export(&law, &output, form).map_err(Failure::from),
         Command::Predict(predict) => predict.print().map_err(Failure::from),
         Command::Bench(bench) => bench.print().map_err(Failure::from),
-        Command::Schema => {
-            polycore::say!("{:#}", mdsurrogate::scene::schema());
-            Ok(true)
-        }
-        Command::Completions { shell } => {
-            let mut text = Vec::new();
-            clap_complete::generate(shell, &mut Cli::command(), "mdsurrogate", &mut text);
-            polycore::command::print(String::from_utf8_lossy(&text));
-            Ok(true)
-        }
-    };
-    exit(result, Error::exit_code)
+    })
 }
 
 fn info(file: &Path, instantaneous: bool) -> Result<bool, Error> {
@@ -123,7 +69,7 @@ fn info(file: &Path, instantaneous: bool) -> Result<bool, Error> {
     let set = read(file, &ReadOptions { columns, ..ReadOptions::default() })?;
     let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), "");
     describe(&mut report, "", &set);
-    polycore::command::print(report.table());
+    polycore::case::terminal::print(report.table());
     polycore::say!("without variance: {}", set.constant_components().join(", "));
     for line in &set.provenance {
         polycore::say!("{line}");

@@ -123,7 +123,7 @@ impl Md {
                 polycore::say!("{} of {all} runs are finished", all - open);
                 folder.run(&engine, jobs, &|run, result| match result {
                     Ok(()) => polycore::say!("{} finished", run.id),
-                    Err(error) => polycore::command::complain(format_args!("{}: {error}\n", run.id)),
+                    Err(error) => polycore::case::terminal::complain(format_args!("{}: {error}\n", run.id)),
                 })?;
                 join(&place.folder)
             }

@@ -5,7 +5,7 @@ use peri::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
 use peri::potential::Law;
 use peri::run::Failure;
-use polycore::command::{Measurement, print_measurements};
+use polycore::case::terminal::{Measurement, print_measurements};
 use std::hint::black_box;
 use std::time::Instant;
 

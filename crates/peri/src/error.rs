@@ -1,7 +1,5 @@
 //! What can go wrong in this crate.
 
-use std::path::PathBuf;
-
 /// Errors of the peridynamics crate.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -75,9 +73,6 @@ pub enum Error {
         /// Estimate of the critical one for all stretches met, s.
         critical: f64,
     },
-    /// The run was asked to stop; its checkpoint is written.
-    #[error("interrupted; resume with `peri resume {}`", .0.display())]
-    Interrupted(PathBuf),
     /// One of several variants.
     #[error("{variant}: {error}")]
     Within {
@@ -92,17 +87,6 @@ pub enum Error {
 }
 
 impl Error {
-    /// Exit code of the command line: 2 for bad input, 130 for an interrupted run, 1 otherwise.
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Geometry(_) | Self::Parameter { .. } | Self::TimeStep { .. } => 2,
-            Self::Interrupted(_) => 130,
-            Self::NotFinite { .. } | Self::NotConverged { .. } | Self::Unstable { .. } => 1,
-            Self::Within { error, .. } => error.exit_code(),
-            Self::Shared(error) => error.exit_code(),
-        }
-    }
-
     /// A geometry error.
     pub fn geometry(what: String) -> Self {
         Self::Geometry(what)

@@ -1,7 +1,7 @@
 //! Bond-based peridynamics of elastomers: chain-network bond laws, lattices without neighbour lists and clouds with
 //! them, adaptive dynamic relaxation, Hardy stress.
 //!
-//! The `peri` command line solves problems written as scenes ([`scene`], feature `cli`); the same parts from Rust:
+//! The `peri` command line solves problems written as scenes ([`scene`], feature `case`); the same parts from Rust:
 //!
 //! ```
 //! use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection, stretch_range};
@@ -60,11 +60,9 @@ mod quadrature;
 pub mod solver;
 pub mod stress;
 
-#[cfg(feature = "cli")]
-pub mod checkpoint;
-#[cfg(feature = "cli")]
+#[cfg(feature = "case")]
 pub mod run;
-#[cfg(feature = "cli")]
+#[cfg(feature = "case")]
 pub mod scene;
 
 pub use error::Error;

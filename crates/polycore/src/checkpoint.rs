@@ -1,13 +1,14 @@
 //! What a killed run needs to go on: one file, whole or not at all, with a checksum.
 
 use std::io::{ErrorKind, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::output::atomic_write;
+use crate::scene::Source;
 
 /// File name inside an output directory.
 pub const FILE_NAME: &str = "checkpoint.bin";
@@ -16,7 +17,60 @@ pub const FILE_NAME: &str = "checkpoint.bin";
 pub type Magic = [u8; 8];
 
 /// How the magics of the command lines begin, before a hyphen.
-const PROGRAMS: [(&str, &str); 3] = [("mdsg", "mdsurrogate"), ("part", "crystfem"), ("peri", "peri")];
+const PROGRAMS: [(&str, &str); 4] =
+    [("mdsg", "mdsurrogate"), ("part", "crystfem"), ("peri", "peri"), ("poly", "polycore")];
+
+/// The part of a run's checkpoint that names its scene.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Header {
+    /// The scene's text, so that a changed scene is not continued with an old state.
+    pub scene: String,
+    /// The scene's path, for relative paths and messages.
+    pub scene_path: PathBuf,
+    /// Whether this is a `--quick` run.
+    pub quick: bool,
+    /// The study, of the run in the directory above.
+    pub study: Option<String>,
+}
+
+impl Header {
+    /// Of a scene, or of one of its studies.
+    pub fn new(source: &Source, quick: bool, study: Option<&str>) -> Self {
+        // files that a scene names lie beside it, from wherever the run is resumed
+        let scene_path = std::path::absolute(&source.path).unwrap_or_else(|_| source.path.clone());
+        Self { scene: source.text.clone(), scene_path, quick, study: study.map(str::to_owned) }
+    }
+
+    /// Reads which scene the checkpoint of an output directory belongs to.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn read(directory: &Path, magic: &Magic) -> Result<Self, Error> {
+        read(&directory.join(FILE_NAME), magic)
+    }
+}
+
+/// Writes the checkpoint of an output directory: its scene, and how far the run is.
+///
+/// # Errors
+/// As [`write`].
+pub fn save<T: Serialize>(
+    directory: &Path,
+    magic: &Magic,
+    header: &Header,
+    state: Option<&T>,
+) -> Result<(), Error> {
+    write(&directory.join(FILE_NAME), magic, &(header, state))
+}
+
+/// Reads how far the run of an output directory was; nothing where it had just begun.
+///
+/// # Errors
+/// As [`read`].
+pub fn resume<T: DeserializeOwned>(directory: &Path, magic: &Magic) -> Result<Option<T>, Error> {
+    let (_, state): (Header, Option<T>) = read(&directory.join(FILE_NAME), magic)?;
+    Ok(state)
+}
 
 /// Writes a value (postcard, behind magic and checksum).
 ///

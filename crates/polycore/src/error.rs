@@ -52,6 +52,25 @@ pub enum Error {
         /// Why not.
         why: String,
     },
+    /// An option of a command line cannot be used.
+    #[error("`{option}`: {reason}")]
+    Option {
+        /// The option, as it was written.
+        option: String,
+        /// What is wrong with it, and what is allowed.
+        reason: String,
+    },
+    /// A run was asked to stop; its checkpoint is written.
+    #[error("interrupted; resume with `{program} resume {}`", output.display())]
+    Interrupted {
+        /// The program.
+        program: &'static str,
+        /// The output directory of the run.
+        output: PathBuf,
+    },
+    /// A sweep was asked to stop; what its runs have done is kept.
+    #[error("interrupted; the same command goes on with what is in {}", .0.display())]
+    SweepInterrupted(PathBuf),
     /// A number outside the range on which an operation is defined.
     #[error("{quantity} = {value} is outside {allowed}")]
     Domain {
@@ -103,12 +122,14 @@ impl Error {
     }
 
     /// Exit code of the command lines: 2 for bad input (what cannot be read, an unusable output directory or
-    /// checkpoint), 1 for a failed run.
+    /// checkpoint), 130 for an interrupted run, 1 for a failed one.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::OutputDirectory { .. } | Self::Checkpoint { .. } | Self::Format { .. } => {
-                crate::scene::EXIT_BAD_INPUT
-            }
+            Self::Interrupted { .. } | Self::SweepInterrupted(_) => 130,
+            Self::Option { .. }
+            | Self::OutputDirectory { .. }
+            | Self::Checkpoint { .. }
+            | Self::Format { .. } => crate::scene::EXIT_BAD_INPUT,
             Self::Constitutive(constitutive::Error::Invalid { .. } | constitutive::Error::File { .. }) => {
                 crate::scene::EXIT_BAD_INPUT
             }

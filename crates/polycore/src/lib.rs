@@ -18,9 +18,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+#[cfg(feature = "case")]
+pub mod case;
 pub mod checkpoint;
-#[cfg(feature = "command")]
-pub mod command;
 pub mod constitutive;
 pub mod error;
 pub mod langevin;

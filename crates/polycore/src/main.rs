@@ -3,14 +3,11 @@
 // polycore::say! prints without a panic where nobody reads any more
 #![deny(clippy::print_stdout, clippy::print_stderr)]
 
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser, Subcommand};
 use polycore::Error;
-use polycore::command::{exit, print};
-use polycore::scene::Failure;
+use polycore::case::{self, Finished, Program, Run, terminal};
+use polycore::scene::{Failure, Source};
 
 mod cli {
     pub mod draw;
@@ -21,75 +18,47 @@ mod cli {
     pub mod trials;
 }
 
-use cli::{exact, fits, scene::Case};
+use cli::{exact, fits, scene};
 
-/// Hyperelastic laws: fits to data, tables, checks.
-#[derive(Parser)]
-#[command(version, about, after_help = "Exit codes: 0 ok, 1 an expectation or the run failed, 2 bad input.")]
-struct Arguments {
-    #[command(subcommand)]
-    command: Command,
+/// Fits of hyperelastic laws.
+struct Fits;
+
+impl case::Case for Fits {
+    const PROGRAM: Program = Program {
+        name: "polycore",
+        version: env!("CARGO_PKG_VERSION"),
+        about: "Hyperelastic laws: fits to data, tables, checks",
+        examples: "  polycore check cases/ch1/rubber-fits/case.toml    which laws it fits to which data
+  polycore run cases/ch1/rubber-fits/case.toml      fit, draw, judge; results in out/rubber-fits
+  polycore exact eight-chain \"0.27 MPa\" 25 --to 4  nominal stress against stretch, as CSV",
+        magic: b"poly-ck1",
+        columns: &["*.rms"],
+    };
+    type Error = Error;
+
+    fn explain(source: &Source, _quick: bool) -> Result<Vec<String>, Failure<Error>> {
+        Ok(scene::Case::parse(source)?.plan().lines().map(str::to_owned).collect())
+    }
+
+    fn solve(source: &Source, run: &mut Run) -> Result<Finished, Failure<Error>> {
+        Ok(fits::run(&scene::Case::parse(source)?, run)?)
+    }
+
+    fn schema() -> serde_json::Value {
+        scene::schema()
+    }
 }
 
-#[derive(Subcommand)]
+#[derive(clap::Subcommand)]
 enum Command {
-    /// Run a case: fits, trials, tables, pictures, report.json.
-    Run {
-        /// The scene, a TOML file.
-        case: PathBuf,
-        /// Where the results go; `out/NAME` if not given, NAME being the scene's file, or its folder if the file is `case.toml`.
-        #[arg(long, short)]
-        output: Option<PathBuf>,
-        /// Fit and judge, but draw no pictures.
-        #[arg(long)]
-        quick: bool,
-    },
-    /// Validate a case and print what `run` would do, without running it.
-    Check {
-        /// The scene, a TOML file.
-        case: PathBuf,
-    },
     /// Tabulate the nominal stress of an incompressible law, as CSV that a case can read back as data.
     Exact(exact::Arguments),
-    /// Print a completion script for a shell.
-    Completions {
-        /// bash, zsh, fish, elvish or powershell.
-        shell: clap_complete::Shell,
-    },
 }
 
 fn main() -> ExitCode {
-    let result = match polycore::command::parse::<Arguments>().command {
-        Command::Run { case, output, quick } => run(&case, output, quick),
-        Command::Check { case } => check(&case),
-        Command::Exact(arguments) => match exact::table(&arguments) {
-            Ok(text) => show(&text),
-            Err(message) => Arguments::command().error(ErrorKind::ValueValidation, message).exit(),
-        },
-        Command::Completions { shell } => {
-            let mut text = Vec::new();
-            clap_complete::generate(shell, &mut Arguments::command(), "polycore", &mut text);
-            show(&String::from_utf8_lossy(&text))
-        }
-    };
-    exit(result, Error::exit_code)
-}
-
-fn run(path: &Path, output: Option<PathBuf>, quick: bool) -> Result<bool, Failure<Error>> {
-    let case = Case::read(path)?;
-    let directory = output.unwrap_or_else(|| polycore::command::default_output(path));
-    let _lock = polycore::output::prepare_run(&directory)?;
-    let report = fits::run(&case, &directory, quick)?;
-    polycore::say!("{}", directory.join(polycore::report::FILE_NAME).display());
-    Ok(report.passed())
-}
-
-fn check(path: &Path) -> Result<bool, Failure<Error>> {
-    let case = Case::read(path)?;
-    show(&case.plan())
-}
-
-fn show(text: &str) -> Result<bool, Failure<Error>> {
-    print(text);
-    Ok(true)
+    case::main::<Fits, _>(|Command::Exact(arguments)| {
+        let refused = |reason| Error::Option { option: "exact".to_owned(), reason };
+        terminal::print(exact::table(&arguments).map_err(refused)?);
+        Ok(true)
+    })
 }

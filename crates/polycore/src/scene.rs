@@ -41,6 +41,9 @@ pub const VERSION: i64 = 1;
 /// Exit code of the command lines for bad input.
 pub const EXIT_BAD_INPUT: u8 = 2;
 
+/// The table that a sweep writes behind a scene: what it sets, in `set`, holds over all else.
+pub const SWEEP: &str = "sweep";
+
 /// A larger file is not a scene; numbers in bulk belong into CSV files beside it.
 pub const LARGEST_FILE: u64 = 16 << 20;
 

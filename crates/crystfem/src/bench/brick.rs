@@ -9,7 +9,7 @@ use crystfem::mesh::{Grid, abaqus};
 use crystfem::problem::{Capacity, Problem};
 use crystfem::run::Failure;
 use crystfem::simulation::{Settings, Simulation};
-use polycore::command::Measurement;
+use polycore::case::terminal::Measurement;
 use polycore::output::{atomic_write, csv};
 use std::ops::ControlFlow;
 use std::path::PathBuf;

@@ -5,7 +5,7 @@ use super::median;
 use crystfem::run::Failure;
 use crystfem::simulation::{LinearSolver, Settings, Simulation};
 use crystfem::time::{Scheme, Steps};
-use polycore::command::Measurement;
+use polycore::case::terminal::Measurement;
 use std::ops::ControlFlow;
 use std::time::Instant;
 

@@ -6,7 +6,7 @@ use super::{REPEATS, material, median};
 use crystfem::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
 use crystfem::material::ThermalMaterial;
 use crystfem::run::Failure;
-use polycore::command::Measurement;
+use polycore::case::terminal::Measurement;
 use std::hint::black_box;
 use std::time::Instant;
 

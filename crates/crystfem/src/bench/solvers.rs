@@ -3,7 +3,7 @@
 use super::cube::{Cube, Start};
 use crystfem::run::Failure;
 use crystfem::simulation::{LinearSolver, Settings, Simulation};
-use polycore::command::Measurement;
+use polycore::case::terminal::Measurement;
 use std::ops::ControlFlow;
 use std::time::Instant;
 

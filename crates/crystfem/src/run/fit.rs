@@ -1,7 +1,7 @@
 //! Fits of measurements: constants with their intervals, tables, pictures.
 
+use super::Failure;
 use super::point::CELSIUS;
-use super::{Failure, Options};
 use crate::error::Error;
 use crate::fit::{Fit, avrami, nakamura, ozawa};
 use crate::scene::{FitScene, FitSpec, Job};
@@ -22,9 +22,10 @@ struct Done {
 }
 
 /// Runs every fit.
-pub fn run(source: &Source, scene: &FitScene, options: &Options) -> Result<Report, Failure> {
+pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> Result<Report, Failure> {
+    let (output, quick) = (run.options.output, run.options.quick);
     let jobs = scene.jobs(source)?;
-    let _lock = polycore::output::prepare_run(options.output)?;
+    run.begin()?;
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let mut phases = Phases::new();
     let mut done = Vec::new();
@@ -43,15 +44,14 @@ pub fn run(source: &Source, scene: &FitScene, options: &Options) -> Result<Repor
     phases.start("write");
     for one in &done {
         record(&mut report, one);
-        write(options.output, one)?;
+        write(output, one)?;
         if scene.output.pictures {
-            draw(options.output, one)?;
+            draw(output, one)?;
         }
     }
-    write_estimates(options.output, &done)?;
+    write_estimates(output, &done)?;
     phases.stop();
-    report.phases(&phases).threads(1).judge(&scene.expect, options.quick);
-    report.write(options.output)?;
+    report.phases(&phases).threads(1).judge(&scene.expect, quick);
     Ok(report)
 }
 

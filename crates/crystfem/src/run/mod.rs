@@ -1,6 +1,5 @@
 //! Whole scenes: run, compared, drawn and judged.
 
-pub mod checkpoint;
 mod draw;
 mod explain;
 mod film;
@@ -8,79 +7,29 @@ mod fit;
 mod part;
 mod point;
 mod probe;
-mod rows;
+mod program;
 mod section;
 mod suite;
-mod sweep;
 
-pub(crate) use rows::STATISTICS;
-pub use sweep::{Search, SweepOptions, Vary, search, sweep};
+pub use program::Crystfem;
 
 use crate::error::Error;
 use crate::scene::{self, FitScene, Kind, PartScene, PointScene};
-use polycore::report::Report;
+use polycore::case::{Finished, Run};
 use polycore::scene::Source;
-use std::path::Path;
-use std::time::Duration;
-
-/// How a run behaves towards its user.
-pub struct Options<'a> {
-    /// Where results go.
-    pub output: &'a Path,
-    /// Leave out what is marked `quick = false`.
-    pub quick: bool,
-    /// Time between checkpoints of a part's run.
-    pub checkpoint_every: Duration,
-    /// Go on from the checkpoint in `output`.
-    pub resume: bool,
-    /// Whether the user asked to stop.
-    pub interrupted: &'a (dyn Fn() -> bool + Sync),
-    /// Sees the progress of a part's run.
-    pub progress: &'a mut (dyn FnMut(&Progress) + Send),
-}
-
-/// Where the run of a part stands.
-#[derive(Clone, Copy, Debug)]
-pub struct Progress {
-    /// Time, s.
-    pub time: f64,
-    /// When it ends, s.
-    pub end: f64,
-    /// The last step, s.
-    pub dt: f64,
-    /// Equations.
-    pub equations: usize,
-    /// Which of how many runs this is, from 1.
-    pub of: [usize; 2],
-}
 
 /// What stops a run: a fault in the scene, or one met on the way.
 pub type Failure = polycore::scene::Failure<Error>;
 
-/// A run that came to its end.
-#[derive(Debug)]
-pub struct Finished {
-    /// What is in `report.json`.
-    pub report: Report,
-    /// What the user is shown of it.
-    pub text: String,
-}
-
-impl From<Report> for Finished {
-    fn from(report: Report) -> Self {
-        Self { text: report.table(), report }
-    }
-}
-
-/// Runs a scene of any kind and writes its report.
+/// Runs a scene of any kind, all but `report.json`, which [`Run::finish`] writes.
 ///
 /// # Errors
 /// [`Failure`].
-pub fn run(source: &Source, options: &mut Options) -> Result<Finished, Failure> {
+pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
     match scene::kind(source)? {
-        Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, options).map(Finished::from),
-        Kind::Fit => self::fit::run(source, &source.parse::<FitScene>()?, options).map(Finished::from),
-        Kind::Part => self::part::run(source, &source.parse::<PartScene>()?, options),
+        Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, run).map(Finished::from),
+        Kind::Fit => self::fit::run(source, &source.parse::<FitScene>()?, run).map(Finished::from),
+        Kind::Part => self::part::run(source, &source.parse::<PartScene>()?, run),
     }
 }
 

@@ -1,19 +1,18 @@
 //! A body in time: solved, recorded, drawn and judged.
 
-use super::checkpoint::{self, Header};
 use super::probe::{self, Probe};
-use super::rows::STATISTICS;
-use super::{Failure, Finished, Options, Progress, film, point::CELSIUS};
+use super::{Failure, film, point::CELSIUS};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
 use crate::scene::{PartScene, Task};
 use crate::simulation::{Simulation, State};
+use polycore::case::{Finished, Run, STATISTICS};
 use polycore::output::vtkhdf::{Cells, Data, MeshSeries};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 /// Name of the temperature among the fields.
 pub const TEMPERATURE: &str = "temperature_degC";
@@ -21,12 +20,12 @@ pub const TEMPERATURE: &str = "temperature_degC";
 const FRAMES: f64 = 50.0;
 
 /// Runs the scene of a body, or goes on with it.
-pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<Finished, Failure> {
+pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished, Failure> {
     if !scene.study.is_empty() {
-        return super::suite::run(source, scene, options);
+        return super::suite::run(source, scene, run);
     }
     scene.check(source)?;
-    let report = one(source, scene, None, options)?;
+    let report = one(source, scene, false, run)?;
     // what each layer ends with, and does to each probe, is more than a screen holds
     let of_layer = |name: &str| {
         let rest = name.strip_prefix("layer-").and_then(|rest| rest.split_once('.'));
@@ -37,30 +36,29 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
 }
 
 /// Runs one scene, or one study of a scene, whose expectations wait for the others.
-pub fn one(
-    source: &Source,
-    scene: &PartScene,
-    study: Option<&str>,
-    options: &mut Options,
-) -> Result<Report, Failure> {
+pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) -> Result<Report, Failure> {
+    let (output, quick) = (run.options.output, run.options.quick);
     let mut phases = Phases::new();
     phases.start("mesh");
     let built = scene.mesh.build(source)?;
     let task = scene.task(source, built.mesh)?;
-    if study.is_none() && !options.resume {
+    if !is_study && !run.options.resume {
         scene.check_expectations(source, &scene.quantities(&task), &[])?;
     }
     phases.start("solve");
-    let (mut simulation, frames, probes, _lock);
-    if options.resume {
-        _lock = polycore::output::resume_run(options.output)?;
-        let saved = checkpoint::read(options.output)?;
-        simulation = Simulation::resume(task.problem.clone(), task.settings, saved.state)?;
-        (frames, probes) = (saved.frames, saved.probes);
+    let (mut simulation, frames, probes);
+    if run.options.resume {
+        run.begin()?;
+    }
+    if let Some(reached) = run.reached::<Reached>()? {
+        simulation = Simulation::resume(task.problem.clone(), task.settings, reached.state)?;
+        (frames, probes) = (reached.frames, reached.probes);
     } else {
         simulation = Simulation::new(task.problem.clone(), task.settings)?;
         scene.refuse_too_large(source, &simulation, task.end)?;
-        _lock = polycore::output::prepare_run(options.output)?;
+        if !run.options.resume {
+            run.begin()?;
+        }
         let fields = simulation.field_names().len();
         frames = 0;
         probes = scene
@@ -72,28 +70,24 @@ pub fn one(
     }
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let names = simulation.field_names();
-    let header = Header::new(source, options.quick, study);
-    let mut run = Run { header, scene, task: &task, probes, names, frames };
-    let series = run.solve(&mut simulation, &mut phases, options)?;
+    let mut recorder = Recorder { scene, task: &task, probes, names, frames };
+    let series = recorder.solve(&mut simulation, &mut phases, run)?;
     phases.start("write");
-    run.record(&simulation, &mut report);
-    probe::write(&run.probes, &run.names, options.output, &mut report)?;
+    recorder.record(&simulation, &mut report);
+    probe::write(&recorder.probes, &recorder.names, output, &mut report)?;
     if !task.layers.is_empty() {
         let births: Vec<f64> = task.problem.births.iter().map(|birth| birth.time).collect();
-        probe::births(&run.probes, &run.names, &births, &mut report);
+        probe::births(&recorder.probes, &recorder.names, &births, &mut report);
     }
     let path = series.map(MeshSeries::finish).transpose()?;
     if scene.output.pictures {
         phases.start("draw");
-        probe::draw(&run.probes, &run.names, scene, options.output)?;
-        film::draw(scene, &task, &simulation, path.as_deref(), options.output)?;
+        probe::draw(&recorder.probes, &recorder.names, scene, output)?;
+        film::draw(scene, &task, &simulation, path.as_deref(), output)?;
     }
     phases.stop();
-    let expect = if study.is_none() { &scene.expect[..] } else { &[] };
-    report.phases(&phases).threads(rayon::current_num_threads()).judge(expect, options.quick);
-    report.write(options.output)?;
-    // the report is the last file: a checkpoint without it is an unfinished run
-    let _ = std::fs::remove_file(options.output.join(polycore::checkpoint::FILE_NAME));
+    let expect = if is_study { &[] } else { &scene.expect[..] };
+    report.phases(&phases).threads(rayon::current_num_threads()).judge(expect, quick);
     Ok(report)
 }
 
@@ -111,8 +105,26 @@ pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<St
     Ok(lines)
 }
 
-struct Run<'a> {
-    header: Header,
+/// How far a run is, as its checkpoint holds it.
+#[derive(Deserialize)]
+struct Reached {
+    /// Frames of the fields that are written.
+    frames: usize,
+    state: State,
+    /// Rows of the probes.
+    probes: Vec<Probe>,
+}
+
+/// [`Reached`], borrowed for writing.
+#[derive(Serialize)]
+struct Borrowed<'a> {
+    frames: usize,
+    state: &'a State,
+    probes: &'a [Probe],
+}
+
+/// What is seen of a body on its way.
+struct Recorder<'a> {
     scene: &'a PartScene,
     task: &'a Task,
     probes: Vec<Probe>,
@@ -122,33 +134,27 @@ struct Run<'a> {
     frames: usize,
 }
 
-impl Run<'_> {
+impl Recorder<'_> {
     /// To the end, frame by frame; a frame is written at each of their times even where no fields are.
     fn solve(
         &mut self,
         simulation: &mut Simulation,
         phases: &mut Phases,
-        options: &mut Options,
+        run: &mut Run,
     ) -> Result<Option<MeshSeries>, Failure> {
         let (end, mesh) = (self.task.end, &self.task.problem.mesh);
         let every = self.scene.output.every.map_or(end / FRAMES, |every| every.si());
         let last = (end / every - 1e-9).ceil().max(1.0) as usize;
-        let path = options.output.join("fields.vtkhdf");
+        let path = run.options.output.join("fields.vtkhdf");
         let mut series = match (self.scene.output.fields, self.frames) {
             (false, _) => None,
             (true, 0) => Some(MeshSeries::create(path, mesh.points.clone(), cells(mesh))?),
             (true, frames) => Some(MeshSeries::resume(path, mesh.points.clone(), cells(mesh), frames)?),
         };
-        let save = |frames: usize, state: &State, probes: &[Probe]| {
-            checkpoint::write(options.output, &self.header, frames, state, probes)
-        };
         if self.frames == 0 {
             simulation.finite()?;
             probe::record(&mut self.probes, simulation, &self.names)?;
-            // a run can be resumed from its first moment on
-            save(0, simulation.state(), &self.probes)?;
         }
-        let mut written = Instant::now();
         while self.frames <= last {
             let until = (self.frames as f64 * every).min(end);
             let (probes, names, frames) = (&mut self.probes, &self.names, self.frames);
@@ -156,20 +162,12 @@ impl Run<'_> {
             let mut observe = |simulation: &Simulation, step: &Record| -> ControlFlow<()> {
                 result = simulation.finite().and_then(|()| probe::record(probes, simulation, names));
                 let state = simulation.state();
-                (options.progress)(&Progress {
-                    time: state.time,
-                    end,
-                    dt: step.dt,
-                    equations: state.temperature.len(),
-                    of: [1, 1],
+                run.show(state.time / end, &|| {
+                    let (time, dt, equations) = (state.time, step.dt, state.temperature.len());
+                    format!("t = {time:.4} of {end:.4} s  step {dt:.3e} s  {equations} equations")
                 });
-                let stop = (options.interrupted)();
-                if result.is_ok() && (stop || written.elapsed() >= options.checkpoint_every) {
-                    result = save(frames, state, probes);
-                    written = Instant::now();
-                }
-                if result.is_ok() && stop {
-                    result = Err(Error::Interrupted(options.output.to_path_buf()));
+                if result.is_ok() {
+                    result = run.pause(|| Some(Borrowed { frames, state, probes })).map_err(Error::from);
                 }
                 if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };

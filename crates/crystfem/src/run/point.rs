@@ -1,7 +1,7 @@
 //! The material alone: curves, events, pictures.
 
+use super::Failure;
 use super::draw::{self, Run};
-use super::{Failure, Options};
 use crate::error::Error;
 use crate::point::{Course, Curves, Drive, Event, Stepping};
 use crate::scene::PointScene;
@@ -17,18 +17,19 @@ const DEGREES: [f64; 3] = [0.01, 0.5, 0.99];
 pub(super) const CELSIUS: f64 = 273.15;
 
 /// Runs every point with every of its materials.
-pub fn run(source: &Source, scene: &PointScene, options: &Options) -> Result<Report, Failure> {
+pub fn run(source: &Source, scene: &PointScene, run: &mut polycore::case::Run) -> Result<Report, Failure> {
+    let (output, quick) = (run.options.output, run.options.quick);
     let materials = scene.materials(source)?;
     let mut built = Vec::new();
     for (name, spec, key) in &materials {
         built.push((name.as_str(), *spec, spec.build(source, key)?));
     }
     let courses = scene.courses(source)?;
-    let _lock = polycore::output::prepare_run(options.output)?;
+    run.begin()?;
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let (mut phases, mut runs) = (Phases::new(), Vec::new());
     for (point, (drive, stepping)) in scene.point.iter().zip(courses) {
-        if options.quick && !point.quick {
+        if quick && !point.quick {
             continue;
         }
         for (material_name, _, material) in &built {
@@ -53,24 +54,23 @@ pub fn run(source: &Source, scene: &PointScene, options: &Options) -> Result<Rep
             };
             record(&mut report, &name, &course, &curves)?;
             phases.start("write");
-            write(options.output, &name, &course, &curves)?;
+            write(output, &name, &course, &curves)?;
             runs.push(Run { name, fields: material.field_names(), curves });
         }
     }
     compare(&mut report, scene);
     if scene.output.pictures {
         phases.start("draw");
-        draw::curves(&scene.title, &runs, options.output)?;
+        draw::curves(&scene.title, &runs, output)?;
         for (name, spec, key) in &materials {
             if spec.law == crate::scene::Law::Semicrystalline {
                 let material = spec.semicrystalline(source, key)?;
-                draw::laws(name, &material, options.output)?;
+                draw::laws(name, &material, output)?;
             }
         }
     }
     phases.stop();
-    report.phases(&phases).threads(1).judge(&scene.expect, options.quick);
-    report.write(options.output)?;
+    report.phases(&phases).threads(1).judge(&scene.expect, quick);
     Ok(report)
 }
 

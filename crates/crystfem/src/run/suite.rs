@@ -1,10 +1,9 @@
 //! The studies of a scene: each in a folder of its own, compared and judged together.
 
-use super::checkpoint::Header;
-use super::rows::{Row, Rows};
-use super::{Failure, Finished, Options, Progress, part};
+use super::{Crystfem, Failure, part};
 use crate::error::Error;
 use crate::scene::PartScene;
+use polycore::case::{Case, Fault, Finished, Options, Row, Rows, Run};
 use polycore::output::picture::{LinePlot, Series};
 use polycore::output::{atomic_write, csv};
 use polycore::report::{Phases, Report, Value};
@@ -17,12 +16,12 @@ use std::path::Path;
 const POINTS: usize = 4000;
 
 /// Runs every study, or goes on with those that are left.
-pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<Finished, Failure> {
-    let studies = scene.studies(source, options.quick)?;
+pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished, Failure> {
+    let (output, quick) = (run.options.output, run.options.quick);
+    let studies = scene.studies(source, quick)?;
     // every problem is built once before anything is computed or written: faults show at once
-    let _lock;
-    if options.resume {
-        _lock = polycore::output::resume_run(options.output)?;
+    if run.options.resume {
+        run.begin()?;
     } else {
         let mut names = scene.quantities_of_studies();
         for &index in &studies {
@@ -34,29 +33,28 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
             }
         }
         scene.check_expectations(source, &names, &left_out(scene, &studies))?;
-        _lock = polycore::output::prepare_run(options.output)?;
+        run.begin()?;
         for &index in &studies {
             // each run takes its own when it begins
-            drop(polycore::output::prepare_run(options.output.join(&scene.study[index].name))?);
+            drop(polycore::output::prepare_run(output.join(&scene.study[index].name))?);
         }
-        Header::new(source, options.quick, None).write(options.output)?;
     }
     let mut rows = Rows { settings: Vec::new(), columns: Vec::new(), rows: Vec::new() };
     for (place, &index) in studies.iter().enumerate() {
         let name = scene.study[index].name.clone();
-        let outcome = study(source, scene, index, [place + 1, studies.len()], options)?;
+        let outcome = study(source, scene, index, [place, studies.len()], run)?;
         rows.rows.push(Row { name, settings: Vec::new(), outcome });
     }
     let mut report = together(source, scene, &rows);
     let mut phases = Phases::new();
     phases.start("write");
-    rows.write(&options.output.join("studies.csv"))?;
+    rows.write(&output.join("studies.csv"))?;
     if scene.output.pictures {
         phases.start("draw");
-        compare(scene, &rows, options.output)?;
+        compare(scene, &rows, output)?;
     }
     phases.stop();
-    report.phases(&phases).threads(rayon::current_num_threads()).judge(&scene.expect, options.quick);
+    report.phases(&phases).threads(rayon::current_num_threads()).judge(&scene.expect, quick);
     // of a study that must fail and does not there need be no expectation
     let mut survivors = String::new();
     for study in scene.study.iter().filter(|study| study.fails.is_some()) {
@@ -65,9 +63,7 @@ pub fn run(source: &Source, scene: &PartScene, options: &mut Options) -> Result<
             survivors += &format!("FAIL  study {} did not fail\n", study.name);
         }
     }
-    table(&report, scene, &rows, options.output)?;
-    report.write(options.output)?;
-    let _ = std::fs::remove_file(options.output.join(polycore::checkpoint::FILE_NAME));
+    table(&report, scene, &rows, output)?;
     let text = rows.text() + &report.verdict() + &survivors;
     Ok(Finished { report, text })
 }
@@ -87,30 +83,33 @@ fn study(
     source: &Source,
     scene: &PartScene,
     index: usize,
-    of: [usize; 2],
-    options: &mut Options,
+    [place, of]: [usize; 2],
+    whole: &mut Run,
 ) -> Result<Result<Report, String>, Failure> {
     let spec = &scene.study[index];
-    let output = options.output.join(&spec.name);
-    if options.resume
+    let output = &whole.options.output.join(&spec.name);
+    if whole.options.resume
         && let Ok(report) = Report::read(output.join(polycore::report::FILE_NAME))
     {
         return Ok(Ok(report));
     }
-    let resume = options.resume && output.join(polycore::checkpoint::FILE_NAME).is_file();
-    let progress = &mut *options.progress;
-    let mut progress = |at: &Progress| progress(&Progress { of, ..*at });
-    let mut options = Options { output: &output, resume, progress: &mut progress, ..*options };
-    let outcome = scene
-        .of_study(source, index)
-        .map_err(Failure::from)
-        .and_then(|(source, scene)| part::one(&source, &scene, Some(&spec.name), &mut options));
-    let interrupted = |error: &Error| matches!(error, Error::Interrupted(_));
+    let interruption = whole.interruption();
+    let resume = whole.options.resume && output.join(polycore::checkpoint::FILE_NAME).is_file();
+    let Options { quick, checkpoint_every, interrupted, .. } = whole.options;
+    let mut progress = |part: f64, line: &dyn Fn() -> String| {
+        let line = || format!("run {} of {of}  {}", place + 1, line());
+        whole.show((place as f64 + part) / of as f64, &line);
+    };
+    let progress = Some(&mut progress as _);
+    let options = Options { output, quick, resume, checkpoint_every, interrupted, progress };
+    let mut own = Run::new(const { &Crystfem::PROGRAM }, source, Some(&spec.name), options);
+    let outcome = scene.of_study(source, index).map_err(Failure::from).and_then(|(source, scene)| {
+        let report = part::one(&source, &scene, true, &mut own)?;
+        own.finish(&report)?;
+        Ok(report)
+    });
     match (outcome, &spec.fails) {
-        (Err(Failure::Run(error)), _) if interrupted(&error) => {
-            let whole = output.parent().unwrap_or(&output).to_path_buf();
-            Err(Error::Interrupted(whole).into())
-        }
+        (Err(Failure::Run(error)), _) if error.is_interruption() => Err(interruption.into()),
         (Err(failure), Some(expected)) if failure.to_string().contains(expected.as_str()) => {
             Ok(Err(failure.to_string()))
         }

@@ -1,7 +1,7 @@
 //! What the expectations of a part may ask for: the names of the scalars that its report can have.
 
 use super::{PartScene, Task};
-use crate::run::STATISTICS;
+use polycore::case::STATISTICS;
 use polycore::scene::{SceneError, Source};
 
 /// Energies and their balance, J.

@@ -201,14 +201,8 @@ fn bad_fits() {
     }
     // two rows for three constants are found by the fit itself
     let source = Source::new(folder.path().join("case.toml"), good);
-    let mut options = crate::run::Options {
-        output: &folder.path().join("out"),
-        quick: false,
-        checkpoint_every: std::time::Duration::MAX,
-        resume: false,
-        interrupted: &|| false,
-        progress: &mut |_| {},
-    };
-    let error = crate::run::run(&source, &mut options).unwrap_err().to_string();
+    let output = folder.path().join("out");
+    let result = polycore::case::run::<crate::run::Crystfem>(&source, polycore::case::Options::new(&output));
+    let error = result.unwrap_err().to_string();
     assert!(error.contains("`fit[0].data`") && error.contains("2 measurements for 3 parameters"), "{error}");
 }

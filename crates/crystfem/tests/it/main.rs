@@ -7,7 +7,7 @@ mod extremes;
 mod fields;
 mod order;
 mod patch;
-#[cfg(feature = "cli")]
+#[cfg(feature = "case")]
 mod point;
 mod readers;
 mod same_bits;

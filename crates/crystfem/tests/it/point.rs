@@ -1,21 +1,14 @@
 //! Scenes of the material alone, and fits, from their text to their report.
 
-use crystfem::run::{Failure, Options, run};
+use crystfem::run::{Crystfem, Failure};
+use polycore::case::Options;
 use polycore::report::Report;
 use polycore::scene::Source;
 use std::path::Path;
-use std::time::Duration;
 
 fn run_quietly(source: &Source, output: &Path, quick: bool) -> Result<Report, Failure> {
-    let mut options = Options {
-        output,
-        quick,
-        checkpoint_every: Duration::MAX,
-        resume: false,
-        interrupted: &|| false,
-        progress: &mut |_| {},
-    };
-    run(source, &mut options).map(|finished| finished.report)
+    let options = Options { quick, ..Options::new(output) };
+    polycore::case::run::<Crystfem>(source, options).map(|finished| finished.report)
 }
 
 const SCENE: &str = r#"

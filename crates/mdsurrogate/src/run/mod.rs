@@ -1,10 +1,10 @@
 //! Whole scenes: data measured, laws trained, judged, drawn and written, with `report.json` last.
 
-pub mod checkpoint;
 mod crystal;
 mod data;
 mod draw;
 mod judge;
+mod program;
 mod search;
 mod searched;
 mod training;
@@ -13,70 +13,43 @@ mod uniaxial;
 
 pub use data::{Prepared, describe, load};
 pub use judge::{Named, judge_laws};
+pub use program::Mdsurrogate;
 
 use crate::cell::ATOMS_OF_MONOMER;
 use crate::error::Error;
 use crate::scene::{CrystalSpec, Scene};
+use polycore::case::{Finished, Run};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
-use std::path::Path;
-use std::time::Duration;
 
 /// What stops a run: a fault in the scene, or one met on the way.
 pub type Failure = polycore::scene::Failure<Error>;
 
-/// How a run behaves towards its user.
-pub struct Options<'a> {
-    /// Where results go.
-    pub output: &'a Path,
-    /// Leave out what is marked `quick = false`.
-    pub quick: bool,
-    /// Time between checkpoints.
-    pub checkpoint_every: Duration,
-    /// Go on from the checkpoint in `output`.
-    pub resume: bool,
-    /// Whether the user asked to stop.
-    pub interrupted: &'a (dyn Fn() -> bool + Sync),
-    /// Sees the part done, from 0 to 1, and a line about it.
-    pub progress: &'a mut dyn FnMut(f64, &dyn Fn() -> String),
-}
-
-/// A finished run.
-pub struct Finished {
-    /// As written to `report.json`.
-    pub report: Report,
-    /// Lines that no number can say: names of constant components, provenance, tables.
-    pub remarks: Vec<String>,
-}
-
-/// Runs a scene.
+/// Runs a scene, all but `report.json`, which [`Run::finish`] writes.
 ///
 /// # Errors
 /// [`Failure`]; nothing half-written remains.
-pub fn run(source: &Source, options: &mut Options) -> Result<Finished, Failure> {
+pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
+    let (output, quick) = (run.options.output, run.options.quick);
     let scene = source.parse::<Scene>()?;
     scene.check(source)?;
     let mut phases = Phases::new();
     phases.start("read");
     let data = scene.data.as_ref().map(|_| Prepared::new(source, &scene)).transpose()?;
-    let _lock = match options.resume {
-        true => polycore::output::resume_run(options.output)?,
-        false => polycore::output::prepare_run(options.output)?,
-    };
+    run.begin()?;
     let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), &source.text);
     let mut remarks = Vec::new();
     if let Some(spec) = &scene.crystal {
         phases.start("build");
-        crystal::measure(spec, options.output, &mut report)?;
+        crystal::measure(spec, output, &mut report)?;
     }
     if let Some(data) = &data {
-        learn(source, &scene, data, options, &mut phases, &mut report, &mut remarks)?;
+        learn(source, &scene, data, run, &mut phases, &mut report, &mut remarks)?;
     }
     phases.stop();
-    report.phases(&phases).threads(1).judge(&scene.expect, options.quick).write(options.output)?;
-    // the report is the last file: a checkpoint without it is an unfinished run
-    let _ = std::fs::remove_file(options.output.join(polycore::checkpoint::FILE_NAME));
-    Ok(Finished { report, remarks })
+    report.phases(&phases).threads(1).judge(&scene.expect, quick);
+    let text = remarks.iter().fold(report.table(), |text, line| text + line + "\n");
+    Ok(Finished { report, text })
 }
 
 /// Measures data, trains and judges laws on them, searches.
@@ -84,7 +57,7 @@ fn learn(
     source: &Source,
     scene: &Scene,
     data: &Prepared,
-    options: &mut Options,
+    run: &mut Run,
     phases: &mut Phases,
     report: &mut Report,
     remarks: &mut Vec<String>,
@@ -92,25 +65,25 @@ fn learn(
     phases.start("measure");
     remarks.extend(data.measure(report)?);
     report.work("rows", data.set.len() as u64).work("paths", data.set.paths.len() as u64);
-    let models: Vec<_> = scene.model.iter().filter(|model| model.quick || !options.quick).collect();
+    let models: Vec<_> = scene.model.iter().filter(|model| model.quick || !run.options.quick).collect();
     if !scene.trial.is_empty() {
         phases.start("trials");
-        trials::run(source, scene, options, report)?;
+        trials::run(source, scene, run, report)?;
     } else if !models.is_empty() {
         phases.start("train");
-        let trained = training::train(source, scene, &models, data, options)?;
+        let trained = training::train(scene, &models, data, run)?;
         phases.start("judge");
-        training::record(&trained, options.output, report)?;
+        training::record(&trained, run.options.output, report)?;
         remarks.extend(training::remarks(&trained, data));
         let laws: Vec<judge::Named> = trained.iter().map(training::Trained::named).collect();
-        remarks.extend(judge_laws(&laws, data, options.output, report)?);
+        remarks.extend(judge_laws(&laws, data, run.options.output, report)?);
     }
     if let Some(spec) = &scene.search {
         phases.start("search");
-        remarks.extend(search::search(source, scene, spec, data, options, report)?);
+        remarks.extend(search::search(scene, spec, data, run, report)?);
     }
     phases.start("write");
-    Ok(data.write(options.output)?)
+    Ok(data.write(run.options.output)?)
 }
 
 /// Three significant digits.

@@ -1,24 +1,23 @@
 //! A scene's search for hyperparameters: trained, remembered, written as a table like 3.4.
 
-use super::{Failure, Options, Prepared, checkpoint, short};
+use super::{Failure, Prepared, short};
 use crate::dataset::Row;
 use crate::error::Error;
 use crate::scene::{Scene, SearchSpec};
 use crate::search::{Journal, Method, Oracle, Trial, at_random, bayesian, hyperband};
 use crate::surrogate::Kind;
 use crate::train::{Settings, State, Training};
+use polycore::case::Run;
 use polycore::output::atomic_write;
 use polycore::output::picture::{LinePlot, Series};
 use polycore::report::Report;
-use polycore::scene::Source;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
-use std::time::Instant;
 
 /// Where the searches stand.
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, Deserialize)]
 struct Progress {
     /// Those with the seeds before.
     done: Vec<Searched>,
@@ -40,38 +39,30 @@ pub(super) struct Searched {
 /// # Errors
 /// [`Error::Interrupted`]; I/O errors.
 pub fn search(
-    source: &Source,
     scene: &Scene,
     spec: &SearchSpec,
     data: &Prepared,
-    options: &mut Options,
+    run: &mut Run,
     report: &mut Report,
 ) -> Result<Vec<String>, Failure> {
-    let header = checkpoint::Header::new(source, options.quick);
-    let Progress { done, current: Searched { mut journal, mut seconds }, states } = match options.resume {
-        true => checkpoint::read(options.output)?,
-        false => Progress::default(),
-    };
-    if !options.resume {
-        checkpoint::write(options.output, &header, &Progress::default())?;
-    }
+    let Progress { done, current: Searched { mut journal, mut seconds }, states } =
+        run.reached()?.unwrap_or_default();
+    let quick = run.options.quick;
     // of a trial that was answered and not yet in the journal
     seconds.truncate(journal.trials.len());
-    let (epochs, trials) = (spec.epochs(options.quick), spec.trials(options.quick));
-    let repeats = spec.repeats(options.quick);
+    let (epochs, trials) = (spec.epochs(quick), spec.trials(quick));
+    let repeats = spec.repeats(quick);
     let expected = expected_epochs(spec, epochs, trials) * u64::from(repeats);
     let mut trainer = Trainer {
         rows: data.rows(&data.split.train),
         validation: data.rows(&data.split.validation),
-        settings: scene.training.over(&Default::default(), options.quick),
-        header,
+        settings: scene.training.over(&Default::default(), quick),
         done,
         states,
         seconds,
-        saved: Instant::now(),
         epochs: 0,
         expected,
-        options,
+        run,
     };
     for repeat in trainer.done.len() as u64..u64::from(repeats) {
         // streams of numbers far enough from each other, and those of a single search what they always were
@@ -93,13 +84,14 @@ pub fn search(
         let own =
             Searched { journal: std::mem::take(&mut journal), seconds: std::mem::take(&mut trainer.seconds) };
         trainer.done.push(own);
-        trainer.save(&journal)?;
+        let Trainer { done, states, seconds, run, .. } = &mut trainer;
+        run.save(&Borrowed { done, current: (&journal, seconds), states })?;
     }
-    let Trainer { done, options, .. } = trainer;
+    let Trainer { done, run, .. } = trainer;
     let count: usize = done.iter().map(|one| one.journal.trials.len()).sum();
     report.work("trainings of the search", count as u64);
     super::searched::against_time(spec, &done, report);
-    Ok(write(spec, &done, options.output, report)?)
+    Ok(write(spec, &done, run.options.output, report)?)
 }
 
 /// Epochs that a search will train, for its progress.
@@ -131,30 +123,20 @@ struct Trainer<'a, 'o> {
     rows: Vec<&'a Row>,
     validation: Vec<&'a Row>,
     settings: Settings,
-    header: checkpoint::Header,
     done: Vec<Searched>,
     states: BTreeMap<(Method, usize), State>,
     seconds: Vec<f64>,
-    saved: Instant,
     epochs: u64,
     expected: u64,
-    options: &'a mut Options<'o>,
+    run: &'a mut Run<'o>,
 }
 
+/// The fields of [`Progress`], one after the other.
 #[derive(Serialize)]
 struct Borrowed<'a> {
     done: &'a [Searched],
     current: (&'a Journal, &'a [f64]),
     states: &'a BTreeMap<(Method, usize), State>,
-}
-
-impl Trainer<'_, '_> {
-    fn save(&mut self, journal: &Journal) -> Result<(), Error> {
-        self.saved = Instant::now();
-        // the fields of `Progress`, one after the other
-        let borrowed = Borrowed { done: &self.done, current: (journal, &self.seconds), states: &self.states };
-        checkpoint::write(self.options.output, &self.header, &borrowed)
-    }
 }
 
 impl Oracle for Trainer<'_, '_> {
@@ -173,11 +155,11 @@ impl Oracle for Trainer<'_, '_> {
             None => Training::new(&law, &self.rows, &self.validation, settings)?,
         };
         while training.ending().is_none() {
-            if (self.options.interrupted)() {
-                self.states.insert(key, training.state().clone());
-                self.save(journal)?;
-                return Err(Error::Interrupted(self.options.output.to_path_buf()));
-            }
+            let Self { done, states, seconds, run, .. } = self;
+            run.pause(|| {
+                states.insert(key, training.state().clone());
+                Some(Borrowed { done, current: (journal, seconds), states })
+            })?;
             match training.epoch() {
                 Ok(_) => {}
                 Err(Error::Diverged { .. }) => {
@@ -188,7 +170,7 @@ impl Oracle for Trainer<'_, '_> {
             }
             self.epochs += 1;
             let part = (self.epochs as f64 / self.expected as f64).min(1.0);
-            (self.options.progress)(part, &|| {
+            self.run.show(part, &|| {
                 format!(
                     "{} {}: {} at {}, epoch {} of {}, best loss {} MPa²",
                     question.method.name(),
@@ -204,9 +186,6 @@ impl Oracle for Trainer<'_, '_> {
         let loss = training.state().best_loss();
         self.seconds.push(training.state().seconds());
         self.states.insert(key, training.state().clone());
-        if self.saved.elapsed() >= self.options.checkpoint_every {
-            self.save(journal)?;
-        }
         Ok(Some(loss))
     }
 

@@ -1,19 +1,18 @@
 //! The models of a scene, trained one after the other.
 
 use super::judge::Named;
-use super::{Failure, Options, Prepared, checkpoint, short};
+use super::{Failure, Prepared, short};
 use crate::dataset::Method;
 use crate::error::Error;
 use crate::scene::{ModelSpec, Scene};
 use crate::surrogate::{Header, Surrogate};
 use crate::train::{Settings, State, Training, ensemble};
+use polycore::case::Run;
 use polycore::output::csv;
 use polycore::report::Report;
-use polycore::scene::Source;
 use polycore::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::time::Instant;
 
 /// Where the trainings of a scene stand: member by member of model by model; the last may be unfinished.
 #[derive(Debug, Default, Serialize, Deserialize)]
@@ -49,25 +48,17 @@ impl Trained {
 /// # Errors
 /// Those of [`Training`], with what is finished kept in the checkpoint; [`Error::Interrupted`].
 pub fn train(
-    source: &Source,
     scene: &Scene,
     models: &[&ModelSpec],
     data: &Prepared,
-    options: &mut Options,
+    run: &mut Run,
 ) -> Result<Vec<Trained>, Failure> {
-    let mut run = Run {
-        header: checkpoint::Header::new(source, options.quick),
-        progress: match options.resume {
-            true => checkpoint::read(options.output)?,
-            false => Progress::default(),
-        },
-        saved: Instant::now(),
+    let (output, quick) = (run.options.output, run.options.quick);
+    let mut queue = Queue {
+        progress: run.reached()?.unwrap_or_default(),
         total: models.iter().map(|model| model.members).sum(),
         done: 0,
     };
-    if !options.resume {
-        checkpoint::write(options.output, &run.header, &run.progress)?;
-    }
     let mut trained = Vec::new();
     for model in models {
         let split = data.split_of(model.split);
@@ -81,7 +72,7 @@ pub fn train(
             &rows,
             model.standardised(),
         )?;
-        let settings = model.training.over(&scene.training, options.quick);
+        let settings = model.training.over(&scene.training, quick);
         header.provenance.clone_from(&data.set.provenance);
         header.provenance.push(format!(
             "{} {}: {} training rows of a split by {:?} with seed {}; {settings:?}",
@@ -91,10 +82,10 @@ pub fn train(
             split.method,
             split.seed,
         ));
-        let first = run.done;
+        let first = queue.done;
         for member in 0..model.members {
             let settings = Settings { seed: settings.seed.wrapping_add(member as u64), ..settings };
-            let training = match run.progress.states.get(run.done) {
+            let training = match queue.progress.states.get(queue.done) {
                 Some(state) => Training::resume(&header, &rows, &validation, settings, state.clone()),
                 None => Training::new(&header, &rows, &validation, settings),
             };
@@ -102,53 +93,52 @@ pub fn train(
                 1 => model.title(),
                 members => format!("{} ({} of {members})", model.title(), member + 1),
             };
-            let result = run.finish(training?, &title, settings, options);
+            let result = queue.finish(training?, &title, settings, run);
             // also of a diverged training: its best epoch is a law
             if let Err(failure) = result {
-                let begun = &run.progress.states[first.min(run.progress.states.len())..];
-                write(&model.title(), &header, begun, &strains, options.output)?;
+                let begun = &queue.progress.states[first.min(queue.progress.states.len())..];
+                write(&model.title(), &header, begun, &strains, output)?;
                 return Err(failure);
             }
         }
-        let states = run.progress.states[first..run.done].to_vec();
-        let law = write(&model.title(), &header, &states, &strains, options.output)?;
+        let states = queue.progress.states[first..queue.done].to_vec();
+        let law = write(&model.title(), &header, &states, &strains, output)?;
         let (name, runs, split) = (model.title(), model.runs.clone(), model.split);
         trained.push(Trained { name, runs, law, states, split });
     }
     Ok(trained)
 }
 
-struct Run {
-    header: checkpoint::Header,
+/// The trainings of a scene, in their order.
+struct Queue {
     progress: Progress,
-    saved: Instant,
     total: usize,
     done: usize,
 }
 
-impl Run {
+impl Queue {
     /// Trains to the end, with checkpoints.
     fn finish(
         &mut self,
         mut training: Training,
         title: &str,
         settings: Settings,
-        options: &mut Options,
+        run: &mut Run,
     ) -> Result<(), Failure> {
         while training.ending().is_none() {
             let result = training.epoch().copied();
             let epochs = training.state().history().len();
-            if result.is_err() || (options.interrupted)() {
-                self.save(&training, options)?;
-                result?;
-                return Err(Error::Interrupted(options.output.to_path_buf()).into());
+            if result.is_err() {
+                self.store(&training);
+                run.save(&self.progress)?;
             }
             let epoch = result?;
-            if self.saved.elapsed() >= options.checkpoint_every {
-                self.save(&training, options)?;
-            }
+            run.pause(|| {
+                self.store(&training);
+                Some(&self.progress)
+            })?;
             let part = (self.done as f64 + epochs as f64 / f64::from(settings.epochs)) / self.total as f64;
-            (options.progress)(part, &|| {
+            run.show(part, &|| {
                 let validation =
                     epoch.validation.map_or(String::new(), |loss| format!(", validation {}", short(loss)));
                 format!(
@@ -161,20 +151,12 @@ impl Run {
         }
         self.store(&training);
         self.done += 1;
-        checkpoint::write(options.output, &self.header, &self.progress)?;
-        Ok(())
+        Ok(run.save(&self.progress)?)
     }
 
     fn store(&mut self, training: &Training) {
         self.progress.states.truncate(self.done);
         self.progress.states.push(training.state().clone());
-    }
-
-    fn save(&mut self, training: &Training, options: &Options) -> Result<(), Error> {
-        self.store(training);
-        checkpoint::write(options.output, &self.header, &self.progress)?;
-        self.saved = Instant::now();
-        Ok(())
     }
 }
 

@@ -1,11 +1,12 @@
 //! The trials of a stability suite: data that are extreme or degenerate, laws asked where they cannot know; each must be
 //! refused with a message, or end with finite numbers, flagged where they are uncertain.
 
-use super::{Failure, Options, Prepared, short};
+use super::{Failure, Prepared, short};
 use crate::error::Error;
 use crate::scene::{ModelSpec, Scene, TrialSpec};
 use crate::surrogate::{Surrogate, Workspace};
 use crate::train::{Settings, Training, ensemble};
+use polycore::case::Run;
 use polycore::report::{Report, Trial};
 use polycore::scene::Source;
 use polycore::tensor::Voigt;
@@ -14,16 +15,16 @@ use polycore::tensor::Voigt;
 ///
 /// # Errors
 /// [`Error::Interrupted`]: errors of a trial are what it shows.
-pub fn run(source: &Source, scene: &Scene, options: &Options, report: &mut Report) -> Result<(), Failure> {
+pub fn run(source: &Source, scene: &Scene, run: &Run, report: &mut Report) -> Result<(), Failure> {
     for trial in &scene.trial {
         let mut own = scene.clone();
         if let (Some(files), Some(data)) = (&trial.files, &mut own.data) {
             data.files.clone_from(files);
         }
         let mut epochs = 0;
-        let result = seen(source, &own, trial, options, &mut epochs);
-        if (options.interrupted)() {
-            return Err(Error::Interrupted(options.output.to_path_buf()).into());
+        let result = seen(source, &own, trial, run.options.quick, &mut epochs);
+        if (run.options.interrupted)() {
+            return Err(run.interruption().into());
         }
         let (seen, passed) = match (result, &trial.refused) {
             (Err(failure), Some(part)) => {
@@ -52,7 +53,7 @@ fn seen(
     source: &Source,
     scene: &Scene,
     trial: &TrialSpec,
-    options: &Options,
+    quick: bool,
     epochs: &mut u64,
 ) -> Result<(String, Option<bool>), Failure> {
     let data = Prepared::new(source, scene)?;
@@ -61,7 +62,7 @@ fn seen(
     let chosen =
         |model: &&ModelSpec| trial.models.as_ref().is_none_or(|names| names.contains(&model.title()));
     for model in scene.model.iter().filter(chosen) {
-        let settings = model.training.over(&scene.training, options.quick);
+        let settings = model.training.over(&scene.training, quick);
         let (law, best) = trained(model, settings, &data, epochs)?;
         let mut part = format!("{}: loss {} MPa²", model.title(), short(best));
         if let Some(c) = trial.at {

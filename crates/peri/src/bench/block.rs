@@ -10,7 +10,7 @@ use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection, force};
 use peri::calibrate::{Space, modulus, poisson_ratio};
 use peri::field::{Field, chunk_range};
 use peri::potential::{KernelFit, Law};
-use polycore::command::Measurement;
+use polycore::case::terminal::Measurement;
 use polycore::output::csv::{self, Column};
 use rayon::prelude::*;
 use std::f64::consts::PI;

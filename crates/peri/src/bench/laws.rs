@@ -6,7 +6,7 @@
 
 use peri::Error;
 use peri::potential::{BondPotential, KernelFit, Law};
-use polycore::command::Measurement;
+use polycore::case::terminal::Measurement;
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -14,7 +14,7 @@ use peri::solver::{
     AdaptiveDynamicRelaxation, Equilibrium, LimitedMemory, Loads, PreconditionedLbfgs, Relaxation, State,
     Support, System, march,
 };
-use polycore::command::Measurement;
+use polycore::case::terminal::Measurement;
 use std::time::Instant;
 
 /// Half a side of the plate, its thickness, and the hole's radius, m.

@@ -8,10 +8,12 @@ mod frames;
 mod history;
 mod outcome;
 mod probes;
+mod program;
 
 pub use compare::BALANCES;
 pub use history::load_at_name;
 pub use outcome::{Outcome, Profile};
+pub use program::Peri;
 
 use bonded::Bonded;
 use frames::Frames;
@@ -19,7 +21,6 @@ use probes::Probes;
 
 use crate::bonds::{Bonds, Kind, fragments, stretch_range};
 use crate::calibrate::Space;
-use crate::checkpoint;
 use crate::contact::Contact;
 use crate::error::Error;
 use crate::material::{BondMaterial, Property};
@@ -27,28 +28,27 @@ use crate::potential::{BondPotential, KernelFit};
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
 use crate::solver::{Breaking, Loads, State, Status, System, march};
 use crate::stress::{Loaded, Tensor, piola_in_cloud, piola_on_lattice};
+use polycore::case::{Fault, Run};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
-use std::path::Path;
-use std::time::{Duration, Instant};
+use serde::{Deserialize, Serialize};
 
-/// How long a run that is asked to stop looks for a moment from which it can go on.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// How far a run is, as its checkpoint holds it.
+#[derive(Deserialize)]
+#[serde(bound = "")]
+struct Progress<const D: usize> {
+    /// Results of the finished variants.
+    finished: Vec<Outcome>,
+    /// The variant under way; none between variants.
+    state: Option<State<D>>,
+}
 
-/// How a run behaves towards its user.
-pub struct Options<'a> {
-    /// Where results go.
-    pub output: &'a Path,
-    /// Leave out variants and expectations marked `quick = false`.
-    pub quick: bool,
-    /// Time between checkpoints.
-    pub checkpoint_every: Duration,
-    /// Continue from the checkpoint in `output`.
-    pub resume: bool,
-    /// Whether the user asked to stop.
-    pub interrupted: &'a dyn Fn() -> bool,
-    /// Sees progress.
-    pub progress: &'a mut dyn FnMut(&str, &Status),
+/// [`Progress`], borrowed for writing.
+#[derive(Serialize)]
+#[serde(bound = "")]
+struct Reached<'a, const D: usize> {
+    finished: &'a [Outcome],
+    state: Option<&'a State<D>>,
 }
 
 /// What stops a run: a fault in the scene, or one met on the way.
@@ -77,56 +77,46 @@ impl Finished {
     }
 }
 
-/// Runs a scene in its dimension.
+/// Runs a scene in its dimension, all but `report.json`, which [`Run::finish`] writes.
 ///
 /// # Errors
 /// [`Failure`]; nothing half-written remains, and an interrupted run can be resumed.
-pub fn run(source: &Source, scene: &Scene, options: &mut Options) -> Result<Finished, Failure> {
+pub fn run(source: &Source, scene: &Scene, run: &mut Run) -> Result<Finished, Failure> {
     match scene.body.space {
-        Space::Solid => run_in::<3>(source, scene, options),
-        _ => run_in::<2>(source, scene, options),
+        Space::Solid => run_in::<3>(source, scene, run),
+        _ => run_in::<2>(source, scene, run),
     }
 }
 
-fn run_in<const D: usize>(
-    source: &Source,
-    scene: &Scene,
-    options: &mut Options,
-) -> Result<Finished, Failure> {
-    let variants = scene::check(source, scene, options.quick)?;
+fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Result<Finished, Failure> {
+    let (output, quick) = (run.options.output, run.options.quick);
+    let variants = scene::check(source, scene, quick)?;
     // every body is built once before anything is computed or written: faults show at once
-    if !options.resume {
+    if !run.options.resume {
         for variant in variants.iter().filter(|variant| expected_error(scene, variant).is_none()) {
             let (source, scene) = variant.resolve(source, scene)?;
             Built::<D>::new(&source, &scene, variant)?;
         }
     }
-    let (mut finished, mut state) = (Vec::new(), None);
-    let _lock;
-    if options.resume {
-        _lock = polycore::output::resume_run(options.output)?;
-        let read = checkpoint::read::<D>(options.output)?;
-        (finished, state) = (read.finished, read.state);
-    } else {
-        _lock = polycore::output::prepare_run(options.output)?;
-        // a run can be resumed from its first moment on
-        checkpoint::write::<D>(options.output, source, options.quick, &finished, None)?;
-    }
+    run.begin()?;
+    let reached = run.reached::<Progress<D>>()?;
+    let (mut finished, mut state) = reached.map_or_else(Default::default, |at| (at.finished, at.state));
     for variant in &variants[finished.len().min(variants.len())..] {
         let state = state.take();
+        let done = Done { finished: &finished, of: variants.len() };
         let (own_source, own_scene) = variant.resolve(source, scene)?;
         let study = variant.study.and_then(|index| scene.study.get(index));
         let expected = expected_error(scene, variant);
         let mut outcome = match scene::check_variant(&own_source, &own_scene)
             .map_err(Failure::from)
-            .and_then(|()| run_variant::<D>(&own_source, &own_scene, variant, options, &finished, state))
+            .and_then(|()| run_variant::<D>(&own_source, &own_scene, variant, run, &done, state))
         {
             Err(failure) if expected.is_some_and(|text| failure.to_string().contains(text)) => {
                 let mut outcome = Outcome::new(variant.name(), variant);
                 outcome.error = Some(failure.to_string());
                 outcome
             }
-            Err(Failure::Run(error)) if variants.len() > 1 && !matches!(error, Error::Interrupted(_)) => {
+            Err(Failure::Run(error)) if variants.len() > 1 && !error.is_interruption() => {
                 return Err(Error::Within { variant: variant.name(), error: Box::new(error) }.into());
             }
             other => other?,
@@ -136,18 +126,15 @@ fn run_in<const D: usize>(
         }
         outcome.must = study.and_then(|study| study.must.clone());
         finished.push(outcome);
-        checkpoint::write::<D>(options.output, source, options.quick, &finished, None)?;
+        run.save(&Reached::<D> { finished: &finished, state: None })?;
     }
-    let mut report = compare::report(source, scene, &finished, options.quick);
-    history::write(scene, &finished, options.output)?;
-    compare::study(&finished, options.output)?;
-    history::suite(&mut report, &finished, options.output)?;
+    let mut report = compare::report(source, scene, &finished, quick);
+    history::write(scene, &finished, output)?;
+    compare::study(&finished, output)?;
+    history::suite(&mut report, &finished, output)?;
     if scene.output.pictures {
-        draw::curves(scene, &finished, options.output)?;
+        draw::curves(scene, &finished, output)?;
     }
-    report.write(options.output)?;
-    // the report is the last file: a checkpoint without it is an unfinished run
-    let _ = std::fs::remove_file(options.output.join(checkpoint::FILE_NAME));
     Ok(Finished { report, outcomes: finished })
 }
 
@@ -160,10 +147,11 @@ fn run_variant<const D: usize>(
     source: &Source,
     scene: &Scene,
     variant: &Variant,
-    options: &mut Options,
-    finished: &[Outcome],
+    run: &mut Run,
+    done: &Done,
     state: Option<State<D>>,
 ) -> Result<Outcome, Failure> {
+    let output = run.options.output;
     let mut phases = Phases::new();
     phases.start("build");
     let Built { bonded, loads, loaded, probes } = Built::<D>::new(source, scene, variant)?;
@@ -179,12 +167,12 @@ fn run_variant<const D: usize>(
     }
     if state.displacement.slots() != slots {
         let why = format!("it has {} particles' slots, the body now has {slots}", state.displacement.slots());
-        let path = options.output.join(checkpoint::FILE_NAME);
+        let path = output.join(polycore::checkpoint::FILE_NAME);
         return Err(polycore::Error::Checkpoint { path, why }.into());
     }
     let mut outcome = Outcome::new(variant.name(), variant);
     outcome.warnings = warnings;
-    let path = options.output.join(format!("{}.vtkhdf", outcome.file_name()));
+    let path = output.join(format!("{}.vtkhdf", outcome.file_name()));
     // where forces act, and where the surface correction has already made up for missing bonds
     let corrected = variant.surface == scene::SurfaceCorrection::Energy;
     let by_window = loaded.iter().map(|&loaded| loaded || corrected).collect();
@@ -192,14 +180,14 @@ fn run_variant<const D: usize>(
     let (law_used, loads_used) = (&*law, &loads);
     let solution = Solution {
         variant,
-        finished,
+        done,
         law: law_used,
         modulus,
         loads: loads_used,
         probes: &probes,
         critical_stretch: critical_stretch.as_ref(),
     };
-    solve(source, scene, &solution, options, &mut body, &mut state, &mut phases, &mut frames)?;
+    solve(scene, &solution, run, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
     let fit = KernelFit::new(&*law, covering(&*body.bonds, &state), scene.fit_bound())?;
     outcome.value("fit_error", fit.max_error, "");
@@ -231,12 +219,18 @@ fn run_variant<const D: usize>(
     let path = frames.path().to_path_buf();
     frames.finish(&*body.bonds, &state, &stresses)?;
     if scene.output.pictures {
-        draw::maps(scene, &*body.bonds, &state, &stresses.cauchy, &outcome, options.output)?;
+        draw::maps(scene, &*body.bonds, &state, &stresses.cauchy, &outcome, output)?;
         if scene.output.fields && scene.output.every.is_some() && critical_stretch.is_some() {
-            frames::stages(scene, &outcome, body.bonds.spacing(), &path, options.output)?;
+            frames::stages(scene, &outcome, body.bonds.spacing(), &path, output)?;
         }
     }
     Ok(outcome)
+}
+
+/// The variants before one, and how many there are.
+struct Done<'a> {
+    finished: &'a [Outcome],
+    of: usize,
 }
 
 /// All that a variant is before it is solved.
@@ -261,7 +255,7 @@ impl<const D: usize> Built<D> {
 /// What is solved and does not change.
 struct Solution<'a, const D: usize> {
     variant: &'a Variant,
-    finished: &'a [Outcome],
+    done: &'a Done<'a>,
     law: &'a dyn BondPotential,
     modulus: f64,
     loads: &'a Loads<D>,
@@ -271,37 +265,24 @@ struct Solution<'a, const D: usize> {
 
 #[expect(clippy::too_many_arguments, reason = "one call, of what changes and what does not")]
 fn solve<const D: usize>(
-    source: &Source,
     scene: &Scene,
     solution: &Solution<D>,
-    options: &mut Options,
+    run: &mut Run,
     body: &mut scene::Body<D>,
     state: &mut State<D>,
     phases: &mut Phases,
     frames: &mut Frames,
 ) -> Result<(), Failure> {
-    let Solution { variant, finished, law, modulus, loads, probes, critical_stretch } = *solution;
+    let Solution { variant, done, law, modulus, loads, probes, critical_stretch } = *solution;
     let factors = scene.solver.factors();
     let name = variant.name();
-    let (mut written, mut asked) = (Instant::now(), None);
-    let (output, quick, every, interrupted) =
-        (options.output, options.quick, options.checkpoint_every, options.interrupted);
-    let progress = &mut *options.progress;
     let mut watch = |status: &Status, state: &State<D>| -> Result<(), Error> {
-        progress(&name, status);
-        let stop = interrupted();
-        if status.restartable && (stop || written.elapsed() >= every) {
-            checkpoint::write(output, source, quick, finished, Some(state))?;
-            written = Instant::now();
+        if status.iteration.is_multiple_of(20) {
+            let part = (done.finished.len() as f64 + part_of(status)) / done.of as f64;
+            run.show(part, &|| format!("{name}  {}", line_of(status)));
         }
-        if stop {
-            let since = *asked.get_or_insert_with(Instant::now);
-            // the last checkpoint will do where the next restartable moment is far
-            if status.restartable || since.elapsed() > PATIENCE {
-                return Err(Error::Interrupted(output.to_path_buf()));
-            }
-        }
-        Ok(())
+        let reached = || Reached { finished: done.finished, state: Some(state) };
+        Ok(run.pause(|| status.restartable.then(reached))?)
     };
     let contact =
         scene.contact.map(|contact| Contact::new(&*body.bonds, modulus, contact.stiffness)).transpose()?;
@@ -329,6 +310,21 @@ fn solve<const D: usize>(
     };
     phases.stop();
     Ok(solved?)
+}
+
+/// An iteration in a line.
+fn line_of(status: &Status) -> String {
+    let Status { step, steps, iteration, residual, load, broken, .. } = *status;
+    let broken = if broken > 0 { format!("  broken {broken}") } else { String::new() };
+    let load = load.map_or(String::new(), |load| format!("  load {load:.4e} N before"));
+    format!("step {}/{steps}{broken}  iteration {iteration}  residual {residual:.2e}{load}", step + 1)
+}
+
+/// The part of a variant that is done, 0 to 1: residuals fall by powers of ten.
+fn part_of(status: &Status) -> f64 {
+    let decades = (1.0 / status.tolerance).log10();
+    let done = (-status.residual.log10()).clamp(0.0, decades) / decades;
+    (status.step as f64 + done) / status.steps as f64
 }
 
 /// The stretches of a state, with a margin for rounding.

@@ -40,6 +40,8 @@ use crate::stress::{BallVolume, Measure};
 use polycore::report::Expect;
 use polycore::units::{Length, Stress};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A whole scene.
@@ -401,6 +403,9 @@ pub struct Study {
     pub must: Option<String>,
     /// The run must end with an error that contains this.
     pub fails: Option<String>,
+    /// Values by their paths (`"solver.tolerance"`, `"boundary[1].displacement"`), merged into the scene.
+    #[schemars(with = "Option<BTreeMap<String, serde_json::Value>>")]
+    pub set: Option<BTreeMap<String, IgnoredAny>>,
     /// Instead of `body.shapes`.
     pub shapes: Option<Vec<ShapeSpec>>,
     /// Instead of `body.cracks`.

@@ -57,10 +57,15 @@ impl Variant {
     /// As [`Source::parse`].
     pub fn resolve(&self, source: &Source, scene: &Scene) -> Result<(Source, Scene), SceneError> {
         let Some(index) = self.study else { return Ok((source.clone(), scene.clone())) };
-        let given = scene.study[index].replaced().into_iter().filter(|(_, _, given)| *given);
-        let source = given.fold(source.clone(), |source, (key, by, _)| {
-            source.with_replaced(key, &format!("study[{index}].{by}"))
-        });
+        let study = &scene.study[index];
+        // of what concerns a key the first holds: a single key before its block
+        let source = match study.set {
+            Some(_) => source.with_merged(&format!("study[{index}].set")),
+            None => source.clone(),
+        };
+        let given = study.replaced().into_iter().filter(|(_, _, given)| *given);
+        let source = given
+            .fold(source, |source, (key, by, _)| source.with_replaced(key, &format!("study[{index}].{by}")));
         let scene = source.parse()?;
         Ok((source, scene))
     }
@@ -97,7 +102,7 @@ pub(super) fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Ve
         if scene.body.has_points() && !(study.spacing.is_empty() && study.horizon_ratio.is_empty()) {
             return Err(source.error(&format!("study[{index}]"), "spacings of a cloud", "corrections only"));
         }
-        let replaces = study.replaced().iter().any(|(_, _, given)| *given);
+        let replaces = study.set.is_some() || study.replaced().iter().any(|(_, _, given)| *given);
         let is_quick = study.quick.unwrap_or(true);
         if quick && !is_quick {
             continue;

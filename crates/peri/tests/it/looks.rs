@@ -1,25 +1,18 @@
 //! Probes, formulas of boundaries and loads, grids, and field files of whole scenes.
 
-use peri::run::{Finished, Options, run};
+use peri::run::{Finished, Peri, run};
 use peri::scene::Scene;
+use polycore::case::{Case, Options, Run};
 use polycore::scene::Source;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 fn solve(text: &str, output: &Path) -> Finished {
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
-    let mut options = Options {
-        output,
-        quick: false,
-        checkpoint_every: Duration::from_secs(1000),
-        resume: false,
-        interrupted: &|| false,
-        progress: &mut |_, _| {},
-    };
-    run(&source, &scene, &mut options).unwrap_or_else(|error| panic!("{error}"))
+    let mut own = Run::new(const { &Peri::PROGRAM }, &source, None, Options::new(output));
+    run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn value(finished: &Finished, name: &str) -> f64 {

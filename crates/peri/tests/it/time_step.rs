@@ -7,6 +7,7 @@ use peri::bonds::Bonds;
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{Breaking, Loads, Motion, Policy, State, System, VelocityVerlet};
+use polycore::case::Fault;
 
 /// Steps beyond the critical one are refused by name, with the exit code of bad input.
 #[test]
@@ -106,7 +107,11 @@ fn tear(cloud: bool, pause: Option<u64>) -> State<2> {
         let mut watch = |status: &peri::solver::Status, state: &State<2>| {
             assert!(status.restartable);
             let stop = pause.is_some_and(|steps| state.total_iterations == steps);
-            if stop { Err(Error::Interrupted("here".into())) } else { Ok(()) }
+            if stop {
+                Err(polycore::Error::Interrupted { program: "peri", output: "here".into() }.into())
+            } else {
+                Ok(())
+            }
         };
         let result = solver.solve(&mut system, state, &mut watch, &mut |_, _| Ok(()));
         assert_eq!(result.is_err(), pause.is_some());

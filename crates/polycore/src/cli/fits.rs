@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use polycore::Error;
+use polycore::case::{Finished, Run};
 use polycore::constitutive;
 use polycore::constitutive::hyperelastic::data::{State, Table};
 use polycore::constitutive::hyperelastic::fit::{Agreement, Fit, Fitted, fit};
@@ -17,8 +18,10 @@ use super::{draw, material, trials};
 /// Everything printed and written is in MPa.
 pub const MPA: f64 = 1e6;
 
-/// Fits every law to every table, writes tables, pictures and the report, and prints the summary.
-pub fn run(case: &Case, directory: &Path, quick: bool) -> Result<Report, Error> {
+/// Fits every law to every table, writes tables and pictures.
+pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {
+    let (directory, quick) = (run.options.output, run.options.quick);
+    run.begin()?;
     let mut report = Report::new("polycore", env!("CARGO_PKG_VERSION"), &case.source.text);
     let mut phases = Phases::new();
     let mut all: Vec<(&str, &Table, Vec<Fit>)> = Vec::new();
@@ -55,12 +58,11 @@ pub fn run(case: &Case, directory: &Path, quick: bool) -> Result<Report, Error> 
     phases.stop();
     report.phases(&phases).threads(1).judge(&case.expect, quick);
     trials::judge(&case.trials, &mut report);
-    report.write(directory)?;
-    polycore::command::print(summary(&case.title, &all, &report));
+    let mut text = summary(&case.title, &all, &report);
     for name in &report.non_finite {
-        polycore::say!("FAIL  {name} is not finite");
+        let _ = writeln!(text, "FAIL  {name} is not finite");
     }
-    Ok(report)
+    Ok(Finished { report, text })
 }
 
 /// In the unit of the tables: a stress in MPa, numbers as they are.

@@ -12,31 +12,35 @@ use serde::Deserialize;
 use super::trials::Trial;
 
 /// The file as written.
-#[derive(Deserialize)]
+#[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Scene {
     /// Checked by its type only.
     #[serde(rename = "program")]
     _program: Program,
+    /// One line for tables and pictures.
     #[serde(default)]
     title: String,
+    /// What is fitted to what.
     #[serde(default)]
     fit: Fit,
+    /// Laws at single states and fits to a few, with what must happen.
     #[serde(default)]
     trial: Vec<Trial>,
+    /// What the results must be.
     #[serde(default)]
     expect: Vec<Expect>,
 }
 
 /// The program that runs these scenes; `cargo xtask validate` chooses by it.
-#[derive(Deserialize)]
+#[derive(Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 enum Program {
     Polycore,
 }
 
 /// What to fit to what.
-#[derive(Default, Deserialize)]
+#[derive(Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Fit {
     /// Names of laws; all of them if not given.
@@ -44,12 +48,13 @@ struct Fit {
     /// Whether a law fitted to one table is judged on the others, too.
     #[serde(default)]
     cross: bool,
+    /// Tables of measurements.
     #[serde(default)]
     data: Vec<Data>,
 }
 
 /// A table of homogeneous states.
-#[derive(Deserialize)]
+#[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Data {
     /// Its name in the report.
@@ -58,6 +63,11 @@ struct Data {
     file: PathBuf,
     /// Only the states of this test.
     mode: Option<Mode>,
+}
+
+/// The JSON Schema of scenes.
+pub fn schema() -> serde_json::Value {
+    polycore::scene::schema("polycore", |generator| vec![generator.subschema_for::<Scene>()])
 }
 
 /// A scene that was checked, with its data.
@@ -72,15 +82,14 @@ pub struct Case {
 }
 
 impl Case {
-    /// Reads and checks a scene and the tables that it names.
-    pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let source = Source::read(path)?;
+    /// Parses and checks a scene and the tables that it names.
+    pub fn parse(source: &Source) -> Result<Self, SceneError> {
         let Scene { _program: Program::Polycore, title, fit, trial, expect } = source.parse()?;
         let laws = match &fit.laws {
             None => MODELS.iter().collect(),
-            Some(names) => selected(&source, names)?,
+            Some(names) => selected(source, names)?,
         };
-        let folder = path.parent().unwrap_or(Path::new(""));
+        let folder = source.path.parent().unwrap_or(Path::new(""));
         let mut data: Vec<(String, Table)> = Vec::new();
         for (i, entry) in fit.data.into_iter().enumerate() {
             let key = |field: &str| format!("fit.data[{i}].{field}");
@@ -120,13 +129,14 @@ impl Case {
                 "at least one `[[fit.data]]` with `name` and `file`, or a `[[trial]]`",
             ));
         }
-        super::trials::check(&source, &trial)?;
-        let case = Self { source, title, laws, cross: fit.cross, data, trials: trial, expect };
+        super::trials::check(source, &trial)?;
+        let case =
+            Self { source: source.clone(), title, laws, cross: fit.cross, data, trials: trial, expect };
         case.check_expectations()?;
         Ok(case)
     }
 
-    /// What a run will do.
+    /// What a run will do, in lines.
     pub fn plan(&self) -> String {
         let mut text = format!("{}: {}\n", self.source.path.display(), self.title);
         for (name, table) in &self.data {

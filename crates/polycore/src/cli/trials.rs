@@ -16,17 +16,21 @@ use serde::Deserialize;
 use super::fits::MPA;
 
 /// One trial: with `parameters` a law is asked at a `stretch`, with `data` it is fitted.
-#[derive(Deserialize)]
+#[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trial {
     /// Its name in the report.
     name: String,
     /// What must happen, in words.
     must: String,
+    /// The law's name.
     law: String,
+    /// Its parameters, in their order.
     parameters: Option<Vec<Number>>,
+    /// The test.
     #[serde(default = "uniaxial")]
     mode: Mode,
+    /// First stretch.
     stretch: Option<f64>,
     /// λ of Lamé of a quadratic volumetric term, with the incompressible law's stress where it is not given.
     bulk: Option<Stress>,
@@ -37,10 +41,12 @@ pub struct Trial {
 }
 
 /// A parameter: a stress with its unit, or a number.
-#[derive(Deserialize)]
+#[derive(Deserialize, schemars::JsonSchema)]
 #[serde(untagged)]
 enum Number {
+    /// With its unit.
     Stress(Stress),
+    /// Without.
     Plain(f64),
 }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-use super::{SceneError, Source, locate};
+use super::{SWEEP, SceneError, Source, locate};
 
 /// One change, from a place in the scene to another.
 #[derive(Clone, Debug)]
@@ -37,8 +37,9 @@ impl Source {
 
     /// Puts the changes into a parsed scene.
     pub(super) fn overlay(&self, root: &mut DeTable<'_>) -> Result<(), SceneError> {
+        let sweep = root.contains_key(SWEEP).then(|| Overlay::Merge { by: format!("{SWEEP}.set") });
         // the first holds: it comes last
-        for overlay in self.overlays.iter().rev() {
+        for overlay in sweep.iter().chain(&self.overlays).rev() {
             match overlay {
                 Overlay::Replace { key, by } => {
                     let Some(value) = locate::value(root, by).cloned() else { continue };
@@ -57,12 +58,14 @@ impl Source {
                 }
             }
         }
+        root.remove(SWEEP);
         Ok(())
     }
 
     /// The key in the text that holds what stands at `key`.
     pub(super) fn origin(&self, root: &DeTable<'_>, key: &str) -> Option<String> {
-        self.overlays.iter().find_map(|overlay| match overlay {
+        let sweep = Overlay::Merge { by: format!("{SWEEP}.set") };
+        std::iter::once(&sweep).chain(&self.overlays).find_map(|overlay| match overlay {
             Overlay::Replace { key: old, by } => {
                 let rest =
                     key.strip_prefix(old.as_str()).filter(|r| r.is_empty() || r.starts_with(['.', '[']))?;

@@ -16,7 +16,7 @@ pub struct Table {
 }
 
 /// The test that a state is of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
     /// A bar: λ₂ = λ₃ = λ₁^{−1/2}.

@@ -1,12 +1,11 @@
 //! Many runs of one scene over a grid of values: in parallel, one thread each; finished ones are kept.
 
-use super::checkpoint::{self, Header};
 use super::rows::{ENDS, Row, Rows, STATISTICS};
-use super::{Failure, Finished, Options, part};
-use crate::error::Error;
-use crate::scene::{Kind, PartScene, kind};
-use polycore::report::{Phases, Report};
-use polycore::scene::{SceneError, Source};
+use super::{Case, Fault, Finished, Options};
+use crate::Error;
+use crate::checkpoint::Header;
+use crate::report::{Phases, Report};
+use crate::scene::{Failure, SWEEP, SceneError, Source};
 use rayon::prelude::*;
 use std::path::Path;
 use std::str::FromStr;
@@ -103,6 +102,8 @@ pub struct SweepOptions<'a> {
     pub output: &'a Path,
     /// Further values to tell, by name; `*` stands for any text.
     pub columns: &'a [String],
+    /// Leave out what is marked `quick = false`.
+    pub quick: bool,
     /// Time between checkpoints of each run.
     pub checkpoint_every: Duration,
     /// Whether the user asked to stop.
@@ -111,7 +112,7 @@ pub struct SweepOptions<'a> {
     pub progress: &'a mut (dyn FnMut(usize, usize, &str) + Send),
 }
 
-/// One run: its name, its values, its scene with the study that sets them.
+/// One run: its name, its values, its scene with the table that sets them.
 struct Run {
     name: String,
     values: Vec<String>,
@@ -123,22 +124,30 @@ struct Run {
 /// # Errors
 /// Faults of the scene or of a key, before anything is run; [`Error::SweepInterrupted`]. What ends a single run does
 /// not end the sweep: its row says so, and the report fails.
-pub fn sweep(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Result<Finished, Failure> {
-    let (rows, report) = rows(source, vary, options)?;
+pub fn sweep<C: Case>(
+    source: &Source,
+    vary: &[Vary],
+    options: &mut SweepOptions,
+) -> Result<Finished, Failure<C::Error>> {
+    let (rows, report) = rows::<C>(source, vary, options)?;
     Ok(Finished { text: rows.text(), report })
 }
 
 /// [`sweep`], and its rows: those asked for first, in their order.
-fn rows(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Result<(Rows, Report), Failure> {
-    let mut runs = runs(source, vary)?;
+fn rows<C: Case>(
+    source: &Source,
+    vary: &[Vary],
+    options: &mut SweepOptions,
+) -> Result<(Rows, Report), Failure<C::Error>> {
+    let mut runs = runs::<C>(source, vary, options.quick)?;
     let former = former(vary, options.output)?;
-    polycore::output::prepare_directory(options.output)?;
-    let _lock = polycore::output::lock_run(options.output)?;
+    crate::output::prepare_directory(options.output)?;
+    let _lock = crate::output::lock_run(options.output)?;
     // what an earlier sweep of the same scene has finished stays in the table
     let mut vary = vary.to_vec();
     for values in former {
         let name = name(&vary, &values);
-        let run = Run::new(source, &vary, name, values);
+        let run = Run::new::<C>(source, &vary, name, values);
         let known = runs.iter().any(|other| other.name == run.name);
         if known || run.finished(options.output).is_none() {
             continue;
@@ -151,14 +160,17 @@ fn rows(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Result<(R
         runs.push(run);
     }
     let vary = vary.as_slice();
-    let _ = std::fs::remove_file(options.output.join(polycore::report::FILE_NAME));
+    let _ = std::fs::remove_file(options.output.join(crate::report::FILE_NAME));
     let mut phases = Phases::new();
     phases.start("solve");
-    let outcomes = solve(&runs, options)?;
+    let outcomes = solve::<C>(&runs, options)?;
     phases.start("write");
     let rows = Rows {
         settings: vary.iter().map(|vary| vary.key.clone()).collect(),
-        columns: options.columns.to_vec(),
+        columns: match options.columns {
+            [] => C::PROGRAM.columns.iter().map(|&name| name.to_owned()).collect(),
+            columns => columns.to_vec(),
+        },
         rows: runs
             .iter()
             .zip(outcomes)
@@ -167,7 +179,7 @@ fn rows(source: &Source, vary: &[Vary], options: &mut SweepOptions) -> Result<(R
     };
     rows.write(&options.output.join(TABLE))?;
     draw(vary, &rows, options.output)?;
-    let mut report = together(source, vary, &rows);
+    let mut report = together(&C::PROGRAM, source, vary, &rows);
     phases.stop();
     report.phases(&phases).threads(rayon::current_num_threads());
     report.passed &= rows.rows.iter().all(|row| row.outcome.is_ok());
@@ -192,14 +204,7 @@ fn former(vary: &[Vary], output: &Path) -> Result<Vec<Vec<String>>, Error> {
 }
 
 /// The runs of a grid, each checked.
-fn runs(source: &Source, vary: &[Vary]) -> Result<Vec<Run>, Failure> {
-    if kind(source)? != Kind::Part {
-        return Err(source.error("program", "a scene without a mesh", "a scene of a part").into());
-    }
-    let scene = source.parse::<PartScene>()?;
-    if !scene.study.is_empty() {
-        return Err(source.error("study", "a sweep of a scene with studies", "a scene without").into());
-    }
+fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>, Failure<C::Error>> {
     let keys: Vec<String> = vary.iter().flat_map(Vary::keys).collect();
     if let Some(twice) = (1..keys.len()).find(|&k| keys[..k].contains(&keys[k])) {
         let reason = "found the key twice; allowed: each key once, with all its values".to_owned();
@@ -207,9 +212,10 @@ fn runs(source: &Source, vary: &[Vary]) -> Result<Vec<Run>, Failure> {
     }
     let count = vary.iter().map(|vary| vary.values.len()).try_fold(1, usize::checked_mul);
     let Some(count) = count.filter(|&count| count <= MOST) else {
-        let found = vary.iter().map(|vary| vary.values.len() as f64).product();
-        let allowed = format!("1 to {MOST}");
-        return Err(Error::Parameter { name: "runs of a sweep", found, allowed }.into());
+        let found: f64 = vary.iter().map(|vary| vary.values.len() as f64).product();
+        let reason = format!("found {found} runs; allowed: 1 to {MOST}");
+        let option = "--vary".to_owned();
+        return Err(Error::Option { option, reason }.into());
     };
     let mut runs: Vec<Run> = Vec::new();
     for index in 0..count {
@@ -225,59 +231,58 @@ fn runs(source: &Source, vary: &[Vary]) -> Result<Vec<Run>, Failure> {
         if same > 0 {
             name += &format!("-{}", same + 1);
         }
-        runs.push(Run::new(source, vary, name, values));
+        runs.push(Run::new::<C>(source, vary, name, values));
     }
     // every problem is built once before anything is computed: faults show at once
-    let faults: Vec<Option<SceneError>> = runs.par_iter().map(|run| run.check().err()).collect();
-    let fault = runs.iter().zip(faults).find_map(|(run, fault)| Some((run, fault?)));
-    match fault {
+    let faults: Vec<_> = runs.par_iter().map(|run| C::explain(&run.source, quick).err()).collect();
+    match runs.iter().zip(faults).find_map(|(run, fault)| Some((run, fault?))) {
         None => Ok(runs),
         Some((run, fault)) => {
             // what is wrong without any option too is told at its place
-            scene.check(source)?;
-            scene.task(source, scene.mesh.build(source)?.mesh)?;
-            Err(run.of_options(vary, &fault).into())
+            C::explain(source, quick)?;
+            Err(match fault {
+                Failure::Scene(fault) => run.of_options(vary, &fault).into(),
+                other => other,
+            })
         }
     }
 }
 
 impl Run {
-    fn new(source: &Source, vary: &[Vary], name: String, values: Vec<String>) -> Self {
+    fn new<C: Case>(source: &Source, vary: &[Vary], name: String, values: Vec<String>) -> Self {
         let keys: Vec<String> = vary.iter().flat_map(Vary::keys).collect();
         let each = keys.iter().zip(values.iter().flat_map(|value| divided(value, ';')));
         let mut set: Vec<String> =
             each.map(|(key, value)| format!("{} = {}", quoted(key), literal(&value))).collect();
-        for key in ["output.pictures", "output.fields"] {
+        for key in C::bulky(source) {
             if !keys.iter().any(|other| other == key) {
                 set.push(format!("{} = false", quoted(key)));
             }
         }
-        let text = format!(
-            "{}\n\n# a run of a sweep\n[[study]]\nname = {}\nset = {{ {} }}\n",
-            source.text.trim_end(),
-            quoted(&name),
-            set.join(", ")
-        );
+        let text = format!("{}\n\n[{SWEEP}]\nset = {{ {} }}\n", source.text.trim_end(), set.join(", "));
         Self { name, values, source: Source::new(&source.path, text) }
     }
 
     /// Its report, where it is finished in the folder of a sweep.
     fn finished(&self, sweep: &Path) -> Option<Report> {
-        let report = Report::read(sweep.join(&self.name).join(polycore::report::FILE_NAME)).ok()?;
-        (report.provenance.scene == self.source.text).then_some(report)
+        let report = Report::read(sweep.join(&self.name).join(crate::report::FILE_NAME)).ok()?;
+        report.provenance.scene.starts_with(self.source.text.trim_end()).then_some(report)
     }
 
-    fn check(&self) -> Result<(), SceneError> {
-        let scene = self.source.parse::<PartScene>()?;
-        scene.studies(&self.source, false)?;
-        let (source, scene) = scene.of_study(&self.source, 0)?;
-        scene.task(&source, scene.mesh.build(&source)?.mesh).map(|_| ())
+    /// Kept where it is finished, gone on with where it is begun.
+    fn solve<C: Case>(&self, sweep: &Path, options: Options) -> Result<Report, Failure<C::Error>> {
+        if let Some(report) = self.finished(sweep) {
+            return Ok(report);
+        }
+        let begun = |header: Header| header.scene == self.source.text;
+        let resume = Header::read(options.output, C::PROGRAM.magic).is_ok_and(begun);
+        Ok(super::run::<C>(&self.source, Options { resume, ..options })?.report)
     }
 
     /// A fault of a scene that nobody wrote, as one of the options that made it: of that at whose key it is, else of all.
     fn of_options(&self, vary: &[Vary], fault: &SceneError) -> Error {
-        const SET: &str = "study[0].set.";
-        let key = fault.key().unwrap_or_default().trim_start_matches(SET);
+        let set = format!("{SWEEP}.set.");
+        let key = fault.key().unwrap_or_default().trim_start_matches(set.as_str());
         let at_key = |vary: &&Vary| {
             let within = |rest: &str| rest.is_empty() || rest.starts_with(['.', '[']);
             vary.keys().iter().any(|own| key.strip_prefix(own.as_str()).is_some_and(within))
@@ -286,9 +291,9 @@ impl Run {
         let options = vary.iter().zip(&self.values).filter(|(v, _)| named.is_empty() || named.contains(v));
         let option: Vec<String> =
             options.map(|(vary, value)| format!("--vary {}={value}", vary.key)).collect();
-        let mut reason = fault.message().replace(SET, "");
+        let mut reason = fault.message().replace(&set, "");
         // of a key that the scene has elsewhere
-        if let Some((before, _)) = reason.split_once(" in `study[0].set`")
+        if let Some((before, _)) = reason.split_once(&format!(" in `{SWEEP}.set`"))
             && let Some(name) = before.split('`').nth(1)
             && let Ok(value) = self.source.parse::<serde_json::Value>()
         {
@@ -311,7 +316,10 @@ impl Run {
 fn paths_of(value: &serde_json::Value, name: &str, above: &str, paths: &mut Vec<String>) {
     match value {
         serde_json::Value::Object(table) => {
-            for (key, value) in table.iter().filter(|(key, _)| !(above.is_empty() && *key == "study")) {
+            for (key, value) in table
+                .iter()
+                .filter(|(key, _)| !(above.is_empty() && [SWEEP, "study"].contains(&key.as_str())))
+            {
                 let path = if above.is_empty() { key.clone() } else { format!("{above}.{key}") };
                 if key == name {
                     paths.push(path.clone());
@@ -355,17 +363,22 @@ fn literal(value: &str) -> String {
 }
 
 /// Each run on a thread of its own, as many at once as there are threads.
-fn solve(runs: &[Run], options: &mut SweepOptions) -> Result<Vec<Result<Report, String>>, Failure> {
+fn solve<C: Case>(
+    runs: &[Run],
+    options: &mut SweepOptions,
+) -> Result<Vec<Result<Report, String>>, Failure<C::Error>> {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let outcomes: Vec<Mutex<Option<Result<Report, Failure>>>> =
+    let outcomes: Vec<Mutex<Option<Result<Report, Failure<C::Error>>>>> =
         runs.iter().map(|_| Mutex::default()).collect();
+    let SweepOptions { output, quick, checkpoint_every, interrupted, .. } = *options;
     let progress = Mutex::new(&mut *options.progress);
-    let (output, every, interrupted) = (options.output, options.checkpoint_every, options.interrupted);
     let work = || {
         while !interrupted() {
             let index = next.fetch_add(1, Ordering::Relaxed);
             let (Some(run), Some(place)) = (runs.get(index), outcomes.get(index)) else { break };
-            let outcome = one(run, output, every, interrupted);
+            let directory = &output.join(&run.name);
+            let one = Options { quick, checkpoint_every, interrupted, ..Options::new(directory) };
+            let outcome = run.solve::<C>(output, one);
             if let Ok(mut place) = place.lock() {
                 *place = Some(outcome);
             }
@@ -387,44 +400,14 @@ fn solve(runs: &[Run], options: &mut SweepOptions) -> Result<Vec<Result<Report, 
     let mut told = Vec::new();
     for outcome in outcomes {
         told.push(match outcome.into_inner().ok().flatten() {
-            None | Some(Err(Failure::Run(Error::Interrupted(_)))) => {
+            None => return Err(Error::SweepInterrupted(output.to_path_buf()).into()),
+            Some(Err(Failure::Run(error))) if error.is_interruption() => {
                 return Err(Error::SweepInterrupted(output.to_path_buf()).into());
             }
             Some(outcome) => outcome.map_err(|failure| failure.to_string()),
         });
     }
     Ok(told)
-}
-
-/// One run: kept where it is finished, gone on with where it is begun. The scene's expectations are judged on it.
-fn one(
-    run: &Run,
-    sweep: &Path,
-    every: Duration,
-    interrupted: &(dyn Fn() -> bool + Sync),
-) -> Result<Report, Failure> {
-    let (source, scene) = run.source.parse::<PartScene>()?.of_study(&run.source, 0)?;
-    let mut report = match run.finished(sweep) {
-        Some(report) => report,
-        None => {
-            let output = &sweep.join(&run.name);
-            let begun = |header: Header| header.scene == run.source.text;
-            let resume = checkpoint::header(output).is_ok_and(begun);
-            let mut progress = |_: &super::Progress| {};
-            let checkpoint_every = every;
-            let mut options = Options {
-                output,
-                quick: false,
-                checkpoint_every,
-                resume,
-                interrupted,
-                progress: &mut progress,
-            };
-            part::one(&source, &scene, Some(&run.name), &mut options)?
-        }
-    };
-    report.judge(&scene.expect, false);
-    Ok(report)
 }
 
 /// `layer_time-10s_film-20W_m_2_K`, of values of keys.

@@ -1,7 +1,7 @@
 //! Several runs side by side: a row for each, with what is left at its end.
 
-use polycore::output::atomic_write;
-use polycore::report::{Report, Value};
+use crate::output::atomic_write;
+use crate::report::{Report, Value};
 use std::path::Path;
 
 /// What is told of a field: its mean by volume, its extremes, and its standard deviation, which measures uniformity.
@@ -133,7 +133,7 @@ impl Rows {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), polycore::Error> {
+    pub fn write(&self, path: &Path) -> Result<(), crate::Error> {
         let fields = self.fields();
         let mut values: Vec<String> = fields
             .iter()

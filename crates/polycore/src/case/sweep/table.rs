@@ -1,15 +1,16 @@
 //! What a sweep found: its report, and its pictures against the first key.
 
 use super::Vary;
-use crate::run::rows::{Rows, STATISTICS};
-use polycore::output::picture::{LinePlot, Series};
-use polycore::report::Report;
-use polycore::scene::Source;
+use crate::case::Program;
+use crate::case::rows::{Rows, STATISTICS};
+use crate::output::picture::{LinePlot, Series};
+use crate::report::Report;
+use crate::scene::Source;
 use std::path::Path;
 
 /// Every statistic of every run, and as curves against the number of the run.
-pub(super) fn together(source: &Source, vary: &[Vary], rows: &Rows) -> Report {
-    let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
+pub(super) fn together(program: &Program, source: &Source, vary: &[Vary], rows: &Rows) -> Report {
+    let mut report = Report::new(program.name, program.version, &source.text);
     let finished = || rows.rows.iter().filter_map(|row| Some((row, row.outcome.as_ref().ok()?)));
     let numbers: Vec<f64> =
         rows.rows.iter().zip(1..).filter(|(row, _)| row.outcome.is_ok()).map(|(_, k)| f64::from(k)).collect();
@@ -59,7 +60,7 @@ pub(super) fn numeric(values: &[String]) -> Option<(Vec<f64>, String)> {
 
 /// sweep_FIELD.png: mean, least and largest at the end (the mean only where several keys vary), and
 /// sweep_deviation_of_FIELD.png, against the first key, with a line for each combination of the others.
-pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
+pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), crate::Error> {
     let Some(first) = vary.first().filter(|vary| vary.values.len() > 1) else { return Ok(()) };
     let (places, label) = match numeric(&first.values) {
         Some((places, unit)) if unit.is_empty() => (places, first.key.clone()),

@@ -1,39 +1,12 @@
-//! Commands on scenes: run, resume, check, and laws evaluated on a scene's data.
+//! Laws evaluated on a scene's data.
 
-use mdsurrogate::run::{self, Failure, Named, Options, Prepared, checkpoint, judge_laws};
+use mdsurrogate::run::{Failure, Named, Prepared, judge_laws};
 use mdsurrogate::scene::Scene;
 use mdsurrogate::surrogate::Surrogate;
-use polycore::command::{Progress, default_output, interrupted, is_finished, seconds};
+use polycore::case::terminal::{default_output, print};
 use polycore::report::Report;
 use polycore::scene::Source;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
-
-/// A scene and where its results go.
-#[derive(clap::Args)]
-pub struct Run {
-    /// The scene (TOML).
-    scene: PathBuf,
-    /// Directory for results; default: out/NAME after the scene's folder.
-    #[arg(long, short)]
-    output: Option<PathBuf>,
-    /// Leave out what the scene marks `quick = false`, and train for its `quick_epochs`.
-    #[arg(long)]
-    quick: bool,
-    /// Seconds between checkpoints.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
-    checkpoint_every: f64,
-}
-
-/// An unfinished run.
-#[derive(clap::Args)]
-pub struct Resume {
-    /// The run's output directory.
-    output: PathBuf,
-    /// Seconds between checkpoints.
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]
-    checkpoint_every: f64,
-}
 
 /// Laws to judge.
 #[derive(clap::Args)]
@@ -46,58 +19,6 @@ pub struct Eval {
     /// Directory for results; default: out/NAME-eval after the scene's folder.
     #[arg(long, short)]
     output: Option<PathBuf>,
-}
-
-impl Run {
-    /// Runs the scene from its beginning.
-    pub fn run(self) -> Result<bool, Failure> {
-        let source = Source::read(&self.scene)?;
-        let output = self.output.unwrap_or_else(|| default_output(&self.scene));
-        solve(&source, &output, self.quick, self.checkpoint_every, false)
-    }
-}
-
-impl Resume {
-    /// Goes on with a run.
-    pub fn run(self) -> Result<bool, Failure> {
-        let output = &self.output;
-        if is_finished(output) {
-            return Ok(true);
-        }
-        let header = checkpoint::header(output)?;
-        let source = Source::new(header.scene_path, header.scene);
-        solve(&source, output, header.quick, self.checkpoint_every, true)
-    }
-}
-
-fn solve(source: &Source, output: &Path, quick: bool, every: f64, resume: bool) -> Result<bool, Failure> {
-    let mut bar = Progress::start();
-    let mut progress = |part: f64, line: &dyn Fn() -> String| bar.show(part, line);
-    let mut options = Options {
-        output,
-        quick,
-        checkpoint_every: Duration::from_secs_f64(every),
-        resume,
-        interrupted: interrupted(),
-        progress: &mut progress,
-    };
-    let finished = run::run(source, &mut options)?;
-    bar.finish();
-    polycore::command::print(finished.report.table());
-    for remark in &finished.remarks {
-        polycore::say!("{remark}");
-    }
-    polycore::say!("results in {}", output.display());
-    Ok(finished.report.passed())
-}
-
-/// Validates a scene and its data, and prints what it builds.
-pub fn check(path: &Path) -> Result<bool, Failure> {
-    for line in run::explain(&Source::read(path)?)? {
-        polycore::say!("{line}");
-    }
-    polycore::say!("{}: the scene is valid", path.display());
-    Ok(true)
 }
 
 impl Eval {
@@ -122,7 +43,7 @@ impl Eval {
             .collect();
         let table = judge_laws(&named, &data, &output, &mut report)?;
         report.threads(1).write(&output)?;
-        polycore::command::print(report.table());
+        print(report.table());
         for line in table {
             polycore::say!("{line}");
         }

@@ -1,5 +1,6 @@
 //! What the command lines of this workspace share: exit codes, progress, threads, where results go.
 
+use super::Fault;
 use crate::scene::Failure;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Display;
@@ -9,6 +10,9 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+/// Exit code of a run that the user stopped.
+pub const EXIT_INTERRUPTED: u8 = 130;
+
 /// Time between lines of progress where there is no terminal.
 const LOG_EVERY: Duration = Duration::from_secs(10);
 
@@ -16,13 +20,13 @@ const LOG_EVERY: Duration = Duration::from_secs(10);
 static CUT_SHORT: AtomicBool = AtomicBool::new(false);
 
 /// Prints a line to standard output as `println!` does, but without its panic: a reader that has seen enough (`| head`)
-/// is no reason to fail; what else goes wrong, a full disk for example, is said once and makes [`command::exit`] fail.
+/// is no reason to fail; what else goes wrong, a full disk for example, is said once and makes [`exit`] fail.
 ///
-/// [`command::exit`]: crate::command::exit
+/// [`exit`]: crate::case::terminal::exit
 #[macro_export]
 macro_rules! say {
     ($($part:tt)*) => {
-        $crate::command::print(format_args!("{}\n", format_args!($($part)*)))
+        $crate::case::terminal::print(format_args!("{}\n", format_args!($($part)*)))
     };
 }
 
@@ -42,8 +46,8 @@ pub fn complain(text: impl Display) {
     let _ = write!(std::io::stderr(), "{text}");
 }
 
-/// The exit code of a command that tells whether it passed; a failure is printed. `code` is that of a run's error.
-pub fn exit<E: Display>(result: Result<bool, Failure<E>>, code: impl Fn(&E) -> u8) -> ExitCode {
+/// The exit code of a command that tells whether it passed; a failure is printed.
+pub fn exit<E: Fault>(result: Result<bool, Failure<E>>) -> ExitCode {
     match result {
         Ok(true) if !CUT_SHORT.load(Ordering::Relaxed) => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
@@ -53,7 +57,7 @@ pub fn exit<E: Display>(result: Result<bool, Failure<E>>, code: impl Fn(&E) -> u
         }
         Err(Failure::Run(error)) => {
             complain(format_args!("error: {error}\n"));
-            ExitCode::from(code(&error))
+            ExitCode::from(error.exit_code())
         }
     }
 }
@@ -76,13 +80,8 @@ pub fn is_finished(output: &Path) -> bool {
     finished
 }
 
-/// The command line of a program. Negative numbers are values and no options: the range of each is then told.
-pub fn parse<C: clap::Parser>() -> C {
-    let matches = with_negative_numbers(C::command()).get_matches();
-    C::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut C::command()).exit())
-}
-
-fn with_negative_numbers(command: clap::Command) -> clap::Command {
+/// A command line on which negative numbers are values and no options: the range of each is then told.
+pub(super) fn with_negative_numbers(command: clap::Command) -> clap::Command {
     let takes = |arg: clap::Arg| match arg.get_action().takes_values() {
         true => arg.allow_negative_numbers(true),
         false => arg,
@@ -170,11 +169,6 @@ impl Progress {
             ProgressStyle::with_template("{spinner} {bar:30} {elapsed} (about {eta} left) {wide_msg}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         Self { bar, logged: Instant::now() }
-    }
-
-    /// Starts the estimate of what is left again.
-    pub fn restart(&self) {
-        self.bar.reset();
     }
 
     /// The part done, 0 to 1, and what to say of it.

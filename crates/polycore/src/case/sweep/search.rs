@@ -2,9 +2,9 @@
 
 use super::table::numeric;
 use super::{SweepOptions, Vary, rows};
-use crate::error::Error;
-use crate::run::{Failure, Finished};
-use polycore::scene::Source;
+use crate::Error;
+use crate::case::{Case, Finished, Row};
+use crate::scene::{Failure, Source};
 use std::str::FromStr;
 
 /// The least value is found to this part of the interval.
@@ -43,13 +43,17 @@ impl FromStr for Search {
 ///
 /// # Errors
 /// As [`super::sweep`]; a scene without expectations.
-pub fn search(source: &Source, search: &Search, options: &mut SweepOptions) -> Result<Finished, Failure> {
+pub fn search<C: Case>(
+    source: &Source,
+    search: &Search,
+    options: &mut SweepOptions,
+) -> Result<Finished, Failure<C::Error>> {
     let Search { key, ends: [low, high], unit } = search;
     let told = |value: f64| format!("{value}{unit}");
-    let mut try_out = |values: &[f64]| -> Result<(Vec<bool>, Finished), Failure> {
+    let mut try_out = |values: &[f64]| -> Result<(Vec<bool>, Finished), Failure<C::Error>> {
         let vary = Vary { key: key.clone(), values: values.iter().map(|&value| told(value)).collect() };
-        let (rows, report) = rows(source, &[vary], options)?;
-        let met = |row: &crate::run::rows::Row| row.outcome.as_ref().is_ok_and(|own| own.passed());
+        let (rows, report) = rows::<C>(source, &[vary], options)?;
+        let met = |row: &Row| row.outcome.as_ref().is_ok_and(|own| own.passed());
         if rows.rows.iter().any(|row| row.outcome.as_ref().is_ok_and(|own| own.expect.is_empty())) {
             let reason =
                 "found a scene without [[expect]]; allowed: one that says what a run must meet".to_owned();

@@ -1,0 +1,51 @@
+//! `mdsurrogate` as a program of the harness.
+
+use super::{explain, run};
+use crate::error::Error;
+use crate::scene;
+use polycore::case::{Case, Fault, Finished, Program, Run};
+use polycore::scene::{Failure, Source};
+
+/// From molecular dynamics to a constitutive law.
+pub struct Mdsurrogate;
+
+impl Case for Mdsurrogate {
+    const PROGRAM: Program = Program {
+        name: "mdsurrogate",
+        version: env!("CARGO_PKG_VERSION"),
+        about: "From molecular dynamics to a constitutive law",
+        examples: "  mdsurrogate check cases/ch3/train-default/case.toml   the scene and its data
+  mdsurrogate run cases/ch3/train-default/case.toml     train, judge, draw; results in out/train-default
+  mdsurrogate resume out/train-default                  go on after an interruption
+  mdsurrogate sweep cases/ch3/train-default/case.toml --vary training.batch=32,256
+  mdsurrogate predict law.safetensors strains.csv -o stresses.csv
+                                                        stress and uncertainty at the strains of a table
+  mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      what a table holds
+  mdsurrogate schema > mdsurrogate.schema.json          for editors",
+        magic: b"mdsg-ck2",
+        columns: &["*percentage error", "*mean square error", "best *"],
+    };
+    type Error = Error;
+
+    fn explain(source: &Source, _quick: bool) -> Result<Vec<String>, Failure<Error>> {
+        explain(source)
+    }
+
+    fn solve(source: &Source, own: &mut Run) -> Result<Finished, Failure<Error>> {
+        run(source, own)
+    }
+
+    fn schema() -> serde_json::Value {
+        scene::schema()
+    }
+}
+
+impl Fault for Error {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Diverged { .. } | Self::NotFinite { .. } => 1,
+            Self::Shared(error) => error.exit_code(),
+            _ => polycore::scene::EXIT_BAD_INPUT,
+        }
+    }
+}

@@ -1,0 +1,234 @@
+//! The command line that all programs have: run, resume, check, sweep, schema, completions, and a program's own commands.
+
+use super::terminal::{
+    self, Progress, Threads, default_output, exit, interrupted, seconds, with_negative_numbers,
+};
+use super::{Case, Options, Search, SweepOptions, Vary};
+use crate::checkpoint::Header;
+use crate::scene::{Failure, Source};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+#[derive(Parser)]
+struct Cli<V: Subcommand> {
+    #[command(subcommand)]
+    command: Command<V>,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+#[derive(Subcommand)]
+enum Command<V: Subcommand> {
+    /// Run a scene, compare, draw, and judge its expectations.
+    Run(RunArguments),
+    /// Continue an interrupted or killed run; the results are bit-identical.
+    Resume {
+        /// The output directory of that run.
+        output: PathBuf,
+        #[command(flatten)]
+        checkpoints: Checkpoints,
+    },
+    /// Validate a scene and print what it builds and leaves out.
+    Check {
+        /// The scene (TOML).
+        scene: PathBuf,
+        /// As `run --quick` would.
+        #[arg(long)]
+        quick: bool,
+    },
+    /// Run a scene for every combination of values of some keys, in parallel; finished runs are kept.
+    Sweep {
+        /// The scene (TOML).
+        scene: PathBuf,
+        /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid, and keys joined with
+        /// `;` change together.
+        #[arg(long, value_name = "KEY=VALUE,…", required_unless_present = "search")]
+        vary: Vec<Vary>,
+        /// Instead: the least value of a key with which all expectations are met, e.g. print.layer_time=5s..40s.
+        #[arg(long, value_name = "KEY=LOW..HIGH", conflicts_with = "vary")]
+        search: Option<Search>,
+        /// A further value to show for each run, e.g. layer-*.mean_crystallinity; may be repeated.
+        #[arg(long, value_name = "NAME")]
+        column: Vec<String>,
+        /// Directory for results; default: out/NAME-sweep.
+        #[arg(long, short)]
+        output: Option<PathBuf>,
+        /// Leave out what the scene marks `quick = false`.
+        #[arg(long)]
+        quick: bool,
+        #[command(flatten)]
+        checkpoints: Checkpoints,
+    },
+    #[command(flatten)]
+    Own(V),
+    /// Print the JSON Schema of scenes, by which editors complete and check them.
+    Schema,
+    /// Print a shell's completion script.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+/// A scene and where its results go.
+#[derive(clap::Args)]
+pub struct RunArguments {
+    /// The scene (TOML).
+    pub scene: PathBuf,
+    /// Directory for results; default: out/NAME after the scene's folder.
+    #[arg(long, short)]
+    output: Option<PathBuf>,
+    /// Leave out what the scene marks `quick = false`.
+    #[arg(long)]
+    quick: bool,
+    /// First print what the scene builds and leaves out.
+    #[arg(long)]
+    explain: bool,
+    #[command(flatten)]
+    checkpoints: Checkpoints,
+}
+
+#[derive(clap::Args)]
+struct Checkpoints {
+    /// Seconds between checkpoints.
+    #[arg(long = "checkpoint-every", value_name = "SECONDS", default_value_t = 30.0, value_parser = seconds)]
+    every: f64,
+}
+
+impl Checkpoints {
+    fn every(&self) -> Duration {
+        Duration::from_secs_f64(self.every)
+    }
+}
+
+/// The main function of a program: its commands on scenes, and `own`, which runs its own commands `V`. Each gives whether
+/// it passed.
+pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<C::Error>>) -> ExitCode {
+    let program = C::PROGRAM;
+    let mut command = with_negative_numbers(Cli::<V>::command())
+        .name(program.name)
+        .version(program.version)
+        .about(program.about)
+        .after_help(format!(
+            "Examples:\n{}\n\nExit codes: 0 done, 1 an expectation or the run failed, 2 bad input, 130 interrupted.",
+            program.examples
+        ));
+    let matches = command.clone().get_matches();
+    let cli = Cli::<V>::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit());
+    if let Err(error) = cli.threads.apply() {
+        terminal::complain(format_args!("error: {error}\n"));
+        return ExitCode::FAILURE;
+    }
+    exit(match cli.command {
+        Command::Run(arguments) => Source::read(&arguments.scene)
+            .map_err(Failure::from)
+            .and_then(|source| solve::<C>(&source, &arguments)),
+        Command::Resume { output, checkpoints } => resume::<C>(&output, checkpoints.every()),
+        Command::Check { scene, quick } => check::<C>(&scene, quick),
+        Command::Sweep { scene, vary, search, column, output, quick, checkpoints } => {
+            let output = output.unwrap_or_else(|| {
+                let mut name = default_output(&scene).into_os_string();
+                name.push("-sweep");
+                name.into()
+            });
+            sweep::<C>(&scene, &vary, search.as_ref(), &column, &output, quick, checkpoints.every())
+        }
+        Command::Own(command) => own(command),
+        Command::Schema => {
+            crate::say!("{:#}", C::schema());
+            Ok(true)
+        }
+        Command::Completions { shell } => {
+            let mut text = Vec::new();
+            clap_complete::generate(shell, &mut command, program.name, &mut text);
+            terminal::print(String::from_utf8_lossy(&text));
+            Ok(true)
+        }
+    })
+}
+
+/// Runs a scene that is read, as `run` does.
+///
+/// # Errors
+/// [`Failure`].
+pub fn solve<C: Case>(source: &Source, arguments: &RunArguments) -> Result<bool, Failure<C::Error>> {
+    let RunArguments { scene, output, quick, explain, checkpoints } = arguments;
+    if *explain {
+        explanation::<C>(source, *quick)?;
+    }
+    let output = output.clone().unwrap_or_else(|| default_output(scene));
+    finish::<C>(source, &output, *quick, checkpoints.every(), false)
+}
+
+fn resume<C: Case>(output: &Path, every: Duration) -> Result<bool, Failure<C::Error>> {
+    if terminal::is_finished(output) {
+        return Ok(true);
+    }
+    let header = Header::read(output, C::PROGRAM.magic)?;
+    if header.study.is_some()
+        && let Some(whole) = output.canonicalize().ok().and_then(|output| output.parent().map(PathBuf::from))
+    {
+        crate::say!("{} is a study of the run in {}", output.display(), whole.display());
+        return resume::<C>(&whole, every);
+    }
+    finish::<C>(&Source::new(header.scene_path, header.scene), output, header.quick, every, true)
+}
+
+fn finish<C: Case>(
+    source: &Source,
+    output: &Path,
+    quick: bool,
+    checkpoint_every: Duration,
+    resume: bool,
+) -> Result<bool, Failure<C::Error>> {
+    let mut bar = Progress::start();
+    let mut progress = |part: f64, line: &dyn Fn() -> String| bar.show(part, line);
+    let interrupted = interrupted();
+    let options =
+        Options { output, quick, resume, checkpoint_every, interrupted, progress: Some(&mut progress) };
+    let finished = super::run::<C>(source, options)?;
+    bar.finish();
+    terminal::print(format_args!("{}results in {}\n", finished.text, output.display()));
+    Ok(finished.report.passed())
+}
+
+fn check<C: Case>(path: &Path, quick: bool) -> Result<bool, Failure<C::Error>> {
+    explanation::<C>(&Source::read(path)?, quick)?;
+    crate::say!("{}: the scene is valid", path.display());
+    Ok(true)
+}
+
+fn explanation<C: Case>(source: &Source, quick: bool) -> Result<(), Failure<C::Error>> {
+    for line in C::explain(source, quick)? {
+        crate::say!("{line}");
+    }
+    Ok(())
+}
+
+fn sweep<C: Case>(
+    scene: &Path,
+    vary: &[Vary],
+    search: Option<&Search>,
+    columns: &[String],
+    output: &Path,
+    quick: bool,
+    checkpoint_every: Duration,
+) -> Result<bool, Failure<C::Error>> {
+    let source = Source::read(scene)?;
+    let mut bar = Progress::start();
+    let mut progress = |done: usize, all: usize, last: &str| {
+        bar.show(done as f64 / all as f64, || format!("{done} of {all} runs are done, last {last}"));
+    };
+    let interrupted = interrupted();
+    let mut options =
+        SweepOptions { output, columns, quick, checkpoint_every, interrupted, progress: &mut progress };
+    let finished = match search {
+        Some(search) => super::search::<C>(&source, search, &mut options)?,
+        None => super::sweep::<C>(&source, vary, &mut options)?,
+    };
+    bar.finish();
+    terminal::print(format_args!("{}results in {}\n", finished.text, output.display()));
+    Ok(finished.report.passed())
+}
