@@ -14,6 +14,8 @@ pub struct Cover {
     pub bound: f64,
     /// Whether the law stays what it is at the ends beyond them, as it must where bonds break.
     pub held: bool,
+    /// What [`Response::cover`] gave for these stretches, of a run that goes on.
+    pub known: Option<f64>,
 }
 
 /// What a material does over a range of stretches, in one unit.

@@ -24,7 +24,9 @@ impl<const D: usize> System<'_, D> {
         }
         self.rebuild_contact(&state.displacement);
         state.fitted[1] = state.fitted[1].min(most(self.breaking.as_ref()));
-        self.fit(state)
+        // a bound that depends on the displacement stays that of the run before
+        let known = Some(state.tangent).filter(|&tangent| tangent > 0.0);
+        self.fit(state, known)
     }
 
     /// Whether every stretch of the state lies within the fit; widens it otherwise.
@@ -48,7 +50,7 @@ impl<const D: usize> System<'_, D> {
         state.fitted[0] =
             state.fitted[0].min((1.0 - 2.0 * (1.0 - low)).max(0.5 * low)).max(least(self.breaking.as_ref()));
         state.fitted[1] = state.fitted[1].max(1.0 + 2.0 * (high - 1.0)).min(most(self.breaking.as_ref()));
-        self.fit(state)?;
+        self.fit(state, None)?;
         Ok(true)
     }
 
@@ -61,9 +63,9 @@ impl<const D: usize> System<'_, D> {
         StretchRange { low: met.low.max(least * least - 1.0), high: met.high.min(most * most - 1.0) }
     }
 
-    fn fit(&mut self, state: &mut State<D>) -> Result<(), Error> {
+    fn fit(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {
         let (bound, held) = (self.fit_bound, self.breaking.is_some());
-        let cover = Cover { stretches: state.fitted, bound, held };
+        let cover = Cover { stretches: state.fitted, bound, held, known };
         state.tangent = self.material.cover(&mut *self.bonds, &state.displacement, &cover)?;
         Ok(())
     }

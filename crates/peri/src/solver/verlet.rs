@@ -146,6 +146,8 @@ impl VelocityVerlet {
         if state.displacement.non_finite().is_some() || state.velocity.non_finite().is_some() {
             return Err(system.not_finite(state));
         }
+        // another method may have left it at another displacement
+        state.tangent = 0.0;
         system.restore(state)?;
         system.covers_stretches(state)?;
         refresh(system, state, factor, None);
