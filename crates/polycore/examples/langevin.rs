@@ -3,7 +3,7 @@
 use polycore::langevin::{Inverse, inverse, inverse_from_complement, langevin};
 
 fn main() {
-    println!("{:>8} {:>20} {:>10}   {}", "x", "L^-1(x)", "L(β) − x", "relative errors of approximants");
+    println!("       x              L^-1(x)   L(β) − x   relative errors of approximants");
     for x in [0.1, 0.5, 0.9, 0.99] {
         let beta = inverse(x);
         let error = |choice: Inverse| format!("{} {:+.1e}", choice.name(), choice.value(x) / beta - 1.0);

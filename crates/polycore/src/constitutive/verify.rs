@@ -152,7 +152,7 @@ fn size(found: &Prediction) -> f64 {
 
 /// The larger one; NaN stays.
 fn raise(largest: &mut f64, value: f64) {
-    if !(value <= *largest) {
+    if value.is_nan() || value > *largest {
         *largest = value;
     }
 }
