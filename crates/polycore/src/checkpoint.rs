@@ -53,7 +53,7 @@ impl Header {
 /// Writes the checkpoint of an output directory: its scene, and how far the run is.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn save<T: Serialize>(
     directory: &Path,
     magic: &Magic,
