@@ -75,7 +75,8 @@ fn faults(root: &Value, schema: &Value, value: &Value, place: &str, faults: &mut
             "array" => value.is_array(),
             "string" => value.is_string(),
             "boolean" => value.is_boolean(),
-            "number" => value.is_number(),
+            // TOML has no null: it was NaN or infinite
+            "number" => value.is_number() || value.is_null(),
             "integer" => value.is_i64() || value.is_u64(),
             other => panic!("{place}: type {other}"),
         };

@@ -241,7 +241,7 @@ fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>
             // what is wrong without any option too is told at its place
             C::explain(source, quick)?;
             Err(match fault {
-                Failure::Scene(fault) => run.of_options(vary, &fault).into(),
+                Failure::Scene(fault) => run.of_options(source, vary, &fault).into(),
                 other => other,
             })
         }
@@ -280,7 +280,7 @@ impl Run {
     }
 
     /// A fault of a scene that nobody wrote, as one of the options that made it: of that at whose key it is, else of all.
-    fn of_options(&self, vary: &[Vary], fault: &SceneError) -> Error {
+    fn of_options(&self, scene: &Source, vary: &[Vary], fault: &SceneError) -> Error {
         let set = format!("{SWEEP}.set.");
         let key = fault.key().unwrap_or_default().trim_start_matches(set.as_str());
         let at_key = |vary: &&Vary| {
@@ -295,7 +295,7 @@ impl Run {
         // of a key that the scene has elsewhere
         if let Some((before, _)) = reason.split_once(&format!(" in `{SWEEP}.set`"))
             && let Some(name) = before.split('`').nth(1)
-            && let Ok(value) = self.source.parse::<serde_json::Value>()
+            && let Ok(value) = scene.parse::<serde_json::Value>()
         {
             let mut paths = Vec::new();
             paths_of(&value, name, "", &mut paths);
@@ -316,10 +316,7 @@ impl Run {
 fn paths_of(value: &serde_json::Value, name: &str, above: &str, paths: &mut Vec<String>) {
     match value {
         serde_json::Value::Object(table) => {
-            for (key, value) in table
-                .iter()
-                .filter(|(key, _)| !(above.is_empty() && [SWEEP, "study"].contains(&key.as_str())))
-            {
+            for (key, value) in table.iter().filter(|(key, _)| !(above.is_empty() && *key == "study")) {
                 let path = if above.is_empty() { key.clone() } else { format!("{above}.{key}") };
                 if key == name {
                     paths.push(path.clone());
