@@ -65,7 +65,11 @@ fn every_program_sweeps() {
             "work_of_loads[dx=20mm m=3.015] [J]",
         ),
         ("polycore", &rubber, "mine.mooney-rivlin.rms [MPa]"),
-        ("mdsurrogate", "cases/ch3/crystal/case.toml --vary crystal.levels=2,3 --column runs", "runs"),
+        (
+            "mdsurrogate",
+            "cases/ch3/crystal/case.toml --vary crystal.levels=2,3 --column runs*",
+            "runs of the grid",
+        ),
     ] {
         let output = directory.path().join(program);
         let line = format!("sweep {arguments} --quick -o {}", output.display());
