@@ -263,7 +263,6 @@ struct Solution<'a, const D: usize> {
     critical_stretch: Option<&'a Property>,
 }
 
-#[expect(clippy::too_many_arguments, reason = "one call, of what changes and what does not")]
 fn solve<const D: usize>(
     scene: &Scene,
     solution: &Solution<D>,

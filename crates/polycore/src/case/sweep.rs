@@ -359,14 +359,16 @@ fn literal(value: &str) -> String {
     if as_it_is { value.to_owned() } else { quoted(value) }
 }
 
+/// What a run gave; nothing where it was not run.
+type Outcome<C> = Option<Result<Report, Failure<<C as Case>::Error>>>;
+
 /// Each run on a thread of its own, as many at once as there are threads.
 fn solve<C: Case>(
     runs: &[Run],
     options: &mut SweepOptions,
 ) -> Result<Vec<Result<Report, String>>, Failure<C::Error>> {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let outcomes: Vec<Mutex<Option<Result<Report, Failure<C::Error>>>>> =
-        runs.iter().map(|_| Mutex::default()).collect();
+    let outcomes: Vec<Mutex<Outcome<C>>> = runs.iter().map(|_| Mutex::default()).collect();
     let SweepOptions { output, quick, checkpoint_every, interrupted, .. } = *options;
     let progress = Mutex::new(&mut *options.progress);
     let work = || {
