@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub struct Record {
     /// Load factor.
     pub factor: f64,
-    /// Force, N, that does the loads' work on `displacement`, see [`Loads::response`].
+    /// Force, N, that does the loads' work on `displacement`, see [`Loads::response`](super::Loads::response).
     pub load: f64,
     /// Displacement of the grips against each other, or of where forces act, m.
     pub displacement: f64,
@@ -47,7 +47,7 @@ pub struct Record {
     pub kinetic: f64,
     /// Energy that mass-proportional damping has taken so far, J.
     pub damped: f64,
-    /// What [`System::observer`] sees.
+    /// What [`System::observer`](super::System::observer) sees.
     pub seen: Vec<f64>,
 }
 

@@ -34,7 +34,7 @@ pub struct System<'a, const D: usize> {
     pub(super) scale: Scale,
     /// The load factor and its rate over the time, s, in explicit dynamics, in place of the ramp.
     pub course: Option<&'a Course<'a>>,
-    /// What is looked at in every row of the history, see [`Record::seen`].
+    /// What is looked at in every row of the history, see [`Record::seen`](super::Record::seen).
     pub observer: Option<&'a Observer<'a, D>>,
 }
 
