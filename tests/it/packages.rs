@@ -1,6 +1,6 @@
 //! What docs/ARCHITECTURE.md says of dependencies.
 
-use crate::program::workspace;
+use crate::program::{executable, workspace};
 use std::process::Command;
 
 /// The packages that a crate is built with.
@@ -28,6 +28,32 @@ fn no_crate_is_built_with_what_it_does_not_need() {
         assert_eq!(learnt, package == "polycore", "{package}");
         for other in ["peri", "crystfem", "mdsurrogate", "evidence"] {
             assert!(package == other || !tree.iter().any(|name| name == other), "{package}: {other}");
+        }
+    }
+}
+
+/// A binary runs on any Linux of its age: it loads nothing but the C library and what comes with it.
+#[cfg(target_os = "linux")]
+#[test]
+fn binaries_need_nothing_but_libc() {
+    for program in ["crystfem", "mdsurrogate", "peri", "polycore"] {
+        let Ok(output) = Command::new("ldd").arg(executable(program)).output() else {
+            return evidence::skipped("ldd");
+        };
+        let text = String::from_utf8(output.stdout).unwrap();
+        let names = text.lines().filter_map(|line| line.split_whitespace().next()?.rsplit('/').next());
+        for name in names {
+            let known = [
+                "linux-vdso.",
+                "libgcc_s.",
+                "libm.",
+                "libc.",
+                "libdl.",
+                "libpthread.",
+                "ld-linux",
+                "statically",
+            ];
+            assert!(known.iter().any(|known| name.starts_with(known)), "{program} loads {name}");
         }
     }
 }
