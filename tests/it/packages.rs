@@ -4,11 +4,11 @@ use crate::program::{executable, workspace};
 use std::process::Command;
 
 /// The packages that a crate is built with.
-fn tree(package: &str) -> Vec<String> {
+fn tree(package: &str, flags: &[&str]) -> Vec<String> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let arguments =
         ["tree", "--offline", "--edges", "normal,build", "--prefix", "none", "--package", package];
-    let output = Command::new(cargo).args(arguments).current_dir(workspace()).output().unwrap();
+    let output = Command::new(cargo).args(arguments).args(flags).current_dir(workspace()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).unwrap();
     text.lines().filter_map(|line| Some(line.split_whitespace().next()?.to_owned())).collect()
@@ -18,9 +18,9 @@ fn tree(package: &str) -> Vec<String> {
 #[test]
 fn no_crate_is_built_with_what_it_does_not_need() {
     let framework = |name: &String| name == "burn" || name.starts_with("burn-");
-    assert!(tree("mdsurrogate").iter().any(framework));
+    assert!(tree("mdsurrogate", &[]).iter().any(framework));
     for package in ["polycore", "peri", "crystfem"] {
-        let tree = tree(package);
+        let tree = tree(package, &[]);
         assert!(tree.iter().any(|name| name == "polycore"), "{tree:?}");
         assert!(!tree.iter().any(framework), "{package} is built with burn");
         // learnt laws are a feature of polycore that the solvers do not take
@@ -28,6 +28,21 @@ fn no_crate_is_built_with_what_it_does_not_need() {
         assert_eq!(learnt, package == "polycore", "{package}");
         for other in ["peri", "crystfem", "mdsurrogate", "evidence"] {
             assert!(package == other || !tree.iter().any(|name| name == other), "{package}: {other}");
+        }
+    }
+}
+
+/// A library without scenes brings no scene format, no errors with carets, no pictures, no command line. Data sets of
+/// `mdsurrogate` are tables: it reads CSV, too.
+#[test]
+fn libraries_bring_no_shell() {
+    for package in ["polycore", "peri", "crystfem", "mdsurrogate"] {
+        let tree = tree(package, &["--no-default-features"]);
+        for name in
+            ["miette", "toml", "schemars", "csv", "kuva", "png", "clap", "indicatif", "rust-hdf5", "burn"]
+        {
+            let reads_tables = package == "mdsurrogate" && name == "csv";
+            assert!(reads_tables || !tree.iter().any(|other| other == name), "{package}: {name}");
         }
     }
 }

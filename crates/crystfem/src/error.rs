@@ -95,6 +95,7 @@ pub enum Error {
     Shared(#[from] polycore::Error),
 }
 
+#[cfg(feature = "case")]
 impl From<Error> for polycore::scene::Failure<Error> {
     fn from(error: Error) -> Self {
         Self::Run(error)

@@ -1,9 +1,6 @@
 //! Temperature histories: ramps and holds, or a table.
 
 use crate::error::Error;
-use crate::table::{Column, read_with_lines};
-use polycore::units::dimension::{TemperatureDimension, TimeDimension};
-use std::path::Path;
 
 /// A temperature that runs linearly from point to point.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,8 +113,12 @@ impl History {
     /// Reads a CSV file with the columns `time [unit]` and `temperature [unit]`.
     ///
     /// # Errors
-    /// [`Error::File`] as [`crate::table::read`], and where times decrease.
-    pub fn read(path: &Path) -> Result<Self, Error> {
+    /// [`Error::File`] as `table::read`, and where times decrease.
+    #[cfg(feature = "case")]
+    pub fn read(path: &std::path::Path) -> Result<Self, Error> {
+        use crate::table::{Column, read_with_lines};
+        use polycore::units::dimension::{TemperatureDimension, TimeDimension};
+
         let columns =
             [Column::of::<TimeDimension>("time"), Column::of::<TemperatureDimension>("temperature")];
         let ([times, temperatures], lines) = read_with_lines(path, columns)?;

@@ -35,6 +35,7 @@ pub mod problem;
 pub mod simulation;
 mod solver;
 mod system;
+#[cfg(feature = "case")]
 pub mod table;
 pub mod time;
 

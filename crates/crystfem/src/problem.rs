@@ -8,9 +8,8 @@ use crate::mesh::{Face, Mesh};
 use std::sync::Arc;
 
 /// How heat capacity is represented.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Capacity {
     /// At the nodes; so are film, radiation and the state of materials with constant conductivity. Temperatures do
@@ -83,7 +82,7 @@ impl Problem {
     }
 
     /// Shortest period of what swings, s: steps must be shorter.
-    pub(crate) fn shortest_period(&self) -> Option<f64> {
+    pub fn shortest_period(&self) -> Option<f64> {
         let conditions = self.conditions.iter().filter_map(Condition::period);
         conditions.chain(self.sources.iter().filter_map(|s| s.power.period())).min_by(f64::total_cmp)
     }

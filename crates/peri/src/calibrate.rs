@@ -8,7 +8,8 @@ use serde::Deserialize;
 use std::f64::consts::PI;
 
 /// The space a body lives in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Space {
     /// Thin sheet, bonds in its plane.
@@ -20,7 +21,8 @@ pub enum Space {
 }
 
 /// Where kθ comes from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Calibration {
     /// The continuum's integrals, (2.76) and (2.80).

@@ -8,7 +8,8 @@ use serde::Deserialize;
 use std::f64::consts::PI;
 
 /// As written in a scene: one of `percent_over_contour` (with `reading`), `stretch`, `fracture_energy`.
-#[derive(Clone, Copy, Debug, Default, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Critical {
     /// Factor f on the contour stretch √n̄, e.g. 1.2.
@@ -23,7 +24,8 @@ pub struct Critical {
 
 /// Readings of f√n̄ (formulation.md, Critical stretch). (2.38) is the trace of an isochoric deformation: the bond stretch
 /// belongs on its right, the chain stretch g on its left.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 pub enum Reading {
     /// l = f√n̄.
     R1,

@@ -93,6 +93,7 @@ impl Error {
     }
 }
 
+#[cfg(feature = "case")]
 impl From<Error> for polycore::scene::Failure<Error> {
     fn from(error: Error) -> Self {
         Self::Run(error)

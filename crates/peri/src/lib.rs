@@ -31,6 +31,7 @@
 //!     let mut state = State::new(bonds.slots());
 //!     let mut system = System::new(&mut bonds, BondMaterial::new(&*law, modulus), &loads, &[1.0]);
 //!     AdaptiveDynamicRelaxation::default().solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
+//!     drop(system);
 //!
 //!     // σ₁₁ in the middle: about E times 2 mm over the free 34 mm
 //!     let met = stretch_range(&bonds, &state.displacement);

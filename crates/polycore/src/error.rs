@@ -4,7 +4,10 @@ use crate::constitutive;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What can go wrong outside reading a scene (see [`crate::scene::SceneError`] for that).
+/// Exit code of the command lines for bad input.
+pub const EXIT_BAD_INPUT: u8 = 2;
+
+/// What can go wrong outside reading a scene (`scene::SceneError` is for that).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -129,12 +132,12 @@ impl Error {
             Self::Option { .. }
             | Self::OutputDirectory { .. }
             | Self::Checkpoint { .. }
-            | Self::Format { .. } => crate::scene::EXIT_BAD_INPUT,
+            | Self::Format { .. } => EXIT_BAD_INPUT,
             Self::Constitutive(constitutive::Error::Invalid { .. } | constitutive::Error::File { .. }) => {
-                crate::scene::EXIT_BAD_INPUT
+                EXIT_BAD_INPUT
             }
             Self::Io { operation, .. } if operation.starts_with("read") || *operation == "open" => {
-                crate::scene::EXIT_BAD_INPUT
+                EXIT_BAD_INPUT
             }
             _ => 1,
         }

@@ -20,6 +20,7 @@
 
 #[cfg(feature = "case")]
 pub mod case;
+#[cfg(feature = "case")]
 pub mod checkpoint;
 pub mod constitutive;
 pub mod error;
@@ -27,7 +28,9 @@ pub mod langevin;
 pub mod memory;
 pub mod output;
 pub mod random;
+#[cfg(feature = "case")]
 pub mod report;
+#[cfg(feature = "case")]
 pub mod scene;
 pub mod tensor;
 pub mod units;

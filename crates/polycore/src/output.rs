@@ -6,6 +6,7 @@ use std::path::Path;
 
 use crate::Error;
 
+#[cfg(feature = "case")]
 pub mod csv;
 #[cfg(feature = "hdf5")]
 pub mod hdf5;
@@ -64,6 +65,7 @@ pub fn prepare_directory(directory: impl AsRef<Path>) -> Result<(), Error> {
     })
 }
 
+#[cfg(feature = "case")]
 /// The directory of a new run: as [`prepare_directory`], without what an earlier run left, which must not pass for this
 /// one's, and held against a second run.
 ///
@@ -80,6 +82,7 @@ pub fn prepare_run(directory: impl AsRef<Path>) -> Result<RunLock, Error> {
     Ok(lock)
 }
 
+#[cfg(feature = "case")]
 /// The directory of a run that goes on: without half-written files, and held against a second run.
 ///
 /// # Errors

@@ -38,8 +38,7 @@ pub use schema::schema;
 /// The only version of the scene format so far.
 pub const VERSION: i64 = 1;
 
-/// Exit code of the command lines for bad input.
-pub const EXIT_BAD_INPUT: u8 = 2;
+pub use crate::error::EXIT_BAD_INPUT;
 
 /// The table that a sweep writes behind a scene: what it sets, in `set`, holds over all else.
 pub const SWEEP: &str = "sweep";

@@ -6,7 +6,6 @@
 //! Symbols, factors and dimensions come from [`uom`]; the grammar on top allows products (`N*mm`, `N·mm`, `N mm`),
 //! quotients (`J/(kg K)`), powers (`mm^2`, `mm²`, `s^-1`) and `u` for `µ`. `J/kg K` is ambiguous and refused.
 
-use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
 use std::str::FromStr;
@@ -121,8 +120,9 @@ impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
 }
 
 /// A text `NUMBER UNIT`; a bare number too where there is no unit.
+#[cfg(feature = "case")]
 impl<D: Dimension> schemars::JsonSchema for Quantity<D> {
-    fn schema_name() -> Cow<'static, str> {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
         let noun = D::NAME.trim_start_matches("an ").trim_start_matches("a ");
         noun.replace(|letter: char| !letter.is_ascii_alphanumeric(), "_").into()
     }

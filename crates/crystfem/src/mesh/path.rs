@@ -4,14 +4,16 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::mesh::Mesh;
-use crate::table::{Column, read_with_lines};
-use polycore::units::dimension::{LengthDimension, RatioDimension, TimeDimension};
 
 mod cover;
+#[cfg(feature = "case")]
+mod csv;
 mod gcode;
 mod place;
 
 pub use cover::{Activation, Bead};
+#[cfg(feature = "case")]
+pub use csv::read_csv;
 pub use gcode::{parse, read_gcode};
 
 /// A straight move of the nozzle at constant velocity.
@@ -124,33 +126,6 @@ impl ToolPath {
     pub fn activation(&self, mesh: &Mesh, elements: &[u32], bead: Bead) -> Result<Activation, Error> {
         cover::activation(self, mesh, elements, bead)
     }
-}
-
-/// Reads a path from a CSV table with columns `time [unit]` (not descending), `x [unit]`, `y [unit]`, `z [unit]`, in s and m
-/// where a heading has no unit, and `print`: not 0 where the move that ends there lays material down.
-///
-/// # Errors
-/// As [`crate::table::read`]; times that descend.
-pub fn read_csv(path: &Path) -> Result<ToolPath, Error> {
-    let length = |name| Column::of::<LengthDimension>(name).or_unit("m");
-    let columns = [
-        Column::of::<TimeDimension>("time").or_unit("s"),
-        length("x"),
-        length("y"),
-        length("z"),
-        Column::of::<RatioDimension>("print"),
-    ];
-    let ([time, x, y, z, print], lines) = read_with_lines(path, columns)?;
-    let mut moves = Vec::with_capacity(time.len());
-    for row in 1..time.len() {
-        let (start, end) = (time[row - 1], time[row]);
-        if end < start {
-            return Err(error(path, lines[row], "time", end, format!("{start} s or later")));
-        }
-        let place = |row: usize| [x[row], y[row], z[row]];
-        moves.push(Move { from: place(row - 1), to: place(row), start, end, prints: print[row] != 0.0 });
-    }
-    Ok(ToolPath { moves, notes: Vec::new() })
 }
 
 fn error(path: &Path, line: usize, what: &str, found: impl ToString, allowed: impl Into<String>) -> Error {

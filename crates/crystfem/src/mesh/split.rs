@@ -3,7 +3,8 @@
 use crate::mesh::{Face, HEXAHEDRON_SIDES, Mesh, TETRAHEDRON_SIDES};
 
 /// What fills the cells of a grid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Split {
     /// One hexahedron.

@@ -1,9 +1,8 @@
 //! Which linear solver a run takes, and why.
 
 /// How linear systems are solved.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LinearSolver {
     /// By an estimate of the work, see [`Choice`].

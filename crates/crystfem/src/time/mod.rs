@@ -19,9 +19,8 @@ pub(crate) use stage::{Stage, Stages};
 pub(crate) use step::{Attempt, Stepper};
 
 /// Time integrators.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Scheme {
     /// Backward Euler, order 1.

@@ -17,7 +17,8 @@ const LENGTHS: [&str; 3] = ["lx", "ly", "lz"];
 const TILTS: [&str; 3] = ["xy", "xz", "yz"];
 
 /// Which columns of a molecular dynamics table are read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Columns {
     /// `avg_…`: means over the interval before each sample. Stress at one instant in a small cell is mostly the

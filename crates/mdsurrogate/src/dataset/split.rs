@@ -6,7 +6,8 @@ use crate::random::SplitMix64;
 use serde::{Deserialize, Serialize};
 
 /// How rows are divided.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Whole runs, so that no row has its neighbours in time on the other side; each kind of run in proportion.
@@ -17,7 +18,8 @@ pub enum Method {
 }
 
 /// Shares of the three sets; they add up to 1.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Fractions {
     /// To learn from.

@@ -20,9 +20,8 @@ use crate::random::SplitMix64;
 use serde::{Deserialize, Serialize};
 
 /// How candidates are chosen.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
     /// Many candidates for few epochs, the best of them for more (Li et al. 2018,

@@ -6,7 +6,8 @@ use crate::random::SplitMix64;
 use serde::{Deserialize, Serialize};
 
 /// Ranges of the hyperparameters.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Space {
     /// Fewest and most hidden layers.

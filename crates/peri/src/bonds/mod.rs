@@ -203,9 +203,8 @@ pub fn surface_weight<const D: usize>(bond: [f64; D], length: f64, own: [f64; D]
 
 /// Whether pairs at distance r ≤ δ carry their full volume or the linear partial volume
 /// clamp((δ + Δx/2 − r)/Δx, 0, 1) of a particle that the horizon cuts.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum VolumeCorrection {
     /// Full volumes, as printed in the thesis.

@@ -43,7 +43,8 @@ pub trait BondPotential: Send + Sync {
 }
 
 /// The laws by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Law {
     /// t = T(l) − T(1): the printed chain force less its value at rest.

@@ -13,7 +13,8 @@ pub struct Breaking {
 }
 
 /// When stretches are compared with the critical one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Policy {
     /// In equilibrium: all overstretched bonds break at once, and a new equilibrium is sought until none is left.

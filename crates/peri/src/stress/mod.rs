@@ -22,7 +22,8 @@ use serde::{Deserialize, Serialize};
 pub type Tensor<const D: usize> = [[f64; D]; D];
 
 /// How stress is measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Measure {
     /// All bonds crossing the ball, by the part of them inside, averaged over the particle's cell: weights that sum to 1
@@ -117,7 +118,8 @@ impl Missing<'_> {
 }
 
 /// Volume Ω of the averaging ball inside the body, for [`Measure::BallShare`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum BallVolume {
     /// The ball's volume times the share of its particles that exist.

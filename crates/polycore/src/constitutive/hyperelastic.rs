@@ -31,6 +31,8 @@ mod principal;
 pub mod data;
 pub mod fit;
 pub mod homogeneous;
+#[cfg(feature = "tables")]
+mod table;
 
 pub use chain::{EightChain, EightChainRootI2, ThreeChain};
 pub use compressible::{Compressible, Coupling, Volumetric};

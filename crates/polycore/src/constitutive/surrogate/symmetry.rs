@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 pub type Monomial<'a> = (f64, &'a [usize]);
 
 /// A symmetry of the crystal, the third of the material axes being the special one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Symmetry {
     /// No symmetry: the six components of C.

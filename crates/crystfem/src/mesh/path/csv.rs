@@ -1,0 +1,34 @@
+//! Paths as tables of moves.
+
+use super::{Move, ToolPath, error};
+use crate::error::Error;
+use crate::table::{Column, read_with_lines};
+use polycore::units::dimension::{LengthDimension, RatioDimension, TimeDimension};
+use std::path::Path;
+
+/// Reads a path from a CSV table with columns `time [unit]` (not descending), `x [unit]`, `y [unit]`, `z [unit]`, in s and m
+/// where a heading has no unit, and `print`: not 0 where the move that ends there lays material down.
+///
+/// # Errors
+/// As [`crate::table::read`]; times that descend.
+pub fn read_csv(path: &Path) -> Result<ToolPath, Error> {
+    let length = |name| Column::of::<LengthDimension>(name).or_unit("m");
+    let columns = [
+        Column::of::<TimeDimension>("time").or_unit("s"),
+        length("x"),
+        length("y"),
+        length("z"),
+        Column::of::<RatioDimension>("print"),
+    ];
+    let ([time, x, y, z, print], lines) = read_with_lines(path, columns)?;
+    let mut moves = Vec::with_capacity(time.len());
+    for row in 1..time.len() {
+        let (start, end) = (time[row - 1], time[row]);
+        if end < start {
+            return Err(error(path, lines[row], "time", end, format!("{start} s or later")));
+        }
+        let place = |row: usize| [x[row], y[row], z[row]];
+        moves.push(Move { from: place(row - 1), to: place(row), start, end, prints: print[row] != 0.0 });
+    }
+    Ok(ToolPath { moves, notes: Vec::new() })
+}
