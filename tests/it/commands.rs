@@ -248,7 +248,7 @@ fn bond_law_of_the_formulation() {
         let line = format!("critical stretch of 1.2 √n̄ read as {reading}:");
         near(&row(&ended.stdout, &line), &[stretch], 5e-3);
     }
-    for law in ["subtract", "shift", "chain", "printed", "pmb"] {
+    for law in ["chain-offset", "chain-shifted", "chain-affine", "as-published", "linear"] {
         let ended = peri(&format!("exact law --law {law}"), workspace()).with_code(0);
         ended.shows(&format!("law {law}"));
         assert!(!ended.stdout.contains("NaN"), "{}", ended.stdout);

@@ -17,7 +17,7 @@ fn a_state_that_is_not_finite_ends_the_run() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     let semicrystalline = &BAR[BAR.find("law = \"semi").unwrap()..BAR.find("[materials.glass]").unwrap()];
-    let printed = "law = \"printed\"\nsign = \"mended\"\nguarded = true\ndensity = \"1010 kg/m^3\"\n\
+    let printed = "law = \"as-published\"\nsign = \"mended\"\nguarded = true\ndensity = \"1010 kg/m^3\"\n\
                    conductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg K)\"\n\n";
     let scene =
         BAR.replace(semicrystalline, printed).replace("layer_time = \"10 s\"", "layer_time = \"8 s\"");
@@ -44,7 +44,7 @@ fn a_state_that_is_not_finite_ends_the_run() {
 fn a_point_that_is_not_finite_ends_the_run() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    let scene = "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"printed\"\nsign = \"mended\"\nguarded = true\n\
+    let scene = "version = 1\nprogram = \"crystfem\"\n[material]\nlaw = \"as-published\"\nsign = \"mended\"\nguarded = true\n\
                  density = \"1010 kg/m^3\"\nconductivity = \"0.25 W/(m K)\"\nspecific_heat = \"2200 J/(kg K)\"\n\
                  [output]\npictures = false\n\
                  [[point]]\nname = \"p\"\nstart = \"200 degC\"\nlegs = [{ to = \"120 degC\", rate = \"10 K/min\" }]\n";

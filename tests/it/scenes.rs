@@ -17,7 +17,7 @@ shapes = [
 
 [material]
 youngs_modulus = "1 MPa"
-law = "subtract"
+law = "chain-offset"
 links = 720
 dissociation = 1200
 
@@ -59,7 +59,7 @@ cracks = [{ from = ["100 mm", "0 mm", "0 mm"], to = ["100 mm", "20 mm", "0 mm"],
 
 [material]
 youngs_modulus = "1 MPa"
-law = "chain"
+law = "chain-affine"
 links = 100
 dissociation = 1200
 volume_correction = "linear"
@@ -95,7 +95,7 @@ points = "points.csv"
 
 [material]
 youngs_modulus = "1 MPa"
-law = "pmb"
+law = "linear"
 
 [[boundary]]
 side = "x-"
@@ -140,7 +140,7 @@ cracks = [{{ from = ["-41 mm", "0 mm"], to = ["-20 mm", "0 mm"] }}]
 
 [material]
 youngs_modulus = "0.6 MPa"
-law = "subtract"
+law = "chain-offset"
 links = 720
 dissociation = 1200
 critical = {{ percent_over_contour = 1.2 }}

@@ -13,7 +13,8 @@ mod kernel;
 const SIZE: f64 = 1e4;
 
 fn dimension<const D: usize>(criterion: &mut Criterion) -> Result<(), Failure> {
-    for (law, range) in [(Law::Subtract, [0.95, 1.05]), (Law::Subtract, [0.5, 3.0]), (Law::Pmb, [0.95, 1.05])]
+    for (law, range) in
+        [(Law::ChainOffset, [0.95, 1.05]), (Law::ChainOffset, [0.5, 3.0]), (Law::Linear, [0.95, 1.05])]
     {
         let mut bonds = kernel::bonds::<D>(kernel::block(SIZE)?)?;
         let (_, displacement) = kernel::loaded(&mut bonds, law, range)?;

@@ -125,7 +125,8 @@ fn measure_dimension<const D: usize>(
     let total: usize = cells.iter().product();
     let mut bonds = kernel::bonds(lattice)?;
     // the DENT specimen's stretches, and those of a stiff plate
-    for (law, range) in [(Law::Subtract, [0.95, 1.05]), (Law::Subtract, [0.5, 3.0]), (Law::Pmb, [0.95, 1.05])]
+    for (law, range) in
+        [(Law::ChainOffset, [0.95, 1.05]), (Law::ChainOffset, [0.5, 3.0]), (Law::Linear, [0.95, 1.05])]
     {
         measure_bonds(&mut bonds, "lattice", law, range, threads, rows)?;
     }
@@ -133,7 +134,7 @@ fn measure_dimension<const D: usize>(
     if size <= 1e6 {
         let points: Vec<[f64; D]> = (0..total).map(points).collect();
         let mut cloud = CloudBonds::new(&points, &vec![1.0; total], 1.0, RATIO, VolumeCorrection::None, &[])?;
-        measure_bonds(&mut cloud, "list", Law::Subtract, [0.95, 1.05], threads, rows)?;
+        measure_bonds(&mut cloud, "list", Law::ChainOffset, [0.95, 1.05], threads, rows)?;
     }
     Ok(())
 }
@@ -168,7 +169,7 @@ fn measure_bonds<const D: usize>(
     let what = format!("{D}D {path} {} {}–{} ({})", law.name(), range[0], range[1], fit.kind());
     let rate = bonds.directed_bonds() as f64 / times[REPEATS / 2];
     rows.push(Measurement { what: what.clone(), size, threads, value: rate, unit: "directed bonds/s" });
-    if law == Law::Pmb || path == "list" {
+    if law == Law::Linear || path == "list" {
         // bonds and particles; displacement, velocity, force and mass of the solver
         let solver = bonds.slots() * 8 * (3 * D + 1);
         let bytes = (bonds.bytes() + solver) as f64 / size as f64;

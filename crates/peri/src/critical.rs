@@ -109,7 +109,7 @@ impl Critical {
                         )
                     }
                 }
-                None => fault("critical.percent_over_contour", factor, "a chain law: `pmb` has no links"),
+                None => fault("critical.percent_over_contour", factor, "a chain law: `linear` has no links"),
             },
             (None, Some(stretch), None) if stretch > 1.0 => Ok(stretch),
             (None, Some(stretch), None) => fault("critical.stretch", stretch, "above 1"),
@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn linear_bond_has_the_textbook_fracture_energy() {
         let (e, horizon, s) = (1e7, 0.03, 0.02);
-        let law = Law::Pmb.build(0.0, 0.0, false).unwrap();
+        let law = Law::Linear.build(0.0, 0.0, false).unwrap();
         let kt = modulus(Space::Solid, e, horizon, 1.0);
         let context =
             Context { law: &*law, links: None, space: Space::Solid, modulus: kt, horizon, thickness: 1.0 };
@@ -248,7 +248,7 @@ mod tests {
         let (e, horizon, thickness) = (0.6e6, 6.03e-3, 3e-3);
         let energy = 2.67e3;
         let phi = 2.0 * PI * energy / (3.0 * e * horizon);
-        let law = Law::Pmb.build(0.0, 0.0, false).unwrap();
+        let law = Law::Linear.build(0.0, 0.0, false).unwrap();
         let (space, modulus) = (Space::PlaneStress, modulus(Space::PlaneStress, e, horizon, thickness));
         let context = Context { law: &*law, links: None, space, modulus, horizon, thickness };
         let critical =
@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn readings_that_break_at_rest_are_refused() {
-        let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+        let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
         let context = Context {
             law: &*law,
             links: Some(720.0),

@@ -18,7 +18,7 @@ pub enum Exact {
     /// Tension, tangent and energy of a bond law, its force maximum, critical stretches and kernel fit.
     Law {
         /// The law.
-        #[arg(long, value_enum, default_value_t = LawName::Subtract)]
+        #[arg(long, value_enum, default_value_t = LawName::ChainOffset)]
         law: LawName,
         /// Links per bond n̄.
         #[arg(long, default_value_t = 720.0)]
@@ -42,15 +42,15 @@ pub enum Exact {
 #[derive(Clone, Copy, ValueEnum)]
 pub enum LawName {
     /// T(l) − T(1).
-    Subtract,
+    ChainOffset,
     /// T(l − 1).
-    Shift,
+    ChainShifted,
     /// T(g(l)) g′(l).
-    Chain,
+    ChainAffine,
     /// T(l).
-    Printed,
+    AsPublished,
     /// 3(l − 1).
-    Pmb,
+    Linear,
 }
 
 /// Far beyond any rubber.
@@ -127,11 +127,11 @@ impl Exact {
 
 fn print_law(name: LawName, links: f64, dissociation: f64, to: f64) -> Result<(), Failure> {
     let law = match name {
-        LawName::Subtract => Law::Subtract,
-        LawName::Shift => Law::Shift,
-        LawName::Chain => Law::Chain,
-        LawName::Printed => Law::Printed,
-        LawName::Pmb => Law::Pmb,
+        LawName::ChainOffset => Law::ChainOffset,
+        LawName::ChainShifted => Law::ChainShifted,
+        LawName::ChainAffine => Law::ChainAffine,
+        LawName::AsPublished => Law::AsPublished,
+        LawName::Linear => Law::Linear,
     };
     if !(1.0 < to && to <= LARGEST_STRETCH) {
         let allowed = format!("above 1, at most {LARGEST_STRETCH}");

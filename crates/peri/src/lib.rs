@@ -17,7 +17,7 @@
 //!     let (spacing, thickness, ratio) = (1e-3, 1e-3, 3.015);
 //!     let body = [Operation::Add(Shape::Box { min: [0.0, 0.0], max: [40e-3, 20e-3] })];
 //!     let mut bonds = LatticeBonds::new(lattice(&body, spacing, thickness)?, ratio, VolumeCorrection::None, &[])?;
-//!     let law = Law::Subtract.build(720.0, 1200.0, false)?;
+//!     let law = Law::ChainOffset.build(720.0, 1200.0, false)?;
 //!     let modulus = modulus(Space::PlaneStress, 1e6, bonds.horizon(), thickness);
 //!
 //!     // three layers at each end: the left held, the right moved by 2 mm along x

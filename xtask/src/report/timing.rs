@@ -56,7 +56,7 @@ const SUBJECTS: &[Subject] = &[
         default: "fitted",
         axes: ["ns per bond", "largest error / rms tension"],
         command: "cargo xtask bench peri-laws",
-        note: "Law `subtract`, one stretch after the other; the kernels evaluate the fit for eight bonds at once. Newton is the exact law.",
+        note: "Law `chain-offset`, one stretch after the other; the kernels evaluate the fit for eight bonds at once. Newton is the exact law.",
     },
     Subject {
         title: "Stress measures and corrections",

@@ -1,15 +1,15 @@
 //! Materials: Abaqus' UMATHT without side effects. (Input, old state) → (response, new state); the old state is never
 //! changed.
 
+mod as_published;
 mod conductor;
 mod crystallization;
-mod printed;
 mod property;
 mod semicrystalline;
 
+pub use as_published::{AsPublished, Sign};
 pub use conductor::Conductor;
 pub use crystallization::{Crystallization, Grown};
-pub use printed::{Printed, Sign};
 pub use property::{Property, REFERENCE_TEMPERATURE, Table};
 pub use semicrystalline::{LARGEST_CHANGE, Polymer, Semicrystalline};
 

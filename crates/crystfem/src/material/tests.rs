@@ -40,8 +40,8 @@ fn all() -> Vec<Box<dyn ThermalMaterial>> {
         Box::new(pa12(None)),
         Box::new(pa12(Some(209e3))),
         Box::new(pa12_of(Constants::TABLE_4_1_COLUMN_2, Some(209e3))),
-        Box::new(Printed::new(plain(), Sign::Printed, false)),
-        Box::new(Printed::new(plain(), Sign::Mended, true)),
+        Box::new(AsPublished::new(plain(), Sign::AsPublished, false)),
+        Box::new(AsPublished::new(plain(), Sign::Mended, true)),
         Box::new(tabulated().with_directions([1.0, 0.4, 1e-3]).unwrap()),
     ]
 }
@@ -256,7 +256,7 @@ mod printed {
 
     /// α after each step of a ramp from 200 °C at 1 K per step, or another start.
     fn ramp(sign: Sign, guarded: bool, from: f64, to: f64, step: f64, dt: f64) -> Vec<f64> {
-        let material = Printed::new(plain(), sign, guarded);
+        let material = AsPublished::new(plain(), sign, guarded);
         let (mut state, mut alphas) = ([0.0], Vec::new());
         material.initial_state(0.0, &mut state);
         let count = ((to - from).abs() / step).round() as usize;
@@ -273,9 +273,9 @@ mod printed {
     /// Erratum 2: `DTEMP > 0` crystallizes. Cooling 200 → 120 °C leaves α = 1e-3, heating 120 → 180 °C gives 1.
     #[test]
     fn erratum_2_the_sign_is_inverted() {
-        let cooled = ramp(Sign::Printed, false, 200.0, 120.0, 0.005, 0.03);
+        let cooled = ramp(Sign::AsPublished, false, 200.0, 120.0, 0.005, 0.03);
         assert!((cooled.last().unwrap() - 1e-3).abs() < 1e-9, "{:?}", cooled.last());
-        let heated = ramp(Sign::Printed, false, 120.0, 180.0, 0.005, 0.03);
+        let heated = ramp(Sign::AsPublished, false, 120.0, 180.0, 0.005, 0.03);
         assert!(heated.iter().any(|&alpha| alpha > 0.999), "{:?}", heated.last());
     }
 
@@ -301,7 +301,7 @@ mod printed {
     /// Erratum 6: α = 1 heated to 459.9 K leaves 0.754, then jumps to 1e-3 at 460 K.
     #[test]
     fn erratum_6_alpha_max_mixes_two_crystallinities() {
-        let material = Printed::new(plain(), Sign::Mended, true);
+        let material = AsPublished::new(plain(), Sign::Mended, true);
         let mut alpha = 1.0;
         let mut last = (0.0, 0.0);
         // TEMPK = K − 0.15 in the code; steps of 1 mK

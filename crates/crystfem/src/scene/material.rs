@@ -4,7 +4,7 @@ use super::either::{self, TextOrTable};
 use super::fault::{located, located_in};
 use crate::error::Error;
 use crate::kinetics::{Constants, Kinetics};
-use crate::material::{Conductor, Polymer, Printed, Property, Semicrystalline, Sign, ThermalMaterial};
+use crate::material::{AsPublished, Conductor, Polymer, Property, Semicrystalline, Sign, ThermalMaterial};
 use crate::melting::Melting;
 use polycore::scene::{SceneError, Source};
 use polycore::units::dimension::{ConductivityDimension, SpecificHeatDimension};
@@ -22,8 +22,8 @@ pub enum Law {
     Conductor,
     /// [`Semicrystalline`].
     Semicrystalline,
-    /// [`Printed`]: Appendix B as coded.
-    Printed,
+    /// [`AsPublished`]: Appendix B as coded.
+    AsPublished,
 }
 
 /// A material.
@@ -62,9 +62,9 @@ pub struct MaterialSpec {
     pub latent_heat: Option<SpecificEnergy>,
     /// Relative crystallinity α of fresh material, of `semicrystalline`; default 0.
     pub initial_alpha: Option<Ratio>,
-    /// Which sign of the increment crystallizes, of `printed`; default as printed.
+    /// Which sign of the increment crystallizes, of `as-published`; default as published.
     pub sign: Option<SignSpec>,
-    /// Whether K = 0 outside (T∞, T₀), of `printed`; default no, as printed.
+    /// Whether K = 0 outside (T∞, T₀), of `as-published`; default no, as published.
     pub guarded: Option<bool>,
 }
 
@@ -73,7 +73,7 @@ pub struct MaterialSpec {
 #[serde(rename_all = "kebab-case")]
 pub enum SignSpec {
     /// Heating crystallizes.
-    Printed,
+    AsPublished,
     /// Cooling crystallizes.
     Mended,
 }
@@ -180,12 +180,12 @@ impl MaterialSpec {
         Ok(match self.law {
             Law::Conductor => Box::new(self.conductor(source, key)?),
             Law::Semicrystalline => Box::new(self.semicrystalline(source, key)?),
-            Law::Printed => {
+            Law::AsPublished => {
                 let sign = match self.sign {
                     Some(SignSpec::Mended) => Sign::Mended,
-                    _ => Sign::Printed,
+                    _ => Sign::AsPublished,
                 };
-                Box::new(Printed::new(self.conductor(source, key)?, sign, self.guarded.unwrap_or(false)))
+                Box::new(AsPublished::new(self.conductor(source, key)?, sign, self.guarded.unwrap_or(false)))
             }
         })
     }
@@ -208,7 +208,7 @@ impl MaterialSpec {
                         format!("`{name}`: a semicrystalline material needs it"),
                     ));
                 }
-                Law::Conductor | Law::Printed if given => {
+                Law::Conductor | Law::AsPublished if given => {
                     let found = format!("`{name}` of a material that has none");
                     return Err(source.error(&at, found, "nothing, or `law = \"semicrystalline\"`"));
                 }
@@ -216,9 +216,13 @@ impl MaterialSpec {
             }
         }
         for (name, given) in [("sign", self.sign.is_some()), ("guarded", self.guarded.is_some())] {
-            if given && self.law != Law::Printed {
+            if given && self.law != Law::AsPublished {
                 let found = format!("`{name}` of another law");
-                return Err(source.error(&format!("{key}.{name}"), found, "nothing, or `law = \"printed\"`"));
+                return Err(source.error(
+                    &format!("{key}.{name}"),
+                    found,
+                    "nothing, or `law = \"as-published\"`",
+                ));
             }
         }
         Ok(())

@@ -107,7 +107,7 @@ fn bad_points() {
         (
             "crystallinity = 0.25",
             "crystallinity = 0.25\nsign = \"mended\"".into(),
-            &["`material.sign`", "law = \"printed\""],
+            &["`material.sign`", "law = \"as-published\""],
         ),
         (
             "law = \"semicrystalline\"",

@@ -116,7 +116,7 @@ impl Block {
         };
         let volumes = if options.partial_volumes { VolumeCorrection::Linear } else { VolumeCorrection::None };
         let mut bonds = LatticeBonds::new(lattice, RATIO, volumes, &[])?;
-        let law = Law::Pmb.build(1.0, 1.0, false)?;
+        let law = Law::Linear.build(1.0, 1.0, false)?;
         let range = [1.0 - 4.0 * options.strain, 1.0 + 4.0 * options.strain];
         let fit = KernelFit::new(&*law, range, options.fit_bound)?;
         let youngs_modulus = 3.0 * BULK_MODULUS * (1.0 - 2.0 * poisson_ratio(Space::Solid));

@@ -92,7 +92,7 @@ impl Plate {
             (slots, Support { displacement: [None; 2], body_force: [sign * 1e3 / depth, 0.0] })
         };
         let loads = Loads::new(bonds.slots(), &[side(1.0), side(-1.0)]);
-        let law = Law::Subtract.build(720.0, 1200.0, Law::Subtract.rescales())?;
+        let law = Law::ChainOffset.build(720.0, 1200.0, Law::ChainOffset.rescales())?;
         let modulus = modulus(Space::PlaneStress, 1e6, RATIO * spacing, THICKNESS);
         Ok(Self { bonds, loads, law, modulus })
     }

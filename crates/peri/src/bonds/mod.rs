@@ -256,7 +256,7 @@ mod tests {
     /// exact law bond by bond.
     #[test]
     fn laws_that_need_a_table() {
-        let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+        let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
         let fit = KernelFit::new(&*law, [0.3, 1.25 * 720.0_f64.sqrt()], 1e-9).unwrap();
         assert!(fit.kind().starts_with("table"), "{}", fit.kind());
         let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [6.0, 5.0] })];

@@ -9,7 +9,7 @@ const SMALL_DIFFERENCE: f64 = 0.03;
 /// Strains below which an energy is an integral of the tension, which does not cancel.
 const SMALL_ENERGY: f64 = 0.05;
 
-/// `subtract`: t = T(l) − T(1).
+/// `chain-offset`: t = T(l) − T(1).
 ///
 /// K = T′(1) = 3 + 27/(5n̄) − 36/(n̄D̂) + O(n̄⁻²). Far beyond the greatest force of the chain t turns negative again and tends
 /// to −T(1); bonds break long before.
@@ -48,7 +48,7 @@ impl BondPotential for BondStretch {
     }
 }
 
-/// `shift`: t = T(l − 1), odd in l − 1.
+/// `chain-shifted`: t = T(l − 1), odd in l − 1.
 pub struct Shifted(pub Chain);
 
 impl BondPotential for Shifted {
@@ -66,7 +66,7 @@ impl BondPotential for Shifted {
     }
 }
 
-/// `chain`: the chain stretch is g(l) = √((l^{4/3} + 2l^{−2/3})/3), Eq. (2.38), and t = T(g) g′.
+/// `chain-affine`: the chain stretch is g(l) = √((l^{4/3} + 2l^{−2/3})/3), Eq. (2.38), and t = T(g) g′.
 pub struct NetworkStretch(pub Chain);
 
 impl NetworkStretch {
@@ -136,10 +136,10 @@ impl BondPotential for NetworkStretch {
     }
 }
 
-/// `printed`: t = T(l). Not stress-free; a body of it collapses.
-pub struct Printed(pub Chain);
+/// `as-published`: t = T(l). Not stress-free; a body of it collapses.
+pub struct AsPublished(pub Chain);
 
-impl BondPotential for Printed {
+impl BondPotential for AsPublished {
     fn tension(&self, stretch: f64) -> f64 {
         self.0.stretched(stretch).force
     }
@@ -154,7 +154,7 @@ impl BondPotential for Printed {
     }
 }
 
-/// `pmb`: t = 3(l − 1), Silling & Askari 2005, doi:10.1016/j.compstruc.2004.11.026.
+/// `linear`: t = 3(l − 1), Silling & Askari 2005, doi:10.1016/j.compstruc.2004.11.026.
 pub struct LinearBond;
 
 impl BondPotential for LinearBond {

@@ -12,7 +12,7 @@ mod tests;
 pub use chain::{Chain, ChainPoint};
 pub use energy::{EnergyTable, TangentTable};
 pub use fit::KernelFit;
-pub use laws::{BondStretch, LinearBond, NetworkStretch, Printed, Scaled, Shifted};
+pub use laws::{AsPublished, BondStretch, LinearBond, NetworkStretch, Scaled, Shifted};
 pub use range::StretchRange;
 
 use crate::error::Error;
@@ -45,49 +45,50 @@ pub trait BondPotential: Send + Sync {
 /// The laws by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "kebab-case")]
 pub enum Law {
     /// t = T(l) − T(1): the printed chain force less its value at rest.
     #[default]
-    Subtract,
+    ChainOffset,
     /// t = T(l − 1), odd: the only one that obeys (2.70) literally.
-    Shift,
+    ChainShifted,
     /// t = T(g(l)) g′(l) with (2.38) as the chain stretch.
-    Chain,
+    ChainAffine,
     /// t = T(l) as printed: not stress-free, collapses.
-    Printed,
+    AsPublished,
     /// t = 3(l − 1): the linear bond of the prototype microelastic brittle material.
-    Pmb,
+    Linear,
 }
 
 impl Law {
     /// Every law.
-    pub const ALL: [Self; 5] = [Self::Subtract, Self::Shift, Self::Chain, Self::Printed, Self::Pmb];
+    pub const ALL: [Self; 5] =
+        [Self::ChainOffset, Self::ChainShifted, Self::ChainAffine, Self::AsPublished, Self::Linear];
 
     /// Name in scenes.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Subtract => "subtract",
-            Self::Shift => "shift",
-            Self::Chain => "chain",
-            Self::Printed => "printed",
-            Self::Pmb => "pmb",
+            Self::ChainOffset => "chain-offset",
+            Self::ChainShifted => "chain-shifted",
+            Self::ChainAffine => "chain-affine",
+            Self::AsPublished => "as-published",
+            Self::Linear => "linear",
         }
     }
 
     /// Whether the law has chain parameters n̄ and D̂.
     pub fn is_chain(self) -> bool {
-        self != Self::Pmb
+        self != Self::Linear
     }
 
     /// Whether kθ is scaled to an exact small-strain modulus unless the scene says otherwise.
     pub fn rescales(self) -> bool {
-        self == Self::Chain
+        self == Self::ChainAffine
     }
 
     /// Factor on the fictitious mass of dynamic relaxation that the law's stiffening asks for.
     pub fn mass_safety(self) -> f64 {
-        if self == Self::Chain { 1.5 } else { 1.1 }
+        if self == Self::ChainAffine { 1.5 } else { 1.1 }
     }
 
     /// The law with n̄ `links` and D̂ = `dissociation`, times 3/K where `rescale`.
@@ -102,11 +103,11 @@ impl Law {
     ) -> Result<Box<dyn BondPotential>, Error> {
         let chain = || Chain::new(links, dissociation);
         Ok(match self {
-            Self::Subtract => scaled(BondStretch::new(chain()?), rescale),
-            Self::Shift => scaled(Shifted(chain()?), rescale),
-            Self::Chain => scaled(NetworkStretch(chain()?), rescale),
-            Self::Printed => scaled(Printed(chain()?), rescale),
-            Self::Pmb => scaled(LinearBond, rescale),
+            Self::ChainOffset => scaled(BondStretch::new(chain()?), rescale),
+            Self::ChainShifted => scaled(Shifted(chain()?), rescale),
+            Self::ChainAffine => scaled(NetworkStretch(chain()?), rescale),
+            Self::AsPublished => scaled(AsPublished(chain()?), rescale),
+            Self::Linear => scaled(LinearBond, rescale),
         })
     }
 }

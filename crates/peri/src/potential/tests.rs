@@ -81,22 +81,22 @@ fn limits_at_zero_and_infinity() {
         }
         let get = |law: Law| law.build(links, dissociation, false).unwrap();
         let at_rest = Chain::new(links, dissociation).unwrap().stretched(1.0).force;
-        assert_eq!(get(Law::Subtract).tension(0.0), -at_rest);
-        assert_eq!(get(Law::Shift).tension(0.0), -at_rest);
-        assert_eq!(get(Law::Shift).tangent(), 3.0);
-        assert_eq!(get(Law::Chain).tension(0.0), f64::NEG_INFINITY);
-        assert_eq!(get(Law::Printed).tension(0.0), 0.0);
-        assert_eq!(get(Law::Pmb).tension(0.0), -3.0);
+        assert_eq!(get(Law::ChainOffset).tension(0.0), -at_rest);
+        assert_eq!(get(Law::ChainShifted).tension(0.0), -at_rest);
+        assert_eq!(get(Law::ChainShifted).tangent(), 3.0);
+        assert_eq!(get(Law::ChainAffine).tension(0.0), f64::NEG_INFINITY);
+        assert_eq!(get(Law::AsPublished).tension(0.0), 0.0);
+        assert_eq!(get(Law::Linear).tension(0.0), -3.0);
         // the scission of a chain in the end: no force is left
-        assert_eq!(get(Law::Chain).tension(f64::INFINITY), 0.0);
-        assert_eq!(get(Law::Printed).tension(f64::INFINITY), 0.0);
+        assert_eq!(get(Law::ChainAffine).tension(f64::INFINITY), 0.0);
+        assert_eq!(get(Law::AsPublished).tension(f64::INFINITY), 0.0);
     }
 }
 
 /// The reference state of (2.47) is in tension at every stretch down to a point, against the limit (2.70).
 #[test]
 fn printed_law_never_rests() {
-    let printed = Law::Printed.build(720.0, 1200.0, false).unwrap();
+    let printed = Law::AsPublished.build(720.0, 1200.0, false).unwrap();
     assert!(!printed.is_stress_free());
     assert!((1..=100).all(|k| printed.tension(0.01 * f64::from(k)) > 0.0));
 }
@@ -196,7 +196,7 @@ fn greatest_force() {
     }
 }
 
-/// formulation.md: T(1), the tangents at rest and the values of `subtract` and `chain`.
+/// formulation.md: T(1), the tangents at rest and the values of `chain-offset` and `chain-affine`.
 #[test]
 fn values_of_the_formulation() {
     let chain = Chain::new(720.0, 1200.0).unwrap();
@@ -204,14 +204,14 @@ fn values_of_the_formulation() {
     evidence::near("tension at rest as printed, n̄ = 720, over kθ", at_rest, 3.002_482_393_209_98, 1e-13);
     assert!((chain.stretched(1.0).force - 3.00248239).abs() < 5e-9);
     assert!((Chain::new(100.0, 1200.0).unwrap().stretched(1.0).force - 3.018019).abs() < 5e-7);
-    let subtract = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+    let subtract = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     // mpmath with 40 digits; formulation.md prints 3.00745365, one unit of its last digit off
     assert!((subtract.tangent() - 3.007_453_641_930_24).abs() < 1e-12, "{}", subtract.tangent());
     assert!((subtract.tangent() - 3.00745365).abs() < 1e-8);
     // the expansion 3 + 27/(5n̄) − 36/(n̄D̂) leaves terms of order n̄⁻²
     assert!((subtract.tangent() - (3.0 + 27.0 / 3600.0 - 36.0 / 864_000.0)).abs() < 30.0 / (720.0 * 720.0));
-    assert!((Law::Shift.build(720.0, 1200.0, false).unwrap().tangent() - 3.0).abs() < 1e-9);
-    let network = Law::Chain.build(720.0, 1200.0, false).unwrap();
+    assert!((Law::ChainShifted.build(720.0, 1200.0, false).unwrap().tangent() - 3.0).abs() < 1e-9);
+    let network = Law::ChainAffine.build(720.0, 1200.0, false).unwrap();
     assert!((network.tangent() - 1.334437).abs() < 1e-6, "{}", network.tangent());
     assert!((network.tangent() - 4.0 / 9.0 * chain.stretched(1.0).force).abs() < 1e-12);
     let stretches = [0.5, 1.2, 2.0, 2.9442];
@@ -224,7 +224,7 @@ fn values_of_the_formulation() {
             assert!((found - expected).abs() < 1e-5, "{stretch}: {found} against {expected}");
         }
     }
-    // `subtract` stays within 1 % of a linear bond up to l = 3
+    // `chain-offset` stays within 1 % of a linear bond up to l = 3
     for stretch in [0.5, 1.5, 2.0, 3.0] {
         let linear = subtract.tangent() * (stretch - 1.0);
         assert!((subtract.tension(stretch) / linear - 1.0).abs() < 0.01, "{stretch}");
@@ -378,13 +378,14 @@ fn a_slack_law_is_refused() {
 
 #[test]
 fn absurd_ranges_and_bounds_are_refused() {
-    let law = Law::Pmb.build(0.0, 0.0, false).unwrap();
+    let law = Law::Linear.build(0.0, 0.0, false).unwrap();
     for range in [[1.1, 0.9], [0.0, 1.0], [0.5, f64::INFINITY], [f64::NAN, 2.0]] {
         assert!(KernelFit::new(&*law, range, 1e-9).is_err(), "{range:?}");
     }
     assert!(KernelFit::new(&*law, [0.5, 2.0], 0.0).is_err());
     assert!(
-        Law::Subtract.build(0.5, 1200.0, false).is_err() && Law::Chain.build(720.0, f64::NAN, false).is_err()
+        Law::ChainOffset.build(0.5, 1200.0, false).is_err()
+            && Law::ChainAffine.build(720.0, f64::NAN, false).is_err()
     );
     for bound in [0.0, -1e-9, f64::NAN] {
         assert!(KernelFit::new(&*law, [0.9, 1.1], bound).is_err(), "{bound}");

@@ -18,7 +18,7 @@ impl Case for Peri {
   peri run cases/ch2/dent/case.toml --quick         solve, draw, judge; results in out/dent
   peri resume out/dent                              go on after an interruption
   peri sweep SCENE --vary material.fracture_energy=50J/m^2,100J/m^2
-  peri exact law --law chain --links 720 --dissociation 1200
+  peri exact law --law chain-affine --links 720 --dissociation 1200
   peri schema > peri.schema.json                    for editors",
         magic: b"peri-ck7",
         columns: &["peak_load", "first_break", "reaction_*", "largest_displacement", "energy"],

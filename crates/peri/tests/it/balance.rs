@@ -71,7 +71,7 @@ fn unequal_volumes_balance() {
     let points = random.vectors::<3>(500, 1.0);
     let volumes: Vec<f64> = (0..500).map(|_| 3.0 + 2.0 * random.next()).collect();
     let mut cloud = CloudBonds::new(&points, &volumes, 1.0, 0.4, VolumeCorrection::Linear, &[]).unwrap();
-    let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     // close pairs of scattered points are stretched arbitrarily: move them affinely, with a rotation
     let u: Vec<[f64; 3]> = points
         .iter()
@@ -256,7 +256,7 @@ fn stretches_are_tracked() {
         let mut built = body.build();
         let pairs = body.pairs(&built.points);
         let u = Random(29).vectors(built.points.len(), 0.012);
-        let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+        let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
         let fit = fit(&*law, stretch_range(&pairs, &u));
         both(&mut built, &fit, &u);
         let stretches = pairs.iter().map(|p| p.deformed(&u).1);

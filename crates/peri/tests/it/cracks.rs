@@ -131,7 +131,7 @@ fn a_tip_on_bond_lines() {
     let cells = lattice.lattice().clone();
     let pairs = body.pairs(&points);
     let u = Random(3).vectors(points.len(), 1e-4);
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
     for (from, to) in [(0.0, 6e-3), (6e-3, 0.0)] {
         let cut = Cut { corner: [from, 0.03], edges: [[to - from, 0.0], [0.0; 2]] };

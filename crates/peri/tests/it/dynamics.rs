@@ -31,7 +31,7 @@ pub fn once(end_time: f64, time_step: f64) -> VelocityVerlet {
 /// A particle without bonds: no critical step, a straight line, no error.
 #[test]
 fn one_particle() {
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let mut one = Body::<3>::solid([1, 1, 1], 0.1, 3.015).build();
     for bonds in [&mut one.lattice as &mut dyn Bonds<3>, &mut one.cloud] {
         let slot = bonds.particles()[0] as usize;
@@ -58,7 +58,7 @@ fn one_particle() {
 /// A particle that only damping slows: v = v₀(1 − ½cΔt)ⁿ/(1 + ½cΔt)ⁿ, to second order v₀e^(−ct), and what it loses is damped.
 #[test]
 fn damping_slows() {
-    let law = Law::Pmb.build(1.0, 1.0, false).unwrap();
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
     let mut one = Body::<2>::solid([1, 1], 0.1, 3.015).build();
     let bonds = &mut one.lattice;
     let slot = bonds.particles()[0] as usize;
@@ -83,7 +83,7 @@ fn damping_slows() {
 /// A body of which every component is held: it follows the ramp, and the supports' work is what it stores.
 #[test]
 fn fully_held() {
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let mut built = Body::<2>::solid([9, 8], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
     let loads = hold(bonds, |x| Some((3, [0.2 * x[0], -0.1 * x[1]])));
@@ -103,7 +103,7 @@ fn fully_held() {
 /// Two particles on a linear bond: ω² = 12kθV/(ρ|ξ|); the method's own oscillation is cos(2n asin(ωΔt/2)).
 #[test]
 fn two_particles() {
-    let law = Law::Pmb.build(1.0, 1.0, false).unwrap();
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
     let mut two = Body::<2>::solid([2, 1], 0.1, 3.015).build();
     let omega = (12.0 * MODULUS * 0.01 / (DENSITY * 0.1)).sqrt();
     for bonds in [&mut two.lattice as &mut dyn Bonds<2>, &mut two.cloud] {
@@ -148,7 +148,7 @@ fn two_particles() {
 /// falls as Δt² where no bond breaks.
 #[test]
 fn energies_balance() {
-    let law = Law::Subtract.build(100.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();
     let body = Body::<2>::damaged([24, 20], 0.1, 3.015);
     let critical = {
         let mut built = body.build();
@@ -249,7 +249,7 @@ fn shake(bonds: &dyn Bonds<2>, strain: f64, state: &mut State<2>) {
 /// 1e5 steps of a small body that is shaken: no drift of the energy, momentum or spin.
 #[test]
 fn energy_does_not_drift() {
-    let law = Law::Subtract.build(100.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();
     let mut built = Body::<2>::solid([7, 6], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
     let run = |bonds: &mut dyn Bonds<2>, part: f64, steps: f64, strain: f64| {
@@ -312,7 +312,7 @@ fn energy_does_not_drift() {
 /// A body turned by 90° in steps of 1° bears no force and no stress; one that spins keeps energy, momentum and spin.
 #[test]
 fn rigid_rotation() {
-    let law = Law::Subtract.build(100.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();
     let mut built = Body::<2>::damaged([24, 20], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
     let fit = crate::bodies::fit(&*law, [0.95, 1.05]);

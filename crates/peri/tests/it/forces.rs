@@ -69,7 +69,7 @@ fn paths_agree_on_a_tabulated_law() {
     let u = Random(3).vectors(built.points.len(), 0.012);
     let range = stretch_range(&pairs, &u);
     // links nearly at their contour: no rational function of the compiled sizes follows T to 1e-9
-    let potential = peri::potential::Law::Chain.build(1.0, 1e9, false).unwrap();
+    let potential = peri::potential::Law::ChainAffine.build(1.0, 1e9, false).unwrap();
     let fit = KernelFit::new(&*potential, [0.02, range[1].max(1.7)], 1e-7).unwrap();
     assert!(fit.kind().starts_with("table"), "{}", fit.kind());
     built.lattice.set_law(&fit, crate::bodies::MODULUS);
@@ -90,7 +90,7 @@ fn paths_agree_on_a_tabulated_law() {
 /// without a complaint; it does not know AVX-512, so probably on the 256-bit kernels.)
 #[test]
 fn thin_bodies_of_any_length() {
-    let law = peri::potential::Law::Subtract.build(720.0, 1200.0, false).unwrap();
+    let law = peri::potential::Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = KernelFit::new(&*law, [0.5, 1.6], 1e-9).unwrap();
     fn check<const D: usize>(
         cells: [usize; D],

@@ -26,7 +26,7 @@ fn apart<const D: usize>(a: &Tensor<D>, b: &Tensor<D>) -> f64 {
 }
 
 fn linear(range: [f64; 2]) -> (Box<dyn BondPotential>, KernelFit) {
-    let law = Law::Pmb.build(1.0, 1.0, false).unwrap();
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
     let fit = fit(&*law, range);
     (law, fit)
 }
@@ -279,7 +279,7 @@ fn hat(x: [f64; 2]) -> f64 {
 #[test]
 fn measures_are_their_definitions() {
     let (_, built, pairs, u) = smooth();
-    let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
     let windows: [(Measure, Shape2); 3] =
         [(Measure::Hardy, ball), (Measure::Gaussian, gaussian), (Measure::Spline, spline)];
@@ -308,7 +308,7 @@ fn measures_are_their_definitions() {
 #[test]
 fn divergence_is_the_average_over_the_window() {
     let (_, built, pairs, u) = smooth();
-    let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
     let mut lattice = Body::<2>::solid([29, 29], 1.0, 3.015).build().lattice;
     lattice.set_law(&fit, MODULUS);

@@ -15,7 +15,7 @@ fn check_affine<const D: usize>(cells: [usize; D], name: &str) {
     let gradient = |a: usize, b: usize| 0.15 - 0.11 * a as f64 + 0.04 * b as f64;
     let affine = |x: [f64; D]| std::array::from_fn(|a| (0..D).map(|b| gradient(a, b) * x[b]).sum::<f64>());
     let edge = |x: [f64; D]| (0..D).any(|d| x[d] < 0.3 || x[d] > 0.1 * cells[d] as f64 - 0.3);
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let solver = AdaptiveDynamicRelaxation { tolerance: 1e-8, ..Default::default() };
     let bonds: [&mut dyn Bonds<D>; 2] = [&mut built.lattice, &mut built.cloud];
     for (path, bonds) in ["lattice", "cloud"].into_iter().zip(bonds) {
@@ -61,7 +61,7 @@ fn an_affine_boundary_gives_the_affine_field() {
 fn a_sheet_between_rollers_is_in_uniaxial_stress() {
     let cells = [201, 31];
     let mut built = Body::<2>::solid(cells, 1.0, 3.015).build();
-    let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let modulus = modulus(Space::PlaneStress, 1.0, 3.015, 1.0);
     let solver = AdaptiveDynamicRelaxation { tolerance: 1e-9, ..Default::default() };
     // P11/E of formulation.md, printed to five digits
@@ -122,14 +122,14 @@ fn a_block_between_rollers_is_in_uniaxial_stress() {
     let cells = [81, 15, 15];
     let ratio = 2.015;
     let mut built = Body::<3>::solid(cells, 1.0, ratio).build();
-    let law = Law::Chain.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainAffine.build(720.0, 1200.0, true).unwrap();
     let modulus = modulus(Space::Solid, 1.0, ratio, 1.0);
     let stretch = 1.25;
     let grip = |x: [f64; 3]| x[0] < 2.0 || x[0] > cells[0] as f64 - 2.0;
     let loads = hold(&built.lattice, |x| grip(x).then(|| (1, [(stretch - 1.0) * x[0], 0.0, 0.0])));
     let solver = AdaptiveDynamicRelaxation {
         tolerance: 1e-7,
-        mass_safety: Law::Chain.mass_safety(),
+        mass_safety: Law::ChainAffine.mass_safety(),
         ..Default::default()
     };
     let mut state = State::new(built.lattice.slots());

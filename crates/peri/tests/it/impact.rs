@@ -18,7 +18,7 @@ fn run(
     kappa: f64,
     state: &mut State<2>,
 ) -> Result<(), Error> {
-    let law = Law::Pmb.build(1.0, 1.0, false).unwrap();
+    let law = Law::Linear.build(1.0, 1.0, false).unwrap();
     let contact = Contact::new(bonds, MODULUS, kappa)?;
     let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), loads, &[]);
     system.contact = Some(contact);
@@ -148,7 +148,7 @@ fn neither_threads_nor_restarts_change_a_bit() {
         pool.install(|| {
             let mut built = body.build();
             let bonds = &mut built.lattice;
-            let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+            let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
             let contact = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
             let mut state = from.unwrap_or_else(|| {
                 let mut state = State::new(bonds.slots());

@@ -84,7 +84,7 @@ impl Plate {
             (slots, Support { displacement: [None; 2], body_force: [sign * 1e3 / depth, 0.0] })
         };
         let loads = Loads::new(bonds.slots(), &[side(1.0), side(-1.0)]);
-        let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+        let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
         let modulus = modulus(Space::PlaneStress, 1e6, ratio * spacing, thickness);
         Self { bonds, loads, law, modulus }
     }
@@ -177,7 +177,7 @@ fn dent(spacing: f64) -> (LatticeBonds<2>, Loads<2>, Box<dyn BondPotential>, f64
     let bonds = LatticeBonds::new(cells, 3.015, VolumeCorrection::None, &[crack(1.0), crack(-1.0)]).unwrap();
     let grip = height / 2.0 - 3.0 * spacing;
     let loads = hold(&bonds, |x| (x[1].abs() > grip).then(|| (3, [0.0, 0.1 * x[1].signum()])));
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let modulus = modulus(Space::PlaneStress, 0.6e6, 3.015 * spacing, thickness);
     (bonds, loads, law, modulus)
 }
@@ -227,7 +227,7 @@ fn bits_do_not_depend_on_threads() {
             let mut built = Body::<2>::damaged([120, 115], 0.1, 3.015).build();
             let bonds: &mut dyn Bonds<2> = if cloud { &mut built.cloud } else { &mut built.lattice };
             let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 11.7).then(|| (3, [0.2 * x[0], 0.01 * x[0]])));
-            let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+            let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
             let mut problem = Problem::new(&*law, 1.0, &loads, &[0.5, 1.0]);
             problem.breaking = Some(Breaking { stretch: 1.5.into(), policy: Policy::AtEquilibrium });
             let mut state = problem.minimised(bonds, 1e-3);
@@ -255,7 +255,7 @@ fn restarts_take_the_same_bits() {
             hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > end).then(|| (3, [0.6 * x[0], 0.1 * x[0]])));
         (built, loads)
     };
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let breaking = Some(Breaking { stretch: 1.8.into(), policy: Policy::AtEquilibrium });
     let run = |state: &mut State<2>, saved: &mut Vec<State<2>>| {
         let (mut built, loads) = build();
@@ -285,7 +285,7 @@ fn restarts_take_the_same_bits() {
 /// Bodies that are no minimum's neighbourhood: a strip that buckles, pieces that float, a hinge, dust.
 #[test]
 fn unstable_and_loose_bodies() {
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     // a slender strip pressed by a fifth, with a nudge: buckles
     let mut strip = Body::<2>::solid([80, 6], 0.125, 3.015).build();
     let loads = hold(&strip.lattice, |x| {
@@ -320,7 +320,7 @@ fn unstable_and_loose_bodies() {
 #[test]
 fn past_the_greatest_force() {
     // β e^{−β𝓛(β)/D̂} is greatest at β = 2.25 for D̂ = 2, where λ̄ = 1.53 with n̄ = 2
-    let law = Law::Subtract.build(2.0, 2.0, true).unwrap();
+    let law = Law::ChainOffset.build(2.0, 2.0, true).unwrap();
     assert!(law.tension_derivative(1.4) > 0.0 && law.tension_derivative(1.7) < 0.0);
     let (mut built, end) = damaged([24, 20]);
     let loads = hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > end).then(|| (3, [0.2 * x[0], 0.0])));
@@ -336,7 +336,7 @@ fn past_the_greatest_force() {
 /// As dynamic relaxation in `limits.rs`: one particle, two, all held, a load that nothing bears, numbers that are none.
 #[test]
 fn smallest_bodies_and_errors() {
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let mut one = Body::<3>::solid([1, 1, 1], 0.1, 3.015).build();
     let loads = hold(&one.lattice, |_| Some((1, [0.3, 0.0, 0.0])));
     let state = Problem::new(&*law, 1.0, &loads, &[1.0]).minimised(&mut one.lattice, 1e-3);

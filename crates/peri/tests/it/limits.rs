@@ -46,10 +46,10 @@ fn extreme_chains() {
 fn parameters_out_of_their_domain_are_named() {
     for (links, dissociation) in [(0.5, 1.0), (f64::NAN, 1.0), (2.0, 0.0), (2.0, -1.0), (2.0, f64::INFINITY)]
     {
-        let error = Law::Subtract.build(links, dissociation, false).err().unwrap();
+        let error = Law::ChainOffset.build(links, dissociation, false).err().unwrap();
         assert!(matches!(error, Error::Parameter { .. }), "{error}");
     }
-    let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     for range in [[0.0, 1.0], [1.2, 1.1], [0.5, f64::INFINITY], [f64::NAN, 1.1], [0.5, f64::NAN]] {
         assert!(matches!(KernelFit::new(&*law, range, 1e-9), Err(Error::Parameter { .. })), "{range:?}");
     }
@@ -58,7 +58,7 @@ fn parameters_out_of_their_domain_are_named() {
 /// A range about rest so narrow that no sample has a force to speak of is still fitted.
 #[test]
 fn narrow_ranges_are_fitted() {
-    let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     for width in [1e-3, 1e-5, 1e-9] {
         let fit = KernelFit::new(&*law, [1.0 - width, 1.0 + width], 1e-9).unwrap();
         assert!(fit.range[0] <= 1.0 - width && fit.range[1] >= 1.0 + width);
@@ -141,7 +141,7 @@ fn bonds_as_long_as_the_horizon() {
 fn smallest_and_large_horizons() {
     for (ratio, cells) in [(1.0, [14, 9]), (8.0, [40, 33])] {
         let mut built = Body::<2>::solid(cells, 0.125, ratio).build();
-        let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+        let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
         let end = 0.125 * cells[0] as f64 - 0.125;
         let loads = hold(&built.lattice, |x| (x[0] < 0.125 || x[0] > end).then(|| (3, [0.1 * x[0], 0.0])));
         let mut state = State::new(built.lattice.slots());
@@ -157,7 +157,7 @@ fn smallest_and_large_horizons() {
 
 #[test]
 fn one_particle_and_two() {
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let solver = AdaptiveDynamicRelaxation::default();
     let mut one = Body::<3>::solid([1, 1, 1], 0.1, 3.015).build();
     assert_eq!((one.lattice.directed_bonds(), one.cloud.directed_bonds()), (0, 0));
@@ -201,7 +201,7 @@ fn loose_parts_stay_where_they_are_put() {
         let value = [0.05 * x[0], 0.0];
         (x[0] < 3.0 || (x[0] > 17.0 && x[0] < 20.0)).then_some((3, value))
     });
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let solver = AdaptiveDynamicRelaxation { tolerance: 1e-6, max_iterations: 2000, ..Default::default() };
     let mut state = State::new(bonds.slots());
     relax(&solver, &mut bonds, (&*law, 1.0), &loads, &[1.0], &mut state).unwrap();
@@ -237,7 +237,7 @@ fn results_scale_with_length_and_modulus() {
         let loads = hold(&built.lattice, |x| {
             (x[0] < 0.375 * length || x[0] > end).then(|| ((1 << D) - 1, x.map(|c| 0.04 * c)))
         });
-        let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+        let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
         let solver = AdaptiveDynamicRelaxation { tolerance: 1e-8, ..Default::default() };
         let mut state = State::new(built.lattice.slots());
         relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[1.0], &mut state).unwrap();
@@ -265,7 +265,7 @@ fn results_scale_with_length_and_modulus() {
 #[test]
 fn what_is_not_finite_is_located() {
     let mut built = Body::<2>::solid([12, 9], 0.125, 3.015).build();
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let solver = AdaptiveDynamicRelaxation::default();
     let struck = 57;
     for bad in [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e200] {
@@ -292,7 +292,7 @@ fn what_is_not_finite_is_located() {
 #[test]
 fn what_does_not_converge_says_how_far_it_came() {
     let mut built = Body::<2>::damaged([20, 15], 0.125, 3.015).build();
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let loads = hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > 2.125).then(|| (3, [0.1 * x[0], 0.0])));
     let solver = AdaptiveDynamicRelaxation { tolerance: 1e-12, max_iterations: 15, ..Default::default() };
     let mut last = f64::NAN;
@@ -326,14 +326,14 @@ fn what_does_not_converge_says_how_far_it_came() {
 #[test]
 fn strong_compression_of_the_network_law() {
     let mut built = Body::<2>::solid([20, 20], 0.125, 3.015).build();
-    let law = Law::Chain.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainAffine.build(720.0, 1200.0, true).unwrap();
     let end = 2.5 - 0.375;
     for (to, most) in [(0.7, 2000), (2.0, 2000), (0.4, 300)] {
         let loads =
             hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > end).then(|| (3, [(to - 1.0) * x[0], 0.0])));
         let solver = AdaptiveDynamicRelaxation {
             tolerance: 1e-5,
-            mass_safety: Law::Chain.mass_safety(),
+            mass_safety: Law::ChainAffine.mass_safety(),
             accept: 0.0,
             max_iterations: most,
         };
@@ -356,7 +356,7 @@ fn strong_compression_of_the_network_law() {
 /// that the law is first fitted for.
 #[test]
 fn a_leap_ends_where_steps_end() {
-    let law = Law::Subtract.build(100.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();
     let mut built = Body::<2>::damaged([18, 16], 0.125, 3.015).build();
     let loads = hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > 1.875).then(|| (3, [3.0 * x[0], 0.0])));
     let solver = AdaptiveDynamicRelaxation { tolerance: 1e-7, max_iterations: 5000, ..Default::default() };

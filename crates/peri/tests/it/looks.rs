@@ -30,7 +30,7 @@ shapes = [{ add = "box", min = ["0 mm", "-20 mm"], max = ["80 mm", "20 mm"] }]
 
 [material]
 youngs_modulus = "1 MPa"
-law = "pmb"
+law = "linear"
 
 [output]
 pictures = false
@@ -189,7 +189,7 @@ fn what_is_most_likely_not_meant() {
     std::fs::write(directory.path().join("points.csv"), format!("x,y,volume\n{points}")).unwrap();
     let cloud = format!(
         "version = 1\nprogram = \"peri\"\n[body]\nspace = \"plane-stress\"\nthickness = \"1 mm\"\nhorizon = \"6 mm\"\npoints = \"{}\"
-[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"pmb\"\n[[boundary]]\nside = \"x-\"\nlayers = 1\ndisplacement = [\"0 mm\", \"0 mm\"]
+[material]\nyoungs_modulus = \"1 MPa\"\nlaw = \"linear\"\n[[boundary]]\nside = \"x-\"\nlayers = 1\ndisplacement = [\"0 mm\", \"0 mm\"]
 [[boundary]]\nmin = [\"37 mm\", \"-1 mm\"]\nmax = [\"39 mm\", \"30 mm\"]\ndisplacement = [\"1 mm\", \"0 mm\"]\n",
         directory.path().join("points.csv").display()
     );
@@ -239,7 +239,7 @@ cracks = [{{ from = ["-1 mm", "0 mm"], to = ["19.9 mm", "0 mm"] }}]
 
 [material]
 youngs_modulus = "1 MPa"
-law = "pmb"
+law = "linear"
 {critical}
 
 [[boundary]]

@@ -77,7 +77,8 @@ fn springs_in_series() {
             });
             let mut state = State::new(bonds.slots());
             let contact = Some([stiffness, 0.5]);
-            let run = Run { bonds, loads: &loads, factors: &factors, law: Law::Pmb, contact, breaking: None };
+            let run =
+                Run { bonds, loads: &loads, factors: &factors, law: Law::Linear, contact, breaking: None };
             run.solve(&mut *method, &mut state, &mut |_, _| ());
             for row in &state.history {
                 let pressed = (most * row.factor - 0.1).max(0.0);
@@ -128,7 +129,7 @@ fn elastic_blocks_press_each_other() {
         let mut state = State::new(bonds.slots());
         let contact = Some([STIFFNESS, 0.5]);
         let run =
-            Run { bonds, loads: &loads, factors: &factors, law: Law::Subtract, contact, breaking: None };
+            Run { bonds, loads: &loads, factors: &factors, law: Law::ChainOffset, contact, breaking: None };
         let lists = run.solve(&mut *methods(1e-6)[which], &mut state, &mut |_, _| ());
         let mut before = 0.0;
         for row in &state.history {
@@ -203,7 +204,7 @@ fn flanks_do_not_interpenetrate() {
                     bonds,
                     loads: &loads,
                     factors: &factors,
-                    law: Law::Subtract,
+                    law: Law::ChainOffset,
                     contact,
                     breaking: None,
                 };
@@ -234,7 +235,7 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
             let mut state = from.unwrap_or_else(|| State::new(bonds.slots()));
             let mut saved = None;
             let breaking = Some(Breaking { stretch: 1.17.into(), policy: Default::default() });
-            let (law, contact) = (Law::Subtract, Some([STIFFNESS, skin]));
+            let (law, contact) = (Law::ChainOffset, Some([STIFFNESS, skin]));
             let run = Run { bonds, loads: &loads, factors: &[0.4, 0.7, 1.0], law, contact, breaking };
             let lists = run.solve(&mut *methods(1e-2)[which], &mut state, &mut |state, restartable| {
                 if restartable && state.total_iterations >= save && saved.is_none() {
@@ -270,8 +271,14 @@ fn contact_without_touch_changes_no_bit() {
         let bonds: &mut dyn Bonds<2> = &mut built.lattice;
         let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 2.7).then(|| (3, [0.05 * x[0], 0.0])));
         let mut state = State::new(bonds.slots());
-        let run =
-            Run { bonds, loads: &loads, factors: &[0.5, 1.0], law: Law::Subtract, contact, breaking: None };
+        let run = Run {
+            bonds,
+            loads: &loads,
+            factors: &[0.5, 1.0],
+            law: Law::ChainOffset,
+            contact,
+            breaking: None,
+        };
         run.solve(&mut *methods(1e-4)[which], &mut state, &mut |_, _| ());
         assert_eq!(state.history[1].contact.map(|touching| touching.pairs), contact.map(|_| 0));
         bits(&state)
@@ -284,14 +291,14 @@ fn contact_without_touch_changes_no_bit() {
         let (mut built, loads) = sheet(30, 4.0);
         let loads = loads(&built.lattice);
         let mut state = State::new(built.lattice.slots());
-        let (bonds, law) = (&mut built.lattice, Law::Subtract);
+        let (bonds, law) = (&mut built.lattice, Law::ChainOffset);
         let run = Run { bonds, loads: &loads, factors: &[1.0], law, contact, breaking: None };
         run.solve(&mut *methods(1e-2)[0], &mut state, &mut |_, _| ());
         bits(&state)
     };
     assert!(pressed(None) == pressed(Some([0.0, 0.5])));
     let mut built = Body::<2>::solid([3, 3], 1.0, 1.5).build();
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let loads = Loads::default();
     assert!(
         System::new(&mut built.lattice, BondMaterial::new(&*law, MODULUS), &loads, &[]).contact.is_none()

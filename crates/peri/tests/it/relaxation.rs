@@ -37,7 +37,7 @@ impl Dent {
         let bonds = LatticeBonds::new(cells, RATIO, VolumeCorrection::None, &cuts).unwrap();
         let grip = height / 2.0 - 3.0 * spacing;
         let loads = hold(&bonds, |x| (x[1].abs() > grip).then(|| (3, [0.0, 0.01 * x[1].signum()])));
-        let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+        let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
         let modulus = modulus(Space::PlaneStress, 0.6e6, RATIO * spacing, THICKNESS);
         Self { bonds, loads, law, modulus, spacing }
     }
@@ -104,7 +104,7 @@ fn bits_do_not_depend_on_threads() {
             let mut built = Body::<2>::damaged([120, 115], 0.1, RATIO).build();
             let bonds: &mut dyn Bonds<2> = if cloud { &mut built.cloud } else { &mut built.lattice };
             let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 11.7).then(|| (3, [0.05 * x[0], 0.01 * x[0]])));
-            let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+            let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
             let mut state = State::new(bonds.slots());
             let solver = AdaptiveDynamicRelaxation { tolerance: 1e-2, ..Default::default() };
             relax(&solver, bonds, (&*law, 1.0), &loads, &[0.5, 1.0], &mut state).unwrap();

@@ -33,7 +33,7 @@ fn solve(
     factors: &[f64],
     state: &mut State<2>,
 ) -> Result<(), peri::Error> {
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), loads, factors);
     march(method, &mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }

@@ -36,7 +36,7 @@ fn measured<const D: usize>(
     cloud: bool,
 ) -> Vec<(&'static str, [f64; 2])> {
     let u = uniaxial(&built.points);
-    let fit = fit(&*Law::Pmb.build(1.0, 1.0, false).unwrap(), [0.9, 1.1]);
+    let fit = fit(&*Law::Linear.build(1.0, 1.0, false).unwrap(), [0.9, 1.1]);
     let modulus = modulus(space(D), 1.0, ratio, 1.0);
     let diagonal = |p: Tensor<D>| [p[0][0] / STRAIN, p[1][1] / STRAIN];
     let field = scatter(built.lattice.slots(), &built.on_lattice, &u);
@@ -287,7 +287,7 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
     let built = body.build();
     let pairs = body.pairs(&built.points);
     let u = Random(31).vectors(built.points.len(), 0.012);
-    let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
     let field = scatter(built.lattice.slots(), &built.on_lattice, &u);
     let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
@@ -338,7 +338,7 @@ fn divergence_is_the_average_force() {
             [1e-3 * (x * x + 0.06 * x * y * y - 0.2 * y * y), 1e-3 * (0.5 * x * y - 0.1 * x * x * x / 6.0)]
         })
         .collect();
-    let law = Law::Subtract.build(720.0, 1200.0, false).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
     let mut bonds: LatticeBonds<2> =
         LatticeBonds::new(lattice(&body.operations, 1.0, 1.0).unwrap(), 3.015, Default::default(), &[])
@@ -380,7 +380,7 @@ fn cauchy_stress_of_a_homogeneous_strain() {
             .map(|x| std::array::from_fn(|a| (0..D).map(|b| h[a][b] * x[b]).sum()))
             .collect();
         let field: Field<D> = scatter(built.lattice.slots(), &built.on_lattice, &u);
-        let law = Law::Chain.build(720.0, 1200.0, true).unwrap();
+        let law = Law::ChainAffine.build(720.0, 1200.0, true).unwrap();
         let fit = fit(&*law, [0.5, 2.0]);
         let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
         let gradients = deformation_gradients::<D>(&built.lattice, &field);

@@ -12,7 +12,7 @@ use polycore::case::Fault;
 /// Steps beyond the critical one are refused by name, with the exit code of bad input.
 #[test]
 fn steps_beyond_the_critical_are_refused() {
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let mut built = Body::<2>::damaged([24, 20], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
     let mut state = State::new(bonds.slots());
@@ -50,11 +50,11 @@ fn steps_beyond_the_critical_are_refused() {
     assert!(matches!(error, Error::NotFinite { quantity: "velocity", .. }), "{error}");
 }
 
-/// A block of the `chain` law, which stiffens without bound, crushed between its ends: at a fixed step just below what is
+/// A block of the `chain-affine` law, which stiffens without bound, crushed between its ends: at a fixed step just below what is
 /// critical at rest the growth is named before anything is infinite; the automatic step follows the stiffening.
 #[test]
 fn stiffening_beyond_the_step_is_named() {
-    let law = Law::Chain.build(100.0, 1200.0, true).unwrap();
+    let law = Law::ChainAffine.build(100.0, 1200.0, true).unwrap();
     let crush = |time_step: Option<f64>, part: f64| {
         let mut built = Body::<2>::solid([16, 8], 0.1, 3.015).build();
         let bonds = &mut built.lattice;
@@ -91,7 +91,7 @@ fn stiffening_beyond_the_step_is_named() {
 
 /// A notched sheet torn apart; `pause` interrupts after so many steps.
 fn tear(cloud: bool, pause: Option<u64>) -> State<2> {
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     // four work items, so that threads have something to mix up
     let build = || Body::<2>::damaged([120, 115], 0.1, 3.015).build();
     let solver =

@@ -70,7 +70,7 @@ fn bytes_per_particle() {
 #[test]
 fn force_evaluations() {
     let mut built = Body::<2>::damaged([24, 20], 0.1, 3.015).build();
-    let law = Law::Subtract.build(720.0, 1200.0, true).unwrap();
+    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let loads = hold(&built.lattice, |x| {
         (x[0] < 0.3 || x[0] > 2.1).then(|| (3, if x[0] < 0.3 { [0.0; 2] } else { [0.1, 0.02] }))
     });

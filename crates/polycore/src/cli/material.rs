@@ -11,7 +11,7 @@ use polycore::output::atomic_write;
 
 use super::fits::MPA;
 
-/// Laws whose chain stretch is that of the bond law `chain`, (2.38).
+/// Laws whose chain stretch is that of the bond law `chain-affine`, (2.38).
 const EIGHT_CHAINS: &str = "eight-chain";
 
 /// Fewest links that `peri` takes.
@@ -26,11 +26,11 @@ fn block(fit: &Fit) -> String {
     let eight = fit.model.key.starts_with(EIGHT_CHAINS);
     match links.filter(|_| eight) {
         Some(links) if links.standard_error.is_some() && links.value >= FEWEST_LINKS => {
-            let _ = writeln!(text, "law = \"chain\"\nlinks = {:.5}", links.value);
+            let _ = writeln!(text, "law = \"chain-affine\"\nlinks = {:.5}", links.value);
             text += "dissociation = 1200 # no test without breaking tells it: the thesis' value\n";
         }
-        Some(_) => text += "law = \"pmb\" # the data do not tell the number of links\n",
-        None => text += "law = \"pmb\" # only the modulus of this law has a place in peri\n",
+        Some(_) => text += "law = \"linear\" # the data do not tell the number of links\n",
+        None => text += "law = \"linear\" # only the modulus of this law has a place in peri\n",
     }
     text
 }

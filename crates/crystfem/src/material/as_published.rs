@@ -7,7 +7,7 @@ use crate::error::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sign {
     /// `DTEMP > 0`, as printed: heating crystallizes and cooling melts.
-    Printed,
+    AsPublished,
     /// `DTEMP < 0`.
     Mended,
 }
@@ -16,7 +16,7 @@ pub enum Sign {
 /// where the variables are `REAL`; temperatures are those at the start of the increment. Whatever it does with α, infinite
 /// and NaN included, stands in the state; energy and flux do not depend on it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Printed {
+pub struct AsPublished {
     conductor: Conductor,
     sign: Sign,
     guarded: bool,
@@ -27,7 +27,7 @@ const ALPHA_MAX: f32 = 0.25;
 const T0: f32 = 466.0;
 const T_INF: f32 = 294.0;
 
-impl Printed {
+impl AsPublished {
     /// With `guarded`, K = 0 outside (T∞, T₀), without which the exponential overflows above T₀.
     pub fn new(conductor: Conductor, sign: Sign, guarded: bool) -> Self {
         Self { conductor, sign, guarded }
@@ -53,7 +53,7 @@ impl Printed {
     fn alpha(&self, old: f32, temperature: f64, increment: f64, dt: f64) -> f32 {
         let kelvin = kelvin(temperature);
         let crystallizing = match self.sign {
-            Sign::Printed => increment,
+            Sign::AsPublished => increment,
             Sign::Mended => -increment,
         };
         if crystallizing > 0.0 {
@@ -82,7 +82,7 @@ fn kelvin(temperature: f64) -> f32 {
     (temperature - 273.15 + 273.0) as f32
 }
 
-impl ThermalMaterial for Printed {
+impl ThermalMaterial for AsPublished {
     fn density(&self) -> f64 {
         self.conductor.density()
     }
