@@ -9,7 +9,7 @@ use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::modulus_in;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{Bond, Family, Material, Property};
-use peri::solver::{Loads, PreconditionedLbfgs, State, Support, System};
+use peri::solver::{Lbfgs, Loads, State, Support, System};
 
 // ANCHOR: material
 /// W = ½K θ² + ½α Σ_J (e − θ|ξ|/D)² V_J with the bonds' extensions e = |ζ| − |ξ|, the weighted volume m = Σ_J |ξ|² V_J of the
@@ -119,7 +119,7 @@ pub fn poisson_ratio(solid: LinearSolid) -> Result<f64, peri::Error> {
 
     let mut state = State::new(bonds.slots());
     let mut system = System::new(&mut bonds, solid, &loads, &[1.0]);
-    let method = PreconditionedLbfgs { tolerance: 1e-6, ..Default::default() };
+    let method = Lbfgs { tolerance: 1e-6, ..Default::default() };
     method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
     let moved = |slot: usize, axis: usize| state.displacement.get(slot)[axis];
     let along = (moved(east, 0) - moved(west, 0)) / 8.0;

@@ -9,7 +9,7 @@
 //! use peri::geometry::{Operation, Shape, lattice};
 //! use peri::material::BondMaterial;
 //! use peri::potential::{KernelFit, Law};
-//! use peri::solver::{AdaptiveDynamicRelaxation, Loads, State, Support, System};
+//! use peri::solver::{DynamicRelaxation, Loads, State, Support, System};
 //! use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
 //!
 //! fn main() -> Result<(), peri::Error> {
@@ -30,7 +30,7 @@
 //!
 //!     let mut state = State::new(bonds.slots());
 //!     let mut system = System::new(&mut bonds, BondMaterial::new(&*law, modulus), &loads, &[1.0]);
-//!     AdaptiveDynamicRelaxation::default().solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
+//!     DynamicRelaxation::default().solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
 //!     drop(system);
 //!
 //!     // σ₁₁ in the middle: about E times 2 mm over the free 34 mm

@@ -1,8 +1,8 @@
 //! Whole scenes: run, compared, drawn and judged.
 
+mod animation;
 mod draw;
 mod explain;
-mod film;
 mod fit;
 mod part;
 mod point;

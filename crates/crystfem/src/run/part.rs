@@ -1,7 +1,7 @@
 //! A body in time: solved, recorded, drawn and judged.
 
 use super::probe::{self, Probe};
-use super::{Failure, film, point::CELSIUS};
+use super::{Failure, animation, point::CELSIUS};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
@@ -83,7 +83,7 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
     if scene.output.pictures {
         phases.start("draw");
         probe::draw(&recorder.probes, &recorder.names, scene, output)?;
-        film::draw(scene, &task, &simulation, path.as_deref(), output)?;
+        animation::draw(scene, &task, &simulation, path.as_deref(), output)?;
     }
     phases.stop();
     let expect = if is_study { &[] } else { &scene.expect[..] };

@@ -11,8 +11,8 @@ use peri::geometry::{Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{
-    AdaptiveDynamicRelaxation, Equilibrium, LimitedMemory, Loads, PreconditionedLbfgs, Relaxation, State,
-    Support, System, march,
+    DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Loads, RelaxationSolver, State, Support, System,
+    load_stepping,
 };
 use polycore::case::terminal::Measurement;
 use std::time::Instant;
@@ -99,14 +99,14 @@ impl Plate {
 
     fn solve(&mut self, method: &str, tolerance: f64) -> Result<State<2>, Error> {
         let mut method: Box<dyn Equilibrium<2>> = if method == "adr" {
-            Box::new(Relaxation::new(AdaptiveDynamicRelaxation { tolerance, ..Default::default() }))
+            Box::new(RelaxationSolver::new(DynamicRelaxation { tolerance, ..Default::default() }))
         } else {
-            Box::new(LimitedMemory::new(PreconditionedLbfgs { tolerance, ..Default::default() }))
+            Box::new(LbfgsSolver::new(Lbfgs { tolerance, ..Default::default() }))
         };
         let mut state = State::new(self.bonds.slots());
         let mut system =
             System::new(&mut self.bonds, BondMaterial::new(&*self.law, self.modulus), &self.loads, &[1.0]);
-        march(&mut *method, &mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
+        load_stepping(&mut *method, &mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
         Ok(state)
     }
 

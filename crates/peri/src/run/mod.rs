@@ -26,7 +26,7 @@ use crate::error::Error;
 use crate::material::{BondMaterial, Property};
 use crate::potential::{BondPotential, KernelFit};
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
-use crate::solver::{Breaking, Loads, State, Status, System, march};
+use crate::solver::{Breaking, Loads, State, Status, System, load_stepping};
 use crate::stress::{Loaded, Tensor, piola_in_cloud, piola_on_lattice};
 use polycore::case::{Fault, Run};
 use polycore::report::{Phases, Report};
@@ -305,7 +305,7 @@ fn solve<const D: usize>(
     };
     let solved = match &scene.dynamics {
         Some(dynamics) => dynamics.method().solve(&mut system, state, &mut watch, &mut finished),
-        None => march(&mut *scene.equilibria(), &mut system, state, &mut watch, &mut finished),
+        None => load_stepping(&mut *scene.equilibria(), &mut system, state, &mut watch, &mut finished),
     };
     phases.stop();
     Ok(solved?)

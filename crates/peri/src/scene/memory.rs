@@ -5,7 +5,7 @@
 
 use super::{Method, Scene};
 use crate::bonds::{Bonds, Stencil, storage};
-use crate::solver::{PreconditionedLbfgs, Record};
+use crate::solver::{Lbfgs, Record};
 use polycore::memory::{available, gib};
 use polycore::scene::{SceneError, Source};
 
@@ -41,7 +41,7 @@ fn of_slots<const D: usize>(scene: &Scene, slots: f64, stencil: usize) -> f64 {
     let mut each = masks + 8.0 + 2.0 * vector;
     each += FIELDS * vector + if scene.material.critical.is_some() { PAST * vector } else { 8.0 };
     if scene.method() == Method::Lbfgs {
-        each += (FIELDS_OF_LBFGS + 2.0 * PreconditionedLbfgs::default().memory as f64) * vector + COARSE;
+        each += (FIELDS_OF_LBFGS + 2.0 * Lbfgs::default().memory as f64) * vector + COARSE;
     }
     if scene.contact.is_some() {
         each += CONTACT;

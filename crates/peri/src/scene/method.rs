@@ -3,8 +3,7 @@
 use super::Scene;
 use super::formula::Formula;
 use crate::solver::{
-    AdaptiveDynamicRelaxation, Equilibrium, LimitedMemory, Policy, PreconditionedLbfgs, Relaxation,
-    VelocityVerlet,
+    DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Policy, RelaxationSolver, VelocityVerlet,
 };
 use polycore::units::{Density, Rate, Time};
 use serde::Deserialize;
@@ -115,18 +114,13 @@ impl Scene {
         let accept = self.solver.accept.unwrap_or(0.0);
         match self.method() {
             Method::Lbfgs => {
-                let plain = PreconditionedLbfgs::default();
-                Box::new(LimitedMemory::new(PreconditionedLbfgs {
-                    tolerance,
-                    max_iterations,
-                    accept,
-                    ..plain
-                }))
+                let plain = Lbfgs::default();
+                Box::new(LbfgsSolver::new(Lbfgs { tolerance, max_iterations, accept, ..plain }))
             }
             Method::Adr | Method::Verlet => {
                 let mass_safety = self.solver.mass_safety.unwrap_or(self.material.law.mass_safety());
-                let settings = AdaptiveDynamicRelaxation { tolerance, max_iterations, accept, mass_safety };
-                Box::new(Relaxation::new(settings))
+                let settings = DynamicRelaxation { tolerance, max_iterations, accept, mass_safety };
+                Box::new(RelaxationSolver::new(settings))
             }
         }
     }

@@ -4,7 +4,7 @@
 //! with the quotient taken on increments (the displacement-weighted form has negative stiffness in many iterations).
 
 use super::balance::Goal;
-use super::march::{Equilibrium, march};
+use super::load_stepping::{Equilibrium, load_stepping};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::passes::{force_pass, move_pass};
 use super::state::{State, Status, Watch};
@@ -17,7 +17,7 @@ const LOOK: u64 = 10;
 
 /// Settings of the method.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AdaptiveDynamicRelaxation {
+pub struct DynamicRelaxation {
     /// Out-of-balance force over reference force at which a step is converged.
     pub tolerance: f64,
     /// Iterations that a search for equilibrium may take.
@@ -29,13 +29,13 @@ pub struct AdaptiveDynamicRelaxation {
     pub accept: f64,
 }
 
-impl Default for AdaptiveDynamicRelaxation {
+impl Default for DynamicRelaxation {
     fn default() -> Self {
         Self { tolerance: 1e-3, max_iterations: 100_000, mass_safety: 1.1, accept: 0.0 }
     }
 }
 
-impl AdaptiveDynamicRelaxation {
+impl DynamicRelaxation {
     fn goal(&self) -> Goal {
         Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
@@ -52,7 +52,7 @@ impl AdaptiveDynamicRelaxation {
         watch: &mut Watch<D>,
         finished: &mut dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        march(&mut Relaxation::new(*self), system, state, watch, finished)
+        load_stepping(&mut RelaxationSolver::new(*self), system, state, watch, finished)
     }
 }
 
@@ -63,8 +63,8 @@ const LONG: u64 = 3000;
 const LATE_DAMPING: f64 = 0.05;
 
 /// The method at work.
-pub struct Relaxation {
-    settings: AdaptiveDynamicRelaxation,
+pub struct RelaxationSolver {
+    settings: DynamicRelaxation,
     /// Gershgorin sums of the undeformed body for a unit bond tangent; made when first needed.
     unit_mass: Vec<f64>,
     /// Gershgorin sums of the deformed body with each bond's own tangent, where bonds differ much in it.
@@ -73,9 +73,9 @@ pub struct Relaxation {
     contact_mass: Vec<f64>,
 }
 
-impl Relaxation {
+impl RelaxationSolver {
     /// Nothing is computed yet.
-    pub fn new(settings: AdaptiveDynamicRelaxation) -> Self {
+    pub fn new(settings: DynamicRelaxation) -> Self {
         Self { settings, unit_mass: Vec::new(), own_mass: Vec::new(), contact_mass: Vec::new() }
     }
 
@@ -164,7 +164,7 @@ impl Relaxation {
     }
 }
 
-impl<const D: usize> Equilibrium<D> for Relaxation {
+impl<const D: usize> Equilibrium<D> for RelaxationSolver {
     fn equilibrate(
         &mut self,
         system: &mut System<D>,

@@ -3,7 +3,7 @@
 //! condition), found by secants.
 
 use super::balance::Goal;
-use super::march::{Equilibrium, march};
+use super::load_stepping::{Equilibrium, load_stepping};
 use super::memory::{Memory, product};
 use super::passes::{Sums, force_pass};
 use super::preconditioner::Preconditioner;
@@ -41,7 +41,7 @@ const FAR: f64 = (1_u64 << 40) as f64;
 
 /// Settings of the method.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PreconditionedLbfgs {
+pub struct Lbfgs {
     /// Out-of-balance force over reference force at which a step is converged.
     pub tolerance: f64,
     /// Iterations that a search for equilibrium may take.
@@ -58,7 +58,7 @@ pub struct PreconditionedLbfgs {
     pub accept: f64,
 }
 
-impl Default for PreconditionedLbfgs {
+impl Default for Lbfgs {
     fn default() -> Self {
         Self {
             tolerance: 1e-3,
@@ -71,7 +71,7 @@ impl Default for PreconditionedLbfgs {
     }
 }
 
-impl PreconditionedLbfgs {
+impl Lbfgs {
     fn goal(&self) -> Goal {
         Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
@@ -88,13 +88,13 @@ impl PreconditionedLbfgs {
         watch: &mut Watch<D>,
         finished: &mut dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        march(&mut LimitedMemory::new(*self), system, state, watch, finished)
+        load_stepping(&mut LbfgsSolver::new(*self), system, state, watch, finished)
     }
 }
 
 /// The method at work.
-pub struct LimitedMemory<const D: usize> {
-    settings: PreconditionedLbfgs,
+pub struct LbfgsSolver<const D: usize> {
+    settings: Lbfgs,
     preconditioner: Preconditioner<D>,
     memory: Memory<D>,
     /// Gradients −V F of the energy at the iterate and at the trial, 0 where held.
@@ -129,9 +129,9 @@ enum Search {
     Failed,
 }
 
-impl<const D: usize> LimitedMemory<D> {
+impl<const D: usize> LbfgsSolver<D> {
     /// Nothing is computed yet.
-    pub fn new(settings: PreconditionedLbfgs) -> Self {
+    pub fn new(settings: Lbfgs) -> Self {
         Self {
             settings,
             preconditioner: Preconditioner::new(),
@@ -378,7 +378,7 @@ impl<const D: usize> LimitedMemory<D> {
     }
 }
 
-impl<const D: usize> Equilibrium<D> for LimitedMemory<D> {
+impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
     fn equilibrate(
         &mut self,
         system: &mut System<D>,

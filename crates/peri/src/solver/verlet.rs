@@ -5,12 +5,14 @@
 //! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
 //! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
-use super::leap::{Leap, Sums, chunks_of, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
 use super::motion::Motion;
 use super::scale::Balance;
 use super::state::{Record, State, Status, Watch};
 use super::system::System;
 use super::time_step::{BondSums, critical, largest_frequency_squared};
+use super::verlet_step::{
+    Sums, VerletStep, chunks_of, force_pass, kick_pass, leap_pass, refresh, stored, volumes,
+};
 use crate::bonds::{Bonds, StretchRange, stretch_range};
 use crate::error::Error;
 
@@ -228,7 +230,7 @@ impl VelocityVerlet {
         let after = state.motion.time_after(end);
         let (before, (factor, rate)) = (self.factor(system, state.motion.time).0, self.factor(system, after));
         let (density, damping, step) = (self.density, self.damping, state.motion.time_step);
-        let leap = Leap { step, density, damping, factors: [before, factor], rate };
+        let leap = VerletStep { step, density, damping, factors: [before, factor], rate };
         let first = leap_pass(&system.loads, state, volumes, &leap);
         // two ends, √D components
         state.motion.slack += 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;

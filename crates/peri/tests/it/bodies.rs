@@ -6,7 +6,7 @@ use peri::field::Field;
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, KernelFit, Law};
-use peri::solver::{AdaptiveDynamicRelaxation, Loads, State, System};
+use peri::solver::{DynamicRelaxation, Loads, State, System};
 
 /// kθ of all bodies here; any value does.
 pub const MODULUS: f64 = 1.7;
@@ -245,7 +245,7 @@ pub fn laws() -> impl Iterator<Item = (Law, Box<dyn BondPotential>)> {
 
 /// Relaxes `state` under `loads`, without a look at what happens on the way.
 pub fn relax<const D: usize>(
-    solver: &AdaptiveDynamicRelaxation,
+    solver: &DynamicRelaxation,
     bonds: &mut dyn Bonds<D>,
     law: (&dyn BondPotential, f64),
     loads: &Loads<D>,

@@ -7,7 +7,7 @@ use peri::bonds::Bonds;
 use peri::correction::bond_factors;
 use peri::material::{BondMaterial, Material, Property};
 use peri::potential::LinearBond;
-use peri::solver::{Breaking, Policy, PreconditionedLbfgs, State, System};
+use peri::solver::{Breaking, Lbfgs, Policy, State, System};
 
 /// Length of the bar, m.
 const LENGTH: f64 = 9.0;
@@ -27,7 +27,7 @@ fn pulled(
     let mut state = State::new(bonds.slots());
     let mut system = System::new(bonds, material, &loads, &[1.0]);
     system.breaking = breaking;
-    let method = PreconditionedLbfgs { tolerance: 1e-6, ..Default::default() };
+    let method = Lbfgs { tolerance: 1e-6, ..Default::default() };
     method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
     state
 }

@@ -5,7 +5,7 @@ use peri::bonds::{Bonds, Stencil};
 use peri::calibrate::{Space, modulus};
 use peri::exact::lattice_uniaxial;
 use peri::potential::{BondPotential, Law};
-use peri::solver::{AdaptiveDynamicRelaxation, State};
+use peri::solver::{DynamicRelaxation, State};
 use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
 
 /// Three layers all around move affinely: the inside follows exactly, since every inner particle has its whole family.
@@ -16,7 +16,7 @@ fn check_affine<const D: usize>(cells: [usize; D], name: &str) {
     let affine = |x: [f64; D]| std::array::from_fn(|a| (0..D).map(|b| gradient(a, b) * x[b]).sum::<f64>());
     let edge = |x: [f64; D]| (0..D).any(|d| x[d] < 0.3 || x[d] > 0.1 * cells[d] as f64 - 0.3);
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-    let solver = AdaptiveDynamicRelaxation { tolerance: 1e-8, ..Default::default() };
+    let solver = DynamicRelaxation { tolerance: 1e-8, ..Default::default() };
     let bonds: [&mut dyn Bonds<D>; 2] = [&mut built.lattice, &mut built.cloud];
     for (path, bonds) in ["lattice", "cloud"].into_iter().zip(bonds) {
         let loads = hold(bonds, |x| edge(x).then(|| ((1 << D) - 1, affine(x))));
@@ -63,7 +63,7 @@ fn a_sheet_between_rollers_is_in_uniaxial_stress() {
     let mut built = Body::<2>::solid(cells, 1.0, 3.015).build();
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let modulus = modulus(Space::PlaneStress, 1.0, 3.015, 1.0);
-    let solver = AdaptiveDynamicRelaxation { tolerance: 1e-9, ..Default::default() };
+    let solver = DynamicRelaxation { tolerance: 1e-9, ..Default::default() };
     // P11/E of formulation.md, printed to five digits
     for (stretch, printed) in [(1.2, 0.22269), (1.5, 0.59576), (2.0, 1.28691)] {
         let grip = |x: [f64; 2]| x[0] < 3.0 || x[0] > cells[0] as f64 - 3.0;
@@ -127,7 +127,7 @@ fn a_block_between_rollers_is_in_uniaxial_stress() {
     let stretch = 1.25;
     let grip = |x: [f64; 3]| x[0] < 2.0 || x[0] > cells[0] as f64 - 2.0;
     let loads = hold(&built.lattice, |x| grip(x).then(|| (1, [(stretch - 1.0) * x[0], 0.0, 0.0])));
-    let solver = AdaptiveDynamicRelaxation {
+    let solver = DynamicRelaxation {
         tolerance: 1e-7,
         mass_safety: Law::ChainAffine.mass_safety(),
         ..Default::default()

@@ -9,8 +9,8 @@ use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{
-    AdaptiveDynamicRelaxation, Breaking, Equilibrium, LimitedMemory, Loads, Policy, PreconditionedLbfgs,
-    Relaxation, State, Support, System, march,
+    Breaking, DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Loads, Policy, RelaxationSolver, State,
+    Support, System, load_stepping,
 };
 
 /// A problem on any bonds.
@@ -32,13 +32,13 @@ impl<'a, const D: usize> Problem<'a, D> {
         let mut system =
             System::new(bonds, BondMaterial::new(self.law, self.modulus), self.loads, self.factors);
         system.breaking.clone_from(&self.breaking);
-        march(method, &mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
+        load_stepping(method, &mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
         Ok(state)
     }
 
     fn relaxed(&self, bonds: &mut dyn Bonds<D>, tolerance: f64) -> State<D> {
-        let settings = AdaptiveDynamicRelaxation { tolerance, ..Default::default() };
-        self.solve(bonds, &mut Relaxation::new(settings)).unwrap()
+        let settings = DynamicRelaxation { tolerance, ..Default::default() };
+        self.solve(bonds, &mut RelaxationSolver::new(settings)).unwrap()
     }
 
     fn minimised(&self, bonds: &mut dyn Bonds<D>, tolerance: f64) -> State<D> {
@@ -46,8 +46,8 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 }
 
-fn method<const D: usize>(tolerance: f64) -> LimitedMemory<D> {
-    LimitedMemory::new(PreconditionedLbfgs { tolerance, max_iterations: 2000, ..Default::default() })
+fn method<const D: usize>(tolerance: f64) -> LbfgsSolver<D> {
+    LbfgsSolver::new(Lbfgs { tolerance, max_iterations: 2000, ..Default::default() })
 }
 
 fn displacements<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Vec<[f64; D]> {
@@ -261,7 +261,7 @@ fn restarts_take_the_same_bits() {
         let (mut built, loads) = build();
         let mut system = System::new(&mut built.lattice, BondMaterial::new(&*law, MODULUS), &loads, &factors);
         system.breaking.clone_from(&breaking);
-        let settings = PreconditionedLbfgs { tolerance: 1e-5, ..Default::default() };
+        let settings = Lbfgs { tolerance: 1e-5, ..Default::default() };
         let mut watch = |status: &peri::solver::Status, state: &State<2>| {
             if status.restartable {
                 saved.push(state.clone());
@@ -366,9 +366,9 @@ fn smallest_bodies_and_errors() {
     let mut force = Field::zeros(one.lattice.slots());
     force.set(one.on_lattice[0], [1.0, 0.0]);
     let loads = Loads { body_force: Some(force), ..Default::default() };
-    let settings = PreconditionedLbfgs { max_iterations: 50, ..Default::default() };
+    let settings = Lbfgs { max_iterations: 50, ..Default::default() };
     let error = Problem::new(&*law, 1.0, &loads, &[1.0])
-        .solve(&mut one.lattice, &mut LimitedMemory::new(settings))
+        .solve(&mut one.lattice, &mut LbfgsSolver::new(settings))
         .err();
     assert!(matches!(error, Some(Error::NotConverged { residual: 1.0, iterations: 50, .. })), "{error:?}");
     for bad in [f64::NAN, f64::INFINITY, 1e200] {

@@ -8,7 +8,7 @@ use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{KernelFit, Law};
-use peri::solver::{AdaptiveDynamicRelaxation, Loads, State};
+use peri::solver::{DynamicRelaxation, Loads, State};
 
 /// D̂ from 1 to 1e9 and n̄ from 2 to 1e6, every law, strains of a tenth: the fit keeps its bound and the forces follow.
 #[test]
@@ -145,7 +145,7 @@ fn smallest_and_large_horizons() {
         let end = 0.125 * cells[0] as f64 - 0.125;
         let loads = hold(&built.lattice, |x| (x[0] < 0.125 || x[0] > end).then(|| (3, [0.1 * x[0], 0.0])));
         let mut state = State::new(built.lattice.slots());
-        let solver = AdaptiveDynamicRelaxation { tolerance: 1e-6, ..Default::default() };
+        let solver = DynamicRelaxation { tolerance: 1e-6, ..Default::default() };
         relax(&solver, &mut built.lattice, (&*law, 1.0), &loads, &[1.0], &mut state).unwrap();
         let middle = built.on_lattice[built.on_lattice.len() / 2];
         let x = built.lattice.position(middle);
@@ -158,7 +158,7 @@ fn smallest_and_large_horizons() {
 #[test]
 fn one_particle_and_two() {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-    let solver = AdaptiveDynamicRelaxation::default();
+    let solver = DynamicRelaxation::default();
     let mut one = Body::<3>::solid([1, 1, 1], 0.1, 3.015).build();
     assert_eq!((one.lattice.directed_bonds(), one.cloud.directed_bonds()), (0, 0));
     for bonds in [&mut one.lattice as &mut dyn Bonds<3>, &mut one.cloud] {
@@ -180,7 +180,7 @@ fn one_particle_and_two() {
             bonds.particles().iter().map(|&s| s as usize).find(|&s| bonds.position(s)[0] > 0.1).unwrap();
         force.set(far, [pull, 0.0]);
         loads.body_force = Some(force);
-        let solver = AdaptiveDynamicRelaxation { tolerance: 1e-10, ..solver };
+        let solver = DynamicRelaxation { tolerance: 1e-10, ..solver };
         let mut state = State::new(bonds.slots());
         relax(&solver, bonds, (&*law, MODULUS), &loads, &[1.0], &mut state).unwrap();
         // tolerance over a tangent of order 1, and the fit's 1e-9
@@ -202,7 +202,7 @@ fn loose_parts_stay_where_they_are_put() {
         (x[0] < 3.0 || (x[0] > 17.0 && x[0] < 20.0)).then_some((3, value))
     });
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-    let solver = AdaptiveDynamicRelaxation { tolerance: 1e-6, max_iterations: 2000, ..Default::default() };
+    let solver = DynamicRelaxation { tolerance: 1e-6, max_iterations: 2000, ..Default::default() };
     let mut state = State::new(bonds.slots());
     relax(&solver, &mut bonds, (&*law, 1.0), &loads, &[1.0], &mut state).unwrap();
     let mut seen = 0;
@@ -238,7 +238,7 @@ fn results_scale_with_length_and_modulus() {
             (x[0] < 0.375 * length || x[0] > end).then(|| ((1 << D) - 1, x.map(|c| 0.04 * c)))
         });
         let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-        let solver = AdaptiveDynamicRelaxation { tolerance: 1e-8, ..Default::default() };
+        let solver = DynamicRelaxation { tolerance: 1e-8, ..Default::default() };
         let mut state = State::new(built.lattice.slots());
         relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[1.0], &mut state).unwrap();
         let u = built.on_lattice.iter().map(|&s| state.displacement.get(s).map(|x| x / length)).collect();
@@ -266,7 +266,7 @@ fn results_scale_with_length_and_modulus() {
 fn what_is_not_finite_is_located() {
     let mut built = Body::<2>::solid([12, 9], 0.125, 3.015).build();
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-    let solver = AdaptiveDynamicRelaxation::default();
+    let solver = DynamicRelaxation::default();
     let struck = 57;
     for bad in [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e200] {
         let mut loads = hold(&built.lattice, |x| (x[0] < 0.375).then_some((3, [0.0; 2])));
@@ -294,7 +294,7 @@ fn what_does_not_converge_says_how_far_it_came() {
     let mut built = Body::<2>::damaged([20, 15], 0.125, 3.015).build();
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let loads = hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > 2.125).then(|| (3, [0.1 * x[0], 0.0])));
-    let solver = AdaptiveDynamicRelaxation { tolerance: 1e-12, max_iterations: 15, ..Default::default() };
+    let solver = DynamicRelaxation { tolerance: 1e-12, max_iterations: 15, ..Default::default() };
     let mut last = f64::NAN;
     let mut state = State::new(built.lattice.slots());
     let mut system =
@@ -317,7 +317,7 @@ fn what_does_not_converge_says_how_far_it_came() {
     force.set(one.on_lattice[0], [1.0, 0.0]);
     let loads = Loads { body_force: Some(force), ..Default::default() };
     let mut state = State::new(one.lattice.slots());
-    let solver = AdaptiveDynamicRelaxation { max_iterations: 50, ..Default::default() };
+    let solver = DynamicRelaxation { max_iterations: 50, ..Default::default() };
     let error = relax(&solver, &mut one.lattice, (&*law, 1.0), &loads, &[1.0], &mut state);
     assert!(matches!(error, Err(Error::NotConverged { residual: 1.0, .. })), "{error:?}");
 }
@@ -331,7 +331,7 @@ fn strong_compression_of_the_network_law() {
     for (to, most) in [(0.7, 2000), (2.0, 2000), (0.4, 300)] {
         let loads =
             hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > end).then(|| (3, [(to - 1.0) * x[0], 0.0])));
-        let solver = AdaptiveDynamicRelaxation {
+        let solver = DynamicRelaxation {
             tolerance: 1e-5,
             mass_safety: Law::ChainAffine.mass_safety(),
             accept: 0.0,
@@ -359,7 +359,7 @@ fn a_leap_ends_where_steps_end() {
     let law = Law::ChainOffset.build(100.0, 1200.0, true).unwrap();
     let mut built = Body::<2>::damaged([18, 16], 0.125, 3.015).build();
     let loads = hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > 1.875).then(|| (3, [3.0 * x[0], 0.0])));
-    let solver = AdaptiveDynamicRelaxation { tolerance: 1e-7, max_iterations: 5000, ..Default::default() };
+    let solver = DynamicRelaxation { tolerance: 1e-7, max_iterations: 5000, ..Default::default() };
     let mut ends = Vec::new();
     for steps in [1, 4] {
         let factors: Vec<f64> = (1..=steps).map(|k| f64::from(k) / f64::from(steps)).collect();

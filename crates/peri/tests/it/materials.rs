@@ -7,9 +7,7 @@ use evidence::near;
 use peri::bonds::{Bonds, Overstretched};
 use peri::field::Field;
 use peri::material::{BondMaterial, Cover, Material, Pointwise, Response};
-use peri::solver::{
-    AdaptiveDynamicRelaxation, Breaking, Policy, PreconditionedLbfgs, State, Status, System, VelocityVerlet,
-};
+use peri::solver::{Breaking, DynamicRelaxation, Lbfgs, Policy, State, Status, System, VelocityVerlet};
 
 /// Makes a material at work in a body.
 type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn Response<D> + 'm>;
@@ -358,9 +356,13 @@ fn pulled(method: Method, setting: f64, threads: usize) -> State<2> {
         let mut system = System::new(&mut built.lattice, solid(), &loads, &[1.0]);
         let (watch, finished) = (&mut |_: &_, _: &_| Ok(()), &mut |_: &dyn Bonds<2>, _: &_| Ok(()));
         let solved = match method {
-            Method::Relaxation => AdaptiveDynamicRelaxation { tolerance: setting, ..Default::default() }
-                .solve(&mut system, &mut state, watch, finished),
-            Method::Lbfgs => PreconditionedLbfgs { tolerance: setting, ..Default::default() }.solve(
+            Method::Relaxation => DynamicRelaxation { tolerance: setting, ..Default::default() }.solve(
+                &mut system,
+                &mut state,
+                watch,
+                finished,
+            ),
+            Method::Lbfgs => Lbfgs { tolerance: setting, ..Default::default() }.solve(
                 &mut system,
                 &mut state,
                 watch,
@@ -436,7 +438,7 @@ fn a_state_based_material_tears() {
                 finished,
             )
         } else {
-            PreconditionedLbfgs { tolerance: 1e-5, ..Default::default() }.solve(
+            Lbfgs { tolerance: 1e-5, ..Default::default() }.solve(
                 &mut system,
                 &mut state,
                 &mut watch,

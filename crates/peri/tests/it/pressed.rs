@@ -6,8 +6,8 @@ use peri::contact::{Contact, STIFFNESS, Touching};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{
-    AdaptiveDynamicRelaxation, Breaking, Equilibrium, LimitedMemory, Loads, PreconditionedLbfgs, Relaxation,
-    State, System, march,
+    Breaking, DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Loads, RelaxationSolver, State, System,
+    load_stepping,
 };
 
 /// A solver's run of a body with contact of a given stiffness and skin (in spacings), or none.
@@ -39,16 +39,16 @@ impl<const D: usize> Run<'_, D> {
             watch(state, status.restartable);
             Ok(())
         };
-        march(method, &mut system, state, &mut see, &mut |_, _| Ok(())).unwrap();
+        load_stepping(method, &mut system, state, &mut see, &mut |_, _| Ok(())).unwrap();
         system.contact.map_or(0, |contact| contact.rebuilds())
     }
 }
 
 /// Dynamic relaxation and L-BFGS.
 fn methods<const D: usize>(tolerance: f64) -> [Box<dyn Equilibrium<D>>; 2] {
-    let relaxation = AdaptiveDynamicRelaxation { tolerance, max_iterations: 20_000, ..Default::default() };
-    let memory = PreconditionedLbfgs { tolerance, max_iterations: 2000, ..Default::default() };
-    [Box::new(Relaxation::new(relaxation)), Box::new(LimitedMemory::new(memory))]
+    let relaxation = DynamicRelaxation { tolerance, max_iterations: 20_000, ..Default::default() };
+    let memory = Lbfgs { tolerance, max_iterations: 2000, ..Default::default() };
+    [Box::new(RelaxationSolver::new(relaxation)), Box::new(LbfgsSolver::new(memory))]
 }
 
 /// What touches in the last step.

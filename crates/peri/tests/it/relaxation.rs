@@ -5,7 +5,7 @@ use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::potential::{BondPotential, Law};
-use peri::solver::{AdaptiveDynamicRelaxation, Loads, State};
+use peri::solver::{DynamicRelaxation, Loads, State};
 
 const THICKNESS: f64 = 3e-3;
 const RATIO: f64 = 3.015;
@@ -43,7 +43,7 @@ impl Dent {
     }
 
     fn relax(&mut self, tolerance: f64, factors: &[f64]) -> State<2> {
-        let solver = AdaptiveDynamicRelaxation { tolerance, ..Default::default() };
+        let solver = DynamicRelaxation { tolerance, ..Default::default() };
         let mut state = State::new(self.bonds.slots());
         relax(&solver, &mut self.bonds, (&*self.law, self.modulus), &self.loads, factors, &mut state)
             .unwrap();
@@ -106,7 +106,7 @@ fn bits_do_not_depend_on_threads() {
             let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 11.7).then(|| (3, [0.05 * x[0], 0.01 * x[0]])));
             let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
             let mut state = State::new(bonds.slots());
-            let solver = AdaptiveDynamicRelaxation { tolerance: 1e-2, ..Default::default() };
+            let solver = DynamicRelaxation { tolerance: 1e-2, ..Default::default() };
             relax(&solver, bonds, (&*law, 1.0), &loads, &[0.5, 1.0], &mut state).unwrap();
             assert!(bonds.slots() > 3 * peri::field::CHUNK);
             let bits: Vec<u64> =
@@ -136,7 +136,7 @@ fn every_stress_free_law_converges() {
         let mut iterations = Vec::new();
         for bonds in bonds {
             let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 2.7).then(|| (3, [0.1 * x[0], 0.0])));
-            let solver = AdaptiveDynamicRelaxation {
+            let solver = DynamicRelaxation {
                 tolerance: 1e-6,
                 mass_safety: law.mass_safety(),
                 accept: 0.0,

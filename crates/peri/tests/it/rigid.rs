@@ -6,8 +6,7 @@ use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{
-    AdaptiveDynamicRelaxation, Equilibrium, LimitedMemory, Loads, PreconditionedLbfgs, Relaxation, State,
-    System, march,
+    DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Loads, RelaxationSolver, State, System, load_stepping,
 };
 
 const WAY: [f64; 2] = [0.3, 1.0];
@@ -15,9 +14,9 @@ const WAY: [f64; 2] = [0.3, 1.0];
 /// Both methods.
 fn methods(tolerance: f64) -> [(&'static str, Box<dyn Equilibrium<2>>); 2] {
     let max_iterations = 5000;
-    let plain = AdaptiveDynamicRelaxation { tolerance, max_iterations, ..Default::default() };
-    let memory = PreconditionedLbfgs { tolerance, max_iterations, ..Default::default() };
-    [("adr", Box::new(Relaxation::new(plain))), ("lbfgs", Box::new(LimitedMemory::new(memory)))]
+    let plain = DynamicRelaxation { tolerance, max_iterations, ..Default::default() };
+    let memory = Lbfgs { tolerance, max_iterations, ..Default::default() };
+    [("adr", Box::new(RelaxationSolver::new(plain))), ("lbfgs", Box::new(LbfgsSolver::new(memory)))]
 }
 
 fn sheet(cuts: &[Cut<2>]) -> LatticeBonds<2> {
@@ -35,7 +34,7 @@ fn solve(
 ) -> Result<(), peri::Error> {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), loads, factors);
-    march(method, &mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
+    load_stepping(method, &mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
 /// The grip y > 88 mm moved by U along [`WAY`], nothing else held.

@@ -7,7 +7,7 @@ use peri::calibrate::{Space, modulus, stiffness_1111};
 use peri::correction::surface_factors;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::potential::Law;
-use peri::solver::{AdaptiveDynamicRelaxation, Loads, State, Support};
+use peri::solver::{DynamicRelaxation, Loads, State, Support};
 use peri::stress::{BallVolume, Loaded, Measure, Missing, Tensor, piola_on_lattice};
 
 /// E ε/σ between (±400, 300) mm, and the largest σ11/σ beside the hole: hardy, one-point.
@@ -32,7 +32,7 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     };
     let loads = Loads::new(bonds.slots(), &[side(1.0), side(-1.0)]);
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
-    let solver = AdaptiveDynamicRelaxation { tolerance: 1e-4, ..Default::default() };
+    let solver = DynamicRelaxation { tolerance: 1e-4, ..Default::default() };
     let mut state = State::new(bonds.slots());
     relax(&solver, &mut bonds, (&*law, modulus), &loads, &[1.0], &mut state).unwrap();
     let slots: Vec<usize> = bonds.particles().iter().map(|&s| s as usize).collect();

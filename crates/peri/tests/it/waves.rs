@@ -5,7 +5,7 @@ use crate::dynamics::{DENSITY, once, run};
 use peri::bonds::Bonds;
 use peri::material::BondMaterial;
 use peri::potential::Law;
-use peri::solver::{AdaptiveDynamicRelaxation, Breaking, Loads, Policy, State, System, VelocityVerlet};
+use peri::solver::{Breaking, DynamicRelaxation, Loads, Policy, State, System, VelocityVerlet};
 use std::f64::consts::PI;
 
 /// ω² = (12kθV/ρ) Σ_k (1 − cos qkΔx)/(kΔx), k = 1 … m: linear bonds along a row of particles, of any amplitude.
@@ -98,7 +98,7 @@ fn wave_in_a_thin_bar() {
         let end = 0.8 - 3.0 * spacing;
         let loads = hold(&short, |x| (x[0] < 3.0 * spacing || x[0] > end).then(|| (1, [1e-4 * x[0], 0.0])));
         let mut state = State::new(short.slots());
-        let solver = AdaptiveDynamicRelaxation { tolerance: 1e-8, ..Default::default() };
+        let solver = DynamicRelaxation { tolerance: 1e-8, ..Default::default() };
         relax(&solver, &mut short, (&*law, MODULUS), &loads, &[1.0], &mut state).unwrap();
         let volume = short.volume(short.particles()[0] as usize);
         let mut mean = [[0.0, 0.0]; 2];

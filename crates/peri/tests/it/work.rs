@@ -4,7 +4,7 @@ use crate::bodies::{Body, hold, relax};
 use peri::bonds::{Bonds, LatticeBonds, Stencil};
 use peri::geometry::{Operation, Shape, lattice};
 use peri::potential::Law;
-use peri::solver::{AdaptiveDynamicRelaxation, State};
+use peri::solver::{DynamicRelaxation, State};
 
 #[test]
 fn stencil_sizes() {
@@ -76,7 +76,7 @@ fn force_evaluations() {
     });
     for (factors, name) in [(&[1.0][..], "one step"), (&[0.2, 0.5, 1.0], "three steps")] {
         let mut state = State::new(built.lattice.slots());
-        let solver = AdaptiveDynamicRelaxation::default();
+        let solver = DynamicRelaxation::default();
         relax(&solver, &mut built.lattice, (&*law, 1.0), &loads, factors, &mut state).unwrap();
         assert_eq!(state.step, factors.len());
         let extra = state.evaluations - state.total_iterations;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// Constants of one step from t to t + Δt.
 #[derive(Clone, Copy, Debug)]
-pub struct Leap {
+pub struct VerletStep {
     /// Δt, s.
     pub step: f64,
     /// ρ, kg/m³.
@@ -55,7 +55,7 @@ pub fn leap_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
     volumes: &[f64],
-    leap: &Leap,
+    leap: &VerletStep,
 ) -> Sums {
     let force = state.force.components();
     let keep = 1.0 - 0.5 * leap.damping * leap.step;
@@ -100,7 +100,7 @@ pub fn force_pass<const D: usize>(
     system: &System<D>,
     state: &mut State<D>,
     volumes: &[f64],
-    leap: &Leap,
+    leap: &VerletStep,
     look: bool,
 ) -> (Sums, StretchRange) {
     let loads = &*system.loads;
@@ -124,7 +124,7 @@ pub fn kick_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
     volumes: &[f64],
-    leap: &Leap,
+    leap: &VerletStep,
 ) -> Sums {
     let force = state.force.components();
     let velocity = state.velocity.chunks_mut();
@@ -176,7 +176,7 @@ fn load<const D: usize>(
 fn kick<const D: usize>(
     loads: &Loads<D>,
     volumes: &[f64],
-    leap: &Leap,
+    leap: &VerletStep,
     chunk: usize,
     force: [&[f64]; D],
     velocity: &mut [&mut [f64]; D],
@@ -243,7 +243,7 @@ impl<'a> Place<'a> {
     }
 
     /// Nothing held, nothing loaded, nothing damped.
-    fn is_plain(&self, leap: &Leap) -> bool {
+    fn is_plain(&self, leap: &VerletStep) -> bool {
         self.held.is_empty() && self.body.is_empty() && leap.damping == 0.0
     }
 

@@ -29,7 +29,7 @@ pub trait Equilibrium<const D: usize> {
 ///
 /// # Errors
 /// As [`Equilibrium::equilibrate`], and whatever `finished` returns.
-pub fn march<const D: usize>(
+pub fn load_stepping<const D: usize>(
     method: &mut dyn Equilibrium<D>,
     system: &mut System<D>,
     state: &mut State<D>,
