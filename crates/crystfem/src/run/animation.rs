@@ -1,6 +1,6 @@
 //! Pictures of a part: sections through its middle at some times, and all of them as an animation.
 
-use super::part::{TEMPERATURE, shifted};
+use super::celsius::{TEMPERATURE, of_kelvin};
 use super::section::Section;
 use crate::error::Error;
 use crate::mesh::Mesh;
@@ -124,7 +124,7 @@ impl Frames<'_> {
                 (series.times()[frame], all, exists.iter().map(|&there| there == 1.0).collect())
             }
             Origin::End(simulation) => {
-                let temperature = shifted(&simulation.temperatures(f64::NAN));
+                let temperature = of_kelvin(&simulation.temperatures(f64::NAN));
                 let or_nan = |x: Option<f64>| x.unwrap_or(f64::NAN);
                 let field = self.field.map(|name| simulation.field(name).into_iter().map(or_nan).collect());
                 let elements = 0..self.mesh.element_count() as u32;

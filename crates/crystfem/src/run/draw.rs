@@ -1,6 +1,6 @@
 //! Pictures of the material alone (Figs 4.1, 4.4, 4.5).
 
-use super::point::CELSIUS;
+use super::celsius::{CELSIUS, of_kelvin};
 use crate::material::Semicrystalline;
 use crate::point::Curves;
 use polycore::Error;
@@ -32,7 +32,7 @@ impl Run {
         kept
     }
 
-    fn celsius(&self) -> Vec<f64> {
+    fn of_kelvin(&self) -> Vec<f64> {
         self.thinned(|row| self.curves.temperature[row] - CELSIUS)
     }
 }
@@ -64,17 +64,17 @@ pub fn curves(title: &str, runs: &[Run], output: &Path) -> Result<(), Error> {
         }
         if any { plot.write(output.join(name)) } else { Ok(()) }
     };
-    plot("temperature.png", &axis, "temperature (°C)", &|run| Some((time(run), run.celsius())))?;
+    plot("temperature.png", &axis, "temperature (°C)", &|run| Some((time(run), run.of_kelvin())))?;
     let alpha = |run: &Run| {
         let index = run.fields.iter().position(|field| *field == "alpha")?;
         Some(run.thinned(|row| run.curves.fields[row][index]))
     };
     let relative = "relative crystallinity α";
-    plot("alpha.png", "temperature (°C)", relative, &|run| Some((run.celsius(), alpha(run)?)))?;
+    plot("alpha.png", "temperature (°C)", relative, &|run| Some((run.of_kelvin(), alpha(run)?)))?;
     plot("alpha_time.png", &axis, relative, &|run| Some((time(run), alpha(run)?)))?;
     plot("rate.png", "temperature (°C)", "dα/dt (1/s)", &|run| {
         alpha(run)?;
-        Some((run.celsius(), run.thinned(|row| run.curves.rate[row])))
+        Some((run.of_kelvin(), run.thinned(|row| run.curves.rate[row])))
     })
 }
 
@@ -84,14 +84,13 @@ pub fn laws(name: &str, material: &Semicrystalline, output: &Path) -> Result<(),
     let sampled = |low: f64, high: f64| -> Vec<f64> {
         (0..=400).map(|i| low + (high - low) * f64::from(i) / 400.0).collect()
     };
-    let celsius = |temperatures: &[f64]| -> Vec<f64> { temperatures.iter().map(|t| t - CELSIUS).collect() };
     let kinetics = material.kinetics();
     let constants = kinetics.constants();
     let temperatures = sampled(constants.frozen, constants.equilibrium_melting);
     let rates: Vec<f64> = temperatures.iter().map(|&t| kinetics.rate(t)).collect();
     LinePlot::new("Rate of crystallization")
         .axes("temperature (°C)", "K(T) (1/s)")
-        .series(Series::line("Hoffman–Lauritzen", &celsius(&temperatures), &rates))
+        .series(Series::line("Hoffman–Lauritzen", &of_kelvin(&temperatures), &rates))
         .write(output.join(format!("kinetics{suffix}.png")))?;
     let Some(melting) = &material.crystallization().melting else { return Ok(()) };
     let [sharpness, _, peak] = melting.constants();
@@ -100,7 +99,7 @@ pub fn laws(name: &str, material: &Semicrystalline, output: &Path) -> Result<(),
     let density: Vec<f64> = temperatures.iter().map(|&t| melting.molten_slope(t)).collect();
     LinePlot::new("Melting")
         .axes("temperature (°C)", "Xm, and dXm/dT (1/K)")
-        .series(Series::line("degree of melting Xm", &celsius(&temperatures), &molten))
-        .series(Series::line("distribution dXm/dT", &celsius(&temperatures), &density))
+        .series(Series::line("degree of melting Xm", &of_kelvin(&temperatures), &molten))
+        .series(Series::line("distribution dXm/dT", &of_kelvin(&temperatures), &density))
         .write(output.join(format!("melting{suffix}.png")))
 }

@@ -1,7 +1,7 @@
 //! Fits of measurements: constants with their intervals, tables, pictures.
 
 use super::Failure;
-use super::point::CELSIUS;
+use super::celsius::{CELSIUS, of_kelvin};
 use crate::error::Error;
 use crate::fit::{Fit, avrami, nakamura, ozawa};
 use crate::scene::{FitScene, FitSpec, Job};
@@ -83,7 +83,6 @@ pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneEr
 
 fn solve(spec: &FitSpec, job: Job) -> Result<Vec<Done>, Error> {
     let name = &spec.name;
-    let celsius = |temperatures: &[f64]| -> Vec<f64> { temperatures.iter().map(|t| t - CELSIUS).collect() };
     match job {
         Job::Avrami(times, degrees) => {
             let fit = avrami(&times, &degrees)?;
@@ -95,7 +94,7 @@ fn solve(spec: &FitSpec, job: Job) -> Result<Vec<Done>, Error> {
             let series = runs
                 .into_iter()
                 .zip(&spec.data)
-                .map(|(run, data)| (stem(&data.file), celsius(&run.temperatures), run.degrees))
+                .map(|(run, data)| (stem(&data.file), of_kelvin(&run.temperatures), run.degrees))
                 .collect();
             Ok(vec![Done { name: name.clone(), fit, abscissa: ("temperature", "degC"), series }])
         }

@@ -1,6 +1,7 @@
 //! Whole scenes: run, compared, drawn and judged.
 
 mod animation;
+mod celsius;
 mod draw;
 mod explain;
 mod fit;
@@ -29,7 +30,13 @@ pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
     match scene::kind(source)? {
         Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, run).map(Finished::from),
         Kind::Fit => self::fit::run(source, &source.parse::<FitScene>()?, run).map(Finished::from),
-        Kind::Part => self::part::run(source, &source.parse::<PartScene>()?, run),
+        Kind::Part => {
+            let scene = source.parse::<PartScene>()?;
+            match scene.study.is_empty() {
+                true => self::part::run(source, &scene, run),
+                false => self::suite::run(source, &scene, run),
+            }
+        }
     }
 }
 
@@ -41,6 +48,12 @@ pub fn explain(source: &Source, quick: bool) -> Result<Vec<String>, Failure> {
     match scene::kind(source)? {
         Kind::Point => Ok(self::point::explain(source, &source.parse::<PointScene>()?, quick)?),
         Kind::Fit => Ok(self::fit::explain(source, &source.parse::<FitScene>()?)?),
-        Kind::Part => self::part::explain(source, &source.parse::<PartScene>()?, quick),
+        Kind::Part => {
+            let scene = source.parse::<PartScene>()?;
+            match scene.study.is_empty() {
+                true => self::part::explain(source, &scene),
+                false => self::suite::explain(source, &scene, quick),
+            }
+        }
     }
 }

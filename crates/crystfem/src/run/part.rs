@@ -1,7 +1,8 @@
 //! A body in time: solved, recorded, drawn and judged.
 
+use super::celsius::{CELSIUS, TEMPERATURE};
 use super::probe::{self, Probe};
-use super::{Failure, animation, point::CELSIUS};
+use super::{Failure, animation};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
@@ -14,16 +15,11 @@ use polycore::scene::Source;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
-/// Name of the temperature among the fields.
-pub const TEMPERATURE: &str = "temperature_degC";
 /// Fields written unless the scene says how often.
 const FRAMES: f64 = 50.0;
 
 /// Runs the scene of a body, or goes on with it.
 pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished, Failure> {
-    if !scene.study.is_empty() {
-        return super::suite::run(source, scene, run);
-    }
     scene.check(source)?;
     let report = one(source, scene, false, run)?;
     // what each layer ends with, and does to each probe, is more than a screen holds
@@ -95,10 +91,7 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
 ///
 /// # Errors
 /// A fault of the scene.
-pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<String>, Failure> {
-    if !scene.study.is_empty() {
-        return super::suite::explain(source, scene, quick);
-    }
+pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failure> {
     scene.check(source)?;
     let (lines, names) = super::explain::one(source, scene)?;
     scene.check_expectations(source, &names, &[])?;
@@ -240,10 +233,6 @@ impl Recorder<'_> {
             .work("material_responses", work.responses)
             .work("builds", work.builds);
     }
-}
-
-pub fn shifted(kelvin: &[f64]) -> Vec<f64> {
-    kelvin.iter().map(|t| t - CELSIUS).collect()
 }
 
 /// Mean by volume, least, largest and standard deviation of a field over the nodes that have it; a value that is not finite

@@ -1,6 +1,7 @@
 //! The material alone: curves, events, pictures.
 
 use super::Failure;
+use super::celsius::CELSIUS;
 use super::draw::{self, Run};
 use crate::error::Error;
 use crate::point::{Course, Curves, Drive, Event, Stepping};
@@ -12,9 +13,6 @@ use std::path::Path;
 
 /// Relative crystallinities whose temperature and time are values of the report.
 const DEGREES: [f64; 3] = [0.01, 0.5, 0.99];
-
-/// 0 °C in K.
-pub(super) const CELSIUS: f64 = 273.15;
 
 /// Runs every point with every of its materials.
 pub fn run(source: &Source, scene: &PointScene, run: &mut polycore::case::Run) -> Result<Report, Failure> {

@@ -1,6 +1,6 @@
 //! Places whose temperature and state are recorded in every step of a part's run.
 
-use super::point::CELSIUS;
+use super::celsius::CELSIUS;
 use crate::error::Error;
 use crate::mesh::Place;
 use crate::scene::{PartScene, ProbeSpec};

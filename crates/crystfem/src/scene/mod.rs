@@ -10,6 +10,7 @@ mod material;
 mod memory;
 mod mesh;
 mod part;
+mod places;
 mod point;
 mod print;
 mod problem;
@@ -22,9 +23,9 @@ pub use fit::{DataSpec, FitLaw, FitScene, FitSpec, Job};
 pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
 pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec, TubeSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
+pub(crate) use places::millimetres;
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, PointScene, PointSpec};
 pub use problem::Task;
-pub(crate) use problem::millimetres;
 pub use schedule::{ScheduleSpec, TimesSpec};
 pub use study::StudySpec;
 

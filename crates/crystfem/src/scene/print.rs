@@ -2,7 +2,7 @@
 
 use super::fault::located;
 use super::part::PrintSpec;
-use super::problem::{elements, millimetres};
+use super::places::{elements, millimetres};
 use crate::element::{self, Geometry};
 use crate::error::Error;
 use crate::mesh::Mesh;

@@ -90,11 +90,6 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
     Ok(set)
 }
 
-/// A file's name without its folder: provenance is the same from wherever a file is read.
-pub(super) fn name_of(path: &std::path::Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
 fn is_hdf5(path: &std::path::Path) -> Result<bool, Error> {
     use std::io::Read;
     let mut start = Vec::new();
@@ -243,7 +238,7 @@ fn nominal(table: &Table) -> Result<Dataset, Error> {
     set.paths.retain(|run| !run.rows.is_empty());
     set.provenance.push(format!(
         "{}: {}, nominal stresses, {} rows of {} runs, {} at rest or free",
-        name_of(path),
+        super::table::name_of(path),
         table.fingerprint,
         set.len(),
         set.paths.len(),
@@ -357,7 +352,7 @@ fn table(table: &Table, options: &ReadOptions) -> Result<Dataset, Error> {
     };
     set.provenance.push(format!(
         "{}: {}, {columns}, {} rows of {} runs, {} skipped",
-        name_of(&table.path),
+        super::table::name_of(&table.path),
         table.fingerprint,
         set.len(),
         set.paths.len(),

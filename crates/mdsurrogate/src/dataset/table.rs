@@ -150,3 +150,8 @@ fn heading(text: &str) -> (String, Option<String>) {
         None => (text.to_owned(), None),
     }
 }
+
+/// A file's name without its folder: provenance is the same from wherever a file is read.
+pub(super) fn name_of(path: &std::path::Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

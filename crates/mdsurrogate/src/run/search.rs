@@ -1,5 +1,6 @@
 //! A scene's search for hyperparameters: trained, remembered, written as a table like 3.4.
 
+use super::searched::Searched;
 use super::{Failure, Prepared, short};
 use crate::dataset::Row;
 use crate::error::Error;
@@ -24,14 +25,6 @@ struct Progress {
     current: Searched,
     /// Trainings of candidates that may be asked about again, by method and number.
     states: BTreeMap<(Method, usize), State>,
-}
-
-/// A search with one seed.
-#[derive(Debug, Default, Serialize, Deserialize)]
-pub(super) struct Searched {
-    pub journal: Journal,
-    /// Of each trial: seconds of training of its candidate up to then.
-    pub seconds: Vec<f64>,
 }
 
 /// Searches, or goes on with it; gives the table in lines.

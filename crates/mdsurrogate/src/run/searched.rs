@@ -1,13 +1,21 @@
 //! What searches have found at what cost: the best loss against epochs and seconds, by method.
 
-use super::search::Searched;
 use crate::scene::SearchSpec;
-use crate::search::Method;
+use crate::search::{Journal, Method};
 use polycore::report::Report;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// Points of a curve.
 const POINTS: usize = 8;
+
+/// A search with one seed.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(super) struct Searched {
+    pub journal: Journal,
+    /// Of each trial: seconds of training of its candidate up to then.
+    pub seconds: Vec<f64>,
+}
 
 /// After each trial of a method: epochs and seconds trained in all, the best loss so far.
 fn course(one: &Searched, method: Method) -> Vec<[f64; 3]> {
