@@ -35,7 +35,7 @@ impl Eval {
             let plain = default_output(&self.scene);
             plain.with_file_name(format!("{}-eval", plain.file_name().unwrap_or_default().to_string_lossy()))
         });
-        let _lock = polycore::output::prepare_run(&output)?;
+        let _lock = polycore::case::prepare_run(&output)?;
         let mut report = Report::new("mdsurrogate", env!("CARGO_PKG_VERSION"), &source.text);
         let named: Vec<Named> = laws
             .iter()

@@ -105,7 +105,7 @@ impl Md {
             Self::Write(write) => write.run(),
             Self::Prepare(place) => {
                 let (folder, engine) = place.open()?;
-                let _lock = polycore::output::lock_run(&place.folder)?;
+                let _lock = polycore::case::lock_run(&place.folder)?;
                 folder.prepare(&engine)?;
                 polycore::say!("reference lengths {:?} Å", folder.reference_lengths()?);
                 Ok(true)
@@ -117,7 +117,7 @@ impl Md {
                     return Ok(true);
                 }
                 // a job array is many processes, of which each has its own run
-                let _lock = polycore::output::lock_run(&place.folder)?;
+                let _lock = polycore::case::lock_run(&place.folder)?;
                 folder.prepare(&engine)?;
                 let (all, open) = (folder.plan().runs.len(), folder.open_runs().len());
                 polycore::say!("{} of {all} runs are finished", all - open);

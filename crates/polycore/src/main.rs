@@ -10,6 +10,9 @@ use polycore::case::{self, Finished, Program, Run, terminal};
 use polycore::scene::{Failure, Source};
 
 mod cli {
+    /// Everything printed and written is in MPa.
+    pub const MPA: f64 = 1e6;
+
     pub mod draw;
     pub mod exact;
     pub mod fits;

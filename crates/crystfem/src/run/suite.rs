@@ -36,7 +36,7 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
         run.begin()?;
         for &index in &studies {
             // each run takes its own when it begins
-            drop(polycore::output::prepare_run(output.join(&scene.study[index].name))?);
+            drop(polycore::case::prepare_run(output.join(&scene.study[index].name))?);
         }
     }
     let mut rows = Rows { settings: Vec::new(), columns: Vec::new(), rows: Vec::new() };

@@ -4,17 +4,18 @@
 //! once: command line, lock and checkpoint of the output directory, progress, interruption, sweeps, the report.
 
 mod cli;
+mod folder;
 mod rows;
 mod sweep;
 pub mod terminal;
 
 pub use cli::{RunArguments, main, solve};
+pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run};
 pub use rows::{Row, Rows, STATISTICS};
 pub use sweep::{Search, SweepOptions, Vary, search, sweep};
 
 use crate::Error;
 use crate::checkpoint::{self, Header, Magic};
-use crate::output::{RunLock, prepare_run, resume_run};
 use crate::report::Report;
 use crate::scene::{Failure, Source};
 use serde::Serialize;

@@ -142,7 +142,7 @@ fn rows<C: Case>(
     let mut runs = runs::<C>(source, vary, options.quick)?;
     let former = former(vary, options.output)?;
     crate::output::prepare_directory(options.output)?;
-    let _lock = crate::output::lock_run(options.output)?;
+    let _lock = crate::case::lock_run(options.output)?;
     // what an earlier sweep of the same scene has finished stays in the table
     let mut vary = vary.to_vec();
     for values in former {

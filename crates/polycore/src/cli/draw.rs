@@ -8,7 +8,7 @@ use polycore::constitutive::hyperelastic::fit::{self, Fit};
 use polycore::constitutive::hyperelastic::{Hyperelastic, Kind, homogeneous};
 use polycore::output::picture::{LinePlot, Series};
 
-use super::fits::MPA;
+use super::MPA;
 
 /// A kind of homogeneous test that may be found among general biaxial states.
 struct Test {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use polycore::constitutive::hyperelastic::{Hyperelastic, homogeneous, model};
 use polycore::units::Stress;
 
-use super::fits::MPA;
+use super::MPA;
 
 /// `polycore exact eight-chain "0.27 MPa" 25 --to 4`
 #[derive(clap::Args)]

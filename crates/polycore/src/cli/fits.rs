@@ -12,11 +12,9 @@ use polycore::constitutive::hyperelastic::{Hyperelastic, homogeneous};
 use polycore::output;
 use polycore::report::{Phases, Report};
 
+use super::MPA;
 use super::scene::Case;
 use super::{draw, material, trials};
-
-/// Everything printed and written is in MPa.
-pub const MPA: f64 = 1e6;
 
 /// Fits every law to every table, writes tables and pictures.
 pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {

@@ -9,7 +9,7 @@ use polycore::constitutive::hyperelastic::data::Table;
 use polycore::constitutive::hyperelastic::fit::Fit;
 use polycore::output::atomic_write;
 
-use super::fits::MPA;
+use super::MPA;
 
 /// Laws whose chain stretch is that of the bond law `chain-affine`, (2.38).
 const EIGHT_CHAINS: &str = "eight-chain";

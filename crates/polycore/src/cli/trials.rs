@@ -13,7 +13,7 @@ use polycore::tensor::Tensor2;
 use polycore::units::Stress;
 use serde::Deserialize;
 
-use super::fits::MPA;
+use super::MPA;
 
 /// One trial: with `parameters` a law is asked at a `stretch`, with `data` it is fitted.
 #[derive(Deserialize, schemars::JsonSchema)]
