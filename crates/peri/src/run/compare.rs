@@ -1,18 +1,14 @@
 //! Comparison with closed forms, convergence, and the report.
 
-use super::outcome::{Outcome, Profile};
+use super::outcome::{Outcome, Profile, families};
 use crate::bonds::Bonds;
 use crate::exact;
-use crate::scene::{ExactSpec, Scene};
+use crate::scene::{BALANCES, ExactSpec, Scene};
 use crate::stress::{Measure, Tensor};
 use polycore::report::Report;
 use polycore::scene::Source;
 use rayon::prelude::*;
 use std::path::Path;
-
-/// Sums over the whole body that must vanish, see [`crate::solver::Balance`], over its forces; of several variants the
-/// largest is a value of its own.
-pub const BALANCES: [&str; 3] = ["force_imbalance", "moment_imbalance", "reaction_imbalance"];
 
 /// Stress around a hole against Kirsch's solution or, given, that of this plate: peak and profile at θ = π/2, RMSE (2.84)
 /// over all particles and without the loading layers; of a plate also within 2δ of the hole, and beyond up to five radii.
@@ -102,22 +98,6 @@ fn profile(name: &str, column: &[(f64, Vec<usize>)], values: &[f64]) -> Profile 
         at: column.iter().map(|row| row.0).collect(),
         value: column.iter().map(|row| mean(&row.1, values)).collect(),
     }
-}
-
-/// Families of variants that differ in spacing only, coarse to fine, at least two in each.
-pub fn families(outcomes: &[Outcome]) -> Vec<(String, Vec<&Outcome>)> {
-    let mut families: Vec<(String, Vec<&Outcome>)> = Vec::new();
-    for outcome in outcomes {
-        match families.iter_mut().find(|(name, _)| *name == outcome.family) {
-            Some((_, members)) => members.push(outcome),
-            None => families.push((outcome.family.clone(), vec![outcome])),
-        }
-    }
-    for (_, members) in &mut families {
-        members.sort_by(|a, b| b.spacing.total_cmp(&a.spacing));
-    }
-    families.retain(|(_, members)| members.len() > 1);
-    families
 }
 
 /// Seconds that a stress field of one measure takes from the scene on.

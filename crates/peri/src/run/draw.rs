@@ -1,8 +1,9 @@
 //! Pictures and field files of a run.
 
-use super::compare::{families, plate_width, run_time};
-use super::frames::short;
+use super::compare::{plate_width, run_time};
 use super::outcome::Outcome;
+use super::outcome::families;
+use super::scale::{bridge, short, stress_unit};
 use crate::bonds::Bonds;
 use crate::exact;
 use crate::scene::{ExactSpec, Scene};
@@ -60,19 +61,6 @@ pub fn maps<const D: usize>(
         map = map.panel(panel.bridge(bridge(outcome)));
     }
     map.write(output.join(format!("stress_{}.png", outcome.file_name())))
-}
-
-/// The unit in which pictures show stresses up to `largest`, Pa: 1 over it, and its name.
-pub fn stress_unit(largest: f64) -> (f64, &'static str) {
-    let units = [(1e-9, "GPa"), (1e-6, "MPa"), (1e-3, "kPa")];
-    units.into_iter().find(|(scale, _)| largest * scale >= 0.1).unwrap_or((1.0, "Pa"))
-}
-
-/// How far apart, in spacings, neighbours on a lattice may be that are still bonded: no intact bond was longer. Where
-/// bonds break, the longest met may have broken.
-pub fn bridge(outcome: &Outcome) -> f64 {
-    let most = outcome.get("critical_stretch").or(outcome.get("largest_stretch")).unwrap_or(1.0);
-    (1.02 * most).clamp(1.5, 100.0)
 }
 
 /// Profiles (Fig. 2.7), convergence (Fig. 2.8), error against run time.

@@ -1,7 +1,7 @@
 //! The history of loading: values, tables and curves of load against displacement and of energies.
 
 use super::outcome::Outcome;
-use crate::scene::Scene;
+use crate::scene::{BALANCES, Scene, load_at_name};
 use crate::solver::{Balance, Event, Record};
 use polycore::Error;
 use polycore::output::csv;
@@ -128,7 +128,7 @@ impl Outcome {
             let size = most(|b| b.size).max(f64::MIN_POSITIVE);
             let (force, external) = (most(|b| b.force) / size, most(|b| b.external) / size);
             let moment = most(|b| b.moment / b.arm.max(f64::MIN_POSITIVE)) / size;
-            for (name, value) in super::compare::BALANCES.into_iter().zip([force, moment, external]) {
+            for (name, value) in BALANCES.into_iter().zip([force, moment, external]) {
                 self.value(name, value, "");
             }
         }
@@ -158,11 +158,6 @@ impl Outcome {
     }
 }
 
-/// What the load at a displacement is called.
-pub fn load_at_name(displacement: f64) -> String {
-    format!("load_at_{}mm", (displacement * 1e9).round() / 1e6)
-}
-
 /// Peaks as far as load steps resolve them, a line for each variant with several steps.
 pub fn peak_lines(outcomes: &[Outcome]) -> String {
     let line = |outcome: &Outcome| {
@@ -189,14 +184,14 @@ pub fn peak_changes(outcomes: &[Outcome]) -> Vec<(String, f64)> {
         let (last, before) = (finest.next()??, finest.next()??);
         (last != 0.0).then(|| (family, ((last - before) / last).abs()))
     };
-    super::compare::families(outcomes).into_iter().filter_map(change).collect()
+    super::outcome::families(outcomes).into_iter().filter_map(change).collect()
 }
 
 /// Peak load over spacing, where variants differ in it.
 fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
     let mut plot = LinePlot::new("Peak load").size(900.0, 560.0).axes("spacing Δx (mm)", "peak load (N)");
     let mut any = false;
-    for (family, members) in super::compare::families(outcomes) {
+    for (family, members) in super::outcome::families(outcomes) {
         let peaks: Vec<f64> = members.iter().filter_map(|o| o.get("peak_load")).collect();
         if peaks.len() == members.len() {
             let spacing: Vec<f64> = members.iter().map(|o| o.spacing * 1e3).collect();

@@ -9,9 +9,9 @@ mod history;
 mod outcome;
 mod probes;
 mod program;
+mod scale;
+mod stages;
 
-pub use compare::BALANCES;
-pub use history::load_at_name;
 pub use outcome::{Outcome, Profile};
 pub use program::Peri;
 
@@ -221,7 +221,7 @@ fn run_variant<const D: usize>(
     if scene.output.pictures {
         draw::maps(scene, &*body.bonds, &state, &stresses.cauchy, &outcome, output)?;
         if scene.output.fields && scene.output.every.is_some() && critical_stretch.is_some() {
-            frames::stages(scene, &outcome, body.bonds.spacing(), &path, output)?;
+            stages::stages(scene, &outcome, body.bonds.spacing(), &path, output)?;
         }
     }
     Ok(outcome)

@@ -138,3 +138,19 @@ impl Outcome {
         self.seconds.iter().filter(|(name, _)| name == phase).map(|s| s.1).fold(0.0, |sum, s| sum + s)
     }
 }
+
+/// Families of variants that differ in spacing only, coarse to fine, at least two in each.
+pub fn families(outcomes: &[Outcome]) -> Vec<(String, Vec<&Outcome>)> {
+    let mut families: Vec<(String, Vec<&Outcome>)> = Vec::new();
+    for outcome in outcomes {
+        match families.iter_mut().find(|(name, _)| *name == outcome.family) {
+            Some((_, members)) => members.push(outcome),
+            None => families.push((outcome.family.clone(), vec![outcome])),
+        }
+    }
+    for (_, members) in &mut families {
+        members.sort_by(|a, b| b.spacing.total_cmp(&a.spacing));
+    }
+    families.retain(|(_, members)| members.len() > 1);
+    families
+}

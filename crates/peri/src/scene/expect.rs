@@ -2,8 +2,16 @@
 
 use super::variant::variants;
 use super::{ExactSpec, Scene};
-use crate::run::{BALANCES, load_at_name};
 use polycore::scene::{SceneError, Source};
+
+/// Sums over the whole body that must vanish, see [`crate::solver::Balance`], over its forces; of several variants the
+/// largest is a value of its own.
+pub const BALANCES: [&str; 3] = ["force_imbalance", "moment_imbalance", "reaction_imbalance"];
+
+/// What the load at a displacement is called.
+pub fn load_at_name(displacement: f64) -> String {
+    format!("load_at_{}mm", (displacement * 1e9).round() / 1e6)
+}
 
 /// Scalars that a run of a scene without studies can give; some only where something happens (`first_break`).
 pub fn quantities(scene: &Scene) -> Vec<String> {

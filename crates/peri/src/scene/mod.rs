@@ -20,7 +20,7 @@ mod warn;
 pub use boundary::{Boundary, Held, HeldBy, Side};
 pub use build::{Body, body_of, least_memory};
 pub use check::{check, check_variant, plain};
-pub use expect::{quantities, quantities_of};
+pub use expect::{BALANCES, load_at_name, quantities, quantities_of};
 pub use explain::explain;
 pub use formula::Formula;
 pub use inclusion::Inclusions;
