@@ -35,7 +35,7 @@ fn a_state_that_is_not_finite_ends_the_run() {
     fs::write(here.join("asked.toml"), study("\"print.start\" = \"0 s\"")).unwrap();
     crystfem("run asked.toml --output asked", here).with_code(0);
     assert_eq!(scalar(&report(&here.join("asked")), "as-coded.failed_as_it_must"), 1.0);
-    fs::write(here.join("none.toml"), study("\"materials.pa12.sign\" = \"printed\"")).unwrap();
+    fs::write(here.join("none.toml"), study("\"materials.pa12.sign\" = \"as-published\"")).unwrap();
     let ended = crystfem("run none.toml --output none", here).with_code(1);
     ended.shows("FAIL  study as-coded did not fail");
 }
