@@ -17,5 +17,5 @@ fn every_example_runs() {
         let ended = finish(command(name, "", folder.path()).spawn().unwrap()).with_code(0);
         assert!(!ended.stdout.is_empty(), "{name} prints what it found");
     }
-    assert!(names.len() >= 5, "{names:?}");
+    assert!(names.len() >= 10, "{names:?}");
 }

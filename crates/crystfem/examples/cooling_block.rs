@@ -1,0 +1,43 @@
+//! A hot block of PA12 in still air: temperatures in its middle and on a corner, and where the heat went.
+
+use crystfem::boundary::{Condition, Schedule, Where};
+use crystfem::material::{Conductor, Property};
+use crystfem::mesh::Grid;
+use crystfem::problem::Problem;
+use crystfem::simulation::{Settings, Simulation};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+fn main() -> Result<(), crystfem::Error> {
+    let (density, conductivity, specific_heat) = (1010.0, 0.25, 2200.0);
+    let material =
+        Conductor::new(density, Property::Constant(conductivity), Property::Constant(specific_heat))?;
+    let mesh = Grid::uniform([0.0; 3], [0.01, 0.02, 0.03], [8, 16, 24])?.mesh("block")?;
+    let (middle, corner) = (nearest(&mesh.points, [0.005, 0.01, 0.015]), nearest(&mesh.points, [0.0; 3]));
+    let film = Condition::Film {
+        surface: Where::Outer { except: Default::default() },
+        coefficient: Schedule::constant(15.0),
+        ambient: Schedule::constant(293.15),
+    };
+    let problem = Problem { conditions: vec![film], ..Problem::new(mesh, Arc::new(material), 453.15) };
+    let mut simulation = Simulation::new(problem, Settings::adaptive(0.1))?;
+    for minute in 0..=5 {
+        let _ = simulation.advance(60.0 * f64::from(minute), &mut |_, _| ControlFlow::Continue(()))?;
+        let at = |node: u32| simulation.temperature(node).unwrap_or(f64::NAN) - 273.15;
+        println!("{minute} min: middle {:6.2} °C, corner {:6.2} °C", at(middle), at(corner));
+    }
+    let ledger = &simulation.state().ledger;
+    println!(
+        "{:.1} J gone through the surface, {:.1e} of it unaccounted for",
+        -ledger.exchange.total(),
+        ledger.worst
+    );
+    Ok(())
+}
+
+/// The node nearest to a place.
+fn nearest(points: &[[f64; 3]], place: [f64; 3]) -> u32 {
+    let distance = |x: &[f64; 3]| (0..3).map(|d| (x[d] - place[d]).powi(2)).sum::<f64>();
+    (0..points.len()).min_by(|&a, &b| distance(&points[a]).total_cmp(&distance(&points[b]))).unwrap_or(0)
+        as u32
+}
