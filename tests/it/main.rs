@@ -3,6 +3,7 @@
 //!
 //! * [`bad`]: malformed and absurd scenes in `tests/bad/`, each with the message it must get;
 //! * [`commands`]: exit codes, help, closed forms, reports and files;
+//! * [`harness`]: what all programs have: the same commands, and sweeps;
 //! * [`bits`]: the same bits on any number of threads;
 //! * [`examples`]: the small programs in `crates/*/examples`;
 //! * [`killed`]: the same bits after `kill -9`, Ctrl-C and `peri resume`;
@@ -23,6 +24,7 @@ mod commands;
 mod documents;
 mod examples;
 mod front_door;
+mod harness;
 mod killed;
 mod limits;
 mod loads;

@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 /// Exit code of the command lines for bad input.
 pub const EXIT_BAD_INPUT: u8 = 2;
 
+/// Exit code of a run that the user stopped.
+pub const EXIT_INTERRUPTED: u8 = 130;
+
 /// What can go wrong outside reading a scene (`scene::SceneError` is for that).
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -128,7 +131,7 @@ impl Error {
     /// checkpoint), 130 for an interrupted run, 1 for a failed one.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Interrupted { .. } | Self::SweepInterrupted(_) => 130,
+            Self::Interrupted { .. } | Self::SweepInterrupted(_) => EXIT_INTERRUPTED,
             Self::Option { .. }
             | Self::OutputDirectory { .. }
             | Self::Checkpoint { .. }

@@ -12,7 +12,6 @@ use polycore::case::{Finished, Run, STATISTICS};
 use polycore::output::vtkhdf::{Cells, Data, MeshSeries};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
-use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
 /// Fields written unless the scene says how often.
@@ -46,9 +45,9 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
     if run.options.resume {
         run.begin()?;
     }
-    if let Some(reached) = run.reached::<Reached>()? {
-        simulation = Simulation::resume(task.problem.clone(), task.settings, reached.state)?;
-        (frames, probes) = (reached.frames, reached.probes);
+    if let Some((written, state, rows)) = run.reached::<Reached>()? {
+        simulation = Simulation::resume(task.problem.clone(), task.settings, state)?;
+        (frames, probes) = (written, rows);
     } else {
         simulation = Simulation::new(task.problem.clone(), task.settings)?;
         scene.refuse_too_large(source, &simulation, task.end)?;
@@ -98,23 +97,8 @@ pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failur
     Ok(lines)
 }
 
-/// How far a run is, as its checkpoint holds it.
-#[derive(Deserialize)]
-struct Reached {
-    /// Frames of the fields that are written.
-    frames: usize,
-    state: State,
-    /// Rows of the probes.
-    probes: Vec<Probe>,
-}
-
-/// [`Reached`], borrowed for writing.
-#[derive(Serialize)]
-struct Borrowed<'a> {
-    frames: usize,
-    state: &'a State,
-    probes: &'a [Probe],
-}
+/// How far a run is, as its checkpoint holds it: frames of the fields that are written, state, rows of the probes.
+type Reached = (usize, State, Vec<Probe>);
 
 /// What is seen of a body on its way.
 struct Recorder<'a> {
@@ -160,7 +144,7 @@ impl Recorder<'_> {
                     format!("t = {time:.4} of {end:.4} s  step {dt:.3e} s  {equations} equations")
                 });
                 if result.is_ok() {
-                    result = run.pause(|| Some(Borrowed { frames, state, probes })).map_err(Error::from);
+                    result = run.pause(|| Some((frames, state, &*probes))).map_err(Error::from);
                 }
                 if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };

@@ -23,7 +23,7 @@ impl Case for Mdsurrogate {
   mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      what a table holds
   mdsurrogate schema > mdsurrogate.schema.json          for editors",
         magic: b"mdsg-ck2",
-        columns: &["*percentage error", "*mean square error", "best *"],
+        columns: &["* error over the noise floor", "best validation loss of *"],
     };
     type Error = Error;
 

@@ -31,25 +31,6 @@ use crate::stress::{Loaded, Tensor, piola_in_cloud, piola_on_lattice};
 use polycore::case::{Fault, Run};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
-use serde::{Deserialize, Serialize};
-
-/// How far a run is, as its checkpoint holds it.
-#[derive(Deserialize)]
-#[serde(bound = "")]
-struct Progress<const D: usize> {
-    /// Results of the finished variants.
-    finished: Vec<Outcome>,
-    /// The variant under way; none between variants.
-    state: Option<State<D>>,
-}
-
-/// [`Progress`], borrowed for writing.
-#[derive(Serialize)]
-#[serde(bound = "")]
-struct Reached<'a, const D: usize> {
-    finished: &'a [Outcome],
-    state: Option<&'a State<D>>,
-}
 
 /// What stops a run: a fault in the scene, or one met on the way.
 pub type Failure = polycore::scene::Failure<Error>;
@@ -99,8 +80,8 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
         }
     }
     run.begin()?;
-    let reached = run.reached::<Progress<D>>()?;
-    let (mut finished, mut state) = reached.map_or_else(Default::default, |at| (at.finished, at.state));
+    // the checkpoint: results of the finished variants, and the state of the one under way
+    let (mut finished, mut state): (Vec<Outcome>, Option<State<D>>) = run.reached()?.unwrap_or_default();
     for variant in &variants[finished.len().min(variants.len())..] {
         let state = state.take();
         let done = Done { finished: &finished, of: variants.len() };
@@ -126,7 +107,7 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
         }
         outcome.must = study.and_then(|study| study.must.clone());
         finished.push(outcome);
-        run.save(&Reached::<D> { finished: &finished, state: None })?;
+        run.save(&(&finished, None::<&State<D>>))?;
     }
     let mut report = compare::report(source, scene, &finished, quick);
     history::write(scene, &finished, output)?;
@@ -280,7 +261,7 @@ fn solve<const D: usize>(
             let part = (done.finished.len() as f64 + part_of(status)) / done.of as f64;
             run.show(part, &|| format!("{name}  {}", line_of(status)));
         }
-        let reached = || Reached { finished: done.finished, state: Some(state) };
+        let reached = || (done.finished, Some(state));
         Ok(run.pause(|| status.restartable.then(reached))?)
     };
     let contact =

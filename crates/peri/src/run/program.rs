@@ -21,7 +21,13 @@ impl Case for Peri {
   peri exact law --law chain-affine --links 720 --dissociation 1200
   peri schema > peri.schema.json                    for editors",
         magic: b"peri-ck7",
-        columns: &["peak_load", "first_break", "reaction_*", "largest_displacement", "energy"],
+        columns: &[
+            "peak_load*",
+            "displacement_at_peak*",
+            "first_break*",
+            "stored_energy*",
+            "largest_displacement*",
+        ],
     };
     type Error = Error;
 

@@ -70,11 +70,7 @@ pub fn remove_unfinished(directory: &Path) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn names(directory: &Path) -> Vec<String> {
-        let entries = fs::read_dir(directory).unwrap();
-        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
-    }
+    use crate::output::tests::names;
 
     /// Files, and folders as HDF5 files are written in; nothing else.
     #[test]

@@ -39,7 +39,7 @@ pub struct Program {
     pub examples: &'static str,
     /// First bytes of its checkpoints: program and version of what they hold.
     pub magic: &'static Magic,
-    /// Values that a sweep shows where the user names no column; `*` stands for any text.
+    /// Values that a sweep shows of each run, before the columns that the user names; `*` stands for any text.
     pub columns: &'static [&'static str],
 }
 
@@ -78,7 +78,7 @@ pub trait Fault: std::error::Error + From<Error> + Send + 'static {
 
     /// Whether the user asked for this end.
     fn is_interruption(&self) -> bool {
-        self.exit_code() == terminal::EXIT_INTERRUPTED
+        self.exit_code() == crate::error::EXIT_INTERRUPTED
     }
 }
 

@@ -1,6 +1,6 @@
 //! Many runs of one scene over a grid of values: in parallel, one thread each; finished ones are kept.
 
-use super::rows::{ENDS, Row, Rows, STATISTICS};
+use super::rows::{Row, Rows};
 use super::{Case, Fault, Finished, Options};
 use crate::Error;
 use crate::checkpoint::Header;
@@ -147,7 +147,7 @@ fn rows<C: Case>(
     let mut vary = vary.to_vec();
     for values in former {
         let name = name(&vary, &values);
-        let run = Run::new::<C>(source, &vary, name, values);
+        let run = Run::new::<C>(source, &vary, name, values, options.quick);
         let known = runs.iter().any(|other| other.name == run.name);
         if known || run.finished(options.output).is_none() {
             continue;
@@ -167,10 +167,12 @@ fn rows<C: Case>(
     phases.start("write");
     let rows = Rows {
         settings: vary.iter().map(|vary| vary.key.clone()).collect(),
-        columns: match options.columns {
-            [] => C::PROGRAM.columns.iter().map(|&name| name.to_owned()).collect(),
-            columns => columns.to_vec(),
-        },
+        columns: C::PROGRAM
+            .columns
+            .iter()
+            .map(|&name| name.to_owned())
+            .chain(options.columns.to_vec())
+            .collect(),
         rows: runs
             .iter()
             .zip(outcomes)
@@ -191,12 +193,20 @@ fn rows<C: Case>(
 fn former(vary: &[Vary], output: &Path) -> Result<Vec<Vec<String>>, Error> {
     let Ok(mut table) = csv::Reader::from_path(output.join(TABLE)) else { return Ok(Vec::new()) };
     let head = table.headers().cloned().unwrap_or_default();
-    let ends = |name: &&str| name.starts_with(STATISTICS[0]) || [ENDS, "steps"].contains(name);
-    let keys: Vec<&str> = head.iter().skip(1).take_while(|name| !ends(name)).collect();
+    let rows: Vec<csv::StringRecord> = table.records().flatten().collect();
+    // the scene of a finished run tells which columns are keys: it sets them
+    let scene = |row: &csv::StringRecord| {
+        let report = output.join(row.get(0)?).join(crate::report::FILE_NAME);
+        Some(Report::read(report).ok()?.provenance.scene)
+    };
+    let Some(scene) = rows.iter().find_map(scene) else { return Ok(Vec::new()) };
+    let set =
+        |name: &&str| divided(name, ';').iter().all(|key| scene.contains(&format!("{} = ", quoted(key))));
+    let keys: Vec<&str> = head.iter().skip(1).take_while(set).collect();
     if vary.iter().map(|vary| vary.key.as_str()).eq(keys.iter().copied()) {
         let values =
-            |row: csv::StringRecord| row.iter().skip(1).take(keys.len()).map(str::to_owned).collect();
-        return Ok(table.records().flatten().map(values).collect());
+            |row: &csv::StringRecord| row.iter().skip(1).take(keys.len()).map(str::to_owned).collect();
+        return Ok(rows.iter().map(values).collect());
     }
     let reason =
         format!("found a sweep over {}; allowed: one over the same keys, or another folder", keys.join(", "));
@@ -231,7 +241,7 @@ fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>
         if same > 0 {
             name += &format!("-{}", same + 1);
         }
-        runs.push(Run::new::<C>(source, vary, name, values));
+        runs.push(Run::new::<C>(source, vary, name, values, quick));
     }
     // every problem is built once before anything is computed: faults show at once
     let faults: Vec<_> = runs.par_iter().map(|run| C::explain(&run.source, quick).err()).collect();
@@ -249,7 +259,7 @@ fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>
 }
 
 impl Run {
-    fn new<C: Case>(source: &Source, vary: &[Vary], name: String, values: Vec<String>) -> Self {
+    fn new<C: Case>(source: &Source, vary: &[Vary], name: String, values: Vec<String>, quick: bool) -> Self {
         let keys: Vec<String> = vary.iter().flat_map(Vary::keys).collect();
         let each = keys.iter().zip(values.iter().flat_map(|value| divided(value, ';')));
         let mut set: Vec<String> =
@@ -259,7 +269,10 @@ impl Run {
                 set.push(format!("{} = false", quoted(key)));
             }
         }
-        let text = format!("{}\n\n[{SWEEP}]\nset = {{ {} }}\n", source.text.trim_end(), set.join(", "));
+        // a quick run is another run: what it finished is not taken for a whole one
+        let quick = if quick { "quick = true\n" } else { "" };
+        let (text, set) = (source.text.trim_end(), set.join(", "));
+        let text = format!("{text}\n\n[{SWEEP}]\n{quick}set = {{ {set} }}\n");
         Self { name, values, source: Source::new(&source.path, text) }
     }
 

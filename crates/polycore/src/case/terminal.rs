@@ -10,9 +10,6 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Exit code of a run that the user stopped.
-pub const EXIT_INTERRUPTED: u8 = 130;
-
 /// Time between lines of progress where there is no terminal.
 const LOG_EVERY: Duration = Duration::from_secs(10);
 

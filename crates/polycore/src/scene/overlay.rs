@@ -37,7 +37,14 @@ impl Source {
 
     /// Puts the changes into a parsed scene.
     pub(super) fn overlay(&self, root: &mut DeTable<'_>) -> Result<(), SceneError> {
-        let sweep = root.contains_key(SWEEP).then(|| Overlay::Merge { by: format!("{SWEEP}.set") });
+        let sweep = root.get(SWEEP).map(Spanned::get_ref);
+        let keys = sweep.into_iter().filter_map(DeValue::as_table).flat_map(DeTable::keys);
+        if let Some(unknown) =
+            keys.map(|key| key.get_ref()).find(|key| !["quick", "set"].contains(&key.as_ref()))
+        {
+            return Err(self.unknown(SWEEP, unknown, &["quick", "set"]));
+        }
+        let sweep = sweep.is_some().then(|| Overlay::Merge { by: format!("{SWEEP}.set") });
         // the first holds: it comes last
         for overlay in sweep.iter().chain(&self.overlays).rev() {
             match overlay {
