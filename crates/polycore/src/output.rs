@@ -65,7 +65,6 @@ pub fn prepare_directory(directory: impl AsRef<Path>) -> Result<(), Error> {
     })
 }
 
-#[cfg(feature = "case")]
 /// Makes a rename last; best effort, since not every system can synchronise a directory.
 pub(crate) fn sync_directory(directory: &Path) {
     if let Ok(handle) = File::open(directory) {

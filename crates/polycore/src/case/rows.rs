@@ -8,7 +8,7 @@ use std::path::Path;
 pub const STATISTICS: [&str; 4] = ["mean_", "least_", "largest_", "deviation_of_"];
 
 /// Heading of the column that says whether a run meets the scene's expectations.
-pub const ENDS: &str = "passed";
+const ENDS: &str = "passed";
 
 /// A run among others.
 pub struct Row {
