@@ -70,6 +70,12 @@ impl Simulation {
         sum.iter().zip(&mass).map(|(sum, mass)| (*mass > 0.0).then(|| sum / mass)).collect()
     }
 
+    /// A quantity of the materials at a place, as [`Self::field`] at its nodes; `None` where no material there has it.
+    pub fn field_at(&self, name: &str, place: [f64; 3]) -> Option<f64> {
+        let field = self.field(name);
+        self.problem.mesh.locate(place)?.value(|node| field[node as usize])
+    }
+
     /// The first temperature, energy or state variable that is not finite, with its node and the time.
     ///
     /// # Errors

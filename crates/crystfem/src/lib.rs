@@ -1,21 +1,34 @@
 //! Heat conduction and crystallization of semicrystalline polymers printed layer by layer.
 //!
-//! The `crystfem` command line solves problems written as scenes (`scene`, feature `case`); the same parts from Rust:
+//! The `crystfem` command line solves problems written as scenes (`scene`, feature `case`); the same from Rust:
 //!
 //! ```
-//! use crystfem::kinetics::{Constants, Kinetics, cooling_curve};
-//! use crystfem::melting::Melting;
+//! use crystfem::material::Semicrystalline;
+//! use crystfem::mesh::Bar;
+//! use crystfem::printed::PrintedPart;
+//! use crystfem::simulation::Settings;
 //!
-//! // PA12 with column 1 of Table 4.1, cooled from 200 to 120 °C at 10 K/min
-//! let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?;
-//! let curve = cooling_curve(&kinetics, 10.0 / 60.0, 473.15, 393.15, 0.0, 2);
-//! let half = curve.temperature_at(0.5).expect("it crystallizes whole");
-//! assert!((half - (152.77 + 273.15)).abs() < 0.02);
+//! # fn main() -> Result<(), crystfem::Error> {
+//! // four layers of PA12, 20 mm × 10 mm × 0.5 mm each, one every 20 s, onto a plate at 80 °C in air of 80 °C
+//! let bar = Bar::new([20e-3, 10e-3], 4, 0.5e-3);
+//! let part = PrintedPart::bar(&bar, Semicrystalline::pa12()?)?
+//!     .layer_every(20.0)
+//!     .hold("bottom", 353.15)
+//!     .convection(15.0, 353.15);
+//! let mut simulation = part.simulate(Settings::adaptive(1e-3))?;
+//! simulation.run_until(200.0)?;
 //!
-//! // heated again, 24.7 % of the crystals survive 450 K
-//! assert!((1.0 - Melting::PA12.molten(450.0) - 0.2468).abs() < 1e-4);
-//! # Ok::<(), crystfem::Error>(())
+//! // in the middle all that can crystallize has crystallized, X = X∞ = 25 %
+//! let place = [0.0, 0.0, 1e-3];
+//! let (kelvin, x) = (simulation.temperature_at(place), simulation.field_at("crystallinity", place));
+//! assert!(kelvin.is_some_and(|kelvin| (kelvin - 353.15).abs() < 5.0), "{kelvin:?}");
+//! assert!(x.is_some_and(|x| (x - 0.25).abs() < 2e-3), "{x:?}");
+//! # Ok(())
+//! # }
 //! ```
+//!
+//! [`printed`] is put together from the parts below, which serve what it leaves out: meshes from files, tool paths, any
+//! condition, materials of your own.
 
 pub mod boundary;
 mod element;
@@ -31,6 +44,7 @@ pub mod material;
 pub mod melting;
 pub mod mesh;
 pub mod point;
+pub mod printed;
 pub mod problem;
 pub mod simulation;
 mod solver;

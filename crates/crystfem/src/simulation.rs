@@ -227,6 +227,11 @@ impl Simulation {
         (0..self.problem.mesh.points.len() as u32).map(|n| self.temperature(n).unwrap_or(missing)).collect()
     }
 
+    /// Temperature at a place, K; `None` where nothing exists.
+    pub fn temperature_at(&self, place: [f64; 3]) -> Option<f64> {
+        self.problem.mesh.locate(place)?.value(|node| self.temperature(node))
+    }
+
     /// Goes to a time. `observe` sees every accepted step, and may stop there. Births at `until` itself are left to
     /// the next call, so that outputs at that time show what was before them.
     ///
@@ -253,6 +258,14 @@ impl Simulation {
             }
             Ok(ControlFlow::Continue(()))
         })
+    }
+
+    /// [`Self::advance`] without looking at its steps.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn run_until(&mut self, until: f64) -> Result<(), Error> {
+        self.advance(until, &mut |_, _| ControlFlow::Continue(())).map(|_| ())
     }
 
     /// How linear systems would be solved from now to a time, and why.

@@ -47,6 +47,30 @@ pub enum Shape<const D: usize> {
     },
 }
 
+impl Shape<2> {
+    /// A rectangle between two corners.
+    pub fn rectangle(min: [f64; 2], max: [f64; 2]) -> Self {
+        Self::Box { min, max }
+    }
+
+    /// A disk.
+    pub fn disk(centre: [f64; 2], radius: f64) -> Self {
+        Self::Ball { centre, radius }
+    }
+}
+
+impl Shape<3> {
+    /// A cuboid between two corners.
+    pub fn cuboid(min: [f64; 3], max: [f64; 3]) -> Self {
+        Self::Box { min, max }
+    }
+
+    /// A ball.
+    pub fn ball(centre: [f64; 3], radius: f64) -> Self {
+        Self::Ball { centre, radius }
+    }
+}
+
 impl<const D: usize> Shape<D> {
     /// Whether the open interior contains a point. Points on a box's face belong to the box.
     pub fn contains(&self, point: [f64; D]) -> bool {
@@ -202,6 +226,13 @@ pub struct Cut<const D: usize> {
     pub corner: [f64; D],
     /// The D − 1 edges from that corner (the last entry is unused).
     pub edges: [[f64; D]; D],
+}
+
+impl Cut<2> {
+    /// A straight crack between two points.
+    pub fn segment(from: [f64; 2], to: [f64; 2]) -> Self {
+        Self { corner: from, edges: [[to[0] - from[0], to[1] - from[1]], [0.0; 2]] }
+    }
 }
 
 impl<const D: usize> Cut<D> {

@@ -2,7 +2,7 @@
 
 use super::{Conductor, Crystallization, Point, Property, Response, ThermalMaterial};
 use crate::error::Error;
-use crate::kinetics::Kinetics;
+use crate::kinetics::{Constants, Kinetics};
 use crate::melting::Melting;
 
 /// A change of α in one increment at which the suggested step is the one taken.
@@ -68,6 +68,24 @@ impl Semicrystalline {
             ultimate_crystallinity,
             latent: latent_heat.map(|heat| heat * ultimate_crystallinity),
             initial: kinetics.z_of_degree(seed),
+        })
+    }
+
+    /// PA12 of Chapter 4: k = 0.25 W/(m K), ρ = 1010 kg/m³, c = 2200 J/(kg K), kinetics of column 1 of Table 4.1, X∞ = 0.25,
+    /// 209 J/g of crystal.
+    ///
+    /// # Errors
+    /// None: as [`Self::new`] for other constants.
+    pub fn pa12() -> Result<Self, Error> {
+        Self::new(Polymer {
+            density: 1010.0,
+            conductivity: Property::Constant(0.25),
+            specific_heat: Property::Constant(2200.0),
+            kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?,
+            melting: Some(Melting::PA12),
+            ultimate_crystallinity: 0.25,
+            latent_heat: Some(209e3),
+            seed: 0.0,
         })
     }
 

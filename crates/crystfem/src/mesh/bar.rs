@@ -35,6 +35,12 @@ pub struct Substrate {
 }
 
 impl Bar {
+    /// A bar alone, m: two elements through a layer, hexahedra about two layers' height long.
+    pub fn new(size: [f64; 2], layers: usize, layer_height: f64) -> Self {
+        let (elements_per_layer, element_size, cells) = (2, 2.0 * layer_height, Split::Hexahedra);
+        Self { size, layers, layer_height, elements_per_layer, element_size, substrate: None, cells }
+    }
+
     /// Conforming elements: element sets `bar`, `layer-1` … `layer-N`, `substrate`; surfaces and node sets on the sides
     /// of the box around all, [`crate::mesh::BOX_SIDES`] (`bottom` is the substrate's lower face), and `interface`,
     /// the bar's lower face.

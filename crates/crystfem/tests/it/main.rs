@@ -9,6 +9,8 @@ mod order;
 mod patch;
 #[cfg(feature = "case")]
 mod point;
+#[cfg(feature = "case")]
+mod printed;
 mod readers;
 mod same_bits;
 mod schedules;

@@ -157,6 +157,12 @@ pub fn stretch_range<const D: usize, B: Bonds<D> + ?Sized>(
         .reduce(|| StretchRange::REST, StretchRange::join)
 }
 
+/// The stretches [λ_low, λ_high] of the bonds in a displacement, with a margin for rounding: the range of a fitted law.
+pub fn covered_stretches<const D: usize>(bonds: &dyn Bonds<D>, displacement: &Field<D>) -> [f64; 2] {
+    let range = stretch_range(bonds, displacement);
+    [(1.0 + range.low).max(0.0).sqrt() - 1e-3, (1.0 + range.high).sqrt() + 1e-3].map(|s| s.max(1e-3))
+}
+
 /// The plain loop over bonds, for laws that only a table represents.
 fn plain_force<const D: usize>(
     bonds: &dyn Bonds<D>,

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::potential::{BondPotential, EnergyTable, KernelFit, StretchRange, TangentTable};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// From this ratio of the largest tangent to that at rest on, every particle has the stiffness of its own bonds.
 const MUCH: f64 = 1.2;
@@ -15,16 +16,26 @@ const LEAST_TANGENT: f64 = 0.25;
 const SAMPLES: u32 = 200;
 
 /// A bond law with its micromodulus.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct BondMaterial<'a> {
-    law: &'a dyn BondPotential,
+    law: Arc<dyn BondPotential + 'a>,
     modulus: f64,
 }
 
 impl<'a> BondMaterial<'a> {
-    /// Of a law in units of kθ = `modulus`, N/m⁶.
-    pub fn new(law: &'a dyn BondPotential, modulus: f64) -> Self {
-        Self { law, modulus }
+    /// Of a law, or a reference to one, in units of kθ = `modulus`, N/m⁶.
+    pub fn new(law: impl BondPotential + 'a, modulus: f64) -> Self {
+        Self { law: Arc::new(law), modulus }
+    }
+
+    /// The law.
+    pub fn law(&self) -> &(dyn BondPotential + 'a) {
+        &*self.law
+    }
+
+    /// kθ, N/m⁶.
+    pub fn modulus(&self) -> f64 {
+        self.modulus
     }
 
     /// 2kθ times the factors of a bond.
@@ -85,7 +96,7 @@ struct Kernels<'a> {
 
 impl<const D: usize> Response<D> for Kernels<'_> {
     fn bond_law(&self) -> (&dyn BondPotential, f64) {
-        (self.material.law, self.material.modulus)
+        (&*self.material.law, self.material.modulus)
     }
 
     fn cover(
@@ -94,7 +105,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         _displacement: &Field<D>,
         cover: &Cover,
     ) -> Result<f64, Error> {
-        let BondMaterial { law, modulus } = self.material;
+        let (law, modulus) = (&*self.material.law, self.material.modulus);
         let mut fit = KernelFit::new(law, cover.stretches, cover.bound)?;
         if cover.held {
             fit = fit.held();
@@ -124,7 +135,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
 
     /// Σ_I V_I Σ_J w V_J kθ |ξ| φ.
     fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, met: StretchRange) -> f64 {
-        let BondMaterial { law, modulus } = self.material;
+        let (law, modulus) = (&*self.material.law, self.material.modulus);
         if self.table.as_ref().is_none_or(|(range, _)| *range != met) {
             self.table = Some((met, EnergyTable::new(law, met)));
         }
@@ -154,7 +165,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
     /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. Beyond what is fitted q is held: the energy grows with half
     /// of it.
     fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64> {
-        let law = self.material.law;
+        let law = &*self.material.law;
         let energy = |bond: &Overstretched| {
             let stretch = (1.0 + bond.elongation).sqrt();
             let mut energy = law.energy(stretch.min(most));
@@ -173,7 +184,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
 
     /// Σ_J (2 w V_J/|ξ|)·max(|t′|, |t|/λ)(1 + max_{d≠e} |n_d n_e|) with the directions of the deformed bonds.
     fn own_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, stretches: [f64; 2]) -> Vec<f64> {
-        let law = self.material.law;
+        let law = &*self.material.law;
         // bonds crushed to nothing have no bound: the law's own at a thousandth
         let [low, high] = stretches.map(|stretch| stretch.powi(2) - 1.0);
         let table = TangentTable::new(law, StretchRange { low, high });
@@ -201,7 +212,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
     }
 
     fn range(&self, stretches: [f64; 2]) -> LawRange {
-        let law = self.material.law;
+        let law = &*self.material.law;
         let (mut steepest, mut tension) = (0.0_f64, 0.0_f64);
         let mut range = LawRange { mean_tangent: 0.0, least_tangent: f64::INFINITY, least_energy: 0.0 };
         for stretch in samples(stretches) {

@@ -42,6 +42,33 @@ pub trait BondPotential: Send + Sync {
     }
 }
 
+/// What a reference, a box or an [`Arc`](std::sync::Arc) points to.
+macro_rules! pointers_are_laws {
+    ($($pointer:ty),*) => {$(
+        impl<L: BondPotential + ?Sized> BondPotential for $pointer {
+            fn tension(&self, stretch: f64) -> f64 {
+                (**self).tension(stretch)
+            }
+            fn tension_at_strain(&self, strain: f64) -> f64 {
+                (**self).tension_at_strain(strain)
+            }
+            fn tension_derivative(&self, stretch: f64) -> f64 {
+                (**self).tension_derivative(stretch)
+            }
+            fn energy(&self, stretch: f64) -> f64 {
+                (**self).energy(stretch)
+            }
+            fn is_stress_free(&self) -> bool {
+                (**self).is_stress_free()
+            }
+            fn tangent(&self) -> f64 {
+                (**self).tangent()
+            }
+        }
+    )*};
+}
+pointers_are_laws!(&L, Box<L>);
+
 /// The laws by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]

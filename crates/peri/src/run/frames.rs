@@ -1,11 +1,11 @@
 //! Fields of single steps: what is written while a run goes on.
 
-use crate::bonds::{Bonds, Kind};
+use crate::bonds::{Bonds, Kind, covered_stretches};
 use crate::error::Error;
 use crate::potential::{BondPotential, KernelFit};
 use crate::scene::Scene;
 use crate::solver::{Record, State};
-use crate::stress::{Loaded, Measure, Missing, Tensor, cauchy, deformation_gradients};
+use crate::stress::{self, Loaded, Measure, Missing, Tensor, cauchy, deformation_gradients};
 use polycore::output::vtkhdf::ParticleSeries;
 use polycore::report::Phases;
 use std::path::{Path, PathBuf};
@@ -166,7 +166,8 @@ impl<'a> Frames<'a> {
     ) -> Result<Stresses<D>, Error> {
         let mut stresses = Stresses { piola: Vec::new(), cauchy: Vec::new() };
         let Some(spec) = &self.scene.stress else { return Ok(stresses) };
-        let fit = KernelFit::new(self.law, super::covering(bonds, state), self.scene.fit_bound())?;
+        let fit =
+            KernelFit::new(self.law, covered_stretches(bonds, &state.displacement), self.scene.fit_bound())?;
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
         for &measure in &spec.measures {
@@ -174,7 +175,7 @@ impl<'a> Frames<'a> {
             let loaded =
                 Loaded { displacement: &state.displacement, fit: &fit, modulus: self.modulus, missing };
             let started = Instant::now();
-            let piola = super::stress(bonds, &loaded, measure, spec.ball);
+            let piola = stress::piola(bonds, &loaded, measure, spec.ball);
             stresses.cauchy.push((measure, cauchy(&piola, &gradients)));
             phases.add(&format!("stress {}", measure.name()), started.elapsed().as_secs_f64());
             if self.scene.output.fields {

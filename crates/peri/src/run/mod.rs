@@ -19,7 +19,7 @@ use bonded::Bonded;
 use frames::Frames;
 use probes::Probes;
 
-use crate::bonds::{Bonds, Kind, fragments, stretch_range};
+use crate::bonds::{Bonds, covered_stretches, fragments};
 use crate::calibrate::Space;
 use crate::contact::Contact;
 use crate::error::Error;
@@ -27,7 +27,6 @@ use crate::material::{BondMaterial, Property};
 use crate::potential::{BondPotential, KernelFit};
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
 use crate::solver::{Breaking, Loads, State, Status, System, load_stepping};
-use crate::stress::{Loaded, Tensor, piola_in_cloud, piola_on_lattice};
 use polycore::case::{Fault, Run};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
@@ -170,7 +169,7 @@ fn run_variant<const D: usize>(
     };
     solve(scene, &solution, run, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
-    let fit = KernelFit::new(&*law, covering(&*body.bonds, &state), scene.fit_bound())?;
+    let fit = KernelFit::new(&*law, covered_stretches(&*body.bonds, &state.displacement), scene.fit_bound())?;
     outcome.value("fit_error", fit.max_error, "");
     if let Some(critical) = &critical_stretch {
         outcome.value("critical_stretch", critical.least(), "");
@@ -305,24 +304,6 @@ fn part_of(status: &Status) -> f64 {
     let decades = (1.0 / status.tolerance).log10();
     let done = (-status.residual.log10()).clamp(0.0, decades) / decades;
     (status.step as f64 + done) / status.steps as f64
-}
-
-/// The stretches of a state, with a margin for rounding.
-fn covering<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> [f64; 2] {
-    let met = stretch_range(bonds, &state.displacement);
-    [(1.0 + met.low).max(0.0).sqrt() - 1e-3, (1.0 + met.high).sqrt() + 1e-3].map(|s| s.max(1e-3))
-}
-
-fn stress<const D: usize>(
-    bonds: &dyn Bonds<D>,
-    loaded: &Loaded<D>,
-    measure: crate::stress::Measure,
-    ball: crate::stress::BallVolume,
-) -> Vec<Tensor<D>> {
-    match bonds.kind() {
-        Kind::Lattice(lattice) => piola_on_lattice(lattice, loaded, measure, ball),
-        Kind::Cloud(cloud) => piola_in_cloud(cloud, loaded, measure, ball),
-    }
 }
 
 /// What a scene builds and leaves out, variant by variant.

@@ -12,7 +12,7 @@ mod window;
 
 pub use ball::{ball_volume, cell_fractions, segment_fraction};
 
-use crate::bonds::{Bonds, CloudBonds, LatticeBonds};
+use crate::bonds::{Bonds, CloudBonds, Kind, LatticeBonds};
 use crate::field::Field;
 use crate::potential::KernelFit;
 use rayon::prelude::*;
@@ -141,6 +141,19 @@ pub struct Loaded<'a, const D: usize> {
     pub modulus: f64,
     /// What makes up for bonds missing at surfaces.
     pub missing: Missing<'a>,
+}
+
+/// First Piola–Kirchhoff stress of every particle (in the order of [`Bonds::particles`]), Pa.
+pub fn piola<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    state: &Loaded<D>,
+    measure: Measure,
+    ball: BallVolume,
+) -> Vec<Tensor<D>> {
+    match bonds.kind() {
+        Kind::Lattice(lattice) => piola_on_lattice(lattice, state, measure, ball),
+        Kind::Cloud(cloud) => piola_in_cloud(cloud, state, measure, ball),
+    }
 }
 
 /// First Piola–Kirchhoff stress of every particle (in the order of [`Bonds::particles`]), Pa, on a lattice.

@@ -17,6 +17,7 @@ mod limits;
 mod linear_solid;
 mod looks;
 mod materials;
+mod model;
 mod pressed;
 mod relaxation;
 mod rigid;

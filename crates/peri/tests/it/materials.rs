@@ -240,10 +240,10 @@ fn solid() -> LinearSolid {
 fn bond_laws_pass() {
     for (law, potential) in laws() {
         let material = BondMaterial::new(&*potential, MODULUS);
-        battery::<2>(law.name(), [8, 7], &|bonds| Material::<2>::respond(material, bonds));
-        battery::<3>(law.name(), [4, 4, 3], &|bonds| Material::<3>::respond(material, bonds));
+        battery::<2>(law.name(), [8, 7], &|bonds| Material::<2>::respond(material.clone(), bonds));
+        battery::<3>(law.name(), [4, 4, 3], &|bonds| Material::<3>::respond(material.clone(), bonds));
         battery::<2>(&format!("{} by loops", law.name()), [8, 7], &|bonds| {
-            Box::new(Pointwise::new(material, bonds))
+            Box::new(Pointwise::new(material.clone(), bonds))
         });
     }
 }
@@ -266,8 +266,8 @@ fn loops_agree_with_kernels() {
         let mut built = body.build();
         let displacement = scatter(built.lattice.slots(), &built.on_lattice, &displaced(&built, 0.1));
         let mut found = Vec::new();
-        let makes: [Make<2>; 2] = [&|bonds| Material::<2>::respond(material, bonds), &|bonds| {
-            Box::new(Pointwise::new(material, bonds))
+        let makes: [Make<2>; 2] = [&|bonds| Material::<2>::respond(material.clone(), bonds), &|bonds| {
+            Box::new(Pointwise::new(material.clone(), bonds))
         }];
         for make in makes {
             let mut case = Case::new(law.name().to_owned(), &mut built.lattice, make, displacement.clone());

@@ -1,0 +1,62 @@
+//! A printed part in a few lines is the one of the scene.
+
+use crystfem::Error;
+use crystfem::material::{Conductor, Property, Semicrystalline};
+use crystfem::mesh::layers::Layers;
+use crystfem::mesh::{Bar, Grid, Substrate};
+use crystfem::printed::PrintedPart;
+use crystfem::scene::PartScene;
+use crystfem::simulation::{Settings, Simulation};
+use polycore::scene::Source;
+
+const SCENE: &str = include_str!("../../../../cases/ch4/printed-bar/case.toml");
+
+fn glass() -> Conductor {
+    Conductor::new(2500.0, Property::Constant(1.0), Property::Constant(800.0)).unwrap()
+}
+
+#[test]
+fn equals_the_scene() {
+    let substrate = Substrate { size: [0.06, 0.03], thickness: 4e-3, growth: 1.6 };
+    let bar = Bar { substrate: Some(substrate), ..Bar::new([0.04, 0.01], 8, 5e-4) };
+    let part = PrintedPart::bar(&bar, Semicrystalline::pa12().unwrap()).unwrap();
+    let part = part.substrate(glass(), 353.15).layer_every(20.0).deposited_at(493.15);
+    let part = part.hold("bottom", 353.15).convection(15.0, 353.15).radiation(0.9, 353.15);
+    let part = part.problem().unwrap();
+
+    let source = Source::new("case.toml", SCENE);
+    let scene: PartScene = source.parse().unwrap();
+    let mesh = scene.mesh.build(&source).unwrap().mesh;
+    let whole = scene.task(&source, mesh).unwrap().problem;
+    assert_eq!(part.births, whole.births);
+    assert_eq!(part.mesh.element_count(), whole.mesh.element_count());
+
+    let settings = Settings::backward_euler(1.0);
+    let temperatures = [part, whole].map(|problem| {
+        let mut simulation = Simulation::new(problem, settings).unwrap();
+        simulation.run_until(22.0).unwrap();
+        simulation.temperatures(0.0)
+    });
+    // the order of materials and conditions differs, and with it that of sums
+    let [a, b] = &temperatures;
+    let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(apart < 1e-5, "{apart} K");
+}
+
+#[test]
+fn faults_are_named() {
+    let bar =
+        || PrintedPart::bar(&Bar::new([0.01, 0.01], 2, 1e-3), Semicrystalline::pa12().unwrap()).unwrap();
+    let fault = |part: PrintedPart| match part.problem() {
+        Err(Error::Mesh(text)) => text,
+        Err(Error::Parameter { name, .. }) => name.to_owned(),
+        other => panic!("{:?}", other.map(|_| ())),
+    };
+    assert!(fault(bar().hold("botom", 300.0)).starts_with("no surface `botom`; allowed: "));
+    assert_eq!(fault(bar().layer_every(0.0)), "time between layers");
+    let mesh = Grid::uniform([0.0; 3], [1.0; 3], [2, 2, 2]).unwrap().mesh("block").unwrap();
+    let half: Vec<u32> = (0..4).collect();
+    let layers = Layers { elements: vec![half], notes: Vec::new() };
+    let part = PrintedPart::new(mesh, layers, Semicrystalline::pa12().unwrap());
+    assert!(fault(part).starts_with("4 elements are in no layer"));
+}

@@ -1,0 +1,214 @@
+//! Models in a few lines: a [`Body`], a material and loads make a [`Simulation`], which any [`Method`] solves.
+
+mod body;
+mod rubber;
+
+pub use body::Body;
+pub use rubber::Rubber;
+
+use crate::bonds::{Bonds, LatticeBonds, Property, covered_stretches, fragments};
+use crate::contact::Contact;
+use crate::error::Error;
+use crate::material::{BondMaterial, Material};
+use crate::potential::KernelFit;
+use crate::solver::{Breaking, Loads, Method, Policy, Record, State, Support, System};
+use crate::stress::{self, BallVolume, Loaded, Measure, Missing, Tensor};
+
+/// What a body can be made of: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
+pub trait IntoMaterial<const D: usize> {
+    /// The material.
+    type Material: Material<D> + Clone;
+
+    /// The material in a body, and the critical stretch of its bonds where they break.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a parameter out of its domain.
+    fn into_material(
+        self,
+        body: &Body<D>,
+        bonds: &LatticeBonds<D>,
+    ) -> Result<(Self::Material, Option<f64>), Error>;
+}
+
+impl<const D: usize, M: Material<D> + Clone> IntoMaterial<D> for M {
+    type Material = M;
+
+    fn into_material(self, _: &Body<D>, _: &LatticeBonds<D>) -> Result<(M, Option<f64>), Error> {
+        Ok((self, None))
+    }
+}
+
+/// Whether a point X, m, belongs to a region.
+type Region<const D: usize> = Box<dyn Fn([f64; D]) -> bool>;
+
+/// A body, its material and its loads, before anything is built.
+///
+/// A region is a function of the reference position: `|[x, _]| x < 3e-3` holds every particle with X₁ below 3 mm.
+pub struct Model<const D: usize, M> {
+    body: Body<D>,
+    material: M,
+    regions: Vec<(Region<D>, Support<D>)>,
+    factors: Vec<f64>,
+    critical_stretch: Option<Property>,
+    contact: Option<f64>,
+}
+
+impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
+    /// A body without loads: one load step, bonds that break only where the material says so, no contact.
+    pub fn new(body: Body<D>, material: M) -> Self {
+        let (regions, factors) = (Vec::new(), vec![1.0]);
+        Self { body, material, regions, factors, critical_stretch: None, contact: None }
+    }
+
+    /// Fixes all components of a region.
+    pub fn clamp(self, region: impl Fn([f64; D]) -> bool + 'static) -> Self {
+        self.displace(region, [0.0; D])
+    }
+
+    /// Moves a region by a displacement, m, at load factor 1. Where regions overlap the last one counts.
+    pub fn displace(self, region: impl Fn([f64; D]) -> bool + 'static, displacement: [f64; D]) -> Self {
+        self.support(region, Support { displacement: displacement.map(Some), body_force: [0.0; D] })
+    }
+
+    /// Loads a region by a body force, N/m³, at load factor 1. Forces add up.
+    pub fn body_force(self, region: impl Fn([f64; D]) -> bool + 'static, force: [f64; D]) -> Self {
+        self.support(region, Support { displacement: [None; D], body_force: force })
+    }
+
+    /// Prescribes some components of the displacement of a region, and a body force.
+    pub fn support(mut self, region: impl Fn([f64; D]) -> bool + 'static, support: Support<D>) -> Self {
+        self.regions.push((Box::new(region), support));
+        self
+    }
+
+    /// Applies the loads in equal steps.
+    pub fn steps(mut self, steps: usize) -> Self {
+        self.factors = (1..=steps).map(|step| step as f64 / steps as f64).collect();
+        self
+    }
+
+    /// Breaks bonds at a stretch, a number or a field over the particles, whatever the material says.
+    pub fn critical_stretch(mut self, stretch: impl Into<Property>) -> Self {
+        self.critical_stretch = Some(stretch.into());
+        self
+    }
+
+    /// Particles without a bond repel each other; see [`Contact::new`] for the stiffness κ.
+    pub fn contact(mut self, stiffness: f64) -> Self {
+        self.contact = Some(stiffness);
+        self
+    }
+
+    /// Builds particles, bonds, material and loads.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for a body without particles or a region without any; [`Error::Parameter`] for a parameter of the
+    /// material or of contact out of its domain.
+    pub fn build(self) -> Result<Simulation<D, M::Material>, Error> {
+        let bonds = self.body.build()?;
+        let (material, critical) = self.material.into_material(&self.body, &bonds)?;
+        let mut regions = Vec::new();
+        let mut loaded = vec![false; bonds.slots()];
+        for (number, (region, support)) in self.regions.into_iter().enumerate() {
+            let inside = |&slot: &u32| region(bonds.position(slot as usize));
+            let members: Vec<u32> = bonds.particles().iter().copied().filter(inside).collect();
+            if members.is_empty() {
+                return Err(Error::geometry(format!("region {} of the loads has no particle", number + 1)));
+            }
+            members.iter().for_each(|&slot| loaded[slot as usize] = true);
+            regions.push((members, support));
+        }
+        let loads = Loads::new(bonds.slots(), &regions);
+        let micromodulus = material.micromodulus(&bonds);
+        let contact =
+            self.contact.map(|stiffness| Contact::new(&bonds, micromodulus, stiffness)).transpose()?;
+        let stretch = self.critical_stretch.or(critical.map(Property::from));
+        let breaking = stretch.map(|stretch| Breaking { stretch, policy: Policy::default() });
+        let state = State::new(bonds.slots());
+        Ok(Simulation { bonds, material, loads, loaded, factors: self.factors, breaking, contact, state })
+    }
+}
+
+/// A model with its particles and its state.
+pub struct Simulation<const D: usize, M> {
+    /// Particles and intact bonds.
+    pub bonds: LatticeBonds<D>,
+    /// The state that is reached. Its velocity may be set before a dynamic solution.
+    pub state: State<D>,
+    /// Load factor at the end of each step; more may be added, for the next call of [`Self::solve`]. Not used in dynamics.
+    pub factors: Vec<f64>,
+    material: M,
+    loads: Loads<D>,
+    /// Slots of the regions that loads act on.
+    loaded: Vec<bool>,
+    breaking: Option<Breaking>,
+    contact: Option<Contact<D>>,
+}
+
+impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
+    /// Solves the load steps that are left, or goes on to the end time of a dynamic method.
+    ///
+    /// # Errors
+    /// As the method: [`Error::NotConverged`], [`Error::NotFinite`], [`Error::Unstable`] and others.
+    pub fn solve(&mut self, method: impl Method<D>) -> Result<(), Error> {
+        self.solve_with(method, |_| Ok(()))
+    }
+
+    /// [`Self::solve`]; `finished` sees the state after every load step, equilibrium in which bonds broke or row of a dynamic
+    /// history, and may stop the solution by an error.
+    ///
+    /// # Errors
+    /// As [`Self::solve`], and those of `finished`.
+    pub fn solve_with(
+        &mut self,
+        method: impl Method<D>,
+        mut finished: impl FnMut(&State<D>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let mut system = System::new(&mut self.bonds, self.material.clone(), &self.loads, &self.factors);
+        system.breaking.clone_from(&self.breaking);
+        system.contact = self.contact.take();
+        let solved =
+            method.solve(&mut system, &mut self.state, &mut |_, _| Ok(()), &mut |_, state| finished(state));
+        self.contact = system.contact.take();
+        solved
+    }
+
+    /// The finished load steps, or the rows of a dynamic history.
+    pub fn history(&self) -> &[Record] {
+        &self.state.history
+    }
+
+    /// Position X and displacement u of every particle, m.
+    pub fn displacements(&self) -> impl Iterator<Item = ([f64; D], [f64; D])> {
+        let particles = self.bonds.particles().iter().map(|&slot| slot as usize);
+        particles.map(|slot| (self.bonds.position(slot), self.state.displacement.get(slot)))
+    }
+
+    /// Pieces that the body has broken into.
+    pub fn fragments(&self) -> usize {
+        fragments(&self.bonds)
+    }
+}
+
+impl<const D: usize> Simulation<D, BondMaterial<'_>> {
+    /// First Piola–Kirchhoff stress P of every particle, Pa, in the order of [`Self::displacements`].
+    ///
+    /// # Errors
+    /// As [`KernelFit::new`].
+    pub fn piola(&self, measure: Measure) -> Result<Vec<Tensor<D>>, Error> {
+        let displacement = &self.state.displacement;
+        let fit = KernelFit::new(self.material.law(), covered_stretches(&self.bonds, displacement), 1e-9)?;
+        let (modulus, missing) = (self.material.modulus(), Missing::WindowAt(&self.loaded));
+        let loaded = Loaded { displacement, fit: &fit, modulus, missing };
+        Ok(stress::piola(&self.bonds, &loaded, measure, BallVolume::default()))
+    }
+
+    /// Cauchy stress σ = P Fᵀ/J of every particle, Pa, in the order of [`Self::displacements`].
+    ///
+    /// # Errors
+    /// As [`Self::piola`].
+    pub fn cauchy(&self, measure: Measure) -> Result<Vec<Tensor<D>>, Error> {
+        let gradients = stress::deformation_gradients(&self.bonds, &self.state.displacement);
+        Ok(stress::cauchy(&self.piola(measure)?, &gradients))
+    }
+}

@@ -1,0 +1,91 @@
+//! A body of shapes on a regular lattice, before it is built.
+
+use crate::bonds::{LatticeBonds, VolumeCorrection};
+use crate::calibrate::Space;
+use crate::error::Error;
+use crate::geometry::{Cut, Operation, Shape, lattice};
+
+/// Shapes filled with particles on a regular lattice; lengths in m.
+#[derive(Clone, Debug)]
+pub struct Body<const D: usize> {
+    operations: Vec<Operation<D>>,
+    cracks: Vec<Cut<D>>,
+    spacing: f64,
+    ratio: f64,
+    correction: VolumeCorrection,
+    pub(super) space: Space,
+    pub(super) thickness: f64,
+}
+
+impl<const D: usize> Body<D> {
+    /// A shape with particles `spacing` apart and a horizon of 3.015 spacings: a solid in three dimensions, in two a sheet
+    /// in plane stress, 1 m thick.
+    pub fn lattice(shape: Shape<D>, spacing: f64) -> Self {
+        Self {
+            operations: vec![Operation::Add(shape)],
+            cracks: Vec::new(),
+            spacing,
+            ratio: 3.015,
+            correction: VolumeCorrection::None,
+            space: if D == 2 { Space::PlaneStress } else { Space::Solid },
+            thickness: 1.0,
+        }
+    }
+
+    /// Adds a shape.
+    pub fn add(mut self, shape: Shape<D>) -> Self {
+        self.operations.push(Operation::Add(shape));
+        self
+    }
+
+    /// Cuts a shape out of what has been added so far.
+    pub fn cut(mut self, shape: Shape<D>) -> Self {
+        self.operations.push(Operation::Cut(shape));
+        self
+    }
+
+    /// A crack of zero width: no bond crosses it.
+    pub fn crack(mut self, crack: Cut<D>) -> Self {
+        self.cracks.push(crack);
+        self
+    }
+
+    /// The horizon δ, in spacings.
+    pub fn horizon(mut self, ratio: f64) -> Self {
+        self.ratio = ratio;
+        self
+    }
+
+    /// How volumes of neighbours near the horizon are corrected; they are not by default.
+    pub fn volume_correction(mut self, correction: VolumeCorrection) -> Self {
+        self.correction = correction;
+        self
+    }
+
+    /// Its particles and bonds.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] as [`lattice()`] and [`LatticeBonds::new`]; for a thickness that is not positive, too.
+    pub fn build(&self) -> Result<LatticeBonds<D>, Error> {
+        if !(self.thickness > 0.0 && self.thickness.is_finite()) {
+            let found = self.thickness;
+            return Err(Error::geometry(format!("thickness: found {found} m; allowed: above 0, finite")));
+        }
+        let lattice = lattice(&self.operations, self.spacing, self.thickness)?;
+        LatticeBonds::new(lattice, self.ratio, self.correction, &self.cracks)
+    }
+}
+
+impl Body<2> {
+    /// A thin sheet: plane stress, Poisson's ratio 1/3.
+    pub fn plane_stress(mut self, thickness: f64) -> Self {
+        (self.space, self.thickness) = (Space::PlaneStress, thickness);
+        self
+    }
+
+    /// A thick slab: plane strain, Poisson's ratio 1/4.
+    pub fn plane_strain(mut self, thickness: f64) -> Self {
+        (self.space, self.thickness) = (Space::PlaneStrain, thickness);
+        self
+    }
+}

@@ -1,0 +1,78 @@
+//! Rubber of a bond law, described by its Young's modulus.
+
+use super::{Body, IntoMaterial};
+use crate::bonds::{Bonds, LatticeBonds};
+use crate::calibrate::{Calibration, lattice_factor, modulus};
+use crate::critical::{Context, Critical};
+use crate::error::Error;
+use crate::material::BondMaterial;
+use crate::potential::Law;
+use polycore::units::EnergyPerArea;
+
+/// Rubber whose bonds follow a [`Law`].
+#[derive(Clone, Copy, Debug)]
+pub struct Rubber {
+    law: Law,
+    youngs_modulus: f64,
+    links: f64,
+    dissociation: f64,
+    calibration: Calibration,
+    critical: Option<Critical>,
+}
+
+impl Rubber {
+    /// Rubber of Young's modulus E, Pa, that does not break. Chains have n̄ = 720 links of D̂ = 1200 unless
+    /// [`Self::chains`] says otherwise.
+    pub fn new(law: Law, youngs_modulus: f64) -> Self {
+        let (links, dissociation, calibration) = (720.0, 1200.0, Calibration::Continuum);
+        Self { law, youngs_modulus, links, dissociation, calibration, critical: None }
+    }
+
+    /// Chains of n̄ `links` and a dissociation energy D̂, in units of kθ.
+    pub fn chains(mut self, links: f64, dissociation: f64) -> Self {
+        (self.links, self.dissociation) = (links, dissociation);
+        self
+    }
+
+    /// Takes kθ from the lattice's own sums or from the continuum's integrals, which is the default.
+    pub fn calibration(mut self, calibration: Calibration) -> Self {
+        self.calibration = calibration;
+        self
+    }
+
+    /// Bonds break at a stretch λ_c.
+    pub fn critical_stretch(mut self, stretch: f64) -> Self {
+        self.critical = Some(Critical { stretch: Some(stretch), ..Critical::default() });
+        self
+    }
+
+    /// Bonds break at the stretch that follows from a fracture energy G, J/m².
+    pub fn fracture_energy(mut self, energy: f64) -> Self {
+        self.critical =
+            Some(Critical { fracture_energy: Some(EnergyPerArea::from_si(energy)), ..Critical::default() });
+        self
+    }
+}
+
+impl<const D: usize> IntoMaterial<D> for Rubber {
+    type Material = BondMaterial<'static>;
+
+    fn into_material(
+        self,
+        body: &Body<D>,
+        bonds: &LatticeBonds<D>,
+    ) -> Result<(Self::Material, Option<f64>), Error> {
+        let found = self.youngs_modulus;
+        if !(found > 0.0 && found.is_finite()) {
+            let allowed = "above 0, finite".into();
+            return Err(Error::Parameter { name: "Young's modulus", found, allowed });
+        }
+        let law = self.law.build(self.links, self.dissociation, self.law.rescales())?;
+        let (space, horizon, thickness) = (body.space, bonds.horizon(), body.thickness);
+        let modulus = modulus(space, found, horizon, thickness) * lattice_factor(self.calibration, bonds);
+        let links = self.law.is_chain().then_some(self.links);
+        let context = Context { law: &*law, links, space, modulus, horizon, thickness };
+        let critical = self.critical.map(|critical| critical.resolve(&context)).transpose()?;
+        Ok((BondMaterial::new(law, modulus), critical))
+    }
+}

@@ -1,0 +1,120 @@
+//! Models in a few lines are what their parts are by hand.
+
+use crate::linear_solid::LinearSolid;
+use peri::Error;
+use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::calibrate::{Space, modulus};
+use peri::geometry::{Cut, Operation, Shape, lattice};
+use peri::material::BondMaterial;
+use peri::model::{Body, Model, Rubber};
+use peri::potential::Law;
+use peri::solver::{
+    Breaking, DynamicRelaxation, Lbfgs, Loads, Policy, State, Support, System, VelocityVerlet,
+};
+use peri::stress::Measure;
+
+const CRACK: [[f64; 2]; 2] = [[0.0, 20e-3], [8e-3, 20e-3]];
+
+fn sheet() -> Body<2> {
+    let shape = Shape::rectangle([0.0; 2], [24e-3, 40e-3]);
+    Body::lattice(shape, 2e-3).plane_stress(1e-3).crack(Cut::segment(CRACK[0], CRACK[1]))
+}
+
+/// The cracked sheet, torn in three steps, by hand.
+fn by_hand() -> (LatticeBonds<2>, State<2>) {
+    let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [24e-3, 40e-3] })];
+    let crack = Cut { corner: CRACK[0], edges: [[8e-3, 0.0], [0.0; 2]] };
+    let lattice = lattice(&body, 2e-3, 1e-3).unwrap();
+    let mut bonds = LatticeBonds::new(lattice, 3.015, VolumeCorrection::None, &[crack]).unwrap();
+    let law = Law::ChainOffset.build(300.0, 900.0, false).unwrap();
+    let modulus = modulus(Space::PlaneStress, 1e6, bonds.horizon(), 1e-3);
+    let grip = |inside: &dyn Fn(f64) -> bool, y| {
+        let inside = |&slot: &u32| inside(bonds.position(slot as usize)[1]);
+        let members: Vec<u32> = bonds.particles().iter().copied().filter(inside).collect();
+        (members, Support { displacement: [Some(0.0), Some(y)], body_force: [0.0; 2] })
+    };
+    let loads = Loads::new(bonds.slots(), &[grip(&|y| y < 6e-3, 0.0), grip(&|y| y > 34e-3, 12e-3)]);
+    let mut state = State::new(bonds.slots());
+    let factors = [1.0 / 3.0, 2.0 / 3.0, 1.0];
+    let mut system = System::new(&mut bonds, BondMaterial::new(&*law, modulus), &loads, &factors);
+    system.breaking = Some(Breaking { stretch: 1.5.into(), policy: Policy::AtEquilibrium });
+    DynamicRelaxation::default()
+        .solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
+        .unwrap();
+    drop(system);
+    (bonds, state)
+}
+
+#[test]
+fn a_model_is_its_parts() {
+    let rubber = Rubber::new(Law::ChainOffset, 1e6).chains(300.0, 900.0).critical_stretch(1.5);
+    let model =
+        Model::new(sheet(), rubber).clamp(|[_, y]| y < 6e-3).displace(|[_, y]| y > 34e-3, [0.0, 12e-3]);
+    let mut simulation = model.steps(3).build().unwrap();
+    let mut seen = 0;
+    let count = |_: &State<2>| {
+        seen += 1;
+        Ok(())
+    };
+    simulation.solve_with(DynamicRelaxation::default(), count).unwrap();
+    let (bonds, state) = by_hand();
+    assert!(state.broken > 0, "the sheet tears");
+    assert_eq!(simulation.state, state);
+    assert_eq!(simulation.bonds.intact(), bonds.intact());
+    assert!(seen >= 3 && simulation.history().len() == 3);
+    let particles = bonds.particles().len();
+    assert_eq!(simulation.displacements().count(), particles);
+    let stress = simulation.cauchy(Measure::Hardy).unwrap();
+    assert!(stress.len() == particles && stress.iter().flatten().flatten().all(|x| x.is_finite()));
+}
+
+/// One method goes on where another one ended: further load steps, then motion.
+#[test]
+fn a_simulation_goes_on() {
+    let model = Model::new(sheet(), Rubber::new(Law::Linear, 1e6));
+    let model = model.clamp(|[_, y]| y < 6e-3).displace(|[_, y]| y > 34e-3, [0.0, 1e-3]);
+    let mut simulation = model.build().unwrap();
+    simulation.solve(Lbfgs::default()).unwrap();
+    simulation.factors.push(2.0);
+    simulation.solve(Lbfgs::default()).unwrap();
+    let [once, twice] = simulation.history() else { panic!("two steps") };
+    // nearly linear at strains of 4 and 7 %
+    let ratio = twice.load / once.load;
+    assert!((1.9..2.1).contains(&ratio), "{ratio}");
+    simulation.state = State::new(simulation.bonds.slots());
+    simulation.solve(VelocityVerlet { records: 2, ..VelocityVerlet::new(1000.0, 1e-3) }).unwrap();
+    assert_eq!(simulation.history().len(), 2);
+}
+
+/// A material from outside the crate, and a crack that opens as it must.
+#[test]
+fn any_material() {
+    let solid = LinearSolid { bulk: 9e6.into(), shear: 1e6.into() };
+    let model = Model::new(sheet(), solid).clamp(|[_, y]| y < 6e-3).displace(|[_, y]| y > 34e-3, [0.0, 1e-3]);
+    let mut simulation = model.build().unwrap();
+    simulation.solve(Lbfgs::default()).unwrap();
+    let opening = |x: f64| {
+        let near = |at: [f64; 2], y: f64| (at[0] - x).abs() < 1.1e-3 && (at[1] - y).abs() < 1.1e-3;
+        let moved =
+            |y: f64| simulation.displacements().find(|(at, _)| near(*at, y)).map_or(f64::NAN, |(_, u)| u[1]);
+        moved(21e-3) - moved(19e-3)
+    };
+    assert!(opening(1e-3) > 3.0 * opening(23e-3), "{} {}", opening(1e-3), opening(23e-3));
+}
+
+#[test]
+fn faults_are_named() {
+    let fault = |model: Model<2, Rubber>| match model.build() {
+        Err(error @ (Error::Geometry(_) | Error::Parameter { .. })) => error.to_string(),
+        other => panic!("{:?}", other.map(|_| ()).map_err(|error| error.to_string())),
+    };
+    let model = |body, youngs_modulus| Model::new(body, Rubber::new(Law::ChainOffset, youngs_modulus));
+    let empty = model(sheet(), 1e6).clamp(|[_, y]| y < 6e-3).clamp(|[_, y]| y > 1.0);
+    assert_eq!(fault(empty), "region 2 of the loads has no particle");
+    assert_eq!(fault(model(sheet(), 0.0)), "Young's modulus: found 0; allowed: above 0, finite");
+    assert!(fault(model(sheet().plane_stress(f64::NAN), 1e6)).starts_with("thickness: found NaN"));
+    assert!(fault(model(Body::lattice(Shape::disk([0.0; 2], 1e-3), -1.0), 1e6)).starts_with("spacing"));
+    let brittle = Rubber::new(Law::ChainOffset, 1e6).fracture_energy(-1.0);
+    assert!(fault(Model::new(sheet(), brittle)).contains("fracture_energy"));
+    assert!(fault(model(sheet(), 1e6).contact(-1.0)).starts_with("contact.stiffness"));
+}
