@@ -39,8 +39,8 @@ fn every_program_sweeps() {
         ("polycore", &rubber, "mine.mooney-rivlin.rms [MPa]"),
         (
             "mdsurrogate",
-            "cases/ch3/crystal/case.toml --vary crystal.levels=2,3 --column runs*",
-            "runs of the grid",
+            "cases/ch3/crystal/case.toml --vary crystal.levels=2,3 --column grid.runs",
+            "grid.runs",
         ),
     ] {
         let output = directory.path().join(program);

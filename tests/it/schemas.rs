@@ -235,8 +235,48 @@ fn keys_are_in_the_reference() {
         }
     }
     let mut known = BTreeSet::new();
-    words(&schema("crystfem"), &mut known);
+    let mut schema = schema("crystfem");
+    // values of reports have a page of their own
+    schema["definitions"]["Expect"]["properties"]["quantity"].take();
+    words(&schema, &mut known);
     assert!(known.len() > 90 && known.contains("\"tr-bdf2\"") && known.contains("growth_rate"), "{known:?}");
     let missing: Vec<&String> = known.difference(&named).collect();
     assert!(missing.is_empty(), "not in the reference: {missing:?}");
+}
+
+/// What the schema says of the scalars of reports, as a table: name, unit, description.
+fn values(program: &str) -> String {
+    let schema = schema(program);
+    let choices = schema["definitions"]["Expect"]["properties"]["quantity"]["anyOf"].as_array().unwrap();
+    let mut table = format!("## {program}\n\n| value | unit | meaning |\n|---|---|---|\n");
+    for choice in choices {
+        let Some(name) = choice["const"].as_str().or(choice["title"].as_str()) else { continue };
+        let about = choice["description"].as_str().unwrap();
+        let (about, unit) = match about.strip_suffix(']').and_then(|rest| rest.rsplit_once(" [")) {
+            Some((about, unit)) => (about, unit),
+            None => (about, ""),
+        };
+        table +=
+            &format!("| `{name}` | {} | {} |\n", unit.replace('*', "its own"), about.replace('|', "\\|"));
+    }
+    table
+}
+
+/// The page of all values is made of the programs' declarations: `UPDATE_REFERENCE=1` writes it.
+#[test]
+fn values_are_in_the_reference() {
+    let path = workspace().join("docs/guide/src/reference/values.md");
+    let text = fs::read_to_string(&path).unwrap();
+    let head = text.split_once("\n## ").unwrap().0;
+    let page =
+        [head.to_owned() + "\n"].into_iter().chain(PROGRAMS.map(values)).collect::<Vec<_>>().join("\n");
+    let page = page.replacen("\n\n\n", "\n\n", 1);
+    if std::env::var_os("UPDATE_REFERENCE").is_some() {
+        fs::write(&path, &page).unwrap();
+    }
+    assert!(
+        text == page,
+        "{} is not what the programs declare: UPDATE_REFERENCE=1 writes it",
+        path.display()
+    );
 }

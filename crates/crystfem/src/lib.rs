@@ -54,6 +54,8 @@ pub mod table;
 pub mod time;
 
 #[cfg(feature = "case")]
+pub mod quantities;
+#[cfg(feature = "case")]
 pub mod run;
 #[cfg(feature = "case")]
 pub mod scene;

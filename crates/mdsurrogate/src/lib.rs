@@ -71,6 +71,8 @@ pub mod search;
 pub mod train;
 
 #[cfg(feature = "case")]
+pub mod quantities;
+#[cfg(feature = "case")]
 pub mod run;
 #[cfg(feature = "case")]
 pub mod scene;

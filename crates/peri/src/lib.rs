@@ -48,6 +48,8 @@ pub mod solver;
 pub mod stress;
 
 #[cfg(feature = "case")]
+pub mod quantities;
+#[cfg(feature = "case")]
 pub mod run;
 #[cfg(feature = "case")]
 pub mod scene;

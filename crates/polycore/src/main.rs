@@ -17,6 +17,7 @@ mod cli {
     pub mod exact;
     pub mod fits;
     pub mod material;
+    pub mod quantities;
     pub mod scene;
     pub mod trials;
 }

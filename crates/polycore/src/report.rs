@@ -16,9 +16,11 @@ use crate::{Error, output};
 mod expect;
 mod number;
 mod provenance;
+mod quantity;
 
 pub use expect::{Bound, Expect, Judgement, Kind, Tolerance};
 pub use provenance::{Git, Host, Provenance};
+pub use quantity::{Named, Quantity};
 
 /// The name of the file that [`Report::write`] leaves in the output directory.
 pub const FILE_NAME: &str = "report.json";
@@ -108,8 +110,9 @@ impl Report {
     }
 
     /// Adds or replaces a scalar.
-    pub fn value(&mut self, name: &str, value: f64, unit: &str) -> &mut Self {
-        self.set(name, Value::Scalar { value, unit: unit.to_owned() })
+    pub fn value(&mut self, quantity: impl Into<Named>, value: f64) -> &mut Self {
+        let Named { name, unit } = quantity.into();
+        self.set(&name, Value::Scalar { value, unit })
     }
 
     /// Adds or replaces a curve of `(column, unit, data)`.

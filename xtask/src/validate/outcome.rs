@@ -140,11 +140,12 @@ fn beyond(judgement: &Judgement) -> Option<String> {
 #[cfg(test)]
 pub mod tests {
     use super::*;
+    use polycore::report::Named;
 
     /// The text of a report with one expectation: kt = 3 ± 1 %.
     pub fn report(value: f64) -> String {
         let mut report = Report::new("peri", "0", "");
-        report.value("kt", value, "");
+        report.value(Named::new("kt", ""), value);
         let expect = r#"{"quantity": "kt", "reference": 3.0, "tolerance": "1 %", "kind": "closed-form", "source": "a | b"}"#;
         report.judge(&[serde_json::from_str(expect).expect("an expectation")], false);
         serde_json::to_string(&report).expect("JSON")

@@ -4,13 +4,14 @@ use super::Failure;
 use crate::boundary::{Condition, Where};
 use crate::scene::{PartScene, millimetres};
 use crate::simulation::Simulation;
+use polycore::report::Named;
 use polycore::scene::Source;
 
-/// The lines of one scene, that is checked, and the names of what it reports.
+/// The lines of one scene, that is checked, and what it reports.
 ///
 /// # Errors
 /// A fault of the scene.
-pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<String>), Failure> {
+pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named>), Failure> {
     let built = scene.mesh.build(source)?;
     let (points, elements) = (built.mesh.points.len(), built.mesh.element_count());
     let [low, high] = built.mesh.bounds().unwrap_or_default().map(millimetres);
@@ -64,6 +65,9 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Strin
     scene.refuse_too_large(source, &simulation, task.end)?;
     lines.push(format!("ends at    {} s", task.end));
     lines.push(format!("needs      {}", polycore::memory::needs(scene.memory(&simulation, task.end))));
+    // those of layers and births are many
+    let few = quantities.iter().filter(|q| !q.name.starts_with("layer-") && !q.name.contains("_at_birth_"));
+    lines.push(format!("reports    {}", Named::list(few)));
     Ok((lines, quantities))
 }
 

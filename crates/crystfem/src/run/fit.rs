@@ -4,10 +4,11 @@ use super::Failure;
 use super::celsius::{CELSIUS, of_kelvin};
 use crate::error::Error;
 use crate::fit::{Fit, avrami, nakamura, ozawa};
+use crate::quantities as q;
 use crate::scene::{FitScene, FitSpec, Job};
 use polycore::output::picture::{LinePlot, Series};
 use polycore::output::{atomic_write, csv};
-use polycore::report::{Phases, Report};
+use polycore::report::{Phases, Quantity, Report};
 use polycore::scene::{SceneError, Source};
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -121,13 +122,13 @@ fn stem(file: &Path) -> String {
 fn record(report: &mut Report, done: &Done) {
     let Done { name, fit, .. } = done;
     for estimate in &fit.estimates {
-        let named = |what: &str| format!("{name}.{}{what}", estimate.name);
-        report.value(&named(""), estimate.value, &estimate.unit);
-        report.value(&named(".standard_error"), estimate.standard_error, &estimate.unit);
-        report.value(&named(".lower"), estimate.interval[0], &estimate.unit);
-        report.value(&named(".upper"), estimate.interval[1], &estimate.unit);
+        let of = |quantity: Quantity| quantity.of(&[name, &estimate.name]).in_unit(&estimate.unit);
+        report.value(of(q::CONSTANT), estimate.value);
+        report.value(of(q::STANDARD_ERROR), estimate.standard_error);
+        report.value(of(q::LOWER), estimate.interval[0]);
+        report.value(of(q::UPPER), estimate.interval[1]);
     }
-    report.value(&format!("{name}.rms"), fit.rms, "");
+    report.value(q::FIT_RMS.of(&[name]), fit.rms);
     report.work(&format!("{name}.measurements"), fit.measurements as u64);
     report.work(&format!("{name}.evaluations"), fit.evaluations as u64);
 }

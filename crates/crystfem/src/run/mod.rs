@@ -15,9 +15,10 @@ mod suite;
 pub use program::Crystfem;
 
 use crate::error::Error;
+use crate::quantities;
 use crate::scene::{self, FitScene, Kind, PartScene, PointScene};
-use polycore::case::{Finished, Run};
-use polycore::scene::Source;
+use polycore::case::{Finished, Run, check_expectations};
+use polycore::scene::{SceneError, Source};
 
 /// What stops a run: a fault in the scene, or one met on the way.
 pub type Failure = polycore::scene::Failure<Error>;
@@ -28,8 +29,8 @@ pub type Failure = polycore::scene::Failure<Error>;
 /// [`Failure`].
 pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
     match scene::kind(source)? {
-        Kind::Point => self::point::run(source, &source.parse::<PointScene>()?, run).map(Finished::from),
-        Kind::Fit => self::fit::run(source, &source.parse::<FitScene>()?, run).map(Finished::from),
+        Kind::Point => self::point::run(source, &points(source)?, run).map(Finished::from),
+        Kind::Fit => self::fit::run(source, &fits(source)?, run).map(Finished::from),
         Kind::Part => {
             let scene = source.parse::<PartScene>()?;
             match scene.study.is_empty() {
@@ -40,14 +41,26 @@ pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
     }
 }
 
+fn points(source: &Source) -> Result<PointScene, SceneError> {
+    let scene = source.parse::<PointScene>()?;
+    check_expectations(source, &scene.expect, &[quantities::OF_POINTS])?;
+    Ok(scene)
+}
+
+fn fits(source: &Source) -> Result<FitScene, SceneError> {
+    let scene = source.parse::<FitScene>()?;
+    check_expectations(source, &scene.expect, &[quantities::OF_FITS])?;
+    Ok(scene)
+}
+
 /// What a scene of any kind builds and leaves out, in lines; `quick`: as a run without what is marked `quick = false`.
 ///
 /// # Errors
 /// A fault of the scene.
 pub fn explain(source: &Source, quick: bool) -> Result<Vec<String>, Failure> {
     match scene::kind(source)? {
-        Kind::Point => Ok(self::point::explain(source, &source.parse::<PointScene>()?, quick)?),
-        Kind::Fit => Ok(self::fit::explain(source, &source.parse::<FitScene>()?)?),
+        Kind::Point => Ok(self::point::explain(source, &points(source)?, quick)?),
+        Kind::Fit => Ok(self::fit::explain(source, &fits(source)?)?),
         Kind::Part => {
             let scene = source.parse::<PartScene>()?;
             match scene.study.is_empty() {

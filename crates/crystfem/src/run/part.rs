@@ -6,11 +6,12 @@ use super::{Failure, animation};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
+use crate::quantities as q;
 use crate::scene::{PartScene, Task};
 use crate::simulation::{Simulation, State};
 use polycore::case::{Finished, Run, STATISTICS};
 use polycore::output::vtkhdf::{Cells, Data, MeshSeries};
-use polycore::report::{Phases, Report};
+use polycore::report::{Phases, Quantity, Report};
 use polycore::scene::Source;
 use std::ops::ControlFlow;
 
@@ -178,13 +179,13 @@ impl Recorder<'_> {
     fn record(&self, simulation: &Simulation, report: &mut Report) {
         let state = simulation.state();
         let Ledger { stored, exchange, reaction, birth, missing, worst } = state.ledger;
-        report.value("stored_energy", stored, "J");
-        report.value("exchanged_energy", exchange.total(), "J");
-        report.value("reaction_energy", reaction, "J");
-        report.value("birth_energy", birth, "J");
-        report.value("heat_given_off", -(exchange.total() + reaction), "J");
-        report.value("missing_energy", missing, "J");
-        report.value("worst_balance", worst, "");
+        report.value(q::STORED_ENERGY, stored);
+        report.value(q::EXCHANGED_ENERGY, exchange.total());
+        report.value(q::REACTION_ENERGY, reaction);
+        report.value(q::BIRTH_ENERGY, birth);
+        report.value(q::HEAT_GIVEN_OFF, -(exchange.total() + reaction));
+        report.value(q::MISSING_ENERGY, missing);
+        report.value(q::WORST_BALANCE, worst);
         let nodes = 0..self.task.problem.mesh.points.len() as u32;
         let temperature: Vec<Option<f64>> =
             nodes.map(|node| simulation.temperature(node).map(|kelvin| kelvin - CELSIUS)).collect();
@@ -244,13 +245,14 @@ fn summarise(
     if volume > 0.0 {
         let mean = sum / volume;
         let variance = there().map(|(value, weight)| weight * (value - mean).powi(2)).sum::<f64>() / volume;
+        let of = |quantity: Quantity| quantity.of(&[prefix, name]).in_unit(unit);
         // `min` and `max` pass over NaN
         let known = |extreme: f64| if mean.is_finite() { extreme } else { mean };
-        report.value(&format!("{prefix}mean_{name}"), mean, unit);
-        report.value(&format!("{prefix}least_{name}"), known(least), unit);
-        report.value(&format!("{prefix}largest_{name}"), known(most), unit);
+        report.value(of(q::MEAN), mean);
+        report.value(of(q::LEAST), known(least));
+        report.value(of(q::LARGEST), known(most));
         let spread = if unit == "degC" { "K" } else { unit };
-        report.value(&format!("{prefix}deviation_of_{name}"), variance.sqrt(), spread);
+        report.value(of(q::DEVIATION).in_unit(spread), variance.sqrt());
     }
 }
 

@@ -5,9 +5,10 @@ use super::celsius::CELSIUS;
 use super::draw::{self, Run};
 use crate::error::Error;
 use crate::point::{Course, Curves, Drive, Event, Stepping};
+use crate::quantities as q;
 use crate::scene::PointScene;
 use polycore::output::csv;
-use polycore::report::{Phases, Report};
+use polycore::report::{Phases, Quantity, Report};
 use polycore::scene::{SceneError, Source};
 use std::path::Path;
 
@@ -48,7 +49,7 @@ pub fn run(source: &Source, scene: &PointScene, run: &mut polycore::case::Run) -
                 None if point.non_finite => {
                     return Err(Error::Finite { place: format!("point `{name}`") }.into());
                 }
-                _ => report.value(&format!("{name}.non_finite_rows"), broken.len() as f64, ""),
+                _ => report.value(q::NON_FINITE_ROWS.of(&[&name]), broken.len() as f64),
             };
             record(&mut report, &name, &course, &curves)?;
             phases.start("write");
@@ -143,27 +144,28 @@ fn record(report: &mut Report, name: &str, course: &Course, curves: &Curves) -> 
     let span = |values: &[f64]| {
         values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &x| [low.min(x), high.max(x)])
     };
+    let of = |quantity: Quantity| quantity.of(&[name]);
     let [coldest, hottest] = span(&curves.temperature);
-    report.value(&named("lowest_temperature"), coldest - CELSIUS, "degC");
-    report.value(&named("highest_temperature"), hottest - CELSIUS, "degC");
-    report.value(&named("final_temperature"), curves.temperature[last] - CELSIUS, "degC");
-    report.value(&named("temperature_rise"), curves.temperature[last] - curves.temperature[0], "K");
-    report.value(&named("energy_change"), curves.energy[last] - curves.energy[0], "J/kg");
+    report.value(of(q::COLDEST), coldest - CELSIUS);
+    report.value(of(q::HOTTEST), hottest - CELSIUS);
+    report.value(of(q::FINAL_TEMPERATURE), curves.temperature[last] - CELSIUS);
+    report.value(of(q::TEMPERATURE_RISE), curves.temperature[last] - curves.temperature[0]);
+    report.value(of(q::ENERGY_CHANGE), curves.energy[last] - curves.energy[0]);
     for (index, field) in course.material.field_names().iter().enumerate() {
         let values: Vec<f64> = curves.fields.iter().map(|f| f[index]).filter(|x| x.is_finite()).collect();
         let [least, most] = span(&values);
-        report.value(&named(&format!("lowest_{field}")), least, "");
-        report.value(&named(&format!("highest_{field}")), most, "");
+        report.value(q::LOWEST.of(&[name, field]), least);
+        report.value(q::HIGHEST.of(&[name, field]), most);
         if curves.fields[last][index].is_finite() {
-            report.value(&named(&format!("final_{field}")), curves.fields[last][index], "");
+            report.value(q::FINAL.of(&[name, field]), curves.fields[last][index]);
         }
         if rows > 1 && curves.fields[1][index].is_finite() {
-            report.value(&named(&format!("first_step_{field}")), curves.fields[1][index], "");
+            report.value(q::FIRST_STEP.of(&[name, field]), curves.fields[1][index]);
         }
     }
     let mut event = |what: &str, event: Event| {
-        report.value(&named(&format!("temperature_at_{what}")), event.temperature - CELSIUS, "degC");
-        report.value(&named(&format!("time_to_{what}")), event.time - curves.time[0], "s");
+        report.value(q::TEMPERATURE_AT.of(&[name, what]), event.temperature - CELSIUS);
+        report.value(q::TIME_TO.of(&[name, what]), event.time - curves.time[0]);
         event
     };
     for degree in DEGREES {
@@ -173,7 +175,7 @@ fn record(report: &mut Report, name: &str, course: &Course, curves: &Curves) -> 
     }
     if let Some(peak) = course.peak(curves)? {
         let rate = event("peak", peak).rate;
-        report.value(&named("peak_rate"), rate, "1/s");
+        report.value(q::PEAK_RATE.of(&[name]), rate);
     }
     Ok(())
 }
@@ -183,18 +185,15 @@ fn compare(report: &mut Report, scene: &PointScene) {
     for pair in &scene.compare {
         for point in &scene.point {
             for degree in DEGREES {
-                let name =
-                    |material: &str, event: &str| format!("{}.{material}.{event}_{degree}", point.name);
-                let both = |event: &str| {
-                    Some([
-                        report.scalar(&name(&pair.material, event))?,
-                        report.scalar(&name(&pair.with, event))?,
-                    ])
+                let of = |quantity: Quantity, material: &str| {
+                    let own = format!("{}.{material}", point.name);
+                    report.scalar(&quantity.of(&[&own, &degree.to_string()]).name)
                 };
-                let (temperatures, times) = (both("temperature_at"), both("time_to"));
+                let both = |quantity| Some([of(quantity, &pair.material)?, of(quantity, &pair.with)?]);
+                let (temperatures, times) = (both(q::TEMPERATURE_AT), both(q::TIME_TO));
                 if let (Some([a, b]), Some([c, d])) = (temperatures, times) {
-                    report.value(&format!("{}.shift_at_{degree}", point.name), a - b, "K");
-                    report.value(&format!("{}.longer_to_{degree}", point.name), c / d - 1.0, "");
+                    report.value(q::SHIFT_AT.of(&[&point.name, &degree.to_string()]), a - b);
+                    report.value(q::LONGER_TO.of(&[&point.name, &degree.to_string()]), c / d - 1.0);
                 }
             }
         }

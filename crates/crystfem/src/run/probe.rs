@@ -3,6 +3,7 @@
 use super::celsius::CELSIUS;
 use crate::error::Error;
 use crate::mesh::Place;
+use crate::quantities as q;
 use crate::scene::{PartScene, ProbeSpec};
 use crate::simulation::Simulation;
 use polycore::output::csv;
@@ -93,7 +94,7 @@ pub fn write(
 ) -> Result<(), Error> {
     for probe in probes {
         let name = &probe.name;
-        report.value(&format!("{name}.distance"), probe.place.distance(), "m");
+        report.value(q::DISTANCE.of(&[name]), probe.place.distance());
         let mut columns: Vec<csv::Column> =
             vec![("time", "s", &probe.time), ("temperature", "degC", &probe.temperature)];
         columns.extend(names.iter().zip(&probe.fields).map(|(name, values)| (*name, "", values.as_slice())));
@@ -101,7 +102,7 @@ pub fn write(
         let mut last = |quantity: &str, values: &[f64], unit: &str| {
             // `record` has refused all others: no material there has it
             if let Some(last) = values.last().filter(|last| !last.is_nan()) {
-                report.value(&format!("{name}.{quantity}"), *last, unit);
+                report.value(q::AT_PROBE.of(&[name, quantity]).in_unit(unit), *last);
             }
         };
         last("temperature", &probe.temperature, "degC");
@@ -111,8 +112,8 @@ pub fn write(
         if !probe.temperature.is_empty() {
             let extreme = |pick: fn(f64, f64) -> f64| probe.temperature.iter().copied().reduce(pick);
             let [lowest, highest] = [extreme(f64::min), extreme(f64::max)].map(Option::unwrap_or_default);
-            report.value(&format!("{name}.lowest_temperature"), lowest, "degC");
-            report.value(&format!("{name}.highest_temperature"), highest, "degC");
+            report.value(q::LOWEST_TEMPERATURE.of(&[name]), lowest);
+            report.value(q::HIGHEST_TEMPERATURE.of(&[name]), highest);
         }
     }
     Ok(())
@@ -136,11 +137,12 @@ pub fn births(probes: &[Probe], names: &[&'static str], times: &[f64], report: &
             let after = |values: &[f64], pick: fn(f64, f64) -> f64| {
                 values[first..last].iter().copied().fold(values[before], pick) - values[before]
             };
-            let name = |what: &str| format!("{}.{what}at_birth_{number}", probe.name);
-            report.value(&name("jump_"), after(&probe.temperature, f64::max), "K");
+            let (name, number) = (probe.name.as_str(), number.to_string());
+            report.value(q::JUMP.of(&[name, &number]), after(&probe.temperature, f64::max));
             for (field, values) in names.iter().zip(&probe.fields).filter(|(_, v)| !v[before].is_nan()) {
-                report.value(&name(&format!("{field}_")), values[before], "");
-                report.value(&name(&format!("{field}_lost_")), after(values, f64::min).abs(), "");
+                report.value(q::AT_BIRTH.of(&[name, field, &number]), values[before]);
+                let lost = after(values, f64::min).abs();
+                report.value(q::LOST_AT_BIRTH.of(&[name, field, &number]), lost);
             }
         }
     }

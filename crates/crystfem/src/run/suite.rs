@@ -2,11 +2,12 @@
 
 use super::{Crystfem, Failure, part};
 use crate::error::Error;
+use crate::quantities as q;
 use crate::scene::PartScene;
 use polycore::case::{Case, Fault, Finished, Options, Row, Rows, Run};
 use polycore::output::picture::{LinePlot, Series};
 use polycore::output::{atomic_write, csv};
-use polycore::report::{Phases, Report, Value};
+use polycore::report::{Named, Phases, Report, Value};
 use polycore::scene::Source;
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -29,7 +30,7 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
             if study.fails.is_none() {
                 let (source, scene) = scene.of_study(source, index)?;
                 let task = scene.task(&source, scene.mesh.build(&source)?.mesh)?;
-                names.extend(of_study(&study.name, &scene.quantities(&task)));
+                names.extend(of_study(&study.name, scene.quantities(&task)));
             }
         }
         scene.check_expectations(source, &names, &left_out(scene, &studies))?;
@@ -58,7 +59,7 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
     // of a study that must fail and does not there need be no expectation
     let mut survivors = String::new();
     for study in scene.study.iter().filter(|study| study.fails.is_some()) {
-        if report.scalar(&format!("{}.failed_as_it_must", study.name)) == Some(0.0) {
+        if report.scalar(&q::FAILED_AS_IT_MUST.of(&[&study.name]).name) == Some(0.0) {
             report.passed = false;
             survivors += &format!("FAIL  study {} did not fail\n", study.name);
         }
@@ -68,8 +69,9 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
     Ok(Finished { report, text })
 }
 
-fn of_study(study: &str, names: &[String]) -> Vec<String> {
-    names.iter().map(|name| format!("{study}.{name}")).collect()
+fn of_study(study: &str, quantities: Vec<Named>) -> impl Iterator<Item = Named> {
+    let of = move |quantity: Named| Named { name: format!("{study}.{}", quantity.name), ..quantity };
+    quantities.into_iter().map(of)
 }
 
 /// Studies that a quick run leaves out.
@@ -127,12 +129,12 @@ fn together(source: &Source, scene: &PartScene, rows: &Rows) -> Report {
         let name = &row.name;
         if scene.study.iter().any(|study| study.name == *name && study.fails.is_some()) {
             let failed = f64::from(u8::from(row.outcome.is_err()));
-            report.value(&format!("{name}.failed_as_it_must"), failed, "");
+            report.value(q::FAILED_AS_IT_MUST.of(&[name]), failed);
         }
         let Ok(own) = &row.outcome else { continue };
         for (key, value) in &own.values {
             if let Value::Scalar { value, unit } = value {
-                report.value(&format!("{name}.{key}"), *value, unit);
+                report.value(Named { name: format!("{name}.{key}"), unit: unit.clone() }, *value);
             }
         }
         for (key, count) in &own.work {
@@ -155,10 +157,10 @@ fn together(source: &Source, scene: &PartScene, rows: &Rows) -> Report {
             continue;
         };
         let [limit, order] = spec.limit_and_order([coarse, middle, fine]);
-        report.value(&format!("{}.limit", spec.name), limit, unit);
+        report.value(q::LIMIT.of(&[&spec.name]).in_unit(unit), limit);
         // of equal values there is none
         if order.is_finite() {
-            report.value(&format!("{}.order", spec.name), order, "");
+            report.value(q::ORDER.of(&[&spec.name]), order);
         }
     }
     let of = |name: &String| rows.rows.iter().find(|row| row.name == *name)?.outcome.as_ref().ok();
@@ -168,7 +170,7 @@ fn together(source: &Source, scene: &PartScene, rows: &Rows) -> Report {
         for study in &spec.studies {
             let Some(own) = of(study) else { continue };
             if let Some(error) = spec.error(own, truth) {
-                report.value(&format!("{}.error_of_{study}", spec.name), error, "");
+                report.value(q::ERROR_OF.of(&[&spec.name, study]), error);
                 points.push((own.seconds.get("solve").copied().unwrap_or(f64::NAN), error));
             }
         }
@@ -274,7 +276,7 @@ pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<St
         }
         let (source, scene) = scene.of_study(source, index)?;
         let (own, quantities) = super::explain::one(&source, &scene)?;
-        names.extend(of_study(&study.name, &quantities));
+        names.extend(of_study(&study.name, quantities));
         lines.extend(own.iter().map(|line| format!("  {line}")));
     }
     scene.check_expectations(source, &names, &left_out(scene, &studies))?;

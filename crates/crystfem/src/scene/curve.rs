@@ -89,12 +89,13 @@ impl PartScene {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use polycore::report::Named;
 
     #[test]
     fn the_error_is_the_rms_over_quantities() {
         let report = |a: f64, b: f64| {
             let mut report = Report::new("crystfem", "0", "");
-            report.value("a", a, "").value("b", b, "");
+            report.value(Named::new("a", ""), a).value(Named::new("b", ""), b);
             report
         };
         let mut spec = CurveSpec {

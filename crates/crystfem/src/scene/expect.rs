@@ -1,54 +1,59 @@
 //! What the expectations of a part may ask for: the names of the scalars that its report can have.
 
 use super::{PartScene, Task};
-use polycore::case::STATISTICS;
+use crate::quantities as q;
+use polycore::report::{Named, Quantity};
 use polycore::scene::{SceneError, Source};
 
-/// Energies and their balance, J.
-const ENERGIES: [&str; 7] = [
-    "stored_energy",
-    "exchanged_energy",
-    "reaction_energy",
-    "birth_energy",
-    "heat_given_off",
-    "missing_energy",
-    "worst_balance",
-];
-
 impl PartScene {
-    /// Names of all scalars that the run of a task can report.
-    pub fn quantities(&self, task: &Task) -> Vec<String> {
+    /// All scalars that the run of a task can report.
+    pub fn quantities(&self, task: &Task) -> Vec<Named> {
         let mut fields: Vec<&str> =
             task.problem.materials.iter().flat_map(|material| material.field_names()).copied().collect();
         fields.sort_unstable();
         fields.dedup();
-        let mut names: Vec<String> = ENERGIES.map(str::to_owned).to_vec();
+        let energies = [
+            q::STORED_ENERGY,
+            q::EXCHANGED_ENERGY,
+            q::REACTION_ENERGY,
+            q::BIRTH_ENERGY,
+            q::HEAT_GIVEN_OFF,
+            q::MISSING_ENERGY,
+            q::WORST_BALANCE,
+        ];
+        let mut all: Vec<Named> = energies.map(Named::from).to_vec();
+        let unit = |field: &str| if field == "temperature" { "degC" } else { "" };
+        let with_temperature = || std::iter::once("temperature").chain(fields.iter().copied());
         let layers = (1..=task.layers.len()).map(|layer| format!("layer-{layer}."));
-        for prefix in std::iter::once(String::new()).chain(layers) {
-            for field in std::iter::once("temperature").chain(fields.iter().copied()) {
-                names.extend(STATISTICS.map(|statistic| format!("{prefix}{statistic}{field}")));
+        for layer in std::iter::once(String::new()).chain(layers) {
+            for field in with_temperature() {
+                let of = |quantity: Quantity| quantity.of(&[&layer, field]).in_unit(unit(field));
+                all.extend([q::MEAN, q::LEAST, q::LARGEST].map(of));
+                let spread = if field == "temperature" { "K" } else { "" };
+                all.push(of(q::DEVIATION).in_unit(spread));
             }
         }
         for probe in &self.probe {
-            let mut add = |what: &str| names.push(format!("{}.{what}", probe.name));
-            let own = ["distance", "temperature", "lowest_temperature", "highest_temperature"];
-            own.into_iter().for_each(&mut add);
-            fields.iter().for_each(|field| add(field));
-            for birth in 2..=task.layers.len() {
-                add(&format!("jump_at_birth_{birth}"));
+            let name = probe.name.as_str();
+            let own = [q::DISTANCE, q::LOWEST_TEMPERATURE, q::HIGHEST_TEMPERATURE];
+            all.extend(own.map(|quantity| quantity.of(&[name])));
+            all.extend(with_temperature().map(|field| q::AT_PROBE.of(&[name, field]).in_unit(unit(field))));
+            for birth in (2..=task.layers.len()).map(|birth| birth.to_string()) {
+                all.push(q::JUMP.of(&[name, &birth]));
                 for field in &fields {
-                    add(&format!("{field}_at_birth_{birth}"));
-                    add(&format!("{field}_lost_at_birth_{birth}"));
+                    all.extend(
+                        [q::AT_BIRTH, q::LOST_AT_BIRTH].map(|quantity| quantity.of(&[name, field, &birth])),
+                    );
                 }
             }
         }
-        names
+        all
     }
 
-    /// Names that studies which must fail add to those of the runs of the others, which have their study's name before them.
-    pub fn quantities_of_studies(&self) -> Vec<String> {
+    /// What studies which must fail add to those of the runs of the others, which have their study's name before them.
+    pub fn quantities_of_studies(&self) -> Vec<Named> {
         let failing = self.study.iter().filter(|study| study.fails.is_some());
-        failing.map(|study| format!("{}.failed_as_it_must", study.name)).collect()
+        failing.map(|study| q::FAILED_AS_IT_MUST.of(&[&study.name])).collect()
     }
 
     /// Refuses an expectation of a quantity that no run of the scene reports; those of studies that are left out of it,
@@ -59,7 +64,7 @@ impl PartScene {
     pub fn check_expectations(
         &self,
         source: &Source,
-        names: &[String],
+        names: &[Named],
         absent: &[&str],
     ) -> Result<(), SceneError> {
         for (index, expect) in self.expect.iter().enumerate() {
@@ -69,8 +74,8 @@ impl PartScene {
             let of_several =
                 !self.study.is_empty() && !self.study.iter().any(|study| first == Some(study.name.as_str()));
             let left_out = first.is_some_and(|first| of_several || absent.contains(&first));
-            if !left_out && !names.iter().any(|name| name == quantity) {
-                let known: Vec<&str> = names.iter().map(String::as_str).collect();
+            if !left_out && !names.iter().any(|known| known.name == quantity) {
+                let known: Vec<&str> = names.iter().map(|known| known.name.as_str()).collect();
                 return Err(source.unknown(&format!("expect[{index}].quantity"), quantity, &known));
             }
         }

@@ -68,7 +68,7 @@ pub enum Kind {
 
 /// The JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    polycore::scene::schema("crystfem", |generator| {
+    polycore::scene::schema("crystfem", crate::quantities::ALL, |generator| {
         vec![
             generator.subschema_for::<PartScene>(),
             generator.subschema_for::<PointScene>(),

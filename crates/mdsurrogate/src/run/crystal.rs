@@ -4,9 +4,10 @@ use crate::cell::{Crystal, Element, LATTICE, Packing, amide_torsions};
 use crate::error::Error;
 use crate::md::{AXES, Grid, Protocol};
 use crate::network::Architecture;
+use crate::quantities as q;
 use crate::scene::CrystalSpec;
 use polycore::output::picture::{LinePlot, Series};
-use polycore::report::Report;
+use polycore::report::{Named, Report};
 use std::path::Path;
 
 /// Builds the crystal and measures it; writes `cell-xy.png`, `cell-yz.png` and the same of the supercell.
@@ -16,22 +17,22 @@ use std::path::Path;
 pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result<(), Error> {
     let cell = Crystal::unit_cell(&LATTICE, Packing::default())?;
     let supercell = cell.replicate(spec.cells)?;
-    let mut value = |name: String, value: f64, unit: &str| {
-        report.value(&name, value, unit);
+    let mut value = |quantity: Named, value: f64| {
+        report.value(quantity, value);
     };
-    value("density".into(), cell.density(), "g/cm³");
-    value("density of four chains in a cell".into(), 2.0 * cell.density(), "g/cm³");
+    value(q::DENSITY.into(), cell.density());
+    value(q::DENSITY_OF_FOUR.into(), 2.0 * cell.density());
     for (name, crystal) in [("cell", &cell), ("supercell", &supercell)] {
-        value(format!("{name} atoms"), crystal.atoms.len() as f64, "");
+        value(q::ATOMS.of(&[name]), crystal.atoms.len() as f64);
         for (axis, length) in ["x", "y", "z"].iter().zip(crystal.lengths) {
-            value(format!("{name} edge {axis}"), length, "Å");
+            value(q::EDGE.of(&[name, axis]), length);
         }
     }
     let nitrogens = cell.atoms.iter().filter(|(element, _)| *element == Element::N).count();
-    value("cell monomers".into(), nitrogens as f64, "");
+    value(q::MONOMERS.into(), nitrogens as f64);
     let bonds = cell.bonds();
-    value("cell bonds".into(), bonds.len() as f64, "");
-    value("cell chains".into(), chains(&cell) as f64, "");
+    value(q::BONDS.into(), bonds.len() as f64);
+    value(q::CHAINS.into(), chains(&cell) as f64);
     let mut of_atom = vec![Vec::new(); cell.atoms.len()];
     for (i, j, d) in &bonds {
         of_atom[*i].push(*d);
@@ -43,7 +44,7 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
                 |(atom, own): &(&(Element, [f64; 3]), &Vec<_>)| atom.0 == element && own.len() == count;
             let found = cell.atoms.iter().zip(&of_atom).filter(with).count();
             if found > 0 {
-                value(format!("{element:?} with {count} bonds"), found as f64, "");
+                value(q::ATOMS_WITH_BONDS.of(&[&format!("{element:?}"), &count.to_string()]), found as f64);
             }
         }
     }
@@ -57,8 +58,8 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
             }
         }
     }
-    value("least angle of a CH₂".into(), carbon[0], "°");
-    value("greatest angle of a CH₂".into(), carbon[1], "°");
+    value(q::LEAST_ANGLE.into(), carbon[0]);
+    value(q::GREATEST_ANGLE.into(), carbon[1]);
     let atoms = &cell.atoms;
     let lengths = |first: Element, second: Element| {
         let own = bonds.iter().filter(move |(i, j, _)| {
@@ -75,37 +76,35 @@ pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result
         (Element::N, Element::H),
     ] {
         let all = lengths(first, second);
-        let name = format!("{first:?}–{second:?} bond");
-        value(format!("shortest {name}"), all.iter().copied().fold(f64::INFINITY, f64::min), "Å");
-        value(format!("longest {name}"), all.iter().copied().fold(0.0, f64::max), "Å");
+        let pair = format!("{first:?}{second:?}");
+        value(q::SHORTEST_BOND.of(&[&pair]), all.iter().copied().fold(f64::INFINITY, f64::min));
+        value(q::LONGEST_BOND.of(&[&pair]), all.iter().copied().fold(0.0, f64::max));
     }
     for (index, torsion) in amide_torsions(LATTICE.b / 2.0)?.into_iter().enumerate() {
-        value(format!("torsion {} beside the amide", index + 1), torsion.abs(), "°");
+        value(q::TORSION.of(&[&(index + 1).to_string()]), torsion.abs());
     }
     let (protocol, grid) = (Protocol::default(), Grid { levels: spec.levels, ..Grid::default() });
     let runs = grid.runs(&protocol)?;
-    value("runs of the grid".into(), runs.len() as f64, "");
+    value(q::GRID_RUNS.into(), runs.len() as f64);
     let samples = (protocol.steps / protocol.every + 1) as f64 * runs.len() as f64;
-    value("samples of the grid".into(), samples, "");
+    value(q::GRID_SAMPLES.into(), samples);
     let steps = protocol.steps as f64;
     for (axis, rates) in AXES.iter().zip(grid.rates(&protocol)) {
         let (Some(least), Some(greatest)) = (rates.first(), rates.last()) else { continue };
         // Table 3.2 prints them in 1e-6 a step of 0.5 fs, and calls them 1e-6/fs
         let printed = |rate: f64| rate * protocol.time_step * 1e6;
-        value(format!("least rate in {axis}"), printed(*least), "1e-6 per step");
-        value(format!("greatest rate in {axis}"), printed(*greatest), "1e-6 per step");
+        value(q::LEAST_RATE.of(&[axis]), printed(*least));
+        value(q::GREATEST_RATE.of(&[axis]), printed(*greatest));
         let ends = greatest * steps * protocol.time_step;
-        value(format!("strain that the greatest rate in {axis} reaches"), ends, "");
-        value(
-            format!("strain if the printed rate in {axis} were per fs"),
-            printed(*greatest) * 1e-6 * steps * protocol.time_step,
-            "",
-        );
+        value(q::GREATEST_STRAIN.of(&[axis]), ends);
+        let per_fs = printed(*greatest) * 1e-6 * steps * protocol.time_step;
+        value(q::STRAIN_IF_PER_FS.of(&[axis]), per_fs);
     }
     for number in 1..=4 {
         let network = Architecture::thesis(number)?;
-        value(format!("ANN-{number} parameters"), network.parameters() as f64, "");
-        value(format!("ANN-{number} hidden layers"), (network.widths.len() - 2) as f64, "");
+        let name = format!("ANN-{number}");
+        value(q::PARAMETERS.of(&[&name]), network.parameters() as f64);
+        value(q::HIDDEN_LAYERS.of(&[&name]), (network.widths.len() - 2) as f64);
     }
     for (name, crystal) in [("cell", &cell), ("supercell", &supercell)] {
         for (view, [across, up]) in [("xy", [0, 1]), ("yz", [1, 2])] {

@@ -6,9 +6,10 @@ use crate::dataset::{
 };
 use crate::error::Error;
 use crate::kinematics::{ANGSTROM, NAMES, PeriodicBox};
+use crate::quantities as q;
 use crate::scene::{Data, Scene};
 use crate::surrogate::{Kind, Symmetry};
-use polycore::report::Report;
+use polycore::report::{Named, Report};
 use polycore::scene::Source;
 use polycore::tensor::Voigt;
 use std::path::{Path, PathBuf};
@@ -156,7 +157,7 @@ impl Prepared {
         uniaxial::measure(report, &self.set);
         measure_split(report, &self.set, &self.split, &standardisation);
         if let Some(heldout) = &self.heldout {
-            describe(report, "heldout ", heldout);
+            describe(report, "heldout.", heldout);
         }
         let mut remarks = self.set.provenance.clone();
         remarks.extend(self.heldout.iter().flat_map(|set| set.provenance.clone()));
@@ -194,35 +195,35 @@ impl Prepared {
 
 /// Counts, ranges and noise of a set.
 pub fn describe(report: &mut Report, prefix: &str, set: &Dataset) {
-    let mut value = |name: &str, value: f64, unit: &str| {
-        report.value(&format!("{prefix}{name}"), value, unit);
+    let mut value = |quantity: Named, value: f64| {
+        report.value(Named { name: format!("{prefix}{}", quantity.name), ..quantity }, value);
     };
-    value("rows", set.len() as f64, "");
-    value("paths", set.paths.len() as f64, "");
-    value("rows skipped", set.skipped as f64, "");
-    value("duplicate rows", set.duplicate_rows() as f64, "");
-    value("constant components", set.constant_components().len() as f64, "");
+    value(q::ROWS.into(), set.len() as f64);
+    value(q::PATHS.into(), set.paths.len() as f64);
+    value(q::SKIPPED_ROWS.into(), set.skipped as f64);
+    value(q::DUPLICATE_ROWS.into(), set.duplicate_rows() as f64);
+    value(q::CONSTANT_COMPONENTS.into(), set.constant_components().len() as f64);
     for (kind, count) in set.kinds() {
-        value(&format!("paths of kind {kind}"), count as f64, "");
+        value(q::PATHS_OF_KIND.of(&[kind]), count as f64);
     }
     for (name, [low, high]) in NAMES.iter().zip(set.box_of_c()) {
-        value(&format!("least C{name}"), low, "");
-        value(&format!("greatest C{name}"), high, "");
+        value(q::LEAST_C.of(&[name]), low);
+        value(q::GREATEST_C.of(&[name]), high);
     }
     let stretches = || set.rows().flat_map(|row| row.deformation.principal_stretches());
-    value("least principal stretch", stretches().fold(f64::INFINITY, f64::min), "");
-    value("greatest principal stretch", stretches().fold(0.0, f64::max), "");
+    value(q::LEAST_PRINCIPAL_STRETCH.into(), stretches().fold(f64::INFINITY, f64::min));
+    value(q::GREATEST_PRINCIPAL_STRETCH.into(), stretches().fold(0.0, f64::max));
     let noises = [("cauchy", noise(set, |row| row.cauchy)), ("S", noise(set, |row| row.s))];
     for (letter, noise) in noises {
         let Some(noise) = noise else { continue };
         let Noise { deviation, floor, lag_1, lag_1_of_white_noise, .. } = noise;
         for (name, deviation) in NAMES.iter().zip(&deviation) {
-            value(&format!("noise of {letter}{name}"), deviation / 1e6, "MPa");
+            value(q::NOISE.of(&[letter, name]), deviation / 1e6);
         }
-        value(&format!("noise floor of {letter}"), floor / 1e12, "MPa²");
+        value(q::NOISE_FLOOR.of(&[letter]), floor / 1e12);
         if let Some(lag) = lag_1 {
-            value(&format!("lag-1 correlation of {letter} residuals"), lag, "");
-            value(&format!("lag-1 correlation of {letter} residuals if white"), lag_1_of_white_noise, "");
+            value(q::LAG_1.of(&[letter]), lag);
+            value(q::LAG_1_IF_WHITE.of(&[letter]), lag_1_of_white_noise);
         }
     }
 }
@@ -230,18 +231,18 @@ pub fn describe(report: &mut Report, prefix: &str, set: &Dataset) {
 fn measure_split(report: &mut Report, set: &Dataset, split: &Split, standardisation: &Standardisation) {
     let sets = [("training", &split.train), ("validation", &split.validation), ("test", &split.test)];
     for (name, rows) in sets {
-        report.value(&format!("{name} rows"), rows.len() as f64, "");
+        report.value(q::SET_ROWS.of(&[name]), rows.len() as f64);
     }
     for (a, name) in NAMES.iter().enumerate() {
-        report.value(&format!("training mean of C{name}"), standardisation.mean[a], "");
-        report.value(&format!("training deviation of C{name}"), standardisation.deviation[a], "");
+        report.value(q::TRAINING_MEAN.of(&[name]), standardisation.mean[a]);
+        report.value(q::TRAINING_DEVIATION.of(&[name]), standardisation.deviation[a]);
     }
     if let Some(leak) = leak(set, split, standardisation) {
-        report.value("nearest training row of a test row", leak.across, "");
-        report.value("nearest other training row of a training row", leak.within, "");
-        report.value("test rows with a neighbour of their run in training", leak.same_path, "");
+        report.value(q::NEAREST_TRAINING_ROW, leak.across);
+        report.value(q::NEAREST_OTHER_ROW, leak.within);
+        report.value(q::NEIGHBOURS_OF_RUN, leak.same_path);
         if let Some(ratio) = leak.ratio {
-            report.value("leak ratio", ratio, "");
+            report.value(q::LEAK_RATIO, ratio);
         }
         report.work("distances", leak.distances);
     }

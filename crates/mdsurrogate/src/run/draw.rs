@@ -4,6 +4,7 @@ use super::judge::{Heldout, percentages};
 use crate::dataset::Row;
 use crate::error::Error;
 use crate::kinematics::NAMES;
+use crate::quantities as q;
 use crate::surrogate::{Surrogate, Workspace};
 use crate::train::State;
 use polycore::output::picture::{LinePlot, Series};
@@ -147,8 +148,8 @@ pub(super) fn binned(
             for (bin, (sum, count)) in sums.iter().enumerate().filter(|(_, (_, count))| *count > 0) {
                 let [low, high] = [bin, bin + 1].map(|k| 1.0 + k as f64 * width);
                 let mean = sum / *count as f64;
-                let range = format!("C{component} {low:.2} to {high:.2}");
-                report.value(&format!("{name} heldout percentage error (3.13), {range}"), mean, "%");
+                let range = [low, high].map(|end| format!("{end:.2}"));
+                report.value(q::BINNED.of(&[name, component, &range[0], &range[1]]), mean);
                 centres.push(0.5 * (low + high));
                 means.push(mean);
                 counts.push(*count as f64);

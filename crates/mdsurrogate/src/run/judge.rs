@@ -7,6 +7,7 @@ use crate::eval::{
     Errors, FLAGS, Physics, Uncertainty, agreement, errors, percentage_error, seconds_of_a_stress,
     within_rates,
 };
+use crate::quantities as q;
 use crate::surrogate::{Surrogate, Workspace};
 use polycore::output::csv;
 use polycore::report::Report;
@@ -106,7 +107,7 @@ pub fn judge_laws(
         }
         for run in data.heldout.iter().flat_map(|set| &set.paths) {
             let found = errors(law, run.rows.iter())?;
-            let set = format!("heldout {}", run.id);
+            let set = format!("heldout.{}", run.id);
             record(report, name, &set, &found, floor);
             uncertain(report, name, &set, law, &Uncertainty::of(law, run.rows.iter(), chance)?);
         }
@@ -176,8 +177,8 @@ fn by_mode(
     data: &Prepared,
 ) -> Result<Vec<String>, Error> {
     let mut lines = Vec::new();
-    let whole = ("all runs".to_owned(), data.set.paths.iter().collect::<Vec<_>>());
-    let single = data.set.paths.iter().map(|path| (format!("run {}", path.id), vec![path]));
+    let whole = ("all_runs".to_owned(), data.set.paths.iter().collect::<Vec<_>>());
+    let single = data.set.paths.iter().map(|path| (format!("run.{}", path.id), vec![path]));
     for (what, paths) in single.chain([whole]) {
         let rows = || paths.iter().flat_map(|path| &path.rows);
         let Some(found) = agreement(law, rows())? else { continue };
@@ -185,12 +186,12 @@ fn by_mode(
         uncertain(report, name, &what, law, &uncertainty);
         let flagged = (uncertainty.caught[0] + uncertainty.alarms[0]) as f64
             / (uncertainty.bad + uncertainty.good) as f64;
-        report.value(&format!("{name} {what} share flagged"), flagged, "");
-        report.value(&format!("{name} {what} mean absolute error"), found.absolute / 1e6, "MPa");
+        report.value(q::SHARE_FLAGGED.of(&[name, &what]), flagged);
+        report.value(q::MEAN_ABSOLUTE_ERROR.of(&[name, &what]), found.absolute / 1e6);
         let rms = (found.squares / found.count as f64).sqrt() / 1e6;
-        report.value(&format!("{name} {what} rms"), rms, "MPa");
+        report.value(q::RMS.of(&[name, &what]), rms);
         if let Some(r2) = found.r2 {
-            report.value(&format!("{name} {what} R2"), r2, "");
+            report.value(q::R2.of(&[name, &what]), r2);
         }
         let learnt = paths.iter().all(|path| runs.is_empty() || runs.contains(&path.id));
         lines.push(format!(
@@ -214,8 +215,7 @@ fn leaks(laws: &[Named], unseen: &[f64], report: &mut Report) {
         };
         let of_scene = laws.iter().zip(unseen).find(|(law, _)| same(law));
         if let Some((law, own)) = of_scene.filter(|(_, own)| **own > 0.0) {
-            let name = format!("{} error on unseen rows over that of {}", other.name, law.name);
-            report.value(&name, loss / own, "");
+            report.value(q::UNSEEN_ERROR_RATIO.of(&[other.name, law.name]), loss / own);
         }
     }
 }
@@ -227,23 +227,23 @@ fn scores_to_beat(report: &mut Report, held: &Heldout, floor: Option<f64>) {
         let known: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
         known.iter().sum::<f64>() / known.len().max(1) as f64
     };
-    let id = &held.run.id;
+    let set = format!("heldout.{}", held.run.id);
     let nothing = mean(percentages(&held.run.rows, &zero));
-    report.value(&format!("zero stress heldout {id} percentage error (3.13)"), nothing, "%");
+    report.value(q::PERCENTAGE_ERROR.of(&["zero_stress", &set]), nothing);
     if let Some(floor) = floor {
         let noise = held.run.rows.iter().map(|row| 100.0 * floor.sqrt() / row.s.norm()).collect();
-        report.value(&format!("noise heldout {id} percentage error (3.13)"), mean(noise), "%");
+        report.value(q::PERCENTAGE_ERROR.of(&["noise", &set]), mean(noise));
     }
 }
 
 fn record(report: &mut Report, name: &str, set: &str, errors: &Errors, floor: Option<f64>) {
-    report.value(&format!("{name} {set} error (3.12)"), errors.mean_square() / 1e12, "MPa²");
-    report.value(&format!("{name} {set} error per component"), errors.mean_square() / 6e12, "MPa²");
-    report.value(&format!("{name} {set} percentage error (3.13)"), errors.percentage, "%");
+    report.value(q::MEAN_SQUARE_ERROR.of(&[name, set]), errors.mean_square() / 1e12);
+    report.value(q::COMPONENT_ERROR.of(&[name, set]), errors.mean_square() / 6e12);
+    report.value(q::PERCENTAGE_ERROR.of(&[name, set]), errors.percentage);
     let outside = errors.flagged as f64 / errors.rows.max(1) as f64;
-    report.value(&format!("{name} {set} share outside the training box"), outside, "");
+    report.value(q::SHARE_OUTSIDE.of(&[name, set]), outside);
     if let Some(floor) = floor {
-        report.value(&format!("{name} {set} error over the noise floor"), errors.mean_square() / floor, "");
+        report.value(q::ERROR_OVER_NOISE.of(&[name, set]), errors.mean_square() / floor);
     }
 }
 
@@ -251,32 +251,33 @@ fn record(report: &mut Report, name: &str, set: &str, errors: &Errors, floor: Op
 fn uncertain(report: &mut Report, name: &str, set: &str, law: &Surrogate, uncertainty: &Uncertainty) {
     let share = |part: usize, all: usize| part as f64 / all.max(1) as f64;
     let rows = uncertainty.bad + uncertainty.good;
-    report.value(&format!("{name} {set} share badly wrong"), share(uncertainty.bad, rows), "");
+    report.value(q::SHARE_BADLY_WRONG.of(&[name, set]), share(uncertainty.bad, rows));
     let known = if law.header().spread_limit.is_some() { 4 } else { 3 };
     for (place, flag) in FLAGS.iter().enumerate().take(known) {
+        let flag = &flag.trim_start_matches("the ").replace(' ', "_");
         if uncertainty.bad > 0 {
             let caught = share(uncertainty.caught[place], uncertainty.bad);
-            report.value(&format!("{name} {set} share of badly wrong caught by {flag}"), caught, "");
+            report.value(q::CAUGHT_BY.of(&[name, set, flag]), caught);
         }
         if uncertainty.good > 0 {
             let alarms = share(uncertainty.alarms[place], uncertainty.good);
-            report.value(&format!("{name} {set} false alarms of {flag}"), alarms, "");
+            report.value(q::FALSE_ALARMS.of(&[name, set, flag]), alarms);
         }
     }
     if let Some(correlation) = uncertainty.correlation {
-        report.value(&format!("{name} {set} rank correlation of spread and error"), correlation, "");
+        report.value(q::RANK_CORRELATION.of(&[name, set]), correlation);
     }
 }
 
 fn obey(report: &mut Report, name: &str, physics: &Physics) {
-    report.value(&format!("{name} stress at rest"), physics.rest / 1e6, "MPa");
-    report.value(&format!("{name} asymmetry of the tangent"), physics.asymmetry, "");
-    report.value(&format!("{name} largest asymmetry of the tangent"), physics.largest_asymmetry, "");
-    report.value(&format!("{name} work of a closed cycle"), physics.cycle, "");
-    report.value(&format!("{name} lack of objectivity"), physics.objectivity, "");
-    report.value(&format!("{name} shear stress where none was seen"), physics.shear_stress / 1e6, "MPa");
+    report.value(q::STRESS_AT_REST.of(&[name]), physics.rest / 1e6);
+    report.value(q::ASYMMETRY.of(&[name]), physics.asymmetry);
+    report.value(q::LARGEST_ASYMMETRY.of(&[name]), physics.largest_asymmetry);
+    report.value(q::CYCLE.of(&[name]), physics.cycle);
+    report.value(q::OBJECTIVITY.of(&[name]), physics.objectivity);
+    report.value(q::UNSEEN_SHEAR.of(&[name]), physics.shear_stress / 1e6);
     if let Some(share) = physics.shear_flagged {
-        report.value(&format!("{name} share of shear flagged"), share, "");
+        report.value(q::SHEAR_FLAGGED.of(&[name]), share);
     }
 }
 

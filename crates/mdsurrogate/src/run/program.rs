@@ -23,7 +23,7 @@ impl Case for Mdsurrogate {
   mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      what a table holds
   mdsurrogate schema > mdsurrogate.schema.json          for editors",
         magic: b"mdsg-ck2",
-        columns: &["* error over the noise floor", "best validation loss of *"],
+        columns: &["*.error_over_noise", "*.best_validation_loss"],
     };
     type Error = Error;
 

@@ -4,6 +4,7 @@ use super::searched::Searched;
 use super::{Failure, Prepared, short};
 use crate::dataset::Row;
 use crate::error::Error;
+use crate::quantities as q;
 use crate::scene::{Scene, SearchSpec};
 use crate::search::{Journal, Method, Oracle, Trial, at_random, bayesian, hyperband};
 use crate::surrogate::Kind;
@@ -244,25 +245,21 @@ fn write(
         ));
     }
     let diverged = ranking.iter().filter(|trial| trial.loss.is_none()).count();
-    report.value("candidates", ranking.len() as f64, "").value(
-        "candidates that diverged",
-        diverged as f64,
-        "",
-    );
+    report.value(q::CANDIDATES, ranking.len() as f64).value(q::DIVERGED, diverged as f64);
     let mut plot =
         LinePlot::new("Search").axes("parameters", "validation loss (3.12) (MPa²)").log_x().log_y();
     for method in &spec.methods {
         let own = || ranking.iter().filter(|t| t.method == *method && t.loss.is_some_and(|loss| loss > 0.0));
         let losses: Vec<f64> = own().filter_map(|trial| trial.loss).collect();
         if let Some(best) = losses.first() {
-            report.value(&format!("best validation loss of {}", method.name()), *best, "MPa²");
+            report.value(q::BEST_LOSS.of(&[method.name()]), *best);
             let sizes: Vec<f64> = own().map(|trial| parameters(trial) as f64).collect();
             plot = plot.series(Series::markers(method.name(), &sizes, &losses));
         }
     }
     if let Some(chosen) = chosen {
-        report.value("parameters of the chosen candidate", parameters(chosen) as f64, "");
-        report.value("validation loss of the chosen candidate", chosen.loss.unwrap_or(f64::NAN), "MPa²");
+        report.value(q::CHOSEN_PARAMETERS, parameters(chosen) as f64);
+        report.value(q::CHOSEN_LOSS, chosen.loss.unwrap_or(f64::NAN));
         plot.write(output.join("search.png"))?;
     }
     Ok(lines)

@@ -1,5 +1,6 @@
 //! What searches have found at what cost: the best loss against epochs and seconds, by method.
 
+use crate::quantities as q;
 use crate::scene::SearchSpec;
 use crate::search::{Journal, Method};
 use polycore::report::Report;
@@ -55,10 +56,10 @@ pub(super) fn against_time(spec: &SearchSpec, done: &[Searched], report: &mut Re
         }
         let name = method.name();
         report.work(&format!("epochs of {name}"), ends.iter().map(|end| end[0] as u64).sum());
-        report.value(&format!("epochs of {name}, median"), median(finite(0)), "");
-        report.value(&format!("median best validation loss of {name}"), median(finite(2)), "MPa²");
+        report.value(q::MEDIAN_EPOCHS.of(&[name]), median(finite(0)));
+        report.value(q::MEDIAN_LOSS.of(&[name]), median(finite(2)));
         let worst = finite(2).into_iter().fold(f64::NEG_INFINITY, f64::max);
-        report.value(&format!("worst best validation loss of {name}"), worst, "MPa²");
+        report.value(q::WORST_LOSS.of(&[name]), worst);
         let most = ends.iter().map(|end| end[0]).fold(0.0, f64::max);
         let mut columns = [Vec::new(), Vec::new(), Vec::new()];
         for point in 1..=POINTS {
@@ -78,16 +79,11 @@ pub(super) fn against_time(spec: &SearchSpec, done: &[Searched], report: &mut Re
             &[("epochs", "", epochs), ("seconds", "s", seconds), ("loss", "MPa²", losses)],
         );
     }
-    let value =
-        |method: &str, report: &Report| report.scalar(&format!("median best validation loss of {method}"));
+    let value = |method: &str, report: &Report| report.scalar(&q::MEDIAN_LOSS.of(&[method]).name);
     if let Some(random) = value("random", report) {
         for name in ["hyperband", "bayesian"] {
             if let Some(own) = value(name, report) {
-                report.value(
-                    &format!("median best validation loss of {name} over that of random"),
-                    own / random,
-                    "",
-                );
+                report.value(q::LOSS_OVER_RANDOM.of(&[name]), own / random);
             }
         }
     }

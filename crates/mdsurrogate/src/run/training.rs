@@ -4,6 +4,7 @@ use super::judge::Named;
 use super::{Failure, Prepared, short};
 use crate::dataset::Method;
 use crate::error::Error;
+use crate::quantities as q;
 use crate::scene::{ModelSpec, Scene};
 use crate::surrogate::{Header, Surrogate};
 use crate::train::{Settings, State, Training, ensemble};
@@ -226,15 +227,17 @@ pub fn record(trained: &[Trained], output: &Path, report: &mut Report) -> Result
         let name = &model.name;
         let epochs: usize = model.states.iter().map(|state| state.history().len()).sum();
         report.work(&format!("epochs of {name}"), epochs as u64);
-        report.value(&format!("{name} parameters"), model.law.header().architecture.parameters() as f64, "");
+        report.value(q::PARAMETERS.of(&[name]), model.law.header().architecture.parameters() as f64);
         report.seconds(&format!("training of {name}"), model.states.iter().map(State::seconds).sum());
         if let Some(limit) = model.law.header().spread_limit {
-            report.value(&format!("{name} spread limit"), limit / 1e6, "MPa");
+            report.value(q::SPREAD_LIMIT.of(&[name]), limit / 1e6);
         }
         for (member, state) in model.states.iter().enumerate() {
-            let end =
-                if model.states.len() == 1 { String::new() } else { format!(", member {}", member + 1) };
-            report.value(&format!("{name} best epoch{end}"), f64::from(state.best_epoch()), "");
+            let quantity = match model.states.len() {
+                1 => q::BEST_EPOCH.of(&[name]),
+                _ => q::MEMBER_BEST_EPOCH.of(&[name, &(member + 1).to_string()]),
+            };
+            report.value(quantity, f64::from(state.best_epoch()));
         }
     }
     let curves: Vec<_> = trained.iter().map(|model| (model.name.as_str(), &model.states[0])).collect();

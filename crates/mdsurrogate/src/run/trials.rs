@@ -3,6 +3,7 @@
 
 use super::{Failure, Prepared, short};
 use crate::error::Error;
+use crate::quantities as q;
 use crate::scene::{ModelSpec, Scene, TrialSpec};
 use crate::surrogate::{Surrogate, Workspace};
 use crate::train::{Settings, Training, ensemble};
@@ -36,7 +37,7 @@ pub fn run(source: &Source, scene: &Scene, run: &Run, report: &mut Report) -> Re
             (Ok((seen, _)), Some(_)) => (format!("not refused: {seen}"), false),
             (Ok((seen, flagged)), None) => (seen, trial.flagged.is_none_or(|asked| flagged == Some(asked))),
         };
-        report.value(&format!("{} as it must", trial.name), f64::from(u8::from(passed)), "");
+        report.value(q::AS_IT_MUST.of(&[&trial.name]), f64::from(u8::from(passed)));
         report.trials.push(Trial {
             what: trial.name.clone(),
             must: trial.must.clone(),

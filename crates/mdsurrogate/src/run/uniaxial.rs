@@ -2,6 +2,7 @@
 
 use crate::dataset::{Dataset, Path as Run};
 use crate::error::Error;
+use crate::quantities as q;
 use polycore::output::csv;
 use polycore::output::picture::{LinePlot, Series};
 use polycore::report::Report;
@@ -48,22 +49,22 @@ pub(super) fn measure(report: &mut Report, set: &Dataset) {
         moduli[axis] = slope(&all, MODULUS);
         peaks[axis] = runs().filter_map(|run| peak(&curve(run, axis))).max_by(|a, b| a[1].total_cmp(&b[1]));
         if let Some(modulus) = moduli[axis] {
-            report.value(&format!("modulus in {name}"), modulus / 1e9, "GPa");
+            report.value(q::MODULUS.of(&[name]), modulus / 1e9);
         }
         if let Some([strain, stress]) = peaks[axis] {
-            report.value(&format!("peak stress in {name}"), stress / 1e9, "GPa");
-            report.value(&format!("strain at the peak in {name}"), strain, "");
+            report.value(q::PEAK_STRESS.of(&[name]), stress / 1e9);
+            report.value(q::PEAK_STRAIN.of(&[name]), strain);
         }
         if let [Some(before), Some(after)] = STIFFENING.map(|range| slope(&all, range)) {
-            report.value(&format!("slope in {name} over that before a strain of 0.12"), after / before, "");
+            report.value(q::STIFFENING.of(&[name]), after / before);
         }
     }
     for axis in [0, 1] {
         if let (Some(across), Some(along)) = (moduli[axis], moduli[2]) {
-            report.value(&format!("modulus in z over that in {}", AXES[axis]), along / across, "");
+            report.value(q::MODULUS_RATIO.of(&[AXES[axis]]), along / across);
         }
         if let (Some([across, _]), Some([along, _])) = (peaks[axis], peaks[2]) {
-            report.value(&format!("strain at the peak in {} over that in z", AXES[axis]), across / along, "");
+            report.value(q::PEAK_STRAIN_RATIO.of(&[AXES[axis]]), across / along);
         }
     }
 }

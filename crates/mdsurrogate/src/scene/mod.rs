@@ -1,6 +1,7 @@
 //! Scenes, as written in TOML: data and what is learnt from them.
 
 use crate::dataset::{Columns, Fractions, Method};
+use crate::quantities;
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
 use polycore::units::{Length, Stress};
@@ -48,7 +49,9 @@ pub struct Scene {
 
 /// The JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    polycore::scene::schema("mdsurrogate", |generator| vec![generator.subschema_for::<Scene>()])
+    polycore::scene::schema("mdsurrogate", quantities::ALL, |generator| {
+        vec![generator.subschema_for::<Scene>()]
+    })
 }
 
 impl Scene {
@@ -57,6 +60,7 @@ impl Scene {
     /// # Errors
     /// What is wrong and where.
     pub fn check(&self, source: &Source) -> Result<(), SceneError> {
+        polycore::case::check_expectations(source, &self.expect, quantities::ALL)?;
         if self.data.is_none() {
             if self.crystal.is_none() {
                 return Err(source.error("data", "no `[data]`", "`[data]` with `files`, or `[crystal]`"));

@@ -162,7 +162,7 @@ fn weights_of_another_architecture() {
     assert_eq!(run("run scene.toml --output out", here).status.code(), Some(0));
     let both = run("eval scene.toml out/energy.safetensors out/ann.safetensors --output judged", here);
     assert_eq!(both.status.code(), Some(0), "{}", told(&both));
-    assert!(String::from_utf8_lossy(&both.stdout).contains("energy stress at rest"));
+    assert!(String::from_utf8_lossy(&both.stdout).contains("energy.stress_at_rest"));
     // a header that tells of other widths
     let mut bytes = fs::read(here.join("out/energy.safetensors")).unwrap();
     let place = bytes.windows(8).position(|window| window == b"[7,32,32").unwrap();

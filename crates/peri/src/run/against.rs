@@ -1,6 +1,7 @@
 //! Variants against one that is taken as true, or against a number: errors, errors over run time, which bonds break when.
 
 use super::outcome::Outcome;
+use crate::quantities as q;
 use crate::scene::CompareSpec;
 use polycore::report::Report;
 use std::collections::BTreeMap;
@@ -15,11 +16,11 @@ pub fn add(report: &mut Report, compare: &CompareSpec, outcomes: &[Outcome]) {
     for outcome in outcomes.iter().filter(|o| truth.is_none_or(|truth| truth.name != o.name)) {
         let Some(value) = outcome.get(&compare.quantity) else { continue };
         let error = (value / exact - 1.0).abs();
-        report.value(&format!("{}_error[{}]", compare.quantity, outcome.name), error, "");
+        report.value(q::COMPARED.of(&[&compare.quantity, &outcome.name]), error);
         if let Some(truth) = truth.filter(|truth| !truth.events.is_empty()) {
             let pairs = outcome.events.iter().zip(&truth.events);
             let same = pairs.take_while(|(a, b)| (a.step, a.fingerprint) == (b.step, b.fingerprint)).count();
-            report.value(&format!("same_events[{}]", outcome.name), same as f64, "");
+            report.value(q::SAME_EVENTS.of(&[&outcome.name]), same as f64);
         }
         curves.entry(method(outcome)).or_default().push([outcome.seconds_of("solve"), error]);
     }

@@ -3,9 +3,10 @@
 use super::outcome::{Outcome, Profile, families};
 use crate::bonds::Bonds;
 use crate::exact;
-use crate::scene::{BALANCES, ExactSpec, Scene};
+use crate::quantities as q;
+use crate::scene::{ExactSpec, Scene};
 use crate::stress::{Measure, Tensor};
-use polycore::report::Report;
+use polycore::report::{Named, Report};
 use polycore::scene::Source;
 use rayon::prelude::*;
 use std::path::Path;
@@ -31,11 +32,11 @@ pub fn hole<const D: usize>(
     let distance: Vec<f64> = positions.iter().map(|p| p[0].hypot(p[1])).collect();
     let column = column(&positions, bonds.spacing());
     if !column.is_empty() {
-        outcome.value("kirsch_first", mean(&column[0].1, &kirsch), "");
+        outcome.value(q::KIRSCH_FIRST, mean(&column[0].1, &kirsch));
         outcome.profiles.push(profile("kirsch", &column, &kirsch));
         if let (Some(plate), Some(truth)) = (plate, &truth) {
-            outcome.value("exact_first", mean(&column[0].1, truth), "");
-            outcome.value("exact_peak", plate.stress(0.0, radius)[0], "");
+            outcome.value(q::EXACT_FIRST, mean(&column[0].1, truth));
+            outcome.value(q::EXACT_PEAK, plate.stress(0.0, radius)[0]);
             outcome.profiles.push(profile("exact", &column, truth));
         }
     }
@@ -49,7 +50,7 @@ pub fn hole<const D: usize>(
         };
         let most =
             (0..normal.len()).filter(|&i| inner[i]).map(|i| normal[i]).fold(f64::NEG_INFINITY, f64::max);
-        outcome.value(&format!("{name}_max"), most, "");
+        outcome.value(q::MEASURE_MAX.of(&[name]), most);
         for kind in spec.errors() {
             let of = if kind.ends_with("kirsch") { &kirsch } else { exact };
             let error = match *kind {
@@ -58,14 +59,14 @@ pub fn hole<const D: usize>(
                 "rmse_ring" => rms(of, &|i| distance[i] <= near),
                 _ => rms(of, &|_| true),
             };
-            outcome.value(&format!("{name}_{kind}"), error, "");
+            outcome.value(q::MEASURE_ERROR.of(&[name, kind]), error);
         }
         if !column.is_empty() {
             let profile = profile(name, &column, &normal);
             let peak = profile.value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            outcome.value(&format!("{name}_peak"), peak, "");
-            outcome.value(&format!("{name}_peak_error"), peak / mean(&column[0].1, exact) - 1.0, "");
-            outcome.value(&format!("{name}_first"), profile.value[0], "");
+            outcome.value(q::MEASURE_PEAK.of(&[name]), peak);
+            outcome.value(q::MEASURE_PEAK_ERROR.of(&[name]), peak / mean(&column[0].1, exact) - 1.0);
+            outcome.value(q::MEASURE_FIRST.of(&[name]), profile.value[0]);
             outcome.profiles.push(profile);
         }
     }
@@ -130,7 +131,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
     };
     for outcome in outcomes {
         for (name, value, unit) in &outcome.values {
-            report.value(&full(name, outcome), *value, unit);
+            report.value(Named { name: full(name, outcome), unit: unit.clone() }, *value);
         }
         for profile in &outcome.profiles {
             let columns = [("y", "m", profile.at.clone()), ("stress", "", profile.value.clone())];
@@ -145,7 +146,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
     }
     if let (Some(problem), Some(stress)) = (&scene.exact, &scene.stress) {
         if let Some(width) = plate_width(scene) {
-            report.value("kt_finite_width", exact::heywood_gross(2.0 * problem.hole().0 / width), "");
+            report.value(q::KT_FINITE_WIDTH, exact::heywood_gross(2.0 * problem.hole().0 / width));
         }
         for (family, members) in families(outcomes) {
             let spacing: Vec<f64> = members.iter().map(|o| o.spacing).collect();
@@ -158,7 +159,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
                     let errors = errors_of(kind);
                     if errors.len() == spacing.len() {
                         let order = observed_order(&spacing, &errors);
-                        report.value(&format!("{name}_{kind}_order[{family}]"), order, "");
+                        report.value(q::MEASURE_ORDER.of(&[name, kind, &family]), order);
                     }
                 }
                 let seconds: Vec<f64> = members.iter().map(|o| run_time(o, name)).collect();
@@ -173,15 +174,15 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
         }
     }
     if scene.output.integrals {
-        for (name, value) in crate::integrals::NAMES.iter().zip(crate::integrals::all()) {
-            report.value(name, value, "");
+        for (quantity, value) in q::INTEGRALS.into_iter().zip(crate::integrals::all()) {
+            report.value(quantity, value);
         }
     }
     if several {
-        for name in BALANCES {
-            let most = outcomes.iter().filter_map(|o| o.get(name)).reduce(f64::max);
+        for quantity in q::BALANCES {
+            let most = outcomes.iter().filter_map(|o| o.get(quantity.name)).reduce(f64::max);
             if let Some(most) = most {
-                report.value(name, most, "");
+                report.value(quantity, most);
             }
         }
     }
@@ -189,7 +190,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
         super::against::add(&mut report, compare, outcomes);
     }
     for (family, change) in super::history::peak_changes(outcomes) {
-        report.value(&format!("peak_load_change[{family}]"), change, "");
+        report.value(q::PEAK_LOAD_CHANGE.of(&[&family]), change);
     }
     report.judge(&scene.expect, quick);
     report

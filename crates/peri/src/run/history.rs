@@ -1,7 +1,8 @@
 //! The history of loading: values, tables and curves of load against displacement and of energies.
 
 use super::outcome::Outcome;
-use crate::scene::{BALANCES, Scene, load_at_name};
+use crate::quantities as q;
+use crate::scene::Scene;
 use crate::solver::{Balance, Event, Record};
 use polycore::Error;
 use polycore::output::csv;
@@ -78,41 +79,41 @@ impl Outcome {
         let Some(last) = self.history.last().cloned() else { return };
         let peak = self.history.iter().max_by(|a, b| a.load.total_cmp(&b.load)).cloned();
         if let Some(peak) = peak.filter(|_| self.history.len() > 1) {
-            self.value("peak_load", peak.load, "N");
-            self.value("displacement_at_peak", peak.displacement, "m");
+            self.value(q::PEAK_LOAD, peak.load);
+            self.value(q::DISPLACEMENT_AT_PEAK, peak.displacement);
         }
         for at in &scene.output.load_at {
             if let Some(load) = self.load_at(at.si()) {
-                self.value(&load_at_name(at.si()), load, "N");
+                self.value(q::load_at(at.si()), load);
             }
         }
         if scene.material.critical.is_some() {
             if let Some(first) = self.history.iter().position(|r| r.broken > 0) {
-                self.value("first_break", self.history[first].displacement, "m");
+                self.value(q::FIRST_BREAK, self.history[first].displacement);
                 // of the equilibrium before: that at the end of the step may be past the collapse
                 let before = first.checked_sub(1).map_or(0.0, |s| self.history[s].load);
                 let load = self.events.first().filter(|_| !self.is_dynamic()).map_or(before, |e| e.load);
-                self.value("load_at_first_break", load, "N");
+                self.value(q::LOAD_AT_FIRST_BREAK, load);
             }
-            self.value("broken_bonds", last.broken as f64, "");
+            self.value(q::BROKEN_BONDS, last.broken as f64);
             if !self.is_dynamic() {
-                self.value("breaking_events", self.events.len() as f64, "");
+                self.value(q::BREAKING_EVENTS, self.events.len() as f64);
             }
-            self.value("detached_particles", last.detached as f64, "");
-            self.value("last_load", last.load, "N");
-            self.value("last_displacement", last.displacement, "m");
+            self.value(q::DETACHED_PARTICLES, last.detached as f64);
+            self.value(q::LAST_LOAD, last.load);
+            self.value(q::LAST_DISPLACEMENT, last.displacement);
         }
-        self.value("work_of_loads", last.work, "J");
-        self.value("stored_energy", last.stored, "J");
+        self.value(q::WORK_OF_LOADS, last.work);
+        self.value(q::STORED_ENERGY, last.stored);
         if scene.material.critical.is_some() {
-            self.value("released_energy", last.released, "J");
+            self.value(q::RELEASED_ENERGY, last.released);
         }
-        self.value("damped_energy", self.damped(&last), "J");
+        self.value(q::DAMPED_ENERGY, self.damped(&last));
         if let Some(touching) = last.contact {
-            self.value("contact_energy", touching.energy, "J");
-            self.value("contacts", touching.pairs as f64, "");
+            self.value(q::CONTACT_ENERGY, touching.energy);
+            self.value(q::CONTACTS, touching.pairs as f64);
             let deepest = self.history.iter().filter_map(|r| Some(r.contact?.overlap)).fold(0.0, f64::max);
-            self.value("deepest_overlap", deepest, "");
+            self.value(q::DEEPEST_OVERLAP, deepest);
         }
         if self.is_dynamic() {
             // largest difference of what came in and what is there, over what was turned over
@@ -120,7 +121,7 @@ impl Outcome {
             let most =
                 self.history.iter().map(|r| r.work.abs().max(r.kinetic)).fold(f64::MIN_POSITIVE, f64::max);
             let error = self.history.iter().map(off).fold(0.0, f64::max) / most;
-            self.value("energy_error", error, "");
+            self.value(q::ENERGY_ERROR, error);
         }
         if !self.is_dynamic() {
             let most =
@@ -128,12 +129,12 @@ impl Outcome {
             let size = most(|b| b.size).max(f64::MIN_POSITIVE);
             let (force, external) = (most(|b| b.force) / size, most(|b| b.external) / size);
             let moment = most(|b| b.moment / b.arm.max(f64::MIN_POSITIVE)) / size;
-            for (name, value) in BALANCES.into_iter().zip([force, moment, external]) {
-                self.value(name, value, "");
+            for (quantity, value) in q::BALANCES.into_iter().zip([force, moment, external]) {
+                self.value(quantity, value);
             }
         }
         let residual = self.history.iter().map(|r| r.residual).fold(0.0, f64::max);
-        self.value("largest_residual", residual, "");
+        self.value(q::LARGEST_RESIDUAL, residual);
     }
 
     /// By how much of it the load rises to its peak, or falls from it, in one step.

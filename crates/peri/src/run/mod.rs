@@ -25,6 +25,7 @@ use crate::contact::Contact;
 use crate::error::Error;
 use crate::material::{BondMaterial, Property};
 use crate::potential::{BondPotential, KernelFit};
+use crate::quantities as q;
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
 use crate::solver::{Breaking, Loads, State, Status, System, load_stepping};
 use polycore::case::{Fault, Run};
@@ -102,7 +103,7 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
             other => other?,
         };
         if expected.is_some() {
-            outcome.value("failed_as_it_must", f64::from(u8::from(outcome.error.is_some())), "");
+            outcome.value(q::FAILED_AS_IT_MUST, f64::from(u8::from(outcome.error.is_some())));
         }
         outcome.must = study.and_then(|study| study.must.clone());
         finished.push(outcome);
@@ -170,18 +171,18 @@ fn run_variant<const D: usize>(
     solve(scene, &solution, run, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
     let fit = KernelFit::new(&*law, covered_stretches(&*body.bonds, &state.displacement), scene.fit_bound())?;
-    outcome.value("fit_error", fit.max_error, "");
+    outcome.value(q::FIT_ERROR, fit.max_error);
     if let Some(critical) = &critical_stretch {
-        outcome.value("critical_stretch", critical.least(), "");
-        outcome.value("fragments", fragments(&*body.bonds) as f64, "");
+        outcome.value(q::CRITICAL_STRETCH, critical.least());
+        outcome.value(q::FRAGMENTS, fragments(&*body.bonds) as f64);
     }
     if scene.dynamics.is_some() {
         // a body that is held everywhere has none
         if state.motion.critical_step.is_finite() {
-            outcome.value("critical_time_step", state.motion.critical_step, "s");
+            outcome.value(q::CRITICAL_TIME_STEP, state.motion.critical_step);
         }
-        outcome.value("time_step", state.motion.time_step, "s");
-        outcome.value("kinetic_energy", state.motion.kinetic, "J");
+        outcome.value(q::TIME_STEP, state.motion.time_step);
+        outcome.value(q::KINETIC_ENERGY, state.motion.kinetic);
     }
     let stresses = frames.stresses(&*body.bonds, &state, &mut phases)?;
     outcome.history.clone_from(&state.history);

@@ -1,9 +1,10 @@
 //! Results of one variant.
 
 use crate::bonds::Bonds;
+use crate::quantities as q;
 use crate::scene::Variant;
 use crate::solver::{Event, Loads, Record, State};
-use polycore::report::Phases;
+use polycore::report::{Named, Phases};
 use serde::{Deserialize, Serialize};
 
 /// Everything of a variant that outlives its fields.
@@ -80,8 +81,9 @@ impl Outcome {
     }
 
     /// Adds a scalar.
-    pub fn value(&mut self, name: &str, value: f64, unit: &str) {
-        self.values.push((name.to_owned(), value, unit.to_owned()));
+    pub fn value(&mut self, quantity: impl Into<Named>, value: f64) {
+        let Named { name, unit } = quantity.into();
+        self.values.push((name, value, unit));
     }
 
     /// A scalar by name.
@@ -104,8 +106,8 @@ impl Outcome {
         ] {
             self.work.push((name.to_owned(), count));
         }
-        self.value("smallest_stretch", (1.0 + state.met.low).max(0.0).sqrt(), "");
-        self.value("largest_stretch", (1.0 + state.met.high).sqrt(), "");
+        self.value(q::SMALLEST_STRETCH, (1.0 + state.met.low).max(0.0).sqrt());
+        self.value(q::LARGEST_STRETCH, (1.0 + state.met.high).sqrt());
     }
 
     /// Largest displacement, force of the held regions, applied force.
@@ -116,14 +118,14 @@ impl Outcome {
             largest = largest.max(displacement.iter().map(|x| x * x).sum::<f64>().sqrt());
         }
         let (reaction, applied) = (loads.reaction(bonds, &state.force), loads.applied(bonds));
-        self.value("largest_displacement", largest, "m");
+        self.value(q::LARGEST_DISPLACEMENT, largest);
         for d in 0..D {
             let axis = ["x", "y", "z"][d];
             if !loads.held.is_empty() {
-                self.value(&format!("reaction_{axis}"), reaction[d], "N");
+                self.value(q::REACTION.of(&[axis]), reaction[d]);
             }
             if loads.body_force.is_some() {
-                self.value(&format!("applied_{axis}"), applied[d], "N");
+                self.value(q::APPLIED.of(&[axis]), applied[d]);
             }
         }
     }

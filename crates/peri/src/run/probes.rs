@@ -2,9 +2,11 @@
 
 use super::outcome::Outcome;
 use crate::bonds::Bonds;
+use crate::quantities as q;
 use crate::run::frames::intact;
 use crate::scene::{Body, Look, Probe, Scene};
 use crate::solver::State;
+use polycore::report::{Named, Quantity};
 use polycore::scene::{SceneError, Source};
 use std::f64::consts::PI;
 
@@ -171,7 +173,8 @@ impl Outcome {
         let each = |probe: &Probe| {
             let mut columns = vec![(probe.name.clone(), probe.look.unit().to_owned())];
             if probe.look == Look::Crack {
-                columns.push((format!("{}_across", probe.name), "m".to_owned()));
+                let Named { name, unit } = probe.named(q::PROBE_ACROSS);
+                columns.push((name, unit));
             }
             columns
         };
@@ -187,37 +190,37 @@ impl Outcome {
             let rows: Vec<(f64, f64)> =
                 self.history.iter().map(|r| (r.time, r.seen[own])).filter(|(_, x)| x.is_finite()).collect();
             column += 1;
-            let (name, unit) = (probe.name.clone(), probe.look.unit());
             let rows = if probe.look == Look::Rotation { unwrapped(rows) } else { rows };
-            let mut add = |end: &str, value: Option<f64>, unit: &str| {
+            let mut add = |quantity: Quantity, value: Option<f64>| {
                 if let Some(value) = value.filter(|value| value.is_finite()) {
-                    self.values.push((format!("{name}{end}"), value, unit.to_owned()));
+                    let Named { name, unit } = probe.named(quantity);
+                    self.values.push((name, value, unit));
                 }
             };
-            add("", rows.last().map(|r| r.1), unit);
+            add(q::PROBE, rows.last().map(|r| r.1));
             let swing = if probe.look == Look::Rotation { first_swing(&rows) } else { None };
             let until = swing.map_or(rows.len(), |(end, _)| end);
             let peak = rows[..until].iter().map(|r| r.1).max_by(|a, b| a.abs().total_cmp(&b.abs()));
-            add("_peak", peak, unit);
+            add(q::PROBE_PEAK, peak);
             match (probe.look, probe.gauges.map(|gauges| gauges.map(|at| at.si()))) {
                 (Look::Rotation, _) => {
                     let frequency = swing.map(|(_, time)| PI / time);
-                    add("_frequency", frequency, "rad/s");
-                    add("_rate", frequency.zip(peak).map(|(a, b)| a * b.abs()), "rad/s");
+                    add(q::PROBE_FREQUENCY, frequency);
+                    add(q::PROBE_RATE, frequency.zip(peak).map(|(a, b)| a * b.abs()));
                 }
                 (Look::Crack | Look::Front, Some([from, to])) => {
                     let times = (crossing(&rows, from), crossing(&rows, to));
                     let speed = |(a, b): (f64, f64)| (to - from) / (b - a);
-                    add("_speed", times.0.zip(times.1).map(speed), "m/s");
+                    add(q::PROBE_SPEED, times.0.zip(times.1).map(speed));
                     let between: Vec<f64> =
                         rows.iter().map(|r| r.1).filter(|x| (from..=to).contains(x)).collect();
-                    add("_between_gauges", Some(between.len() as f64), "");
+                    add(q::PROBE_BETWEEN_GAUGES, Some(between.len() as f64));
                     let back = between.windows(2).map(|pair| pair[0] - pair[1]).fold(0.0, f64::max);
-                    add("_backstep", Some(back), "m");
+                    add(q::PROBE_BACKSTEP, Some(back));
                 }
                 (Look::Crack | Look::Front, None) => {
                     let speed = rows.first().zip(rows.last()).map(|(a, b)| (b.1 - a.1) / (b.0 - a.0));
-                    add("_speed", speed, "m/s");
+                    add(q::PROBE_SPEED, speed);
                 }
                 _ => {}
             }
@@ -226,7 +229,7 @@ impl Outcome {
                 let within = self.history.iter().filter(|r| (gauges[0]..=gauges[1]).contains(&r.seen[own]));
                 let most = within.map(|r| r.seen[own + 1]).filter(|x| x.is_finite()).reduce(f64::max);
                 if let Some(most) = most {
-                    self.values.push((format!("{name}_across"), most, "m".to_owned()));
+                    self.value(probe.named(q::PROBE_ACROSS), most);
                 }
                 column += 1;
             }

@@ -2,54 +2,51 @@
 
 use super::variant::variants;
 use super::{ExactSpec, Scene};
+use crate::calibrate::Space;
+use crate::quantities as q;
+use polycore::report::{Named, Quantity};
 use polycore::scene::{SceneError, Source};
 
-/// Sums over the whole body that must vanish, see [`crate::solver::Balance`], over its forces; of several variants the
-/// largest is a value of its own.
-pub const BALANCES: [&str; 3] = ["force_imbalance", "moment_imbalance", "reaction_imbalance"];
-
-/// What the load at a displacement is called.
-pub fn load_at_name(displacement: f64) -> String {
-    format!("load_at_{}mm", (displacement * 1e9).round() / 1e6)
-}
-
 /// Scalars that a run of a scene without studies can give; some only where something happens (`first_break`).
-pub fn quantities(scene: &Scene) -> Vec<String> {
-    let mut names: Vec<String> = Vec::new();
-    let mut add = |given: bool, more: &[&str]| {
-        names.extend(more.iter().filter(|_| given).map(ToString::to_string));
-    };
-    add(true, &["smallest_stretch", "largest_stretch", "fit_error", "largest_displacement", "work_of_loads"]);
-    add(true, &["stored_energy", "damped_energy", "largest_residual"]);
+pub fn quantities(scene: &Scene) -> Vec<Named> {
+    let mut all: Vec<Named> = Vec::new();
+    let mut add =
+        |given: bool, more: &[Quantity]| all.extend(more.iter().filter(|_| given).map(|&q| Named::from(q)));
+    add(true, &[q::SMALLEST_STRETCH, q::LARGEST_STRETCH, q::FIT_ERROR, q::LARGEST_DISPLACEMENT]);
+    add(true, &[q::WORK_OF_LOADS, q::STORED_ENERGY, q::DAMPED_ENERGY, q::LARGEST_RESIDUAL]);
     let records = scene.dynamics.as_ref().map_or(scene.solver.steps, |dynamics| dynamics.method().records);
-    add(records > 1, &["peak_load", "displacement_at_peak"]);
-    add(scene.dynamics.is_none(), &BALANCES);
+    add(records > 1, &[q::PEAK_LOAD, q::DISPLACEMENT_AT_PEAK]);
+    add(scene.dynamics.is_none(), &q::BALANCES);
     let critical = scene.material.critical.is_some();
-    add(critical, &["critical_stretch", "fragments", "first_break", "load_at_first_break", "broken_bonds"]);
-    add(critical && scene.dynamics.is_none(), &["breaking_events"]);
-    add(critical, &["detached_particles", "last_load", "last_displacement", "released_energy"]);
-    add(scene.contact.is_some(), &["contact_energy", "contacts", "deepest_overlap"]);
-    let motion = ["critical_time_step", "time_step", "kinetic_energy", "energy_error"];
+    add(
+        critical,
+        &[q::CRITICAL_STRETCH, q::FRAGMENTS, q::FIRST_BREAK, q::LOAD_AT_FIRST_BREAK, q::BROKEN_BONDS],
+    );
+    add(critical && scene.dynamics.is_none(), &[q::BREAKING_EVENTS]);
+    add(critical, &[q::DETACHED_PARTICLES, q::LAST_LOAD, q::LAST_DISPLACEMENT, q::RELEASED_ENERGY]);
+    add(scene.contact.is_some(), &[q::CONTACT_ENERGY, q::CONTACTS, q::DEEPEST_OVERLAP]);
+    let motion = [q::CRITICAL_TIME_STEP, q::TIME_STEP, q::KINETIC_ENERGY, q::ENERGY_ERROR];
     add(scene.dynamics.is_some(), &motion);
-    add(scene.boundary.iter().any(|b| b.holds()), &["reaction_x", "reaction_y", "reaction_z"]);
-    let forces = scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some());
-    add(forces, &["applied_x", "applied_y", "applied_z"]);
-    names.extend(scene.probe.iter().flat_map(super::Probe::values));
-    if scene.body.space != crate::calibrate::Space::Solid {
-        names.retain(|name| !name.ends_with("_z"));
-    }
-    names.extend(scene.output.load_at.iter().map(|at| load_at_name(at.si())));
+    let axes = if scene.body.space == Space::Solid { &["x", "y", "z"][..] } else { &["x", "y"] };
+    let mut along = |given: bool, quantity: Quantity| {
+        all.extend(axes.iter().filter(|_| given).map(|axis| quantity.of(&[axis])));
+    };
+    along(scene.boundary.iter().any(|b| b.holds()), q::REACTION);
+    along(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), q::APPLIED);
+    all.extend(scene.probe.iter().flat_map(super::Probe::values));
+    all.extend(scene.output.load_at.iter().map(|at| q::load_at(at.si())));
     if let (Some(exact), Some(stress)) = (&scene.exact, &scene.stress) {
-        names.push("kirsch_first".to_owned());
+        all.push(q::KIRSCH_FIRST.into());
         if matches!(exact, ExactSpec::PlateWithHole { .. }) {
-            names.extend(["exact_first", "exact_peak"].map(str::to_owned));
+            all.extend([q::EXACT_FIRST, q::EXACT_PEAK].map(Named::from));
         }
-        for measure in &stress.measures {
-            let kinds = ["first", "peak", "peak_error", "max"].iter().chain(exact.errors());
-            names.extend(kinds.map(|kind| format!("{}_{kind}", measure.name())));
+        for name in stress.measures.iter().map(|measure| measure.name()) {
+            let kinds = [q::MEASURE_FIRST, q::MEASURE_PEAK, q::MEASURE_PEAK_ERROR, q::MEASURE_MAX];
+            all.extend(kinds.map(|quantity| quantity.of(&[name])));
+            all.extend(exact.errors().iter().map(|error| q::MEASURE_ERROR.of(&[name, error])));
         }
     }
-    names
+    all
 }
 
 /// Scalars that the report of a scene can have, with its variants.
@@ -64,19 +61,20 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
         // what must fail may have no scene at all
         let fails = variant.study.is_some_and(|index| scene.study[index].fails.is_some());
         let own = match variant.resolve(source, scene) {
-            Ok((_, own)) => quantities(&own),
+            Ok((_, own)) => quantities(&own).into_iter().map(|quantity| quantity.name).collect(),
             Err(_) if fails => Vec::new(),
             Err(error) => return Err(error),
         };
-        let own = own.into_iter().chain(fails.then(|| "failed_as_it_must".to_owned()));
+        let own = own.into_iter().chain(fails.then(|| q::FAILED_AS_IT_MUST.name.to_owned()));
         match variants.len() {
             1 => names.extend(own),
             _ => {
                 for name in own {
                     let compared = scene.output.compare.as_ref().filter(|c| c.quantity == name).is_some();
-                    names.extend(compared.then(|| format!("{name}_error[{}]", variant.name())));
-                    names.extend(compared.then(|| format!("same_events[{}]", variant.name())));
-                    names.extend(BALANCES.contains(&name.as_str()).then(|| name.clone()));
+                    names.extend(compared.then(|| q::COMPARED.of(&[&name, &variant.name()]).name));
+                    names.extend(compared.then(|| q::SAME_EVENTS.of(&[&variant.name()]).name));
+                    names
+                        .extend(q::BALANCES.iter().any(|balance| balance.name == name).then(|| name.clone()));
                     names.push(format!("{name}[{}]", variant.name()));
                 }
             }
@@ -87,16 +85,16 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
         }
     }
     for (family, _) in families.iter().filter(|(_, count)| *count > 1) {
-        names.push(format!("peak_load_change[{family}]"));
+        names.push(q::PEAK_LOAD_CHANGE.of(&[family]).name);
         for measure in scene.stress.iter().flat_map(|stress| &stress.measures) {
             let kinds = scene.exact.iter().flat_map(|exact| exact.errors());
-            names.extend(kinds.map(|kind| format!("{}_{kind}_order[{family}]", measure.name())));
+            names.extend(kinds.map(|kind| q::MEASURE_ORDER.of(&[measure.name(), kind, family]).name));
         }
     }
     if scene.output.integrals {
-        names.extend(crate::integrals::NAMES.map(str::to_owned));
+        names.extend(q::INTEGRALS.iter().map(|quantity| quantity.name.to_owned()));
     }
-    names.extend(scene.exact.as_ref().map(|_| "kt_finite_width".to_owned()));
+    names.extend(scene.exact.as_ref().map(|_| q::KT_FINITE_WIDTH.name.to_owned()));
     Ok(names)
 }
 

@@ -4,6 +4,7 @@ use super::check::plain;
 use super::variant::Variant;
 use super::{Body, Method, Scene, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;
+use polycore::report::Named;
 use polycore::scene::{SceneError, Source};
 
 /// Lines for `peri check`.
@@ -89,6 +90,7 @@ pub fn explain<const D: usize>(
     omits(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), "body forces");
     omits(scene.output.fields, "VTKHDF fields");
     omits(scene.output.pictures, "pictures");
+    lines.push(format!("  reports    {}", Named::list(&super::quantities(scene))));
     lines.extend(super::warnings(scene, body).into_iter().map(|text| format!("  warning    {text}")));
     Ok(lines)
 }

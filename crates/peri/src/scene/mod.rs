@@ -20,7 +20,7 @@ mod warn;
 pub use boundary::{Boundary, Held, HeldBy, Side};
 pub use build::{Body, body_of, least_memory};
 pub use check::{check, check_variant, plain};
-pub use expect::{BALANCES, load_at_name, quantities, quantities_of};
+pub use expect::{quantities, quantities_of};
 pub use explain::explain;
 pub use formula::Formula;
 pub use inclusion::Inclusions;
@@ -436,7 +436,9 @@ pub struct Study {
 
 /// The JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    polycore::scene::schema("peri", |generator| vec![generator.subschema_for::<Scene>()])
+    polycore::scene::schema("peri", crate::quantities::ALL, |generator| {
+        vec![generator.subschema_for::<Scene>()]
+    })
 }
 
 impl Scene {

@@ -5,6 +5,8 @@ use super::build::{Body, vector};
 use super::loads::region;
 use super::{Axis, Boundary, Method, Scene, Side};
 use crate::calibrate::Space;
+use crate::quantities as q;
+use polycore::report::{Named, Quantity};
 use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
 use serde::{Deserialize, Serialize};
@@ -77,14 +79,22 @@ impl Axis {
 
 impl Probe {
     /// Names of its values.
-    pub fn values(&self) -> Vec<String> {
-        let named = |ends: &[&str]| ends.iter().map(|end| format!("{}{end}", self.name)).collect();
-        match self.look {
-            Look::Displacement | Look::Strain => named(&["", "_peak"]),
-            Look::Rotation => named(&["", "_peak", "_frequency", "_rate"]),
-            Look::Crack => named(&["", "_peak", "_speed", "_between_gauges", "_backstep", "_across"]),
-            Look::Front => named(&["", "_peak", "_speed", "_between_gauges", "_backstep"]),
-        }
+    pub fn values(&self) -> Vec<Named> {
+        let front = [q::PROBE_SPEED, q::PROBE_BETWEEN_GAUGES, q::PROBE_BACKSTEP];
+        let more = match self.look {
+            Look::Displacement | Look::Strain => Vec::new(),
+            Look::Rotation => vec![q::PROBE_FREQUENCY, q::PROBE_RATE],
+            Look::Crack => [&front[..], &[q::PROBE_ACROSS]].concat(),
+            Look::Front => front.to_vec(),
+        };
+        let all = [q::PROBE, q::PROBE_PEAK].into_iter().chain(more);
+        all.map(|quantity| self.named(quantity)).collect()
+    }
+
+    /// A quantity of this probe, in its unit where it has none of its own.
+    pub fn named(&self, quantity: Quantity) -> Named {
+        let named = quantity.of(&[&self.name]);
+        if named.unit == "*" { named.in_unit(self.look.unit()) } else { named }
     }
 
     /// Slots of its region, of the whole body where it names none.
@@ -154,7 +164,8 @@ impl Probe {
 /// The key, what was found and what is allowed.
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let dimension = if scene.body.space == Space::Solid { 3 } else { 2 };
-    let mut names: Vec<String> = super::quantities(&Scene { probe: Vec::new(), ..scene.clone() });
+    let taken = super::quantities(&Scene { probe: Vec::new(), ..scene.clone() });
+    let mut names: Vec<String> = taken.into_iter().map(|quantity| quantity.name).collect();
     for (index, probe) in scene.probe.iter().enumerate() {
         let key = |name: &str| format!("probe[{index}].{name}");
         let letters = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
@@ -162,7 +173,7 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let found = format!("`{}`", probe.name);
             return Err(source.error(&key("name"), found, "letters, digits, `_` and `-`"));
         }
-        for value in probe.values() {
+        for Named { name: value, .. } in probe.values() {
             if names.contains(&value) {
                 let found = format!("`{}`, of which `{value}` is taken", probe.name);
                 return Err(source.error(&key("name"), found, "a name of its own"));

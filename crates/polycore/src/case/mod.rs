@@ -11,13 +11,14 @@ pub mod terminal;
 
 pub use cli::{RunArguments, main, solve};
 pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run};
+use rows::fits;
 pub use rows::{Row, Rows, STATISTICS};
-pub use sweep::{Search, SweepOptions, Vary, search, sweep};
+pub use sweep::{OF_SWEEPS, Search, SweepOptions, Vary, search, sweep};
 
 use crate::Error;
 use crate::checkpoint::{self, Header, Magic};
-use crate::report::Report;
-use crate::scene::{Failure, Source};
+use crate::report::{Expect, Quantity, Report};
+use crate::scene::{Failure, SceneError, Source};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -69,6 +70,26 @@ pub trait Case {
 
     /// The JSON Schema of its scenes.
     fn schema() -> serde_json::Value;
+}
+
+/// Refuses an expectation of a scalar that a program does not declare, where it cannot say which of them a scene has.
+///
+/// # Errors
+/// The name, and those that are most like it.
+pub fn check_expectations(
+    source: &Source,
+    expectations: &[Expect],
+    declared: &[&[Quantity]],
+) -> Result<(), SceneError> {
+    for (index, expect) in expectations.iter().enumerate() {
+        let is_declared =
+            |name: &str| declared.iter().flat_map(|list| *list).any(|q| fits(&q.pattern(), name));
+        if let Some(name) = expect.names().find(|name| !is_declared(name)) {
+            let known: Vec<&str> = declared.iter().flat_map(|list| *list).map(|q| q.name).collect();
+            return Err(source.unknown(&format!("expect[{index}].quantity"), name, &known));
+        }
+    }
+    Ok(())
 }
 
 /// An error that ends a program.

@@ -16,6 +16,13 @@ use std::time::Duration;
 mod search;
 mod table;
 
+crate::quantities! {
+    /// Scalars that reports of sweeps have, whatever the program.
+    pub OF_SWEEPS:
+    FAILED_RUNS = "failed_runs", "", "runs of a sweep that ended with an error";
+    LEAST_VALUE = "least_value", "*", "least value that a search found to meet all expectations";
+}
+
 pub use search::{Search, search};
 use table::{draw, together};
 

@@ -13,6 +13,7 @@ use polycore::output;
 use polycore::report::{Phases, Report};
 
 use super::MPA;
+use super::quantities as q;
 use super::scene::Case;
 use super::{draw, material, trials};
 
@@ -75,7 +76,7 @@ fn judge_on(report: &mut Report, key: &str, law: &dyn Hyperelastic, table: &Tabl
         matches!(homogeneous::biaxial(law, a, b), Err(constitutive::Error::Locked { .. }))
     };
     let locked = table.states.iter().filter(locks).count();
-    report.value(&format!("{key}.locked"), locked as f64, "");
+    report.value(q::LOCKED.of(&[key]), locked as f64);
     if locked == 0 {
         agree(report, key, &Agreement::of(law, table)?);
     }
@@ -83,22 +84,22 @@ fn judge_on(report: &mut Report, key: &str, law: &dyn Hyperelastic, table: &Tabl
 }
 
 fn agree(report: &mut Report, key: &str, found: &Agreement) {
-    report.value(&format!("{key}.rms"), found.rms / MPA, "MPa");
-    report.value(&format!("{key}.mae"), found.mae / MPA, "MPa");
+    report.value(q::RMS.of(&[key]), found.rms / MPA);
+    report.value(q::MAE.of(&[key]), found.mae / MPA);
     if let Some(r2) = found.r2 {
-        report.value(&format!("{key}.r2"), r2, "");
+        report.value(q::R2.of(&[key]), r2);
     }
 }
 
 fn record(report: &mut Report, data: &str, table: &Table, fit: &Fit) -> Result<(), Error> {
     let key = format!("{data}.{}", fit.model.key);
-    report.value(&format!("{key}.shear_modulus"), fit.law.shear_modulus() / MPA, "MPa");
+    report.value(q::SHEAR_MODULUS.of(&[&key]), fit.law.shear_modulus() / MPA);
     for parameter in &fit.parameters {
         let (value, unit) = scaled(parameter.value, parameter.unit);
-        report.value(&format!("{key}.{}", parameter.name), value, unit);
+        report.value(q::PARAMETER.of(&[&key, parameter.name]).in_unit(unit), value);
         if let Some(error) = parameter.standard_error {
-            let name = format!("{key}.{}.standard_error", parameter.name);
-            report.value(&name, scaled(error, parameter.unit).0, unit);
+            let quantity = q::STANDARD_ERROR.of(&[&key, parameter.name]).in_unit(unit);
+            report.value(quantity, scaled(error, parameter.unit).0);
         }
     }
     agree(report, &key, &Agreement::of(&fit.law, table)?);

@@ -9,6 +9,7 @@ use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
 
+use super::quantities as q;
 use super::trials::Trial;
 
 /// The file as written.
@@ -67,7 +68,7 @@ struct Data {
 
 /// The JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
-    polycore::scene::schema("polycore", |generator| vec![generator.subschema_for::<Scene>()])
+    polycore::scene::schema("polycore", &[q::ALL], |generator| vec![generator.subschema_for::<Scene>()])
 }
 
 /// A scene that was checked, with its data.
@@ -165,16 +166,16 @@ impl Case {
         let mut names = Vec::new();
         for (data, _) in &self.data {
             for model in &self.laws {
-                let fixed = ["rms", "mae", "r2", "shear_modulus"].into_iter();
-                let all = fixed.chain(model.parameters.iter().map(|parameter| parameter.name));
-                // a law may be parameterised by its shear modulus
-                for name in all {
-                    names.push(format!("{data}.{}.{name}", model.key));
-                }
+                let fit = format!("{data}.{}", model.key);
+                names.extend(
+                    [q::RMS, q::MAE, q::R2, q::SHEAR_MODULUS].map(|quantity| quantity.of(&[&fit]).name),
+                );
+                let parameters = model.parameters.iter().map(|parameter| parameter.name);
+                names.extend(parameters.map(|parameter| q::PARAMETER.of(&[&fit, parameter]).name));
                 for (other, _) in self.data.iter().filter(|(other, _)| self.cross && other != data) {
-                    for name in ["rms", "mae", "r2", "locked"] {
-                        names.push(format!("{data}.{}.{other}.{name}", model.key));
-                    }
+                    let fit = format!("{fit}.{other}");
+                    names
+                        .extend([q::RMS, q::MAE, q::R2, q::LOCKED].map(|quantity| quantity.of(&[&fit]).name));
                 }
             }
         }
@@ -188,11 +189,8 @@ impl Case {
         let names = self.quantities();
         for (i, expect) in self.expect.iter().enumerate() {
             if let Some(name) = expect.names().find(|name| !names.iter().any(|known| known == name)) {
-                let found = format!("`{name}`, which this scene does not compute");
-                let allowed = "<data>.<law>.rms, .mae, .r2, .shear_modulus, or a parameter (`polycore check` lists them); \
-                     <data>.<law>.<other data>.rms, .mae, .r2, .locked with `cross`; <trial>.nominal, .energy, .refused, \
-                     .rms or a parameter";
-                return Err(self.source.error(&format!("expect[{i}].quantity"), found, allowed));
+                let known: Vec<&str> = names.iter().map(String::as_str).collect();
+                return Err(self.source.unknown(&format!("expect[{i}].quantity"), name, &known));
             }
         }
         Ok(())

@@ -7,13 +7,13 @@ use polycore::constitutive::hyperelastic::fit::fit;
 use polycore::constitutive::hyperelastic::{
     self, Compressible, Hyperelastic, Volumetric, homogeneous, model, plane_stress,
 };
-use polycore::report::{self, Judgement, Report};
+use polycore::report::{self, Judgement, Quantity, Report};
 use polycore::scene::{SceneError, Source};
 use polycore::tensor::Tensor2;
 use polycore::units::Stress;
 use serde::Deserialize;
 
-use super::MPA;
+use super::{MPA, quantities as q};
 
 /// One trial: with `parameters` a law is asked at a `stretch`, with `data` it is fitted.
 #[derive(Deserialize, schemars::JsonSchema)]
@@ -73,9 +73,10 @@ impl Trial {
     /// Names of the scalars that it may have.
     pub fn quantities(&self) -> Vec<String> {
         let parameters = model(&self.law).map_or(&[][..], |model| model.parameters);
-        let fixed = ["nominal", "energy", "refused", "rms", "shear_modulus"].into_iter();
-        let all = fixed.chain(parameters.iter().map(|parameter| parameter.name));
-        all.map(|name| format!("{}.{name}", self.name)).collect()
+        let fixed = [q::NOMINAL, q::ENERGY, q::REFUSED, q::RMS, q::SHEAR_MODULUS];
+        let fixed = fixed.iter().map(|quantity| quantity.of(&[&self.name]));
+        let own = parameters.iter().map(|parameter| q::PARAMETER.of(&[&self.name, parameter.name]));
+        fixed.chain(own).map(|quantity| quantity.name).collect()
     }
 
     fn attempt(&self) -> Result<Seen, constitutive::Error> {
@@ -168,34 +169,35 @@ pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
 /// # Errors
 /// What fails without being asked to.
 pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
-    let key = |name: &str| format!("{}.{name}", trial.name);
+    let of = |quantity: Quantity| quantity.of(&[&trial.name]);
     let seen = trial.attempt();
     let mut passed = true;
     let text = match (seen, &trial.refused) {
         (Err(error), Some(part)) => {
             let error = error.to_string();
             passed = error.contains(part.as_str());
-            report.value(&key("refused"), f64::from(u8::from(passed)), "");
+            report.value(of(q::REFUSED), f64::from(u8::from(passed)));
             format!("refused: {error}")
         }
         (Err(error), None) => return Err(error.into()),
         (Ok(seen), refused) => {
             if refused.is_some() {
                 passed = false;
-                report.value(&key("refused"), 0.0, "");
+                report.value(of(q::REFUSED), 0.0);
             }
             match seen {
                 Seen::Stress { nominal, energy } => {
-                    report.value(&key("nominal"), nominal / MPA, "MPa");
-                    report.value(&key("energy"), energy / MPA, "MJ/m³");
+                    report.value(of(q::NOMINAL), nominal / MPA);
+                    report.value(of(q::ENERGY), energy / MPA);
                     format!("P = {:e} MPa, W = {:e} MJ/m³", nominal / MPA, energy / MPA)
                 }
                 Seen::Fit(fit) => {
-                    report.value(&key("rms"), fit.rms / MPA, "MPa");
-                    report.value(&key("shear_modulus"), fit.law.shear_modulus() / MPA, "MPa");
+                    report.value(of(q::RMS), fit.rms / MPA);
+                    report.value(of(q::SHEAR_MODULUS), fit.law.shear_modulus() / MPA);
                     for parameter in &fit.parameters {
                         let (scale, unit) = if parameter.unit == "Pa" { (MPA, "MPa") } else { (1.0, "") };
-                        report.value(&key(parameter.name), parameter.value / scale, unit);
+                        let quantity = q::PARAMETER.of(&[&trial.name, parameter.name]).in_unit(unit);
+                        report.value(quantity, parameter.value / scale);
                     }
                     format!("rms {:e} MPa", fit.rms / MPA)
                 }

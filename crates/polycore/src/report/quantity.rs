@@ -44,6 +44,20 @@ impl Quantity {
 }
 
 impl Named {
+    /// One that no program declares: of another report, say.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { name: name.into(), unit: unit.into() }
+    }
+
+    /// Names with their units, in a line.
+    pub fn list<'a>(all: impl IntoIterator<Item = &'a Self>) -> String {
+        let one = |Self { name, unit }: &Self| match unit.as_str() {
+            "" => name.clone(),
+            unit => format!("{name} ({unit})"),
+        };
+        all.into_iter().map(one).collect::<Vec<_>>().join(", ")
+    }
+
     /// The same in a unit that only the result knows.
     pub fn in_unit(self, unit: &str) -> Self {
         Self { unit: unit.to_owned(), ..self }

@@ -14,7 +14,11 @@ fn one(rest: &str) -> Result<Expect, toml::de::Error> {
 
 fn report(value: f64) -> Report {
     let mut report = Report::new("peri", "0.1.0", "version = 1\n");
-    report.value("k", value, "MPa").work("steps", 12).seconds("solve", 0.5).seconds("solve", 0.25);
+    report
+        .value(Named::new("k", "MPa"), value)
+        .work("steps", 12)
+        .seconds("solve", 0.5)
+        .seconds("solve", 0.25);
     report.curve("profile", &[("x", "m", vec![0.0, 1.0]), ("sigma", "Pa", vec![1.0, 2.0])]);
     report
 }
@@ -72,7 +76,7 @@ fn quotients() {
         ("k/m", "at_least = 0", false),
     ] {
         let mut report = report(3.0);
-        report.value("m", 2.0, "MPa").value("zero", 0.0, "");
+        report.value(Named::new("m", "MPa"), 2.0).value(Named::new("zero", ""), 0.0);
         let mut expect = one(&format!("{rest}\nsource = 's'")).unwrap();
         expect.quantity = quantity.to_owned();
         report.judge(&[expect], false);
@@ -126,7 +130,7 @@ fn file_round_trip() {
 fn non_finite_values_are_stated_and_fail() {
     let directory = tempfile::tempdir().unwrap();
     let mut report = report(f64::NAN);
-    report.value("m", f64::NEG_INFINITY, "");
+    report.value(Named::new("m", ""), f64::NEG_INFINITY);
     report.curve("profile", &[("x", "m", vec![0.0]), ("sigma", "Pa", vec![f64::INFINITY])]);
     assert!(!report.passed());
     let path = report.write(directory.path()).unwrap();
@@ -136,7 +140,7 @@ fn non_finite_values_are_stated_and_fail() {
     assert_eq!(read.non_finite, ["k", "m", "profile.sigma"]);
     assert!(read.scalar("k").unwrap().is_nan() && !read.passed());
     assert!(read.table().contains("profile.sigma is not finite"));
-    report.value("k", 1.0, "").value("m", 1.0, "").curve("profile", &[]);
+    report.value(Named::new("k", ""), 1.0).value(Named::new("m", ""), 1.0).curve("profile", &[]);
     assert!(report.passed());
 }
 

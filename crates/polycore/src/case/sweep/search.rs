@@ -1,9 +1,10 @@
 //! The least value of a key with which a scene meets all that it expects.
 
 use super::table::numeric;
-use super::{SweepOptions, Vary, rows};
+use super::{LEAST_VALUE, SweepOptions, Vary, rows};
 use crate::Error;
 use crate::case::{Case, Finished, Row};
+use crate::report::Named;
 use crate::scene::{Failure, Source};
 use std::str::FromStr;
 
@@ -82,7 +83,7 @@ pub fn search<C: Case>(
                 finished = last;
                 if met.first() == Some(&true) { passes = middle } else { fails = middle }
             }
-            finished.report.value("least_value", passes, unit);
+            finished.report.value(Named::from(LEAST_VALUE).in_unit(unit), passes);
             finished.report.write(options.output)?;
             format!(
                 "{key} = {} is the least that meets all that is expected; {} does not",

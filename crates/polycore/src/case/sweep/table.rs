@@ -1,6 +1,6 @@
 //! What a sweep found: its report, and its pictures against the first key.
 
-use super::Vary;
+use super::{FAILED_RUNS, Vary};
 use crate::case::Program;
 use crate::case::rows::{Rows, STATISTICS};
 use crate::output::picture::{LinePlot, Series};
@@ -39,7 +39,7 @@ pub(super) fn together(program: &Program, source: &Source, vary: &[Vary], rows: 
     let views: Vec<(&str, &str, Vec<f64>)> =
         columns.iter().map(|(name, unit, list)| (name.as_str(), unit.as_str(), list.clone())).collect();
     report.curve("sweep", &views);
-    report.value("failed_runs", (rows.rows.len() - finished().count()) as f64, "");
+    report.value(FAILED_RUNS, (rows.rows.len() - finished().count()) as f64);
     report.work("runs", rows.rows.len() as u64);
     report.work("steps", finished().filter_map(|(_, own)| own.work.get("steps")).sum());
     report

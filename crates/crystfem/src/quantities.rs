@@ -1,0 +1,61 @@
+//! The scalars that reports of `crystfem` can have. Those of a study have its name and a dot before them.
+
+polycore::quantities! {
+    /// Of parts; `{field}` is `temperature`, `alpha` or another field of a material, `{layer}` nothing or `layer-N.`.
+    pub OF_PARTS:
+    STORED_ENERGY = "stored_energy", "J", "change of the stored energy since the start";
+    EXCHANGED_ENERGY = "exchanged_energy", "J", "heat that came through surfaces and from sources";
+    REACTION_ENERGY = "reaction_energy", "J", "heat that prescribed temperatures brought";
+    BIRTH_ENERGY = "birth_energy", "J", "energy of the elements that appeared";
+    HEAT_GIVEN_OFF = "heat_given_off", "J", "heat that left: exchanged and reaction energy, with the other sign";
+    MISSING_ENERGY = "missing_energy", "J", "stored energy less all that came in";
+    WORST_BALANCE = "worst_balance", "", "largest error of the balance in a step, over the energy that moved";
+    MEAN = "{layer}mean_{field}", "*", "mean by volume at the end, of the part or of a layer";
+    LEAST = "{layer}least_{field}", "*", "smallest value at a node";
+    LARGEST = "{layer}largest_{field}", "*", "largest value at a node";
+    DEVIATION = "{layer}deviation_of_{field}", "*", "standard deviation by volume";
+    DISTANCE = "{probe}.distance", "m", "distance of a probe from the mesh; 0 inside";
+    AT_PROBE = "{probe}.{field}", "*", "value at a probe at the end";
+    LOWEST_TEMPERATURE = "{probe}.lowest_temperature", "degC", "lowest temperature at a probe";
+    HIGHEST_TEMPERATURE = "{probe}.highest_temperature", "degC", "highest temperature at a probe";
+    JUMP = "{probe}.jump_at_birth_{number}", "K", "rise of the temperature after a birth, before the next one";
+    AT_BIRTH = "{probe}.{field}_at_birth_{number}", "", "value of a field just before a birth";
+    LOST_AT_BIRTH = "{probe}.{field}_lost_at_birth_{number}", "", "by how much it falls after the birth";
+    FAILED_AS_IT_MUST = "{study}.failed_as_it_must", "", "1 if a study with `fails` ended with this error, else 0";
+    LIMIT = "{convergence}.limit", "*", "value that three studies tend to, after Richardson";
+    ORDER = "{convergence}.order", "", "observed order of these studies";
+    ERROR_OF = "{curve}.error_of_{study}", "", "relative error of a study in an error-against-time curve";
+}
+
+polycore::quantities! {
+    /// Of points; `{point}` is the point's name or, with several materials, POINT.MATERIAL.
+    pub OF_POINTS:
+    NON_FINITE_ROWS = "{point}.non_finite_rows", "", "rows with a value that is not finite, where the scene expects some";
+    COLDEST = "{point}.lowest_temperature", "degC", "lowest temperature";
+    HOTTEST = "{point}.highest_temperature", "degC", "highest temperature";
+    FINAL_TEMPERATURE = "{point}.final_temperature", "degC", "temperature at the end";
+    TEMPERATURE_RISE = "{point}.temperature_rise", "K", "temperature at the end less that at the start";
+    ENERGY_CHANGE = "{point}.energy_change", "J/kg", "internal energy at the end less that at the start";
+    LOWEST = "{point}.lowest_{field}", "", "smallest value of a field";
+    HIGHEST = "{point}.highest_{field}", "", "largest value of a field";
+    FINAL = "{point}.final_{field}", "", "value of a field at the end";
+    FIRST_STEP = "{point}.first_step_{field}", "", "value of a field after the first step";
+    TEMPERATURE_AT = "{point}.temperature_at_{event}", "degC", "temperature at which α reaches a value, or at the `peak` of its rate";
+    TIME_TO = "{point}.time_to_{event}", "s", "time from the start to it";
+    PEAK_RATE = "{point}.peak_rate", "1/s", "largest dα/dt";
+    SHIFT_AT = "{point}.shift_at_{degree}", "K", "temperature at a value of α, of one material less that of another";
+    LONGER_TO = "{point}.longer_to_{degree}", "", "time to a value of α, of one material over that of another, less 1";
+}
+
+polycore::quantities! {
+    /// Of fits.
+    pub OF_FITS:
+    CONSTANT = "{fit}.{constant}", "*", "a fitted constant";
+    STANDARD_ERROR = "{fit}.{constant}.standard_error", "*", "its standard error";
+    LOWER = "{fit}.{constant}.lower", "*", "lower end of its 95 % confidence interval";
+    UPPER = "{fit}.{constant}.upper", "*", "upper end of it";
+    FIT_RMS = "{fit}.rms", "", "root mean square of the residuals";
+}
+
+/// All of them.
+pub const ALL: &[&[polycore::report::Quantity]] = &[OF_PARTS, OF_POINTS, OF_FITS];

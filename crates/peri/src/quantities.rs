@@ -1,0 +1,100 @@
+//! The scalars that reports of `peri` can have. A scene's own are those of [`crate::scene::quantities`].
+
+polycore::quantities! {
+    /// Scalars of every variant; with several variants each has its variant's name behind it in square brackets.
+    pub OF_A_VARIANT:
+    SMALLEST_STRETCH = "smallest_stretch", "", "smallest stretch of any bond in any iteration";
+    LARGEST_STRETCH = "largest_stretch", "", "largest stretch of any bond in any iteration";
+    FIT_ERROR = "fit_error", "", "measured relative error of the fitted law at the final stretches";
+    LARGEST_DISPLACEMENT = "largest_displacement", "m", "length of the longest displacement vector";
+    REACTION = "reaction_{axis}", "N", "with a prescribed displacement: net reactions of these regions along an axis, the larger of the summed positive and negative ones; the history has each region's with its sign";
+    APPLIED = "applied_{axis}", "N", "with a traction or force: applied force along an axis, of both directions the larger";
+    PEAK_LOAD = "peak_load", "N", "with two steps or more: largest load of all steps";
+    DISPLACEMENT_AT_PEAK = "displacement_at_peak", "m", "displacement of the grips at the largest load";
+    LOAD_AT = "load_at_{displacement}mm", "N", "with `output.load_at`: load at this displacement, where the run comes so far";
+    WORK_OF_LOADS = "work_of_loads", "J", "work of the loads up to the end";
+    STORED_ENERGY = "stored_energy", "J", "energy in bonds and contact at the end";
+    DAMPED_ENERGY = "damped_energy", "J", "work less stored and released energy; of a quasi-static run the work is summed by the trapezoidal rule, and the value may be as small as this error, about 1e-3 of the work, and negative";
+    RELEASED_ENERGY = "released_energy", "J", "with `material.critical`: energy that broken bonds held when they broke";
+    CRITICAL_STRETCH = "critical_stretch", "", "with `material.critical`: least stretch at which a bond of the body breaks";
+    FRAGMENTS = "fragments", "", "with `material.critical`: pieces of two particles or more that intact bonds hold together";
+    FIRST_BREAK = "first_break", "m", "displacement of the step in which the first bond breaks";
+    LOAD_AT_FIRST_BREAK = "load_at_first_break", "N", "load of the equilibrium before the first bond breaks";
+    BROKEN_BONDS = "broken_bonds", "", "broken bonds at the end";
+    BREAKING_EVENTS = "breaking_events", "", "with `material.critical`, without `[dynamics]`: equilibria in which bonds broke together";
+    DETACHED_PARTICLES = "detached_particles", "", "particles that have lost all their bonds";
+    LAST_LOAD = "last_load", "N", "load of the last step";
+    LAST_DISPLACEMENT = "last_displacement", "m", "displacement of the grips in the last step";
+    CONTACT_ENERGY = "contact_energy", "J", "with `[contact]`: energy of these pairs, a part of `stored_energy`";
+    CONTACTS = "contacts", "", "with `[contact]`: pairs of particles that touch at the end";
+    DEEPEST_OVERLAP = "deepest_overlap", "", "with `[contact]`: largest overlap 1 − r/d of a touching pair at the end of any step";
+    CRITICAL_TIME_STEP = "critical_time_step", "s", "critical time step 2/ω of the body at the start";
+    TIME_STEP = "time_step", "s", "time step at the end";
+    KINETIC_ENERGY = "kinetic_energy", "J", "kinetic energy at the end";
+    ENERGY_ERROR = "energy_error", "", "largest error of the energy balance, over the energy turned over";
+    FORCE_IMBALANCE = "force_imbalance", "", "without `[dynamics]`: largest sum of the internal forces in any step, over half the sum of their magnitudes; zero but for rounding, whatever the residual";
+    MOMENT_IMBALANCE = "moment_imbalance", "", "the same of their moments about the body's middle, in deformed positions, over half the body's diagonal as well";
+    REACTION_IMBALANCE = "reaction_imbalance", "", "the same of reactions and loads: what free particles still have out of balance";
+    LARGEST_RESIDUAL = "largest_residual", "", "largest residual of any step";
+    FAILED_AS_IT_MUST = "failed_as_it_must", "", "1 if a variant with `fails` ended with this error, else 0";
+    PROBE = "{probe}", "*", "value of a probe at the end (m, rad or a strain)";
+    PROBE_PEAK = "{probe}_peak", "*", "its value of the largest size; of a rotation up to the end of its first half swing";
+    PROBE_FREQUENCY = "{probe}_frequency", "rad/s", "of a rotation: π over the time of the zero that ends its first half swing";
+    PROBE_RATE = "{probe}_rate", "rad/s", "frequency times peak: the rate at which a harmonic swing of this peak begins";
+    PROBE_SPEED = "{probe}_speed", "m/s", "of a crack or a front: mean speed between its gauges if a row lies before the first; without gauges from its first row to its last";
+    PROBE_BETWEEN_GAUGES = "{probe}_between_gauges", "", "rows of the history with the tip or front between the gauges";
+    PROBE_BACKSTEP = "{probe}_backstep", "m", "largest step back between the gauges";
+    PROBE_ACROSS = "{probe}_across", "m", "of a crack: largest distance of its tip from 0 across its axis, between the gauges if there are any";
+    KIRSCH_FIRST = "kirsch_first", "", "σ₁₁/σ∞ of Kirsch's plate at the particles nearest to the hole";
+    EXACT_FIRST = "exact_first", "", "of `plate-with-hole`: exact σ₁₁/σ∞ at the particles nearest to the hole";
+    EXACT_PEAK = "exact_peak", "", "of `plate-with-hole`: exact σ₁₁/σ∞ at the rim of the hole";
+    MEASURE_MAX = "{measure}_max", "", "largest σ₁₁/σ∞ of all particles on which no load or support acts";
+    MEASURE_FIRST = "{measure}_first", "", "computed σ₁₁/σ∞ at the particles nearest to the hole";
+    MEASURE_PEAK = "{measure}_peak", "", "largest σ₁₁/σ∞ above the hole";
+    MEASURE_PEAK_ERROR = "{measure}_peak_error", "", "this over the exact value at the particles nearest to the hole, less 1";
+    MEASURE_ERROR = "{measure}_{error}", "", "error (2.84) of σ₁₁/σ∞: `rmse` over all particles, `rmse_inner` without those on which a load or support acts; of `plate-with-hole` also `rmse_ring` up to 2δ from the hole, `rmse_bulk` beyond, to five radii, and `rmse_kirsch`, `rmse_inner_kirsch` against Kirsch's solution";
+}
+
+polycore::quantities! {
+    /// Scalars of a whole scene.
+    pub OF_A_SCENE:
+    KT_FINITE_WIDTH = "kt_finite_width", "", "Heywood's peak σ₁₁/σ∞ of a long strip of the plate's width";
+    MEASURE_ORDER = "{measure}_{error}_order[{variants}]", "", "observed order of an error over the spacing";
+    PEAK_LOAD_CHANGE = "peak_load_change[{variants}]", "", "change of the peak load between the two finest spacings, over the finest";
+    COMPARED = "{quantity}_error[{variant}]", "", "with `output.compare`: |q/q₀ − 1|";
+    SAME_EVENTS = "same_events[{variant}]", "", "with `output.compare`: how many of the first events broke the same bonds in the same load step";
+    INTEGRAL_DISK_1111 = "integral_disk_1111", "", "∫ ξ₁⁴/|ξ|³ dV over the unit disk, see Appendix A";
+    INTEGRAL_DISK_1122 = "integral_disk_1122", "", "∫ ξ₁²ξ₂²/|ξ|³ dV over the unit disk";
+    INTEGRAL_BALL_1111 = "integral_ball_1111", "", "∫ ξ₁⁴/|ξ|³ dV over the unit ball";
+    INTEGRAL_BALL_1122 = "integral_ball_1122", "", "∫ ξ₁²ξ₂²/|ξ|³ dV over the unit ball";
+    DOUBLE_INTEGRAL_DISK_TRACE = "double_integral_disk_trace", "", "∬ |ξ| dV dV over the unit disk";
+    DOUBLE_INTEGRAL_BALL_TRACE = "double_integral_ball_trace", "", "∬ |ξ| dV dV over the unit ball";
+    PRINTED_OVER_DISK = "printed_over_double_integral_disk", "", "trace of (A.18) as published over the integral";
+    PRINTED_OVER_BALL = "printed_over_double_integral_ball", "", "trace of (A.38) as published over the integral";
+}
+
+use polycore::report::{Named, Quantity};
+
+/// Sums over the whole body that must vanish, see [`crate::solver::Balance`], over its forces; of several variants the
+/// largest is a value of its own.
+pub const BALANCES: [Quantity; 3] = [FORCE_IMBALANCE, MOMENT_IMBALANCE, REACTION_IMBALANCE];
+
+/// Those of [`crate::integrals::all`], in its order.
+pub const INTEGRALS: [Quantity; 8] = [
+    INTEGRAL_DISK_1111,
+    INTEGRAL_DISK_1122,
+    INTEGRAL_BALL_1111,
+    INTEGRAL_BALL_1122,
+    DOUBLE_INTEGRAL_DISK_TRACE,
+    DOUBLE_INTEGRAL_BALL_TRACE,
+    PRINTED_OVER_DISK,
+    PRINTED_OVER_BALL,
+];
+
+/// The load at a displacement, m.
+pub fn load_at(displacement: f64) -> Named {
+    LOAD_AT.of(&[&((displacement * 1e9).round() / 1e6).to_string()])
+}
+
+/// All of them.
+pub const ALL: &[&[Quantity]] = &[OF_A_VARIANT, OF_A_SCENE];
