@@ -28,8 +28,13 @@ fn plate_on_a_lattice() {
 fn cracked_bar_in_three_dimensions() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    fs::write(here.join("scene.toml"), scenes::bar()).unwrap();
+    let scene = scenes::bar().to_owned() + "[output.solid]\nturntable = true\ncut = { normal = [0, 1, 0] }\n";
+    fs::write(here.join("scene.toml"), scene).unwrap();
     on_any_number_of_threads(here);
+    for picture in ["solid", "turntable"] {
+        let path = here.join(format!("out1/{picture}_dx-10mm_m-3.015_surface-energy_volume-linear.png"));
+        assert!(fs::read(path).unwrap().starts_with(b"\x89PNG"), "{picture}");
+    }
     let work = &report(&here.join("out1"))["work"];
     assert_eq!((&work["particles"], &work["steps"]), (&320.into(), &3.into()));
 }

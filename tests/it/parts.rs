@@ -75,7 +75,8 @@ at = ["0 mm", "0 mm", "0.75 mm"]
 fn a_printed_bar() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    fs::write(here.join("bar.toml"), BAR).unwrap();
+    let solid = "solid = { turntable = true, cut = { normal = [0, 1, 0] } }";
+    fs::write(here.join("bar.toml"), BAR.replace("stages = 2", &format!("stages = 2\n{solid}"))).unwrap();
     let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
     let told = crystfem("check bar.toml").with_code(0);
     told.shows("builds     3 births, 288 elements in all");
@@ -120,7 +121,15 @@ fn a_printed_bar() {
     let between = of("temperature")[of("time").len() - 1];
     assert!(ends[0] != ends[1] && (between - 0.5 * (ends[0] + ends[1])).abs() < 1e-9, "{between} {ends:?}");
     assert_eq!(scalar(&report, "middle.distance"), 0.0);
-    for name in ["probe_middle.csv", "probes_temperature.png", "sections.png", "process.png"] {
+    for name in [
+        "probe_middle.csv",
+        "probes_temperature.png",
+        "sections.png",
+        "process.png",
+        "solid.png",
+        "process_solid.png",
+        "turntable.png",
+    ] {
         assert!(out.join(name).is_file(), "{name}");
     }
 }

@@ -30,10 +30,12 @@ mod failure;
 mod locate;
 mod overlay;
 mod schema;
+mod solid;
 
 pub use error::SceneError;
 pub use failure::Failure;
 pub use schema::schema;
+pub use solid::{CutSpec, SolidSpec};
 
 /// The only version of the scene format so far.
 pub const VERSION: i64 = 1;

@@ -1,12 +1,14 @@
-//! Pictures of a part: sections through its middle at some times, and all of them as an animation.
+//! Pictures of a part at some times, and of all of them as an animation: sections through its middle, and as it looks from
+//! outside.
 
 use super::celsius::{TEMPERATURE, of_kelvin};
+use super::outside::Outside;
 use super::section::Section;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::scene::{PartScene, Task};
 use crate::simulation::Simulation;
-use polycore::output::picture::{ColorMap, Stage, Strip, Strips};
+use polycore::output::picture::{ColorMap, Skin, Solids, Stage, Strip, Strips};
 use polycore::output::vtkhdf::{self, Series};
 use std::path::Path;
 
@@ -14,10 +16,12 @@ use std::path::Path;
 const FRAMES: usize = 60;
 const SHOWN: f64 = 0.12;
 
-/// Where a section's values come from, frame by frame.
+/// Frames of a full turn.
+const TURN: usize = 36;
+
+/// Where values come from, frame by frame.
 struct Frames<'a> {
     mesh: &'a Mesh,
-    section: Section,
     /// The field beside the temperature.
     field: Option<&'static str>,
     from: Origin<'a>,
@@ -30,7 +34,15 @@ enum Origin<'a> {
     End(&'a Simulation),
 }
 
-/// sections.png: stages below one another, temperature beside crystallinity; process.png: all frames, animated.
+/// A frame: what it is called, the values of its fields at the nodes, and which elements exist.
+pub(super) struct Frame {
+    pub(super) title: String,
+    pub(super) values: Vec<Vec<f64>>,
+    pub(super) exists: Vec<bool>,
+}
+
+/// sections.png, solid.png: stages beside one another, temperature and crystallinity; process.png, process_solid.png: all
+/// frames, animated; turntable.png: the end from all sides. A field has one range in all of them.
 pub fn draw(
     scene: &PartScene,
     task: &Task,
@@ -39,36 +51,71 @@ pub fn draw(
     output: &Path,
 ) -> Result<(), Error> {
     let mesh = &task.problem.mesh;
-    let Some(section) = Section::through_the_middle(mesh, &task.printed) else { return Ok(()) };
     let names = simulation.field_names();
     let field = names.iter().copied().find(|name| *name == "crystallinity").or(names.first().copied());
     let from = match fields {
         Some(path) => Origin::File(vtkhdf::read(path)?),
         None => Origin::End(simulation),
     };
-    let frames = Frames { mesh, section, field, from };
+    let frames = Frames { mesh, field, from };
     let count = frames.count();
     // all frames, or as many as an animation may have, the last among them
     let every = count.div_ceil(FRAMES);
     let shown: Vec<usize> = (0..count).rev().step_by(every).collect::<Vec<_>>().into_iter().rev().collect();
-    if count > 1 {
-        let mut ranges = frames.no_ranges();
-        for &frame in &shown {
-            widen(&mut ranges, &frames.values(frame)?);
-        }
-        frames.strips(scene, &ranges).animate(output.join("process.png"), shown.len(), SHOWN, |k| {
-            frames.values(shown[k]).map_err(|error| match error {
-                Error::Shared(error) => error,
-                other => polycore::Error::Data { what: "animation".into(), reason: other.to_string() },
-            })
-        })?;
-    }
     let births: Vec<f64> = task.problem.births.iter().map(|birth| birth.time).collect();
     let stages = stages(&births, &frames.times(), scene.output.stages);
-    let stages = stages.into_iter().map(|frame| frames.values(frame)).collect::<Result<Vec<_>, _>>()?;
-    let mut ranges = frames.no_ranges();
-    stages.iter().for_each(|stage| widen(&mut ranges, stage));
-    Ok(frames.strips(scene, &ranges).write(output.join("sections.png"), &stages)?)
+    let mut printed: Vec<u32> =
+        task.printed.iter().flat_map(|&element| mesh.nodes(element)).copied().collect();
+    printed.sort_unstable();
+    printed.dedup();
+    let mut ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; 1 + usize::from(frames.field.is_some())];
+    let others = stages.iter().filter(|stage| shown.binary_search(stage).is_err());
+    for &frame in shown.iter().chain(others) {
+        widen(&mut ranges, &frames.read(frame)?, &printed);
+    }
+    let columns = frames.columns(&ranges);
+    if let Some(section) = Section::through_the_middle(mesh, &task.printed) {
+        let strips = Strips {
+            title: scene.title.clone(),
+            samples: section.samples,
+            low: section.low,
+            spacing: section.spacing,
+            unit: ("mm".into(), 1e-3),
+            axes: ["x", "z"],
+            columns: columns.clone(),
+        };
+        let stage = |frame: usize| Ok(frames.section(&section, frames.read(frame)?));
+        if count > 1 {
+            let path = output.join("process.png");
+            strips.animate(path, shown.len(), SHOWN, |k| stage(shown[k]).map_err(polycore_error))?;
+        }
+        let stages = stages.iter().map(|&frame| stage(frame)).collect::<Result<Vec<_>, Error>>()?;
+        strips.write(output.join("sections.png"), &stages)?;
+    }
+    let Some(bounds) = mesh.bounds_of(&task.printed) else { return Ok(()) };
+    let solid = &scene.output.solid;
+    let view = solid.view();
+    let solids =
+        Solids { title: scene.title.clone(), bounds, unit: ("mm".into(), 1e-3), view, fields: columns };
+    let outside = Outside::new(mesh, &task.printed, solid.plane(bounds))?;
+    let stage = |frame: usize| -> Result<(String, Skin), polycore::Error> {
+        frames.read(frame).map(|frame| outside.skin(frame)).map_err(polycore_error)
+    };
+    solids.write(output.join("solid.png"), stages.len(), |k| stage(stages[k]))?;
+    if count > 1 {
+        solids.animate(output.join("process_solid.png"), shown.len(), SHOWN, |k| stage(shown[k]))?;
+    }
+    if solid.turntable {
+        solids.turn(output.join("turntable.png"), TURN, SHOWN, &stage(count - 1)?)?;
+    }
+    Ok(())
+}
+
+fn polycore_error(error: Error) -> polycore::Error {
+    match error {
+        Error::Shared(error) => error,
+        other => polycore::Error::Data { what: "picture".into(), reason: other.to_string() },
+    }
 }
 
 /// Frames to show: the first after some births, which shows fresh material while it is hot, then evenly to the end.
@@ -86,10 +133,11 @@ fn stages(births: &[f64], times: &[f64], wanted: usize) -> Vec<usize> {
     frames
 }
 
-/// Takes the values of a stage into the ranges of its fields.
-fn widen(ranges: &mut [[f64; 2]], stage: &Stage) {
-    for (values, [low, high]) in stage.1.iter().zip(ranges) {
-        for &value in values.iter().filter(|value| value.is_finite()) {
+/// Takes the values of a frame at some nodes into the ranges of its fields.
+fn widen(ranges: &mut [[f64; 2]], frame: &Frame, nodes: &[u32]) {
+    for (values, [low, high]) in frame.values.iter().zip(ranges) {
+        let there = nodes.iter().filter_map(|&node| values.get(node as usize));
+        for &value in there.filter(|value| value.is_finite()) {
             (*low, *high) = (low.min(value), high.max(value));
         }
     }
@@ -111,12 +159,8 @@ impl Frames<'_> {
         }
     }
 
-    fn no_ranges(&self) -> Vec<[f64; 2]> {
-        vec![[f64::INFINITY, f64::NEG_INFINITY]; 1 + usize::from(self.field.is_some())]
-    }
-
-    fn values(&self, frame: usize) -> Result<Stage, Error> {
-        let (time, all, exists): (f64, Vec<Vec<f64>>, Vec<bool>) = match &self.from {
+    fn read(&self, frame: usize) -> Result<Frame, Error> {
+        let (time, values, exists): (f64, Vec<Vec<f64>>, Vec<bool>) = match &self.from {
             Origin::File(series) => {
                 let names = std::iter::once(TEMPERATURE).chain(self.field);
                 let all = names.map(|name| series.data(frame, name)).collect::<Result<_, _>>()?;
@@ -132,12 +176,16 @@ impl Frames<'_> {
                 (simulation.time(), std::iter::once(temperature).chain(field).collect(), exists)
             }
         };
-        let there = |element: u32| exists.get(element as usize) == Some(&true);
-        let values = all.iter().map(|field| self.section.values(self.mesh, field, &there)).collect();
-        Ok((format!("t = {} s", (time * 100.0).round() / 100.0), values))
+        Ok(Frame { title: format!("t = {} s", (time * 100.0).round() / 100.0), values, exists })
     }
 
-    fn strips(&self, scene: &PartScene, ranges: &[[f64; 2]]) -> Strips<'static> {
+    fn section(&self, section: &Section, frame: Frame) -> Stage {
+        let there = |element: u32| frame.exists.get(element as usize) == Some(&true);
+        let values = frame.values.iter().map(|field| section.values(self.mesh, field, &there)).collect();
+        (frame.title, values)
+    }
+
+    fn columns(&self, ranges: &[[f64; 2]]) -> Vec<Strip> {
         let label = match self.field {
             Some("crystallinity") => "crystallinity X",
             Some("alpha") => "relative crystallinity α",
@@ -145,23 +193,14 @@ impl Frames<'_> {
             None => "",
         };
         let labels = [("T [°C]", ColorMap::Inferno), (label, ColorMap::Viridis)];
-        let columns =
-            labels.into_iter().zip(ranges).enumerate().map(|(k, ((label, colors), &[low, high]))| {
-                // a field that is the same everywhere still needs a bar, and crystallinity begins at 0
-                let low = if k == 0 { low } else { low.min(0.0) };
-                let range = if high > low { (low, high) } else { (low.min(0.0), low.max(0.0) + 1.0) };
-                let range = if range.0.is_finite() && range.1.is_finite() { range } else { (0.0, 1.0) };
-                Strip { label: label.to_owned(), range, colors }
-            });
-        Strips {
-            title: scene.title.clone(),
-            samples: self.section.samples,
-            low: self.section.low,
-            spacing: self.section.spacing,
-            unit: ("mm".into(), 1e-3),
-            axes: ["x", "z"],
-            columns: columns.collect(),
-        }
+        let column = |(k, ((label, colors), &[low, high])): (usize, ((&str, ColorMap), &[f64; 2]))| {
+            // a field that is the same everywhere still needs a bar, and crystallinity begins at 0
+            let low = if k == 0 { low } else { low.min(0.0) };
+            let range = if high > low { (low, high) } else { (low.min(0.0), low.max(0.0) + 1.0) };
+            let range = if range.0.is_finite() && range.1.is_finite() { range } else { (0.0, 1.0) };
+            Strip { label: label.to_owned(), range, colors }
+        };
+        labels.into_iter().zip(ranges).enumerate().map(column).collect()
     }
 }
 

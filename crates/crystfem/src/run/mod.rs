@@ -5,6 +5,7 @@ mod celsius;
 mod draw;
 mod explain;
 mod fit;
+mod outside;
 mod part;
 mod point;
 mod probe;

@@ -7,7 +7,7 @@ use crate::problem::Capacity;
 use crate::simulation::LinearSolver;
 use crate::time::Scheme;
 use polycore::report::Expect;
-use polycore::scene::{SceneError, Source};
+use polycore::scene::{SceneError, SolidSpec, Source};
 use polycore::units::dimension::{
     HeatFluxDimension, HeatTransferDimension, PowerDensityDimension, TemperatureDimension,
 };
@@ -191,11 +191,13 @@ pub struct PartOutput {
     pub every: Option<Time>,
     /// Pictures of so many stages.
     pub stages: usize,
+    /// How pictures show the body from outside.
+    pub solid: SolidSpec,
 }
 
 impl Default for PartOutput {
     fn default() -> Self {
-        Self { pictures: true, fields: true, every: None, stages: 5 }
+        Self { pictures: true, fields: true, every: None, stages: 5, solid: SolidSpec::default() }
     }
 }
 
@@ -261,7 +263,7 @@ impl PartScene {
         if !(1..=12).contains(&self.output.stages) {
             return Err(source.error("output.stages", self.output.stages, "1 to 12"));
         }
-        Ok(())
+        self.output.solid.check(source, "output.solid")
     }
 }
 

@@ -10,6 +10,7 @@ mod outcome;
 mod probes;
 mod program;
 mod scale;
+mod solid;
 mod stages;
 
 pub use outcome::{Outcome, Profile};
@@ -198,11 +199,15 @@ fn run_variant<const D: usize>(
     });
     outcome.seconds(&phases);
     let path = frames.path().to_path_buf();
+    let damage = if D == 3 && scene.output.pictures { frames.damage(&*body.bonds) } else { None };
     frames.finish(&*body.bonds, &state, &stresses)?;
     if scene.output.pictures {
         draw::maps(scene, &*body.bonds, &state, &stresses.cauchy, &outcome, output)?;
-        if scene.output.fields && scene.output.every.is_some() && critical_stretch.is_some() {
+        let staged = scene.output.fields && scene.output.every.is_some() && scene.stress.is_some();
+        if staged && critical_stretch.is_some() {
             stages::stages(scene, &outcome, body.bonds.spacing(), &path, output)?;
+        } else if D == 3 {
+            solid::end(scene, &*body.bonds, &state, &stresses, damage, &outcome, output)?;
         }
     }
     Ok(outcome)

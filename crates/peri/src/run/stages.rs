@@ -1,21 +1,17 @@
 //! Pictures of the stages of a run: the body as its fields show it.
 
 use super::outcome::Outcome;
-use super::scale::{bridge, short, stress_unit};
+use super::scale::{bridge, short};
+use super::solid::{self, Look, shown};
 use crate::error::Error;
 use crate::scene::Scene;
 use polycore::output::picture::{FieldMap, Panel};
 use polycore::output::vtkhdf;
+use std::borrow::Cow;
 use std::path::Path;
 
-/// Largest principal stress of a plane tensor in a row-major 3 × 3.
-fn principal(t: &[f64]) -> f64 {
-    let (mean, half) = (0.5 * (t[0] + t[4]), 0.5 * (t[0] - t[4]));
-    mean + half.hypot(0.5 * (t[1] + t[3]))
-}
-
 /// Largest principal stress and damage at some stages from the last whole state on, of a plane body or of the middle
-/// plane y = const of a solid.
+/// plane y = const of a solid; of a solid also as it looks from outside.
 ///
 /// # Errors
 /// Files that cannot be read or written.
@@ -36,14 +32,21 @@ pub fn stages(
     let chosen = choose(&damages, peak, scene.output.stages);
     let Some(spec) = &scene.stress else { return Ok(()) };
     let measure = format!("cauchy_{}", spec.measures[0].name());
-    let component = spec.component();
-    let index = match (&spec.component, component) {
-        (Some(name), Some(_)) => {
-            name.chars().filter_map(|c| "₀₁₂₃".chars().nth(c.to_digit(10)? as usize)).collect()
-        }
-        _ => "₁".to_owned(),
-    };
     let flat = scene.body.space != crate::calibrate::Space::Solid;
+    let look = |frame: usize| -> Result<Look, polycore::Error> {
+        let (places, moved) = (frames.points(frame)?, frames.data(frame, "displacement")?);
+        let tensors = frames.data(frame, &measure)?;
+        let at_rest = |(k, x): (usize, &[f64; 3])| [0, 1, 2].map(|d| x[d] - moved[3 * k + d]);
+        Ok(Look {
+            title: title(outcome, frames.times()[frame]),
+            rest: places.iter().enumerate().map(at_rest).collect(),
+            places,
+            values: [
+                tensors.chunks(9).map(|t| shown(spec, flat, t)).collect(),
+                frames.data(frame, "damage")?,
+            ],
+        })
+    };
     struct Stage {
         places: Vec<[f64; 2]>,
         rest: Vec<[f64; 2]>,
@@ -51,40 +54,31 @@ pub fn stages(
         damage: Vec<f64>,
         title: String,
     }
-    let mut stages = Vec::new();
-    for frame in chosen {
-        let points = frames.points(frame)?;
-        let (moved, tensors, damage) = (
-            frames.data(frame, "displacement")?,
-            frames.data(frame, &measure)?,
-            frames.data(frame, "damage")?,
-        );
-        let at_rest = |k: usize| [0, 1, 2].map(|d| points[k][d] - moved[3 * k + d]);
-        let rest = |k: usize| at_rest(k)[1];
-        let middle = {
-            let (low, high) =
-                (0..points.len()).map(rest).fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
-            0.5 * (low + high)
-        };
-        let keep: Vec<usize> = (0..points.len())
-            .filter(|&k| flat || (0.0..spacing).contains(&(rest(k) - middle + 0.01 * spacing)))
+    let (mut stages, mut all, mut bounds) = (Vec::new(), Vec::new(), solid::NOWHERE);
+    for &frame in &chosen {
+        let Look { title, places, rest, values: [stress, damage] } = look(frame)?;
+        solid::widen(&mut bounds, &places);
+        let (low, high) = rest.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x[1]), h.max(x[1])));
+        let middle = 0.5 * (low + high);
+        let keep: Vec<usize> = (0..places.len())
+            .filter(|&k| flat || (0.0..spacing).contains(&(rest[k][1] - middle + 0.01 * spacing)))
             .collect();
         let in_plane = |x: [f64; 3]| if flat { [x[0], x[1]] } else { [x[0], x[2]] };
-        let plane = |k: usize| {
-            let t = &tensors[9 * k..9 * k + 9];
-            if let Some([a, b]) = component {
-                return t[3 * a + b];
-            }
-            if flat { principal(t) } else { principal(&[t[0], t[2], 0.0, t[6], t[8]]) }
-        };
-        let title = title(outcome, frames.times()[frame]);
         stages.push(Stage {
-            places: keep.iter().map(|&k| in_plane(points[k])).collect(),
-            rest: keep.iter().map(|&k| in_plane(at_rest(k))).collect(),
-            stress: keep.iter().map(|&k| plane(k)).collect(),
+            places: keep.iter().map(|&k| in_plane(places[k])).collect(),
+            rest: keep.iter().map(|&k| in_plane(rest[k])).collect(),
+            stress: keep.iter().map(|&k| stress[k]).collect(),
             damage: keep.iter().map(|&k| damage[k]).collect(),
             title,
         });
+        all.extend(stress);
+    }
+    let field = solid::stress_field(spec, all);
+    let (scale, label, (low, high)) = (field.scale, field.strip.label.clone(), field.strip.range);
+    if !flat {
+        let picture = solid::Picture { scene, outcome, spacing, bounds };
+        let fields = vec![field, solid::damage_field()];
+        picture.draw(output, fields, chosen.len(), |k| Ok(Cow::Owned(look(chosen[k])?)))?;
     }
     let bridge = bridge(outcome);
     let [wide, tall] = [0, 1].map(|d| {
@@ -97,13 +91,6 @@ pub fn stages(
     if !flat {
         map = map.axes(["x", "z"]);
     }
-    // a crushed particle's Cauchy stress would take all the colours
-    let mut all: Vec<f64> = stages.iter().flat_map(|stage| stage.stress.iter().copied()).collect();
-    all.sort_by(f64::total_cmp);
-    let part = |share: f64| all.get((share * (all.len().max(1) - 1) as f64) as usize).copied().unwrap_or(0.0);
-    let (low, high) = (part(0.002).min(0.0), part(0.998).max(0.0));
-    let (scale, unit) = stress_unit(high.max(-low));
-    let (low_stress, high_stress, label) = (low * scale, high * scale, format!("σ{index} ({unit})"));
     for stage in &mut stages {
         stage.stress.iter_mut().for_each(|stress| *stress *= scale);
     }
@@ -117,8 +104,7 @@ pub fn stages(
         let panel = if damage {
             Panel::new("", "damage", &stage.places, &stage.damage, spacing).range(0.0, 0.6)
         } else {
-            let panel = Panel::new(&stage.title, &label, &stage.places, &stage.stress, spacing);
-            if high_stress > low_stress { panel.range(low_stress, high_stress) } else { panel }
+            Panel::new(&stage.title, &label, &stage.places, &stage.stress, spacing).range(low, high)
         };
         map = map.panel(panel.reference(&stage.rest).bridge(bridge));
     }
@@ -146,7 +132,7 @@ impl Layout {
 }
 
 /// What a moment of a run is called: a load step's displacement and load, or a place within a step.
-fn title(outcome: &Outcome, time: f64) -> String {
+pub(super) fn title(outcome: &Outcome, time: f64) -> String {
     let step = time.ceil() as usize;
     let Some(record) = step.checked_sub(1).and_then(|k| outcome.history.get(k)) else { return String::new() };
     let place = format!("U = {} mm", short(record.displacement * 1e3));

@@ -199,7 +199,13 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if !(1..=12).contains(&scene.output.stages) {
         return Err(source.error("output.stages", scene.output.stages, "1 to 12"));
     }
-    Ok(())
+    match &scene.output.solid {
+        Some(_) if scene.body.space != Space::Solid => {
+            Err(source.error("output.solid", "a view of a solid", "only with `space = \"solid\"`"))
+        }
+        Some(solid) => solid.check(source, "output.solid"),
+        None => Ok(()),
+    }
 }
 
 pub(super) fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {

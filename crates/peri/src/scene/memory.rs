@@ -30,6 +30,8 @@ const PACKED: f64 = 160.0;
 /// Canvases and letters of pictures, and a particle in one: its place, its components, its reach, its cell.
 const PICTURES: f64 = 60e6;
 const DRAWN: f64 = 150.0;
+/// The same of a solid: two places, two values, its place in the lattice, its neighbours, the faces of its surface.
+const DRAWN_IN_SPACE: f64 = 350.0;
 /// A bond of a cloud beside what it keeps: the lists while they are built.
 const BOND_LISTS: f64 = 12.0;
 
@@ -61,8 +63,8 @@ fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     if scene.output.fields {
         each += WRITTEN + PACKED + WRITTEN_TENSORS * measures;
     }
-    if scene.output.pictures && D == 2 {
-        each += DRAWN;
+    if scene.output.pictures {
+        each += if D == 2 { DRAWN } else { DRAWN_IN_SPACE };
     }
     let rows = match &scene.dynamics {
         Some(dynamics) => dynamics.method().records,

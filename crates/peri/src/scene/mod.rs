@@ -38,6 +38,7 @@ use crate::critical::Critical;
 use crate::potential::Law;
 use crate::stress::{BallVolume, Measure};
 use polycore::report::Expect;
+use polycore::scene::SolidSpec;
 use polycore::units::{Length, Stress};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -283,7 +284,7 @@ pub struct StressSpec {
     /// Volume of the averaging ball of `ball-share`.
     #[serde(default)]
     pub ball: BallVolume,
-    /// The component that pictures of stages show, e.g. `22`; default: the largest principal stress in the plane.
+    /// The component that pictures of stages show, e.g. `22`; default: the largest principal stress, of a plane body that in the plane.
     pub component: Option<String>,
 }
 
@@ -358,6 +359,8 @@ pub struct OutputSpec {
     pub every: Option<usize>,
     /// Pictures of so many stages from the last whole state to the end, of what is written with `every`.
     pub stages: usize,
+    /// How pictures show a solid.
+    pub solid: Option<SolidSpec>,
     /// Displacements at which the load becomes a value of the report: `load_at_20mm`.
     pub load_at: Vec<Length>,
     /// The integrals over the horizon of Appendix A, by quadrature, among the values of the report.
@@ -385,6 +388,7 @@ impl Default for OutputSpec {
             fields: true,
             every: None,
             stages: 5,
+            solid: None,
             load_at: Vec::new(),
             integrals: false,
             compare: None,

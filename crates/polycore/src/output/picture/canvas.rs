@@ -2,6 +2,10 @@
 
 use kuva::backend::raster::RasterBackend;
 use kuva::render::render::{Primitive, Scene, TextAnchor};
+use std::path::Path;
+
+use super::picture_error;
+use crate::Error;
 
 pub(super) type Color = [u8; 3];
 
@@ -9,6 +13,7 @@ pub(super) const BLACK: Color = [0, 0, 0];
 const WHITE: Color = [255, 255, 255];
 
 /// An RGB image.
+#[derive(Clone)]
 pub(super) struct Canvas {
     pub(super) width: usize,
     pub(super) height: usize,
@@ -99,6 +104,49 @@ impl Canvas {
         self.rectangle(x + width, y, t, height, color);
     }
 
+    /// A straight line between two points.
+    pub(super) fn line(&mut self, from: [f64; 2], to: [f64; 2], width: f64, color: Color) {
+        let [along, across] = [0, 1].map(|d| to[d] - from[d]);
+        let square = (along * along + across * across).max(f64::MIN_POSITIVE);
+        let pixels = |d: usize| {
+            let (low, high) = (from[d].min(to[d]) - width, from[d].max(to[d]) + width);
+            low.floor() as isize..=high.ceil() as isize
+        };
+        for y in pixels(1) {
+            for x in pixels(0) {
+                let r = [x as f64 + 0.5 - from[0], y as f64 + 0.5 - from[1]];
+                let t = ((r[0] * along + r[1] * across) / square).clamp(0.0, 1.0);
+                let off = (r[0] - t * along).hypot(r[1] - t * across);
+                self.mix(x, y, (0.5 + 0.5 * width - off).clamp(0.0, 1.0), color);
+            }
+        }
+    }
+
+    /// Covers a part of a pixel with a colour.
+    fn mix(&mut self, x: isize, y: isize, part: f64, color: Color) {
+        if (0..self.width as isize).contains(&x) && (0..self.height as isize).contains(&y) {
+            let pixel = &mut self.pixels[y as usize * self.width + x as usize];
+            let mixed = |k: usize| (1.0 - part) * f64::from(pixel[k]) + part * f64::from(color[k]);
+            *pixel = [0, 1, 2].map(|k| mixed(k).round() as u8);
+        }
+    }
+
+    /// The least rectangle (left, top, width, height) outside of which nothing differs from an image of the same size; one
+    /// pixel where nothing does.
+    fn difference(&self, other: &Self) -> [usize; 4] {
+        let differs =
+            |x: usize, y: usize| self.pixels[y * self.width + x] != other.pixels[y * self.width + x];
+        let in_row = |y: &usize| {
+            self.pixels[y * self.width..][..self.width] != other.pixels[y * self.width..][..self.width]
+        };
+        let Some(top) = (0..self.height).find(in_row) else { return [0, 0, 1, 1] };
+        let bottom = (top..self.height).rev().find(in_row).unwrap_or(top);
+        let in_column = |x: &usize| (top..=bottom).any(|y| differs(*x, y));
+        let left = (0..self.width).find(in_column).unwrap_or(0);
+        let right = (left..self.width).rev().find(in_column).unwrap_or(left);
+        [left, top, right + 1 - left, bottom + 1 - top]
+    }
+
     /// Copies another image to a place where it fits.
     pub(super) fn paste(&mut self, other: &Self, x: usize, y: usize) {
         for (row, line) in other.pixels.chunks(other.width.max(1)).enumerate() {
@@ -132,6 +180,57 @@ impl Canvas {
             *pixel = pixel.map(|channel| (u16::from(channel) * (255 - u16::from(ink)) / 255) as u8);
         }
     }
+}
+
+/// An animated PNG of images of one size, one after another without end; the last is shown `rest` times as long.
+///
+/// # Errors
+/// Those of `frame`; no frame; what cannot be encoded.
+pub(super) fn film(
+    path: &Path,
+    frames: usize,
+    seconds: f64,
+    rest: u16,
+    mut frame: impl FnMut(usize) -> Result<Canvas, Error>,
+) -> Result<Vec<u8>, Error> {
+    if frames == 0 {
+        return Err(picture_error(path, "there is no frame"));
+    }
+    let text = |error: png::EncodingError| picture_error(path, error);
+    let mut last = frame(0)?;
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, last.width as u32, last.height as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Balanced);
+    encoder.set_filter(png::Filter::NoFilter);
+    let delay = (1000.0 * seconds).round().clamp(1.0, 60_000.0) as u16;
+    if frames > 1 {
+        encoder.set_animated(frames as u32, 0).map_err(text)?;
+        encoder.set_frame_delay(delay, 1000).map_err(text)?;
+    }
+    let mut writer = encoder.write_header().map_err(text)?;
+    writer.write_image_data(last.pixels.as_flattened()).map_err(text)?;
+    for index in 1..frames {
+        let next = frame(index)?;
+        if [next.width, next.height] != [last.width, last.height] {
+            return Err(picture_error(path, format!("frame {index} has another size")));
+        }
+        // what changes only
+        let [x, y, width, height] = next.difference(&last);
+        writer.reset_frame_position().map_err(text)?;
+        writer.set_frame_dimension(width as u32, height as u32).map_err(text)?;
+        writer.set_frame_position(x as u32, y as u32).map_err(text)?;
+        if index + 1 == frames {
+            writer.set_frame_delay(delay.saturating_mul(rest), 1000).map_err(text)?;
+        }
+        let rows = next.pixels.chunks(next.width).skip(y).take(height);
+        let part: Vec<u8> = rows.flat_map(|row| row[x..x + width].as_flattened()).copied().collect();
+        writer.write_image_data(&part).map_err(text)?;
+        last = next;
+    }
+    writer.finish().map_err(text)?;
+    Ok(bytes)
 }
 
 /// A rendered line of text: how much ink each pixel takes.

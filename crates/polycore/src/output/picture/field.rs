@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use super::axis::{labels, ticks};
+use super::bar::{Bar, LABEL, LINE, TICK, TICK_LENGTH};
 use super::blocks::Blocks;
 use super::canvas::{Anchor, BLACK, Canvas, Text};
 use super::color::{ColorMap, MISSING};
@@ -13,12 +14,7 @@ use crate::Error;
 use crate::output::atomic_write;
 
 const TITLE: u32 = 28;
-const LABEL: u32 = 25;
-const TICK: u32 = 22;
 const MARGIN: usize = 26;
-const BAR_WIDTH: usize = 26;
-const TICK_LENGTH: isize = 8;
-const LINE: isize = 2;
 /// More pixels than this are a mistake.
 const LARGEST_PICTURE: usize = 200_000_000;
 
@@ -244,7 +240,9 @@ impl<'a> FieldMap<'a> {
         let blocks = Blocks::new(panel.positions, panel.reference, panel.spacing, panel.bridge);
         let raster = window.draw(panel.positions, panel.values, &blocks);
         let (low, high) = panel.limits();
-        let bar = Bar::new(panel, low, high, raster.height.max(220))?;
+        let beyond =
+            [panel.values.iter().any(|value| *value < low), panel.values.iter().any(|value| *value > high)];
+        let bar = Bar::new(&panel.label, (low, high), beyond, raster.height.max(220))?;
         let axes = self.lengths.as_ref().map(|lengths| Axes::new(&window, &raster, lengths, self.names));
         let axes = axes.transpose()?;
         let title = Text::new(&panel.title, TITLE)?;
@@ -281,69 +279,6 @@ fn sheet(width: usize, height: usize) -> Result<Canvas, String> {
     match width.checked_mul(height) {
         Some(pixels) if pixels <= LARGEST_PICTURE => Ok(Canvas::new(width, height)),
         _ => Err(format!("{width} × {height} pixels are too many")),
-    }
-}
-
-/// The colour bar with its ticks.
-struct Bar {
-    ticks: Vec<(f64, Text)>,
-    label: Text,
-    below: bool,
-    above: bool,
-    /// Of everything.
-    width: usize,
-    height: usize,
-}
-
-impl Bar {
-    fn new(panel: &Panel<'_>, low: f64, high: f64, height: usize) -> Result<Self, String> {
-        let positions = ticks(low, high, (height / 70).clamp(3, 9));
-        let texts =
-            labels(&positions).iter().map(|text| Text::new(text, TICK)).collect::<Result<Vec<_>, _>>()?;
-        let widest = texts.iter().map(|text| text.width).max().unwrap_or(0);
-        let label = Text::new(&panel.label, LABEL)?;
-        let beside = if panel.label.is_empty() { 0 } else { LABEL as usize * 3 / 2 + 8 };
-        Ok(Self {
-            ticks: positions.iter().map(|tick| (tick - low) / (high - low)).zip(texts).collect(),
-            below: panel.values.iter().any(|value| *value < low),
-            above: panel.values.iter().any(|value| *value > high),
-            width: BAR_WIDTH + TICK_LENGTH as usize + 8 + widest + beside,
-            height: height.max(label.width),
-            label,
-        })
-    }
-
-    fn draw(&self, canvas: &mut Canvas, x: isize, y: isize, colors: ColorMap) {
-        let (width, height) = (BAR_WIDTH as isize, self.height as isize);
-        // points at the ends say that there are values beyond
-        let (top, bottom) = (if self.above { width } else { 0 }, if self.below { width } else { 0 });
-        let (start, length) = (y + top, height - top - bottom);
-        for row in 0..length {
-            let share = 1.0 - (row as f64 + 0.5) / length as f64;
-            canvas.rectangle(x, start + row, width, 1, colors.at(share));
-        }
-        canvas.frame(x, start, width, length, LINE, BLACK);
-        for (there, base, direction, share) in
-            [(self.above, start - LINE, -1, 1.0), (self.below, start + length + LINE, 1, 0.0)]
-        {
-            if there {
-                for step in 0..width / 2 {
-                    let row = if direction < 0 { base - 1 - step } else { base + step };
-                    canvas.rectangle(x + step, row, width - 2 * step, 1, colors.at(share));
-                    for edge in [x + step, x + width - 1 - step] {
-                        canvas.rectangle(edge - 1, row, LINE + 1, 1, BLACK);
-                    }
-                }
-            }
-        }
-        for (share, text) in &self.ticks {
-            let at = start + ((1.0 - share) * length as f64).round() as isize;
-            let at = at.clamp(start, start + length - 1);
-            canvas.rectangle(x + width + LINE, at - LINE / 2, TICK_LENGTH, LINE, BLACK);
-            canvas.text(x + width + LINE + TICK_LENGTH + 6, at, text, Anchor::Left);
-        }
-        let far = x + self.width as isize - LABEL as isize * 3 / 4;
-        canvas.text(far, start + length / 2, &self.label, Anchor::Upwards);
     }
 }
 
