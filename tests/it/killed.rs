@@ -170,7 +170,7 @@ fn checkpoints_that_cannot_be_used() {
         assert!(!here.join("out/report.json").exists());
         assert_eq!(fs::read(&path).unwrap(), bytes, "it stays as it is");
     };
-    let damaged = "damaged or cut short";
+    let damaged = "damaged or truncated";
     refused(&bytes[..bytes.len() / 2], damaged);
     refused(&bytes[..bytes.len() - 1], damaged);
     refused(&[&bytes[..], b"more"].concat(), damaged);

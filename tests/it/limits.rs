@@ -56,7 +56,7 @@ fn no_room_on_the_disk() {
             }
             let ended = ended.with_code(1);
             ended.tells("cannot write ");
-            ended.tells("the file would be larger than is allowed: ");
+            ended.tells("the file exceeds the size limit: ");
             assert!(!ended.stderr.contains("rust-hdf5"), "{}", ended.stderr);
             fields += usize::from(ended.stderr.contains(".vtkhdf"));
             assert!(!here.join(&out).join("report.json").exists());
@@ -83,7 +83,7 @@ fn memory_of_the_process() {
     // 5e8 bytes are needed
     let ended = limited("crystfem", "check brick.toml", "ulimit -v 450000", here).with_code(2);
     ended.tells("`mesh.brick.elements`: found 1.030e6 nodes, which need about 0.5 GiB");
-    ended.tells("(the memory available)");
+    ended.tells("(the available memory)");
 }
 
 /// Begins a run and waits for a file of it.

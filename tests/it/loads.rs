@@ -110,7 +110,7 @@ fn every_value_may_be_expected() {
         + "\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"1 ms\"\nrecords = 3\n";
     let forced = strip(HELD, "force = [\"1 N\", \"0 N\"]");
     let plates = scenes::plate("\"50 mm\", \"40 mm\"", "1e-3")
-        + "\n[[study]]\nname = \"impossible\"\nspacing = [\"50 mm\"]\nfails = \"not converged\"\n\
+        + "\n[[study]]\nname = \"impossible\"\nspacing = [\"50 mm\"]\nexpect_error = \"not converged\"\n\
            solver = { tolerance = 1e-9, max_iterations = 2 }\n";
     for (scene, asked) in [
         (fracture, "load_at_first_break"),

@@ -141,11 +141,11 @@ pub fn studies() -> String {
     bar + r#"
 [[study]]
 name = "uncoupled"
-must = "crystallize"
+description = "crystallize"
 
 [[study]]
 name = "coupled"
-must = "crystallize later"
+description = "crystallize later"
 set = { "materials.pa12.latent_heat" = "209 J/g" }
 
 [[study]]
@@ -155,8 +155,8 @@ set = { "boundary[0].temperature" = "20 degC" }
 
 [[study]]
 name = "flat"
-must = "be refused"
-fails = "no extent"
+description = "be refused"
+expect_error = "no extent"
 mesh = { brick = { size = ["1 mm", "1 mm", "0 mm"], elements = [1, 1, 1] } }
 
 [[expect]]
@@ -175,15 +175,15 @@ fn studies_of_a_part() {
     let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
     let told = crystfem("check bar.toml").with_code(0);
     told.shows("study coupled");
-    told.shows("leaves out latent heat: temperatures know nothing of crystals");
-    told.shows("  must fail  with `no extent`");
+    told.shows("leaves out latent heat: temperature does not depend on crystallinity");
+    told.shows("  expects    an error that contains `no extent`");
     crystfem("run bar.toml --output out").with_code(0).shows("pass  coupled.least_alpha");
     let out = here.join("out");
     let report = report(&out);
     let of = |name: &str| scalar(&report, name);
     // what heat of crystallization adds stays in the bar for a while; glass at 20 °C quenches it
     assert!(of("coupled.worst_balance") < 1e-10 && of("cold.mean_alpha") < 0.5);
-    assert!(of("uncoupled.least_alpha") > 0.95 && of("flat.failed_as_it_must") == 1.0);
+    assert!(of("uncoupled.least_alpha") > 0.95 && of("flat.failed_as_expected") == 1.0);
     // a study is what its scene alone would be
     let alone = BAR.replace("tolerance = \"1 K\"", "tolerance = \"2 K\"");
     fs::write(here.join("alone.toml"), alone).unwrap();

@@ -11,7 +11,7 @@ fn crystfem(arguments: &str, here: &Path) -> Ended {
     finish(command("crystfem", arguments, here).spawn().unwrap())
 }
 
-/// The scene that hid NaN: Appendix B with its sign mended takes steps by temperature only, and α passes 1.
+/// The scene that hid NaN: Appendix B with its sign corrected takes steps by temperature only, and α passes 1.
 #[test]
 fn a_state_that_is_not_finite_ends_the_run() {
     let directory = tempfile::tempdir().unwrap();
@@ -29,12 +29,12 @@ fn a_state_that_is_not_finite_ends_the_run() {
     // unless the scene asks for it, and then it must come
     let study = |set: &str| {
         format!(
-            "{scene}\n[[study]]\nname = \"as-coded\"\nfails = \"alpha is not finite\"\nset = {{ {set} }}\n"
+            "{scene}\n[[study]]\nname = \"as-coded\"\nexpect_error = \"alpha is not finite\"\nset = {{ {set} }}\n"
         )
     };
     fs::write(here.join("asked.toml"), study("\"print.start\" = \"0 s\"")).unwrap();
     crystfem("run asked.toml --output asked", here).with_code(0);
-    assert_eq!(scalar(&report(&here.join("asked")), "as-coded.failed_as_it_must"), 1.0);
+    assert_eq!(scalar(&report(&here.join("asked")), "as-coded.failed_as_expected"), 1.0);
     fs::write(here.join("none.toml"), study("\"materials.pa12.sign\" = \"as-published\"")).unwrap();
     let ended = crystfem("run none.toml --output none", here).with_code(1);
     ended.shows("FAIL  study as-coded did not fail");
@@ -130,7 +130,7 @@ fn a_path_beside_the_part() {
         scene(keys);
         let told = crystfem("check cube.toml", here).with_code(0);
         told.shows("the beads cover 19.0 % of the part; 0.0 % of their length lies outside of it");
-        told.shows("probe `middle` lies where nothing is printed");
+        told.shows("probe `middle` is where nothing is printed");
         told.shows("304 elements in all");
     }
     crystfem("run cube.toml --output out", here).with_code(0);

@@ -10,7 +10,7 @@ fn crystfem(arguments: &str, here: &Path) -> Ended {
 }
 
 #[test]
-fn slips_are_told() {
+fn slips_are_reported() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     let write = |name: &str, text: &str| fs::write(here.join(name), text).unwrap();
@@ -137,7 +137,7 @@ fn the_least_value_that_passes() {
         "\n[[expect]]\nquantity = \"mean_alpha\"\nat_least = 0.5\nkind = \"bound\"\nsource = \"none\"\n";
     fs::write(here.join("bar.toml"), bar.clone() + expect).unwrap();
     let ended = crystfem("sweep bar.toml --search time.end=5s..105s -o out", here).with_code(0);
-    ended.shows(" is the least that meets all that is expected; ");
+    ended.shows(" is the least value that satisfies all expectations; ");
     let line = ended.stdout.lines().find(|line| line.starts_with("time.end = ")).unwrap();
     let numbers: Vec<f64> = line.split([' ', 's']).filter_map(|word| word.parse().ok()).collect();
     assert!(numbers.len() == 2 && numbers[0] > numbers[1] && numbers[0] - numbers[1] <= 1.0 + 1e-9, "{line}");

@@ -26,13 +26,13 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Run all tests: the command of the README; lists at the end what could not be tested here.
+    /// Run all tests: the command of the README; lists skipped tests at the end.
     Test {
         /// Passed on to `cargo test`, for example a test's name.
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
-    /// Run the cases and judge everything that they expect; the report is target/validation/report.html.
+    /// Run the cases and judge their expectations; the report is target/validation/report.html.
     Validate(validate::Options),
     /// Measure: `langevin`, `peri-peers`, or a program that has a `bench --json` of its own (`peri`).
     Bench(bench::Options),

@@ -61,7 +61,7 @@ enum Left {
 pub type Records = BTreeMap<String, Record>;
 
 impl Record {
-    /// The value and what was asked for, for a reader.
+    /// The value and what was requested, for a reader.
     pub fn cells(&self) -> [String; 2] {
         let mut expect = json!({ "quantity": self.name, "kind": "bound", "source": "a test" });
         let asked = [

@@ -97,7 +97,7 @@ fn command(outcome: &Outcome, quick: bool) -> String {
     format!("cargo run --release -p {} -- run {}{quick}", outcome.program, outcome.file)
 }
 
-/// The cases asked for, in alphabetical order.
+/// The cases requested, in alphabetical order.
 fn find(workspace: &Workspace, options: &Options) -> Result<Vec<Case>> {
     let all = workspace.root().join("cases");
     let mut files = Vec::new();

@@ -51,7 +51,7 @@ enum What {
 }
 
 fn elements(text: &str) -> Result<usize, String> {
-    let value: usize = text.parse().map_err(|_| format!("`{text}` is no whole number"))?;
+    let value: usize = text.parse().map_err(|_| format!("`{text}` is not a whole number"))?;
     if (1..=400).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 1 to 400")) }
 }
 

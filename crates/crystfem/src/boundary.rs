@@ -64,7 +64,7 @@ impl Schedule {
                 return Err(wrong("value", value, "a finite number"));
             }
             if index > 0 && time <= pairs[index - 1].0 {
-                return Err(wrong("time, s", time, "a time above the one before"));
+                return Err(wrong("time, s", time, "a time after the previous one"));
             }
         }
         Ok(Self {
@@ -276,7 +276,7 @@ impl Condition {
                 // k/h is less than an atom there: no film, but a surface that is held
                 let bad = |h: &&f64| !(0.0..=1e12).contains(*h);
                 if let Some(&found) = coefficient.values.iter().find(bad) {
-                    let allowed = "0 to 1e12 W/(m² K); beyond it, hold the surface by `temperature`";
+                    let allowed = "0 to 1e12 W/(m² K); beyond it, prescribe its `temperature`";
                     return wrong("film coefficient", found, allowed);
                 }
                 not_below_zero("ambient temperature", ambient)

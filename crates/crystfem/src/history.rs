@@ -128,7 +128,7 @@ impl History {
                 line: lines[row],
                 what: "time".to_owned(),
                 found: format!("{} s", times[row]),
-                allowed: format!("{} s or later, as in the row before", times[row - 1]),
+                allowed: format!("{} s or later, as in the previous row", times[row - 1]),
             });
         }
         Self::new(times, temperatures)

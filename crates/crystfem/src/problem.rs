@@ -202,7 +202,7 @@ impl Problem {
                 return Err(Error::Parameter {
                     name: "birth time",
                     found: birth.time,
-                    allowed: format!("{last} s (the birth before) or later, finite"),
+                    allowed: format!("{last} s (the previous birth) or later, finite"),
                 });
             }
             last = birth.time;

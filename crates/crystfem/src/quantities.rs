@@ -21,7 +21,7 @@ polycore::quantities! {
     JUMP = "{probe}.jump_at_birth_{number}", "K", "rise of the temperature after a birth, before the next one";
     AT_BIRTH = "{probe}.{field}_at_birth_{number}", "", "value of a field just before a birth";
     LOST_AT_BIRTH = "{probe}.{field}_lost_at_birth_{number}", "", "by how much it falls after the birth";
-    FAILED_AS_IT_MUST = "{study}.failed_as_it_must", "", "1 if a study with `fails` ended with this error, else 0";
+    FAILED_AS_EXPECTED = "{study}.failed_as_expected", "", "1 if a study with `expect_error` ended with this error, else 0";
     LIMIT = "{convergence}.limit", "*", "value that three studies tend to, after Richardson";
     ORDER = "{convergence}.order", "", "observed order of these studies";
     ERROR_OF = "{curve}.error_of_{study}", "", "relative error of a study in an error-against-time curve";

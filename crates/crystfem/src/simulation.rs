@@ -69,7 +69,7 @@ impl Settings {
     }
 }
 
-/// Everything a run needs to go on, bit by bit.
+/// Everything a run needs to continue, bit by bit.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct State {
     /// Time, s.
@@ -196,7 +196,7 @@ impl Simulation {
         &self.problem
     }
 
-    /// Where it stands: serialise it to go on later with the same bits.
+    /// Where it stands: serialise it to continue later with the same bits.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -323,7 +323,7 @@ impl Simulation {
         let [rows, segments, entries] = system.rows.stored();
         let mut lines = vec![
             format!(
-                "{} equations for {} of {} elements; {} nodes have no equation, {} are held",
+                "{} equations for {} of {} elements; {} nodes have no equation, {} are prescribed",
                 system.size(),
                 system.elements.len(),
                 self.problem.material_of.len(),

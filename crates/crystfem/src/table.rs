@@ -4,7 +4,7 @@ use crate::error::Error;
 use polycore::units::{Dimension, Quantity};
 use std::path::Path;
 
-/// A column that is asked for.
+/// A column that is requested.
 #[derive(Clone, Copy)]
 pub struct Column {
     name: &'static str,

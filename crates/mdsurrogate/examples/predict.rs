@@ -8,7 +8,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
     let path = std::env::args().nth(1).map_or(folder.path().join("law.safetensors"), Into::into);
     if !path.exists() {
-        // random weights in place of a training: an orthotropic energy, an ensemble of two
+        // random weights instead of a training: an orthotropic energy, an ensemble of two
         let header = Header::new(Kind::energy(Symmetry::Orthotropic), &[(32, Softplus), (32, Softplus)], 2);
         Surrogate::random(header, 1)?.write(&path)?;
     }

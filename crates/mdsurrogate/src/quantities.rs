@@ -61,7 +61,7 @@ polycore::quantities! {
     UNSEEN_SHEAR = "{model}.unseen_shear_stress", "MPa", "stress in these shears";
     SHEAR_FLAGGED = "{model}.share_of_shear_flagged", "", "share of simple shears of 0.05 that are flagged as unseen, where the data have no shear";
     BINNED = "{model}.heldout.percentage_error_c{component}_{from}_to_{to}", "%", "mean of (3.13) over all held-out runs pulled along an axis, between two values of C";
-    AS_IT_MUST = "{trial}.as_it_must", "", "1 if a trial ended as its scene asks, else 0";
+    AS_EXPECTED = "{trial}.as_expected", "", "1 if a trial ended as its scene expects, else 0";
 }
 
 polycore::quantities! {

@@ -43,13 +43,13 @@ pub enum Error {
         iterations: u64,
         /// Relative residual reached.
         residual: f64,
-        /// Relative residual asked for.
+        /// Relative residual requested.
         needed: f64,
     },
     /// The time step of explicit dynamics is beyond the critical one.
     #[error("time step: found {found:.4e} s; allowed: up to the critical {critical:.4e} s")]
     TimeStep {
-        /// The time step asked for, s.
+        /// The time step requested, s.
         found: f64,
         /// The critical one 2/ω_max, s.
         critical: f64,
@@ -57,7 +57,7 @@ pub enum Error {
     /// Energy grows from nothing in explicit dynamics.
     #[error(
         "unstable at t = {time:.4e} s (time step {step}): kinetic energy {kinetic:.3e} J where {available:.3e} J are \
-         available; its time step is {time_step:.4e} s, the critical one for the stretches met {critical:.4e} s"
+         available; its time step is {time_step:.4e} s, the critical one for the observed stretches {critical:.4e} s"
     )]
     Unstable {
         /// Time, s.

@@ -186,7 +186,7 @@ pub fn recognise<const D: usize>(points: &[[f64; D]], volumes: &[f64], thickness
     let high: [f64; D] =
         std::array::from_fn(|d| points.iter().map(|p| p[d]).fold(f64::NEG_INFINITY, f64::max));
     let extent: [f64; D] = std::array::from_fn(|d| ((high[d] - low[d]) / spacing).round() + 1.0);
-    // a sparse box would waste more than a neighbour list; of a spacing of 0 the extent is no number
+    // a sparse box would waste more than a neighbour list; of a spacing of 0 the extent is not a number
     let sparse = extent.iter().product::<f64>() > 8.0 * points.len() as f64;
     if sparse || !extent.iter().all(|e| e.is_finite()) {
         return None;
@@ -327,10 +327,10 @@ struct Meeting<const D: usize> {
     inward: [f64; D],
 }
 
-/// Whether cuts sever the bond of `a` and `b`: solves a + s(b − a) = corner + Σ wᵢ edgeᵢ and asks for 0 < s < 1, 0 < w < 1.
+/// Whether cuts break the bond of `a` and `b`: solves a + s(b − a) = corner + Σ wᵢ edgeᵢ and asks for 0 < s < 1, 0 < w < 1.
 ///
 /// The answer is one for the pair, whichever end comes first. A bond through a tip (in 3D: the rim) stays, however the
-/// tip is rounded, unless another cut goes on from there on the bond's other side. A bond parallel to a cut, or that ends
+/// tip is rounded, unless another cut continues from there on the bond's other side. A bond parallel to a cut, or that ends
 /// on it, stays.
 pub fn severed<const D: usize>(cuts: &[Cut<D>], a: [f64; D], b: [f64; D]) -> bool {
     let (a, b) = if a <= b { (a, b) } else { (b, a) };

@@ -93,7 +93,7 @@ pub fn read<T: DeserializeOwned>(path: &Path, magic: &Magic) -> Result<T, Error>
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) => {
-            return Err(refused(path, "there is none; a run begins with `run`"));
+            return Err(refused(path, "there is none; start a run with `run`"));
         }
         Err(error) => return Err(Error::io("read", path)(error)),
     };
@@ -101,7 +101,7 @@ pub fn read<T: DeserializeOwned>(path: &Path, magic: &Magic) -> Result<T, Error>
         return Err(refused(path, foreign(&bytes, magic)));
     };
     if u64::from_le_bytes(*sum) != checksum(rest) {
-        let why = "damaged or cut short: its checksum does not fit; run the scene again";
+        let why = "damaged or truncated: its checksum is wrong; run the scene again";
         return Err(refused(path, why));
     }
     postcard::take_from_bytes(rest).map(|(value, _)| value).map_err(|error| refused(path, error))
@@ -113,7 +113,7 @@ fn foreign(bytes: &[u8], magic: &Magic) -> String {
     let found = bytes.get(..magic.len()).and_then(name);
     match PROGRAMS.iter().find(|(prefix, _)| found.as_deref() == Some(prefix.as_bytes())) {
         Some((_, program)) if found != name(magic) => {
-            format!("of a run of `{program}`; `{program} resume` goes on with it")
+            format!("of a run of `{program}`; `{program} resume` continues it")
         }
         _ => "not a checkpoint of this version".to_owned(),
     }
@@ -161,12 +161,12 @@ mod tests {
             read::<(String, Vec<f64>, u32)>(&path, MAGIC).unwrap_err().to_string()
         };
         for length in 16..bytes.len() {
-            assert!(told(&bytes[..length]).contains("damaged or cut short"), "{length}");
+            assert!(told(&bytes[..length]).contains("damaged or truncated"), "{length}");
         }
         for at in 8..bytes.len() {
             let mut changed = bytes.clone();
             changed[at] ^= 0x10;
-            assert!(told(&changed).contains("damaged or cut short"), "{at}");
+            assert!(told(&changed).contains("damaged or truncated"), "{at}");
         }
         assert!(told(b"").contains("not a checkpoint of this version"));
         assert!(told(b"test-ck0").contains("not a checkpoint of this version"));

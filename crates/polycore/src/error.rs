@@ -75,7 +75,7 @@ pub enum Error {
         output: PathBuf,
     },
     /// A sweep was asked to stop; what its runs have done is kept.
-    #[error("interrupted; the same command goes on with what is in {}", .0.display())]
+    #[error("interrupted; the same command continues with the results in {}", .0.display())]
     SweepInterrupted(PathBuf),
     /// A number outside the range on which an operation is defined.
     #[error("{quantity} = {value} is outside {allowed}")]
@@ -109,8 +109,8 @@ pub enum Error {
 fn plainly(error: &io::Error) -> &'static str {
     match error.kind() {
         io::ErrorKind::StorageFull => "the disk is full: ",
-        io::ErrorKind::QuotaExceeded => "the quota of the disk is used up: ",
-        io::ErrorKind::FileTooLarge => "the file would be larger than is allowed: ",
+        io::ErrorKind::QuotaExceeded => "the disk quota is exhausted: ",
+        io::ErrorKind::FileTooLarge => "the file exceeds the size limit: ",
         _ => "",
     }
 }

@@ -84,10 +84,10 @@ pub struct Column {
 pub struct Trial {
     /// Its name.
     pub what: String,
-    /// What must happen, as the scene has it.
-    pub must: String,
-    /// What was seen.
-    pub seen: String,
+    /// Expected behaviour, as the scene has it.
+    pub description: String,
+    /// Observed behaviour.
+    pub observed: String,
     /// Iterations or steps, where they are counted.
     pub iterations: Option<u64>,
     /// It met its expectations.
@@ -167,7 +167,7 @@ impl Report {
         self.refresh()
     }
 
-    /// Everything asked for was met, every trial passed, and every number is finite.
+    /// Everything expected is satisfied, every trial passed, and every number is finite.
     pub fn passed(&self) -> bool {
         self.passed
     }
@@ -204,7 +204,7 @@ impl Report {
         self.table_of(|_| true)
     }
 
-    /// [`Report::table`] with those values alone that are asked for by name; the number of the others is told.
+    /// [`Report::table`] with those values alone that are requested by name; the number of the others is reported.
     pub fn table_of(&self, shown: impl Fn(&str) -> bool) -> String {
         let mut text = String::new();
         let mut rows = Vec::new();

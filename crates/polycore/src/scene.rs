@@ -95,7 +95,7 @@ impl Source {
             let valid = error.utf8_error().valid_up_to();
             let line = 1 + error.as_bytes()[..valid].iter().filter(|&&byte| byte == b'\n').count();
             let what = format!("is not UTF-8 text (byte {valid}, line {line})");
-            fail("scene::not_utf8", what, Some("save the file as UTF-8; is it a scene at all?".into()))
+            fail("scene::not_utf8", what, Some("save the file as UTF-8; is it a scene?".into()))
         })?;
         Ok(Self { path: path.to_path_buf(), text, overlays: Vec::new() })
     }

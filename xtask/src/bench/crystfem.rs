@@ -38,7 +38,7 @@ pub fn run(workspace: &Workspace, folder: &Path, arguments: &[String]) -> Result
             let allowed = known().collect::<Vec<_>>().join(", ");
             edge.trim()
                 .parse()
-                .map_err(|_| miette!("`{edge}` is no number of elements, and none of {allowed}"))
+                .map_err(|_| miette!("`{edge}` is not a number of elements, and none of {allowed}"))
         })
         .collect::<Result<_>>()?;
     let wanted = |name: &str| names.is_empty() || names.contains(&name);

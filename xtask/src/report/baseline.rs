@@ -12,7 +12,7 @@ use crate::validate::outcome::Outcome;
 /// Relative changes below this are rounding of another machine or instruction set.
 const STILL: f64 = 1e-6;
 
-/// What is read of an earlier report.json.
+/// The part of an earlier report.json that is compared.
 #[derive(Deserialize)]
 pub struct Baseline {
     commit: Option<String>,
@@ -46,7 +46,7 @@ pub struct Difference {
     compared: usize,
 }
 
-/// A number that is another one now.
+/// A number that has changed.
 #[derive(Serialize)]
 pub struct Move {
     case: String,
@@ -62,7 +62,7 @@ impl Baseline {
     pub fn read(path: &Path) -> Result<Self> {
         let text = fs::read_to_string(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
         serde_json::from_str(&text).map_err(|error| {
-            miette!("{} is no report.json of `cargo xtask validate`: {error}", path.display())
+            miette!("{} is not a report.json of `cargo xtask validate`: {error}", path.display())
         })
     }
 

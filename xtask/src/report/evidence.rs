@@ -40,7 +40,7 @@ pub struct Measured {
     pub thesis: Option<String>,
 }
 
-/// A row of numbers: what it is, what was found, what was asked for, how that ended.
+/// A row of numbers: what it is, what was found, what was expected, the verdict.
 #[derive(Clone, Debug, Serialize)]
 pub struct Finding {
     /// In words.

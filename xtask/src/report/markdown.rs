@@ -30,14 +30,13 @@ pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
     page.thesis.iter().for_each(|judged| table.push(judged.cells()));
     text += &table.markdown();
     if !page.others.is_empty() {
-        text +=
-            "\n## Others' figures\n\nWhat no one here wrote, and ours (cases below `cases/external`).\n\n";
+        text += "\n## Others' figures\n\nFigures of other authors beside ours (cases below `cases/external`).\n\n";
         let mut table = Table::new(["case", "what", "source", "figure", "ours", "verdict"]);
         page.others.iter().for_each(|other| table.push(other.cells()));
         text += &table.markdown();
     }
     text += "\n## Cases\n\n";
-    let mut table = Table::new(["case", "program", "expectations", "of them regressions", "not met"]);
+    let mut table = Table::new(["case", "program", "expectations", "of them regressions", "not satisfied"]);
     for outcome in outcomes {
         let missed = outcome.expect().iter().filter(|judgement| !judgement.pass).count();
         let ours = outcome.expect().iter().filter(|judgement| !judgement.expect.kind.is_evidence()).count();
@@ -45,7 +44,7 @@ pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
         table.push([outcome.case.clone(), outcome.program.clone(), all, ours, missed]);
     }
     text += &table.markdown();
-    text += "\n## Error against run time\n\nMethods that nothing measured beats in both error and time.\n\n";
+    text += "\n## Error against run time\n\nMethods that no other measured method beats in both error and time.\n\n";
     let mut table = Table::new(["what", "front", "default", "measured"]);
     let mut absent = Vec::new();
     for measured in &page.timing {
@@ -61,7 +60,7 @@ pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
         text += &format!("\n{title}: not measured, run `{command}`.\n");
     }
     text += "\n## Cross-checks\n\n";
-    let mut table = Table::new(["engine", "largest difference", "asked for", "verdict", "measured"]);
+    let mut table = Table::new(["engine", "largest difference", "expected", "verdict", "measured"]);
     page.cross.iter().for_each(|crossed| table.push(crossed.cells()));
     text + &table.markdown()
 }
@@ -72,7 +71,7 @@ fn meaning(kind: Kind) -> &'static str {
         Kind::Published => "a figure of the literature, of an experiment, of a benchmark",
         Kind::IndependentProgram => "a figure of a program that shares no code with ours",
         Kind::Convergence => "an observed order, a change under refinement",
-        Kind::Bound => "an inequality that any correct answer meets",
-        Kind::Regression => "our own earlier figure: it shows a change, and is no evidence",
+        Kind::Bound => "an inequality that any correct result satisfies",
+        Kind::Regression => "our own earlier figure: it detects changes and is no evidence",
     }
 }

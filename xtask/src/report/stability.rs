@@ -1,4 +1,4 @@
-//! What is stiff, extreme or degenerate: what must happen, what was seen, at what cost.
+//! Stiff, extreme and degenerate runs: expected and observed behaviour, and cost.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::validate::outcome::Outcome;
 
-/// Words in the names of cases whose every run is such a thing, though their scenes have no `must`.
+/// Words in the names of cases whose every run is such a thing, though their scenes have no `description`.
 const WORDS: [&str; 2] = ["stability", "extremes"];
 
 /// A run.
@@ -17,8 +17,8 @@ const WORDS: [&str; 2] = ["stability", "extremes"];
 pub struct Trial {
     case: String,
     what: String,
-    must: String,
-    seen: String,
+    description: String,
+    observed: String,
     iterations: String,
     passed: bool,
 }
@@ -32,8 +32,8 @@ pub fn trials(outcomes: &[Outcome]) -> Vec<Trial> {
         trials.extend(report.trials.iter().map(|trial| Trial {
             case: case.clone(),
             what: trial.what.clone(),
-            must: trial.must.clone(),
-            seen: trial.seen.clone(),
+            description: trial.description.clone(),
+            observed: trial.observed.clone(),
             iterations: trial.iterations.map(|count| count.to_string()).unwrap_or_default(),
             passed: trial.passed,
         }));
@@ -53,8 +53,8 @@ pub fn trials(outcomes: &[Outcome]) -> Vec<Trial> {
 #[derive(Deserialize)]
 struct Row {
     case: String,
-    must: String,
-    seen: String,
+    description: String,
+    observed: String,
     pass: bool,
     steps: Option<u64>,
 }
@@ -65,8 +65,8 @@ fn of_suite(case: &str, output: &Path) -> Vec<Trial> {
     let trial = |row: Row| Trial {
         case: case.to_owned(),
         what: row.case,
-        must: row.must,
-        seen: row.seen,
+        description: row.description,
+        observed: row.observed,
         iterations: row.steps.map(|steps| steps.to_string()).unwrap_or_default(),
         passed: row.pass,
     };
@@ -91,18 +91,18 @@ fn parts(quantity: &str) -> (&str, &str) {
 }
 
 fn trial(case: &str, what: &str, judged: &[&Judgement]) -> Trial {
-    let (mut must, mut seen) = (Vec::new(), Vec::new());
+    let (mut description, mut observed) = (Vec::new(), Vec::new());
     for judgement in judged {
         let [_, quantity, value, asked, _] = judgement.row();
         let name = parts(&quantity).1.replace('_', " ");
-        must.push(format!("{name} {asked}"));
-        seen.push(format!("{name} {value}"));
+        description.push(format!("{name} {asked}"));
+        observed.push(format!("{name} {value}"));
     }
     Trial {
         case: case.to_owned(),
         what: what.to_owned(),
-        must: must.join(", "),
-        seen: seen.join(", "),
+        description: description.join(", "),
+        observed: observed.join(", "),
         iterations: String::new(),
         passed: judged.iter().all(|judgement| judgement.pass),
     }
@@ -116,8 +116,7 @@ mod tests {
     fn rows_of_a_suite() {
         let folder = tempfile::tempdir().expect("a folder");
         assert!(of_suite("ch4/x", folder.path()).is_empty());
-        let rows =
-            r#"[{"case": "a", "must": "end", "seen": "ended", "pass": true, "steps": 7, "seconds": 0.1}]"#;
+        let rows = r#"[{"case": "a", "description": "end", "observed": "ended", "pass": true, "steps": 7, "seconds": 0.1}]"#;
         fs::write(folder.path().join("suite.json"), rows).expect("a suite");
         let trials = of_suite("ch4/x", folder.path());
         assert_eq!(

@@ -158,10 +158,10 @@ impl Map {
         for row in &self.row {
             let mut fault = |text: String| faults.push(format!("{}: {text}", row.number));
             if !seen.insert(row.number.as_str()) {
-                fault("stands there twice".to_owned());
+                fault("is listed twice".to_owned());
             }
             if row.verdict != Verdict::Reproduced && row.because.as_deref().unwrap_or_default().is_empty() {
-                fault("says not why (`because`)".to_owned());
+                fault("does not say why (`because`)".to_owned());
             }
             let because = row.because.as_deref().unwrap_or_default();
             let judged = row.numbers.iter().filter(|number| number.judged).count();
@@ -214,7 +214,7 @@ pub fn check(
     let (mut evidence, mut regressions) = (tests.len(), 0);
     for number in numbers {
         let Some(case) = number.case.as_deref().or(case) else {
-            fault(format!("`{}` is of no case", number.quantity));
+            fault(format!("`{}` names no case", number.quantity));
             continue;
         };
         match expected(workspace, case) {
@@ -228,7 +228,7 @@ pub fn check(
         }
     }
     if evidence == 0 && regressions > 0 {
-        fault("rests on nothing but our own earlier figures (kind = \"regression\")".to_owned());
+        fault("rests only on our own earlier figures (kind = \"regression\")".to_owned());
     }
     for test in tests {
         if !named(workspace, &test.record) {

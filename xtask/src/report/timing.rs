@@ -99,7 +99,7 @@ const SUBJECTS: &[Subject] = &[
         source: Source::Case { case: "ch2/contact-series", curves: "error_against_time_" },
         split: "\n",
         default: "peak_load [m=1 adr]",
-        axes: ["s, whole solution", "error of the force against a contact that does not give"],
+        axes: ["s, whole solution", "error of the force against a rigid contact"],
         command: "cargo xtask validate --case cases/ch2/contact-series",
         note: "Springs in series, one of them the contact; a point for each stiffness of the contact.",
     },

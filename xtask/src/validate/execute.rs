@@ -202,7 +202,7 @@ fn describe(status: ExitStatus) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// A case run by a shell script in place of a program.
+    /// A case run by a shell script instead of a program.
     struct Stage {
         folder: tempfile::TempDir,
         case: Case,

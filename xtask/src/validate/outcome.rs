@@ -49,7 +49,7 @@ impl Outcome {
             _ if !report.non_finite.is_empty() => {
                 Some(format!("not finite: {}", report.non_finite.join(", ")))
             }
-            None if report.expect.is_empty() && !quick => Some("the case expects nothing".to_owned()),
+            None if report.expect.is_empty() && !quick => Some("the case has no expectations".to_owned()),
             status => status,
         };
         self.report = Some(report);
@@ -101,8 +101,8 @@ impl Outcome {
         let mut lines: Vec<String> = missed
             .map(|judgement| {
                 let [_, quantity, value, asked, _] = judgement.row();
-                let by = beyond(judgement).map(|by| format!(", beyond by {by}")).unwrap_or_default();
-                format!("{quantity} = {value}, asked for {asked}{by}")
+                let by = beyond(judgement).map(|by| format!(", off by {by}")).unwrap_or_default();
+                format!("{quantity} = {value}, expected {asked}{by}")
             })
             .collect();
         lines.extend(self.failure.clone());
@@ -123,7 +123,7 @@ fn shown(value: f64) -> String {
     format!("{value:.digits$}")
 }
 
-/// How far a value lies outside what was asked for.
+/// How far a value lies outside what was requested.
 fn beyond(judgement: &Judgement) -> Option<String> {
     use polycore::report::Bound;
     let value = judgement.value.filter(|value| value.is_finite())?;
@@ -175,7 +175,7 @@ pub mod tests {
     #[test]
     fn complaints_say_what_and_by_how_much() {
         let text = outcome(&report(4.0), None).complaint(|path| path.display().to_string());
-        assert!(text.starts_with("kt = 4, asked for 3 ± 1 %, beyond by 9.700e-1\nresults: "), "{text}");
+        assert!(text.starts_with("kt = 4, expected 3 ± 1 %, off by 9.700e-1\nresults: "), "{text}");
         assert_eq!(outcome(&report(3.0), None).complaint(|_| String::new()), "");
     }
 }

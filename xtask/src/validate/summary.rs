@@ -9,8 +9,8 @@ use crate::table::Table;
 
 /// Every expectation of every case, seconds by case, and a last line of sums.
 pub fn text(outcomes: &[Outcome]) -> String {
-    let mut table = Table::new(["case", "quantity", "value", "asked for", "kind", "verdict"]);
-    let mut times = Table::new(["case", "program", "seconds", "expectations", "not met"]);
+    let mut table = Table::new(["case", "quantity", "value", "expected", "kind", "verdict"]);
+    let mut times = Table::new(["case", "program", "seconds", "expectations", "not satisfied"]);
     for outcome in outcomes {
         for [verdict, quantity, value, asked, kind, _] in outcome.rows() {
             table.push([outcome.case.clone(), quantity, value, asked, kind, verdict]);
@@ -33,7 +33,7 @@ pub fn text(outcomes: &[Outcome]) -> String {
     text
 }
 
-/// `22 cases, 0 failed; 282 expectations, 0 not met: 120 closed-form, 40 published; 25 regression (no evidence)`.
+/// `22 cases, 0 failed; 282 expectations, 0 not satisfied: 120 closed-form, 40 published; 25 regression (no evidence)`.
 pub fn sums(outcomes: &[Outcome]) -> String {
     let failed = outcomes.iter().filter(|outcome| !outcome.passed()).count();
     let judged = || outcomes.iter().flat_map(Outcome::expect);
@@ -46,7 +46,7 @@ pub fn sums(outcomes: &[Outcome]) -> String {
         list.iter().map(|(kind, count)| format!("{count} {kind}")).collect::<Vec<_>>().join(", ")
     };
     let mut text =
-        format!("{cases} case{plural}, {failed} failed; {expectations} expectations, {missed} not met");
+        format!("{cases} case{plural}, {failed} failed; {expectations} expectations, {missed} not satisfied");
     if !evidence.is_empty() {
         text += &format!(": {}", of(&evidence));
     }
@@ -75,10 +75,10 @@ mod tests {
         let outcomes = [outcome(&report(3.0), None), outcome(&report(4.0), Some("exit code 1"))];
         let text = text(&outcomes);
         assert!(
-            text.contains("2 cases, 1 failed; 2 expectations, 1 not met: 2 closed-form; 0.0 s."),
+            text.contains("2 cases, 1 failed; 2 expectations, 1 not satisfied: 2 closed-form; 0.0 s."),
             "{text}"
         );
-        assert!(text.contains("ch2/plate  kt        4      3 ± 1 %    closed-form  FAIL"), "{text}");
+        assert!(text.contains("ch2/plate  kt        4      3 ± 1 %   closed-form  FAIL"), "{text}");
     }
 
     #[test]
@@ -87,9 +87,9 @@ mod tests {
         let outcomes = [outcome(&report(3.0), None), outcome(&report(3.0), None), outcome(&ours, None)];
         let text = sums(&outcomes);
         assert!(
-            text.ends_with("3 expectations, 0 not met: 2 closed-form; 1 regression (no evidence)"),
+            text.ends_with("3 expectations, 0 not satisfied: 2 closed-form; 1 regression (no evidence)"),
             "{text}"
         );
-        assert!(sums(&[outcome(&ours, None)]).ends_with("0 not met; 1 regression (no evidence)"));
+        assert!(sums(&[outcome(&ours, None)]).ends_with("0 not satisfied; 1 regression (no evidence)"));
     }
 }

@@ -32,7 +32,7 @@ pub struct Options {
     /// Length of a step, s.
     #[arg(long, default_value_t = 0.5)]
     step: f64,
-    /// Lumped capacity in place of consistent.
+    /// Lumped capacity instead of consistent.
     #[arg(long)]
     lumped: bool,
     /// Move inner nodes by up to this part of an edge, smoothly, so that no two elements are equal.
@@ -47,7 +47,7 @@ pub struct Options {
 }
 
 fn amplitude(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
     if (0.0..=0.2).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 0 to 0.2")) }
 }
 

@@ -10,7 +10,7 @@ use std::time::Instant;
 /// Lengths of steps, s; steps taken.
 const LENGTHS: [f64; 3] = [0.5, 5.0, 50.0];
 const STEPS: i32 = 6;
-/// Rms errors that conjugate gradients are asked for, K.
+/// Rms errors requested of conjugate gradients, K.
 const TOLERANCES: [f64; 5] = [1e-1, 1e-3, 1e-5, 1e-7, 1e-9];
 
 /// Rows `SOLVER TOLERANCE: QUANTITY, LENGTH`; factors have the tolerance 0.

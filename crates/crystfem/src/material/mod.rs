@@ -72,7 +72,7 @@ pub trait ThermalMaterial: Send + Sync {
     /// iteration is needed.
     fn is_linear(&self) -> bool;
     /// Whether the flux is −k ∇T with the same k at any temperature and state: conduction is then assembled once, and
-    /// with lumped capacity the energy is asked for at nodes only, with ∇T = 0.
+    /// with lumped capacity the energy is requested at nodes only, with ∇T = 0.
     fn constant_conductivity(&self) -> bool {
         self.is_linear()
     }

@@ -318,7 +318,7 @@ mod printed {
         assert_eq!(alpha, f64::from(1e-3_f32));
     }
 
-    /// Euler at 1 K steps and 10 K/min: NaN, as formulation.md's table has it, with the sign mended and guarded.
+    /// Euler at 1 K steps and 10 K/min: NaN, as formulation.md's table has it, with the sign corrected and guarded.
     #[test]
     fn euler_goes_nan_at_one_kelvin_per_step() {
         let alphas = ramp(Sign::Mended, true, 200.0, 120.0, 1.0, 6.0);

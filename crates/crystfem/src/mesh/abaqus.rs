@@ -49,7 +49,7 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
             "PART" | "INSTANCE" => reader.once(&card, &mut cards)?,
             "END PART" | "ASSEMBLY" | "END ASSEMBLY" | "END INSTANCE" | "HEADING" => {}
             keyword if CHANGING.contains(&keyword) => {
-                let allowed = "a file that holds all its nodes and elements itself";
+                let allowed = "a file that contains all its nodes and elements itself";
                 return Err(line_error(path, card.line, "keyword", format!("*{keyword}"), allowed));
             }
             keyword => *skipped.entry(keyword.to_owned()).or_default() += 1,
@@ -157,7 +157,7 @@ impl Reader<'_> {
                     labels[filled] = row.label(word, "element or node")?;
                     filled += 1;
                 }
-                // an open line goes on in the next
+                // an open line continues in the next
                 let next = if filled <= count && row.is_open() { cards.row() } else { None };
                 match next {
                     Some(next) => row = next,

@@ -211,12 +211,13 @@ impl Content {
         let kept = quality::drop_unused_nodes(&mut mesh);
         if kept.len() < self.nodes.len() {
             let unused = self.nodes.len() - kept.len();
-            self.notes.push(format!("{unused} nodes of no hexahedron or tetrahedron are left out"));
+            self.notes
+                .push(format!("{unused} nodes that belong to no hexahedron or tetrahedron are left out"));
         }
         let notes = &mut self.notes;
         mesh.node_sets.retain(|name, set| {
             if set.is_empty() {
-                notes.push(format!("node set `{name}` holds no node of the mesh: left out"));
+                notes.push(format!("node set `{name}` contains no node of the mesh: left out"));
             }
             !set.is_empty()
         });
@@ -254,7 +255,7 @@ impl Content {
             let first = facets.iter().find(|facet| !face_of.contains_key(&facet.1));
             let label = first.map_or(0, |facet| self.elements[facet.1 as usize].label);
             self.notes.push(format!(
-                "{missed} triangles or quadrangles are no side of a hexahedron or tetrahedron, element {label} first: left out"
+                "{missed} triangles or quadrangles are not sides of a hexahedron or tetrahedron, element {label} first: left out"
             ));
         }
         face_of
@@ -272,7 +273,7 @@ impl Content {
             let faces: Vec<Face> = places.iter().filter_map(|place| face_of.get(place).copied()).collect();
             if set.is_empty() && faces.is_empty() {
                 self.notes.push(format!(
-                    "element set `{name}` holds no hexahedra, tetrahedra or sides of them: left out"
+                    "element set `{name}` contains no hexahedra, tetrahedra or sides of them: left out"
                 ));
             }
             if !faces.is_empty() {
@@ -288,7 +289,7 @@ impl Content {
             faces.sort_unstable();
             faces.dedup();
             if faces.is_empty() {
-                self.notes.push(format!("surface `{name}` holds no face: left out"));
+                self.notes.push(format!("surface `{name}` contains no face: left out"));
             }
         }
         mesh.surfaces.retain(|_, faces| !faces.is_empty());

@@ -50,7 +50,9 @@ impl Layers {
                         )));
                     }
                     None => {
-                        return Err(Error::Mesh(format!("element set `{name}` holds no element {element}")));
+                        return Err(Error::Mesh(format!(
+                            "element set `{name}` contains no element {element}"
+                        )));
                     }
                 }
             }

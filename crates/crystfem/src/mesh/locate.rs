@@ -18,7 +18,7 @@ pub struct Place {
     weights: Vec<(u32, f64)>,
     /// Elements that hold it: one, or those that meet there.
     elements: Vec<u32>,
-    /// How far it is from the place that was asked for, m; 0 inside the mesh.
+    /// How far it is from the place that was requested, m; 0 inside the mesh.
     distance: f64,
 }
 
@@ -28,7 +28,7 @@ impl Place {
         &self.elements
     }
 
-    /// How far it is from the place that was asked for, m; 0 inside the mesh.
+    /// How far it is from the place that was requested, m; 0 inside the mesh.
     pub fn distance(&self) -> f64 {
         self.distance
     }

@@ -179,7 +179,7 @@ fn measures(mesh: &Mesh, element: u32) -> [f64; 4] {
         // `min` would forget what is not a number
         least[0] = if determinant.is_nan() { f64::NAN } else { least[0].min(determinant) };
         if corner {
-            // 0/0 of coincident nodes: the determinant tells
+            // 0/0 of coincident nodes: the determinant decides
             least[1] = if scaled.is_nan() { 0.0 } else { least[1].min(scaled) };
             edges = lengths.iter().fold(edges, |[low, high], length| [low.min(*length), high.max(*length)]);
         }

@@ -121,7 +121,7 @@ impl Grid {
                 until(block.lower[d])..until(block.upper[d])
             });
             if range.iter().any(std::ops::Range::is_empty) {
-                return Err(Error::Mesh(format!("block `{}` holds no element of the grid", block.name)));
+                return Err(Error::Mesh(format!("block `{}` contains no element of the grid", block.name)));
             }
             ranges.push((&block.name, range));
         }
@@ -363,7 +363,7 @@ mod tests {
         let mut grid = Grid::uniform([0.0; 3], [1.0; 3], [2; 3]).unwrap();
         let far = Block { name: "far".into(), lower: [2.0; 3], upper: [3.0; 3] };
         let error = grid.blocks(&[far], Split::Hexahedra).unwrap_err().to_string();
-        assert!(error.contains("`far` holds no element"));
+        assert!(error.contains("`far` contains no element"));
         grid.lines[1].swap(0, 1);
         assert!(
             grid.mesh("brick").unwrap_err().to_string().contains("along y do not ascend: 0.5 m, then 0 m")

@@ -112,7 +112,7 @@ fn lumped_cooling_is_exponential() {
     assert!(error(0.1) < 5e-6, "{}", error(0.1));
 }
 
-/// Jumps, holds, no time at all, one step over everything: what is asked for, and finite.
+/// Jumps, holds, no time at all, one step over everything: what is requested, and finite.
 #[test]
 fn limits() {
     let material = pa12(Constants::TABLE_4_1_COLUMN_1, Some(209e3));

@@ -27,7 +27,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     let births = problem.births.len();
     if births > 0 {
         lines.push(format!(
-            "builds     {births} births, {} elements in all; what is not printed yet has no equations",
+            "builds     {births} births, {} elements in all; elements not printed yet have no equations",
             task.printed.len()
         ));
     }
@@ -45,7 +45,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     for (needed, what) in [
         (births > 0, "births: everything exists from the start"),
         (!names.is_empty(), "states of materials"),
-        (latent || names.is_empty(), "latent heat: temperatures know nothing of crystals"),
+        (latent || names.is_empty(), "latent heat: temperature does not depend on crystallinity"),
         (radiates, "radiation"),
         (!problem.sources.is_empty(), "heat sources"),
         (changes, "conditions that change over time"),
@@ -82,11 +82,11 @@ fn told(condition: &Condition) -> String {
     let what = match condition {
         Condition::Temperature { nodes, .. } => format!("temperature of {} nodes", nodes.len()),
         Condition::Flux { .. } => format!("flux into {place}"),
-        Condition::Film { .. } => format!("film on {place}"),
+        Condition::Film { .. } => format!("convection on {place}"),
         Condition::Radiation { .. } => format!("radiation of {place}"),
     };
     match condition.breaks().len() {
         0 => what,
-        kinks => format!("{what}, over {kinks} given times, on which steps land"),
+        kinks => format!("{what}, over {kinks} given times, at which steps end"),
     }
 }

@@ -18,7 +18,7 @@ use std::ops::ControlFlow;
 /// Fields written unless the scene says how often.
 const FRAMES: f64 = 50.0;
 
-/// Runs the scene of a body, or goes on with it.
+/// Runs the scene of a body, or resumes it.
 pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished, Failure> {
     scene.check(source)?;
     let report = one(source, scene, false, run)?;

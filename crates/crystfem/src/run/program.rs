@@ -17,7 +17,7 @@ impl Case for Crystfem {
         examples: "  crystfem check cases/ch4/printed-bar/case.toml    what it builds and leaves out
   crystfem run cases/ch4/printed-bar/case.toml      print the bar, draw, judge; results in out/printed-bar
   crystfem run cases/ch4/cooling-rates/case.toml    the material alone
-  crystfem resume out/printed-bar                   go on after an interruption
+  crystfem resume out/printed-bar                   continue an interrupted run
   crystfem sweep cases/ch4/printed-bar/case.toml --vary print.layer_time=10s,20s,40s
   crystfem schema > crystfem.schema.json            for editors",
         magic: b"part-ck4",

@@ -16,7 +16,7 @@ use std::path::Path;
 /// Points of a curve that are drawn at most.
 const POINTS: usize = 4000;
 
-/// Runs every study, or goes on with those that are left.
+/// Runs every study, or resumes with the remaining ones.
 pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished, Failure> {
     let (output, quick) = (run.options.output, run.options.quick);
     let studies = scene.studies(source, quick)?;
@@ -27,7 +27,7 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
         let mut names = scene.quantities_of_studies();
         for &index in &studies {
             let study = &scene.study[index];
-            if study.fails.is_none() {
+            if study.expect_error.is_none() {
                 let (source, scene) = scene.of_study(source, index)?;
                 let task = scene.task(&source, scene.mesh.build(&source)?.mesh)?;
                 names.extend(of_study(&study.name, scene.quantities(&task)));
@@ -58,8 +58,8 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
     report.phases(&phases).threads(rayon::current_num_threads()).judge(&scene.expect, quick);
     // of a study that must fail and does not there need be no expectation
     let mut survivors = String::new();
-    for study in scene.study.iter().filter(|study| study.fails.is_some()) {
-        if report.scalar(&q::FAILED_AS_IT_MUST.of(&[&study.name]).name) == Some(0.0) {
+    for study in scene.study.iter().filter(|study| study.expect_error.is_some()) {
+        if report.scalar(&q::FAILED_AS_EXPECTED.of(&[&study.name]).name) == Some(0.0) {
             report.passed = false;
             survivors += &format!("FAIL  study {} did not fail\n", study.name);
         }
@@ -110,7 +110,7 @@ fn study(
         own.finish(&report)?;
         Ok(report)
     });
-    match (outcome, &spec.fails) {
+    match (outcome, &spec.expect_error) {
         (Err(Failure::Run(error)), _) if error.is_interruption() => Err(interruption.into()),
         (Err(failure), Some(expected)) if failure.to_string().contains(expected.as_str()) => {
             Ok(Err(failure.to_string()))
@@ -127,9 +127,9 @@ fn together(source: &Source, scene: &PartScene, rows: &Rows) -> Report {
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     for row in &rows.rows {
         let name = &row.name;
-        if scene.study.iter().any(|study| study.name == *name && study.fails.is_some()) {
+        if scene.study.iter().any(|study| study.name == *name && study.expect_error.is_some()) {
             let failed = f64::from(u8::from(row.outcome.is_err()));
-            report.value(q::FAILED_AS_IT_MUST.of(&[name]), failed);
+            report.value(q::FAILED_AS_EXPECTED.of(&[name]), failed);
         }
         let Ok(own) = &row.outcome else { continue };
         for (key, value) in &own.values {
@@ -184,41 +184,45 @@ fn together(source: &Source, scene: &PartScene, rows: &Rows) -> Report {
     report
 }
 
-/// suite.md and suite.json: what each study is, what must happen, what was seen, and at what cost.
+/// suite.md and suite.json: each study, its expected and observed behaviour, and its cost.
 fn table(report: &Report, scene: &PartScene, rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
-    if scene.study.iter().all(|study| study.must.is_none()) {
+    if scene.study.iter().all(|study| study.description.is_none()) {
         return Ok(());
     }
-    let mut text = String::from("| case | must | seen | steps | seconds |\n|---|---|---|---|---|\n");
+    let mut text = String::from("| case | expected | observed | steps | seconds |\n|---|---|---|---|---|\n");
     let mut list = Vec::new();
     for row in &rows.rows {
         let name = &row.name;
         let study = scene.study.iter().find(|study| study.name == *name);
-        let must = study.and_then(|study| study.must.as_deref()).unwrap_or_default();
+        let description = study.and_then(|study| study.description.as_deref()).unwrap_or_default();
         let (held, missed) = report.verdict_on(|quantity| {
             quantity.strip_prefix(name.as_str()).is_some_and(|rest| rest.starts_with('.'))
         });
-        let seen = match &row.outcome {
+        let observed = match &row.outcome {
             Err(failure) => format!("refused: {}", failure.lines().next().unwrap_or_default()),
             Ok(_) if !missed.is_empty() => format!("missed: {}", missed.join(", ")),
             Ok(own) => {
                 let value = |name: &str| own.scalar(name).unwrap_or(f64::NAN);
                 let [low, high] = [value("least_temperature"), value("largest_temperature")];
-                let mut seen = format!("ends at {low:.3} to {high:.3} °C");
+                let mut observed = format!("ends at {low:.3} to {high:.3} °C");
                 if let [Some(low), Some(high)] = ["least_alpha", "largest_alpha"].map(|name| own.scalar(name))
                 {
-                    seen += &format!(", α {low:.4} to {high:.4}");
+                    observed += &format!(", α {low:.4} to {high:.4}");
                 }
-                seen + &format!("; energy kept to {:.0e}; {held} expectations hold", value("worst_balance"))
+                observed
+                    + &format!(
+                        "; energy balance {:.0e}; {held} expectations satisfied",
+                        value("worst_balance")
+                    )
             }
         };
         let own = row.outcome.as_ref().ok();
         let steps = own.and_then(|own| own.work.get("steps")).copied().unwrap_or(0);
         let seconds = own.and_then(|own| own.seconds.get("solve")).copied().unwrap_or(0.0);
-        text += &format!("| {name} | {must} | {seen} | {steps} | {seconds:.2} |\n");
+        text += &format!("| {name} | {description} | {observed} | {steps} | {seconds:.2} |\n");
         let pass = missed.is_empty();
         list.push(serde_json::json!({
-            "case": name, "must": must, "seen": seen, "pass": pass, "steps": steps, "seconds": seconds,
+            "case": name, "description": description, "observed": observed, "pass": pass, "steps": steps, "seconds": seconds,
         }));
     }
     atomic_write(output.join("suite.md"), |file| file.write_all(text.as_bytes()))?;
@@ -270,8 +274,8 @@ pub fn explain(source: &Source, scene: &PartScene, quick: bool) -> Result<Vec<St
     for &index in &studies {
         let study = &scene.study[index];
         lines.push(format!("study {}", study.name));
-        if let Some(error) = &study.fails {
-            lines.push(format!("  must fail  with `{error}`"));
+        if let Some(error) = &study.expect_error {
+            lines.push(format!("  expects    an error that contains `{error}`"));
             continue;
         }
         let (source, scene) = scene.of_study(source, index)?;

@@ -53,11 +53,7 @@ impl PartScene {
             let taken = self.study.iter().map(|study| &study.name);
             let taken = taken.chain(self.convergence[..index].iter().map(|other| &other.name));
             if taken.into_iter().any(|other| *other == spec.name) {
-                return Err(source.error(
-                    &key("name"),
-                    format!("`{}` twice", spec.name),
-                    "a name of its own",
-                ));
+                return Err(source.error(&key("name"), format!("`{}` twice", spec.name), "a unique name"));
             }
             for name in &spec.studies {
                 if !self.study.iter().any(|study| study.name == *name) {
@@ -68,7 +64,7 @@ impl PartScene {
             let [first, second] = spec.powers;
             if !(1..second).contains(&first) || second > 16 {
                 let found = format!("{first} and {second}");
-                return Err(source.error(&key("powers"), found, "two that rise, from 1 to 16"));
+                return Err(source.error(&key("powers"), found, "two increasing powers, from 1 to 16"));
             }
         }
         Ok(())

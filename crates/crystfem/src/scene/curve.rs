@@ -5,7 +5,7 @@ use polycore::report::Report;
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
 
-/// Studies that solve one problem at different cost, and what is true.
+/// Studies that solve one problem at different cost, and a reference.
 ///
 /// ```toml
 /// [[error_against_time]]
@@ -25,7 +25,7 @@ pub struct CurveSpec {
     pub studies: Vec<String>,
     /// A study that is much more exact.
     pub truth: Option<String>,
-    /// Or what is true of each quantity, as the report has it (degC for temperatures).
+    /// Or the reference of each quantity, in the report's unit (degC for temperatures).
     pub values: Option<Vec<f64>>,
 }
 
@@ -57,18 +57,14 @@ impl PartScene {
             let taken = taken.chain(self.convergence.iter().map(|other| &other.name));
             let taken = taken.chain(self.error_against_time[..index].iter().map(|other| &other.name));
             if taken.into_iter().any(|other| *other == spec.name) {
-                return Err(source.error(
-                    &key("name"),
-                    format!("`{}` twice", spec.name),
-                    "a name of its own",
-                ));
+                return Err(source.error(&key("name"), format!("`{}` twice", spec.name), "a unique name"));
             }
             let known = |name: &String| self.study.iter().any(|study| study.name == *name);
             if let Some(name) = spec.studies.iter().find(|name| !known(name)) {
                 return Err(source.error(&key("studies"), format!("`{name}`"), "names of studies"));
             }
             if spec.quantities.is_empty() {
-                return Err(source.error(&key("quantities"), "nothing", "one at least"));
+                return Err(source.error(&key("quantities"), "nothing", "at least one"));
             }
             match (&spec.truth, &spec.values) {
                 (Some(name), None) if !known(name) => {

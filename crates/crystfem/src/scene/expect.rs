@@ -52,8 +52,8 @@ impl PartScene {
 
     /// What studies which must fail add to those of the runs of the others, which have their study's name before them.
     pub fn quantities_of_studies(&self) -> Vec<Named> {
-        let failing = self.study.iter().filter(|study| study.fails.is_some());
-        failing.map(|study| q::FAILED_AS_IT_MUST.of(&[&study.name])).collect()
+        let failing = self.study.iter().filter(|study| study.expect_error.is_some());
+        failing.map(|study| q::FAILED_AS_EXPECTED.of(&[&study.name])).collect()
     }
 
     /// Refuses an expectation of a quantity that no run of the scene reports; those of studies that are left out of it,

@@ -27,7 +27,7 @@ pub struct FitScene {
     /// Files to write.
     #[serde(default)]
     pub output: OutputSpec,
-    /// What the results must be.
+    /// Expected results.
     #[serde(default)]
     pub expect: Vec<Expect>,
 }
@@ -218,7 +218,7 @@ impl FitSpec {
                 return Err(source.error(&key("frozen"), "nothing", allowed));
             }
             (Some(_), Some(_)) => {
-                let found = "`glass_transition` beside `frozen`";
+                let found = "`glass_transition` together with `frozen`";
                 return Err(source.error(&key("glass_transition"), found, "one of them"));
             }
         };

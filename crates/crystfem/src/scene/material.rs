@@ -309,7 +309,7 @@ impl GivenKinetics {
             }
             (Some(_), Some(_)) => {
                 let at = format!("{key}.kinetics.glass_transition");
-                return Err(source.error(&at, "`glass_transition` beside `frozen`", "one of them"));
+                return Err(source.error(&at, "`glass_transition` together with `frozen`", "one of them"));
             }
         };
         let energy = Constants::TABLE_4_1_COLUMN_1.activation_energy;

@@ -1,4 +1,4 @@
-//! Memory that the run of a part needs: as far as the mesh tells before it is made, and the whole before a step is taken.
+//! Memory that the run of a part needs: as far as the mesh determines it before it is made, and the whole before a step is taken.
 //!
 //! Counted are the arrays that live at once, in bytes; the test `memory` of the workspace compares the sum with what whole
 //! runs take.
@@ -18,7 +18,7 @@ const STAGE: f64 = 12e6;
 /// outer faces while they are sought.
 const NODE: f64 = 350.0;
 const ELEMENT: f64 = 150.0;
-/// An element that is printed: births, layers, equations that are made anew.
+/// An element that is printed: births, layers, equations that are rebuilt.
 const PRINTED: f64 = 300.0;
 /// A stored entry of the conduction matrix, while it is sorted.
 const ENTRY: f64 = 40.0;
@@ -122,5 +122,5 @@ fn refuse(source: &Source, key: &str, what: &str, needed: f64) -> Result<(), Sce
         return Ok(());
     }
     let found = format!("{what}, which need about {}", gib(needed));
-    Err(source.error(key, found, format!("at most {} (the memory available)", gib(available))))
+    Err(source.error(key, found, format!("at most {} (the available memory)", gib(available))))
 }

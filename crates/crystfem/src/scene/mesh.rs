@@ -57,7 +57,7 @@ pub struct MeshSpec {
     pub tube: Option<TubeSpec>,
     /// A Gmsh `.msh` (4.1) or an Abaqus or CalculiX `.inp`.
     pub file: Option<PathBuf>,
-    /// Length of a unit of the file; default 1 m.
+    /// Length of one unit of the file; default 1 m.
     pub unit: Option<Length>,
 }
 
@@ -75,9 +75,9 @@ pub struct BarSpec {
     pub elements_per_layer: Option<usize>,
     /// Greatest element along x and y.
     pub element_size: Length,
-    /// What it is printed on.
+    /// The substrate.
     pub substrate: Option<SubstrateSpec>,
-    /// What fills the cells of the grid; default hexahedra.
+    /// Element type of the grid's cells; default hexahedra.
     #[serde(default)]
     pub cells: Split,
 }
@@ -102,7 +102,7 @@ pub struct BrickSpec {
     pub size: [Length; 3],
     /// Elements along each axis; tetrahedra fill each of these cells.
     pub elements: [usize; 3],
-    /// What fills the cells; default hexahedra.
+    /// Element type; default hexahedra.
     #[serde(default)]
     pub cells: Split,
 }

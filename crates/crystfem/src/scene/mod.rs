@@ -55,7 +55,7 @@ impl Default for OutputSpec {
     }
 }
 
-/// What a scene asks for.
+/// The task of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The material alone: `[[point]]`.
@@ -77,7 +77,7 @@ pub fn schema() -> serde_json::Value {
     })
 }
 
-/// Tells what a scene asks for by the blocks that it has.
+/// Determines the task of a scene from its blocks.
 ///
 /// # Errors
 /// What is no scene at all, another program, and a scene without any such block.
@@ -101,7 +101,7 @@ pub fn kind(source: &Source) -> Result<Kind, SceneError> {
     match (asked.next(), asked.next()) {
         (Some((kind, ..)), None) => Ok(*kind),
         (Some((_, first, _)), Some((_, second, _))) => {
-            let found = format!("`{second}` beside `{first}`");
+            let found = format!("`{second}` together with `{first}`");
             Err(source.error(second, found, "one of them: a scene does one thing"))
         }
         (None, _) => {

@@ -29,11 +29,11 @@ pub struct PartScene {
     pub mesh: MeshSpec,
     /// The materials, by name.
     pub materials: BTreeMap<String, MaterialSpec>,
-    /// What is made of which material.
+    /// Elements of each material.
     pub region: Vec<RegionSpec>,
     /// Layers that appear one after another; without it everything exists from the start.
     pub print: Option<PrintSpec>,
-    /// What acts on surfaces.
+    /// Conditions on surfaces.
     #[serde(default)]
     pub boundary: Vec<BoundarySpec>,
     /// Heat released in a volume.
@@ -48,7 +48,7 @@ pub struct PartScene {
     /// Files to write.
     #[serde(default)]
     pub output: PartOutput,
-    /// Variants to run in place of the scene itself.
+    /// Variants to run instead of the scene itself.
     #[serde(default)]
     pub study: Vec<StudySpec>,
     /// Limits and orders of quantities over studies.
@@ -57,12 +57,12 @@ pub struct PartScene {
     /// Error against run time over studies.
     #[serde(default)]
     pub error_against_time: Vec<CurveSpec>,
-    /// What the results must be.
+    /// Expected results.
     #[serde(default)]
     pub expect: Vec<Expect>,
 }
 
-/// Elements of one material. Where regions overlap, the last one wins.
+/// Elements of one material. Where regions overlap, the last one applies.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RegionSpec {
@@ -74,11 +74,11 @@ pub struct RegionSpec {
     pub temperature: Temperature,
 }
 
-/// Elements that appear while time goes on: in layers, or along a path.
+/// Elements that appear during the run: in layers, or along a path.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PrintSpec {
-    /// Temperature of what is laid down, at the time it is.
+    /// Temperature of new material at its birth.
     pub temperature: ScheduleSpec<TemperatureDimension>,
     /// Element sets `PREFIX1`, `PREFIX2`, …; default `layer-`.
     pub layers: Option<String>,
@@ -86,13 +86,13 @@ pub struct PrintSpec {
     pub elements: Option<String>,
     /// Height of these layers.
     pub layer_height: Option<Length>,
-    /// From one layer to the next.
+    /// Time from one layer to the next.
     pub layer_time: Option<Time>,
     /// When the first layer, or the path, begins; default 0.
     pub start: Option<Time>,
     /// G-code (`.gcode`, `.g`, `.nc`) or a CSV table (`time [s]`, `x [mm]`, `y [mm]`, `z [mm]`, `print`).
     pub path: Option<PathBuf>,
-    /// Width of what the path lays down.
+    /// Width of the bead.
     pub bead_width: Option<Length>,
     /// Its height.
     pub bead_height: Option<Length>,
@@ -109,7 +109,7 @@ pub struct PrintSpec {
     pub window: Option<Time>,
 }
 
-/// What acts on a surface: one of a temperature, a flux, or a film and radiation.
+/// A condition on a surface: one of a temperature, a flux, or a film and radiation.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundarySpec {
@@ -149,7 +149,7 @@ pub struct SourceSpec {
 #[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TimeSpec {
-    /// When to end; default: one layer time after the last layer, or when the path ends and one window after its last birth.
+    /// End; default: one layer time after the last layer, or when the path ends and one window after its last birth.
     pub end: Option<Time>,
     /// Time integrator.
     pub scheme: Scheme,
@@ -165,7 +165,7 @@ pub struct TimeSpec {
     pub capacity: Capacity,
     /// Linear solver.
     pub solver: LinearSolver,
-    /// Rms error that solves may leave; default 1e-7 K.
+    /// Rms error of linear solves; default 1e-7 K.
     pub solver_tolerance: Option<TemperatureDifference>,
 }
 
@@ -227,7 +227,7 @@ impl PartScene {
             let key = format!("probe[{index}].name");
             check_name(source, &key, &probe.name)?;
             if self.probe[..index].iter().any(|other| other.name == probe.name) {
-                return Err(source.error(&key, format!("`{}` twice", probe.name), "names that differ"));
+                return Err(source.error(&key, format!("`{}` twice", probe.name), "different names"));
             }
         }
         if let Some(print) = &self.print {

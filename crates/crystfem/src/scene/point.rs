@@ -26,7 +26,7 @@ pub struct PointScene {
     /// Several, by name, instead.
     #[serde(default)]
     pub materials: BTreeMap<String, MaterialSpec>,
-    /// What happens to it.
+    /// Temperature histories.
     pub point: Vec<PointSpec>,
     /// Pairs of materials whose events are compared.
     #[serde(default)]
@@ -34,7 +34,7 @@ pub struct PointScene {
     /// Files to write.
     #[serde(default)]
     pub output: OutputSpec,
-    /// What the results must be.
+    /// Expected results.
     #[serde(default)]
     pub expect: Vec<Expect>,
 }
@@ -63,7 +63,7 @@ pub struct PointSpec {
     /// Ramps, holds and jumps.
     #[serde(default)]
     pub legs: Vec<LegSpec>,
-    /// How often the legs are gone through; default once.
+    /// Number of repetitions of the legs; default 1.
     pub cycles: Option<usize>,
     /// CSV file with the columns `time [unit]` and `temperature [unit]`, instead of legs.
     pub history: Option<PathBuf>,
@@ -72,7 +72,7 @@ pub struct PointSpec {
     /// A lumped body that exchanges no heat, instead of legs.
     #[serde(default)]
     pub adiabatic: bool,
-    /// How long, for a lumped body.
+    /// Duration, for a lumped body.
     pub duration: Option<Time>,
     /// Steps of the same time; default: adaptive.
     pub time_step: Option<Time>,
@@ -82,7 +82,7 @@ pub struct PointSpec {
     pub largest_change: Option<Ratio>,
     /// Largest change of temperature in an adaptive step; default 0.5 K.
     pub largest_temperature_change: Option<TemperatureDifference>,
-    /// Its values leave the finite numbers, and must; otherwise the first that does ends the run.
+    /// Whether some value must become non-finite; otherwise the first such value ends the run.
     #[serde(default)]
     pub non_finite: bool,
     /// Part of `--quick` runs.
@@ -98,13 +98,13 @@ fn yes() -> bool {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LegSpec {
-    /// Where to.
+    /// Target temperature.
     pub to: Option<Temperature>,
-    /// How fast, above 0 for heating and cooling alike.
+    /// Rate, above 0 for both heating and cooling.
     pub rate: Option<TemperatureRate>,
-    /// In which time.
+    /// Duration.
     pub duration: Option<Time>,
-    /// How long at the same temperature.
+    /// Duration at constant temperature.
     pub hold: Option<Time>,
 }
 
@@ -139,7 +139,7 @@ impl PointScene {
             }
             (None, true) => Err(source.error("material", "nothing", "a block `[material]`")),
             (Some(_), false) => {
-                Err(source.error("materials", "`materials` beside `material`", "one of them"))
+                Err(source.error("materials", "`materials` together with `material`", "one of them"))
             }
         }
     }
@@ -202,7 +202,7 @@ impl PointSpec {
             return Err(source.error(&key("legs"), "nothing that drives the temperature", allowed));
         };
         if let Some(other) = given.next() {
-            return Err(source.error(&key(other), format!("`{other}` beside `{way}`"), allowed));
+            return Err(source.error(&key(other), format!("`{other}` together with `{way}`"), allowed));
         }
         let lumped = matches!(way, "exchange" | "adiabatic");
         let needs = [
@@ -215,7 +215,7 @@ impl PointSpec {
                 return Err(source.error(&key(name), "nothing", format!("`{name}`: `{way}` needs it")));
             }
             if refused && given {
-                return Err(source.error(&key(name), format!("`{name}` beside `{way}`"), "nothing"));
+                return Err(source.error(&key(name), format!("`{name}` together with `{way}`"), "nothing"));
             }
         }
         let start = self.start.map_or(0.0, |t| t.si());
@@ -274,7 +274,7 @@ impl PointSpec {
         if let (Some((first, _)), Some((second, _))) = (given.next(), given.next())
             && fixed.iter().any(|(name, _)| name == first)
         {
-            let found = format!("`{second}` beside `{first}`");
+            let found = format!("`{second}` together with `{first}`");
             return Err(source.error(&key(second), found, "one of them"));
         }
         let Stepping::Adaptive { degree, kelvin } = Stepping::default() else {

@@ -12,14 +12,14 @@ use crate::problem::Birth;
 use polycore::scene::{SceneError, Source};
 use std::path::Path;
 
-/// What is laid down when.
+/// Elements and times of births.
 #[derive(Default)]
 pub(super) struct Laid {
     pub births: Vec<Birth>,
-    /// What is never laid down, ascending.
+    /// Elements that are never printed, ascending.
     pub absent: Vec<u32>,
     pub layers: Vec<Vec<u32>>,
-    /// When it is over, s.
+    /// End of the path, s.
     pub end: f64,
 }
 

@@ -86,8 +86,7 @@ impl PartScene {
         }
         for (spec, place) in self.probe.iter().zip(&probes) {
             if place.elements().iter().all(|element| absent.binary_search(element).is_ok()) {
-                notes
-                    .push(format!("probe `{}` lies where nothing is printed: it records nothing", spec.name));
+                notes.push(format!("probe `{}` is where nothing is printed: it records nothing", spec.name));
             }
         }
         let mut printed: Vec<u32> = births.iter().flat_map(|birth| birth.elements.iter().copied()).collect();
@@ -230,7 +229,7 @@ impl PartScene {
                     return Err(source.error(
                         &format!("{key}.min"),
                         found,
-                        "a box that holds the middle of one",
+                        "a box that contains the centre of a face",
                     ));
                 }
                 Where::Faces(inside)

@@ -87,7 +87,7 @@ impl<D: Dimension + Copy> TimesSpec<D> {
             return Ok(None);
         }
         if table || self.file.is_some() {
-            return Err(source.error(key, "a swing beside a table or a file", "one of them"));
+            return Err(source.error(key, "a sine together with a table or a file", "one of them"));
         }
         let missing =
             |name: &str| source.error(&format!("{key}.{name}"), "nothing", "`low`, `high` and `period`");

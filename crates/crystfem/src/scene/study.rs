@@ -18,10 +18,10 @@ use std::collections::BTreeMap;
 pub struct StudySpec {
     /// Its name: values are `NAME.mean_alpha` and so on, files lie in a folder of this name.
     pub name: String,
-    /// What must happen, for the table of a suite.
-    pub must: Option<String>,
+    /// Expected behaviour, for the table of a suite.
+    pub description: Option<String>,
     /// It must end with an error that contains this.
-    pub fails: Option<String>,
+    pub expect_error: Option<String>,
     /// Part of `--quick` runs; default yes.
     pub quick: Option<bool>,
     /// Values by their paths (`"print.layer_time"`, `"boundary[1].film"`), merged into the scene.
@@ -85,7 +85,7 @@ impl PartScene {
             check_name(source, &key, &study.name)?;
             // folders of some systems do not tell `A` from `a`
             if self.study[..index].iter().any(|other| other.name.eq_ignore_ascii_case(&study.name)) {
-                return Err(source.error(&key, format!("`{}` twice", study.name), "names that differ"));
+                return Err(source.error(&key, format!("`{}` twice", study.name), "different names"));
             }
         }
         self.check_convergence(source)?;

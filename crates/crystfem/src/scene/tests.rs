@@ -133,10 +133,10 @@ fn bad_points() {
         ),
         ("name = \"a\"", "name = \"a/b\"".into(), &["`point[0].name`", "it names files"]),
         (legs, String::new(), &["one of `legs`, `history`, `exchange`, `adiabatic`"]),
-        (legs, format!("{legs}\nadiabatic = true"), &["`adiabatic` beside `legs`"]),
+        (legs, format!("{legs}\nadiabatic = true"), &["`adiabatic` together with `legs`"]),
         (legs, "adiabatic = true".into(), &["`point[0].duration`", "`adiabatic` needs it"]),
         (legs, "adiabatic = true\nduration = \"-1 s\"".into(), &["`point[0].duration`", "above 0"]),
-        (legs, "history = \"none.csv\"".into(), &["`point[0].start`", "`start` beside `history`"]),
+        (legs, "history = \"none.csv\"".into(), &["`point[0].start`", "`start` together with `history`"]),
         ("start = \"200 degC\"\n", String::new(), &["`point[0].start`", "`legs` needs it"]),
         ("start = \"200 degC\"", "start = \"-300 degC\"".into(), &["below absolute zero"]),
         (
@@ -150,7 +150,7 @@ fn bad_points() {
         (
             legs,
             format!("{legs}\ntime_step = \"1 s\"\nlargest_change = 0.1"),
-            &["`largest_change` beside `time_step`"],
+            &["`largest_change` together with `time_step`"],
         ),
         (
             legs,
@@ -159,7 +159,7 @@ fn bad_points() {
         ),
         (legs, format!("{legs}\n[[compare]]\nmaterial = \"a\"\nwith = \"b\""), &["`compare[0].material`"]),
         ("[material]", "[materials.x]".into(), &["point a"]),
-        ("[[point]]", "[[fit]]\nname = \"x\"\n[[point]]".into(), &["`fit` beside `point`"]),
+        ("[[point]]", "[[fit]]\nname = \"x\"\n[[point]]".into(), &["`fit` together with `point`"]),
         ("[[point]]", "[[pint]]".into(), &["a scene without a task"]),
     ];
     let folder = tempfile::tempdir().unwrap();

@@ -34,7 +34,7 @@ impl BiconjugateGradients {
         }
         solution.fill(0.0);
         let goal = (tolerance * tolerance * capacity).max(floor);
-        // 0 begins anew: along the residual, with the residual as shadow
+        // 0 restarts: along the residual, with the residual as shadow
         let (mut rho, mut alpha, mut omega) = (0.0, 0.0, 0.0);
         for iteration in 0..limit {
             let square = norm_squared(residual, inverse);

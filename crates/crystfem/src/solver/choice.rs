@@ -45,7 +45,7 @@ pub struct Task {
     pub symmetric: bool,
     /// Whether steps are all equal.
     pub equal_steps: bool,
-    /// What was asked for.
+    /// The requirement.
     pub wanted: LinearSolver,
 }
 
@@ -76,8 +76,8 @@ impl Task {
             );
         }
         match self.wanted {
-            LinearSolver::ConjugateGradients => return by(false, "conjugate gradients: asked for".into()),
-            LinearSolver::Direct => return by(true, "factors: asked for".into()),
+            LinearSolver::ConjugateGradients => return by(false, "conjugate gradients: requested".into()),
+            LinearSolver::Direct => return by(true, "factors: requested".into()),
             LinearSolver::Auto => {}
         }
         if !self.linear {

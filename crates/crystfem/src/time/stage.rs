@@ -290,7 +290,7 @@ impl Stages {
                 self.factors = Direct::analyse(&operator, &system.free, place);
                 (self.analysed_for, self.factored_for) = (Some(system.build), None);
             }
-            // without memory for factors, or with a matrix that is singular to rounding, the other method goes on
+            // without memory for factors, or with a matrix that is singular to rounding, the other method takes over
             if self.factored_for != made_for || !system.is_linear() {
                 work.factorizations += 1;
                 if !self.factors.as_mut().is_some_and(|factors| factors.factor(&operator)) {

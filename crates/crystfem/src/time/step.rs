@@ -15,7 +15,7 @@ const D: f64 = 0.5 * GAMMA;
 /// What a step came to.
 #[derive(Clone, Copy, Debug)]
 pub struct Attempt {
-    /// Largest temporal error of a node, K; `None` if not asked for.
+    /// Largest temporal error of a node, K; `None` if not requested.
     pub error: Option<f64>,
     /// Order of the error estimate in Δt.
     pub order: i32,

@@ -173,7 +173,7 @@ impl Dataset {
         kinds
     }
 
-    /// Whether any row has nominal stresses in place of a whole stress ([`Row::nominal`]).
+    /// Whether any row has nominal stresses instead of a whole stress ([`Row::nominal`]).
     pub fn is_nominal(&self) -> bool {
         self.rows().any(|row| row.nominal.is_some())
     }
@@ -305,7 +305,7 @@ impl Dataset {
                         "{:.4e} Pa, where nine of ten rows have at most {usual:.4e} Pa",
                         row.cauchy.norm()
                     ),
-                    allowed: "a row may have a thousand times that at most: such an outlier would be all that is learnt",
+                    allowed: "at most a thousand times that: such an outlier would dominate the training",
                 });
             }
         }

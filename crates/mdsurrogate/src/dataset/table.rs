@@ -42,8 +42,8 @@ impl Table {
             unpack.map_err(|error| {
                 Error::file(
                     path,
-                    format!("a gzip file that breaks off or is damaged after {} bytes ({error})", text.len()),
-                    "a whole gzip file",
+                    format!("a gzip file that is truncated or damaged after {} bytes ({error})", text.len()),
+                    "a complete gzip file",
                 )
             })?;
         } else {

@@ -176,7 +176,7 @@ fn nominal_stresses_of_rubber() {
     for (text, message) in [
         ("stretch,nominal_kg\n1,2\n", "header `stretch,nominal_kg`"),
         ("mode,stretch,nominal_MPa\nshear,1,2\n", "line 2: mode `shear`"),
-        ("stretch,nominal_MPa\n1,x\n", "line 2: `x` is no number"),
+        ("stretch,nominal_MPa\n1,x\n", "line 2: `x` is not a number"),
     ] {
         let error = read_text(text).unwrap_err().to_string();
         assert!(error.contains(message), "{error}");
@@ -270,7 +270,7 @@ fn broken_gzip() {
     for cut in [3, 20, bytes.len() - 1] {
         std::fs::write(&path, &bytes[..cut]).unwrap();
         let error = read(&path, &ReadOptions::default()).unwrap_err().to_string();
-        assert!(error.contains("breaks off or is damaged"), "{error}");
+        assert!(error.contains("is truncated or damaged"), "{error}");
     }
 }
 

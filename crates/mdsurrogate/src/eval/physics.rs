@@ -6,7 +6,7 @@ use crate::surrogate::{Surrogate, Workspace};
 use polycore::constitutive::Law;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
 
-/// Amount of simple shear at which a law is asked for a shear stress.
+/// Amount of simple shear at which the shear stress of a law is evaluated.
 pub const SHEAR: f64 = 0.05;
 /// Pieces of each side of the closed cycle.
 const PIECES: usize = 64;

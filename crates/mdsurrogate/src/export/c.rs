@@ -32,7 +32,7 @@ pub fn c_source(model: &Surrogate, name: &str) -> Result<CSource, Error> {
         return Err(Error::parameter("network", format!("{stack} bytes of stack"), "up to 1 MiB"));
     }
     let header = format!(
-        "/* {name}: a constitutive law C -> S, written by mdsurrogate. Voigt order 11 22 33 12 13 23, C_12 counted once.
+        "/* {name}: a constitutive law C -> S, written by mdsurrogate. Voigt order 11 22 33 12 13 23, C_12 not doubled.
  * s: second Piola-Kirchhoff stress, Pa. tangent (36, row by row, or NULL): 2 dS/dC, Pa, no factors.
  * energy (or NULL): W, J/m3, 0 if the law has none. spread (or NULL): disagreement of the ensemble, Pa.
  * flags (or NULL): bit a: component a of C is outside the training data; bit 6 + a: it never changed there;

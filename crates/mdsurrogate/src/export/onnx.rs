@@ -17,7 +17,7 @@ const BOOLEAN: i32 = 9;
 
 /// A model as the bytes of an ONNX model (operator set 17, doubles).
 ///
-/// Input `C` (points, 6), C_12 counted once. Outputs: `S` (points, 6) in Pa; `W` (points, 1) in J/m³ of an energy;
+/// Input `C` (points, 6), C_12 not doubled. Outputs: `S` (points, 6) in Pa; `W` (points, 1) in J/m³ of an energy;
 /// `spread` (points, 1) in Pa; `outside` (points, 6), whether a component leaves the training box; `far` (points, 1) of
 /// a model with a [`Support`](crate::surrogate::Support). C is not checked: the result at a C that is not positive definite
 /// means nothing.
@@ -79,8 +79,7 @@ impl Model<'_> {
             ir_version: FORMAT,
             producer_name: "mdsurrogate".into(),
             producer_version: env!("CARGO_PKG_VERSION").into(),
-            doc_string: "C (11 22 33 12 13 23, C_12 counted once) -> second Piola-Kirchhoff stress, Pa"
-                .into(),
+            doc_string: "C (11 22 33 12 13 23, C_12 not doubled) -> second Piola-Kirchhoff stress, Pa".into(),
             graph: Some(Graph {
                 node: graph.nodes,
                 name: "law".into(),
@@ -223,7 +222,7 @@ impl Model<'_> {
         if !(0..count).any(is_root) {
             return (x, slopes, None);
         }
-        // √p in place of p, and ½/√p before its slopes
+        // √p instead of p, and ½/√p before its slopes
         let half = graph.scalar(0.5);
         let (mut all, mut factors) = (Vec::new(), Vec::new());
         for k in 0..count {

@@ -164,7 +164,7 @@ impl Prepared {
         let constant = self.set.constant_components();
         if !constant.is_empty() {
             remarks.push(format!(
-                "without variance: {} (standardised to 0; other values of them are not to be trusted)",
+                "without variance: {} (standardised to 0; predictions for other values are not reliable)",
                 constant.join(", ")
             ));
         }

@@ -138,8 +138,8 @@ pub fn judge_laws(
         let far = floor.is_some_and(|floor| found.mean_square() > FAR_ABOVE_NOISE * floor);
         if far && found.mean_square() > FAR_FROM_STRESS * stress_square {
             warnings.push(format!(
-                "{name}: its error on the test rows is {} times the noise of the data and {} of their stress; it has \
-                 not learnt them",
+                "{name}: its error on the test rows is {} times the noise of the data and {} of their stress; the model has \
+                 not learnt the data",
                 short(found.mean_square() / floor.unwrap_or(f64::NAN)),
                 short((found.mean_square() / stress_square).sqrt())
             ));

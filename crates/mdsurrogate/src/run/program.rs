@@ -16,11 +16,11 @@ impl Case for Mdsurrogate {
         about: "From molecular dynamics to a constitutive law",
         examples: "  mdsurrogate check cases/ch3/train-default/case.toml   the scene and its data
   mdsurrogate run cases/ch3/train-default/case.toml     train, judge, draw; results in out/train-default
-  mdsurrogate resume out/train-default                  go on after an interruption
+  mdsurrogate resume out/train-default                  continue an interrupted run
   mdsurrogate sweep cases/ch3/train-default/case.toml --vary training.batch=32,256
   mdsurrogate predict law.safetensors strains.csv -o stresses.csv
                                                         stress and uncertainty at the strains of a table
-  mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      what a table holds
+  mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      describe a table
   mdsurrogate schema > mdsurrogate.schema.json          for editors",
         magic: b"mdsg-ck2",
         columns: &["*.error_over_noise", "*.best_validation_loss"],

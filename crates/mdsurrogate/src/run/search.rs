@@ -28,7 +28,7 @@ struct Progress {
     states: BTreeMap<(Method, usize), State>,
 }
 
-/// Searches, or goes on with it; gives the table in lines.
+/// Searches, or resumes it; gives the table in lines.
 ///
 /// # Errors
 /// [`Error::Interrupted`]; I/O errors.

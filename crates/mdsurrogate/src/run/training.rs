@@ -44,7 +44,7 @@ impl Trained {
     }
 }
 
-/// Trains the models, or goes on with it; writes each law when its members are done.
+/// Trains the models, or resumes it; writes each law when its members are done.
 ///
 /// # Errors
 /// Those of [`Training`], with what is finished kept in the checkpoint; [`Error::Interrupted`].
@@ -209,7 +209,7 @@ pub fn remarks(trained: &[Trained], data: &Prepared) -> Vec<String> {
             &data.rows_of(&data.split_of(model.split).train, &model.runs),
         );
         let text = format!(
-            "{}: {} does not vary by itself in these data: how the energy changes with it is not known",
+            "{}: {} does not vary independently in these data: the dependence of the energy on it is not known",
             model.name,
             names.join(", ")
         );

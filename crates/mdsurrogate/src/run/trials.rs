@@ -12,7 +12,7 @@ use polycore::report::{Report, Trial};
 use polycore::scene::Source;
 use polycore::tensor::Voigt;
 
-/// Goes through the trials: a row each in the report, and the value `NAME as it must`, 1 or 0.
+/// Goes through the trials: a row each in the report, and the value `NAME as expected`, 1 or 0.
 ///
 /// # Errors
 /// [`Error::Interrupted`]: errors of a trial are what it shows.
@@ -23,25 +23,27 @@ pub fn run(source: &Source, scene: &Scene, run: &Run, report: &mut Report) -> Re
             data.files.clone_from(files);
         }
         let mut epochs = 0;
-        let result = seen(source, &own, trial, run.options.quick, &mut epochs);
+        let result = observed(source, &own, trial, run.options.quick, &mut epochs);
         if (run.options.interrupted)() {
             return Err(run.interruption().into());
         }
-        let (seen, passed) = match (result, &trial.refused) {
+        let (observed, passed) = match (result, &trial.refused) {
             (Err(failure), Some(part)) => {
                 let text = failure.to_string();
                 let passed = text.contains(part.as_str());
                 (format!("refused: {text}"), passed)
             }
             (Err(failure), None) => (format!("refused: {failure}"), false),
-            (Ok((seen, _)), Some(_)) => (format!("not refused: {seen}"), false),
-            (Ok((seen, flagged)), None) => (seen, trial.flagged.is_none_or(|asked| flagged == Some(asked))),
+            (Ok((observed, _)), Some(_)) => (format!("not refused: {observed}"), false),
+            (Ok((observed, flagged)), None) => {
+                (observed, trial.flagged.is_none_or(|asked| flagged == Some(asked)))
+            }
         };
-        report.value(q::AS_IT_MUST.of(&[&trial.name]), f64::from(u8::from(passed)));
+        report.value(q::AS_EXPECTED.of(&[&trial.name]), f64::from(u8::from(passed)));
         report.trials.push(Trial {
             what: trial.name.clone(),
-            must: trial.must.clone(),
-            seen,
+            description: trial.description.clone(),
+            observed,
             iterations: (epochs > 0).then_some(epochs),
             passed,
         });
@@ -50,7 +52,7 @@ pub fn run(source: &Source, scene: &Scene, run: &Run, report: &mut Report) -> Re
 }
 
 /// Trains the models on a trial's data and asks them; what came out, and whether all answers were flagged.
-fn seen(
+fn observed(
     source: &Source,
     scene: &Scene,
     trial: &TrialSpec,

@@ -55,6 +55,6 @@ impl Scene {
         }
         let key = if self.search.is_some() { "search" } else { "model" };
         let found = format!("networks that need about {}", gib(needed));
-        Err(source.error(key, found, format!("at most {} (the memory available)", gib(available))))
+        Err(source.error(key, found, format!("at most {} (the available memory)", gib(available))))
     }
 }

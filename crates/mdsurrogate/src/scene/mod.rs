@@ -24,25 +24,25 @@ pub struct Scene {
     /// One line for tables and pictures.
     #[serde(default)]
     pub title: String,
-    /// What is read.
+    /// The data.
     pub data: Option<Data>,
-    /// In place of data, or beside them: the crystal, the grid of runs and the networks of the thesis, in numbers.
+    /// Instead of data, or beside them: the crystal, the grid of runs and the networks of the thesis, in numbers.
     pub crystal: Option<CrystalSpec>,
-    /// How it is divided.
+    /// Division into training, validation and test rows.
     #[serde(default)]
     pub split: SplitSpec,
     /// Laws to train, in this order.
     #[serde(default)]
     pub model: Vec<ModelSpec>,
-    /// How they are trained.
+    /// Training settings.
     #[serde(default)]
     pub training: TrainingSpec,
     /// A search for hyperparameters of an `ann`.
     pub search: Option<SearchSpec>,
-    /// A stability suite: what must happen with other data or at other strains. The models are trained in trials only.
+    /// A stability suite: expected behaviour with other data or at other strains. The models are trained in trials only.
     #[serde(default)]
     pub trial: Vec<TrialSpec>,
-    /// What the results must be.
+    /// Expected results.
     #[serde(default)]
     pub expect: Vec<Expect>,
 }
@@ -79,7 +79,7 @@ impl Scene {
             Some(_) if !self.model.is_empty() => {
                 return Err(source.error(
                     "search",
-                    "`[search]` beside `[[model]]`",
+                    "`[search]` together with `[[model]]`",
                     "one of them in a scene",
                 ));
             }
@@ -132,19 +132,19 @@ pub struct CrystalSpec {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrialSpec {
-    /// Names its row and its value `NAME as it must`.
+    /// Names its row and its value `NAME as expected`.
     pub name: String,
-    /// What must happen, for the table of the suite.
-    pub must: String,
-    /// In place of the scene's `data.files`.
+    /// Expected behaviour, for the table of the suite.
+    pub description: String,
+    /// Instead of the scene's `data.files`.
     pub files: Option<Vec<PathBuf>>,
     /// Models by name; default: all.
     pub models: Option<Vec<String>>,
     /// The trial must end with an error that contains this.
     pub refused: Option<String>,
-    /// A C at which the trained laws are asked, as C11, C22, C33, C12, C13, C23.
+    /// A C at which the trained models are evaluated, as C11, C22, C33, C12, C13, C23.
     pub at: Option<[f64; 6]>,
-    /// Whether all of their answers there must be flagged, or none.
+    /// Whether all of their predictions there must be flagged, or none.
     pub flagged: Option<bool>,
 }
 
@@ -165,7 +165,7 @@ fn check_trials(source: &Source, trials: &[TrialSpec], models: &[ModelSpec]) -> 
         }
         if trial.flagged.is_some() && (trial.at.is_none() || trial.refused.is_some()) {
             let allowed = "`at`, and no `refused`, beside it";
-            return Err(source.error(&at("flagged"), "`flagged` without an answer", allowed));
+            return Err(source.error(&at("flagged"), "`flagged` without a prediction", allowed));
         }
     }
     Ok(())
@@ -204,7 +204,7 @@ pub struct SplitSpec {
     /// Shares of train, validation, test; default 0.64, 0.16, 0.2.
     #[serde(default)]
     pub fractions: Fractions,
-    /// Names the shuffle.
+    /// Seed of the shuffle.
     #[serde(default)]
     pub seed: u64,
 }

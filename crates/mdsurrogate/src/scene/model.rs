@@ -16,7 +16,7 @@ const OWN_AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelSpec {
-    /// Names its files and results; default: its network's row of Table 3.4, or its kind.
+    /// Prefix of its files and results; default: its network's row of Table 3.4, or its kind.
     pub name: Option<String>,
     /// What its networks compute.
     pub kind: KindName,
@@ -24,11 +24,11 @@ pub struct ModelSpec {
     pub network: Option<ThesisNetwork>,
     /// Neurons and activation of each hidden layer; default of an `energy`: two of 64, softplus.
     pub hidden: Option<Vec<(usize, Activation)>>,
-    /// What an energy is invariant under; default: orthotropic.
+    /// Material symmetry of an energy; default: orthotropic.
     pub symmetry: Option<Symmetry>,
     /// Material axes of an energy as rows; default: those of the data.
     pub axes: Option<[[f64; 3]; 3]>,
-    /// Whether an energy is polyconvex by construction: elliptic everywhere, but it cannot follow data that soften. Its
+    /// Whether an energy is polyconvex by construction: elliptic everywhere, but it cannot represent softening. Its
     /// symmetry is orthotropic, transverse or isotropic, its activations are softplus, elu or linear.
     #[serde(default)]
     pub polyconvex: bool,
@@ -42,9 +42,9 @@ pub struct ModelSpec {
     /// Networks trained from different seeds into one law.
     #[serde(default = "one")]
     pub members: usize,
-    /// In what an `ann` answers inside; default: standardised.
+    /// Internal units of an `ann`'s outputs; default: standardised.
     pub outputs: Option<Outputs>,
-    /// What differs from the scene's `[training]`.
+    /// Overrides of the scene's `[training]`.
     #[serde(default)]
     pub training: TrainingSpec,
     /// Divides the rows by another method than the scene's `[split]`, for this model alone.
@@ -201,7 +201,7 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
             return Err(source.error(&at("name"), format!("`{name}` twice"), "a name for each model"));
         }
         if model.hidden.is_some() && model.network.is_some() {
-            return Err(source.error(&at("network"), "`network` beside `hidden`", "one of them"));
+            return Err(source.error(&at("network"), "`network` together with `hidden`", "one of them"));
         }
         let energy = model.kind == KindName::Energy;
         for (key, written) in [
@@ -216,7 +216,7 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
             }
         }
         if energy && model.network.is_some() {
-            let found = "a network of Table 3.4, which answers with a stress";
+            let found = "a network of Table 3.4, which returns a stress";
             return Err(source.error(&at("network"), found, "`hidden` layers for an energy"));
         }
         if energy && model.outputs.is_some() {

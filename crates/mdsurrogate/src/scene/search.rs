@@ -7,14 +7,14 @@ use crate::surrogate::Kind;
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
 
-/// What is searched, how, and how long.
+/// A search for hyperparameters.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SearchSpec {
     /// `hyperband`, `bayesian`, `random` or some of them, in this order.
     #[serde(default = "both")]
     pub methods: Vec<Method>,
-    /// Most epochs of a training; the only ones of `bayesian`.
+    /// Maximum epochs of a training; `bayesian` always uses it.
     #[serde(default = "epochs")]
     pub epochs: u32,
     /// The same in `--quick` runs.
@@ -27,10 +27,10 @@ pub struct SearchSpec {
     pub trials: usize,
     /// The same in `--quick` runs.
     pub quick_trials: Option<usize>,
-    /// Of them, how many are at random before a process is fitted.
+    /// Random trials before the Gaussian process is fitted.
     #[serde(default = "initial")]
     pub initial: usize,
-    /// Names the random choices.
+    /// Seed of the random choices.
     #[serde(default)]
     pub seed: u64,
     /// Whole searches with one seed after the other, for medians of their best losses.
@@ -41,7 +41,7 @@ pub struct SearchSpec {
     /// Of the best so many, the one with the fewest parameters is chosen.
     #[serde(default = "top")]
     pub top: usize,
-    /// What may be chosen; default: Table 3.3.
+    /// Search space; default: Table 3.3.
     #[serde(default)]
     pub space: Space,
 }

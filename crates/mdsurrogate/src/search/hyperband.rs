@@ -37,7 +37,7 @@ pub fn brackets(epochs: u32, eta: u32) -> Result<Vec<Vec<(usize, u32)>>, Error> 
 /// Searches with Hyperband of `epochs` at most and a reduction of `eta`.
 ///
 /// # Errors
-/// [`brackets`], [`Space::check`], and what the oracle tells.
+/// [`brackets`], [`Space::check`], and what the oracle returns.
 pub fn hyperband(
     space: &Space,
     epochs: u32,

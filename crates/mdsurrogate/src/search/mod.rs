@@ -1,8 +1,8 @@
 //! Search for the hyperparameters of an `ann`: Hyperband and Bayesian optimisation over Table 3.3.
 //!
 //! A search asks an [`Oracle`] for the validation loss of candidates after some epochs and remembers every answer in a
-//! [`Journal`]. It is a function of seed and answers alone: a search that goes on with the journal of a killed one asks
-//! the same questions again, gets the answers that are known from the journal, and goes on where it was.
+//! [`Journal`]. It is a function of seed and answers alone: a search that continues with the journal of a killed one asks
+//! the same questions again, gets the answers that are known from the journal, and continues where it was.
 
 mod bayesian;
 mod hyperband;
@@ -46,7 +46,7 @@ impl Method {
     }
 }
 
-/// The answer to a question of a search.
+/// One trial of a search.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
     /// Which method asked.
@@ -61,7 +61,7 @@ pub struct Trial {
     pub loss: Option<f64>,
 }
 
-/// Every answer so far, in the order of the questions.
+/// All trials so far, in order.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Journal {
     /// The answers.
@@ -93,7 +93,7 @@ fn worth(trial: &Trial) -> f64 {
 /// Asks for `trials` candidates at random, each for `epochs`.
 ///
 /// # Errors
-/// [`Space::check`], and what the oracle tells.
+/// [`Space::check`], and what the oracle returns.
 pub fn at_random(
     space: &Space,
     trials: usize,
@@ -112,7 +112,7 @@ pub fn at_random(
     Ok(())
 }
 
-/// Whoever trains candidates.
+/// A trainer of candidates.
 pub trait Oracle {
     /// The best validation loss of a candidate after so many epochs in all; none if its training diverged. The journal
     /// has all answers before this one.

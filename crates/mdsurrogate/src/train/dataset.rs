@@ -48,7 +48,7 @@ pub(super) fn units(header: &Header) -> ([f64; 6], [f64; 6]) {
 /// S in MPa = Σ_k slopes[k] ∂N/∂x_k before the correction at the identity: (inputs · 6), in f32.
 pub(super) fn scaled_slopes(law: &Surrogate<f64>, slopes: &[[f64; 6]]) -> Vec<f32> {
     let scale = law.header().output_deviation[0] / MEGAPASCAL;
-    // S_ii = 2 ∂W/∂C_ii, S_12 = ∂W/∂C_12 with C_12 counted once
+    // S_ii = 2 ∂W/∂C_ii, S_12 = ∂W/∂C_12 with C_12 not doubled
     let factor = |a: usize| if a < 3 { 2.0 } else { 1.0 };
     let row = |(slope, input): (&[f64; 6], &f64)| {
         let input = if law.header().kind.is_polyconvex() { 1.0 } else { *input };

@@ -1,4 +1,4 @@
-//! Training of laws on [burn](https://burn.dev): the loss (3.12), Adam, early stopping, runs that go on after a kill.
+//! Training of laws on [burn](https://burn.dev): the loss (3.12), Adam, early stopping, runs that continue after a kill.
 //!
 //! [`Training`] trains one network epoch by epoch. Its [`State`] is all that changes, to the bit: a training that goes
 //! on from a stored state ends with the same weights as an undisturbed one, and so does every rerun. [`ensemble`]
@@ -231,7 +231,7 @@ impl Training {
         &self.state.best
     }
 
-    /// Forgets where it stood in a step and goes on to more epochs, as Hyperband's promotions do.
+    /// Forgets where it stood in a step and continues to more epochs, as Hyperband's promotions do.
     pub fn extend(&mut self, epochs: u32) {
         self.settings.epochs = epochs;
     }

@@ -62,7 +62,7 @@ fn fit_bound(text: &str) -> Result<f64, String> {
 }
 
 pub fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
     if (least..=most).contains(&value) {
         Ok(value)
     } else {

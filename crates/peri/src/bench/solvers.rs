@@ -21,7 +21,7 @@ use std::time::Instant;
 const HALF: f64 = 0.5;
 const THICKNESS: f64 = 10e-3;
 const RADIUS: f64 = 60e-3;
-/// Residuals asked for.
+/// Residuals requested.
 const TOLERANCES: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 /// Residual of what errors are measured against.
 const REFERENCE: f64 = 1e-11;

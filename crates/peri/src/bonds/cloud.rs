@@ -53,7 +53,7 @@ impl<const D: usize> CloudBonds<D> {
         cuts: &[Cut<D>],
     ) -> Result<Self, Error> {
         if points.is_empty() {
-            return Err(Error::geometry("the body holds no particle".to_owned()));
+            return Err(Error::geometry("the body contains no particle".to_owned()));
         }
         if points.len() != volumes.len() {
             return Err(Error::geometry(format!("{} points with {} volumes", points.len(), volumes.len())));

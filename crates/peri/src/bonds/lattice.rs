@@ -132,7 +132,7 @@ impl<const D: usize> LatticeBonds<D> {
         };
         bonds.particles = bonds.occupied_slots();
         if bonds.particles.is_empty() {
-            return Err(Error::geometry("the body holds no particle".to_owned()));
+            return Err(Error::geometry("the body contains no particle".to_owned()));
         }
         bonds.connect(cuts);
         bonds.classify();

@@ -85,7 +85,7 @@ impl<const D: usize> List<D> {
         self.listed_at = Field::zeros(0);
     }
 
-    /// Makes the list anew where a particle has moved by half of the skin since it was made.
+    /// Rebuilds the list where a particle has moved by half of the skin since it was made.
     pub fn update(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
         // a little less, for rounding
         let limit = (0.49 * self.skin).powi(2);

@@ -9,7 +9,7 @@
 //! Other than there, intact bonds never repel: their own law resists compression. Particles have their whole volume,
 //! whatever the corrections of bonds.
 //!
-//! The pairs come from a list of all that are within d, what is about to touch, and a skin, made anew where a particle
+//! The pairs come from a list of all that are within d, what is about to touch, and a skin, rebuilt where a particle
 //! has moved by half of the skin. Pairs beyond d add nothing, not even a rounding: the list is no part of the state, and
 //! how often it is made makes no difference to any bit.
 //!
@@ -95,7 +95,7 @@ impl<const D: usize> Contact<D> {
         self.list.rebuilds
     }
 
-    /// Makes the list anew where a particle has moved by half of the skin since it was made.
+    /// Rebuilds the list where a particle has moved by half of the skin since it was made.
     pub fn update(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
         self.list.update(bonds, displacement);
     }
@@ -171,7 +171,7 @@ impl<const D: usize> Contact<D> {
 
     /// Adds to the Gershgorin sums of dynamic relaxation, in units of `tangent`, those of what touches or is about to:
     /// Σ_J κ(c/δ) V_J (1 + max_{d≠e} |n_d n_e|). A particle that became heavy only in touch would be driven far into
-    /// another as a light one, out again as a heavy one, and so on for ever. A particle without bonds has twice that alone:
+    /// another as a light one, out again as a heavy one, and so on indefinitely. A particle without bonds has twice that alone:
     /// it starts each step from rest, see [`Contact::still`], and so must not go farther than a gradient step may.
     pub fn add_stiffness(&self, displacement: &Field<D>, tangent: f64, masses: &mut [f64]) {
         let of = |own: &Listed, candidates: &[Candidate<D>]| {

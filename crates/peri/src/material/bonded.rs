@@ -90,7 +90,7 @@ fn mixed<const D: usize>(n: [f64; D]) -> f64 {
 /// A bond law in the kernels.
 struct Kernels<'a> {
     material: BondMaterial<'a>,
-    /// Energies over the range of stretches last asked for: a law costs more to sample than bonds to sum.
+    /// Energies over the range of stretches last requested: a law costs more to sample than bonds to sum.
     table: Option<(StretchRange, EnergyTable)>,
 }
 

@@ -30,7 +30,7 @@ use crate::bonds::Bonds;
 pub trait Material<const D: usize>: Send + Sync {
     /// What a particle knows of its family: filled by [`Self::prepare`] before each pass over the bonds; `()` for bond laws.
     ///
-    /// A run that goes on from a checkpoint fills it anew: it must follow from the body as it was built, the displacement and
+    /// A run that resumes from a checkpoint computes it again: it must follow from the body as it was built, the displacement and
     /// the intact bonds alone, and from no history.
     type Point: Default + Clone + Send + Sync;
 

@@ -14,7 +14,7 @@ pub struct Cover {
     pub bound: f64,
     /// Whether the law stays what it is at the ends beyond them, as it must where bonds break.
     pub held: bool,
-    /// What [`Response::cover`] gave for these stretches, of a run that goes on.
+    /// What [`Response::cover`] gave for these stretches, of a resumed run.
     pub known: Option<f64>,
 }
 

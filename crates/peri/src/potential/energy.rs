@@ -27,7 +27,7 @@ impl EnergyTable {
         Self { low, step, nodes: (0..=PIECES).map(node).collect() }
     }
 
-    /// φ(e)/kθ; beyond the table its ends' tangents go on.
+    /// φ(e)/kθ; beyond the table its ends' tangents continue.
     pub fn value(&self, e: f64) -> f64 {
         let place = (e - self.low) / self.step;
         let k = (place.max(0.0) as usize).min(PIECES - 1);

@@ -16,7 +16,7 @@ const MOST_NODES: usize = 1 << 17;
 /// Cost of a division in multiply-adds, for choosing between candidates.
 const DIVISION: usize = 5;
 /// Sizes of numerator and denominator (beyond its 1): those that the kernels are compiled for, cheapest first. On stretch
-/// ranges that scenes meet, all the laws need nearly the same, whence the choice of ratios.
+/// ranges that scenes meet, all the laws need nearly the same, hence the choice of ratios.
 ///
 /// (10, 9) is padded to (11, 10): a size more than needed may have a pole and its zero in the same place.
 const CANDIDATES: [(usize, usize); 17] = [

@@ -235,7 +235,7 @@ pub fn table(outcomes: &[Outcome]) -> String {
                 || of_loading.contains(name)
                 || (!torn && name.starts_with("reaction_"))
         })
-        .filter(|(name, _)| !name.starts_with("printed"))
+        .filter(|(name, _)| !name.starts_with("as-published"))
         .map(|(name, unit)| {
             (name, if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") })
         })

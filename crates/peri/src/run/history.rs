@@ -203,23 +203,24 @@ fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
     if any { plot.write(output.join("peak_load.png")) } else { Ok(()) }
 }
 
-/// The table of a suite, also as trials of the report: what each variant is, what must happen, what was seen, at what cost.
+/// The table of a suite, also as trials of the report:each variant, its expected and observed behaviour, and its cost.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn suite(report: &mut Report, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
     use std::fmt::Write;
-    if outcomes.iter().all(|o| o.must.is_none()) {
+    if outcomes.iter().all(|o| o.description.is_none()) {
         return Ok(());
     }
-    let mut text = String::from("| case | must | seen | iterations | seconds |\n|---|---|---|---|---|\n");
+    let mut text =
+        String::from("| case | expected | observed | iterations | seconds |\n|---|---|---|---|---|\n");
     for outcome in outcomes {
         let work = |name: &str| outcome.work.iter().find(|w| w.0 == name).map_or(0, |w| w.1);
         let (held, failed) = report.verdict_on(|name| name.ends_with(&format!("[{}]", outcome.name)));
-        let seen = match (&outcome.error, failed.is_empty()) {
+        let observed = match (&outcome.error, failed.is_empty()) {
             (Some(error), _) => format!("refused: {}", error.lines().next().unwrap_or_default()),
             (None, true) => format!(
-                "stretches {:.3} to {:.3}, residual {:.1e}, {} bonds broken; {held} expectations hold",
+                "stretches {:.3} to {:.3}, residual {:.1e}, {} bonds broken; {held} expectations satisfied",
                 outcome.get("smallest_stretch").unwrap_or(f64::NAN),
                 outcome.get("largest_stretch").unwrap_or(f64::NAN),
                 outcome.get("largest_residual").unwrap_or(f64::NAN),
@@ -227,17 +228,17 @@ pub fn suite(report: &mut Report, outcomes: &[Outcome], output: &Path) -> Result
             ),
             (None, false) => format!("missed: {}", failed.join(", ")),
         };
-        let must = outcome.must.clone().unwrap_or_default();
+        let description = outcome.description.clone().unwrap_or_default();
         let _ = writeln!(
             text,
-            "| {} | {must} | {seen} | {} | {:.2} |",
+            "| {} | {description} | {observed} | {} | {:.2} |",
             outcome.name,
             work("iterations"),
             outcome.seconds_of("solve")
         );
-        if outcome.must.is_some() {
+        if outcome.description.is_some() {
             let (what, iterations) = (outcome.name.clone(), Some(work("iterations")));
-            report.trials.push(Trial { what, must, seen, iterations, passed: failed.is_empty() });
+            report.trials.push(Trial { what, description, observed, iterations, passed: failed.is_empty() });
         }
     }
     polycore::output::atomic_write(output.join("suite.md"), |file| {

@@ -104,9 +104,9 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
             other => other?,
         };
         if expected.is_some() {
-            outcome.value(q::FAILED_AS_IT_MUST, f64::from(u8::from(outcome.error.is_some())));
+            outcome.value(q::FAILED_AS_EXPECTED, f64::from(u8::from(outcome.error.is_some())));
         }
-        outcome.must = study.and_then(|study| study.must.clone());
+        outcome.description = study.and_then(|study| study.description.clone());
         finished.push(outcome);
         run.save(&(&finished, None::<&State<D>>))?;
     }
@@ -122,7 +122,7 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
 
 /// What the error of a variant must contain, where one is expected.
 fn expected_error<'a>(scene: &'a Scene, variant: &Variant) -> Option<&'a str> {
-    variant.study.and_then(|index| scene.study.get(index)?.fails.as_deref())
+    variant.study.and_then(|index| scene.study.get(index)?.expect_error.as_deref())
 }
 
 fn run_variant<const D: usize>(
@@ -331,7 +331,7 @@ fn explanation_in<const D: usize>(
     let mut lines = Vec::new();
     for variant in scene::check(source, scene, quick)? {
         if let Some(error) = expected_error(scene, &variant) {
-            lines.push(format!("variant {}\n  must fail  with `{error}`", variant.name()));
+            lines.push(format!("variant {}\n  expects    an error that contains `{error}`", variant.name()));
             continue;
         }
         let (source, scene) = variant.resolve(source, scene)?;

@@ -32,8 +32,8 @@ pub struct Outcome {
     pub probes: Vec<(String, String)>,
     /// What is allowed and most likely not meant.
     pub warnings: Vec<String>,
-    /// What must happen, where the scene says so.
-    pub must: Option<String>,
+    /// Expected behaviour, where the scene says so.
+    pub description: Option<String>,
     /// The error with which it ended, where the scene expects one.
     pub error: Option<String>,
     /// Work done.
@@ -68,7 +68,7 @@ impl Outcome {
             regions: Vec::new(),
             probes: Vec::new(),
             warnings: Vec::new(),
-            must: None,
+            description: None,
             error: None,
             work: Vec::new(),
             seconds: Vec::new(),

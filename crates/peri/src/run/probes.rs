@@ -4,7 +4,7 @@ use super::outcome::Outcome;
 use crate::bonds::Bonds;
 use crate::quantities as q;
 use crate::run::frames::intact;
-use crate::scene::{Body, Look, Probe, Scene};
+use crate::scene::{Body, Probe, Scene, Track};
 use crate::solver::State;
 use polycore::report::{Named, Quantity};
 use polycore::scene::{SceneError, Source};
@@ -42,16 +42,16 @@ impl<const D: usize> Probes<D> {
         let mut probes = Vec::new();
         for (index, probe) in scene.probe.iter().enumerate() {
             let key = format!("probe[{index}]");
-            let members = match (probe.look, probe.axis) {
-                (Look::Strain, _) => Members::Marks(probe.marks(source, &key, body)?),
-                (Look::Front, Some(axis)) => {
+            let members = match (probe.track, probe.axis) {
+                (Track::Strain, _) => Members::Marks(probe.marks(source, &key, body)?),
+                (Track::Front, Some(axis)) => {
                     Members::Planes(planes(bonds, probe.members(source, &key, body)?, axis.index()))
                 }
                 _ => Members::Region(probe.members(source, &key, body)?),
             };
             probes.push((probe.clone(), members));
         }
-        let cracks = scene.probe.iter().any(|probe| probe.look == Look::Crack);
+        let cracks = scene.probe.iter().any(|probe| probe.track == Track::Crack);
         let whole =
             if cracks { (0..bonds.slots()).map(|slot| intact(bonds, slot)).collect() } else { Vec::new() };
         Ok(Self { probes, whole })
@@ -62,16 +62,16 @@ impl<const D: usize> Probes<D> {
         let mut seen = Vec::new();
         for (probe, members) in &self.probes {
             let axis = probe.axis.map_or(0, |axis| axis.index());
-            match (probe.look, members) {
-                (Look::Displacement, Members::Region(slots)) => {
+            match (probe.track, members) {
+                (Track::Displacement, Members::Region(slots)) => {
                     let sum: f64 =
                         slots.iter().map(|&slot| state.displacement.get(slot as usize)[axis]).sum();
                     seen.push(sum / slots.len() as f64);
                 }
-                (Look::Rotation, Members::Region(slots)) => seen.push(rotation(bonds, state, slots, axis)),
-                (Look::Crack, Members::Region(slots)) => seen.extend(self.tip(bonds, probe, slots, axis)),
-                (Look::Strain, Members::Marks(marks)) => seen.push(strain(bonds, state, marks)),
-                (Look::Front, Members::Planes(planes)) => {
+                (Track::Rotation, Members::Region(slots)) => seen.push(rotation(bonds, state, slots, axis)),
+                (Track::Crack, Members::Region(slots)) => seen.extend(self.tip(bonds, probe, slots, axis)),
+                (Track::Strain, Members::Marks(marks)) => seen.push(strain(bonds, state, marks)),
+                (Track::Front, Members::Planes(planes)) => {
                     seen.push(front(state, planes, axis, probe.threshold.unwrap_or(AT_THE_FRONT)));
                 }
                 _ => seen.push(f64::NAN),
@@ -171,8 +171,8 @@ impl Outcome {
     /// Which columns of [`crate::solver::Record::seen`] are whose, with their units.
     pub(super) fn seen_columns(probes: &[Probe]) -> Vec<(String, String)> {
         let each = |probe: &Probe| {
-            let mut columns = vec![(probe.name.clone(), probe.look.unit().to_owned())];
-            if probe.look == Look::Crack {
+            let mut columns = vec![(probe.name.clone(), probe.track.unit().to_owned())];
+            if probe.track == Track::Crack {
                 let Named { name, unit } = probe.named(q::PROBE_ACROSS);
                 columns.push((name, unit));
             }
@@ -190,7 +190,7 @@ impl Outcome {
             let rows: Vec<(f64, f64)> =
                 self.history.iter().map(|r| (r.time, r.seen[own])).filter(|(_, x)| x.is_finite()).collect();
             column += 1;
-            let rows = if probe.look == Look::Rotation { unwrapped(rows) } else { rows };
+            let rows = if probe.track == Track::Rotation { unwrapped(rows) } else { rows };
             let mut add = |quantity: Quantity, value: Option<f64>| {
                 if let Some(value) = value.filter(|value| value.is_finite()) {
                     let Named { name, unit } = probe.named(quantity);
@@ -198,17 +198,17 @@ impl Outcome {
                 }
             };
             add(q::PROBE, rows.last().map(|r| r.1));
-            let swing = if probe.look == Look::Rotation { first_swing(&rows) } else { None };
+            let swing = if probe.track == Track::Rotation { first_swing(&rows) } else { None };
             let until = swing.map_or(rows.len(), |(end, _)| end);
             let peak = rows[..until].iter().map(|r| r.1).max_by(|a, b| a.abs().total_cmp(&b.abs()));
             add(q::PROBE_PEAK, peak);
-            match (probe.look, probe.gauges.map(|gauges| gauges.map(|at| at.si()))) {
-                (Look::Rotation, _) => {
+            match (probe.track, probe.gauges.map(|gauges| gauges.map(|at| at.si()))) {
+                (Track::Rotation, _) => {
                     let frequency = swing.map(|(_, time)| PI / time);
                     add(q::PROBE_FREQUENCY, frequency);
                     add(q::PROBE_RATE, frequency.zip(peak).map(|(a, b)| a * b.abs()));
                 }
-                (Look::Crack | Look::Front, Some([from, to])) => {
+                (Track::Crack | Track::Front, Some([from, to])) => {
                     let times = (crossing(&rows, from), crossing(&rows, to));
                     let speed = |(a, b): (f64, f64)| (to - from) / (b - a);
                     add(q::PROBE_SPEED, times.0.zip(times.1).map(speed));
@@ -218,13 +218,13 @@ impl Outcome {
                     let back = between.windows(2).map(|pair| pair[0] - pair[1]).fold(0.0, f64::max);
                     add(q::PROBE_BACKSTEP, Some(back));
                 }
-                (Look::Crack | Look::Front, None) => {
+                (Track::Crack | Track::Front, None) => {
                     let speed = rows.first().zip(rows.last()).map(|(a, b)| (b.1 - a.1) / (b.0 - a.0));
                     add(q::PROBE_SPEED, speed);
                 }
                 _ => {}
             }
-            if probe.look == Look::Crack {
+            if probe.track == Track::Crack {
                 let gauges = probe.gauges.map_or([f64::NEG_INFINITY, f64::INFINITY], |g| g.map(|at| at.si()));
                 let within = self.history.iter().filter(|r| (gauges[0]..=gauges[1]).contains(&r.seen[own]));
                 let most = within.map(|r| r.seen[own + 1]).filter(|x| x.is_finite()).reduce(f64::max);

@@ -26,7 +26,7 @@ pub fn stages(
     let damages: Vec<f64> = (0..frames.len())
         .map(|k| Ok(frames.data(k, "damage")?.iter().sum()))
         .collect::<Result<_, Error>>()?;
-    // the step of the peak load, which the damage does not tell
+    // the step of the peak load, which the damage does not determine
     let peak = outcome.history.iter().enumerate().max_by(|a, b| a.1.load.total_cmp(&b.1.load));
     let peak = peak.and_then(|(k, _)| frames.times().iter().position(|&time| time == (k + 1) as f64));
     let chosen = choose(&damages, peak, scene.output.stages);

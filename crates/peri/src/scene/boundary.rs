@@ -4,7 +4,7 @@ use super::formula::Formula;
 use polycore::units::{Force, Length, Speed, Stress};
 use serde::Deserialize;
 
-/// A region and what holds there.
+/// A region and its conditions.
 #[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Boundary {

@@ -91,7 +91,7 @@ fn filled<const D: usize>(
     Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness, severed, cuts, operations })
 }
 
-/// Bytes that a variant needs at least, as far as its lattice tells, before anything of it is built; 0 for a cloud.
+/// Bytes that a variant needs at least, as far as its lattice determines it, before anything of it is built; 0 for a cloud.
 ///
 /// # Errors
 /// As [`body_of`].
@@ -146,7 +146,7 @@ fn refuse_too_large<const D: usize>(
     if !(cells <= MOST_CELLS && slots <= MOST_SLOTS && needed <= available) {
         let found = format!("{cells:.3e} lattice cells, which need about {}", gib(needed));
         let allowed = format!(
-            "at most {MOST_CELLS:.0e} cells and {} (the memory available); take a larger spacing",
+            "at most {MOST_CELLS:.0e} cells and {} (the available memory); take a larger spacing",
             gib(available)
         );
         return Err(source.error(spacing_key(scene), found, allowed));

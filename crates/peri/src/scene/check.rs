@@ -23,7 +23,7 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
     let variants = variants(source, scene, quick)?;
     for variant in &variants {
         // what must fail does so when its turn comes
-        if variant.study.is_none_or(|index| scene.study[index].fails.is_none()) {
+        if variant.study.is_none_or(|index| scene.study[index].expect_error.is_none()) {
             let (source, scene) = variant.resolve(source, scene)?;
             check_variant(&source, &scene)?;
         }
@@ -75,7 +75,7 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let lattices = scene.stress.iter().flat_map(|stress| &stress.measures).position(|m| m.needs_lattice());
     if let Some(index) = lattices.filter(|_| scene.body.points.is_some()) {
         let found = "a measure of lattices in a cloud";
-        let allowed = "`hardy`, `gaussian`, `spline`, `ball-share`, `one-point` or `printed`";
+        let allowed = "`hardy`, `gaussian`, `spline`, `ball-share`, `one-point` or `as-published`";
         return Err(source.error(&format!("stress.measures[{index}]"), found, allowed));
     }
     if let Some(exact) = &scene.exact {
@@ -128,7 +128,11 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             }
             if let Some(factor) = &dynamics.factor {
                 if dynamics.ramp.is_some() {
-                    return Err(source.error("dynamics.factor", "`factor` beside `ramp`", "one of them"));
+                    return Err(source.error(
+                        "dynamics.factor",
+                        "`factor` together with `ramp`",
+                        "one of them",
+                    ));
                 }
                 if let Some(found) = factor.other_than("t") {
                     let found = format!("`{found}` in `{}`", factor.text());
@@ -219,7 +223,7 @@ pub(super) fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Re
 fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let body = &scene.body;
     if body.points.is_some() && body.grid.is_some() {
-        return Err(source.error("body.grid", "`grid` beside `points`", "one of them"));
+        return Err(source.error("body.grid", "`grid` together with `points`", "one of them"));
     }
     let name = if body.grid.is_some() { "grid" } else { "points" };
     match (body.shapes().is_empty(), body.has_points()) {
@@ -229,7 +233,7 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         (_, true) if body.shapes.is_some() => {
             return Err(source.error(
                 &format!("body.{name}"),
-                format!("`{name}` beside `shapes`"),
+                format!("`{name}` together with `shapes`"),
                 "one of them",
             ));
         }

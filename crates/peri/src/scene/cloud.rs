@@ -114,7 +114,7 @@ fn grid<const D: usize>(source: &Source, spec: &GridSpec, thickness: f64) -> Res
     let needed = memory::of_cloud::<D>(count, 0.0);
     if cells.contains(&0) || needed > available() || count > f64::from(u32::MAX) {
         let allowed =
-            format!("at least 1 along each axis, and at most {} (the memory available)", gib(available()));
+            format!("at least 1 along each axis, and at most {} (the available memory)", gib(available()));
         return Err(source.error(
             "body.grid.cells",
             format!("{cells:?}, which need {}", gib(needed)),
@@ -157,8 +157,9 @@ fn read<const D: usize>(source: &Source, path: &Path) -> Result<Points<D>, Scene
         let line = record.position().map_or(0, csv::Position::line);
         let mut values = [0.0_f64; 4];
         for (value, field) in values.iter_mut().zip(&record) {
-            *value =
-                field.parse().map_err(|_| bad(format!(", line {line}: `{field}` is no number"), &columns))?;
+            *value = field
+                .parse()
+                .map_err(|_| bad(format!(", line {line}: `{field}` is not a number"), &columns))?;
         }
         if let Some(value) = values.iter().find(|v| !v.is_finite()) {
             return Err(bad(format!(", line {line}: {value}"), "finite numbers"));
@@ -199,7 +200,7 @@ fn refuse_too_many_bonds<const D: usize>(
     let (needed, available) = (memory::of_cloud::<D>(positions.len() as f64, bonds), available());
     if needed > available {
         let found = format!("{horizon} m, which makes about {bonds:.1e} bonds that need {}", gib(needed));
-        let allowed = format!("at most {} (the memory available); take a smaller horizon", gib(available));
+        let allowed = format!("at most {} (the available memory); take a smaller horizon", gib(available));
         return Err(source.error("body.horizon", found, allowed));
     }
     Ok(())

@@ -37,10 +37,10 @@ pub(super) fn cracks<const D: usize>(source: &Source, scene: &Scene) -> Result<V
     each.collect()
 }
 
-/// How many bonds each crack severs, whatever the others do.
+/// Number of bonds that each crack breaks by itself.
 ///
 /// # Errors
-/// A crack that severs none.
+/// A crack that breaks none.
 pub(super) fn severed<const D: usize>(
     source: &Source,
     bonds: &dyn Bonds<D>,
@@ -71,7 +71,7 @@ pub(super) fn severed<const D: usize>(
             }
         }
         if severed == 0 {
-            let found = "a crack that severs no bond";
+            let found = "a crack that breaks no bond";
             return Err(source.error(
                 &format!("body.cracks[{index}]"),
                 found,

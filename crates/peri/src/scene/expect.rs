@@ -59,13 +59,13 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
     let mut families: Vec<(String, usize)> = Vec::new();
     for variant in &variants {
         // what must fail may have no scene at all
-        let fails = variant.study.is_some_and(|index| scene.study[index].fails.is_some());
+        let fails = variant.study.is_some_and(|index| scene.study[index].expect_error.is_some());
         let own = match variant.resolve(source, scene) {
             Ok((_, own)) => quantities(&own).into_iter().map(|quantity| quantity.name).collect(),
             Err(_) if fails => Vec::new(),
             Err(error) => return Err(error),
         };
-        let own = own.into_iter().chain(fails.then(|| q::FAILED_AS_IT_MUST.name.to_owned()));
+        let own = own.into_iter().chain(fails.then(|| q::FAILED_AS_EXPECTED.name.to_owned()));
         match variants.len() {
             1 => names.extend(own),
             _ => {

@@ -42,7 +42,7 @@ pub fn explain<const D: usize>(
             .flatten()
             .map(|point| point.iter().map(|x| plain(rounded(x.si() * 1e3))).collect::<Vec<_>>().join(", "))
             .collect();
-        builds(format!("a crack, ({}) mm: {severed} bonds severed", corners.join(") – (")));
+        builds(format!("a crack, ({}) mm: {severed} bonds broken", corners.join(") – (")));
     }
     lines.extend(super::loads::explain(source, scene, body)?);
     lines.push(format!("  needs      {}", polycore::memory::needs(super::memory_needed(scene, bonds))));
@@ -61,9 +61,9 @@ pub fn explain<const D: usize>(
     }
     if let Some(contact) = &scene.contact {
         builds(if contact.stiffness > 0.0 {
-            format!("contact of stiffness {}, a list of near pairs without a bond", contact.stiffness)
+            format!("contact of stiffness {}, a list of close pairs without a bond", contact.stiffness)
         } else {
-            "a look in each step at how far particles without a bond overlap, no repulsion".to_owned()
+            "detection of overlaps in each step, no repulsion".to_owned()
         });
     }
     if let Some(stress) = &scene.stress {

@@ -19,7 +19,7 @@ impl<'a> Inclusions<'a> {
     /// Finds the particles of all inclusions.
     ///
     /// # Errors
-    /// A fault of an inclusion's shape, or one that holds no particle.
+    /// A fault of an inclusion's shape, or one that contains no particle.
     pub fn new<const D: usize>(
         source: &Source,
         scene: &'a Scene,
@@ -37,11 +37,7 @@ impl<'a> Inclusions<'a> {
             let inside = |&slot: &u32| shape.contains(bonds.position(slot as usize));
             let members: Vec<u32> = bonds.particles().iter().copied().filter(inside).collect();
             if members.is_empty() {
-                return Err(source.error(
-                    &key,
-                    "a shape without particles",
-                    "a shape that holds at least one",
-                ));
+                return Err(source.error(&key, "a shape without particles", "a shape with at least one"));
             }
             members.iter().for_each(|&slot| stiffness[slot as usize] *= inclusion.stiffness);
             each.push((inclusion, members));

@@ -22,7 +22,7 @@ pub fn loads_of<const D: usize>(
         let key = format!("boundary[{index}]");
         let (members, depth) = region(source, &key, boundary, body)?;
         if members.is_empty() {
-            return Err(source.error(&key, "a region without particles", "a region that holds at least one"));
+            return Err(source.error(&key, "a region without particles", "a region with at least one"));
         }
         let forced =
             boundary.traction.is_some() || boundary.force.is_some() || boundary.displacement.is_some();
@@ -43,14 +43,14 @@ pub fn loads_of<const D: usize>(
     if body.bonds.particles().iter().all(|&slot| loads.held(slot as usize) == all) {
         return Err(source.error(
             "boundary",
-            "every component of every particle is held",
+            "every component of every particle is prescribed",
             "at least one free",
         ));
     }
     Ok((loads, loaded))
 }
 
-/// Velocities at the start, m/s; the last region wins.
+/// Velocities at the start, m/s; the last region applies.
 ///
 /// # Errors
 /// As [`super::body_of`].
@@ -144,8 +144,10 @@ fn balanced<const D: usize>(
         }
         if !held && sum.abs() > scene.tolerance() * size {
             let axis = ["x", "y", "z"][d];
-            let found = format!("a total force of {sum:.3e} N along {axis}, along which nothing is held");
-            let allowed = "forces in balance, or a `displacement` that holds some region";
+            let found = format!(
+                "a total force of {sum:.3e} N along {axis}, along which no displacement is prescribed"
+            );
+            let allowed = "balanced forces, or a `displacement` of some region";
             return Err(source.error("boundary", found, allowed));
         }
     }
@@ -310,9 +312,11 @@ fn support<const D: usize>(
         }
     };
     let either = |name: &str, both: bool, other: &str| match both {
-        true => {
-            Err(source.error(&format!("{key}.{name}"), format!("`{name}` beside `{other}`"), "one of them"))
-        }
+        true => Err(source.error(
+            &format!("{key}.{name}"),
+            format!("`{name}` together with `{other}`"),
+            "one of them",
+        )),
         false => Ok(()),
     };
     let of_place = |name: &str, formula: &Formula| match formula.other_than(&"xyz"[..D]) {

@@ -1,4 +1,4 @@
-//! Memory that a variant needs, stated before it is solved and, as far as its lattice tells, before it is built.
+//! Memory that a variant needs, stated before it is solved and, as far as its lattice determines it, before it is built.
 //!
 //! Counted are the arrays that live at once, in bytes a slot or a particle; the test `memory` of the workspace compares
 //! the sum with what whole runs take.
@@ -118,5 +118,5 @@ pub(super) fn refuse_too_large<const D: usize>(
         return Ok(());
     }
     let found = format!("{} particles, whose run needs about {}", bonds.particles().len(), gib(needed));
-    Err(source.error(key, found, format!("at most {} (the memory available)", gib(available))))
+    Err(source.error(key, found, format!("at most {} (the available memory)", gib(available))))
 }

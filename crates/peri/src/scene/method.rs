@@ -136,7 +136,7 @@ pub struct Dynamics {
     pub end_time: Time,
     /// Time over which the loads rise; default: at once.
     pub ramp: Option<Time>,
-    /// The load factor as a formula of the time `t`, s, in place of `ramp`.
+    /// The load factor as a formula of the time `t`, s, instead of `ramp`.
     pub factor: Option<Formula>,
     /// Largest time step; default: `safety` times the critical one.
     pub time_step: Option<Time>,

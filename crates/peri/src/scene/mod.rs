@@ -28,7 +28,7 @@ pub use loads::{loads_of, region_names, velocities_of};
 pub use memory::needed as memory_needed;
 pub use method::{Dynamics, Method, Solver};
 pub use placement::{check_placement, exact_plate};
-pub use probe::{Look, Probe};
+pub use probe::{Probe, Track};
 pub use variant::Variant;
 pub use warn::warnings;
 
@@ -66,9 +66,9 @@ pub struct Scene {
     pub solver: Solver,
     /// Density and times of explicit dynamics.
     pub dynamics: Option<Dynamics>,
-    /// Repulsion of particles without a bond; without it there is none, and nothing of it is computed.
+    /// Repulsion of particles without a bond; default: none.
     pub contact: Option<ContactSpec>,
-    /// What is looked at in every row of the history.
+    /// Quantities recorded in every row of the history.
     #[serde(default)]
     pub probe: Vec<Probe>,
     /// Stress output; without it no stress is computed.
@@ -81,7 +81,7 @@ pub struct Scene {
     /// Variants to run instead of the scene's own discretisation.
     #[serde(default)]
     pub study: Vec<Study>,
-    /// What the results must be.
+    /// Expected results.
     #[serde(default)]
     pub expect: Vec<Expect>,
 }
@@ -112,7 +112,7 @@ pub struct BodySpec {
     pub shapes: Option<Vec<ShapeSpec>>,
     /// CSV file with the columns x, y(, z) in m and volume in m³.
     pub points: Option<PathBuf>,
-    /// A box of cells that need not be as wide as high, with `horizon`.
+    /// A box of cells that may have unequal sides, with `horizon`.
     pub grid: Option<GridSpec>,
     /// Cracks of zero width.
     #[serde(default)]
@@ -132,7 +132,7 @@ pub struct GridSpec {
 }
 
 impl BodySpec {
-    /// Whether it has points in place of shapes.
+    /// Whether it has points instead of shapes.
     pub fn has_points(&self) -> bool {
         self.points.is_some() || self.grid.is_some()
     }
@@ -150,9 +150,9 @@ pub const HORIZON_RATIO: f64 = 3.015;
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShapeSpec {
-    /// Kind of a shape put on.
+    /// Kind of an added shape.
     pub add: Option<ShapeKind>,
-    /// Kind of a shape taken away.
+    /// Kind of a shape that is cut out.
     pub cut: Option<ShapeKind>,
     /// Lower corner of a box.
     pub min: Option<Vec<Length>>,
@@ -231,7 +231,7 @@ pub struct Material {
     /// Bonds near free surfaces.
     #[serde(default)]
     pub surface_correction: SurfaceCorrection,
-    /// Critical stretch: bonds break beyond it; without it none does, and nothing of breaking is computed.
+    /// Critical stretch, beyond which bonds break; default: no bond breaks.
     pub critical: Option<Critical>,
     /// Parts of the body that are stiffer or softer.
     #[serde(default)]
@@ -365,19 +365,19 @@ pub struct OutputSpec {
     pub load_at: Vec<Length>,
     /// The integrals over the horizon of Appendix A, by quadrature, among the values of the report.
     pub integrals: bool,
-    /// What every variant is measured against.
+    /// Reference for the variants.
     pub compare: Option<CompareSpec>,
 }
 
-/// A truth for one result: that of a variant, or a number.
+/// A reference for one result: that of a variant, or a number.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CompareSpec {
     /// The result, such as `peak_load`.
     pub quantity: String,
-    /// Name of the variant that is taken as true.
+    /// Name of the reference variant.
     pub variant: Option<String>,
-    /// The true value, in SI units.
+    /// The reference value, in SI units.
     pub value: Option<f64>,
 }
 
@@ -396,17 +396,17 @@ impl Default for OutputSpec {
     }
 }
 
-/// A set of variants: every combination of what is listed, the scene's own value where nothing is. What replaces a part
-/// of the scene replaces it whole.
+/// A set of variants: every combination of the listed values; other keys keep the scene's value. A replaced part of the
+/// scene is replaced as a whole.
 #[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Study {
-    /// What its variants are called, after their spacing and horizon.
+    /// Suffix of the variants' names.
     pub name: Option<String>,
-    /// What must happen, for the table of a suite.
-    pub must: Option<String>,
+    /// Expected behaviour, for the table of a suite.
+    pub description: Option<String>,
     /// The run must end with an error that contains this.
-    pub fails: Option<String>,
+    pub expect_error: Option<String>,
     /// Values by their paths (`"solver.tolerance"`, `"boundary[1].displacement"`), merged into the scene.
     #[schemars(with = "Option<BTreeMap<String, serde_json::Value>>")]
     pub set: Option<BTreeMap<String, IgnoredAny>>,

@@ -10,7 +10,7 @@ use polycore::scene::{SceneError, Source};
 /// Checks what only the body and its loads can tell.
 ///
 /// # Errors
-/// A hole of `[exact]` that the body does not have; a load asked for at a displacement that is never reached.
+/// A hole of `[exact]` that the body does not have; a load requested at a displacement that is never reached.
 pub fn check_placement<const D: usize>(
     source: &Source,
     scene: &Scene,

@@ -1,4 +1,4 @@
-//! What a scene has looked at in every row of the history: displacements, strains between marks, rotations, crack tips, wave
+//! Quantities that a scene records in every row of the history: displacements, strains between marks, rotations, crack tips, wave
 //! fronts.
 
 use super::build::{Body, vector};
@@ -11,15 +11,15 @@ use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
 use serde::{Deserialize, Serialize};
 
-/// A look at a part of the body.
+/// A quantity recorded in every row of the history.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
-    /// Its column in the history, and the beginning of its values' names.
+    /// Its column in the history, and the prefix of its values.
     pub name: String,
-    /// At what.
-    pub look: Look,
-    /// Along which axis; about which, of a rotation.
+    /// Its quantity.
+    pub track: Track,
+    /// Direction, or axis of rotation.
     pub axis: Option<Axis>,
     /// A side of the bounding box; default: the whole body.
     pub side: Option<Side>,
@@ -35,18 +35,18 @@ pub struct Probe {
     pub to: Option<Vec<Length>>,
     /// Damage, from and to, of the particles at a crack's tip.
     pub damage: Option<[f64; 2]>,
-    /// How far from 0 along this axis a crack's tip is found.
+    /// Axis along which the distance of a crack's tip from 0 is recorded.
     pub across: Option<Axis>,
     /// Two places between which a crack's or a front's speed is measured.
     pub gauges: Option<[Length; 2]>,
-    /// Part of the largest velocity that a front has.
+    /// Velocity of a front, as a fraction of the largest.
     pub threshold: Option<f64>,
 }
 
-/// At what a probe looks.
+/// Quantities of a probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Look {
+pub enum Track {
     /// Mean displacement of the region along the axis, m.
     Displacement,
     /// Distance of two marks over that at rest, less 1.
@@ -59,7 +59,7 @@ pub enum Look {
     Front,
 }
 
-impl Look {
+impl Track {
     /// Unit of its column.
     pub fn unit(self) -> &'static str {
         match self {
@@ -81,11 +81,11 @@ impl Probe {
     /// Names of its values.
     pub fn values(&self) -> Vec<Named> {
         let front = [q::PROBE_SPEED, q::PROBE_BETWEEN_GAUGES, q::PROBE_BACKSTEP];
-        let more = match self.look {
-            Look::Displacement | Look::Strain => Vec::new(),
-            Look::Rotation => vec![q::PROBE_FREQUENCY, q::PROBE_RATE],
-            Look::Crack => [&front[..], &[q::PROBE_ACROSS]].concat(),
-            Look::Front => front.to_vec(),
+        let more = match self.track {
+            Track::Displacement | Track::Strain => Vec::new(),
+            Track::Rotation => vec![q::PROBE_FREQUENCY, q::PROBE_RATE],
+            Track::Crack => [&front[..], &[q::PROBE_ACROSS]].concat(),
+            Track::Front => front.to_vec(),
         };
         let all = [q::PROBE, q::PROBE_PEAK].into_iter().chain(more);
         all.map(|quantity| self.named(quantity)).collect()
@@ -94,7 +94,7 @@ impl Probe {
     /// A quantity of this probe, in its unit where it has none of its own.
     pub fn named(&self, quantity: Quantity) -> Named {
         let named = quantity.of(&[&self.name]);
-        if named.unit == "*" { named.in_unit(self.look.unit()) } else { named }
+        if named.unit == "*" { named.in_unit(self.track.unit()) } else { named }
     }
 
     /// Slots of its region, of the whole body where it names none.
@@ -119,7 +119,7 @@ impl Probe {
         };
         let (members, _) = region(source, key, &place, body)?;
         if members.is_empty() {
-            return Err(source.error(key, "a region without particles", "a region that holds at least one"));
+            return Err(source.error(key, "a region without particles", "a region with at least one"));
         }
         Ok(members)
     }
@@ -176,50 +176,54 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         for Named { name: value, .. } in probe.values() {
             if names.contains(&value) {
                 let found = format!("`{}`, of which `{value}` is taken", probe.name);
-                return Err(source.error(&key("name"), found, "a name of its own"));
+                return Err(source.error(&key("name"), found, "a unique name"));
             }
             names.push(value);
         }
-        let look = probe.look;
+        let track = probe.track;
         // name, given, belongs, needed
-        let of_crack = look == Look::Crack;
-        let moving = of_crack || look == Look::Front;
+        let of_crack = track == Track::Crack;
+        let moving = of_crack || track == Track::Front;
         for (name, given, belongs, needed) in [
-            ("axis", probe.axis.is_some(), look != Look::Strain, look != Look::Strain),
-            ("from", probe.from.is_some(), look == Look::Strain, look == Look::Strain),
-            ("to", probe.to.is_some(), look == Look::Strain, look == Look::Strain),
-            ("side", probe.side.is_some(), look != Look::Strain, false),
-            ("min", probe.min.is_some(), look != Look::Strain, false),
-            ("max", probe.max.is_some(), look != Look::Strain, false),
+            ("axis", probe.axis.is_some(), track != Track::Strain, track != Track::Strain),
+            ("from", probe.from.is_some(), track == Track::Strain, track == Track::Strain),
+            ("to", probe.to.is_some(), track == Track::Strain, track == Track::Strain),
+            ("side", probe.side.is_some(), track != Track::Strain, false),
+            ("min", probe.min.is_some(), track != Track::Strain, false),
+            ("max", probe.max.is_some(), track != Track::Strain, false),
             ("damage", probe.damage.is_some(), of_crack, false),
             ("across", probe.across.is_some(), of_crack, false),
             ("gauges", probe.gauges.is_some(), moving, false),
-            ("threshold", probe.threshold.is_some(), look == Look::Front, false),
+            ("threshold", probe.threshold.is_some(), track == Track::Front, false),
         ] {
             if given && !belongs {
-                let found = format!("`{name}` of a look at `{}`", name_of(look));
+                let found = format!("`{name}` of a probe of `{}`", name_of(track));
                 return Err(source.error(&key(name), found, "nothing"));
             }
             if needed && !given {
-                let allowed = format!("a look at `{}` needs its `{name}`", name_of(look));
+                let allowed = format!("a probe of `{}` needs `{name}`", name_of(track));
                 return Err(source.error(&key(name), "nothing", allowed));
             }
         }
         for (name, axis) in [("axis", probe.axis), ("across", probe.across)] {
-            let plane_rotation = look == Look::Rotation && axis == Some(Axis::Z);
+            let plane_rotation = track == Track::Rotation && axis == Some(Axis::Z);
             if axis.is_some_and(|axis| axis.index() >= dimension) && !plane_rotation {
                 return Err(source.error(&key(name), "`z` in a plane body", "`x` or `y`"));
             }
         }
-        if look == Look::Rotation && dimension == 2 && probe.axis != Some(Axis::Z) {
+        if track == Track::Rotation && dimension == 2 && probe.axis != Some(Axis::Z) {
             return Err(source.error(&key("axis"), "an axis in the plane", "`z` in a plane body"));
         }
         if of_crack && scene.material.critical.is_none() {
             let allowed = "nothing, or `material.critical`: without it nothing breaks";
-            return Err(source.error(&key("look"), "`crack`", allowed));
+            return Err(source.error(&key("track"), "`crack`", allowed));
         }
-        if look == Look::Front && scene.method() != Method::Verlet {
-            return Err(source.error(&key("look"), "`front` without motion", "`solver.method = \"verlet\"`"));
+        if track == Track::Front && scene.method() != Method::Verlet {
+            return Err(source.error(
+                &key("track"),
+                "`front` without motion",
+                "`solver.method = \"verlet\"`",
+            ));
         }
         if let Some([low, high]) = probe.damage
             && !(low > 0.0 && low <= high && high <= 1.0)
@@ -241,12 +245,12 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     Ok(())
 }
 
-fn name_of(look: Look) -> &'static str {
-    match look {
-        Look::Displacement => "displacement",
-        Look::Strain => "strain",
-        Look::Rotation => "rotation",
-        Look::Crack => "crack",
-        Look::Front => "front",
+fn name_of(track: Track) -> &'static str {
+    match track {
+        Track::Displacement => "displacement",
+        Track::Strain => "strain",
+        Track::Rotation => "rotation",
+        Track::Crack => "crack",
+        Track::Front => "front",
     }
 }

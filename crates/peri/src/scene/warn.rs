@@ -96,7 +96,7 @@ fn on_crack<const D: usize>(bonds: &dyn Bonds<D>, index: usize, cut: &Cut<D>) ->
     let place = first.map(|x| format!("{:.3}", x * 1e3)).join(", ");
     Some(format!(
         "{} particles lie on body.cracks[{index}], the first at ({place}) mm, and keep their {kept} bonds to both of its sides: \
-         the crack is bridged; half a spacing ({:.3} mm) beside it lies between the particles",
+         the crack is bridged; move it by half a spacing ({:.3} mm)",
         on.len(),
         0.5e3 * spacing
     ))
@@ -134,8 +134,8 @@ fn bridged<const D: usize>(
     }
     (across > 0).then(|| {
         format!(
-            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} bonds reach across it; a \
-             crack through it severs them",
+            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} bonds cross it; a \
+             crack through it breaks them",
             width * 1e3,
             ["x", "y", "z"][axis],
             horizon * 1e3
@@ -156,7 +156,7 @@ fn long_steps<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<Str
     let horizons = step / bonds.horizon();
     (horizons > LONGEST_STEP).then(|| {
         format!(
-            "a step moves a grip by {:.3} mm, {horizons:.0} horizons: what breaks on the way is not seen; `solver.steps` = {:.0} moves it \
+            "a step moves a grip by {:.3} mm, {horizons:.0} horizons: breaking within the step is not resolved; `solver.steps` = {:.0} moves it \
              by one spacing",
             step * 1e3,
             largest / bonds.spacing()

@@ -24,7 +24,7 @@ pub struct DynamicRelaxation {
     pub max_iterations: u64,
     /// Factor S on the fictitious mass above the Gershgorin bound.
     pub mass_safety: f64,
-    /// A search that has used all its iterations goes on all the same if its residual is below this; its residual stays
+    /// A search that has used all its iterations continues if its residual is below this; its residual stays
     /// in the history.
     pub accept: f64,
 }
@@ -132,7 +132,7 @@ impl RelaxationSolver {
         } else {
             0.0
         };
-        // where bonds soften the quotient is negative and would leave them to swing for ever: a long search is damped
+        // where bonds soften the quotient is negative and would leave them to swing indefinitely: a long search is damped
         let late = state.iteration.saturating_sub(LONG) as f64 / LONG as f64;
         let damping = (2.0 * quotient.max(0.0).sqrt()).clamp(LATE_DAMPING * late.min(1.0), 1.9);
         let goal = settings.goal();
@@ -156,7 +156,7 @@ impl RelaxationSolver {
             load: state.history.last().map(|record| record.load),
             damping,
             broken: state.broken,
-            // masses are made anew from the state alone
+            // masses are rebuilt from the state alone
             restartable: state.iteration.is_multiple_of(REFRESH),
         };
         watch(&status, state)?;

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 const LEAST_REFERENCE: f64 = 0.05;
 /// Rounding of displacements, in units of the last place, that forces may show.
 const ROUNDING: f64 = 4.0;
-/// Iterations after which the rounding of displacements is asked for anew.
+/// Iterations after which the rounding of displacements is computed again.
 const LOOK: u64 = 50;
 
 /// How well forces must balance, and how long a search may take.

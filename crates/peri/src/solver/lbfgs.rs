@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use rayon::prelude::*;
 
-/// Searches, load steps, and iterations of one search, after which the preconditioner is built anew …
+/// Searches, load steps, and iterations of one search, after which the preconditioner is rebuilt …
 const SEARCHES: u64 = 25;
 const STEPS: usize = 10;
 const ITERATIONS: u64 = 200;
@@ -53,7 +53,7 @@ pub struct Lbfgs {
     pub coarsening: f64,
     /// Weight ω of the local part of the preconditioner.
     pub weight: f64,
-    /// A search that has used all its iterations goes on all the same if its residual is below this; its residual stays
+    /// A search that has used all its iterations continues if its residual is below this; its residual stays
     /// in the history.
     pub accept: f64,
 }

@@ -27,7 +27,7 @@ pub struct Loads<const D: usize> {
 }
 
 impl<const D: usize> Loads<D> {
-    /// Collects regions, each given as its slots and what holds there; body forces add up, the last displacement wins.
+    /// Collects regions, each given as its slots and what holds there; body forces add up, the last displacement applies.
     pub fn new(slots: usize, regions: &[(Vec<u32>, Support<D>)]) -> Self {
         let mut loads = Self::default();
         for (members, support) in regions {

@@ -64,7 +64,7 @@ pub struct Event {
     pub load: f64,
 }
 
-/// Everything an interrupted run needs to go on with the same bits.
+/// Everything an interrupted run needs to continue with the same bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct State<const D: usize> {

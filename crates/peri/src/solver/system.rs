@@ -32,7 +32,7 @@ pub struct System<'a, const D: usize> {
     pub contact: Option<Contact<D>>,
     /// What forces out of balance are measured by.
     pub(super) scale: Scale,
-    /// The load factor and its rate over the time, s, in explicit dynamics, in place of the ramp.
+    /// The load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
     pub course: Option<&'a Course<'a>>,
     /// What is looked at in every row of the history, see [`Record::seen`](super::Record::seen).
     pub observer: Option<&'a Observer<'a, D>>,

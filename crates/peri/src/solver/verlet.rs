@@ -55,7 +55,7 @@ impl VelocityVerlet {
     /// and may stop the run by an error; `finished` sees every row of the history. [`System::factors`] and
     /// [`System::stop_below`] are not used.
     ///
-    /// A state that has not moved yet, or the equilibrium that another method found (its velocities set anew), is where
+    /// A state that has not moved yet, or the equilibrium that another method found (its velocities reset), is where
     /// time begins: [`State::work`] is set to the energy that is there, so that kinetic + stored + released + damped = work
     /// in every row but for O(Δt²).
     ///

@@ -86,8 +86,8 @@ pub fn piola<const D: usize>(
                     }
                     (_, Some(_)) => 0.0,
                     // either end finds such a bond: half of its ½ from each
-                    (Measure::Printed, _) if norm(p) < square && norm(q) < square => 0.25,
-                    (Measure::Printed, _) => 0.0,
+                    (Measure::AsPublished, _) if norm(p) < square && norm(q) < square => 0.25,
+                    (Measure::AsPublished, _) => 0.0,
                     _ if nearer(p, q, other) => segment_fraction(p, q, square),
                     _ => 0.0,
                 });

@@ -107,8 +107,8 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
             let q = std::array::from_fn(|d| p[d] + f64::from(offset[d]));
             let norm = |x: [f64; D]| x.iter().map(|c| c * c).sum::<f64>();
             let weight = match measure {
-                Measure::Printed if norm(p) < square && norm(q) < square => 0.5,
-                Measure::Printed => 0.0,
+                Measure::AsPublished if norm(p) < square && norm(q) < square => 0.5,
+                Measure::AsPublished => 0.0,
                 _ => segment_fraction(p, q, square),
             };
             (weight > 0.0).then_some((start, weight))

@@ -49,7 +49,7 @@ pub enum Measure {
     /// P = ½ Σ_J f ⊗ ξ V_J: cheap, equals the lattice's stiffness.
     OnePoint,
     /// Eq. (2.31) as printed: t for f, bonds with both ends in the ball only, the whole ball's volume.
-    Printed,
+    AsPublished,
 }
 
 impl Measure {
@@ -64,7 +64,7 @@ impl Measure {
         Self::LehoucqSilling,
         Self::BallShare,
         Self::OnePoint,
-        Self::Printed,
+        Self::AsPublished,
     ];
 
     /// Name in scenes and reports.
@@ -79,7 +79,7 @@ impl Measure {
             Self::LehoucqSilling => "lehoucq-silling",
             Self::BallShare => "ball-share",
             Self::OnePoint => "one-point",
-            Self::Printed => "printed",
+            Self::AsPublished => "as-published",
         }
     }
 
@@ -90,7 +90,7 @@ impl Measure {
 
     /// Whether it shares every bond out with weights of sum 1.
     fn is_partition(self) -> bool {
-        !matches!(self, Self::BallShare | Self::OnePoint | Self::Printed)
+        !matches!(self, Self::BallShare | Self::OnePoint | Self::AsPublished)
     }
 }
 

@@ -85,7 +85,7 @@ fn paths_agree_on_a_tabulated_law() {
     assert!(apart <= 1e-7, "{apart:.1e}");
 }
 
-/// In place of Miri, which cannot run the vector kernels: bodies whose particles touch every edge of the storage, at
+/// Instead of Miri, which cannot run the vector kernels: bodies whose particles touch every edge of the storage, at
 /// sizes that no tile of 16 slots or group of 8 neighbours divides. (By hand, valgrind 3.19 runs this test
 /// without a complaint; it does not know AVX-512, so probably on the 256-bit kernels.)
 #[test]

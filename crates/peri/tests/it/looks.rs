@@ -46,9 +46,9 @@ fn a_rotation_is_seen_as_one() {
 displacement_field = [\"(cos(0.3) - 1)*x - sin(0.3)*y\", \"sin(0.3)*x + (cos(0.3) - 1)*y\"]
 [solver]\nmethod = \"verlet\"
 [dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"1 ms\"\nrecords = 2
-[[probe]]\nname = \"turn\"\nlook = \"rotation\"\naxis = \"z\"
-[[probe]]\nname = \"gauge\"\nlook = \"strain\"\nfrom = [\"11 mm\", \"1 mm\"]\nto = [\"61 mm\", \"11 mm\"]
-[[probe]]\nname = \"end\"\nlook = \"displacement\"\naxis = \"y\"\nside = \"x+\"\nlayers = 1\n"
+[[probe]]\nname = \"turn\"\ntrack = \"rotation\"\naxis = \"z\"
+[[probe]]\nname = \"gauge\"\ntrack = \"strain\"\nfrom = [\"11 mm\", \"1 mm\"]\nto = [\"61 mm\", \"11 mm\"]
+[[probe]]\nname = \"end\"\ntrack = \"displacement\"\naxis = \"y\"\nside = \"x+\"\nlayers = 1\n"
     );
     let finished = solve(&turn, directory.path());
     assert!((value(&finished, "turn") - 0.3).abs() < 1e-14);
@@ -77,8 +77,8 @@ displacement_field = [\"0.02*x\", \"-0.01*y\"]\n",
             min[0], min[1], max[0], max[1]
         );
     }
-    scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\nlook = \"strain\"\nfrom = [\"31 mm\", \"1 mm\"]\nto = [\"51 mm\", \"1 mm\"]
-[[probe]]\nname = \"across\"\nlook = \"strain\"\nfrom = [\"41 mm\", \"-5 mm\"]\nto = [\"41 mm\", \"5 mm\"]\n";
+    scene += "[solver]\ntolerance = 1e-10\n[[probe]]\nname = \"along\"\ntrack = \"strain\"\nfrom = [\"31 mm\", \"1 mm\"]\nto = [\"51 mm\", \"1 mm\"]
+[[probe]]\nname = \"across\"\ntrack = \"strain\"\nfrom = [\"41 mm\", \"-5 mm\"]\nto = [\"41 mm\", \"5 mm\"]\n";
     let finished = solve(&scene, directory.path());
     assert!((value(&finished, "along") / 0.02 - 1.0).abs() < 1e-8);
     assert!((value(&finished, "across") / -0.01 - 1.0).abs() < 1e-8);
@@ -91,7 +91,7 @@ fn loads_follow_a_factor() {
     let scene = format!(
         "{SHEET}\n[[boundary]]\nname = \"all\"\nmin = [\"0 mm\", \"-20 mm\"]\nmax = [\"80 mm\", \"20 mm\"]\ndisplacement = [\"2 mm\", \"0 mm\"]
 [solver]\nmethod = \"verlet\"\n[dynamics]\ndensity = \"1 g/cm^3\"\nend_time = \"3 ms\"\nrecords = 3\nfactor = \"sin(pi*t/4e-3)\"
-[[probe]]\nname = \"all\"\nlook = \"displacement\"\naxis = \"x\"\n"
+[[probe]]\nname = \"all\"\ntrack = \"displacement\"\naxis = \"x\"\n"
     );
     let finished = solve(&scene, directory.path());
     for (k, record) in finished.outcomes[0].history.iter().enumerate() {
@@ -167,7 +167,7 @@ fn what_is_most_likely_not_meant() {
             .replace("19.9 mm\", \"0 mm", "40.5 mm\", \"1 mm"),
     );
     assert!(on.contains("20 particles lie on body.cracks[0], the first at (1.000, 1.000) mm"), "{on}");
-    assert!(on.contains("half a spacing (1.000 mm) beside it"), "{on}");
+    assert!(on.contains("move it by half a spacing (1.000 mm)"), "{on}");
     let slot = |height: &str| {
         let (low, high) = (format!("\"-{height} mm\""), format!("\"{height} mm\""));
         let cut =
@@ -256,7 +256,7 @@ stop_below = 0.02
 
 [[probe]]
 name = "tip"
-look = "crack"
+track = "crack"
 axis = "x"
 across = "y"
 min = ["20 mm", "-20 mm"]

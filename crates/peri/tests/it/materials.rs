@@ -405,7 +405,7 @@ fn methods_agree_on_a_state_based_material() {
     assert!(coarse < 0.02 && fine < coarse / 6.0, "{coarse} {fine}");
 }
 
-/// A notched plate of the linear solid that tears: broken bonds take the energy that the whole body loses, and a run that goes on
+/// A notched plate of the linear solid that tears: broken bonds take the energy that the whole body loses, and a resumed run
 /// from a saved state takes the same way to the last bit.
 #[test]
 fn a_state_based_material_tears() {

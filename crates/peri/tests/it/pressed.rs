@@ -256,14 +256,14 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
             let other = run(which, 2, skin, cloud, None, u64::MAX);
             assert!(other.2 != lists && other.0 == one, "skin {skin}, cloud: {cloud}");
         }
-        // L-BFGS may be restarted where it begins anew, which is at the start of a step
+        // L-BFGS may be restarted where it restarts, which is at the start of a step
         let saved = run(which, 2, 0.5, cloud, None, iterations * [3, 1][which] / 4).1.unwrap();
         assert!(saved.total_iterations < iterations);
         assert!(run(which, 2, 0.2, cloud, Some(saved), u64::MAX).0 == one, "restart, cloud: {cloud}");
     }
 }
 
-/// Where nothing touches, contact changes no bit, a mere look at what does never does, and none is built unless asked for.
+/// Where nothing touches, contact changes no bit, a mere look at what does never does, and none is built unless requested.
 #[test]
 fn contact_without_touch_changes_no_bit() {
     let solve = |which: usize, contact: Option<[f64; 2]>| {

@@ -78,7 +78,7 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
     let (built, middle) = patch::<D>(ratio);
     // the whole ball lies in the body: every reading of its volume but the cells' (64 slices in 3D) is exact
     let rows = [
-        (Measure::Printed, BallVolume::Whole, [printed, f64::NAN]),
+        (Measure::AsPublished, BallVolume::Whole, [printed, f64::NAN]),
         (Measure::BallShare, BallVolume::Whole, [hardy, hardy_22]),
         (Measure::BallShare, BallVolume::Particles, [hardy, hardy_22]),
         (Measure::OnePoint, BallVolume::Particles, [one_point, one_point_22]),
@@ -97,7 +97,7 @@ fn check_patch<const D: usize>(ratio: f64, cloud: bool) {
             }
             if (D, ratio, ball) == (2, 3.015, BallVolume::Whole) {
                 match measure {
-                    Measure::Printed => {
+                    Measure::AsPublished => {
                         evidence::near(
                             "patch test, m = 3, share of the stress as printed",
                             found[0],

@@ -46,7 +46,7 @@ enum Command<V: Subcommand> {
         /// `;` change together.
         #[arg(long, value_name = "KEY=VALUE,…", required_unless_present = "search")]
         vary: Vec<Vary>,
-        /// Instead: the least value of a key with which all expectations are met, e.g. print.layer_time=5s..40s.
+        /// Find the least value of a key that satisfies all expectations instead, e.g. print.layer_time=5s..40s.
         #[arg(long, value_name = "KEY=LOW..HIGH", conflicts_with = "vary")]
         search: Option<Search>,
         /// A further value to show for each run, e.g. layer-*.mean_crystallinity; may be repeated.
@@ -63,7 +63,7 @@ enum Command<V: Subcommand> {
     },
     #[command(flatten)]
     Own(V),
-    /// Print the JSON Schema of scenes, by which editors complete and check them.
+    /// Print the JSON Schema of scenes for editors.
     Schema,
     /// Print a shell's completion script.
     Completions {

@@ -21,7 +21,7 @@ pub fn prepare_run(directory: impl AsRef<Path>) -> Result<RunLock, Error> {
     Ok(lock)
 }
 
-/// The directory of a run that goes on: without half-written files, and held against a second run.
+/// The directory of a resumed run: without half-written files, and held against a second run.
 ///
 /// # Errors
 /// As [`lock_run`].

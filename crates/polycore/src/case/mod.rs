@@ -24,7 +24,7 @@ use serde::de::DeserializeOwned;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// How long a run that is asked to stop looks for a moment from which it can go on.
+/// How long a run that is asked to stop looks for a moment from which it can continue.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// What a command line says of itself.
@@ -97,7 +97,7 @@ pub trait Fault: std::error::Error + From<Error> + Send + 'static {
     /// 1 for a failed run, 2 for bad input, 130 for an interrupted run.
     fn exit_code(&self) -> u8;
 
-    /// Whether the user asked for this end.
+    /// Whether the user requested this end.
     fn is_interruption(&self) -> bool {
         self.exit_code() == crate::error::EXIT_INTERRUPTED
     }
@@ -214,8 +214,8 @@ impl<'a> Run<'a> {
         checkpoint::save(self.options.output, self.program.magic, &self.header, Some(state))
     }
 
-    /// Between steps: writes the checkpoint where one is due, and ends the run where the user asked for it. `state` gives
-    /// nothing at a moment from which the run cannot go on.
+    /// Between steps: writes the checkpoint where one is due, and ends the run where the user requested it. `state` gives
+    /// nothing at a moment from which the run cannot continue.
     ///
     /// # Errors
     /// [`Error::Interrupted`]; the checkpoint cannot be written.
@@ -231,7 +231,7 @@ impl<'a> Run<'a> {
         if !stop {
             return Ok(());
         }
-        // the last checkpoint will do where the next moment to go on from is far
+        // the last checkpoint will do where the next moment to continue from is far
         let since = *self.asked.get_or_insert_with(Instant::now);
         if state.is_some() || since.elapsed() > PATIENCE { Err(self.interruption()) } else { Ok(()) }
     }

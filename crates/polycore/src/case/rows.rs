@@ -4,7 +4,7 @@ use crate::output::atomic_write;
 use crate::report::{Report, Value};
 use std::path::Path;
 
-/// What is told of a field: its mean by volume, its extremes, and its standard deviation, which measures uniformity.
+/// Statistics of a field: its mean by volume, its extremes, and its standard deviation, which measures uniformity.
 pub const STATISTICS: [&str; 4] = ["mean_", "least_", "largest_", "deviation_of_"];
 
 /// Heading of the column that says whether a run meets the scene's expectations.
@@ -24,7 +24,7 @@ pub struct Row {
 pub struct Rows {
     /// Headings.
     pub settings: Vec<String>,
-    /// Further values that are asked for, by name; `*` stands for any text.
+    /// Further values that are requested, by name; `*` stands for any text.
     pub columns: Vec<String>,
     /// Rows.
     pub rows: Vec<Row>,

@@ -70,7 +70,7 @@ impl FromStr for Vary {
         }
         let values = &linked.values;
         if let Some(twice) = (1..values.len()).find(|&k| values[..k].contains(&values[k])) {
-            return Err(format!("found `{}` twice; allowed: values that differ", values[twice]));
+            return Err(format!("found `{}` twice; allowed: different values", values[twice]));
         }
         Ok(linked)
     }
@@ -107,7 +107,7 @@ fn divided(text: &str, separator: char) -> Vec<String> {
 pub struct SweepOptions<'a> {
     /// Where results go; each run in a folder of its own.
     pub output: &'a Path,
-    /// Further values to tell, by name; `*` stands for any text.
+    /// Further values to report, by name; `*` stands for any text.
     pub columns: &'a [String],
     /// Leave out what is marked `quick = false`.
     pub quick: bool,
@@ -140,7 +140,7 @@ pub fn sweep<C: Case>(
     Ok(Finished { text: rows.text(), report })
 }
 
-/// [`sweep`], and its rows: those asked for first, in their order.
+/// [`sweep`], and its rows: those requested first, in their order.
 fn rows<C: Case>(
     source: &Source,
     vary: &[Vary],
@@ -255,7 +255,7 @@ fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>
     match runs.iter().zip(faults).find_map(|(run, fault)| Some((run, fault?))) {
         None => Ok(runs),
         Some((run, fault)) => {
-            // what is wrong without any option too is told at its place
+            // what is wrong without any option too is reported at its place
             C::explain(source, quick)?;
             Err(match fault {
                 Failure::Scene(fault) => run.of_options(source, vary, &fault).into(),

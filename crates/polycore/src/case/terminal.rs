@@ -89,16 +89,16 @@ pub(super) fn with_negative_numbers(command: clap::Command) -> clap::Command {
 /// A time in seconds, for clap.
 ///
 /// # Errors
-/// The text is no number, or none of 0 to 1e9.
+/// The text is not a number, or none of 0 to 1e9.
 pub fn seconds(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
     if (0.0..=1e9).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 0 to 1e9")) }
 }
 
 /// The option `--threads`.
 #[derive(clap::Args)]
 pub struct Threads {
-    /// Threads to compute on; default: all. The results are the same bits on any number.
+    /// Number of threads; default: all. The results are bit-identical.
     #[arg(long, global = true, value_parser = clap::value_parser!(u16).range(1..=4096))]
     threads: Option<u16>,
 }

@@ -65,7 +65,7 @@ fn law(arguments: &Arguments) -> Result<Box<dyn Hyperelastic>, String> {
         let value = if stress {
             given.parse::<Stress>().map(Stress::si).map_err(|error| format!("`{given}`: {error}"))?
         } else {
-            given.parse().map_err(|_| format!("`{given}` is no number"))?
+            given.parse().map_err(|_| format!("`{given}` is not a number"))?
         };
         values.push(value);
     }

@@ -180,7 +180,8 @@ fn summary(title: &str, all: &[(&str, &Table, Vec<Fit>)], report: &Report) -> St
         text.push('\n');
     }
     for (name, _, fits) in all {
-        let _ = writeln!(text, "parameters on {name} (± standard error, - where the data do not tell)");
+        let _ =
+            writeln!(text, "parameters on {name} (± standard error, - where the data do not determine it)");
         for fit in fits {
             let list: Vec<String> = fit.parameters.iter().map(shown).collect();
             let _ = writeln!(text, "  {:<22}{}", fit.model.key, list.join(", "));
@@ -189,7 +190,11 @@ fn summary(title: &str, all: &[(&str, &Table, Vec<Fit>)], report: &Report) -> St
     }
     for trial in &report.trials {
         let verdict = if trial.passed { "pass" } else { "FAIL" };
-        let _ = writeln!(text, "{verdict}  {}: must {}; seen: {}", trial.what, trial.must, trial.seen);
+        let _ = writeln!(
+            text,
+            "{verdict}  {}: expected: {}; observed: {}",
+            trial.what, trial.description, trial.observed
+        );
     }
     for judgement in &report.expect {
         let _ = writeln!(text, "{}", judgement.row().join("  "));

@@ -27,10 +27,10 @@ fn block(fit: &Fit) -> String {
     match links.filter(|_| eight) {
         Some(links) if links.standard_error.is_some() && links.value >= FEWEST_LINKS => {
             let _ = writeln!(text, "law = \"chain-affine\"\nlinks = {:.5}", links.value);
-            text += "dissociation = 1200 # no test without breaking tells it: the thesis' value\n";
+            text += "dissociation = 1200 # tests without rupture do not determine it: the thesis' value\n";
         }
-        Some(_) => text += "law = \"linear\" # the data do not tell the number of links\n",
-        None => text += "law = \"linear\" # only the modulus of this law has a place in peri\n",
+        Some(_) => text += "law = \"linear\" # the data do not determine the number of links\n",
+        None => text += "law = \"linear\" # peri takes only the modulus of this law\n",
     }
     text
 }

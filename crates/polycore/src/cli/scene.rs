@@ -1,4 +1,4 @@
-//! The scene of fits and trials: which laws, which data, what must happen, what is expected.
+//! The scene of fits and trials: which laws, which data, trials, expectations.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -22,13 +22,13 @@ struct Scene {
     /// One line for tables and pictures.
     #[serde(default)]
     title: String,
-    /// What is fitted to what.
+    /// Fits.
     #[serde(default)]
     fit: Fit,
-    /// Laws at single states and fits to a few, with what must happen.
+    /// Laws at single states and fits to a few, with their expected behaviour.
     #[serde(default)]
     trial: Vec<Trial>,
-    /// What the results must be.
+    /// Expected results.
     #[serde(default)]
     expect: Vec<Expect>,
 }
@@ -40,7 +40,7 @@ enum Program {
     Polycore,
 }
 
-/// What to fit to what.
+/// Laws and data to fit.
 #[derive(Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Fit {

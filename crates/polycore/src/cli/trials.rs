@@ -1,4 +1,4 @@
-//! Trials: a law at a stretch, or fitted to a few states, with what must happen.
+//! Trials: a law at a stretch, or fitted to a few states, with their expected behaviour.
 
 use polycore::Error;
 use polycore::constitutive;
@@ -15,14 +15,14 @@ use serde::Deserialize;
 
 use super::{MPA, quantities as q};
 
-/// One trial: with `parameters` a law is asked at a `stretch`, with `data` it is fitted.
+/// One trial: with `parameters` a law is evaluated at a `stretch`, with `data` it is fitted.
 #[derive(Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Trial {
     /// Its name in the report.
     name: String,
-    /// What must happen, in words.
-    must: String,
+    /// Expected behaviour, in words.
+    description: String,
     /// The law's name.
     law: String,
     /// Its parameters, in their order.
@@ -36,7 +36,7 @@ pub struct Trial {
     bulk: Option<Stress>,
     /// λ₁ and P₁ of states in that mode.
     data: Option<Vec<(f64, Stress)>>,
-    /// Part of the message with which it must be refused.
+    /// Part of the expected error message.
     refused: Option<String>,
 }
 
@@ -63,7 +63,7 @@ fn uniaxial() -> Mode {
     Mode::Uniaxial
 }
 
-/// What a trial came to.
+/// Result of a trial.
 enum Seen {
     Stress { nominal: f64, energy: f64 },
     Fit(Box<hyperelastic::fit::Fit>),
@@ -132,11 +132,11 @@ pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
             return Err(source.error(&key("law"), format!("`{}`", trial.law), all.join(", ")));
         };
         if trial.data.is_some() == trial.parameters.is_some() {
-            let found = if trial.data.is_some() { "`data` beside `parameters`" } else { "neither" };
+            let found = if trial.data.is_some() { "`data` together with `parameters`" } else { "neither" };
             return Err(source.error(&key("law"), found, "`parameters` and `stretch`, or `data` to fit"));
         }
         if trial.data.is_some() && (trial.stretch.is_some() || trial.bulk.is_some()) {
-            let found = "`stretch` or `bulk` beside `data`";
+            let found = "`stretch` or `bulk` together with `data`";
             return Err(source.error(&key("data"), found, "`data` alone: the law is fitted"));
         }
         let Some(parameters) = &trial.parameters else { continue };
@@ -164,10 +164,10 @@ pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// Makes a trial and records what was seen.
+/// Runs a trial and records the observed behaviour.
 ///
 /// # Errors
-/// What fails without being asked to.
+/// Unexpected failures.
 pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
     let of = |quantity: Quantity| quantity.of(&[&trial.name]);
     let seen = trial.attempt();
@@ -204,8 +204,8 @@ pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
             }
         }
     };
-    let (what, must) = (trial.name.clone(), trial.must.clone());
-    report.trials.push(report::Trial { what, must, seen: text, iterations: None, passed });
+    let (what, description) = (trial.name.clone(), trial.description.clone());
+    report.trials.push(report::Trial { what, description, observed: text, iterations: None, passed });
     Ok(())
 }
 

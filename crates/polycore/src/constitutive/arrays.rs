@@ -11,7 +11,7 @@ use ndarray::{Array1, Array2, Array3, ArrayView1, ArrayView2};
 pub struct Predictions {
     /// S, (N, 6), Pa.
     pub stress: Array2<f64>,
-    /// ℂ = 2 ∂S/∂C, (N, 6, 6), Pa; if asked for.
+    /// ℂ = 2 ∂S/∂C, (N, 6, 6), Pa; if requested.
     pub tangent: Option<Array3<f64>>,
     /// W, (N), J/m³; none of a law that has no energy.
     pub energy: Option<Array1<f64>>,

@@ -48,7 +48,7 @@ pub enum Error {
     /// No law of that name.
     #[error("there is no hyperelastic law `{name}`")]
     UnknownLaw {
-        /// The name asked for.
+        /// The name requested.
         name: String,
     },
     /// An iteration did not converge.

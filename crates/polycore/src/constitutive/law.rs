@@ -1,4 +1,4 @@
-//! What a law is: a function of C, asked for stress and tangent.
+//! Constitutive laws: functions of C that return stress and tangent.
 
 use super::Error;
 use super::hyperelastic::Hyperelastic;
@@ -88,7 +88,7 @@ pub struct Moduli {
 pub struct Prediction<T: Scalar = f64> {
     /// S (3.3), Pa.
     pub stress: SVector<T, 6>,
-    /// ℂ = 2 ∂S/∂C, Pa, in the Voigt order without factors (dS = ℂ dE with doubled shear strains); if asked for.
+    /// ℂ = 2 ∂S/∂C, Pa, in the Voigt order without factors (dS = ℂ dE with doubled shear strains); if requested.
     pub tangent: Option<SMatrix<T, 6, 6>>,
     /// W, J/m³; none of a law that has no energy.
     pub energy: Option<T>,

@@ -18,7 +18,7 @@ pub use real::Real;
 use packed::Packed;
 use pass::Want;
 
-/// Most inputs of a network whose derivatives are asked for: the lanes of one row of a Jacobian.
+/// Most inputs of a network whose derivatives are requested: the lanes of one row of a Jacobian.
 pub const LANES: usize = 8;
 
 /// Most neurons in a layer: a file that claims more is damaged.

@@ -11,7 +11,7 @@
 //! use polycore::constitutive::network::Activation::Softplus;
 //! use polycore::constitutive::surrogate::{Header, Kind, Surrogate, Symmetry};
 //!
-//! // an orthotropic energy with random weights, in place of `Surrogate::read("law.safetensors")`
+//! // an orthotropic energy with random weights, instead of `Surrogate::read("law.safetensors")`
 //! let header = Header::new(Kind::energy(Symmetry::Orthotropic), &[(32, Softplus), (32, Softplus)], 2);
 //! let model = Surrogate::<f64>::random(header, 1)?;
 //! let prediction = model.predict(&[1.1, 1.0, 1.0, 0.1, 0.0, 0.0].into())?;

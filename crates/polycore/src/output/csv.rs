@@ -35,7 +35,7 @@ pub fn write(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<(), Error
 /// Reads a table of numbers: headings and columns. Lines that begin with `#` are comments.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read; [`Error::Format`] with the line for text that is no number or for rows
+/// [`Error::Io`] if the file cannot be read; [`Error::Format`] with the line for text that is not a number or for rows
 /// of different lengths.
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<f64>)>, Error> {
     let path = path.as_ref();
@@ -52,7 +52,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<(String, Vec<f64>)>, Error> {
         for ((name, data), cell) in columns.iter_mut().zip(&record) {
             let number = cell
                 .parse()
-                .map_err(|_| fail(format!("line {line}, column `{name}`: `{cell}` is no number")));
+                .map_err(|_| fail(format!("line {line}, column `{name}`: `{cell}` is not a number")));
             data.push(number?);
         }
     }

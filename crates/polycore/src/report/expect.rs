@@ -21,7 +21,7 @@ use crate::units::Ratio;
 /// quick = false                       # optional: not judged in --quick runs
 /// ```
 ///
-/// or with `at_most = …` and/or `at_least = …` in place of `reference` and `tolerance`.
+/// or with `at_most = …` and/or `at_least = …` instead of `reference` and `tolerance`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(try_from = "Written", into = "Written")]
 pub struct Expect {
@@ -51,9 +51,9 @@ pub enum Kind {
     IndependentProgram,
     /// An observed order, or a change under refinement.
     Convergence,
-    /// An inequality that any correct answer meets: a maximum principle, a balance, a range.
+    /// An inequality that any correct result satisfies: a maximum principle, a balance, a range.
     Bound,
-    /// An earlier figure of this program: it shows a change, and is no evidence.
+    /// An earlier figure of this program: it detects changes and is no evidence.
     Regression,
 }
 
@@ -207,10 +207,10 @@ struct Written {
     /// `"1 %"` of the reference, or a number in the unit of the value.
     tolerance: Option<Tolerance>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    /// In place of a reference: a lower bound.
+    /// Instead of a reference: a lower bound.
     at_least: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    /// In place of a reference: an upper bound.
+    /// Instead of a reference: an upper bound.
     at_most: Option<f64>,
     /// What kind of evidence the figure is.
     kind: Kind,
@@ -316,7 +316,7 @@ fn scalar(values: &BTreeMap<String, Value>, name: &str) -> Result<f64, String> {
 /// An expectation with what was found.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Judgement {
-    /// What was asked for.
+    /// The requirement.
     #[serde(flatten)]
     pub expect: Expect,
     /// What was found.

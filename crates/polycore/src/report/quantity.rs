@@ -21,7 +21,7 @@ pub struct Named {
 }
 
 impl Quantity {
-    /// The name with `parts` in place of what stands in braces, in this order.
+    /// The name with `parts` instead of what stands in braces, in this order.
     pub fn of(&self, parts: &[&str]) -> Named {
         let mut parts = parts.iter();
         let mut name = String::new();

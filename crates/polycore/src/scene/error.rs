@@ -132,7 +132,7 @@ impl SceneError {
             // a caret needs a character to stand under
             span = floor_boundary(&source.text, end.saturating_sub(1))..end;
         }
-        let help = cut.then(|| "the text ends in the middle of something; is the file complete?".to_owned());
+        let help = cut.then(|| "the text ends unexpectedly; is the file complete?".to_owned());
         let message = format!("not valid TOML: {}", error.message());
         Self::at(source, "scene::syntax", None, span, message).label("here").help(help)
     }

@@ -129,7 +129,7 @@ fn put<'i>(
     }
     let missing = |what: String| Wrong { found: format!("`{part}`"), allowed: what };
     let Some(mut slot) = table.get_mut(name) else {
-        return Err(missing(format!("an array that is there: there is no `{name}`")));
+        return Err(missing(format!("an existing array: there is no `{name}`")));
     };
     for index in numbers {
         let count = slot.get_ref().as_array().map(|array| array.len());
@@ -140,7 +140,7 @@ fn put<'i>(
         slot = element.ok_or_else(|| {
             missing(match count {
                 Some(count) => format!("`{name}` has {count} elements, counted from 0"),
-                None => format!("`{name}` is no array"),
+                None => format!("`{name}` is not an array"),
             })
         })?;
     }

@@ -51,7 +51,7 @@ pub fn stress_from_energy_gradient(gradient: &Voigt) -> Voigt {
     Voigt::from_fn(|a, _| gradient[a] * if a < 3 { 2.0 } else { 1.0 })
 }
 
-/// D = 2 ∂S/∂C from the 6×6 matrix of ∂S_a/∂C_b (C_12 counted once): columns 1–3 are doubled.
+/// D = 2 ∂S/∂C from the 6×6 matrix of ∂S_a/∂C_b (C_12 not doubled): columns 1–3 are doubled.
 pub fn tangent_from_stress_gradient(gradient: &Voigt6x6) -> Voigt6x6 {
     Voigt6x6::from_fn(|a, b| gradient[(a, b)] * if b < 3 { 2.0 } else { 1.0 })
 }

@@ -29,7 +29,7 @@ fn meshes_written_by_gmsh() {
         }
         assert_eq!(mesh.element_sets["printed_bar"], mesh.element_sets["Volume2"]);
         assert_eq!(read.notes.len(), 2, "{:?}", read.notes);
-        assert!(read.notes[1].contains("element set `edge` holds no"), "{:?}", read.notes);
+        assert!(read.notes[1].contains("element set `edge` contains no"), "{:?}", read.notes);
     }
 }
 

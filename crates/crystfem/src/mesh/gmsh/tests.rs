@@ -122,7 +122,7 @@ fn what_is_not_used_is_noted() {
     assert_eq!((read.node_labels, read.element_labels), (vec![1, 2, 3, 4], vec![11]));
     assert_eq!(read.notes.len(), 2);
     assert!(read.notes[0].contains("1 × section $Comments: not used"));
-    assert!(read.notes[1].contains("1 nodes of no hexahedron"));
+    assert!(read.notes[1].contains("1 nodes that belong to no hexahedron"));
     // parametric nodes
     let parametric = TETRAHEDRON
         .replace("3 7 0 5", "1 7 1 5")

@@ -21,7 +21,7 @@ pub struct Bead {
 /// that centre.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Activation {
-    /// Time of each element of the mesh, s: −∞ for those not asked for, +∞ for those never covered.
+    /// Time of each element of the mesh, s: −∞ for those not requested, +∞ for those never covered.
     pub times: Vec<f64>,
     /// Elements never covered, ascending.
     pub missed: Vec<u32>,
@@ -121,7 +121,7 @@ pub(super) fn activation(
         return Err(Error::Parameter { name: "element", found: f64::from(*element), allowed });
     }
     if !path.moves.iter().any(|one| one.prints) {
-        return Err(Error::Mesh("the path lays nothing down; allowed: 1 printing move or more".into()));
+        return Err(Error::Mesh("the path prints nothing; allowed: 1 printing move or more".into()));
     }
     let values = |one: &Move| {
         [one.from[0], one.from[1], one.from[2], one.to[0], one.to[1], one.to[2], one.start, one.end]

@@ -176,7 +176,7 @@ fn what_is_wrong_is_named_with_its_line() {
     );
     let bead = Bead { width: 5e-4, height: 2e-4 };
     assert!(text(path.activation(&mesh, &[400], bead)).contains("element: found 400; allowed: below 400"));
-    assert!(text(ToolPath::default().activation(&mesh, &[0], bead)).contains("lays nothing down"));
+    assert!(text(ToolPath::default().activation(&mesh, &[0], bead)).contains("prints nothing"));
     let mut bad = path.clone();
     bad.moves[3].to[1] = f64::NAN;
     assert!(text(bad.activation(&mesh, &[0], bead)).contains("move of the path: found NaN"));

@@ -56,8 +56,7 @@ pub fn search<C: Case>(
         let (rows, report) = rows::<C>(source, &[vary], options)?;
         let met = |row: &Row| row.outcome.as_ref().is_ok_and(|own| own.passed());
         if rows.rows.iter().any(|row| row.outcome.as_ref().is_ok_and(|own| own.expect.is_empty())) {
-            let reason =
-                "found a scene without [[expect]]; allowed: one that says what a run must meet".to_owned();
+            let reason = "found a scene without [[expect]]; allowed: one with expectations".to_owned();
             return Err(Error::Option { option: format!("--search {key}"), reason }.into());
         }
         let first = rows.rows.iter().take(values.len()).map(met).collect();
@@ -65,10 +64,15 @@ pub fn search<C: Case>(
     };
     let (met, mut finished) = try_out(&[*low, *high])?;
     let verdict = match met[..] {
-        [true, ..] => format!("{key} = {} meets all that is expected; less was not tried", told(*low)),
+        [true, ..] => {
+            format!("{key} = {} satisfies all expectations; smaller values were not tried", told(*low))
+        }
         [_, false] => {
             finished.report.passed = false;
-            format!("{key} = {} does not meet all that is expected; more was not tried", told(*high))
+            format!(
+                "{key} = {} does not satisfy all expectations; greater values were not tried",
+                told(*high)
+            )
         }
         _ => {
             let (mut fails, mut passes) = (*low, *high);
@@ -86,7 +90,7 @@ pub fn search<C: Case>(
             finished.report.value(Named::from(LEAST_VALUE).in_unit(unit), passes);
             finished.report.write(options.output)?;
             format!(
-                "{key} = {} is the least that meets all that is expected; {} does not",
+                "{key} = {} is the least value that satisfies all expectations; {} does not",
                 told(passes),
                 told(fails)
             )

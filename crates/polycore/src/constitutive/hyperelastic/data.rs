@@ -72,7 +72,7 @@ impl Table {
         let states = self.states.iter().copied().filter(|state| state.mode == mode).collect();
         let table = Self { source: self.source.clone(), states };
         if table.measurements() == 0 {
-            let reason = "holds no stress other than zero".to_owned();
+            let reason = "contains no stress other than zero".to_owned();
             return Err(Error::Data { what: format!("mode `{}`", mode.name()), reason });
         }
         Ok(table)

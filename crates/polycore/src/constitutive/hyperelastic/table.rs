@@ -62,7 +62,8 @@ impl Table {
             let mut numbers = Vec::with_capacity(4);
             for field in record.iter().skip(usize::from(moded)) {
                 let number = field.parse::<f64>().ok().filter(|number| number.is_finite());
-                numbers.push(number.ok_or_else(|| refuse(format!("line {line}: `{field}` is no number")))?);
+                numbers
+                    .push(number.ok_or_else(|| refuse(format!("line {line}: `{field}` is not a number")))?);
             }
             let state = match numbers[..] {
                 [stretch, nominal] => State {
@@ -84,7 +85,7 @@ impl Table {
         let source = text.lines().find_map(|line| line.strip_prefix("# source:"));
         let table = Self { source: source.unwrap_or_default().trim().to_owned(), states };
         if table.measurements() == 0 {
-            return Err(refuse("holds no stress other than zero".to_owned()));
+            return Err(refuse("contains no stress other than zero".to_owned()));
         }
         Ok(table)
     }
@@ -126,8 +127,8 @@ mod tests {
         for (text, message) in [
             ("stretch,force_N\n1,0\n", "header `stretch,force_N`"),
             ("stretch,nominal_kg\n1,0\n", "header `stretch,nominal_kg`"),
-            ("stretch,nominal_MPa\n1,0\n2,x\n", "line 3: `x` is no number"),
-            ("stretch,nominal_MPa\n1,0\n2,NaN\n", "line 3: `NaN` is no number"),
+            ("stretch,nominal_MPa\n1,0\n2,x\n", "line 3: `x` is not a number"),
+            ("stretch,nominal_MPa\n1,0\n2,NaN\n", "line 3: `NaN` is not a number"),
             ("stretch,nominal_MPa\n-2,1\n", "line 2: stretch 1 is -2"),
             ("stretch,nominal_MPa\n1,2,3\n", "3 fields"),
             (

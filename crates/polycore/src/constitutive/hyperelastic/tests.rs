@@ -158,7 +158,7 @@ fn printed_gent_has_hardly_any_bulk_modulus() {
     evidence::near("(1.23) as printed, Poisson's ratio", poisson, 1.0 / 62.0, 1e-12);
 }
 
-/// (1.21) and (1.17), mended, written in tensors, with p = −J ∂W/∂J.
+/// (1.21) and (1.17), corrected, written in tensors, with p = −J ∂W/∂J.
 #[test]
 fn stress_by_the_tensor_form_1_17() {
     let (c1, c2, lame) = (1.5, 0.4, 7.0);

@@ -28,7 +28,7 @@ pub enum Kind {
         /// Whether W is polyconvex by construction: see [`Kind::non_negative`].
         #[serde(default)]
         polyconvex: bool,
-        /// Whether ‖F‖ = √I₁ and ‖cof F‖ = √I₂ are its inputs in place of their squares, of a polyconvex isotropic one:
+        /// Whether ‖F‖ = √I₁ and ‖cof F‖ = √I₂ are its inputs instead of their squares, of a polyconvex isotropic one:
         /// convex in F and cof F too, and grows as slowly as with the first power of a stretch.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         norms: bool,

@@ -241,7 +241,7 @@ fn meshes_that_do_not_fit_are_refused() {
     assert!(error.unwrap_err().to_string().contains("3 values for 2 cells of 1 components"));
 }
 
-/// Numbers of the steps survive the merging, and a run that goes on; NaN stands for none.
+/// Numbers of the steps survive the merging, and a resumed run; NaN stands for none.
 #[test]
 fn numbers_of_steps() {
     let directory = tempfile::tempdir().unwrap();
