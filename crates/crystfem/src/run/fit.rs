@@ -122,7 +122,7 @@ fn stem(file: &Path) -> String {
 fn record(report: &mut Report, done: &Done) {
     let Done { name, fit, .. } = done;
     for estimate in &fit.estimates {
-        let of = |quantity: Quantity| quantity.of(&[name, &estimate.name]).in_unit(&estimate.unit);
+        let of = |quantity: Quantity| quantity.of(&[name, estimate.name]).in_unit(&estimate.unit);
         report.value(of(q::CONSTANT), estimate.value);
         report.value(of(q::STANDARD_ERROR), estimate.standard_error);
         report.value(of(q::LOWER), estimate.interval[0]);

@@ -32,8 +32,8 @@ impl<const D: usize> Body<D> {
         }
     }
 
-    /// Adds a shape.
-    pub fn add(mut self, shape: Shape<D>) -> Self {
+    /// Joins another shape to what has been added so far.
+    pub fn join(mut self, shape: Shape<D>) -> Self {
         self.operations.push(Operation::Add(shape));
         self
     }

@@ -285,7 +285,7 @@ impl Solids {
         let mut panel = half.map(|half| (2.0 * half * scale).ceil() + 6.0);
         if !stacked {
             // room for the titles of stages
-            panel[0] = panel[0].max(310.0);
+            panel[0] = panel[0].max(350.0);
         }
         let corner = [-0.5 * panel[0] / scale, 0.5 * panel[1] / scale];
         let camera = Camera { axes: self.view.axes(), centre, corner, scale };
