@@ -5,7 +5,6 @@ use crystfem::material::{Conductor, Property};
 use crystfem::mesh::Grid;
 use crystfem::problem::Problem;
 use crystfem::simulation::{Settings, Simulation};
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 fn main() -> Result<(), crystfem::Error> {
@@ -22,7 +21,7 @@ fn main() -> Result<(), crystfem::Error> {
     let problem = Problem { conditions: vec![film], ..Problem::new(mesh, Arc::new(material), 453.15) };
     let mut simulation = Simulation::new(problem, Settings::adaptive(0.1))?;
     for minute in 0..=5 {
-        let _ = simulation.advance(60.0 * f64::from(minute), &mut |_, _| ControlFlow::Continue(()))?;
+        simulation.run_until(60.0 * f64::from(minute))?;
         let at = |node: u32| simulation.temperature(node).unwrap_or(f64::NAN) - 273.15;
         println!("{minute} min: middle {:6.2} °C, corner {:6.2} °C", at(middle), at(corner));
     }

@@ -27,8 +27,8 @@
 //! # }
 //! ```
 //!
-//! [`printed`] is put together from the parts below, which serve what it leaves out: meshes from files, tool paths, any
-//! condition, materials of your own.
+//! The modules below are the parts of [`printed`]. Use them directly for meshes from files, tool paths, other conditions
+//! and materials of your own.
 
 pub mod boundary;
 mod element;

@@ -41,7 +41,7 @@ polycore::quantities! {
     MEMBER_BEST_EPOCH = "{model}.member_{number}.best_epoch", "", "the same of a member of an ensemble";
     MEAN_SQUARE_ERROR = "{model}.{set}.mean_square_error", "MPa²", "mean over the rows of the sum of squares over the six components, Eq. (3.12)";
     COMPONENT_ERROR = "{model}.{set}.error_per_component", "MPa²", "a sixth of it, as Keras reports";
-    PERCENTAGE_ERROR = "{model}.{set}.percentage_error", "%", "mean of |S − Ŝ|/|S|, Eq. (3.13), the thesis' measure of a run; of `zero_stress`, the score of S = 0 (100 %), and of `noise`, a lower bound for every model";
+    PERCENTAGE_ERROR = "{model}.{set}.percentage_error", "%", "mean of |S − Ŝ|/|S|, Eq. (3.13), the error measure of the thesis; the model `zero_stress` predicts S = 0 (100 %), `noise` is the lower bound that the noise sets";
     SHARE_OUTSIDE = "{model}.{set}.share_outside_training", "", "share of rows outside the box of the training data";
     ERROR_OVER_NOISE = "{model}.{set}.error_over_noise", "", "mean square error over the variance of the noise of single rows; 1 is the minimum for any model";
     SHARE_BADLY_WRONG = "{model}.{set}.share_badly_wrong", "", "share of rows with an error above a tenth of the stress and three times the noise";
@@ -58,8 +58,8 @@ polycore::quantities! {
     LARGEST_ASYMMETRY = "{model}.largest_tangent_asymmetry", "", "the same, largest of the test rows";
     CYCLE = "{model}.work_of_a_closed_cycle", "", "|∮ S:dC/2| over ∮ |S:dC/2| around a rectangle in C₁₁ and C₃₃, from I to half of the training box";
     OBJECTIVITY = "{model}.lack_of_objectivity", "", "largest ‖σ(RF) − R σ(F) Rᵀ‖/‖σ(F)‖";
-    UNSEEN_SHEAR = "{model}.unseen_shear_stress", "MPa", "stress in these shears";
-    SHEAR_FLAGGED = "{model}.share_of_shear_flagged", "", "share of simple shears of 0.05 that are flagged as unseen, where the data have no shear";
+    UNSEEN_SHEAR = "{model}.unseen_shear_stress", "MPa", "shear stress in simple shears of 0.05, where the data have no shear";
+    SHEAR_FLAGGED = "{model}.share_of_shear_flagged", "", "share of these shears that are flagged as unseen";
     BINNED = "{model}.heldout.percentage_error_c{component}_{from}_to_{to}", "%", "mean of (3.13) over all held-out runs pulled along an axis, between two values of C";
     AS_EXPECTED = "{trial}.as_expected", "", "1 if a trial ended as its scene expects, else 0";
 }

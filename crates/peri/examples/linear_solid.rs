@@ -9,7 +9,7 @@ use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::modulus_in;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{Bond, Family, Material, Property};
-use peri::solver::{Lbfgs, Loads, State, Support, System};
+use peri::solver::{Lbfgs, Loads, Method, State, Support, System};
 
 // ANCHOR: material
 /// W = ½K θ² + ½α Σ_J (e − θ|ξ|/D)² V_J with the bonds' extensions e = |ζ| − |ξ|, the weighted volume m = Σ_J |ξ|² V_J of the

@@ -27,8 +27,8 @@
 //! # }
 //! ```
 //!
-//! [`model`] is put together from the parts below, which serve what it leaves out: clouds of particles, surface corrections,
-//! materials and methods of your own.
+//! The modules below are the parts of [`model`]. Use them directly for clouds of particles, surface corrections, materials
+//! and methods of your own.
 
 pub mod bonds;
 pub mod calibrate;

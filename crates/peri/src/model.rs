@@ -93,7 +93,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         self
     }
 
-    /// Particles without a bond repel each other; see [`Contact::new`] for the stiffness κ.
+    /// Particles without a bond repel each other with the stiffness κ of [`Contact::new`], where kθ is
+    /// [`Material::micromodulus`].
     pub fn contact(mut self, stiffness: f64) -> Self {
         self.contact = Some(stiffness);
         self
@@ -146,7 +147,7 @@ pub struct Simulation<const D: usize, M> {
 }
 
 impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
-    /// Solves the load steps that are left, or goes on to the end time of a dynamic method.
+    /// Solves the remaining load steps, or continues to the end time of a dynamic method.
     ///
     /// # Errors
     /// As the method: [`Error::NotConverged`], [`Error::NotFinite`], [`Error::Unstable`] and others.

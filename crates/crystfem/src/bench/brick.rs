@@ -11,7 +11,6 @@ use crystfem::run::Failure;
 use crystfem::simulation::{Settings, Simulation};
 use polycore::case::terminal::Measurement;
 use polycore::output::{atomic_write, csv};
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -65,7 +64,7 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     let built = since.elapsed().as_secs_f64();
     let since = Instant::now();
     let end = options.step * f64::from(options.steps);
-    let _ = simulation.advance(end, &mut |_, _| ControlFlow::Continue(()))?;
+    simulation.run_until(end)?;
     let solved = since.elapsed().as_secs_f64();
     let memory = peak_memory().zip(before).map(|(after, before)| after - before);
     let temperatures = simulation.temperatures(f64::NAN);

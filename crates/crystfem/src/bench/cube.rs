@@ -161,7 +161,7 @@ mod tests {
             ..crystfem::simulation::Settings::backward_euler(10.0)
         };
         let mut simulation = Simulation::new(cube.problem().unwrap(), settings).unwrap();
-        let _ = simulation.advance(20.0, &mut |_, _| std::ops::ControlFlow::Continue(())).unwrap();
+        simulation.run_until(20.0).unwrap();
         let error = cube.mean_square(&simulation, |lambda| (1.0 + 10.0 * lambda).powi(-2)).sqrt();
         assert!(error < 1e-8, "{error}");
     }

@@ -4,7 +4,6 @@ use super::cube::{Cube, Start};
 use crystfem::run::Failure;
 use crystfem::simulation::{LinearSolver, Settings, Simulation};
 use polycore::case::terminal::Measurement;
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Lengths of steps, s; steps taken.
@@ -39,7 +38,7 @@ fn run(
     let mut simulation = Simulation::new(cube.problem()?, settings)?;
     let mut advance = |until: i32| -> Result<f64, Failure> {
         let since = Instant::now();
-        let _ = simulation.advance(f64::from(until) * dt, &mut |_, _| ControlFlow::Continue(()))?;
+        simulation.run_until(f64::from(until) * dt)?;
         Ok(since.elapsed().as_secs_f64())
     };
     // the first step makes what serves all of them

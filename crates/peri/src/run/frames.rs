@@ -1,4 +1,4 @@
-//! Fields of single steps: what is written while a run goes on.
+//! Fields of single steps: what is written during a run.
 
 use crate::bonds::{Bonds, Kind, covered_stretches};
 use crate::error::Error;
@@ -48,7 +48,7 @@ fn all_intact<const D: usize>(bonds: &dyn Bonds<D>) -> Vec<u32> {
     bonds.particles().iter().map(|&slot| intact(bonds, slot as usize)).collect()
 }
 
-/// Whether the fields of the last step of a history are written while the run goes on.
+/// Whether the fields of the last step of a history are written during the run.
 fn wanted(every: usize, history: &[Record]) -> bool {
     let step = history.len();
     let before = step.checked_sub(2).map_or(0, |k| history[k].broken);
@@ -73,6 +73,16 @@ fn frames_of<const D: usize>(every: usize, state: &State<D>) -> usize {
         in_between(state.history[step].rounds.saturating_sub(1)) + usize::from(last)
     };
     (0..state.history.len()).map(of_step).sum::<usize>() + in_between(state.round)
+}
+
+/// A vector with zeros for what a plane body lacks.
+pub(super) fn in_space<const D: usize>(v: [f64; D]) -> [f64; 3] {
+    std::array::from_fn(|d| v.get(d).copied().unwrap_or(0.0))
+}
+
+/// A tensor, rows first, with zeros for what a plane body lacks.
+pub(super) fn tensor_in_space<const D: usize>(t: &Tensor<D>) -> [f64; 9] {
+    std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
 }
 
 impl<'a> Frames<'a> {
@@ -194,8 +204,6 @@ impl<'a> Frames<'a> {
     ) -> Result<(), Error> {
         let damage = self.damage(bonds);
         let Some(series) = &mut self.series else { return Ok(()) };
-        let in_space =
-            |v: [f64; D]| -> [f64; 3] { std::array::from_fn(|d| v.get(d).copied().unwrap_or(0.0)) };
         // lists of arrays are allocated once; flat ones would grow by doubling
         let particles = bonds.particles().iter().map(|&slot| slot as usize);
         let displacement: Vec<[f64; 3]> =
@@ -205,15 +213,12 @@ impl<'a> Frames<'a> {
             std::array::from_fn(|d| x[d] + u[d])
         };
         let points: Vec<[f64; 3]> = particles.zip(&displacement).map(place).collect();
-        let full = |t: &Tensor<D>| -> [f64; 9] {
-            std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
-        };
         let kinds = [("cauchy", &stresses.cauchy), ("piola", &stresses.piola)];
         let tensors: Vec<(String, Vec<f64>)> = kinds
             .iter()
             .flat_map(|(kind, fields)| fields.iter().map(move |(measure, field)| (kind, measure, field)))
             .map(|(kind, measure, field)| {
-                let all: Vec<[f64; 9]> = field.iter().map(full).collect();
+                let all: Vec<[f64; 9]> = field.iter().map(tensor_in_space).collect();
                 (format!("{kind}_{}", measure.name()), all.into_flattened())
             })
             .collect();

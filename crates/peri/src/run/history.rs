@@ -203,7 +203,7 @@ fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
     if any { plot.write(output.join("peak_load.png")) } else { Ok(()) }
 }
 
-/// The table of a suite, also as trials of the report:each variant, its expected and observed behaviour, and its cost.
+/// The table of a suite, also as trials of the report: each variant, its expected and observed behaviour, and its cost.
 ///
 /// # Errors
 /// A file that cannot be written.

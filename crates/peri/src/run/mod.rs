@@ -28,7 +28,7 @@ use crate::material::{BondMaterial, Property};
 use crate::potential::{BondPotential, KernelFit};
 use crate::quantities as q;
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
-use crate::solver::{Breaking, Loads, State, Status, System, load_stepping};
+use crate::solver::{Breaking, Loads, Method, State, Status, System, load_stepping};
 use polycore::case::{Fault, Run};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
@@ -199,14 +199,18 @@ fn run_variant<const D: usize>(
     });
     outcome.seconds(&phases);
     let path = frames.path().to_path_buf();
-    let damage = if D == 3 && scene.output.pictures { frames.damage(&*body.bonds) } else { None };
+    let staged = scene.output.fields
+        && scene.output.every.is_some()
+        && scene.stress.is_some()
+        && critical_stretch.is_some();
+    let seen_at_end = D == 3 && scene.output.pictures && !staged;
+    let damage = if seen_at_end { frames.damage(&*body.bonds) } else { None };
     frames.finish(&*body.bonds, &state, &stresses)?;
     if scene.output.pictures {
         draw::maps(scene, &*body.bonds, &state, &stresses.cauchy, &outcome, output)?;
-        let staged = scene.output.fields && scene.output.every.is_some() && scene.stress.is_some();
-        if staged && critical_stretch.is_some() {
+        if staged {
             stages::stages(scene, &outcome, body.bonds.spacing(), &path, output)?;
-        } else if D == 3 {
+        } else if seen_at_end {
             solid::end(scene, &*body.bonds, &state, &stresses, damage, &outcome, output)?;
         }
     }

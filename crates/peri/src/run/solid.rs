@@ -1,6 +1,6 @@
 //! Pictures of solids as they look from outside.
 
-use super::frames::Stresses;
+use super::frames::{Stresses, in_space, tensor_in_space};
 use super::outcome::Outcome;
 use super::scale::{bridge, stress_unit};
 use super::stages;
@@ -113,17 +113,13 @@ pub fn end<const D: usize>(
     output: &Path,
 ) -> Result<(), Error> {
     let slots = || bonds.particles().iter().map(|&slot| slot as usize);
-    let in_space = |v: [f64; D]| -> [f64; 3] { std::array::from_fn(|d| v.get(d).copied().unwrap_or(0.0)) };
     let rest: Vec<[f64; 3]> = slots().map(|slot| in_space(bonds.position(slot))).collect();
     let moved = || slots().map(|slot| in_space(state.displacement.get(slot)));
     let places: Vec<[f64; 3]> =
         rest.iter().zip(moved()).map(|(x, u)| [0, 1, 2].map(|d| x[d] + u[d])).collect();
     let (first, values) = match (&scene.stress, stresses.cauchy.first()) {
         (Some(spec), Some((_, tensors))) => {
-            let full = |t: &[[f64; D]; D]| -> [f64; 9] {
-                std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
-            };
-            let values: Vec<f64> = tensors.iter().map(|t| shown(spec, false, &full(t))).collect();
+            let values: Vec<f64> = tensors.iter().map(|t| shown(spec, false, &tensor_in_space(t))).collect();
             (stress_field(spec, values.clone()), values)
         }
         _ => {

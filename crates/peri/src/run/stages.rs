@@ -73,11 +73,11 @@ pub fn stages(
         });
         all.extend(stress);
     }
-    let field = solid::stress_field(spec, all);
-    let (scale, label, (low, high)) = (field.scale, field.strip.label.clone(), field.strip.range);
+    let (field, damage) = (solid::stress_field(spec, all), solid::damage_field());
+    let (scale, strips) = (field.scale, [field.strip.clone(), damage.strip.clone()]);
     if !flat {
         let picture = solid::Picture { scene, outcome, spacing, bounds };
-        let fields = vec![field, solid::damage_field()];
+        let fields = vec![field, damage];
         picture.draw(output, fields, chosen.len(), |k| Ok(Cow::Owned(look(chosen[k])?)))?;
     }
     let bridge = bridge(outcome);
@@ -101,12 +101,11 @@ pub fn stages(
         kinds.iter().flat_map(|&damage| stages.iter().map(move |stage| (stage, damage))).collect()
     };
     for (stage, damage) in order {
-        let panel = if damage {
-            Panel::new("", "damage", &stage.places, &stage.damage, spacing).range(0.0, 0.6)
-        } else {
-            Panel::new(&stage.title, &label, &stage.places, &stage.stress, spacing).range(low, high)
-        };
-        map = map.panel(panel.reference(&stage.rest).bridge(bridge));
+        let (title, values) = if damage { ("", &stage.damage) } else { (&*stage.title, &stage.stress) };
+        let strip = &strips[usize::from(damage)];
+        let panel = Panel::new(title, &strip.label, &stage.places, values, spacing);
+        let panel = panel.range(strip.range.0, strip.range.1).reference(&stage.rest).bridge(bridge);
+        map = map.panel(panel);
     }
     map.write(output.join(format!("stages_{}.png", outcome.file_name())))?;
     Ok(())

@@ -6,10 +6,11 @@
 use super::balance::Goal;
 use super::load_stepping::{Equilibrium, load_stepping};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
+use super::method::{Finished, Method};
 use super::passes::{force_pass, move_pass};
 use super::state::{State, Status, Watch};
 use super::system::System;
-use crate::bonds::Bonds;
+
 use crate::error::Error;
 
 /// Iterations between looks at the stretches.
@@ -39,18 +40,20 @@ impl DynamicRelaxation {
     fn goal(&self) -> Goal {
         Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
+}
 
+impl<const D: usize> Method<D> for DynamicRelaxation {
     /// Solves the remaining load steps of `state`. `watch` sees every iteration and may stop the run by an error;
     /// `finished` sees every finished step.
     ///
     /// # Errors
     /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` and `finished` return.
-    pub fn solve<const D: usize>(
+    fn solve(
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error>,
+        finished: &mut Finished<D>,
     ) -> Result<(), Error> {
         load_stepping(&mut RelaxationSolver::new(*self), system, state, watch, finished)
     }

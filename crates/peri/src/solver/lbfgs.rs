@@ -5,11 +5,12 @@
 use super::balance::Goal;
 use super::load_stepping::{Equilibrium, load_stepping};
 use super::memory::{Memory, product};
+use super::method::{Finished, Method};
 use super::passes::{Sums, force_pass};
 use super::preconditioner::Preconditioner;
 use super::state::{State, Status, Watch};
 use super::system::System;
-use crate::bonds::{Bonds, StretchRange, stretch_range};
+use crate::bonds::{StretchRange, stretch_range};
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use rayon::prelude::*;
@@ -75,18 +76,20 @@ impl Lbfgs {
     fn goal(&self) -> Goal {
         Goal { tolerance: self.tolerance, max_iterations: self.max_iterations, accept: self.accept }
     }
+}
 
+impl<const D: usize> Method<D> for Lbfgs {
     /// Solves the remaining load steps of `state`. `watch` sees every iteration and may stop the run by an error;
     /// `finished` sees every finished step.
     ///
     /// # Errors
     /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` and `finished` return.
-    pub fn solve<const D: usize>(
+    fn solve(
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error>,
+        finished: &mut Finished<D>,
     ) -> Result<(), Error> {
         load_stepping(&mut LbfgsSolver::new(*self), system, state, watch, finished)
     }

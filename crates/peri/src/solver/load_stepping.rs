@@ -1,9 +1,10 @@
 //! Load step after load step: a first guess, an equilibrium, the bonds that break in it, the next equilibrium.
 
+use super::method::Finished;
 use super::scale::{Balance, Scale};
 use super::state::{Record, State, Watch};
 use super::system::System;
-use crate::bonds::Bonds;
+
 use crate::error::Error;
 
 /// A method that finds the equilibrium of a state at the load factor of its step.
@@ -20,7 +21,7 @@ pub trait Equilibrium<const D: usize> {
         watch: &mut Watch<D>,
     ) -> Result<(), Error>;
 
-    /// Is told the slots whose bonds have broken since the last equilibrium.
+    /// Takes notice of the slots whose bonds have broken since the last equilibrium.
     fn broke(&mut self, system: &System<D>, slots: &[u32]);
 }
 
@@ -34,7 +35,7 @@ pub fn load_stepping<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
     watch: &mut Watch<D>,
-    finished: &mut dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error>,
+    finished: &mut Finished<D>,
 ) -> Result<(), Error> {
     let stiffness = system.stiffness_at_rest();
     // of the body as it was built: an interrupted run must guess as if it had not been

@@ -1,6 +1,6 @@
 //! What all methods have in common.
 
-use super::{DynamicRelaxation, Lbfgs, State, System, VelocityVerlet, Watch};
+use super::{State, System, Watch};
 use crate::bonds::Bonds;
 use crate::error::Error;
 
@@ -9,7 +9,7 @@ pub type Finished<'a, const D: usize> = dyn FnMut(&dyn Bonds<D>, &State<D>) -> R
 
 /// A method that brings a state to the end of a system's loads.
 pub trait Method<const D: usize> {
-    /// Goes on from `state`. `watch` sees every iteration, `finished` every finished step.
+    /// Continues from `state`. `watch` sees every iteration, `finished` every finished step.
     ///
     /// # Errors
     /// Those of the method, and whatever `watch` and `finished` return.
@@ -21,21 +21,3 @@ pub trait Method<const D: usize> {
         finished: &mut Finished<D>,
     ) -> Result<(), Error>;
 }
-
-macro_rules! methods {
-    ($($method:ty),*) => {$(
-        impl<const D: usize> Method<D> for $method {
-            fn solve(
-                &self,
-                system: &mut System<D>,
-                state: &mut State<D>,
-                watch: &mut Watch<D>,
-                finished: &mut Finished<D>,
-            ) -> Result<(), Error> {
-                // the method's own function of this name
-                self.solve(system, state, watch, finished)
-            }
-        }
-    )*};
-}
-methods!(DynamicRelaxation, Lbfgs, VelocityVerlet);

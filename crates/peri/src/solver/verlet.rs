@@ -5,6 +5,7 @@
 //! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
 //! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
+use super::method::{Finished, Method};
 use super::motion::Motion;
 use super::scale::Balance;
 use super::state::{Record, State, Status, Watch};
@@ -13,7 +14,7 @@ use super::time_step::{BondSums, critical, largest_frequency_squared};
 use super::verlet_step::{
     Sums, VerletStep, chunks_of, force_pass, kick_pass, leap_pass, refresh, stored, volumes,
 };
-use crate::bonds::{Bonds, StretchRange, stretch_range};
+use crate::bonds::{StretchRange, stretch_range};
 use crate::error::Error;
 
 /// Part of the energy turned over by which the kinetic energy may exceed what is available before the run is given up:
@@ -50,8 +51,10 @@ impl VelocityVerlet {
     pub fn new(density: f64, end_time: f64) -> Self {
         Self { density, time_step: None, safety: 0.9, damping: 0.0, ramp: 0.0, end_time, records: 100 }
     }
+}
 
-    /// Goes on from `state` to the end time. Bonds break in every step whose stretches ask for it. `watch` sees every step
+impl<const D: usize> Method<D> for VelocityVerlet {
+    /// Continues from `state` to the end time. Bonds break in every step whose stretches ask for it. `watch` sees every step
     /// and may stop the run by an error; `finished` sees every row of the history. [`System::factors`] and
     /// [`System::stop_below`] are not used.
     ///
@@ -63,12 +66,12 @@ impl VelocityVerlet {
     /// [`Error::Parameter`] for settings out of their domain; [`Error::TimeStep`] for a time step beyond the critical one;
     /// [`Error::Unstable`] where energy grows from nothing; [`Error::NotFinite`] for a state that is not finite at the
     /// start; [`Error::Geometry`] as [`System::restore`]; whatever `watch` and `finished` return.
-    pub fn solve<const D: usize>(
+    fn solve(
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-        finished: &mut dyn FnMut(&dyn Bonds<D>, &State<D>) -> Result<(), Error>,
+        finished: &mut Finished<D>,
     ) -> Result<(), Error> {
         self.check()?;
         let volumes = volumes(system);
@@ -94,7 +97,9 @@ impl VelocityVerlet {
         }
         Ok(())
     }
+}
 
+impl VelocityVerlet {
     fn check(&self) -> Result<(), Error> {
         let step = self.time_step.unwrap_or(1.0);
         let positive = "above 0, finite";

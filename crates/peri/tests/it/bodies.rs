@@ -6,7 +6,7 @@ use peri::field::Field;
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, KernelFit, Law};
-use peri::solver::{DynamicRelaxation, Loads, State, System};
+use peri::solver::{DynamicRelaxation, Loads, Method, State, System};
 
 /// kθ of all bodies here; any value does.
 pub const MODULUS: f64 = 1.7;

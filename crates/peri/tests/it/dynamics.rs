@@ -6,7 +6,7 @@ use peri::bonds::{Bonds, force};
 use peri::field::Field;
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
-use peri::solver::{Breaking, Loads, Policy, Record, State, System, VelocityVerlet};
+use peri::solver::{Breaking, Loads, Method, Policy, Record, State, System, VelocityVerlet};
 use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_on_lattice};
 use std::f64::consts::PI;
 

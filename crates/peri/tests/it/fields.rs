@@ -7,7 +7,7 @@ use peri::bonds::Bonds;
 use peri::correction::bond_factors;
 use peri::material::{BondMaterial, Material, Property};
 use peri::potential::LinearBond;
-use peri::solver::{Breaking, Lbfgs, Policy, State, System};
+use peri::solver::{Breaking, Lbfgs, Method, Policy, State, System};
 
 /// Length of the bar, m.
 const LENGTH: f64 = 9.0;

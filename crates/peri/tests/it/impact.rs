@@ -7,7 +7,7 @@ use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
 use peri::contact::{Contact, STIFFNESS};
 use peri::material::BondMaterial;
 use peri::potential::Law;
-use peri::solver::{Loads, State, System, VelocityVerlet};
+use peri::solver::{Loads, Method, State, System, VelocityVerlet};
 use std::f64::consts::PI;
 
 /// Linear bonds, contact of stiffness κ.

@@ -9,8 +9,8 @@ use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{
-    Breaking, DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Loads, Policy, RelaxationSolver, State,
-    Support, System, load_stepping,
+    Breaking, DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Loads, Method, Policy, RelaxationSolver,
+    State, Support, System, load_stepping,
 };
 
 /// A problem on any bonds.

@@ -8,7 +8,7 @@ use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{KernelFit, Law};
-use peri::solver::{DynamicRelaxation, Loads, State};
+use peri::solver::{DynamicRelaxation, Loads, Method, State};
 
 /// D̂ from 1 to 1e9 and n̄ from 2 to 1e6, every law, strains of a tenth: the fit keeps its bound and the forces follow.
 #[test]

@@ -7,7 +7,9 @@ use evidence::near;
 use peri::bonds::{Bonds, Overstretched};
 use peri::field::Field;
 use peri::material::{BondMaterial, Cover, Material, Pointwise, Response};
-use peri::solver::{Breaking, DynamicRelaxation, Lbfgs, Policy, State, Status, System, VelocityVerlet};
+use peri::solver::{
+    Breaking, DynamicRelaxation, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
+};
 
 /// Makes a material at work in a body.
 type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn Response<D> + 'm>;
@@ -333,7 +335,7 @@ fn the_linear_solid_has_its_poisson_ratio() {
 
 /// How a plate is pulled.
 #[derive(Clone, Copy)]
-enum Method {
+enum Scheme {
     Relaxation,
     Lbfgs,
     Verlet,
@@ -341,7 +343,7 @@ enum Method {
 
 /// A plate of the linear solid in two work items, its right grip moved by 2 %, in dynamics within 1 s; `setting` is the tolerance, or
 /// the part of the critical time step.
-fn pulled(method: Method, setting: f64, threads: usize) -> State<2> {
+fn pulled(method: Scheme, setting: f64, threads: usize) -> State<2> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let body = Body::<2>::solid([70, 50], 0.1, 3.015);
     let mut built = body.build();
@@ -356,19 +358,19 @@ fn pulled(method: Method, setting: f64, threads: usize) -> State<2> {
         let mut system = System::new(&mut built.lattice, solid(), &loads, &[1.0]);
         let (watch, finished) = (&mut |_: &_, _: &_| Ok(()), &mut |_: &dyn Bonds<2>, _: &_| Ok(()));
         let solved = match method {
-            Method::Relaxation => DynamicRelaxation { tolerance: setting, ..Default::default() }.solve(
+            Scheme::Relaxation => DynamicRelaxation { tolerance: setting, ..Default::default() }.solve(
                 &mut system,
                 &mut state,
                 watch,
                 finished,
             ),
-            Method::Lbfgs => Lbfgs { tolerance: setting, ..Default::default() }.solve(
+            Scheme::Lbfgs => Lbfgs { tolerance: setting, ..Default::default() }.solve(
                 &mut system,
                 &mut state,
                 watch,
                 finished,
             ),
-            Method::Verlet => {
+            Scheme::Verlet => {
                 VelocityVerlet { safety: setting, records: 3, ramp: 1.0, ..VelocityVerlet::new(1.0, 1.2) }
                     .solve(&mut system, &mut state, watch, finished)
             }
@@ -380,14 +382,14 @@ fn pulled(method: Method, setting: f64, threads: usize) -> State<2> {
 
 #[test]
 fn bits_do_not_depend_on_threads() {
-    for (method, setting) in [(Method::Relaxation, 1e-3), (Method::Lbfgs, 1e-3), (Method::Verlet, 0.9)] {
+    for (method, setting) in [(Scheme::Relaxation, 1e-3), (Scheme::Lbfgs, 1e-3), (Scheme::Verlet, 0.9)] {
         assert_eq!(pulled(method, setting, 1), pulled(method, setting, 2));
     }
 }
 
 #[test]
 fn methods_agree_on_a_state_based_material() {
-    let [a, b] = [Method::Relaxation, Method::Lbfgs].map(|method| pulled(method, 1e-6, 2));
+    let [a, b] = [Scheme::Relaxation, Scheme::Lbfgs].map(|method| pulled(method, 1e-6, 2));
     println!("iterations: relaxation {}, L-BFGS {}", a.total_iterations, b.total_iterations);
     let (stored, other) = (a.history[0].stored, b.history[0].stored);
     // both are within (tolerance × condition)² of the least energy
@@ -396,7 +398,7 @@ fn methods_agree_on_a_state_based_material() {
     assert!((a.history[0].work / stored - 1.0).abs() < 0.02, "{} {stored}", a.history[0].work);
     // velocity Verlet keeps kinetic + stored = work but for O(Δt²)
     let [coarse, fine] = [0.9, 0.3].map(|safety| {
-        let state = pulled(Method::Verlet, safety, 2);
+        let state = pulled(Scheme::Verlet, safety, 2);
         let last = state.history.last().unwrap().clone();
         assert!(last.kinetic > 0.01 * last.work);
         (last.kinetic + last.stored - last.work).abs() / last.work

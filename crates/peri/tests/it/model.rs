@@ -9,7 +9,7 @@ use peri::material::BondMaterial;
 use peri::model::{Body, Model, Rubber};
 use peri::potential::Law;
 use peri::solver::{
-    Breaking, DynamicRelaxation, Lbfgs, Loads, Policy, State, Support, System, VelocityVerlet,
+    Breaking, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, Support, System, VelocityVerlet,
 };
 use peri::stress::Measure;
 

@@ -5,7 +5,7 @@ use crate::dynamics::{DENSITY, once, run};
 use peri::bonds::Bonds;
 use peri::material::BondMaterial;
 use peri::potential::Law;
-use peri::solver::{Breaking, DynamicRelaxation, Loads, Policy, State, System, VelocityVerlet};
+use peri::solver::{Breaking, DynamicRelaxation, Loads, Method, Policy, State, System, VelocityVerlet};
 use std::f64::consts::PI;
 
 /// ω² = (12kθV/ρ) Σ_k (1 − cos qkΔx)/(kΔx), k = 1 … m: linear bonds along a row of particles, of any amplitude.

@@ -21,8 +21,9 @@ pub struct Named {
 }
 
 impl Quantity {
-    /// The name with `parts` instead of what stands in braces, in this order.
+    /// The name with `parts` in place of its words in braces, in this order.
     pub fn of(&self, parts: &[&str]) -> Named {
+        debug_assert_eq!(parts.len(), self.name.matches('{').count(), "`{}`", self.name);
         let mut parts = parts.iter();
         let mut name = String::new();
         let mut rest = self.name;
@@ -33,13 +34,12 @@ impl Quantity {
             name += parts.next().copied().unwrap_or_default();
             rest = after;
         }
-        debug_assert!(parts.next().is_none(), "`{}` has fewer places", self.name);
         Named { name: name + rest, unit: self.unit.to_owned() }
     }
 
     /// The name with `*` for what is filled in.
     pub fn pattern(&self) -> String {
-        self.of(&["*"; 8][..self.name.matches('{').count().min(8)]).name
+        self.of(&vec!["*"; self.name.matches('{').count()]).name
     }
 }
 
