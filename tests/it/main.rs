@@ -9,6 +9,7 @@
 //! * [`killed`]: the same bits after `kill -9`, Ctrl-C and `peri resume`;
 //! * [`front_door`]: scenes, meshes, tables, HDF5, laws and checkpoints damaged at random;
 //! * [`printing`]: paths that miss the part, gaps, values that are not finite;
+//! * [`probes`]: tables along lines and of sections;
 //! * [`limits`]: no room on the disk, memory of the process, one run a folder;
 //! * [`loads`]: loads, displacements and names of values in reports;
 //! * [`memory`]: no run takes more memory than is stated, absurd sizes are refused before they are allocated;
@@ -32,6 +33,7 @@ mod memory;
 mod packages;
 mod parts;
 mod printing;
+mod probes;
 mod program;
 mod results;
 mod scenes;

@@ -45,6 +45,8 @@ polycore::quantities! {
     PROBE_BETWEEN_GAUGES = "{probe}_between_gauges", "", "rows of the history with the tip or front between the gauges";
     PROBE_BACKSTEP = "{probe}_backstep", "m", "largest step back between the gauges";
     PROBE_ACROSS = "{probe}_across", "m", "of a crack: largest distance of its tip from 0 across its axis, between the gauges if there are any";
+    SECTION_FORCE = "{section}_force_{axis}", "N", "force along an axis that bonds across a section exert at the end on the part of the body behind it";
+    SECTION_MOMENT = "{section}_moment_{axis}", "N m", "moment of these forces about the section's point";
     KIRSCH_FIRST = "kirsch_first", "", "σ₁₁/σ∞ of Kirsch's plate at the particles nearest to the hole";
     EXACT_FIRST = "exact_first", "", "of `plate-with-hole`: exact σ₁₁/σ∞ at the particles nearest to the hole";
     EXACT_PEAK = "exact_peak", "", "of `plate-with-hole`: exact σ₁₁/σ∞ at the rim of the hole";

@@ -27,6 +27,7 @@ use toml::de::{DeTable, DeValue, Deserializer};
 
 mod error;
 mod failure;
+mod line;
 mod locate;
 mod overlay;
 mod schema;
@@ -34,6 +35,7 @@ mod solid;
 
 pub use error::SceneError;
 pub use failure::Failure;
+pub use line::{LineSpec, check_name};
 pub use schema::schema;
 pub use solid::{CutSpec, SolidSpec};
 

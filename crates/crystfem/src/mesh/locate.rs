@@ -55,8 +55,17 @@ impl Mesh {
     /// The elements around a place, m, and the shape functions there. A place outside, but no further than half an
     /// element's extent along each axis, is moved into the nearest element; `None` beyond.
     pub fn locate(&self, at: [f64; 3]) -> Option<Place> {
+        self.locate_in(0..self.element_count() as u32, at)
+    }
+
+    /// As [`Self::locate`], in some of the elements.
+    pub fn locate_among(&self, elements: &[u32], at: [f64; 3]) -> Option<Place> {
+        self.locate_in(elements.iter().copied(), at)
+    }
+
+    fn locate_in(&self, elements: impl Iterator<Item = u32>, at: [f64; 3]) -> Option<Place> {
         let mut found: Vec<(u32, [f64; MOST], f64, f64)> = Vec::new();
-        for number in 0..self.element_count() as u32 {
+        for number in elements {
             let (corners, nodes) = element::corners(self, number);
             let corners = &corners[..nodes];
             if let Some((weights, distance, rounding)) = near(corners, at) {

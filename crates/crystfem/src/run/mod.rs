@@ -5,6 +5,7 @@ mod celsius;
 mod draw;
 mod explain;
 mod fit;
+mod line;
 mod outside;
 mod part;
 mod point;

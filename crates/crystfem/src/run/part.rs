@@ -2,7 +2,7 @@
 
 use super::celsius::{CELSIUS, TEMPERATURE};
 use super::probe::{self, Probe};
-use super::{Failure, animation};
+use super::{Failure, animation, line};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
@@ -71,6 +71,7 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
     phases.start("write");
     recorder.record(&simulation, &mut report);
     probe::write(&recorder.probes, &recorder.names, output, &mut report)?;
+    line::write(scene, &task, &simulation, &recorder.names, output)?;
     if !task.layers.is_empty() {
         let births: Vec<f64> = task.problem.births.iter().map(|birth| birth.time).collect();
         probe::births(&recorder.probes, &recorder.names, &births, &mut report);

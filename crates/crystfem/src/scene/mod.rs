@@ -29,6 +29,8 @@ pub use problem::Task;
 pub use schedule::{ScheduleSpec, TimesSpec};
 pub use study::StudySpec;
 
+pub(crate) use polycore::scene::check_name;
+
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -109,15 +111,6 @@ pub fn kind(source: &Source) -> Result<Kind, SceneError> {
             Err(source.error("program", "a scene without a task", allowed))
         }
     }
-}
-
-/// A name that may be part of a file's name and of a value's.
-pub(crate) fn check_name(source: &Source, key: &str, name: &str) -> Result<(), SceneError> {
-    let valid = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if !name.is_empty() && name.chars().all(valid) {
-        return Ok(());
-    }
-    Err(source.error(key, format!("`{name}`"), "letters, digits, `-` and `_`: it names files"))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use crate::problem::Capacity;
 use crate::simulation::LinearSolver;
 use crate::time::Scheme;
 use polycore::report::Expect;
-use polycore::scene::{SceneError, SolidSpec, Source};
+use polycore::scene::{LineSpec, SceneError, SolidSpec, Source};
 use polycore::units::dimension::{
     HeatFluxDimension, HeatTransferDimension, PowerDensityDimension, TemperatureDimension,
 };
@@ -193,11 +193,14 @@ pub struct PartOutput {
     pub stages: usize,
     /// How pictures show the body from outside.
     pub solid: SolidSpec,
+    /// Lines along which temperature and fields are written at the end.
+    pub line: Vec<LineSpec>,
 }
 
 impl Default for PartOutput {
     fn default() -> Self {
-        Self { pictures: true, fields: true, every: None, stages: 5, solid: SolidSpec::default() }
+        let (solid, line) = (SolidSpec::default(), Vec::new());
+        Self { pictures: true, fields: true, every: None, stages: 5, solid, line }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::mesh::{Face, Mesh, Place};
 use crate::problem::Problem;
 use crate::simulation::Settings;
 use crate::time::Steps;
-use polycore::scene::{SceneError, Source};
+use polycore::scene::{LineSpec, SceneError, Source};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -47,6 +47,8 @@ pub struct Task {
     pub layers: Vec<Vec<u32>>,
     /// Where each probe is.
     pub probes: Vec<Place>,
+    /// Where the points of each line are; none outside of the mesh.
+    pub lines: Vec<Vec<Option<Place>>>,
     /// What should be looked at.
     pub notes: Vec<String>,
 }
@@ -61,6 +63,9 @@ impl PartScene {
         let mut notes = Vec::new();
         let probes = self.places(source, &mesh, &mut notes)?;
         let (materials, material_of, temperature_of) = self.regions(source, &mesh)?;
+        let shown = materials.iter().flat_map(|material| material.field_names().iter().copied());
+        let shown: Vec<String> = ["temperature"].into_iter().chain(shown).map(str::to_owned).collect();
+        let lines = self.lines(source, &mesh, &shown)?;
         let conditions = self.conditions(source, &mesh)?;
         self.note_cold(source, &mut notes)?;
         let mut heats = Vec::new();
@@ -111,7 +116,7 @@ impl PartScene {
         };
         problem.check().map_err(|error| located(source, "mesh", &error))?;
         let settings = self.settings(end, problem.shortest_period());
-        Ok(Task { problem, settings, end, printed, layers, probes, notes })
+        Ok(Task { problem, settings, end, printed, layers, probes, lines, notes })
     }
 
     /// Notes temperatures at which no part is made: numbers in °C that were written as K.
@@ -165,6 +170,35 @@ impl PartScene {
             places.push(place);
         }
         Ok(places)
+    }
+
+    /// Where the points of each line lie in the mesh.
+    fn lines(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+        columns: &[String],
+    ) -> Result<Vec<Vec<Option<Place>>>, SceneError> {
+        LineSpec::check(&self.output.line, source, 3, columns)?;
+        let mut lines = Vec::new();
+        for (index, line) in self.output.line.iter().enumerate() {
+            let places = line.places::<3>();
+            let (a, b) = (places[0], places[places.len() - 1]);
+            let touches = |element: &u32| {
+                let [low, high] = mesh.bounds_of(&[*element]).unwrap_or_default();
+                (0..3).all(|d| {
+                    let around = 1e-6 * (high[d] - low[d]);
+                    a[d].min(b[d]) <= high[d] + around && a[d].max(b[d]) >= low[d] - around
+                })
+            };
+            let near: Vec<u32> = (0..mesh.element_count() as u32).filter(touches).collect();
+            let inside =
+                |at: &[f64; 3]| mesh.locate_among(&near, *at).filter(|place| place.distance() == 0.0);
+            let places: Vec<Option<Place>> = places.iter().map(inside).collect();
+            line.refuse_outside(source, index, places.iter().flatten().count())?;
+            lines.push(places);
+        }
+        Ok(lines)
     }
 
     #[allow(clippy::type_complexity)]

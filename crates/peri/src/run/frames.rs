@@ -188,7 +188,7 @@ impl<'a> Frames<'a> {
             let piola = stress::piola(bonds, &loaded, measure, spec.ball);
             stresses.cauchy.push((measure, cauchy(&piola, &gradients)));
             phases.add(&format!("stress {}", measure.name()), started.elapsed().as_secs_f64());
-            if self.scene.output.fields {
+            if self.scene.output.fields || !self.scene.output.line.is_empty() {
                 stresses.piola.push((measure, piola));
             }
         }

@@ -6,10 +6,12 @@ mod compare;
 mod draw;
 mod frames;
 mod history;
+mod lines;
 mod outcome;
 mod probes;
 mod program;
 mod scale;
+mod sections;
 mod solid;
 mod stages;
 
@@ -19,6 +21,7 @@ pub use program::Peri;
 use bonded::Bonded;
 use frames::Frames;
 use probes::Probes;
+use sections::{Fitted, Sections};
 
 use crate::bonds::{Bonds, covered_stretches, fragments};
 use crate::calibrate::Space;
@@ -136,7 +139,7 @@ fn run_variant<const D: usize>(
     let output = run.options.output;
     let mut phases = Phases::new();
     phases.start("build");
-    let Built { bonded, loads, loaded, probes } = Built::<D>::new(source, scene, variant)?;
+    let Built { bonded, loads, loaded, probes, sections } = Built::<D>::new(source, scene, variant)?;
     let Bonded { mut body, law, modulus, critical_stretch } = bonded;
     let plate = scene::exact_plate(source, scene, &body)?;
     phases.stop();
@@ -167,6 +170,7 @@ fn run_variant<const D: usize>(
         modulus,
         loads: loads_used,
         probes: &probes,
+        sections: &sections,
         critical_stretch: critical_stretch.as_ref(),
     };
     solve(scene, &solution, run, &mut body, &mut state, &mut phases, &mut frames)?;
@@ -197,6 +201,11 @@ fn run_variant<const D: usize>(
             compare::hole(&*body.bonds, exact, plate.as_ref(), &stresses.cauchy, &loaded, &mut outcome);
         }
     });
+    sections::write::<D>(scene, &mut outcome, output)?;
+    if !scene.output.line.is_empty() {
+        let damage = frames.damage(&*body.bonds);
+        lines::write(scene, &*body.bonds, &state, &stresses, damage.as_deref(), &outcome, output)?;
+    }
     outcome.seconds(&phases);
     let path = frames.path().to_path_buf();
     let staged = scene.output.fields
@@ -230,6 +239,7 @@ struct Built<const D: usize> {
     /// Slots in any loading layer.
     loaded: Vec<bool>,
     probes: Probes<D>,
+    sections: Sections<D>,
 }
 
 impl<const D: usize> Built<D> {
@@ -238,7 +248,10 @@ impl<const D: usize> Built<D> {
         let (loads, loaded) = loads_of(source, scene, &body)?;
         scene::check_placement(source, scene, &body, &loads)?;
         let probes = Probes::new(source, scene, &body)?;
-        Ok(Self { bonded: Bonded::new(source, scene, variant, body)?, loads, loaded, probes })
+        let sections = Sections::new(source, &scene.output.section, &body)?;
+        lines::check(source, &scene.output.line, &*body.bonds)?;
+        let bonded = Bonded::new(source, scene, variant, body)?;
+        Ok(Self { bonded, loads, loaded, probes, sections })
     }
 }
 
@@ -250,6 +263,7 @@ struct Solution<'a, const D: usize> {
     modulus: f64,
     loads: &'a Loads<D>,
     probes: &'a Probes<D>,
+    sections: &'a Sections<D>,
     critical_stretch: Option<&'a Property>,
 }
 
@@ -262,7 +276,7 @@ fn solve<const D: usize>(
     phases: &mut Phases,
     frames: &mut Frames,
 ) -> Result<(), Failure> {
-    let Solution { variant, done, law, modulus, loads, probes, critical_stretch } = *solution;
+    let Solution { variant, done, law, modulus, loads, probes, sections, critical_stretch } = *solution;
     let factors = scene.solver.factors();
     let name = variant.name();
     let mut watch = |status: &Status, state: &State<D>| -> Result<(), Error> {
@@ -277,10 +291,16 @@ fn solve<const D: usize>(
         scene.contact.map(|contact| Contact::new(&*body.bonds, modulus, contact.stiffness)).transpose()?;
     let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
     let course = course.map(|formula| |time: f64| formula.in_time(time));
-    let observer = |bonds: &dyn Bonds<D>, state: &State<D>| probes.see(bonds, state);
+    let fitted = Fitted::new(scene, law, modulus);
+    let observer = |bonds: &dyn Bonds<D>, state: &State<D>| {
+        let mut seen = probes.see(bonds, state);
+        seen.extend(sections.see(bonds, state, &fitted));
+        seen
+    };
+    let observed = !scene.probe.is_empty() || !scene.output.section.is_empty();
     let mut system = System::new(&mut *body.bonds, BondMaterial::new(law, modulus), loads, &factors);
     system.course = course.as_ref().map(|course| course as _);
-    system.observer = (!scene.probe.is_empty()).then_some(&observer as _);
+    system.observer = observed.then_some(&observer as _);
     system.fit_bound = scene.fit_bound();
     system.breaking =
         critical_stretch.map(|stretch| Breaking { stretch: stretch.clone(), policy: scene.solver.breaking });

@@ -94,6 +94,7 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     dynamics(source, scene)?;
     contact(source, scene)?;
     super::probe::check(source, scene)?;
+    super::line::check(source, scene)?;
     output(source, scene)
 }
 

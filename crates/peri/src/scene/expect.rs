@@ -34,6 +34,7 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     along(scene.boundary.iter().any(|b| b.holds()), q::REACTION);
     along(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), q::APPLIED);
     all.extend(scene.probe.iter().flat_map(super::Probe::values));
+    all.extend(super::line::values(scene));
     all.extend(scene.output.load_at.iter().map(|at| q::load_at(at.si())));
     if let (Some(exact), Some(stress)) = (&scene.exact, &scene.stress) {
         all.push(q::KIRSCH_FIRST.into());

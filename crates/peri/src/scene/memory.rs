@@ -58,7 +58,7 @@ fn of_slots<const D: usize>(scene: &Scene, slots: f64, stencil: usize) -> f64 {
 fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     let tensor = 8.0 * (D * D) as f64;
     let measures = scene.stress.as_ref().map_or(0, |stress| stress.measures.len()) as f64;
-    let kept = if scene.output.fields { 2.0 } else { 1.0 };
+    let kept = if scene.output.fields || !scene.output.line.is_empty() { 2.0 } else { 1.0 };
     let mut each = if measures > 0.0 { (3.0 + kept * measures) * tensor } else { 0.0 };
     if scene.output.fields {
         each += WRITTEN + PACKED + WRITTEN_TENSORS * measures;
@@ -71,9 +71,12 @@ fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
         None => scene.solver.steps,
     };
     // a row of history and its copy in a checkpoint
-    let row = size_of::<Record>() + 24 * scene.boundary.len();
+    let row = size_of::<Record>() + 24 * scene.boundary.len() + 48 * scene.output.section.len();
+    // weights of the particles around each point, and every column
+    let points = scene.output.line.iter().map(|line| line.points).max().unwrap_or(0) as f64;
+    let line = points * (16.0 * 150.0 + 8.0 * (8.0 + 2.0 * measures * (D * D) as f64));
     let canvas = if scene.output.pictures { PICTURES } else { 0.0 };
-    canvas + particles * each + 2.0 * rows as f64 * row as f64
+    canvas + line + particles * each + 2.0 * rows as f64 * row as f64
 }
 
 /// Bytes that the run of a variant needs at most, of a body that is built.

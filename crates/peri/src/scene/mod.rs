@@ -9,6 +9,7 @@ mod expect;
 mod explain;
 mod formula;
 mod inclusion;
+mod line;
 mod loads;
 mod memory;
 mod method;
@@ -24,6 +25,7 @@ pub use expect::{quantities, quantities_of};
 pub use explain::explain;
 pub use formula::Formula;
 pub use inclusion::Inclusions;
+pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, region_names, velocities_of};
 pub use memory::needed as memory_needed;
 pub use method::{Dynamics, Method, Solver};
@@ -38,7 +40,7 @@ use crate::critical::Critical;
 use crate::potential::Law;
 use crate::stress::{BallVolume, Measure};
 use polycore::report::Expect;
-use polycore::scene::SolidSpec;
+use polycore::scene::{LineSpec, SolidSpec};
 use polycore::units::{Length, Stress};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -367,6 +369,10 @@ pub struct OutputSpec {
     pub integrals: bool,
     /// Reference for the variants.
     pub compare: Option<CompareSpec>,
+    /// Lines along which fields are written at the end.
+    pub line: Vec<LineSpec>,
+    /// Planes across which the transmitted force is written in every row of the history.
+    pub section: Vec<SectionSpec>,
 }
 
 /// A reference for one result: that of a variant, or a number.
@@ -392,6 +398,8 @@ impl Default for OutputSpec {
             load_at: Vec::new(),
             integrals: false,
             compare: None,
+            line: Vec::new(),
+            section: Vec::new(),
         }
     }
 }

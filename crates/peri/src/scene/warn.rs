@@ -17,7 +17,9 @@ pub fn warnings<const D: usize>(scene: &Scene, body: &Body<D>) -> Vec<String> {
     let bonds = &*body.bonds;
     let cracks = body.cuts.iter().enumerate().filter_map(|(index, cut)| on_crack(bonds, index, cut));
     let voids = (0..body.operations.len()).filter_map(|index| bridged(bonds, &body.operations, index));
-    let once = [volumes(scene, bonds, body.thickness), thin(bonds), long_steps(scene, bonds)];
+    let contact = (scene.contact.is_some() && !scene.output.section.is_empty())
+        .then(|| "the forces of `output.section` are those of bonds: contact is no part of them".to_owned());
+    let once = [volumes(scene, bonds, body.thickness), thin(bonds), long_steps(scene, bonds), contact];
     once.into_iter().flatten().chain(cracks).chain(voids).collect()
 }
 

@@ -182,7 +182,7 @@ pub fn piola_in_cloud<const D: usize>(
 }
 
 /// Force f V_I V_J, N, along ζ per unit |ζ|: 2kθ w V_I V_J q(e)/|ξ|.
-fn force_over_length<const D: usize>(
+pub(crate) fn force_over_length<const D: usize>(
     fit: &KernelFit,
     modulus: f64,
     weight: f64,

@@ -13,7 +13,20 @@ pub type Column<'a> = (&'a str, &'a str, &'a [f64]);
 /// # Errors
 /// [`Error::Data`] if the lengths differ, [`Error::Io`] if writing fails.
 pub fn write(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<(), Error> {
-    let path = path.as_ref();
+    // `{:?}` is the shortest text that reads back to the same f64
+    write_cells(path.as_ref(), columns, |number| format!("{number:?}"))
+}
+
+/// As [`write`], with an empty cell for NaN: where there is no value.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_with_gaps(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<(), Error> {
+    let cell = |number: f64| if number.is_nan() { String::new() } else { format!("{number:?}") };
+    write_cells(path.as_ref(), columns, cell)
+}
+
+fn write_cells(path: &Path, columns: &[Column<'_>], cell: impl Fn(f64) -> String) -> Result<(), Error> {
     let rows = columns.first().map_or(0, |(_, _, data)| data.len());
     if let Some((name, _, data)) = columns.iter().find(|(_, _, data)| data.len() != rows) {
         let reason = format!("{} rows, but the first column has {rows}", data.len());
@@ -23,10 +36,7 @@ pub fn write(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<(), Error
         let mut writer = csv::Writer::from_writer(file);
         writer.write_record(columns.iter().map(|(name, unit, _)| heading(name, unit))).map_err(plain)?;
         for row in 0..rows {
-            // `{:?}` is the shortest text that reads back to the same f64
-            writer
-                .write_record(columns.iter().map(|(_, _, data)| format!("{:?}", data[row])))
-                .map_err(plain)?;
+            writer.write_record(columns.iter().map(|(_, _, data)| cell(data[row]))).map_err(plain)?;
         }
         writer.flush()
     })
@@ -88,6 +98,14 @@ mod tests {
         assert_eq!(read[1].0, "stress, xx [Pa]");
         assert_eq!(read[1].1, y);
         assert!(x.iter().zip(&read[0].1).all(|(a, b)| a.to_bits() == b.to_bits()));
+    }
+
+    #[test]
+    fn gaps_are_empty_cells() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("line.csv");
+        write_with_gaps(&path, &[("x", "m", &[0.0, 1.0]), ("u", "m", &[f64::NAN, 0.5])]).unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "x [m],u [m]\n0.0,\n1.0,0.5\n");
     }
 
     #[test]

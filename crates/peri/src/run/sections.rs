@@ -1,0 +1,177 @@
+//! Forces across sections of the body: the sum of the bond forces that cross a plane, as the areal force density of Silling
+//! (2000), doi:10.1016/S0022-5096(99)00029-0, over the whole plane.
+
+use super::outcome::Outcome;
+use crate::bonds::Bonds;
+use crate::potential::{BondPotential, KernelFit};
+use crate::scene::{Body, Scene, SectionSpec};
+use crate::solver::State;
+use crate::stress::force_over_length;
+use polycore::Error;
+use polycore::output::csv;
+use polycore::scene::{SceneError, Source};
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+/// Distance from a plane, over the spacing, up to which a particle counts as behind it.
+const ON_PLANE: f64 = 1e-9;
+
+/// The sections of a scene, on a body.
+pub struct Sections<const D: usize> {
+    each: Vec<Section<D>>,
+}
+
+struct Section<const D: usize> {
+    point: [f64; D],
+    normal: [f64; D],
+    /// Slots behind the plane that bonds joined to those in front as the body was built.
+    behind: Vec<u32>,
+    /// Distance up to which a particle counts as behind, m.
+    on: f64,
+}
+
+/// A bond law, and how the solver fits it: sections then carry the solver's own forces.
+pub struct Fitted<'a> {
+    law: &'a dyn BondPotential,
+    modulus: f64,
+    bound: f64,
+    held: bool,
+    /// The fit made last, with its stretches.
+    last: Mutex<Option<([f64; 2], KernelFit)>>,
+}
+
+impl<'a> Fitted<'a> {
+    /// A law with kθ = `modulus`, as the scene has it fitted.
+    pub fn new(scene: &Scene, law: &'a dyn BondPotential, modulus: f64) -> Self {
+        let (bound, held) = (scene.fit_bound(), scene.material.critical.is_some());
+        Self { law, modulus, bound, held, last: Mutex::new(None) }
+    }
+
+    fn over(&self, stretches: [f64; 2]) -> Option<KernelFit> {
+        let fit = KernelFit::new(self.law, stretches, self.bound).ok()?;
+        Some(if self.held { fit.held() } else { fit })
+    }
+}
+
+impl<const D: usize> Section<D> {
+    fn is_in_front(&self, place: [f64; D]) -> bool {
+        (0..D).map(|d| (place[d] - self.point[d]) * self.normal[d]).sum::<f64>() > self.on
+    }
+}
+
+impl<const D: usize> Sections<D> {
+    /// Finds the bonds that cross each section.
+    ///
+    /// # Errors
+    /// A section that no bond crosses.
+    pub fn new(source: &Source, specs: &[SectionSpec], body: &Body<D>) -> Result<Self, SceneError> {
+        let bonds = &*body.bonds;
+        let mut each = Vec::new();
+        for (index, spec) in specs.iter().enumerate() {
+            let key = format!("output.section[{index}]");
+            let (point, normal) = spec.plane(source, &key)?;
+            let mut section = Section { point, normal, behind: Vec::new(), on: ON_PLANE * bonds.spacing() };
+            let crosses = |slot: usize| {
+                let mut crosses = false;
+                bonds.neighbours(slot, &mut |bond| crosses |= section.is_in_front(bonds.position(bond.slot)));
+                crosses
+            };
+            let reach = bonds.horizon() * (1.0 + ON_PLANE);
+            let near = |slot: usize| {
+                let place = bonds.position(slot);
+                let height = (0..D).map(|d| (place[d] - point[d]) * normal[d]).sum::<f64>();
+                (-reach..=section.on).contains(&height)
+            };
+            let all = bonds.particles().iter().copied();
+            let behind: Vec<u32> =
+                all.filter(|&slot| near(slot as usize) && crosses(slot as usize)).collect();
+            if behind.is_empty() {
+                let allowed = "a point in the body: bonds must cross the plane";
+                return Err(source.error(&format!("{key}.point"), "a plane that no bond crosses", allowed));
+            }
+            section.behind = behind;
+            each.push(section);
+        }
+        Ok(Self { each })
+    }
+
+    /// Forces and moments of every section, as [`SectionSpec::values`] names them: F = Σ f V_I V_J ζ/|ζ| over the intact bonds
+    /// from behind a plane to its front, and the moments of these forces, in deformed positions, about its point.
+    pub fn see(&self, bonds: &dyn Bonds<D>, state: &State<D>, law: &Fitted) -> Vec<f64> {
+        if self.each.is_empty() {
+            return Vec::new();
+        }
+        let mut last = law.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if last.as_ref().is_none_or(|(stretches, _)| *stretches != state.fitted) {
+            *last = law.over(state.fitted).map(|fit| (state.fitted, fit));
+        }
+        // the solver has made the same fit
+        let Some((_, fit)) = &*last else { return Vec::new() };
+        let mut seen = Vec::new();
+        for section in &self.each {
+            let (mut force, mut moment) = ([0.0; D], [0.0; 3]);
+            for &slot in &section.behind {
+                let slot = slot as usize;
+                let (rest, own, volume) =
+                    (bonds.position(slot), state.displacement.get(slot), bonds.volume(slot));
+                let mut sum = [0.0; D];
+                bonds.neighbours(slot, &mut |bond| {
+                    if !section.is_in_front(bonds.position(bond.slot)) {
+                        return;
+                    }
+                    let other = state.displacement.get(bond.slot);
+                    let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
+                    let pull = force_over_length(fit, law.modulus, bond.weight, volume, bond.bond, eta);
+                    for d in 0..D {
+                        sum[d] += pull * (bond.bond[d] + eta[d]);
+                    }
+                });
+                let arm: [f64; D] = std::array::from_fn(|d| rest[d] + own[d] - section.point[d]);
+                let at = |of: [f64; D], d: usize| of.get(d).copied().unwrap_or(0.0);
+                for d in 0..3 {
+                    let (a, b) = ((d + 1) % 3, (d + 2) % 3);
+                    moment[d] += at(arm, a) * at(sum, b) - at(arm, b) * at(sum, a);
+                }
+                for d in 0..D {
+                    force[d] += sum[d];
+                }
+            }
+            seen.extend(force);
+            seen.extend(&moment[if D == 3 { 0 } else { 2 }..]);
+        }
+        seen
+    }
+}
+
+/// Writes `section_NAME_VARIANT.csv`, a row for each row of the history, and adds the values of the last to the outcome.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write<const D: usize>(scene: &Scene, outcome: &mut Outcome, output: &Path) -> Result<(), Error> {
+    let mut first = Outcome::seen_columns(&scene.probe).len();
+    for section in &scene.output.section {
+        let names = section.values(D);
+        let own = first..first + names.len();
+        first = own.end;
+        // displacement, load, and the time of a run in motion
+        let columns = outcome.columns();
+        let is_shared = |name: &str| ["displacement", "load", "time"].contains(&name);
+        let shared = columns.iter().filter(|(name, ..)| is_shared(name));
+        let mut table: Vec<(&str, &str, Vec<f64>)> =
+            shared.map(|(name, unit, values)| (name.as_str(), unit.as_str(), values.clone())).collect();
+        let row =
+            |k: usize| outcome.history.iter().map(|r| r.seen.get(k).copied().unwrap_or(f64::NAN)).collect();
+        let prefix = section.name.len() + 1;
+        table.extend(
+            names.iter().zip(own.clone()).map(|(named, k)| (&named.name[prefix..], &*named.unit, row(k))),
+        );
+        let view: Vec<csv::Column> =
+            table.iter().map(|(name, unit, values)| (*name, *unit, values.as_slice())).collect();
+        csv::write(output.join(format!("section_{}_{}.csv", section.name, outcome.file_name())), &view)?;
+        let last = outcome.history.last().and_then(|r| r.seen.get(own)).map(<[f64]>::to_vec);
+        for (named, value) in names.into_iter().zip(last.unwrap_or_default()) {
+            outcome.value(named, value);
+        }
+    }
+    Ok(())
+}
