@@ -1,40 +1,5 @@
 //! The `crystfem` command line.
 
-// polycore::say! prints without a panic where nobody reads any more
-#![deny(clippy::print_stdout, clippy::print_stderr)]
-
-use crystfem::run::{Crystfem, Failure};
-use crystfem::scene::{Kind, kind};
-use polycore::case::{self, RunArguments};
-use polycore::scene::Source;
-use std::process::ExitCode;
-
-mod bench;
-
-#[derive(clap::Subcommand)]
-enum Command {
-    /// Run a scene of the material alone: kinetics and melting under temperature histories.
-    Point(RunArguments),
-    /// Run a scene of fits: constants of the kinetics from measurements, with confidence intervals.
-    Fit(RunArguments),
-    /// Measure error against run time.
-    Bench(bench::Bench),
-}
-
-fn main() -> ExitCode {
-    case::main::<Crystfem, _>(|command| match command {
-        Command::Point(arguments) => run(&arguments, Kind::Point),
-        Command::Fit(arguments) => run(&arguments, Kind::Fit),
-        Command::Bench(bench) => bench.print(),
-    })
-}
-
-/// Runs a scene of one kind.
-fn run(arguments: &RunArguments, asked: Kind) -> Result<bool, Failure> {
-    let source = Source::read(&arguments.scene)?;
-    if kind(&source)? != asked {
-        let found = "a scene of another kind";
-        return Err(source.error("program", found, "`crystfem run`, which takes scenes of all kinds").into());
-    }
-    case::solve::<Crystfem>(&source, arguments)
+fn main() -> std::process::ExitCode {
+    crystfem::command::main()
 }

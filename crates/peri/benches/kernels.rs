@@ -6,7 +6,7 @@ use peri::field::Field;
 use peri::potential::Law;
 use peri::run::Failure;
 
-#[path = "../src/bench/kernel.rs"]
+#[path = "../src/command/bench/kernel.rs"]
 mod kernel;
 
 /// Particles: what the caches hold.

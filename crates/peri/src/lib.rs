@@ -47,6 +47,12 @@ mod quadrature;
 pub mod solver;
 pub mod stress;
 
+// `cargo bench` compiles a file of `command`, in which this crate has its name
+#[cfg(feature = "case")]
+extern crate self as peri;
+
+#[cfg(feature = "case")]
+pub mod command;
 #[cfg(feature = "case")]
 pub mod quantities;
 #[cfg(feature = "case")]

@@ -4,6 +4,7 @@ use super::cloud_kernel::{CloudData, CloudPass};
 use super::kernel::dispatch;
 use super::lattice_kernel::{LatticePass, Row, Tiles};
 use crate::potential::{KernelFit, StretchRange};
+use std::any::Any;
 
 /// One bond of the stencil: its distance in slots, ξ, and its stiffness 2kθ w V/|ξ|.
 #[derive(Clone, Copy, Debug)]
@@ -101,14 +102,13 @@ fn padded<const N: usize>(values: &[f64], scale: impl Fn(usize) -> f64) -> [f64;
 
 /// Sizes (numerator, denominator) that are compiled; a fit is padded with zeros to the first that holds it.
 macro_rules! for_size {
-    ($rational:expr, $make:ident $arguments:tt) => {
-        for_size!(@try $rational, $make $arguments;
-            (3, 0) (4, 0) (5, 0) (6, 0) (7, 0) (8, 0) (9, 0) (10, 0) (12, 0)
-            (3, 3) (4, 4) (5, 5) (7, 6) (8, 7) (9, 8) (11, 10))
+    ($d:literal, $rational:expr, $make:ident $arguments:tt) => {
+        for_size!(@try $d, $rational, $make $arguments;
+            (3, 0) (4, 0) (6, 0) (8, 0) (10, 0) (12, 0) (4, 4) (7, 6) (9, 8) (11, 10))
     };
-    (@try $rational:expr, $make:ident $arguments:tt; $(($p:literal, $q:literal))*) => {{
+    (@try $d:literal, $rational:expr, $make:ident $arguments:tt; $(($p:literal, $q:literal))*) => {{
         $(if $rational.numerator.len() <= $p && $rational.denominator.len() <= $q {
-            return Some($make::<D, $p, $q> $arguments);
+            return Some($make::<$d, $p, $q> $arguments);
         })*
         None
     }};
@@ -119,8 +119,42 @@ pub fn lattice_kernel<const D: usize>(
     fit: &KernelFit,
     stencil: &[StencilBond<D>],
 ) -> Option<Box<dyn LatticeKernel<D>>> {
+    let (rational, stencil) = (Rational::new(fit)?, stencil.to_vec());
+    if D == 2 {
+        same(plane_lattice(&rational, same(stencil)?)?)
+    } else {
+        same(solid_lattice(&rational, same(stencil)?)?)
+    }
+}
+
+/// The cloud kernel for a fitted law; `None` as in [`lattice_kernel`].
+pub fn cloud_kernel<const D: usize>(fit: &KernelFit) -> Option<Box<dyn CloudKernel<D>>> {
     let rational = Rational::new(fit)?;
-    for_size!(rational, lattice_rows(&rational, stencil))
+    if D == 2 { same(plane_cloud(&rational)?) } else { same(solid_cloud(&rational)?) }
+}
+
+// these four are not generic, so that the kernels are compiled in this crate alone and not in every program that makes bonds
+
+fn plane_lattice(law: &Rational, stencil: Vec<StencilBond<2>>) -> Option<Box<dyn LatticeKernel<2>>> {
+    for_size!(2, law, lattice_rows(law, &stencil))
+}
+
+fn solid_lattice(law: &Rational, stencil: Vec<StencilBond<3>>) -> Option<Box<dyn LatticeKernel<3>>> {
+    for_size!(3, law, lattice_rows(law, &stencil))
+}
+
+fn plane_cloud(law: &Rational) -> Option<Box<dyn CloudKernel<2>>> {
+    for_size!(2, law, cloud_law(law))
+}
+
+fn solid_cloud(law: &Rational) -> Option<Box<dyn CloudKernel<3>>> {
+    for_size!(3, law, cloud_law(law))
+}
+
+/// A value whose type is known under another name: `X<D>` is `X<2>` where D = 2.
+fn same<A: 'static, B: 'static>(value: A) -> Option<B> {
+    let mut value = Some(value);
+    (&mut value as &mut dyn Any).downcast_mut::<Option<B>>()?.take()
 }
 
 fn lattice_rows<const D: usize, const P: usize, const Q: usize>(
@@ -141,12 +175,6 @@ fn lattice_rows<const D: usize, const P: usize, const Q: usize>(
         }
     };
     Box::new(LatticeRows::<D, P, Q>(stencil.iter().map(row).collect()))
-}
-
-/// The cloud kernel for a fitted law; `None` as in [`lattice_kernel`].
-pub fn cloud_kernel<const D: usize>(fit: &KernelFit) -> Option<Box<dyn CloudKernel<D>>> {
-    let rational = Rational::new(fit)?;
-    for_size!(rational, cloud_law(&rational))
 }
 
 fn cloud_law<const D: usize, const P: usize, const Q: usize>(law: &Rational) -> Box<dyn CloudKernel<D>> {

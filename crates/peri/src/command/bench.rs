@@ -1,10 +1,10 @@
 //! `peri bench`: bond evaluations per second, bytes per particle, and the machine's bandwidth beside them.
 
+use crate::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
+use crate::field::Field;
+use crate::potential::Law;
+use crate::run::Failure;
 use kernel::RATIO;
-use peri::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
-use peri::field::Field;
-use peri::potential::Law;
-use peri::run::Failure;
 use polycore::case::terminal::{Measurement, print_measurements};
 use std::hint::black_box;
 use std::time::Instant;
@@ -55,7 +55,7 @@ impl Bench {
         let mut rows = Vec::new();
         for &threads in &self.bench_threads {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
-                peri::Error::Parameter {
+                crate::Error::Parameter {
                     name: "--bench-threads",
                     found: threads as f64,
                     allowed: error.to_string(),

@@ -4,8 +4,8 @@
 //! specimen. As in the kernels, what comes in is e = l² − 1 and what goes out q = t/l: tables need a square root. Error:
 //! the largest of q over its root mean square, against the law itself.
 
-use peri::Error;
-use peri::potential::{BondPotential, KernelFit, Law};
+use crate::Error;
+use crate::potential::{BondPotential, KernelFit, Law};
 use polycore::case::terminal::Measurement;
 use std::hint::black_box;
 use std::time::Instant;

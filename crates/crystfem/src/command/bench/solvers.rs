@@ -1,8 +1,8 @@
 //! Error against run time of the linear solvers, in short and long steps.
 
 use super::cube::{Cube, Start};
-use crystfem::run::Failure;
-use crystfem::simulation::{LinearSolver, Settings, Simulation};
+use crate::run::Failure;
+use crate::simulation::{LinearSolver, Settings, Simulation};
 use polycore::case::terminal::Measurement;
 use std::time::Instant;
 

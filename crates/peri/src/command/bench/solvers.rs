@@ -4,13 +4,13 @@
 //! difference of displacements from the same lattice's equilibrium at a residual of 1e-11, over the root mean square.
 
 use super::RATIO;
-use peri::Error;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
-use peri::calibrate::{Space, modulus};
-use peri::geometry::{Operation, Shape, lattice};
-use peri::material::BondMaterial;
-use peri::potential::{BondPotential, Law};
-use peri::solver::{
+use crate::Error;
+use crate::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use crate::calibrate::{Space, modulus};
+use crate::geometry::{Operation, Shape, lattice};
+use crate::material::BondMaterial;
+use crate::potential::{BondPotential, Law};
+use crate::solver::{
     DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Loads, RelaxationSolver, State, Support, System,
     load_stepping,
 };

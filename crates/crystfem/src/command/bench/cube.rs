@@ -6,11 +6,11 @@
 //! scheme (a product of its amplifications) are known to rounding: errors of time steps and of linear solvers have
 //! nothing of the error in space.
 
-use crystfem::boundary::{Condition, Field};
-use crystfem::material::{Conductor, Property};
-use crystfem::mesh::Grid;
-use crystfem::problem::Problem;
-use crystfem::simulation::Simulation;
+use crate::boundary::{Condition, Field};
+use crate::material::{Conductor, Property};
+use crate::mesh::Grid;
+use crate::problem::Problem;
+use crate::simulation::Simulation;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -52,7 +52,7 @@ impl Cube {
     }
 
     /// As finite elements.
-    pub fn problem(&self) -> Result<Problem, crystfem::Error> {
+    pub fn problem(&self) -> Result<Problem, crate::Error> {
         let mesh = Grid::uniform([0.0; 3], [EDGE; 3], [self.elements; 3])?.mesh("cube")?;
         let property = Property::constant;
         let (k, c) = (property("k", CONDUCTIVITY)?, property("c", SPECIFIC_HEAT)?);
@@ -126,7 +126,7 @@ impl Cube {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crystfem::exact::Wall;
+    use crate::exact::Wall;
 
     /// The start comes back, and on many elements the product of three walls with held faces (Carslaw & Jaeger).
     #[test]
@@ -156,9 +156,9 @@ mod tests {
     #[test]
     fn backward_euler_is_a_product() {
         let cube = Cube::new(4, Start::Quenched);
-        let settings = crystfem::simulation::Settings {
+        let settings = crate::simulation::Settings {
             tolerance: 1e-9,
-            ..crystfem::simulation::Settings::backward_euler(10.0)
+            ..crate::simulation::Settings::backward_euler(10.0)
         };
         let mut simulation = Simulation::new(cube.problem().unwrap(), settings).unwrap();
         simulation.run_until(20.0).unwrap();

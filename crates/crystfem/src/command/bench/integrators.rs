@@ -2,9 +2,9 @@
 
 use super::cube::{Cube, END, Start};
 use super::median;
-use crystfem::run::Failure;
-use crystfem::simulation::{LinearSolver, Settings, Simulation};
-use crystfem::time::{Scheme, Steps};
+use crate::run::Failure;
+use crate::simulation::{LinearSolver, Settings, Simulation};
+use crate::time::{Scheme, Steps};
 use polycore::case::terminal::Measurement;
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -1,10 +1,10 @@
 //! `peri exact`: closed forms and law constants on the terminal.
 
+use crate::critical::Reading;
+use crate::potential::{Chain, KernelFit, Law};
+use crate::run::Failure;
+use crate::{calibrate, exact};
 use clap::{Subcommand, ValueEnum};
-use peri::critical::Reading;
-use peri::potential::{Chain, KernelFit, Law};
-use peri::run::Failure;
-use peri::{calibrate, exact};
 
 /// What to print.
 #[derive(Subcommand)]
@@ -63,7 +63,7 @@ impl Exact {
             Self::Kirsch { width_ratio } => {
                 if !(0.0..1.0).contains(&width_ratio) {
                     let allowed = "0 to 1, less than 1".into();
-                    return Err(peri::Error::Parameter {
+                    return Err(crate::Error::Parameter {
                         name: "--width-ratio",
                         found: width_ratio,
                         allowed,
@@ -84,7 +84,7 @@ impl Exact {
             Self::Law { law, links, dissociation, to } => print_law(law, links, dissociation, to)?,
             Self::Lattice { horizon_ratio } => {
                 if !(1.0..=20.0).contains(&horizon_ratio) {
-                    return Err(peri::Error::Parameter {
+                    return Err(crate::Error::Parameter {
                         name: "--horizon-ratio",
                         found: horizon_ratio,
                         allowed: "1 to 20".into(),
@@ -101,7 +101,8 @@ impl Exact {
                     "ν",
                     "Zener"
                 );
-                for correction in [peri::bonds::VolumeCorrection::None, peri::bonds::VolumeCorrection::Linear]
+                for correction in
+                    [crate::bonds::VolumeCorrection::None, crate::bonds::VolumeCorrection::Linear]
                 {
                     for (name, m) in [
                         ("2D", calibrate::LatticeModuli::new::<2>(horizon_ratio, correction)),
@@ -135,7 +136,7 @@ fn print_law(name: LawName, links: f64, dissociation: f64, to: f64) -> Result<()
     };
     if !(1.0 < to && to <= LARGEST_STRETCH) {
         let allowed = format!("above 1, at most {LARGEST_STRETCH}");
-        return Err(peri::Error::Parameter { name: "--to", found: to, allowed }.into());
+        return Err(crate::Error::Parameter { name: "--to", found: to, allowed }.into());
     }
     let built = law.build(links, dissociation, false)?;
     polycore::say!(

@@ -3,12 +3,12 @@
 //! 20 mm cube of PA12 at 220 °C; the bottom held at 80 °C, on the five other sides h = 15 W/m²K and ε = 0.9 against
 //! 80 °C; backward Euler.
 
-use crystfem::boundary::{Condition, Field, Schedule, Where};
-use crystfem::material::{Conductor, Property};
-use crystfem::mesh::{Grid, abaqus};
-use crystfem::problem::{Capacity, Problem};
-use crystfem::run::Failure;
-use crystfem::simulation::{Settings, Simulation};
+use crate::boundary::{Condition, Field, Schedule, Where};
+use crate::material::{Conductor, Property};
+use crate::mesh::{Grid, abaqus};
+use crate::problem::{Capacity, Problem};
+use crate::run::Failure;
+use crate::simulation::{Settings, Simulation};
 use polycore::case::terminal::Measurement;
 use polycore::output::{atomic_write, csv};
 use std::path::PathBuf;
@@ -96,7 +96,7 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     Ok(rows)
 }
 
-fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
+fn problem(options: &Options) -> Result<Problem, crate::Error> {
     let mesh = Grid::uniform([0.0; 3], [EDGE; 3], [options.elements; 3])?.mesh("brick")?;
     let mesh = if options.distorted > 0.0 { mesh.distorted(options.distorted)? } else { mesh };
     let property = Property::constant;

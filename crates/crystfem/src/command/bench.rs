@@ -1,7 +1,7 @@
 //! `crystfem bench`: error against run time, seconds per step, memory.
 
+use crate::run::Failure;
 use clap::Subcommand;
-use crystfem::run::Failure;
 use polycore::case::terminal::print_measurements;
 
 mod brick;

@@ -3,9 +3,9 @@
 //! Rows `SCHEME KELVIN: QUANTITY`: the largest error in α over the curve, the time for all of it, and for a step of KELVIN.
 
 use super::{REPEATS, material, median};
-use crystfem::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
-use crystfem::material::ThermalMaterial;
-use crystfem::run::Failure;
+use crate::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
+use crate::material::ThermalMaterial;
+use crate::run::Failure;
 use polycore::case::terminal::Measurement;
 use std::hint::black_box;
 use std::time::Instant;
@@ -17,7 +17,7 @@ const STEPS: usize = 200_000;
 pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
     if !(rate > 0.0 && rate.is_finite()) {
         let allowed = "above 0".to_owned();
-        return Err(crystfem::Error::Parameter { name: "--rate, K/min", found: rate, allowed }.into());
+        return Err(crate::Error::Parameter { name: "--rate, K/min", found: rate, allowed }.into());
     }
     let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?;
     let rate = rate / 60.0;
@@ -74,7 +74,7 @@ fn error(
     rate: f64,
     kelvin: f64,
     steps: usize,
-    exact: &crystfem::kinetics::CoolingCurve,
+    exact: &crate::kinetics::CoolingCurve,
 ) -> f64 {
     let mut state = scheme.state(kinetics, 1e-3);
     let mut worst = 0.0_f64;

@@ -5,11 +5,11 @@
 //! are those of LAMMPS' example `peri`, Parks et al. 2008, doi:10.1016/j.cpc.2008.06.011.
 
 use super::RATIO;
-use peri::Error;
-use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection, force};
-use peri::calibrate::{Space, modulus, poisson_ratio};
-use peri::field::{Field, chunk_range};
-use peri::potential::{KernelFit, Law};
+use crate::Error;
+use crate::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection, force};
+use crate::calibrate::{Space, modulus, poisson_ratio};
+use crate::field::{Field, chunk_range};
+use crate::potential::{KernelFit, Law};
 use polycore::case::terminal::Measurement;
 use polycore::output::csv::{self, Column};
 use rayon::prelude::*;

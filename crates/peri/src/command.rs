@@ -1,0 +1,27 @@
+//! The `peri` command line. It is a part of the library, so that the solvers are compiled once for all commands.
+
+// polycore::say! prints without a panic where nobody reads any more
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
+use crate::run::Peri;
+use std::process::ExitCode;
+
+mod bench;
+mod exact;
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Print closed-form solutions and the constants of a bond law.
+    #[command(subcommand)]
+    Exact(exact::Exact),
+    /// Measure bond evaluations per second, memory, and the machine's bandwidth.
+    Bench(bench::Bench),
+}
+
+/// Runs the command line of this process.
+pub fn main() -> ExitCode {
+    polycore::case::main::<Peri, _>(|command| match command {
+        Command::Exact(exact) => exact.print(),
+        Command::Bench(bench) => bench.print(),
+    })
+}
