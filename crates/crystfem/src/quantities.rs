@@ -54,6 +54,8 @@ polycore::quantities! {
     STANDARD_ERROR = "{fit}.{constant}.standard_error", "*", "its standard error";
     LOWER = "{fit}.{constant}.lower", "*", "lower end of its 95 % confidence interval";
     UPPER = "{fit}.{constant}.upper", "*", "upper end of it";
+    ENTHALPY = "{fit}.run-{number}.enthalpy", "J/g", "of heat flows: area of the peak over its baseline, file by file";
+    CRYSTALLINITY = "{fit}.run-{number}.crystallinity", "", "this enthalpy over the `latent_heat` of the perfect crystal";
     FIT_RMS = "{fit}.rms", "", "root mean square of the residuals";
 }
 

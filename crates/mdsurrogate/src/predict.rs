@@ -19,7 +19,8 @@ pub struct Predict {
     /// The strains (CSV): columns C11, C22, C33 and, where there is shear, C12, C13, C23 (C = FᵀF; C12 counted once), or
     /// stretch_1, stretch_2, stretch_3 as in tables of data; other columns are left alone.
     table: PathBuf,
-    /// The predictions (CSV): S and its spread in MPa, W in MJ/m³ of an energy, and a 1 for each flag.
+    /// The predictions (CSV): S in MPa, of an ensemble with the standard deviation of each component beside it, their norm
+    /// (`spread`), W in MJ/m³ of an energy, and a 1 for each flag.
     #[arg(long, short)]
     output: PathBuf,
     /// Also the 36 components of 2 ∂S/∂C.
@@ -55,7 +56,7 @@ impl Predict {
             let place = format!("row {} of {}", row + 1, self.table.display());
             return Err(Error::NotFinite { quantity: "the prediction", place });
         }
-        write(&self.output, &points, &predictions)?;
+        write(&self.output, &points, &predictions, law.header().members > 1)?;
         let flagged = predictions.iter().filter(|prediction| prediction.flags.any()).count();
         polycore::say!(
             "{} predictions, {flagged} of them flagged: {}",
@@ -66,7 +67,12 @@ impl Predict {
     }
 }
 
-fn write(path: &Path, points: &[Voigt], predictions: &[Prediction<f64>]) -> Result<(), Error> {
+fn write(
+    path: &Path,
+    points: &[Voigt],
+    predictions: &[Prediction<f64>],
+    of_ensemble: bool,
+) -> Result<(), Error> {
     let column =
         |value: &dyn Fn(&Prediction<f64>) -> f64| predictions.iter().map(value).collect::<Vec<f64>>();
     let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
@@ -75,6 +81,10 @@ fn write(path: &Path, points: &[Voigt], predictions: &[Prediction<f64>]) -> Resu
     }
     for (a, name) in NAMES.iter().enumerate() {
         columns.push((format!("S{name}"), "MPa", column(&|prediction| prediction.stress[a] / MEGA)));
+        if of_ensemble {
+            let deviation = column(&|prediction| prediction.deviation[a] / MEGA);
+            columns.push((format!("S{name} std"), "MPa", deviation));
+        }
     }
     if predictions.iter().any(|prediction| prediction.energy.is_some()) {
         columns.push((

@@ -48,6 +48,7 @@ polycore::quantities! {
     CAUGHT_BY = "{model}.{set}.caught_by_{flag}", "", "share of these rows with a flag: `any_flag`, `box`, `distance` or `spread`";
     FALSE_ALARMS = "{model}.{set}.false_alarms_of_{flag}", "", "share of the other rows with this flag";
     RANK_CORRELATION = "{model}.{set}.rank_correlation", "", "Spearman's rank correlation of spread and error, of an ensemble";
+    WITHIN = "{model}.{set}.share_within_{count}_std_of_s{component}", "", "of an ensemble: share of rows whose measured component lies within `1` or `2` of its standard deviations from the predicted one; normal errors give 0.683 and 0.954";
     SHARE_FLAGGED = "{model}.{set}.share_flagged", "", "of nominal stresses: share of rows with any flag";
     MEAN_ABSOLUTE_ERROR = "{model}.{set}.mean_absolute_error", "MPa", "mean of |P − P̂| over the measured stresses";
     RMS = "{model}.{set}.rms", "MPa", "root mean square of P − P̂ over the measured stresses";

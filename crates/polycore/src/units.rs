@@ -278,6 +278,8 @@ dimensions! {
     Energy, EnergyDimension: of!(energy), "an energy", "J", "1 J";
     /// A power.
     Power, PowerDimension: of!(power), "a power", "W", "21 W";
+    /// A power per mass, as calorimeters measure it.
+    SpecificPower, SpecificPowerDimension: [2, 0, -3, 0, 0, 0, 0, 0], "a power per mass", "W/kg", "1.5 W/g";
     /// An energy per area or force per length: fracture energy, surface tension; `N/mm` = 1000 J/m².
     EnergyPerArea, EnergyPerAreaDimension: of!(surface_tension), "an energy per area", "J/m^2", "2.67 N/mm";
     /// A specific energy or latent heat.

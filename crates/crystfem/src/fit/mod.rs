@@ -1,12 +1,14 @@
 //! Constants of the kinetics from measurements, by least squares in α, with 95 % confidence intervals.
 
 mod avrami;
+mod heat_flow;
 mod least_squares;
 mod nakamura;
 mod ozawa;
 mod student;
 
 pub use avrami::avrami;
+pub use heat_flow::{Baseline, Peak, at};
 pub use nakamura::{Known, Run, nakamura};
 pub use ozawa::{Cooling, ozawa, rates_at};
 pub use student::quantile;

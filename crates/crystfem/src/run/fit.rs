@@ -2,10 +2,11 @@
 
 use super::Failure;
 use super::celsius::{CELSIUS, of_kelvin};
+use super::heat_flow;
 use crate::error::Error;
 use crate::fit::{Fit, avrami, nakamura, ozawa};
 use crate::quantities as q;
-use crate::scene::{FitScene, FitSpec, Job};
+use crate::scene::{FitScene, FitSpec, Job, Measured};
 use polycore::output::picture::{LinePlot, Series};
 use polycore::output::{atomic_write, csv};
 use polycore::report::{Phases, Quantity, Report};
@@ -30,7 +31,7 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> 
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let mut phases = Phases::new();
     let mut done = Vec::new();
-    for (index, (spec, job)) in scene.fit.iter().zip(jobs).enumerate() {
+    for (index, (spec, (job, peaks))) in scene.fit.iter().zip(jobs).enumerate() {
         phases.start("fit");
         let fits = solve(spec, job);
         // data that say nothing are a fault of the scene, which names them
@@ -41,6 +42,8 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> 
             other => Failure::Run(other),
         })?;
         done.extend(fits);
+        heat_flow::record(&mut report, spec, &peaks);
+        heat_flow::write(output, &spec.name, &peaks, scene.output.pictures)?;
     }
     phases.start("write");
     for one in &done {
@@ -62,7 +65,7 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> 
 /// A fault of the scene or of its data.
 pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneError> {
     let jobs = scene.jobs(source)?;
-    let line = |(spec, job): (&FitSpec, &Job)| {
+    let line = |(spec, (job, peaks)): (&FitSpec, &(Job, Vec<Measured>))| {
         let what = match job {
             Job::Avrami(times, _) => format!("k and n from {} measurements", times.len()),
             Job::Ozawa(coolings, temperatures) => {
@@ -77,7 +80,10 @@ pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneEr
                 format!("K0, K_G and n from {rows} measurements in {} runs", runs.len())
             }
         };
-        format!("fit {}: {:?}, {what}", spec.name, spec.law)
+        let heat = |found: &Measured| format!("{:.4} J/g", found.peak.enthalpy / 1e3);
+        let heats: Vec<String> = peaks.iter().map(heat).collect();
+        let of = if heats.is_empty() { String::new() } else { format!("; peaks of {}", heats.join(", ")) };
+        format!("fit {}: {:?}, {what}{of}", spec.name, spec.law)
     };
     Ok(scene.fit.iter().zip(&jobs).map(line).collect())
 }

@@ -1,10 +1,11 @@
 //! Whole scenes: run, compared, drawn and judged.
 
 mod animation;
-mod celsius;
+pub(crate) mod celsius;
 mod draw;
 mod explain;
 mod fit;
+mod heat_flow;
 mod line;
 mod outside;
 mod part;

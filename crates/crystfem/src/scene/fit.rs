@@ -1,6 +1,7 @@
 //! The scene of a fit.
 
 use super::fault::{located, located_in};
+use super::heat_flow::{HeatFlowSpec, Limit, Measured};
 use super::material::KINETICS_KEYS;
 use super::{OutputSpec, Program, check_name};
 use crate::fit::{Cooling, DEGREES, Known, Run};
@@ -9,7 +10,7 @@ use crate::table::{Column, read};
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
 use polycore::units::dimension::{RatioDimension, TemperatureDimension, TimeDimension};
-use polycore::units::{MolarEnergy, Temperature, TemperatureRate};
+use polycore::units::{Mass, MolarEnergy, Temperature, TemperatureRate};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -55,6 +56,8 @@ pub struct FitSpec {
     pub law: FitLaw,
     /// Measurements.
     pub data: Vec<DataSpec>,
+    /// The files have raw heat flow of a calorimeter: columns `time` and `heat_flow` in place of `alpha`.
+    pub heat_flow: Option<HeatFlowSpec>,
     /// Where rates are compared, of `ozawa`.
     #[serde(default)]
     pub temperatures: Vec<Temperature>,
@@ -76,6 +79,14 @@ pub struct DataSpec {
     pub file: PathBuf,
     /// Cooling rate.
     pub rate: Option<TemperatureRate>,
+    /// Mass of the sample, of heat flow in W.
+    pub mass: Option<Mass>,
+    /// Where the integration of the heat flow begins, a time or a temperature; default the first row.
+    #[schemars(with = "Option<String>")]
+    pub from: Option<Limit>,
+    /// Where it ends; default the last row.
+    #[schemars(with = "Option<String>")]
+    pub to: Option<Limit>,
 }
 
 /// A fit with its data, checked.
@@ -89,11 +100,11 @@ pub enum Job {
 }
 
 impl FitScene {
-    /// All fits with their data.
+    /// All fits with their data, and the peaks of those that come from heat flows.
     ///
     /// # Errors
     /// A [`SceneError`] that names the key, the value found and what is allowed; for data, file, line and column.
-    pub fn jobs(&self, source: &Source) -> Result<Vec<Job>, SceneError> {
+    pub fn jobs(&self, source: &Source) -> Result<Vec<(Job, Vec<Measured>)>, SceneError> {
         if self.fit.is_empty() {
             return Err(source.error("fit", "nothing", "at least one [[fit]]"));
         }
@@ -109,7 +120,12 @@ impl FitScene {
                 ));
             }
             fit.check_keys(source, &key)?;
-            jobs.push(fit.job(source, &key)?);
+            fit.check_heat_flow(source, &key)?;
+            let measured = |flow| {
+                (0..fit.data.len()).map(|i| fit.measured(source, &key, flow, i)).collect::<Result<_, _>>()
+            };
+            let peaks: Vec<Measured> = fit.heat_flow.as_ref().map_or(Ok(Vec::new()), measured)?;
+            jobs.push((fit.job(source, &key, &peaks)?, peaks));
         }
         Ok(jobs)
     }
@@ -160,9 +176,19 @@ impl FitSpec {
         Ok(())
     }
 
-    fn job(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<Job, SceneError> {
+    /// The job, of the peaks where there are any and else of tables of α.
+    fn job(
+        &self,
+        source: &Source,
+        key: &dyn Fn(&str) -> String,
+        peaks: &[Measured],
+    ) -> Result<Job, SceneError> {
         match self.law {
             FitLaw::Avrami => {
+                if let [Measured { peak, .. }] = peaks {
+                    let times = peak.times.iter().map(|time| time - peak.times[0]).collect();
+                    return Ok(Job::Avrami(times, peak.degrees.clone()));
+                }
                 let columns = [time().within(0.0, f64::INFINITY), alpha()];
                 let [times, degrees] = table(source, &key("data[0].file"), &self.data[0].file, columns)?;
                 Ok(Job::Avrami(times, degrees))
@@ -175,7 +201,10 @@ impl FitSpec {
                 let mut coolings = Vec::new();
                 for (i, data) in self.data.iter().enumerate() {
                     let at = key(&format!("data[{i}].file"));
-                    let [temperatures, degrees] = table(source, &at, &data.file, [temperature(), alpha()])?;
+                    let [temperatures, degrees] = match peaks.get(i) {
+                        Some(found) => [found.temperatures.clone(), found.peak.degrees.clone()],
+                        None => table(source, &at, &data.file, [temperature(), alpha()])?,
+                    };
                     coolings.push(Cooling { rate: data.rate.map_or(0.0, |r| r.si()), temperatures, degrees });
                 }
                 Ok(Job::Ozawa(coolings, self.temperatures.iter().map(|t| t.si()).collect()))
@@ -185,14 +214,22 @@ impl FitSpec {
                 let mut runs = Vec::new();
                 for (i, data) in self.data.iter().enumerate() {
                     let at = key(&format!("data[{i}].file"));
-                    runs.push(match data.rate {
-                        Some(rate) => {
-                            let [temperatures, degrees] =
-                                table(source, &at, &data.file, [temperature(), alpha()])?;
+                    runs.push(match (data.rate, peaks.get(i)) {
+                        (Some(rate), found) => {
+                            let [temperatures, degrees] = match found {
+                                Some(found) => [found.temperatures.clone(), found.peak.degrees.clone()],
+                                None => table(source, &at, &data.file, [temperature(), alpha()])?,
+                            };
                             let run = Run::cooling(rate.si(), temperatures, degrees, &known);
                             run.map_err(|error| source.error(&at, error, "temperatures that fall"))?
                         }
-                        None => {
+                        (None, Some(Measured { peak, temperatures, origin })) => Run {
+                            times: peak.times.clone(),
+                            temperatures: temperatures.clone(),
+                            degrees: peak.degrees.clone(),
+                            origin: *origin,
+                        },
+                        (None, None) => {
                             let columns = [time(), temperature(), alpha()];
                             let [times, temperatures, degrees] = table(source, &at, &data.file, columns)?;
                             let origin = [times[0], temperatures[0]];
@@ -241,11 +278,11 @@ impl FitSpec {
     }
 }
 
-fn time() -> Column {
+pub(super) fn time() -> Column {
     Column::of::<TimeDimension>("time")
 }
 
-fn temperature() -> Column {
+pub(super) fn temperature() -> Column {
     Column::of::<TemperatureDimension>("temperature")
 }
 

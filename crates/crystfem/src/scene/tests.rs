@@ -199,6 +199,64 @@ fn bad_fits() {
         let message = complaint(&replaced(&good, from, to), folder.path());
         assert!(parts.iter().all(|part| message.contains(part)), "{to}: {message}");
     }
+    std::fs::write(
+        folder.path().join("w.csv"),
+        "time [s],temperature [degC],heat_flow [W/g]\n0,170,0\n9,165,1\n18,160,0\n",
+    )
+    .unwrap();
+    let other = "# mW\ntime [s],temperature [degC],heat_flow [mW]\n0,170,0\n9,165,-1\n18,160,0\n";
+    std::fs::write(folder.path().join("mw.csv"), other).unwrap();
+    std::fs::write(folder.path().join("back.csv"), other.replace("18,", "8,")).unwrap();
+    let flow = |file: &str, rest: &str, up: &str| {
+        let data = format!("data = [{{ file = \"{file}\", rate = \"1 K/min\"{rest} }}]");
+        let flow = format!("heat_flow = {{ exothermal = \"{up}\" }}\n{data}");
+        replaced(&good, "data = [{ file = \"a.csv\", rate = \"1 K/min\" }]", &flow)
+    };
+    let lines = complaint(&flow("w.csv", "", "up"), folder.path());
+    assert!(lines.ends_with("3 measurements in 1 runs; peaks of 9.0000 J/g"), "{lines}");
+    let lines = complaint(&flow("mw.csv", ", mass = \"2 mg\"", "down"), folder.path());
+    assert!(lines.ends_with("; peaks of 4.5000 J/g"), "{lines}");
+    let lines = complaint(&flow("w.csv", ", from = \"4.5 s\", to = \"162.5 degC\"", "up"), folder.path());
+    assert!(lines.ends_with("; peaks of 2.2500 J/g"), "{lines}");
+    let level = flow("w.csv", "", "up").replace("exothermal", "latent_heat = \"0 J/g\", exothermal");
+    let cases: &[(String, &[&str])] = &[
+        (flow("mw.csv", "", "down"), &["`fit[0].data[0].mass`", "mw.csv is a power", "5.2 mg"]),
+        (flow("w.csv", ", mass = \"2 mg\"", "up"), &["`fit[0].data[0].mass`", "one per mass"]),
+        (flow("w.csv", ", mass = \"0 mg\"", "up"), &["`fit[0].data[0].mass`", "above 0"]),
+        (
+            flow("w.csv", "", "down"),
+            &["`fit[0].heat_flow.exothermal`", "`down`", "-9.0000e3 J/kg", "wrong way round"],
+        ),
+        (flow("w.csv", "", "left"), &["`left`", "`up`"]),
+        (
+            flow("back.csv", ", mass = \"2 mg\"", "down"),
+            &["back.csv:5: column `time`", "8 s", "9 s or later"],
+        ),
+        (flow("a.csv", "", "up"), &["a.csv:1: header", "`time [unit]`"]),
+        (flow("w.csv", ", from = \"20 s\"", "up"), &["`fit[0].data[0].from`", "20 s", "0 to 18 s"]),
+        (
+            flow("w.csv", ", to = \"150 degC\"", "up"),
+            &["`fit[0].data[0].to`", "150.00 degC", "160.00 to 170.00"],
+        ),
+        (flow("w.csv", ", from = \"9 s\", to = \"3 s\"", "up"), &["`fit[0].data[0].to`", "after `from`"]),
+        (
+            flow("w.csv", ", from = \"9 mm\"", "up"),
+            &["found `9 mm`", "a time, e.g. \"90 s\", or a temperature"],
+        ),
+        (level, &["`fit[0].heat_flow.latent_heat`", "above 0"]),
+        (
+            good.replace("rate =", "mass = \"1 mg\", rate ="),
+            &["`fit[0].data[0].mass`", "`heat_flow` in the fit"],
+        ),
+        (
+            flow("w.csv", "", "up").replace("\"up\"", "\"up\", baseline = \"tangential\""),
+            &["1 measurements from", "before the first limit"],
+        ),
+    ];
+    for (text, parts) in cases {
+        let message = complaint(text, folder.path());
+        assert!(parts.iter().all(|part| message.contains(part)), "{parts:?}: {message}");
+    }
     // two rows for three constants are found by the fit itself
     let source = Source::new(folder.path().join("case.toml"), good);
     let output = folder.path().join("out");

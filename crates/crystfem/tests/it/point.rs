@@ -1,5 +1,6 @@
 //! Scenes of the material alone, and fits, from their text to their report.
 
+use crystfem::kinetics::{Constants, Kinetics, cooling_curve};
 use crystfem::run::{Crystfem, Failure};
 use polycore::case::Options;
 use polycore::report::Report;
@@ -108,5 +109,74 @@ data = [{ file = "out/slow.csv" }, { file = "fast.csv" }]
     for (name, value) in [("growth_rate", 37_869.0), ("nucleation", 136_235.0), ("avrami_exponent", 2.678)] {
         let found = report.scalar(&format!("pa12.{name}")).expect(name);
         assert!((found / value - 1.0).abs() < 1e-4, "{name} {found}");
+    }
+}
+
+/// Raw heat flow of known kinetics, ΔH dα/dt with α of Nakamura's law by Gauss' quadrature, over a sloped baseline: enthalpies
+/// and constants come back, of heat flows in mW that point down and in W/g that point up.
+#[test]
+fn a_fit_reads_heat_flows() {
+    let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).expect("constants");
+    let folder = tempfile::tempdir().expect("a folder");
+    let (enthalpy, mass) = (52e3, 5.2e-6);
+    let export = |name: &str, per_minute: f64, heading: &str, scale: f64| {
+        let rate = per_minute / 60.0;
+        let curve = cooling_curve(&kinetics, rate, 466.35, 400.0, 0.0, 6000);
+        // a minute in the melt first
+        let mut text =
+            format!("time [min],temperature [degC],heat_flow [{heading}]\n0,193.2,{}\n", scale * 20.0);
+        for (&temperature, &z) in curve.temperature.iter().zip(&curve.z).skip(1) {
+            let time = 60.0 + (466.35 - temperature) / rate;
+            let flow = enthalpy * kinetics.degree_slope(z) * kinetics.rate(temperature) + 20.0 + 0.01 * time;
+            text += &format!("{},{},{}\n", time / 60.0, temperature - 273.15, scale * flow);
+        }
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    };
+    for (heading, scale, exothermal, extra) in
+        [("mW", -1e3 * mass, "down", ", mass = \"5.2 mg\""), ("W/g", 1e-3, "up", "")]
+    {
+        export("slow.csv", 2.0, heading, scale);
+        export("fast.csv", 10.0, heading, scale);
+        let data = |file: &str| {
+            format!("{{ file = \"{file}.csv\", from = \"175 degC\", to = \"130 degC\"{extra} }}")
+        };
+        let text = format!(
+            r#"
+version = 1
+program = "crystfem"
+
+[[fit]]
+name = "dsc"
+law = "nakamura"
+equilibrium_melting = "193.2 degC"
+glass_transition = "51 degC"
+heat_flow = {{ exothermal = "{exothermal}", latent_heat = "209 J/g" }}
+data = [{}, {}]
+"#,
+            data("slow"),
+            data("fast")
+        );
+        let source = Source::new(folder.path().join("fit.toml"), &text);
+        let output = folder.path().join("fit");
+        let report = match run_quietly(&source, &output, false) {
+            Ok(report) => report,
+            Err(error) => panic!("{error}"),
+        };
+        let is = |name: &str, value: f64, tolerance: f64| {
+            let found = report.scalar(&format!("dsc.{name}")).expect(name);
+            assert!((found / value - 1.0).abs() < tolerance, "{name} {found}");
+        };
+        for run in ["run-1", "run-2"] {
+            is(&format!("{run}.enthalpy"), 52.0, 1e-4);
+            is(&format!("{run}.crystallinity"), 52.0 / 209.0, 1e-4);
+        }
+        for (name, value) in
+            [("growth_rate", 37_869.0), ("nucleation", 136_235.0), ("avrami_exponent", 2.678)]
+        {
+            is(name, value, 2e-3);
+        }
+        for file in ["dsc-heat-flow.csv", "dsc-heat-flow.png", "dsc.csv", "dsc.png"] {
+            assert!(output.join(file).is_file(), "{file}");
+        }
     }
 }

@@ -25,6 +25,10 @@ pub struct Uncertainty {
     pub alarms: [usize; 4],
     /// Spearman's rank correlation of the ensemble's spread and the error; none for a single member or two rows.
     pub correlation: Option<f64>,
+    /// Of each component of S: the share of rows whose measured value lies within one and within two standard deviations
+    /// of the ensemble ([`Prediction::deviation`](crate::surrogate::Prediction::deviation)) from the predicted one. None
+    /// for a single member, nominal stresses (their deviation needs the covariance) and where the members always agree.
+    pub within: [Option<[f64; 2]>; 6],
 }
 
 impl Uncertainty {
@@ -36,6 +40,7 @@ impl Uncertainty {
         let mut memory = Workspace::default();
         let mut found = Self::default();
         let (mut errors, mut spreads) = (Vec::new(), Vec::new());
+        let (mut inside, mut apart, mut nominal) = ([[0; 2]; 6], [false; 6], false);
         for row in rows {
             let answer = law.stress(&row.c, &mut memory)?;
             let [measured, predicted] = row.compared(&answer.stress);
@@ -50,11 +55,21 @@ impl Uncertainty {
             for (sum, flag) in of.iter_mut().zip(raised) {
                 *sum += usize::from(flag);
             }
+            nominal |= row.nominal.is_some();
+            for a in 0..6 {
+                let (distance, deviation) = ((predicted[a] - measured[a]).abs(), answer.deviation[a]);
+                apart[a] |= deviation > 0.0;
+                inside[a][0] += usize::from(distance <= deviation);
+                inside[a][1] += usize::from(distance <= 2.0 * deviation);
+            }
             errors.push(error);
             spreads.push(answer.spread);
         }
         if law.header().members > 1 && errors.len() > 2 {
             found.correlation = correlation(&ranks(&errors), &ranks(&spreads));
+        }
+        for a in (0..6).filter(|&a| apart[a] && !nominal) {
+            found.within[a] = Some(inside[a].map(|count| count as f64 / errors.len() as f64));
         }
         Ok(found)
     }
@@ -90,6 +105,7 @@ fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::dataset::tests::rows_of_a_law;
+    use crate::network::{Activation::Linear, Layer, Network};
     use crate::surrogate::{Header, Kind};
 
     #[test]
@@ -99,6 +115,39 @@ mod tests {
         let found = correlation(&ranks(&[1.0, 2.0, 3.0, 9.0]), &ranks(&[2.0, 1.0, 5.0, 6.0])).unwrap();
         assert!((found - (1.0 - 12.0 / 60.0)).abs() < 1e-15);
         assert_eq!(correlation(&[1.0, 2.0], &[3.0, 3.0]), None);
+    }
+
+    /// Two members that answer with m ± s: shares counted by hand.
+    #[test]
+    fn shares_within_deviations() {
+        let rows = rows_of_a_law();
+        let mut header = Header::new(Kind::Ann, &[], 2);
+        header.output_deviation = vec![0.0; 6];
+        let range = rows.iter().fold([f64::MAX, f64::MIN], |[l, h], row| [l.min(row.s[1]), h.max(row.s[1])]);
+        let (mean, deviation) = (0.5 * (range[0] + range[1]), 0.2 * (range[1] - range[0]));
+        (header.output_mean[1], header.output_deviation[1]) = (mean, deviation);
+        let member = |sign: f64| {
+            let mut bias = vec![0.0; 6];
+            bias[1] = sign;
+            let layer = Layer { weights: vec![0.0; 36], bias, activation: Linear };
+            Network::<f64>::new(header.architecture.clone(), vec![layer]).unwrap()
+        };
+        let law = Surrogate::new(header.clone(), vec![member(1.0), member(-1.0)]).unwrap();
+        let share = |reach: f64| {
+            rows.iter().filter(|row| (row.s[1] - mean).abs() <= reach).count() as f64 / rows.len() as f64
+        };
+        let found = Uncertainty::of(&law, rows.iter(), 0.0).unwrap();
+        // the members agree on all components but 22
+        let expected = [None, Some([share(deviation), share(2.0 * deviation)]), None, None, None, None];
+        assert_eq!(found.within, expected);
+        assert!(
+            share(deviation) > 0.0
+                && share(2.0 * deviation) > share(deviation)
+                && share(2.0 * deviation) < 1.0
+        );
+        header.members = 1;
+        let alone = Surrogate::new(header.clone(), vec![member(1.0)]).unwrap();
+        assert_eq!(Uncertainty::of(&alone, rows.iter(), 0.0).unwrap().within, [None; 6]);
     }
 
     /// Laws that answer with nothing, and with the stress of one row.

@@ -267,6 +267,11 @@ fn uncertain(report: &mut Report, name: &str, set: &str, law: &Surrogate, uncert
     if let Some(correlation) = uncertainty.correlation {
         report.value(q::RANK_CORRELATION.of(&[name, set]), correlation);
     }
+    for (component, within) in crate::kinematics::NAMES.iter().zip(uncertainty.within) {
+        for (count, share) in ["1", "2"].into_iter().zip(within.into_iter().flatten()) {
+            report.value(q::WITHIN.of(&[name, set, count, component]), share);
+        }
+    }
 }
 
 fn obey(report: &mut Report, name: &str, physics: &Physics) {

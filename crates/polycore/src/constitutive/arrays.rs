@@ -17,6 +17,8 @@ pub struct Predictions {
     pub energy: Option<Array1<f64>>,
     /// Spread of an ensemble, (N), Pa; 0 of other laws.
     pub spread: Array1<f64>,
+    /// Standard deviation of each component of S over an ensemble, (N, 6), Pa; 0 of other laws.
+    pub deviation: Array2<f64>,
     /// Reasons for uncertainty, (N).
     pub flags: Array1<Flags>,
 }
@@ -46,6 +48,7 @@ pub fn predict(law: &dyn Law, c: ArrayView2<'_, f64>, tangent: bool) -> Result<P
         }),
         energy: all.iter().map(|found| found.energy).collect(),
         spread: all.iter().map(|found| found.spread).collect(),
+        deviation: Array2::from_shape_fn((count, 6), |(k, a)| all[k].deviation[a]),
         flags: all.iter().map(|found| found.flags).collect(),
     })
 }

@@ -92,8 +92,12 @@ pub struct Prediction<T: Scalar = f64> {
     pub tangent: Option<SMatrix<T, 6, 6>>,
     /// W, J/m³; none of a law that has no energy.
     pub energy: Option<T>,
-    /// Root mean square over the members of an ensemble of the norm of their distance from the mean, Pa; 0 for one.
+    /// Root mean square over the members of an ensemble of the norm of their distance from the mean, Pa; 0 for one. It is
+    /// the norm of `deviation`: √Σₐ sₐ².
     pub spread: T,
+    /// Standard deviation over the M members of each component of S, sₐ = √(Σₘ (Sₐᵐ − Sₐ)²/M), Pa, in the order of
+    /// `stress`; 0 for one member. It belongs to these axes: in others it needs the members' covariance.
+    pub deviation: SVector<T, 6>,
     /// Reasons for uncertainty; none of a law in closed form.
     pub flags: Flags,
 }

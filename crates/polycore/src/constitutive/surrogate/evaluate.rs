@@ -164,11 +164,12 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
                 energy += (*value - rest.value - linear) / count;
             }
         }
-        let mut square = 0.0;
+        let (mut square, mut squares) = (0.0, [0.0; 6]);
         for (m, (_, first)) in parts.enumerate() {
             for a in 0..6 {
                 let distance = (own(m, first, a) - mean[a]).to_f64();
                 square += distance * distance;
+                squares[a] += distance * distance;
             }
         }
         let spread = (square / self.members.len() as f64).sqrt();
@@ -186,6 +187,7 @@ impl<T: Real + nalgebra::Scalar> Surrogate<T> {
             tangent,
             energy: energetic.then_some(energy),
             spread: T::from_f64(spread),
+            deviation: squares.map(|square| T::from_f64((square / self.members.len() as f64).sqrt())).into(),
             flags,
         })
     }

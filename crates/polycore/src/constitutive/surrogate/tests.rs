@@ -1,7 +1,8 @@
 //! What holds for every kind of model by construction, beside [`crate::constitutive::verify`].
 
 use super::*;
-use crate::constitutive::network::Activation::{Elu, Relu, Softplus, Tanh};
+use crate::constitutive::network::Activation::{Elu, Linear, Relu, Softplus, Tanh};
+use crate::constitutive::network::Layer;
 use crate::random::SplitMix64;
 use crate::tensor::{DeformationGradient, Tensor, voigt};
 use nalgebra::Rotation3;
@@ -117,9 +118,58 @@ fn uncertainty_is_flagged() {
     let mean = stresses.iter().sum::<Voigt>() / 4.0;
     let spread = (stresses.iter().map(|s| (s - mean).norm_squared()).sum::<f64>() / 4.0).sqrt();
     assert!((mean - inside.stress).norm() < 1e-9 && (spread / inside.spread - 1.0).abs() < 1e-12);
+    for a in 0..6 {
+        let square = stresses.iter().map(|s| (s[a] - mean[a]).powi(2)).sum::<f64>() / 4.0;
+        assert!((inside.deviation[a] - square.sqrt()).abs() < 1e-12 * spread, "component {a}");
+    }
     header.spread_limit = Some(spread * 0.99);
     let strict = Surrogate::<f64>::random(header, 1).unwrap();
     assert!(strict.stress(&c, &mut memory).unwrap().flags.spread);
+}
+
+/// Linear networks: Sᵐ = Aᵐ c + bᵐ, with deviations in closed form; one member has none.
+#[test]
+fn the_deviation_of_linear_members() {
+    let slopes: [f64; 4] = [1.0, 2.0, 4.0, 9.0];
+    let header =
+        |members: usize| Header { output_deviation: vec![1e6; 6], ..Header::new(Kind::Ann, &[], members) };
+    // Sₐ = 10⁶ m (a + 1) xₐ + 10⁶ m², x the standardised input
+    let member = |slope: &f64| {
+        let weight = |i: usize| if i.is_multiple_of(7) { slope * (i / 7 + 1) as f64 } else { 0.0 };
+        let (weights, bias) = ((0..36).map(weight).collect(), vec![slope * slope; 6]);
+        let layer = Layer { weights, bias, activation: Linear };
+        Network::<f64>::new(header(4).architecture, vec![layer]).unwrap()
+    };
+    let of =
+        |slopes: &[f64]| Surrogate::new(header(slopes.len()), slopes.iter().map(member).collect()).unwrap();
+    let (law, mut memory) = (of(&slopes), Workspace::default());
+    for c in deformations().iter().map(c_of) {
+        let found = law.stress(&c, &mut memory).unwrap();
+        let x = law.features(&c).values;
+        for a in 0..6 {
+            let at = |m: &f64| 1e6 * (m * (a + 1) as f64 * x[a] + m * m);
+            let mean = slopes.iter().map(at).sum::<f64>() / 4.0;
+            let exact = (slopes.iter().map(|m| (at(m) - mean).powi(2)).sum::<f64>() / 4.0).sqrt();
+            assert!((found.deviation[a] - exact).abs() < 1e-13 * found.spread, "{a}");
+        }
+        assert!((found.deviation.norm() / found.spread - 1.0).abs() < 1e-15);
+        let alone = of(&slopes[1..2]).tangent(&c, &mut memory).unwrap();
+        assert_eq!((alone.deviation, alone.spread), (Voigt::zeros(), 0.0));
+    }
+}
+
+/// Turning the axes by 90° about 3 turns the deviations of isotropic energies, too: 11 ↔ 22, 13 ↔ 23.
+#[test]
+fn the_deviation_turns_with_the_axes() {
+    let header = Header::new(Kind::energy(Symmetry::Isotropic), &[(8, Softplus)], 3);
+    let (law, mut memory) = (Surrogate::<f64>::random(header, 5).unwrap(), Workspace::default());
+    for c in deformations().iter().map(c_of) {
+        let turned = Voigt::new(c[1], c[0], c[2], -c[3], -c[5], c[4]);
+        let [here, there] = [c, turned].map(|c| law.stress(&c, &mut memory).unwrap());
+        let d = there.deviation;
+        let back = Voigt::new(d[1], d[0], d[2], d[3], d[5], d[4]);
+        assert!(here.spread > 0.0 && (back - here.deviation).norm() < 1e-11 * here.spread);
+    }
 }
 
 #[test]
