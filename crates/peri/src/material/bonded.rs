@@ -183,7 +183,12 @@ impl<const D: usize> Response<D> for Kernels<'_> {
     }
 
     /// Σ_J (2 w V_J/|ξ|)·max(|t′|, |t|/λ)(1 + max_{d≠e} |n_d n_e|) with the directions of the deformed bonds.
-    fn own_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, stretches: [f64; 2]) -> Vec<f64> {
+    fn own_stiffness(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        stretches: [f64; 2],
+    ) -> Vec<f64> {
         let law = &*self.material.law;
         // bonds crushed to nothing have no bound: the law's own at a thousandth
         let [low, high] = stretches.map(|stretch| stretch.powi(2) - 1.0);

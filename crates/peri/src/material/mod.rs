@@ -10,11 +10,17 @@
 //! of the stiffness. A material of the first kind needs no word about them.
 
 mod bonded;
+mod constitutive;
+mod deformation;
+mod eight_chain;
 mod family;
 mod pointwise;
 mod response;
 
 pub use bonded::BondMaterial;
+pub use constitutive::Correspondence;
+pub use deformation::{Deformation, NonlocalSolid, Point, PointLaw, PointStress, Tensor};
+pub use eight_chain::EightChain;
 pub use family::{Bond, Family};
 pub use pointwise::Pointwise;
 pub use response::{Cover, LawRange, Response};
@@ -43,6 +49,12 @@ pub trait Material<const D: usize>: Send + Sync {
 
     /// The first pass: brings the state of a particle to the present displacement of its family.
     fn prepare(&self, family: &Family<D>, point: &mut Self::Point) {
+        let _ = (family, point);
+    }
+
+    /// What bounds the stiffness, and is the same for all bonds of a particle: called for every particle before
+    /// [`Self::stiffness`], after [`Self::prepare`].
+    fn stiffen(&self, family: &Family<D>, point: &mut Self::Point) {
         let _ = (family, point);
     }
 

@@ -32,6 +32,25 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
         Self { material, points, modulus, tangent: 0.0 }
     }
 
+    /// Brings the states of all particles up to date.
+    fn visit(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        visit: impl Fn(&M, &Family<D>, &mut M::Point) + Sync,
+    ) {
+        if size_of::<M::Point>() == 0 {
+            return;
+        }
+        let material = &self.material;
+        self.points.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, points)| {
+            for &slot in particles_of(bonds, chunk) {
+                let slot = slot as usize;
+                visit(material, &Family::new(bonds, displacement, slot), &mut points[slot - chunk * CHUNK]);
+            }
+        });
+    }
+
     /// The states, slot by slot.
     pub fn points(&self) -> &[M::Point] {
         &self.points
@@ -66,6 +85,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
             return Ok(known);
         }
         let bonds = &*bonds;
+        self.visit(bonds, displacement, M::stiffen);
         let of = |&slot: &u32| {
             let family = Family::new(bonds, displacement, slot as usize);
             let unit = family.sum(|bond| 2.0 * bond.weight / bond.length);
@@ -76,16 +96,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
     }
 
     fn prepare(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
-        if !self.has_points() {
-            return;
-        }
-        let material = &self.material;
-        self.points.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, points)| {
-            for &slot in particles_of(bonds, chunk) {
-                let slot = slot as usize;
-                material.prepare(&Family::new(bonds, displacement, slot), &mut points[slot - chunk * CHUNK]);
-            }
-        });
+        self.visit(bonds, displacement, M::prepare);
     }
 
     fn has_points(&self) -> bool {
@@ -141,7 +152,13 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         true
     }
 
-    fn own_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, _stretches: [f64; 2]) -> Vec<f64> {
+    fn own_stiffness(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        _stretches: [f64; 2],
+    ) -> Vec<f64> {
+        self.visit(bonds, displacement, M::stiffen);
         let of = |&slot: &u32| {
             self.material.stiffness(&Family::new(bonds, displacement, slot as usize), &self.points)
                 / self.modulus

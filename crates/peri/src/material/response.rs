@@ -74,7 +74,12 @@ pub trait Response<const D: usize>: Send + Sync {
     fn has_own_stiffness(&self, tangent: f64) -> bool;
 
     /// Bounds of the stiffness of all particles, in their order, over kθ: s_I of [`super::Material::stiffness`].
-    fn own_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, stretches: [f64; 2]) -> Vec<f64>;
+    fn own_stiffness(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        stretches: [f64; 2],
+    ) -> Vec<f64>;
 
     /// Tangents and energies over a range of stretches.
     fn range(&self, stretches: [f64; 2]) -> LawRange;

@@ -32,7 +32,7 @@ pub fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, slots: &[u32], mas
 }
 
 /// The bounds of all particles with each bond's own tangent, over kθ.
-pub fn own_mass<const D: usize>(system: &System<D>, state: &State<D>, mass: &mut Vec<f64>) {
+pub fn own_mass<const D: usize>(system: &mut System<D>, state: &State<D>, mass: &mut Vec<f64>) {
     let sums = system.material.own_stiffness(&*system.bonds, &state.displacement, state.fitted);
     mass.resize(system.bonds.slots(), 1.0);
     for (&slot, sum) in system.bonds.particles().iter().zip(sums) {

@@ -39,23 +39,25 @@ impl<const D: usize> Preconditioner<D> {
 
     /// Builds it for the present state, and from nothing else: `weight` is ω, `coarsening` the edge of a coarse cell over
     /// the particles' distance.
-    pub fn build(&mut self, system: &System<D>, state: &State<D>, weight: f64, coarsening: f64) {
+    pub fn build(&mut self, system: &mut System<D>, state: &State<D>, weight: f64, coarsening: f64) {
+        // half the Gershgorin sum is about a particle's own stiffness
+        let mut springs = Vec::new();
+        let own = has_own_mass(system, state);
+        if own {
+            own_mass(system, state, &mut springs);
+        }
+        let system = &*system;
         let (bonds, slots) = (&*system.bonds, system.bonds.slots());
         let survey = Survey::new(bonds, &state.displacement);
         self.unit_mass.resize(slots, 1.0);
         self.volumes.resize(slots, 0.0);
         bonds.particles().iter().for_each(|&s| self.volumes[s as usize] = bonds.volume(s as usize));
         update_unit_mass(bonds, bonds.particles(), &mut self.unit_mass);
-        // half the Gershgorin sum is about a particle's own stiffness
-        let mut springs = Vec::new();
         let (law, modulus) = system.material.bond_law();
-        let tangent = if has_own_mass(system, state) {
-            own_mass(system, state, &mut springs);
-            modulus
-        } else {
+        let tangent = if own { modulus } else { state.tangent };
+        if !own {
             springs.clone_from(&self.unit_mass);
-            state.tangent
-        };
+        }
         let particles = bonds.particles().iter().map(|&slot| slot as usize);
         particles.filter(|&slot| survey.bonded[slot] == 0).for_each(|slot| springs[slot] = 0.0);
         if let Some(contact) = system.repulsion() {

@@ -21,6 +21,7 @@ mod model;
 mod pressed;
 mod relaxation;
 mod rigid;
+mod solids;
 mod stress;
 mod surface;
 mod time_step;

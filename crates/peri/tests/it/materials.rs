@@ -12,7 +12,7 @@ use peri::solver::{
 };
 
 /// Makes a material at work in a body.
-type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn Response<D> + 'm>;
+pub type Make<'m, const D: usize> = &'m dyn Fn(&dyn Bonds<D>) -> Box<dyn Response<D> + 'm>;
 
 /// Bonds, a material at work in them, and where they are.
 struct Case<'a, 'm, const D: usize> {
@@ -212,7 +212,7 @@ fn displaced<const D: usize>(built: &Built<D>, spacing: f64) -> Vec<[f64; D]> {
 }
 
 /// The whole battery, on a damaged body, as a lattice and as a cloud; the greatest λ(K)/s V met.
-fn battery<const D: usize>(name: &str, cells: [usize; D], make: Make<D>) -> f64 {
+pub fn battery<const D: usize>(name: &str, cells: [usize; D], make: Make<D>) -> f64 {
     let body = Body::damaged(cells, 0.1, 3.015);
     let mut built = body.build();
     let moved = displaced(&built, 0.1);

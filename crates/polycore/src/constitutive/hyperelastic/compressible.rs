@@ -38,6 +38,12 @@ pub enum Volumetric {
         /// Lamé's λ, Pa.
         lame: f64,
     },
+    /// U = ¼λ(J² − 1 − 2 ln J): convex, and infinite as J → 0 and as J → ∞ (Ciarlet 1988, Simo & Taylor 1991,
+    /// doi:10.1016/0045-7825(91)90100-K).
+    Ciarlet {
+        /// Lamé's λ, Pa.
+        lame: f64,
+    },
     /// U = −p(J − 1): the reaction of an incompressible body under the pressure p (Pa), which no law determines.
     Pressure {
         /// p, positive in compression.
@@ -64,7 +70,9 @@ impl<L: Hyperelastic> Compressible<L> {
     /// Also [`Error::NotPublished`] if the thesis has no compressible form of that law.
     pub fn with_coupling(law: L, volumetric: Volumetric, coupling: Coupling) -> Result<Self, Error> {
         match volumetric {
-            Volumetric::Quadratic { lame } | Volumetric::Logarithmic { lame } => {
+            Volumetric::Quadratic { lame }
+            | Volumetric::Logarithmic { lame }
+            | Volumetric::Ciarlet { lame } => {
                 parameter(Self::NAME, "lame", lame, lame >= 0.0, "[0, ∞)")?;
             }
             Volumetric::Pressure { pressure } => {
@@ -107,6 +115,10 @@ impl Volumetric {
                 lame * jacobian * (jacobian + excess),
             ),
             Self::Logarithmic { lame } => (0.5 * lame * log * log, lame * log, lame),
+            Self::Ciarlet { lame } => {
+                let square = excess * (2.0 + excess);
+                (0.25 * lame * (square - 2.0 * log), 0.5 * lame * square, lame * jacobian * jacobian)
+            }
             Self::Pressure { pressure } => (-pressure * excess, -pressure * jacobian, -pressure * jacobian),
             Self::None => (0.0, 0.0, 0.0),
         }
@@ -118,6 +130,7 @@ impl<L: Hyperelastic> Hyperelastic for Compressible<L> {
         let volumetric = match self.volumetric {
             Volumetric::Quadratic { .. } => "λ/2(J−1)²",
             Volumetric::Logarithmic { .. } => "λ/2(ln J)²",
+            Volumetric::Ciarlet { .. } => "λ/4(J²−1−2 ln J)",
             Volumetric::Pressure { .. } => "−p(J−1)",
             Volumetric::None => "U = 0",
         };
@@ -128,7 +141,9 @@ impl<L: Hyperelastic> Hyperelastic for Compressible<L> {
     fn parameters(&self) -> Vec<(String, f64)> {
         let mut all = self.law.parameters();
         match self.volumetric {
-            Volumetric::Quadratic { lame } | Volumetric::Logarithmic { lame } => {
+            Volumetric::Quadratic { lame }
+            | Volumetric::Logarithmic { lame }
+            | Volumetric::Ciarlet { lame } => {
                 all.push(("lame".into(), lame));
             }
             Volumetric::Pressure { pressure } => all.push(("pressure".into(), pressure)),

@@ -197,7 +197,11 @@ mod tests {
         for model in MODELS {
             let law = model.law(model.example).unwrap();
             let nominal = biaxial(&law, 1.5, 0.9).unwrap();
-            for volumetric in [Volumetric::Quadratic { lame: 4e10 }, Volumetric::Logarithmic { lame: 4e10 }] {
+            for volumetric in [
+                Volumetric::Quadratic { lame: 4e10 },
+                Volumetric::Logarithmic { lame: 4e10 },
+                Volumetric::Ciarlet { lame: 4e10 },
+            ] {
                 let law = Compressible::new(model.law(model.example).unwrap(), volumetric).unwrap();
                 let state = plane_stress(&law, &Tensor2::new(1.5, 0.0, 0.0, 0.9)).unwrap();
                 for (i, l) in [1.5, 0.9].into_iter().enumerate() {

@@ -111,7 +111,8 @@ pub fn all() -> Result<Vec<Box<dyn Hyperelastic>>, Error> {
         laws.push(model.law(model.example)?);
     }
     let lame = 2.0e6;
-    let volumetrics = [Volumetric::Quadratic { lame }, Volumetric::Logarithmic { lame }];
+    let volumetrics =
+        [Volumetric::Quadratic { lame }, Volumetric::Logarithmic { lame }, Volumetric::Ciarlet { lame }];
     for model in MODELS {
         for volumetric in volumetrics {
             laws.push(Box::new(Compressible::new(model.law(model.example)?, volumetric)?));

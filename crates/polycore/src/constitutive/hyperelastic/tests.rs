@@ -98,7 +98,9 @@ fn small_strain_limit_of_the_compressible_laws() {
     let lame = 1.7e6;
     for model in MODELS {
         let modulus = model.law(model.example).unwrap().shear_modulus();
-        for volumetric in [Volumetric::Quadratic { lame }, Volumetric::Logarithmic { lame }] {
+        for volumetric in
+            [Volumetric::Quadratic { lame }, Volumetric::Logarithmic { lame }, Volumetric::Ciarlet { lame }]
+        {
             let law = Compressible::new(model.law(model.example).unwrap(), volumetric).unwrap();
             let response = law.response_at(IDENTITY).unwrap();
             assert!(response.stress.iter().all(|s| s.abs() < 1e-15 * modulus), "{}", law.name());

@@ -1,0 +1,138 @@
+//! Any constitutive law C → (W, S, ℂ) as the law of a family's mean deformation.
+
+use super::deformation::{Deformation, PointLaw, PointStress, Tensor};
+use super::eight_chain::embed;
+use crate::calibrate::Space;
+use crate::error::Error;
+use nalgebra::Matrix3;
+use polycore::constitutive::{Law, Prediction, Workspace};
+use polycore::tensor::voigt::{self, Voigt, component};
+use std::cell::RefCell;
+
+/// W = W(C) + ½ a μ · residual, C = FᵀF, for any [`Law`] that has an energy and no stress at rest: correspondence with the
+/// stabilisation a = 1 of `shared/formulation-correspondence.md`, part A. In plane stress the law gives the stretch of the
+/// thickness by S₃₃ = 0.
+#[derive(Clone, Debug)]
+pub struct Correspondence<L> {
+    law: L,
+    space: Space,
+    shear: f64,
+    stabilisation: f64,
+}
+
+thread_local! {
+    /// Memory in which laws work.
+    static MEMORY: RefCell<Workspace> = RefCell::default();
+}
+
+impl<L: Law> Correspondence<L> {
+    /// With the stabilisation a = 1: accurate in the bulk and at free surfaces.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a law without energy, without shear modulus or with stress at rest.
+    pub fn new(law: L, space: Space) -> Result<Self, Error> {
+        Self::stabilised(law, space, 1.0)
+    }
+
+    /// With another stabilisation a ≥ 0: 4/3 is the most accurate in the bulk, below 0.1 soft modes appear.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; a below 0.
+    pub fn stabilised(law: L, space: Space, stabilisation: f64) -> Result<Self, Error> {
+        let mut memory = Workspace::default();
+        let rest = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
+        let wrong =
+            |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.into() });
+        let found = (law.tangent(&rest, &mut memory), law.moduli(&mut memory));
+        let (Ok(found), Ok(moduli)) = found else {
+            return wrong("law", f64::NAN, "a law with a tangent at rest");
+        };
+        if found.energy.is_none() {
+            return wrong("law", f64::NAN, "a law with an energy");
+        }
+        if !(moduli.shear > 0.0 && moduli.bulk > 0.0) {
+            return wrong("shear or bulk modulus of the law", moduli.shear.min(moduli.bulk), "above 0 Pa");
+        }
+        let stress = found.stress.amax() / moduli.shear;
+        if !(stress < 1e-6) {
+            return wrong("stress at rest over the shear modulus", stress, "below 1e-6");
+        }
+        if !(stabilisation >= 0.0 && stabilisation.is_finite()) {
+            return wrong("stabilisation", stabilisation, "at least 0");
+        }
+        Ok(Self { law, space, shear: moduli.shear, stabilisation })
+    }
+
+    /// C in three dimensions and what the law predicts at it, with ℂ if asked for.
+    fn predict<const D: usize>(&self, gradient: &Tensor<D>, tangent: bool) -> Option<Prediction> {
+        let mut c = voigt::from_stress(&embed(&(gradient.transpose() * gradient), 1.0));
+        MEMORY.with_borrow_mut(|memory| {
+            if self.space == Space::PlaneStress {
+                // from the stretch of a body that keeps its volume
+                c[2] = 1.0 / (c[0] * c[1] - c[3] * c[3]);
+                for _ in 0..60 {
+                    let found = self.law.tangent(&c, memory).ok()?;
+                    let step = found.stress[2] / (0.5 * found.tangent?[(2, 2)]);
+                    let next = (c[2] - step).clamp(0.5 * c[2], 2.0 * c[2]);
+                    let done = (next - c[2]).abs() <= 1e-15 * next;
+                    c[2] = next;
+                    if done {
+                        break;
+                    }
+                }
+            }
+            let found = if tangent { self.law.tangent(&c, memory) } else { self.law.stress(&c, memory) };
+            found.ok()
+        })
+    }
+}
+
+impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L> {
+    fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
+        let gradient = deformation.gradient();
+        // W(C) does not see a body turned inside out
+        let upright = embed(&gradient, 1.0).determinant() > 0.0;
+        let found = self.predict(&gradient, false).filter(|_| upright);
+        let (energy, stress) = found.map_or((f64::NAN, Matrix3::from_element(f64::NAN)), |found| {
+            (found.energy.unwrap_or(f64::NAN), voigt::to_stress(&found.stress))
+        });
+        let stabilisation = self.stabilisation * self.shear;
+        let plane = Tensor::<D>::from_fn(|a, b| stress[(a, b)]);
+        PointStress {
+            energy: energy + 0.5 * stabilisation * deformation.residual,
+            piola: gradient * plane,
+            stabilisation,
+        }
+    }
+
+    /// √(‖A‖₁‖A‖∞) of A_iJkL = F_iM ℂ_MJNL F_kN + δ_ik S_JL: 3K at rest where K > 2μ/3.
+    fn stiffness(&self, deformation: &Deformation<D>) -> f64 {
+        let f = deformation.gradient();
+        let Some(Prediction { stress, tangent: Some(c), .. }) = self.predict(&f, true) else {
+            return f64::NAN;
+        };
+        let stress = voigt::to_stress(&stress);
+        // in plane stress the thickness gives way
+        let thin = if self.space == Space::PlaneStress { 1.0 / c[(2, 2)] } else { 0.0 };
+        let material = |i, j, k, l| {
+            component(&c, i, j, k, l) - thin * component(&c, i, j, 2, 2) * component(&c, 2, 2, k, l)
+        };
+        let entry = |i: usize, j: usize, k: usize, l: usize| {
+            let mut sum = if i == k { stress[(j, l)] } else { 0.0 };
+            for m in 0..D {
+                for n in 0..D {
+                    sum += f[(i, m)] * material(m, j, n, l) * f[(k, n)];
+                }
+            }
+            sum
+        };
+        let pairs = || (0..D).flat_map(|i| (0..D).map(move |j| (i, j)));
+        let rows = pairs().map(|(i, j)| pairs().map(|(k, l)| entry(i, j, k, l).abs()).sum::<f64>());
+        let columns = pairs().map(|(k, l)| pairs().map(|(i, j)| entry(i, j, k, l).abs()).sum::<f64>());
+        (rows.fold(0.0, f64::max) * columns.fold(0.0, f64::max)).sqrt()
+    }
+
+    fn shear_modulus(&self) -> f64 {
+        self.shear
+    }
+}

@@ -1,0 +1,241 @@
+//! Solids of the mean deformation of a family, with any Poisson ratio: correspondence and its stabilisation as one energy.
+
+use super::{Bond, Family, Material};
+use crate::bonds::Bonds;
+use crate::calibrate::modulus_in;
+use nalgebra::SMatrix;
+
+/// A tensor in the space of a body.
+pub type Tensor<const D: usize> = SMatrix<f64, D, D>;
+
+/// The mean deformation of a family: with ω_IJ = V_J/(|ξ|² Σ_K V_K) over the whole family, I = Σ_J V_J/Σ_K V_K over the intact
+/// bonds, M = Σ_J ω ξ⊗ξ/I and η = u_J − u_I.
+#[derive(Clone, Copy, Debug)]
+pub struct Deformation<const D: usize> {
+    /// H = F − 1 = (Σ_J ω η⊗ξ/I) M⁻¹.
+    pub displacement_gradient: Tensor<D>,
+    /// D Σ_J ω|ζ − Fξ|²/I: the part of the deformation that no gradient describes. 0 where it is homogeneous.
+    pub residual: f64,
+}
+
+impl<const D: usize> Deformation<D> {
+    /// F.
+    pub fn gradient(&self) -> Tensor<D> {
+        self.displacement_gradient + Tensor::identity()
+    }
+
+    /// tr FᵀF − D + residual, which loses no digits at small strains.
+    pub fn excess_trace(&self) -> f64 {
+        2.0 * self.displacement_gradient.trace() + self.displacement_gradient.norm_squared() + self.residual
+    }
+}
+
+/// What a solid does at a deformation.
+#[derive(Clone, Copy, Debug)]
+pub struct PointStress<const D: usize> {
+    /// Energy density W, J/m³, 0 at rest.
+    pub energy: f64,
+    /// P = ∂W/∂F at a constant residual, Pa.
+    pub piola: Tensor<D>,
+    /// 2 ∂W/∂(residual), Pa: the shear modulus of the stabilisation.
+    pub stabilisation: f64,
+}
+
+/// A solid whose energy follows from the mean deformation of a family. [`NonlocalSolid`] makes a material of it.
+pub trait PointLaw<const D: usize>: Send + Sync {
+    /// Energy and stress. A deformation outside the law's domain gives values that are not finite; solvers report them.
+    fn respond(&self, deformation: &Deformation<D>) -> PointStress<D>;
+
+    /// A bound of ‖∂P/∂F‖₂, Pa.
+    fn stiffness(&self, deformation: &Deformation<D>) -> f64;
+
+    /// Shear modulus at rest, Pa.
+    fn shear_modulus(&self) -> f64;
+}
+
+/// A solid of [`PointLaw`] as a material: W_I = I W(F, residual), an exact variation for any law, whose bonds
+/// carry T_IJ = ω (A ζ + Q ξ) with A = D G, Q = P M⁻¹ − D G F and G = [`PointStress::stabilisation`]. A homogeneous deformation
+/// gives its exact P in every particle, at edges too; bonds are not parallel to their forces.
+///
+/// Where too few bonds are left (D λ_min(M) ≤ 0.1) a particle has springs of the same shear modulus instead,
+/// W_I = ½D(D + 2)μ Σ_J ω(|ζ| − |ξ|)². `shared/formulation-correspondence.md` derives all of it; the stabilisation is that of
+/// Silling 2017, doi:10.1016/j.cma.2017.03.043.
+#[derive(Clone, Debug)]
+pub struct NonlocalSolid<L>(pub L);
+
+/// D λ_min(M) below which a family has no deformation gradient. Intact corners have 0.50 and more.
+const LEAST_SHAPE: f64 = 0.1;
+
+/// (|q̂|δ)² of the largest gradient that particles one spacing apart feel: 2.69 to 3.09 for δ of 2 to 6 spacings.
+const GRADIENT: f64 = 3.1;
+
+/// What a particle knows of its family.
+#[derive(Clone, Debug)]
+pub struct Point<const D: usize> {
+    /// Σ_J V_J of the whole family, m³, and of the intact bonds that `inverse` and `shape` belong to.
+    whole: f64,
+    intact: f64,
+    /// M⁻¹.
+    inverse: Tensor<D>,
+    /// D λ_min(M).
+    shape: f64,
+    deformation: Deformation<D>,
+    /// A, Q + A 1, both over Σ_J V_J, and the stiffness of the springs over it, Pa/m³.
+    slope: f64,
+    stress: Tensor<D>,
+    spring: f64,
+    energy: f64,
+    /// The particle's own part in the bound of the stiffness, N/m⁴.
+    own: f64,
+}
+
+impl<const D: usize> Default for Point<D> {
+    fn default() -> Self {
+        let zero = Tensor::zeros();
+        Self {
+            whole: 0.0,
+            intact: 0.0,
+            inverse: zero,
+            shape: 0.0,
+            deformation: Deformation { displacement_gradient: zero, residual: 0.0 },
+            slope: 0.0,
+            stress: zero,
+            spring: 0.0,
+            energy: 0.0,
+            own: 0.0,
+        }
+    }
+}
+
+impl<const D: usize> Point<D> {
+    /// The mean deformation; `None` where too few bonds are left.
+    pub fn deformation(&self) -> Option<&Deformation<D>> {
+        (self.shape > LEAST_SHAPE).then_some(&self.deformation)
+    }
+
+    /// I: the part of the family that is intact, 0 to 1.
+    pub fn integrity(&self) -> f64 {
+        if self.whole > 0.0 { self.intact / self.whole } else { 0.0 }
+    }
+
+    /// Energy density W_I, J/m³.
+    pub fn energy(&self) -> f64 {
+        self.energy
+    }
+}
+
+/// M⁻¹ and the least eigenvalue of M = `shape`, a tensor of trace 1.
+fn invert<const D: usize>(shape: &Tensor<D>) -> (Tensor<D>, f64) {
+    let entry = |a, b| if a < D && b < D { shape[(a, b)] } else { f64::from(u8::from(a == b)) };
+    let values = nalgebra::Matrix3::from_fn(entry).symmetric_eigenvalues();
+    // the third of two dimensions is 1, and none of the others is larger
+    (shape.try_inverse().unwrap_or_else(Tensor::zeros), values.min())
+}
+
+impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
+    type Point = Point<D>;
+
+    fn begin(&self, family: &Family<D>) -> Point<D> {
+        Point { whole: family.sum(|bond| bond.volume), ..Point::default() }
+    }
+
+    fn prepare(&self, family: &Family<D>, point: &mut Point<D>) {
+        let (mut shape, mut moment) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
+        let (mut intact, mut square) = (0.0, 0.0);
+        family.each(|bond| {
+            let share = bond.volume / (bond.length * bond.length);
+            intact += bond.volume;
+            for b in 0..D {
+                let weighted = share * bond.reference[b];
+                for a in 0..D {
+                    shape[(a, b)] += weighted * bond.reference[a];
+                    moment[(a, b)] += weighted * bond.change[a];
+                }
+                square += share * bond.change[b] * bond.change[b];
+            }
+        });
+        if intact != point.intact {
+            point.intact = intact;
+            let (inverse, least) = if intact > 0.0 { invert(&(shape / intact)) } else { (shape, 0.0) };
+            (point.inverse, point.shape) = (inverse, D as f64 * least);
+        }
+        if point.shape <= LEAST_SHAPE {
+            return self.spring(family, point);
+        }
+        let dimension = D as f64;
+        moment /= intact;
+        let gradient = moment * point.inverse;
+        let residual = dimension * (square / intact - gradient.dot(&moment));
+        point.deformation = Deformation { displacement_gradient: gradient, residual: residual.max(0.0) };
+        let found = self.0.respond(&point.deformation);
+        point.energy = intact / point.whole * found.energy;
+        point.slope = dimension * found.stabilisation / point.whole;
+        point.stress = found.piola * point.inverse / point.whole - gradient * point.slope;
+        point.spring = 0.0;
+    }
+
+    fn stiffen(&self, family: &Family<D>, point: &mut Point<D>) {
+        let squares = family.sum(|bond| bond.volume / (bond.length * bond.length));
+        point.own = if point.shape <= LEAST_SHAPE {
+            4.0 * point.spring * squares
+        } else {
+            // Σ_J ω 2(1 − cos kξ) is at most 2.6 (2D) or 2.4 (3D) Σ_J ω in all lattices
+            let springs = if D == 2 { 2.6 } else { 2.4 } * point.slope * squares;
+            let shear = point.slope * point.whole / D as f64;
+            let gradient = self.0.stiffness(&point.deformation) - shear;
+            // λ_max(M⁻¹)/D = 1/(D λ_min(M))
+            let reach = GRADIENT.sqrt() / (family.horizon() * point.shape);
+            springs + point.integrity() * gradient.max(0.0) * reach * reach
+        };
+    }
+
+    /// T_IJ/V_J = (A ζ + Q ξ)/(|ξ|² Σ_K V_K) of both ends, with ζ = ξ + η.
+    fn force(&self, bond: &Bond<D>, own: &Point<D>, other: &Point<D>) -> [f64; D] {
+        let (slope, spring) = (own.slope + other.slope, own.spring + other.spring);
+        let unit = 1.0 / (bond.length * bond.length);
+        let mut sum: [f64; D] = std::array::from_fn(|a| {
+            let stress = (0..D).map(|b| (own.stress[(a, b)] + other.stress[(a, b)]) * bond.reference[b]);
+            unit * (slope * bond.change[a] + stress.sum::<f64>())
+        });
+        if spring > 0.0 {
+            let (pull, direction) = (spring * bond.strain() * bond.length * unit, bond.direction());
+            for a in 0..D {
+                sum[a] += pull * direction[a];
+            }
+        }
+        sum
+    }
+
+    fn energy(&self, _family: &Family<D>, point: &Point<D>) -> f64 {
+        point.energy
+    }
+
+    /// Half of 1.75 (2D) or 1 (3D) times the greatest part of a particle and its neighbours: 1.1 to 3 times the true bound on
+    /// lattices and clouds.
+    fn stiffness(&self, family: &Family<D>, points: &[Point<D>]) -> f64 {
+        let mut most = points[family.slot()].own;
+        family.each(|bond| most = most.max(points[bond.to].own));
+        0.5 * if D == 2 { 1.75 } else { 1.0 } * most
+    }
+
+    /// Of Young's modulus E ≈ 3μ.
+    fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+        modulus_in(bonds, 3.0 * self.0.shear_modulus())
+    }
+}
+
+impl<L> NonlocalSolid<L> {
+    /// Springs in place of the law.
+    fn spring<const D: usize>(&self, family: &Family<D>, point: &mut Point<D>)
+    where
+        L: PointLaw<D>,
+    {
+        let dimension = D as f64;
+        let stiffness = dimension * (dimension + 2.0) * self.0.shear_modulus();
+        (point.slope, point.stress) = (0.0, Tensor::zeros());
+        if point.whole > 0.0 {
+            point.spring = stiffness / point.whole;
+            point.energy = 0.5 * point.spring * family.sum(|bond| bond.volume * bond.strain().powi(2));
+        }
+    }
+}
