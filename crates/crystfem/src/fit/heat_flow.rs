@@ -46,7 +46,7 @@ pub struct Peak {
 impl Peak {
     /// Integrates the heat given off, W/kg, at `times`, s, between `limits`, s, by the trapezoidal rule; the heat flow is
     /// linear between measurements. B = (1 − α) B₁ + α B₂ with lines B₁ and B₂ through the limits is iterated with α; see
-    /// Höhne, Hemminger & Flammersheim, Differential Scanning Calorimetry (2003), section 5.2.
+    /// Höhne, Hemminger & Flammersheim, Differential Scanning Calorimetry (2003).
     ///
     /// # Errors
     /// [`Error::Data`] for columns of different lengths, numbers that are not finite, times that decrease, limits that are

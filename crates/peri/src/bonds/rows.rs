@@ -104,7 +104,8 @@ fn padded<const N: usize>(values: &[f64], scale: impl Fn(usize) -> f64) -> [f64;
 macro_rules! for_size {
     ($d:literal, $rational:expr, $make:ident $arguments:tt) => {
         for_size!(@try $d, $rational, $make $arguments;
-            (3, 0) (4, 0) (6, 0) (8, 0) (10, 0) (12, 0) (4, 4) (7, 6) (9, 8) (11, 10))
+            (3, 0) (4, 0) (5, 0) (6, 0) (7, 0) (8, 0) (9, 0) (10, 0) (12, 0)
+            (3, 3) (4, 4) (5, 5) (7, 6) (8, 7) (9, 8) (11, 10))
     };
     (@try $d:literal, $rational:expr, $make:ident $arguments:tt; $(($p:literal, $q:literal))*) => {{
         $(if $rational.numerator.len() <= $p && $rational.denominator.len() <= $q {

@@ -10,7 +10,7 @@ use polycore::tensor::voigt::{self, Voigt, component};
 use std::cell::RefCell;
 
 /// W = W(C) + ½ a μ · residual, C = FᵀF, for any [`Law`] that has an energy and no stress at rest: correspondence with the
-/// stabilisation a = 1 of `shared/formulation-correspondence.md`, part A. In plane stress the law gives the stretch of the
+/// stabilisation a = 1 (Silling 2017, doi:10.1016/j.cma.2017.03.043, made exact). In plane stress the law gives the stretch of the
 /// thickness by S₃₃ = 0.
 #[derive(Clone, Debug)]
 pub struct Correspondence<L> {
@@ -54,7 +54,7 @@ impl<L: Law> Correspondence<L> {
             return wrong("shear or bulk modulus of the law", moduli.shear.min(moduli.bulk), "above 0 Pa");
         }
         let stress = found.stress.amax() / moduli.shear;
-        if !(stress < 1e-6) {
+        if stress.is_nan() || stress >= 1e-6 {
             return wrong("stress at rest over the shear modulus", stress, "below 1e-6");
         }
         if !(stabilisation >= 0.0 && stabilisation.is_finite()) {

@@ -58,7 +58,7 @@ pub trait PointLaw<const D: usize>: Send + Sync {
 /// gives its exact P in every particle, at edges too; bonds are not parallel to their forces.
 ///
 /// Where too few bonds are left (D λ_min(M) ≤ 0.1) a particle has springs of the same shear modulus instead,
-/// W_I = ½D(D + 2)μ Σ_J ω(|ζ| − |ξ|)². `shared/formulation-correspondence.md` derives all of it; the stabilisation is that of
+/// W_I = ½D(D + 2)μ Σ_J ω(|ζ| − |ξ|)². The guide (*Solids with any Poisson ratio*) has more; the stabilisation is that of
 /// Silling 2017, doi:10.1016/j.cma.2017.03.043.
 #[derive(Clone, Debug)]
 pub struct NonlocalSolid<L>(pub L);

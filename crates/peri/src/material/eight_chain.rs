@@ -11,7 +11,7 @@ use polycore::langevin;
 /// W = ψ(I₁) − μ₀ ln J + ¼κ(J² − 1 − 2 ln J), μ = 2ψ′ = μ₀ (β/β₁)/Λ with Λ = √(I₁/3), β = 𝓛⁻¹(Λ/√n), β₁ = 𝓛⁻¹(1/√n).
 ///
 /// I₁ = S in three dimensions, S + 1 in plane strain, and S + λ₃² in plane stress, where the stretch λ₃ of the thickness
-/// follows from W; incompressible sheets have λ₃ = 1/J. `shared/formulation.md`, last part.
+/// follows from W; incompressible sheets have λ₃ = 1/J.
 #[derive(Clone, Copy, Debug)]
 pub struct EightChain {
     space: Space,
@@ -61,7 +61,7 @@ impl EightChain {
         if bulk.is_infinite() && space != Space::PlaneStress {
             return wrong("bulk modulus", bulk, "finite, except in plane stress");
         }
-        if !(bulk >= least) {
+        if bulk.is_nan() || bulk < least {
             let allowed = format!("at least {least:.6e} Pa, that of a network without volumetric energy");
             return Err(Error::Parameter { name: "bulk modulus", found: bulk, allowed });
         }

@@ -21,6 +21,8 @@ mod model;
 mod pressed;
 mod relaxation;
 mod rigid;
+#[path = "../../examples/rubber_bearing.rs"]
+mod rubber_bearing;
 mod solids;
 mod stress;
 mod surface;
