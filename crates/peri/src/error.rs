@@ -70,7 +70,7 @@ pub enum Error {
         available: f64,
         /// The time step, s.
         time_step: f64,
-        /// Estimate of the critical one for all stretches met, s.
+        /// Estimate of the critical one for all stretches observed, s.
         critical: f64,
     },
     /// One of several variants.

@@ -35,11 +35,11 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
         let mut scratch = vec![0.0; D * range.len()];
         let mut parts = scratch.chunks_mut(range.len());
         let mut out: [&mut [f64]; D] = std::array::from_fn(|_| parts.next().unwrap_or_default());
-        let mut met = StretchRange::REST;
-        bonds.force(displacement, chunk, &mut out, Some(&mut met));
+        let mut observed = StretchRange::REST;
+        bonds.force(displacement, chunk, &mut out, Some(&mut observed));
         let mut found = Vec::new();
         // its last bits may differ from those below
-        if met.high * (1.0 + 1e-9) < least {
+        if observed.high * (1.0 + 1e-9) < least {
             return found;
         }
         for slot in range {

@@ -9,7 +9,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 /// A kernel with everything it reads in place.
 pub trait Pass<const D: usize> {
-    /// Force densities of the slots `start..start + force[0].len()`; `track` collects the stretches met.
+    /// Force densities of the slots `start..start + force[0].len()`; `track` collects the stretches observed.
     fn run<S: Simd>(
         &self,
         simd: S,

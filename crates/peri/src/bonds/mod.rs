@@ -95,7 +95,7 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
     /// Sets per-particle surface-correction factors (one field of `D` components over the slots).
     fn set_factors(&mut self, factors: Field<D>);
-    /// Force densities Σ_J f V_J, N/m³, of work item `chunk`; collects the stretches met if asked.
+    /// Force densities Σ_J f V_J, N/m³, of work item `chunk`; collects the stretches observed if asked.
     fn force(
         &self,
         displacement: &Field<D>,

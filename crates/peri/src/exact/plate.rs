@@ -1,7 +1,7 @@
 //! Rectangular plate with a free circular hole under tension: the truth that plates of finite size are judged by.
 //!
 //! Kolosov's potentials Φ, Ψ as even powers with real coefficients (Muskhelishvili, 1953, §§ 32, 56): the coefficients of Ψ
-//! follow from those of Φ so that the hole is free of traction exactly; the outer edges are met by least squares.
+//! follow from those of Φ so that the hole is free of traction exactly; the outer edges are satisfied by least squares.
 
 use crate::quadrature::panel;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -36,7 +36,7 @@ impl Plate {
     /// Finds the coefficients; lengths in any one unit. None unless 0 < `radius` < both halves and 0 ≤ `layer` < half₁ −
     /// `radius`.
     ///
-    /// For the square with half = 25/3 radii, where the figures of an independent finite-element program are met (tests):
+    /// For the square with half = 25/3 radii, which reproduces the figures of an independent finite-element program (tests):
     /// 8 digits without a layer; with one, 5e-5 but for the last twentieth of the edges.
     pub fn new(radius: f64, half: [f64; 2], layer: f64) -> Option<Self> {
         let fits = 0.0 < radius && radius < half[0].min(half[1]) && 0.0 <= layer && layer < half[0] - radius;

@@ -134,10 +134,10 @@ impl<const D: usize> Response<D> for Kernels<'_> {
     }
 
     /// Σ_I V_I Σ_J w V_J kθ |ξ| φ.
-    fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, met: StretchRange) -> f64 {
+    fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, observed: StretchRange) -> f64 {
         let (law, modulus) = (&*self.material.law, self.material.modulus);
-        if self.table.as_ref().is_none_or(|(range, _)| *range != met) {
-            self.table = Some((met, EnergyTable::new(law, met)));
+        if self.table.as_ref().is_none_or(|(range, _)| *range != observed) {
+            self.table = Some((observed, EnergyTable::new(law, observed)));
         }
         let Some((_, table)) = &self.table else { return 0.0 };
         let of = |slots: &[u32]| {

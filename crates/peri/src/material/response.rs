@@ -52,7 +52,7 @@ pub trait Response<const D: usize>: Send + Sync {
     /// Whether forces of a particle depend on more than its own bonds.
     fn has_points(&self) -> bool;
 
-    /// Force densities, N/m³, of work item `chunk`; collects the stretches met if asked.
+    /// Force densities, N/m³, of work item `chunk`; collects the stretches observed if asked.
     fn force(
         &self,
         bonds: &dyn Bonds<D>,
@@ -62,8 +62,8 @@ pub trait Response<const D: usize>: Send + Sync {
         track: Option<&mut StretchRange>,
     );
 
-    /// Energy of the body, J; `met` holds the stretches within which the law itself is to be taken.
-    fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, met: StretchRange) -> f64;
+    /// Energy of the body, J; `observed` holds the stretches within which the law itself is to be taken.
+    fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, observed: StretchRange) -> f64;
 
     /// Energy of bonds about to be severed, J, where it does not depend on others; `most` is the largest stretch of the law
     /// itself. `None`: what the body loses when they are.

@@ -13,11 +13,11 @@ pub struct EnergyTable {
 }
 
 impl EnergyTable {
-    /// The energies of the stretches met.
-    pub fn new(law: &dyn BondPotential, met: StretchRange) -> Self {
+    /// The energies of the stretches observed.
+    pub fn new(law: &dyn BondPotential, observed: StretchRange) -> Self {
         // never empty, never a bond of no length
-        let low = met.low.max(-1.0 + 1e-12);
-        let high = met.high.max(low + 1e-9);
+        let low = observed.low.max(-1.0 + 1e-12);
+        let high = observed.high.max(low + 1e-9);
         let step = (high - low) / PIECES as f64;
         let node = |k: usize| {
             let e = low + step * k as f64;
@@ -49,10 +49,10 @@ pub struct TangentTable {
 }
 
 impl TangentTable {
-    /// The tangents of the stretches met.
-    pub fn new(law: &dyn BondPotential, met: StretchRange) -> Self {
-        let low = met.low.max(-1.0 + 1e-6);
-        let high = met.high.max(low + 1e-9);
+    /// The tangents of the stretches observed.
+    pub fn new(law: &dyn BondPotential, observed: StretchRange) -> Self {
+        let low = observed.low.max(-1.0 + 1e-6);
+        let high = observed.high.max(low + 1e-9);
         let step = (high - low) / PIECES as f64;
         let node = |k: usize| {
             let stretch = (1.0 + low + step * k as f64).sqrt();

@@ -1,6 +1,6 @@
 //! Ranges of bond stretches.
 
-/// Stretches met, as the extremes of e = λ² − 1.
+/// Stretches observed, as the extremes of e = λ² − 1.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StretchRange {
     /// Smallest e.

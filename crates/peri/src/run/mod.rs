@@ -36,7 +36,7 @@ use polycore::case::{Fault, Run};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
 
-/// What stops a run: a fault in the scene, or one met on the way.
+/// What stops a run: a fault in the scene, or one on the way.
 pub type Failure = polycore::scene::Failure<Error>;
 
 /// A finished run.

@@ -106,8 +106,8 @@ impl Outcome {
         ] {
             self.work.push((name.to_owned(), count));
         }
-        self.value(q::SMALLEST_STRETCH, (1.0 + state.met.low).max(0.0).sqrt());
-        self.value(q::LARGEST_STRETCH, (1.0 + state.met.high).sqrt());
+        self.value(q::SMALLEST_STRETCH, (1.0 + state.observed.low).max(0.0).sqrt());
+        self.value(q::LARGEST_STRETCH, (1.0 + state.observed.high).sqrt());
     }
 
     /// Largest displacement, force of the held regions, applied force.
@@ -121,7 +121,7 @@ impl Outcome {
         self.value(q::LARGEST_DISPLACEMENT, largest);
         for d in 0..D {
             let axis = ["x", "y", "z"][d];
-            if !loads.held.is_empty() {
+            if !loads.constrained.is_empty() {
                 self.value(q::REACTION.of(&[axis]), reaction[d]);
             }
             if loads.body_force.is_some() {

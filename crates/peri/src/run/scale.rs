@@ -16,7 +16,7 @@ pub fn stress_unit(largest: f64) -> (f64, &'static str) {
 }
 
 /// How far apart, in spacings, neighbours on a lattice may be that are still bonded: no intact bond was longer. Where
-/// bonds break, the longest met may have broken.
+/// bonds break, the longest observed may have broken.
 pub fn bridge(outcome: &Outcome) -> f64 {
     let most = outcome.get("critical_stretch").or(outcome.get("largest_stretch")).unwrap_or(1.0);
     (1.02 * most).clamp(1.5, 100.0)

@@ -85,8 +85,8 @@ pub fn explain<const D: usize>(
     omits(scene.contact.is_some(), "contact (no [contact] in this scene)");
     omits(scene.material.critical.is_some(), "damage and bond breaking (no `critical` in this scene)");
     omits(scene.output.every.is_some(), "fields of the steps before the last");
-    let held = scene.boundary.iter().any(|b| b.holds());
-    omits(held, "prescribed displacements");
+    let constrained = scene.boundary.iter().any(|b| b.holds());
+    omits(constrained, "prescribed displacements");
     omits(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), "body forces");
     omits(scene.output.fields, "VTKHDF fields");
     omits(scene.output.pictures, "pictures");

@@ -40,7 +40,7 @@ pub fn loads_of<const D: usize>(
     }
     balanced(source, scene, body, &loads)?;
     let all = (1_u8 << D) - 1;
-    if body.bonds.particles().iter().all(|&slot| loads.held(slot as usize) == all) {
+    if body.bonds.particles().iter().all(|&slot| loads.constrained(slot as usize) == all) {
         return Err(source.error(
             "boundary",
             "every component of every particle is prescribed",
@@ -135,14 +135,14 @@ fn balanced<const D: usize>(
 ) -> Result<(), SceneError> {
     let Some(field) = &loads.body_force else { return Ok(()) };
     for d in 0..D {
-        let (mut sum, mut size, mut held) = (0.0, 0.0, false);
+        let (mut sum, mut size, mut constrained) = (0.0, 0.0, false);
         for &slot in body.bonds.particles() {
             let force = field.get(slot as usize)[d] * body.bonds.volume(slot as usize);
             sum += force;
             size += force.abs();
-            held |= loads.held(slot as usize) >> d & 1 == 1;
+            constrained |= loads.constrained(slot as usize) >> d & 1 == 1;
         }
-        if !held && sum.abs() > scene.tolerance() * size {
+        if !constrained && sum.abs() > scene.tolerance() * size {
             let axis = ["x", "y", "z"][d];
             let found = format!(
                 "a total force of {sum:.3e} N along {axis}, along which no displacement is prescribed"
@@ -156,8 +156,8 @@ fn balanced<const D: usize>(
 
 /// What the regions of prescribed displacement are called, in their order.
 pub fn region_names(scene: &Scene) -> Vec<String> {
-    let held = scene.boundary.iter().enumerate().filter(|(_, b)| b.holds());
-    held.map(|(index, boundary)| name_of(index, boundary)).collect()
+    let constrained = scene.boundary.iter().enumerate().filter(|(_, b)| b.holds());
+    constrained.map(|(index, boundary)| name_of(index, boundary)).collect()
 }
 
 /// Lines for `peri check`: which particles a boundary takes, and what is free between two grips.
@@ -186,7 +186,7 @@ pub(super) fn explain<const D: usize>(
             _ => String::new(),
         };
         let what = [
-            ("held", boundary.holds()),
+            ("constrained", boundary.holds()),
             ("pulled", boundary.traction.is_some() || boundary.force.is_some()),
             ("moving at the start", boundary.moves()),
         ];
@@ -351,8 +351,8 @@ fn support<const D: usize>(
     if let Some(field) = &boundary.displacement_field {
         count("displacement_field", field.len())?;
         either("displacement_field", boundary.displacement.is_some(), "displacement")?;
-        for (d, held) in field.iter().enumerate() {
-            if let HeldBy::By(formula) = held {
+        for (d, constrained) in field.iter().enumerate() {
+            if let HeldBy::By(formula) = constrained {
                 of_place(&format!("displacement_field[{d}]"), formula)?;
                 support.displacement[d] = Some(0.0);
             }

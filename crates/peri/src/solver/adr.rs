@@ -114,17 +114,17 @@ impl RelaxationSolver {
             contact.add_stiffness(&state.displacement, tangent, &mut self.contact_mass);
         }
         let mass = 0.5 * settings.mass_safety * tangent;
-        let (sums, met) = force_pass(system, state, self.masses(system, own), mass, factor, look);
+        let (sums, observed) = force_pass(system, state, self.masses(system, own), mass, factor, look);
         system.count_evaluation(state);
         if !sums.is_finite() {
             return Err(system.not_finite(state));
         }
-        state.met = state.met.join(met);
+        state.observed = state.observed.join(observed);
         let mut broken = false;
         if look {
             // after a refit this force still belongs to the old fit, whose range it left by little: go on
             system.widen(state)?;
-            if system.breaks_on_the_way() && system.is_overstretched(met) {
+            if system.breaks_on_the_way() && system.is_overstretched(observed) {
                 let slots = system.break_bonds(state);
                 broken = !slots.is_empty();
                 Equilibrium::broke(self, system, &slots);

@@ -36,13 +36,13 @@ pub struct Goal {
 impl Sums {
     /// Whether every sum is finite.
     pub fn is_finite(&self) -> bool {
-        let sums = [self.free, self.held, self.external, self.quotient_top, self.quotient_bottom];
+        let sums = [self.free, self.constrained, self.external, self.quotient_top, self.quotient_bottom];
         sums.iter().all(|x| x.is_finite())
     }
 
     /// Reference force of these sums alone.
     fn reference(&self) -> f64 {
-        self.held.sqrt().max(self.external.sqrt())
+        self.constrained.sqrt().max(self.external.sqrt())
     }
 
     /// Out-of-balance force over its reference, which is `floor` at least.
@@ -58,7 +58,7 @@ impl<const D: usize> State<D> {
         if self.iteration.is_multiple_of(LOOK) || self.floor == 0.0 {
             let (scale, factor) = (&system.scale, system.factors[self.step]);
             let rounding = ROUNDING * f64::EPSILON * scale.moved(&self.displacement) / goal.tolerance;
-            let strained = scale.strain(factor) * scale.held;
+            let strained = scale.strain(factor) * scale.constrained;
             self.floor = (LEAST_REFERENCE * self.reference).max(strained).max(rounding);
         }
         self.present = sums.reference();
@@ -106,7 +106,7 @@ impl Balance {
             let mut sums = [0.0; 10];
             for &slot in slots {
                 let slot = slot as usize;
-                let (volume, held) = (bonds.volume(slot), system.loads.held(slot));
+                let (volume, constrained) = (bonds.volume(slot), system.loads.constrained(slot));
                 let body = system.loads.body_force.as_ref().map_or([0.0; D], |b| b.get(slot));
                 let (total, position, moved) =
                     (state.force.get(slot), bonds.position(slot), state.displacement.get(slot));
@@ -114,7 +114,7 @@ impl Balance {
                 let arm: [f64; D] = std::array::from_fn(|d| position[d] + moved[d] - middle[d]);
                 for d in 0..D {
                     sums[d] += internal[d];
-                    let reaction = if held >> d & 1 == 1 { total[d] } else { 0.0 };
+                    let reaction = if constrained >> d & 1 == 1 { total[d] } else { 0.0 };
                     sums[3 + d] += volume * (factor * body[d] - reaction);
                     for e in 0..d {
                         sums[5 + d + e] += arm[e] * internal[d] - arm[d] * internal[e];

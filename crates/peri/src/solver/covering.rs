@@ -1,4 +1,4 @@
-//! The stretches that a law is evaluated over, and how they follow those that are met.
+//! The stretches that a law is evaluated over, and how they follow those that are observed.
 
 use super::breaking::{least, most};
 use super::state::State;
@@ -31,22 +31,22 @@ impl<const D: usize> System<'_, D> {
 
     /// Whether every stretch of the state lies within the fit; widens it otherwise.
     pub(super) fn covers_stretches(&mut self, state: &mut State<D>) -> Result<bool, Error> {
-        let met = stretch_range(&*self.bonds, &state.displacement);
+        let observed = stretch_range(&*self.bonds, &state.displacement);
         self.count_evaluation(state);
-        state.balanced_stretches = met;
-        state.met = state.met.join(met);
+        state.balanced_stretches = observed;
+        state.observed = state.observed.join(observed);
         Ok(!self.widen(state)?)
     }
 
     /// Widens the fitted range where stretches have left it, and the tangent with it.
     pub(super) fn widen(&mut self, state: &mut State<D>) -> Result<bool, Error> {
         // bonds crushed below that are extrapolated: no fit covers l → 0
-        let low = (1.0 + state.met.low).max(0.0).sqrt().max(least(self.breaking.as_ref()));
-        let high = (1.0 + state.met.high).sqrt().min(most(self.breaking.as_ref()));
+        let low = (1.0 + state.observed.low).max(0.0).sqrt().max(least(self.breaking.as_ref()));
+        let high = (1.0 + state.observed.high).sqrt().min(most(self.breaking.as_ref()));
         if low >= state.fitted[0] && high <= state.fitted[1] {
             return Ok(false);
         }
-        // twice the strain met, so that a growing load does not refit at every look
+        // twice the strain observed, so that a growing load does not refit at every look
         state.fitted[0] =
             state.fitted[0].min((1.0 - 2.0 * (1.0 - low)).max(0.5 * low)).max(least(self.breaking.as_ref()));
         state.fitted[1] = state.fitted[1].max(1.0 + 2.0 * (high - 1.0)).min(most(self.breaking.as_ref()));
@@ -55,12 +55,15 @@ impl<const D: usize> System<'_, D> {
     }
 
     /// The part of stretches that the law itself covers; beyond it q is held, and energies grow with e.
-    pub fn fitted_part(&self, met: StretchRange) -> StretchRange {
+    pub fn fitted_part(&self, observed: StretchRange) -> StretchRange {
         if self.breaking.is_none() {
-            return met;
+            return observed;
         }
         let (least, most) = (least(self.breaking.as_ref()), most(self.breaking.as_ref()));
-        StretchRange { low: met.low.max(least * least - 1.0), high: met.high.min(most * most - 1.0) }
+        StretchRange {
+            low: observed.low.max(least * least - 1.0),
+            high: observed.high.min(most * most - 1.0),
+        }
     }
 
     fn fit(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {

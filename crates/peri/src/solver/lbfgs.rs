@@ -100,7 +100,7 @@ pub struct LbfgsSolver<const D: usize> {
     settings: Lbfgs,
     preconditioner: Preconditioner<D>,
     memory: Memory<D>,
-    /// Gradients −V F of the energy at the iterate and at the trial, 0 where held.
+    /// Gradients −V F of the energy at the iterate and at the trial, 0 where constrained.
     gradient: Field<D>,
     trial: Field<D>,
     /// z = B g at both.
@@ -119,7 +119,7 @@ pub struct LbfgsSolver<const D: usize> {
 #[derive(Clone, Copy)]
 struct Point {
     sums: Sums,
-    met: StretchRange,
+    observed: StretchRange,
     /// Derivative of the energy along the direction.
     slope: f64,
 }
@@ -198,7 +198,7 @@ impl<const D: usize> LbfgsSolver<D> {
         let factor = system.factors[state.step];
         system.prepare(&state.displacement);
         // at rest the velocity leaves the pass' quotients at 0
-        let (sums, met) = force_pass(system, state, self.preconditioner.local(), 1.0, factor, true);
+        let (sums, observed) = force_pass(system, state, self.preconditioner.local(), 1.0, factor, true);
         system.count_evaluation(state);
         let (slots, volumes) = (system.bonds.slots(), self.preconditioner.volumes());
         let (force, direction) = (state.force.components(), self.direction.components());
@@ -210,7 +210,7 @@ impl<const D: usize> LbfgsSolver<D> {
             .enumerate()
             .map(|(chunk, gradient)| {
                 let range = chunk_range(chunk, slots);
-                let held = loads.held.get(range.clone()).unwrap_or_default();
+                let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
                 let volumes = &volumes[range.clone()];
                 let mut slope = 0.0;
                 for d in 0..D {
@@ -218,8 +218,8 @@ impl<const D: usize> LbfgsSolver<D> {
                     for k in 0..f.len() {
                         g[k] = -volumes[k] * f[k];
                     }
-                    for (g, held) in g.iter_mut().zip(held) {
-                        if held >> d & 1 == 1 {
+                    for (g, constrained) in g.iter_mut().zip(constrained) {
+                        if constrained >> d & 1 == 1 {
                             *g = 0.0;
                         }
                     }
@@ -228,7 +228,7 @@ impl<const D: usize> LbfgsSolver<D> {
                 slope
             })
             .collect();
-        Point { sums, met, slope: parts.iter().sum() }
+        Point { sums, observed, slope: parts.iter().sum() }
     }
 
     /// Evaluates, and once more where the fitted law had to be widened.
@@ -237,7 +237,7 @@ impl<const D: usize> LbfgsSolver<D> {
         if !point.sums.is_finite() {
             return Ok(point);
         }
-        state.met = state.met.join(point.met);
+        state.observed = state.observed.join(point.observed);
         Ok(if system.widen(state)? { self.evaluate(system, state) } else { point })
     }
 
@@ -273,7 +273,7 @@ impl<const D: usize> LbfgsSolver<D> {
         start: &Point,
         slope: f64,
     ) -> Result<Search, Error> {
-        let [least, most] = allowed(start.met);
+        let [least, most] = allowed(start.observed);
         let longest = self.longest_step(system, state, most);
         // the slope is too steep below `low` and has turned, or the body is torn, above `high`
         let (mut low, mut low_slope, mut high) = (0.0, slope, f64::INFINITY);
@@ -282,14 +282,14 @@ impl<const D: usize> LbfgsSolver<D> {
             self.step(state, step - at);
             at = step;
             let rough = self.evaluate(system, state);
-            let torn = !rough.sums.is_finite() || rough.met.low < least || rough.met.high > most;
+            let torn = !rough.sums.is_finite() || rough.observed.low < least || rough.observed.high > most;
             if torn {
                 high = step;
-                let excess = excess(start.met, rough.met);
+                let excess = excess(start.observed, rough.observed);
                 step = low + (high - low) * (1.0 / excess).clamp(1e-6, 0.5);
                 continue;
             }
-            state.met = state.met.join(rough.met);
+            state.observed = state.observed.join(rough.observed);
             let point = if system.widen(state)? { self.evaluate(system, state) } else { rough };
             if point.sums.residual(state.floor) <= self.settings.tolerance
                 || point.slope.abs() <= SLOPE * slope.abs()
@@ -421,7 +421,7 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
                 self.simplify();
                 point = self.arrive(system, state)?;
             }
-            if system.breaks_on_the_way() && system.is_overstretched(point.met) {
+            if system.breaks_on_the_way() && system.is_overstretched(point.observed) {
                 let slots = system.break_bonds(state);
                 broken = !slots.is_empty();
                 if broken {
@@ -449,14 +449,14 @@ fn scale<const D: usize>(field: &mut Field<D>, factor: f64) {
 }
 
 /// How far stretches may go in one step, as e = λ² − 1.
-fn allowed(met: StretchRange) -> [f64; 2] {
-    let [low, high] = [met.low, met.high].map(|e| (1.0 + e).max(0.0).sqrt());
+fn allowed(observed: StretchRange) -> [f64; 2] {
+    let [low, high] = [observed.low, observed.high].map(|e| (1.0 + e).max(0.0).sqrt());
     [(CRUSH * low).powi(2) - 1.0, (high + STRETCH * high.max(1.0)).powi(2) - 1.0]
 }
 
 /// How many times as far as allowed stretches have gone.
-fn excess(start: StretchRange, met: StretchRange) -> f64 {
+fn excess(start: StretchRange, observed: StretchRange) -> f64 {
     let root = |e: f64| (1.0 + e).max(0.0).sqrt();
-    let far = (root(met.high) - root(start.high)) / (STRETCH * root(start.high).max(1.0));
+    let far = (root(observed.high) - root(start.high)) / (STRETCH * root(start.high).max(1.0));
     if far.is_finite() { far.max(2.0) } else { 10.0 }
 }

@@ -18,10 +18,10 @@ pub struct Support<const D: usize> {
 pub struct Loads<const D: usize> {
     /// Body force density at load factor 1, N/m³.
     pub body_force: Option<Field<D>>,
-    /// Prescribed displacement at load factor 1, m, where held.
+    /// Prescribed displacement at load factor 1, m, where constrained.
     pub displacement: Option<Field<D>>,
-    /// Bit d of a slot: component d is held. Empty where nothing is.
-    pub held: Vec<u8>,
+    /// Bit d of a slot: component d is constrained. Empty where nothing is.
+    pub constrained: Vec<u8>,
     /// Slots of each region of prescribed displacement, in the order given.
     pub held_regions: Vec<Vec<u32>>,
 }
@@ -41,13 +41,13 @@ impl<const D: usize> Loads<D> {
             if support.displacement.iter().any(Option::is_some) {
                 loads.held_regions.push(members.clone());
                 let field = loads.displacement.get_or_insert_with(|| Field::zeros(slots));
-                loads.held.resize(slots, 0);
+                loads.constrained.resize(slots, 0);
                 for &slot in members {
                     let mut value = field.get(slot as usize);
                     for d in 0..D {
                         if let Some(prescribed) = support.displacement[d] {
                             value[d] = prescribed;
-                            loads.held[slot as usize] |= 1 << d;
+                            loads.constrained[slot as usize] |= 1 << d;
                         }
                     }
                     field.set(slot as usize, value);
@@ -57,9 +57,9 @@ impl<const D: usize> Loads<D> {
         loads
     }
 
-    /// Bits of the held components of a slot.
-    pub fn held(&self, slot: usize) -> u8 {
-        self.held.get(slot).copied().unwrap_or(0)
+    /// Bits of the constrained components of a slot.
+    pub fn constrained(&self, slot: usize) -> u8 {
+        self.constrained.get(slot).copied().unwrap_or(0)
     }
 
     /// Takes the body force off a slot.
@@ -69,17 +69,17 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// What the loads pull, N·m: Σ −F V·d over held components with d their displacement at factor 1, and
+    /// What the loads pull, N·m: Σ −F V·d over constrained components with d their displacement at factor 1, and
     /// Σ b V·u with b the body force at factor 1. `force` holds out-of-balance force densities.
     pub fn conjugates(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, force: &Field<D>) -> (f64, f64) {
         let (mut pull, mut push) = (0.0, 0.0);
         for &slot in bonds.particles() {
             let slot = slot as usize;
-            let (held, volume) = (self.held(slot), bonds.volume(slot));
-            if let Some(prescribed) = self.displacement.as_ref().filter(|_| held != 0) {
+            let (constrained, volume) = (self.constrained(slot), bonds.volume(slot));
+            if let Some(prescribed) = self.displacement.as_ref().filter(|_| constrained != 0) {
                 let (full, force) = (prescribed.get(slot), force.get(slot));
-                pull -=
-                    (0..D).filter(|d| held >> d & 1 == 1).map(|d| full[d] * force[d]).sum::<f64>() * volume;
+                pull -= (0..D).filter(|d| constrained >> d & 1 == 1).map(|d| full[d] * force[d]).sum::<f64>()
+                    * volume;
             }
             if let Some(body) = &self.body_force {
                 let (body, moved) = (body.get(slot), displacement.get(slot));
@@ -93,8 +93,9 @@ impl<const D: usize> Loads<D> {
     pub fn reach(&self, bonds: &dyn Bonds<D>) -> f64 {
         let Some(prescribed) = &self.displacement else { return 0.0 };
         let span = |d: usize| {
-            let held = bonds.particles().iter().map(|&s| s as usize).filter(|&s| self.held(s) >> d & 1 == 1);
-            let (low, high) = held
+            let constrained =
+                bonds.particles().iter().map(|&s| s as usize).filter(|&s| self.constrained(s) >> d & 1 == 1);
+            let (low, high) = constrained
                 .map(|s| prescribed.get(s)[d])
                 .fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
             high - low
@@ -127,14 +128,14 @@ impl<const D: usize> Loads<D> {
         if applied > 0.0 { (factor * applied, push / applied) } else { (0.0, 0.0) }
     }
 
-    /// Reaction on each region of prescribed displacement, N; components that are not held give none.
+    /// Reaction on each region of prescribed displacement, N; components that are not constrained give none.
     pub fn reactions(&self, bonds: &dyn Bonds<D>, force: &Field<D>) -> Vec<[f64; 3]> {
         let of_region = |slots: &Vec<u32>| {
             let mut sum = [0.0; 3];
             for &slot in slots {
                 let (force, volume) = (force.get(slot as usize), bonds.volume(slot as usize));
                 for d in 0..D {
-                    if self.held(slot as usize) >> d & 1 == 1 {
+                    if self.constrained(slot as usize) >> d & 1 == 1 {
                         sum[d] -= force[d] * volume;
                     }
                 }
@@ -147,7 +148,7 @@ impl<const D: usize> Loads<D> {
     /// Force with which the regions of prescribed displacement hold or pull along each axis, N: their reactions in one
     /// direction, or in the other if these are more. A particle counts in the first region that has it.
     pub fn reaction(&self, bonds: &dyn Bonds<D>, force: &Field<D>) -> [f64; D] {
-        let mut counted = vec![false; self.held.len()];
+        let mut counted = vec![false; self.constrained.len()];
         let (mut up, mut down) = ([0.0; D], [0.0; D]);
         for slots in &self.held_regions {
             let mut sum = [0.0; D];
@@ -157,7 +158,7 @@ impl<const D: usize> Loads<D> {
                     continue;
                 }
                 let (force, volume) = (force.get(slot), bonds.volume(slot));
-                for d in (0..D).filter(|d| self.held(slot) >> d & 1 == 1) {
+                for d in (0..D).filter(|d| self.constrained(slot) >> d & 1 == 1) {
                     sum[d] -= force[d] * volume;
                 }
             }
@@ -186,20 +187,22 @@ impl<const D: usize> Loads<D> {
         let mut result = [[0.0; 4]; D];
         let Some(field) = &self.displacement else { return result };
         for d in 0..D {
-            let held: Vec<usize> = bonds
+            let constrained: Vec<usize> = bonds
                 .particles()
                 .iter()
                 .map(|&slot| slot as usize)
-                .filter(|&slot| self.held(slot) >> d & 1 == 1)
+                .filter(|&slot| self.constrained(slot) >> d & 1 == 1)
                 .collect();
             let mut normal = nalgebra::Matrix4::<f64>::zeros();
             let mut right = nalgebra::Vector4::<f64>::zeros();
             // lengths in units of the body, so that the pseudo-inverse's threshold means something
-            let scale =
-                held.iter().flat_map(|&s| bonds.position(s)).fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+            let scale = constrained
+                .iter()
+                .flat_map(|&s| bonds.position(s))
+                .fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
             // a body that is moved as a whole stays unstrained to the last bit
-            let first = held.first().map_or(0.0, |&slot| field.get(slot)[d]);
-            for &slot in &held {
+            let first = constrained.first().map_or(0.0, |&slot| field.get(slot)[d]);
+            for &slot in &constrained {
                 let position = bonds.position(slot);
                 let mut row = nalgebra::Vector4::zeros();
                 row[0] = 1.0;
@@ -209,7 +212,7 @@ impl<const D: usize> Loads<D> {
                 normal += row * row.transpose();
                 right += row * (field.get(slot)[d] - first);
             }
-            let count = held.len().max(1) as f64;
+            let count = constrained.len().max(1) as f64;
             if let Ok(inverse) = (normal / count).pseudo_inverse(1e-10) {
                 let solution = inverse * right / count;
                 result[d][0] = first + solution[0];

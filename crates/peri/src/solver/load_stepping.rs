@@ -114,9 +114,9 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
         let slot = slot as usize;
         let position = system.bonds.position(slot);
         let mut value = state.displacement.get(slot);
-        let held = system.loads.held(slot);
+        let constrained = system.loads.constrained(slot);
         for d in 0..D {
-            if held >> d & 1 == 1 {
+            if constrained >> d & 1 == 1 {
                 value[d] =
                     factor * system.loads.displacement.as_ref().map_or(0.0, |field| field.get(slot)[d]);
             } else if weights.is_empty() {
@@ -143,7 +143,7 @@ fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
 
 fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let [factor, pull, push] = state.balanced;
-    let met = state.balanced_stretches;
+    let observed = state.balanced_stretches;
     let (load, displacement) = system.loads.response(&*system.bonds, factor, (pull, push));
     if state.history.last().map_or(0, |r| r.broken) != state.broken {
         state.past.clear();
@@ -159,12 +159,12 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
         rounds: state.round,
         broken: state.broken,
         detached: state.detached,
-        stored: system.stored_energy(state, system.fitted_part(met)),
+        stored: system.stored_energy(state, system.fitted_part(observed)),
         balance,
         contact: system.touching(state),
         work: state.work,
         released: state.released,
-        largest_stretch: (1.0 + met.high).sqrt(),
+        largest_stretch: (1.0 + observed.high).sqrt(),
         time: 0.0,
         kinetic: 0.0,
         damped: 0.0,

@@ -61,8 +61,8 @@ impl Motion {
     }
 
     /// Notes the stretches of a look.
-    pub(super) fn see(&mut self, met: StretchRange) {
-        self.looked = [met.low, met.high].map(|e| (1.0 + e).max(0.0).sqrt());
+    pub(super) fn see(&mut self, observed: StretchRange) {
+        self.looked = [observed.low, observed.high].map(|e| (1.0 + e).max(0.0).sqrt());
         self.slack = 0.0;
     }
 

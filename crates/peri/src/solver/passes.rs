@@ -16,8 +16,8 @@ pub struct Sums {
     pub quotient_bottom: f64,
     /// Σ F² over free components.
     pub free: f64,
-    /// Σ F² over held components.
-    pub held: f64,
+    /// Σ F² over constrained components.
+    pub constrained: f64,
     /// Σ b² of the body forces.
     pub external: f64,
 }
@@ -27,7 +27,7 @@ impl Sums {
         self.quotient_top += other.quotient_top;
         self.quotient_bottom += other.quotient_bottom;
         self.free += other.free;
-        self.held += other.held;
+        self.constrained += other.constrained;
         self.external += other.external;
         self
     }
@@ -57,10 +57,10 @@ pub fn force_pass<const D: usize>(
                 let mut parts = scratch.chunks_mut(CHUNK);
                 let mut new: [&mut [f64]; D] =
                     std::array::from_fn(|_| &mut parts.next().unwrap_or_default()[..range.len()]);
-                let mut met = StretchRange::REST;
-                system.internal_force(displacement, chunk, &mut new, look.then_some(&mut met));
+                let mut observed = StretchRange::REST;
+                system.internal_force(displacement, chunk, &mut new, look.then_some(&mut observed));
                 let mut sums = Sums::default();
-                let held = loads.held.get(range.clone()).unwrap_or_default();
+                let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
                 for d in 0..D {
                     if let Some(body) = &loads.body_force {
                         for (f, b) in new[d].iter_mut().zip(&body.components()[d][range.clone()]) {
@@ -69,15 +69,15 @@ pub fn force_pass<const D: usize>(
                         }
                     }
                     let (v, m) = (&velocity[d][range.clone()], &unit_mass[range.clone()]);
-                    if held.iter().all(|h| h >> d & 1 == 0) {
+                    if constrained.iter().all(|h| h >> d & 1 == 0) {
                         sums = sums.add(free_sums(&new[d][..], old[d], v, m, mass));
                         old[d].copy_from_slice(new[d]);
                         continue;
                     }
                     for k in 0..v.len() {
                         let f = new[d][k];
-                        if held[k] >> d & 1 == 1 {
-                            sums.held += f * f;
+                        if constrained[k] >> d & 1 == 1 {
+                            sums.constrained += f * f;
                         } else {
                             sums.quotient_top += v[k] * (f - old[d][k]);
                             sums.quotient_bottom += v[k] * v[k] * m[k] * mass;
@@ -86,13 +86,13 @@ pub fn force_pass<const D: usize>(
                         old[d][k] = f;
                     }
                 }
-                (sums, met)
+                (sums, observed)
             },
         )
         .collect();
-    results
-        .into_iter()
-        .fold((Sums::default(), StretchRange::REST), |(sums, met), (s, m)| (sums.add(s), met.join(m)))
+    results.into_iter().fold((Sums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
+        (sums.add(s), observed.join(m))
+    })
 }
 
 /// The sums over components that are all free, in eight interleaved parts so that they vectorise.
@@ -115,7 +115,7 @@ fn free_sums(new: &[f64], old: &[f64], v: &[f64], m: &[f64], mass: f64) -> Sums 
     }
 }
 
-/// v ← ((2 − c)v + 2F/M)/(2 + c), at rest v ← F/2M; u ← u + v; held components stay.
+/// v ← ((2 − c)v + 2F/M)/(2 + c), at rest v ← F/2M; u ← u + v; constrained components stay.
 pub fn move_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
@@ -133,13 +133,13 @@ pub fn move_pass<const D: usize>(
     let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
     displacement.into_par_iter().zip(velocity).enumerate().for_each(|(chunk, (u, v))| {
         let range = chunk_range(chunk, slots);
-        let held = loads.held.get(range.clone()).unwrap_or_default();
+        let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
         for d in 0..D {
             let (f, m) = (&force[d][range.clone()], &unit_mass[range.clone()]);
             let (u, v) = (&mut *u[d], &mut *v[d]);
-            let free = held.iter().all(|h| h >> d & 1 == 0);
+            let free = constrained.iter().all(|h| h >> d & 1 == 0);
             for k in 0..f.len() {
-                if free || held[k] >> d & 1 == 0 {
+                if free || constrained[k] >> d & 1 == 0 {
                     v[k] = keep * v[k] + push * f[k] / m[k];
                     u[k] += v[k];
                 }

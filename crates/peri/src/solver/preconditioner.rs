@@ -106,7 +106,7 @@ impl<const D: usize> Preconditioner<D> {
         }
     }
 
-    /// z = B g, or its local part alone; g is zero where components are held, and so is z.
+    /// z = B g, or its local part alone; g is zero where components are constrained, and so is z.
     pub fn apply(&mut self, loads: &Loads<D>, gradient: &Field<D>, result: &mut Field<D>, local_only: bool) {
         if let Some(coarse) = self.coarse.as_mut().filter(|_| !local_only) {
             coarse.solve(gradient);
@@ -124,9 +124,9 @@ impl<const D: usize> Preconditioner<D> {
             let Some(coarse) = coarse else { return };
             for slot in range {
                 let value = coarse.value(slot);
-                let held = loads.held(slot);
+                let constrained = loads.constrained(slot);
                 for d in 0..D {
-                    if held >> d & 1 == 0 {
+                    if constrained >> d & 1 == 0 {
                         z[d][slot - start] += value[d];
                     }
                 }

@@ -17,8 +17,8 @@ pub struct Scale {
     /// U at load factor 1, m, and L, m.
     largest: f64,
     pub(super) diagonal: f64,
-    /// δ‖s‖₂ over held particles, N/m³, and δ Σ V s over them, N.
-    pub(super) held: f64,
+    /// δ‖s‖₂ over constrained particles, N/m³, and δ Σ V s over them, N.
+    pub(super) constrained: f64,
     pub(super) held_sum: f64,
 }
 
@@ -39,7 +39,7 @@ impl Scale {
             let position = bonds.position(slot);
             low = std::array::from_fn(|d| low[d].min(position[d]));
             high = std::array::from_fn(|d| high[d].max(position[d]));
-            if let Some(prescribed) = loads.displacement.as_ref().filter(|_| loads.held(slot) != 0) {
+            if let Some(prescribed) = loads.displacement.as_ref().filter(|_| loads.constrained(slot) != 0) {
                 let moved = prescribed.get(slot).iter().map(|x| x * x).sum::<f64>().sqrt();
                 scale.largest = scale.largest.max(moved);
                 square += sum * sum;
@@ -47,7 +47,7 @@ impl Scale {
             }
         }
         scale.diagonal = (0..D).map(|d| (high[d] - low[d]).powi(2)).sum::<f64>().sqrt();
-        scale.held = bonds.horizon() * square.sqrt();
+        scale.constrained = bonds.horizon() * square.sqrt();
         scale
     }
 

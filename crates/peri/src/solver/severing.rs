@@ -17,7 +17,7 @@ impl<const D: usize> System<'_, D> {
         }
         let released = self.material.released(&*self.bonds, &list, most(self.breaking.as_ref()));
         // what does not follow bond by bond is what the whole body loses
-        let before = released.is_none().then(|| self.stored_energy(state, state.met));
+        let before = released.is_none().then(|| self.stored_energy(state, state.observed));
         let bonds = list.len() as u64 / 2;
         state.broken += bonds;
         let [factor, pull, push] = state.balanced;
@@ -25,7 +25,7 @@ impl<const D: usize> System<'_, D> {
         state.events.push(Event { step: state.step, bonds, fingerprint: fingerprint(&list), load });
         self.bonds.sever(&list);
         state.released +=
-            released.unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.met));
+            released.unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.observed));
         self.rebuild_contact(&state.displacement);
         state.intact = Some(self.bonds.intact());
         let mut slots: Vec<u32> = list.iter().map(|bond| bond.slot).collect();
@@ -54,7 +54,7 @@ impl<const D: usize> System<'_, D> {
     }
 
     /// Whether stretches reach the critical one.
-    pub(super) fn is_overstretched(&self, met: StretchRange) -> bool {
-        self.breaking.as_ref().is_some_and(|b| met.high > b.stretch.least() * b.stretch.least() - 1.0)
+    pub(super) fn is_overstretched(&self, observed: StretchRange) -> bool {
+        self.breaking.as_ref().is_some_and(|b| observed.high > b.stretch.least() * b.stretch.least() - 1.0)
     }
 }

@@ -37,7 +37,7 @@ pub struct Record {
     pub contact: Option<Touching>,
     /// Work of the loads so far, J.
     pub work: f64,
-    /// Energy that broken bonds held when they broke, J.
+    /// Energy of broken bonds when they broke, J.
     pub released: f64,
     /// Largest intact stretch.
     pub largest_stretch: f64,
@@ -72,7 +72,7 @@ pub struct State<const D: usize> {
     pub displacement: Field<D>,
     /// Velocity, m per (fictitious) second.
     pub velocity: Field<D>,
-    /// Force density with loads, N/m³: out of balance where free, reaction where held.
+    /// Force density with loads, N/m³: out of balance where free, reaction where constrained.
     pub force: Field<D>,
     /// Load steps finished.
     pub step: usize,
@@ -92,8 +92,8 @@ pub struct State<const D: usize> {
     pub bond_evaluations: u64,
     /// Stretches [λ_low, λ_high] that the fitted law covers.
     pub fitted: [f64; 2],
-    /// Stretches met, as e = λ² − 1.
-    pub met: StretchRange,
+    /// Stretches observed, as e = λ² − 1.
+    pub observed: StretchRange,
     /// Stretches at the last equilibrium.
     pub(super) balanced_stretches: StretchRange,
     /// Largest relative bond tangent max(|t′|, |t|/λ) kθ over the fitted stretches.
@@ -145,7 +145,7 @@ impl<const D: usize> State<D> {
             evaluations: 0,
             bond_evaluations: 0,
             fitted: [0.95, 1.05],
-            met: StretchRange::REST,
+            observed: StretchRange::REST,
             balanced_stretches: StretchRange::REST,
             tangent: 0.0,
             reference: 0.0,

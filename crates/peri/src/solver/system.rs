@@ -113,9 +113,9 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// Energy of the material, whose law is taken over the stretches `met`, and of contact, J.
-    pub fn stored_energy(&mut self, state: &State<D>, met: StretchRange) -> f64 {
-        let bonds = self.material.energy(&*self.bonds, &state.displacement, met);
+    /// Energy of the material, whose law is taken over the stretches `observed`, and of contact, J.
+    pub fn stored_energy(&mut self, state: &State<D>, observed: StretchRange) -> f64 {
+        let bonds = self.material.energy(&*self.bonds, &state.displacement, observed);
         match self.repulsion() {
             Some(contact) => bonds + contact.touching(&state.displacement).energy,
             None => bonds,

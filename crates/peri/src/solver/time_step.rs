@@ -58,7 +58,7 @@ pub fn critical(frequency_squared: f64) -> f64 {
 }
 
 /// ω_max² of the tangent −∂f/∂u/ρ at a state, 1/s², by the Lanczos iteration (1950, doi:10.6028/jres.045.026) on
-/// differences of forces, held components at rest; 0 where the greatest is not positive.
+/// differences of forces, constrained components at rest; 0 where the greatest is not positive.
 ///
 /// Volumes are the weights of the inner product in which the tangent is symmetric. The Ritz value is a lower bound; with
 /// its residual, up to a hundredth of it, added it is on the safe side: half of a hundredth above what 200 steps give.
@@ -149,14 +149,14 @@ fn tangent<const D: usize>(
     let factor = -0.5 / (probe * density);
     combine(product, [(-1.0, &scratch[1]), (0.0, &scratch[1])]);
     scale(product, factor);
-    if system.loads.held.is_empty() {
+    if system.loads.constrained.is_empty() {
         return;
     }
     for &slot in system.bonds.particles() {
-        let held = system.loads.held(slot as usize);
-        if held != 0 {
+        let constrained = system.loads.constrained(slot as usize);
+        if constrained != 0 {
             let value = product.get(slot as usize);
-            let value = std::array::from_fn(|d| if held >> d & 1 == 1 { 0.0 } else { value[d] });
+            let value = std::array::from_fn(|d| if constrained >> d & 1 == 1 { 0.0 } else { value[d] });
             product.set(slot as usize, value);
         }
     }
@@ -167,10 +167,10 @@ fn start<const D: usize>(system: &System<D>) -> Field<D> {
     let mut field = Field::zeros(system.bonds.slots());
     let mut seed = 1_u64;
     for &slot in system.bonds.particles() {
-        let held = system.loads.held(slot as usize);
+        let constrained = system.loads.constrained(slot as usize);
         let value = std::array::from_fn(|d| {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            if held >> d & 1 == 1 { 0.0 } else { (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0 }
+            if constrained >> d & 1 == 1 { 0.0 } else { (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0 }
         });
         field.set(slot as usize, value);
     }

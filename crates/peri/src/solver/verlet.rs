@@ -1,6 +1,6 @@
 //! Explicit dynamics: velocity Verlet, with every energy that the integrator exchanges.
 //!
-//! ρü = f + F(t)b − cρu̇ with the load factor F rising linearly over a ramp, or as [`System::course`] says; held components follow F(t)d and its rate.
+//! ρü = f + F(t)b − cρu̇ with the load factor F rising linearly over a ramp, or as [`System::course`] says; constrained components follow F(t)d and its rate.
 //! v₊ = v + ½Δt a, u ← u + Δt v₊, v ← v₊ + ½Δt a, the new a = (f + Fb)/ρ − cv; Swope et al. (1982),
 //! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
 //! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
@@ -24,7 +24,7 @@ const EXCESS: f64 = 0.25;
 /// exceeds the work by (3/n²)·¼ after n steps.
 const LENIENT: u64 = 8;
 
-/// Contact that is allowed for, over what was met: the time step is not shortened for each particle that joins.
+/// Contact that is allowed for, over what was observed: the time step is not shortened for each particle that joins.
 const GROWTH: f64 = 1.25;
 
 /// Settings of explicit dynamics. [`State::velocity`] is the velocity at the start.
@@ -36,7 +36,7 @@ pub struct VelocityVerlet {
     pub time_step: Option<f64>,
     /// Part of the critical time step taken where none is given.
     pub safety: f64,
-    /// Mass-proportional damping c, 1/s, of components that are not held.
+    /// Mass-proportional damping c, 1/s, of components that are not constrained.
     pub damping: f64,
     /// Time over which the loads rise to their full value, s; 0: at once.
     pub ramp: f64,
@@ -141,10 +141,10 @@ impl VelocityVerlet {
         let (factor, rate) = self.factor(system, 0.0);
         for &slot in system.bonds.particles() {
             let slot = slot as usize;
-            let held = system.loads.held(slot);
+            let constrained = system.loads.constrained(slot);
             let Some(full) = system.loads.displacement.as_ref().map(|field| field.get(slot)) else { break };
             let (mut u, mut v) = (state.displacement.get(slot), state.velocity.get(slot));
-            for d in (0..D).filter(|d| held >> d & 1 == 1) {
+            for d in (0..D).filter(|d| constrained >> d & 1 == 1) {
                 (u[d], v[d]) = (factor * full[d], rate * full[d]);
             }
             state.displacement.set(slot, u);
@@ -159,8 +159,8 @@ impl VelocityVerlet {
         system.covers_stretches(state)?;
         refresh(system, state, factor, None);
         system.count_evaluation(state);
-        let met = state.balanced_stretches;
-        let stored = system.stored_energy(state, met);
+        let observed = state.balanced_stretches;
+        let stored = system.stored_energy(state, observed);
         let square = |slot: u32| state.velocity.get(slot as usize).iter().map(|v| v * v).sum::<f64>();
         let particles = system.bonds.particles().iter();
         let kinetic = particles.map(|&slot| volumes[slot as usize] * square(slot)).sum::<f64>();
@@ -172,7 +172,7 @@ impl VelocityVerlet {
         (state.step, state.iteration, state.step_iterations) = (0, 0, 0);
         let BondSums { stiffness, shortest, extent } = BondSums::new(system);
         let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
-        let range = [met.low, met.high].map(|e| (1.0 + e).max(0.0).sqrt());
+        let range = [observed.low, observed.high].map(|e| (1.0 + e).max(0.0).sqrt());
         let tangent = system.material.range(range).least_tangent;
         let contact = system.repulsion().map_or(0.0, |contact| {
             contact.greatest_stiffness(&state.displacement).max(contact.pair_stiffness())
@@ -193,8 +193,8 @@ impl VelocityVerlet {
             return Err(Error::TimeStep { found, critical: state.motion.critical_step });
         }
         self.cover(system, state);
-        state.motion.see(met);
-        self.sever(system, state, met, factor);
+        state.motion.see(observed);
+        self.sever(system, state, observed, factor);
         Ok(())
     }
 
@@ -241,12 +241,12 @@ impl VelocityVerlet {
         state.motion.slack += 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
         system.prepare(&state.displacement);
         let look = state.motion.must_look(state.fitted, system.breaking.as_ref().map(|b| b.stretch.least()));
-        let (mut second, met) = force_pass(system, state, volumes, &leap, look);
+        let (mut second, observed) = force_pass(system, state, volumes, &leap, look);
         system.count_evaluation(state);
         if look {
-            state.met = state.met.join(met);
-            state.motion.see(met);
-            if state.met.high.is_finite() && system.widen(state)? {
+            state.observed = state.observed.join(observed);
+            state.motion.see(observed);
+            if state.observed.high.is_finite() && system.widen(state)? {
                 refresh(system, state, factor, None);
                 system.count_evaluation(state);
                 self.cover(system, state);
@@ -261,7 +261,7 @@ impl VelocityVerlet {
         state.total_iterations += 1;
         self.account(state, first, second)?;
         if look {
-            self.sever(system, state, met, factor);
+            self.sever(system, state, observed, factor);
         }
         self.cover_contact(system, state);
         let motion = &mut state.motion;
@@ -300,10 +300,10 @@ impl VelocityVerlet {
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
-        met: StretchRange,
+        observed: StretchRange,
         factor: f64,
     ) {
-        if system.is_overstretched(met) {
+        if system.is_overstretched(observed) {
             let slots = system.break_bonds(state);
             refresh(system, state, factor, Some(&chunks_of(&slots)));
         }
@@ -325,9 +325,9 @@ impl VelocityVerlet {
 
     /// A row of history.
     fn record<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>) {
-        let met = stretch_range(&*system.bonds, &state.displacement);
+        let observed = stretch_range(&*system.bonds, &state.displacement);
         system.count_evaluation(state);
-        let stored = stored(system, state, met);
+        let stored = stored(system, state, observed);
         let (factor, _) = self.factor(system, state.motion.time);
         let conjugates = system.loads.conjugates(&*system.bonds, &state.displacement, &state.force);
         let (load, displacement) = system.loads.response(&*system.bonds, factor, conjugates);
@@ -346,7 +346,7 @@ impl VelocityVerlet {
             contact: system.touching(state),
             work: state.work,
             released: state.released,
-            largest_stretch: (1.0 + met.high).sqrt(),
+            largest_stretch: (1.0 + observed.high).sqrt(),
             time: state.motion.time,
             kinetic: state.motion.kinetic,
             damped: state.motion.damped,

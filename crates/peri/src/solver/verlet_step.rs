@@ -50,7 +50,7 @@ impl Sums {
 /// A work item of two fields.
 type Two<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
 
-/// v ← v + ½Δt a and u ← u + Δt v; held components go to F d.
+/// v ← v + ½Δt a and u ← u + Δt v; constrained components go to F d.
 pub fn leap_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
@@ -72,7 +72,7 @@ pub fn leap_pass<const D: usize>(
                 continue;
             }
             for k in 0..f.len() {
-                let increment = if let Some(full) = at.held(k) {
+                let increment = if let Some(full) = at.constrained(k) {
                     let increment = leap.factors[1] * full - u[k];
                     u[k] = leap.factors[1] * full;
                     sums.work -= 0.5 * f[k] * increment * at.volumes[k];
@@ -107,19 +107,19 @@ pub fn force_pass<const D: usize>(
     let displacement = &state.displacement;
     let (force, velocity) = (state.force.chunks_mut(), state.velocity.chunks_mut());
     let of = |(chunk, (mut f, mut v)): (usize, Two<D>)| {
-        let mut met = StretchRange::REST;
-        system.internal_force(displacement, chunk, &mut f, look.then_some(&mut met));
+        let mut observed = StretchRange::REST;
+        system.internal_force(displacement, chunk, &mut f, look.then_some(&mut observed));
         load(loads, chunk, volumes.len(), leap.factors[1], &mut f);
         let f = f.map(|f| &*f);
-        (if look { Sums::default() } else { kick(loads, volumes, leap, chunk, f, &mut v) }, met)
+        (if look { Sums::default() } else { kick(loads, volumes, leap, chunk, f, &mut v) }, observed)
     };
     let parts: Vec<_> = force.into_par_iter().zip(velocity).enumerate().map(of).collect();
-    parts
-        .into_iter()
-        .fold((Sums::default(), StretchRange::REST), |(sums, met), (s, m)| (sums.add(s), met.join(m)))
+    parts.into_iter().fold((Sums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
+        (sums.add(s), observed.join(m))
+    })
 }
 
-/// The second half of the kick: v ← v + ½Δt a with the new a; held components have the rate of F d.
+/// The second half of the kick: v ← v + ½Δt a with the new a; constrained components have the rate of F d.
 pub fn kick_pass<const D: usize>(
     loads: &Loads<D>,
     state: &mut State<D>,
@@ -196,7 +196,7 @@ fn kick<const D: usize>(
         }
         for k in 0..f.len() {
             let volume = at.volumes[k];
-            let increment = if let Some(full) = at.held(k) {
+            let increment = if let Some(full) = at.constrained(k) {
                 let increment = (after - before) * full;
                 let old = std::mem::replace(&mut v[k], leap.rate * full);
                 // the support moves the particle's mass, too
@@ -219,7 +219,7 @@ fn kick<const D: usize>(
 
 /// The loads on one axis of a work item.
 struct Place<'a> {
-    held: &'a [u8],
+    constrained: &'a [u8],
     bit: usize,
     prescribed: &'a [f64],
     body: &'a [f64],
@@ -233,24 +233,24 @@ impl<'a> Place<'a> {
         range: std::ops::Range<usize>,
         axis: usize,
     ) -> Self {
-        let held = loads.held.get(range.clone()).unwrap_or_default();
-        let held = if held.iter().any(|h| h >> axis & 1 == 1) { held } else { &[] };
+        let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
+        let constrained = if constrained.iter().any(|h| h >> axis & 1 == 1) { constrained } else { &[] };
         let of = |field: &'a Option<crate::field::Field<D>>| {
             field.as_ref().map_or(&[][..], |field| &field.components()[axis][range.clone()])
         };
         let (prescribed, body) = (of(&loads.displacement), of(&loads.body_force));
-        Self { held, bit: axis, prescribed, body, volumes: &volumes[range.clone()] }
+        Self { constrained, bit: axis, prescribed, body, volumes: &volumes[range.clone()] }
     }
 
-    /// Nothing held, nothing loaded, nothing damped.
+    /// Nothing constrained, nothing loaded, nothing damped.
     fn is_plain(&self, leap: &VerletStep) -> bool {
-        self.held.is_empty() && self.body.is_empty() && leap.damping == 0.0
+        self.constrained.is_empty() && self.body.is_empty() && leap.damping == 0.0
     }
 
-    /// The prescribed displacement at factor 1 where held.
-    fn held(&self, k: usize) -> Option<f64> {
-        let held = self.held.get(k).is_some_and(|h| h >> self.bit & 1 == 1);
-        held.then(|| self.prescribed.get(k).copied().unwrap_or(0.0))
+    /// The prescribed displacement at factor 1 where constrained.
+    fn constrained(&self, k: usize) -> Option<f64> {
+        let constrained = self.constrained.get(k).is_some_and(|h| h >> self.bit & 1 == 1);
+        constrained.then(|| self.prescribed.get(k).copied().unwrap_or(0.0))
     }
 
     fn body(&self, k: usize) -> f64 {
@@ -297,10 +297,10 @@ pub fn chunks_of(slots: &[u32]) -> Vec<usize> {
 }
 
 /// The energy of material and contact, J; over all stretches that are fitted, so that the law is sampled once a fit.
-pub fn stored<const D: usize>(system: &mut System<D>, state: &State<D>, met: StretchRange) -> f64 {
+pub fn stored<const D: usize>(system: &mut System<D>, state: &State<D>, observed: StretchRange) -> f64 {
     let [low, high] = state.fitted.map(|stretch| stretch * stretch - 1.0);
-    let inside = met.low >= low && met.high <= high;
-    system.stored_energy(state, if inside { StretchRange { low, high } } else { met })
+    let inside = observed.low >= low && observed.high <= high;
+    system.stored_energy(state, if inside { StretchRange { low, high } } else { observed })
 }
 
 /// Volumes of all slots, 0 where there is no particle.

@@ -263,8 +263,8 @@ fn stretches_are_tracked() {
         let (low, high) = stretches.fold((1.0_f64, 1.0_f64), |(l, h), x| (l.min(x), h.max(x)));
         let lattice: &dyn Bonds<D> = &built.lattice;
         for (bonds, slots) in [(lattice, &built.on_lattice), (&built.cloud, &built.in_cloud)] {
-            let met = peri::bonds::stretch_range(bonds, &scatter(bonds.slots(), slots, &u));
-            let found = ((1.0 + met.low).sqrt(), (1.0 + met.high).sqrt());
+            let observed = peri::bonds::stretch_range(bonds, &scatter(bonds.slots(), slots, &u));
+            let found = ((1.0 + observed.low).sqrt(), (1.0 + observed.high).sqrt());
             // roundings of λ²
             assert!(
                 (found.0 - low).abs() < 1e-14 && (found.1 - high).abs() < 1e-14,

@@ -257,20 +257,20 @@ pub fn relax<const D: usize>(
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
 }
 
-/// Holds the components `held` (bits) of the particles that `choose` picks at the displacements it gives.
+/// Prescribes the components `constrained` (bits) of the particles that `choose` picks at the displacements it gives.
 pub fn hold<const D: usize>(
     bonds: &dyn Bonds<D>,
     choose: impl Fn([f64; D]) -> Option<(u8, [f64; D])>,
 ) -> Loads<D> {
     let mut displacement = Field::zeros(bonds.slots());
-    let mut held = vec![0; bonds.slots()];
+    let mut constrained = vec![0; bonds.slots()];
     for &slot in bonds.particles() {
         if let Some((bits, value)) = choose(bonds.position(slot as usize)) {
-            held[slot as usize] = bits;
+            constrained[slot as usize] = bits;
             displacement.set(slot as usize, value);
         }
     }
-    Loads { displacement: Some(displacement), held, ..Loads::default() }
+    Loads { displacement: Some(displacement), constrained, ..Loads::default() }
 }
 
 /// A fit at the scenes' default bound.

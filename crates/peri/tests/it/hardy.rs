@@ -292,7 +292,7 @@ fn measures_are_their_definitions() {
         for (measure, window) in windows {
             let found = on_lattice(&built, &fit, &u, measure, Missing::Bonds)[particle];
             let exact = by_definition(&pairs, &built.points, &*law, &u, at, 48, &|x| averaged(window, x));
-            // both sample the window at sixteenths of a cell; the ball's rim is met to about 1e-3 of its area
+            // both sample the window at sixteenths of a cell; the ball's rim is observed to about 1e-3 of its area
             let bound = 2e-3 * size(&exact);
             assert!(apart(&found, &exact) < bound, "{measure:?}: {found:?} against {exact:?}");
         }

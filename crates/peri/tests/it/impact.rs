@@ -72,7 +72,7 @@ fn two_particles_rebound() {
     for pair in errors.windows(2) {
         let order = (pair[0] / pair[1]).log2();
         eprintln!("rebound: error {:.1e} m/s of 1.2, order {order:.2}", pair[1]);
-        // a force with a kink, met anywhere within a step
+        // a force with a kink, observed anywhere within a step
         assert!((order - 2.0).abs() < 0.4, "{errors:?}");
     }
     assert!(errors[3] < 1e-3 * 1.2, "{errors:?}");

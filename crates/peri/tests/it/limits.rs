@@ -346,7 +346,7 @@ fn strong_compression_of_the_network_law() {
             Err(Error::NotConverged { residual, .. }) if to < 0.5 && residual < 1.0 => {}
             Err(error) => panic!("to {to}: {error}"),
         }
-        let (low, high) = ((1.0 + state.met.low).sqrt(), (1.0 + state.met.high).sqrt());
+        let (low, high) = ((1.0 + state.observed.low).sqrt(), (1.0 + state.observed.high).sqrt());
         eprintln!("chain to {to}: stretches {low:.3} to {high:.3}, {} iterations", state.total_iterations);
         assert!(state.fitted[0] <= low && high <= state.fitted[1], "{:?} {low} {high}", state.fitted);
     }

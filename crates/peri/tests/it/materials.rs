@@ -45,8 +45,8 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
     }
 
     fn energy(&mut self, displacement: &Field<D>) -> f64 {
-        let met = peri::bonds::stretch_range(self.bonds, displacement);
-        self.material.energy(self.bonds, displacement, met)
+        let observed = peri::bonds::stretch_range(self.bonds, displacement);
+        self.material.energy(self.bonds, displacement, observed)
     }
 
     fn slots(&self) -> Vec<usize> {
@@ -211,7 +211,7 @@ fn displaced<const D: usize>(built: &Built<D>, spacing: f64) -> Vec<[f64; D]> {
     built.points.iter().zip(random).map(moved).collect()
 }
 
-/// The whole battery, on a damaged body, as a lattice and as a cloud; the greatest λ(K)/s V met.
+/// The whole battery, on a damaged body, as a lattice and as a cloud; the greatest λ(K)/s V observed.
 pub fn battery<const D: usize>(name: &str, cells: [usize; D], make: Make<D>) -> f64 {
     let body = Body::damaged(cells, 0.1, 3.015);
     let mut built = body.build();

@@ -54,7 +54,7 @@ impl Dent {
     fn pull(&self, state: &State<2>) -> f64 {
         let volume = self.spacing * self.spacing * THICKNESS;
         let each = self.bonds.particles().iter().map(|&s| {
-            let held = self.loads.held(s as usize) != 0;
+            let held = self.loads.constrained(s as usize) != 0;
             let sign = -self.bonds.position(s as usize)[1].signum();
             if held { 0.5 * volume * sign * state.force.get(s as usize)[1] } else { 0.0 }
         });

@@ -72,7 +72,7 @@ fn a_strained_start_comes_to_rest() {
             let loads = grip(&bonds, 1e-3);
             let mut state = State::new(bonds.slots());
             // the first guess moves all with the grip: what is free is put back before
-            for &slot in bonds.particles().iter().filter(|&&s| loads.held(s as usize) == 0) {
+            for &slot in bonds.particles().iter().filter(|&&s| loads.constrained(s as usize) == 0) {
                 state.displacement.set(slot as usize, WAY.map(|w| -1e-3 * w));
             }
             solve(&mut *method, &mut bonds, &loads, &[1.0], &mut state).unwrap();

@@ -17,10 +17,10 @@ pub fn write(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<(), Error
     write_cells(path.as_ref(), columns, |number| format!("{number:?}"))
 }
 
-/// As [`write`], with an empty cell for NaN: where there is no value.
+/// As [`write()`], with an empty cell for NaN: where there is no value.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_with_gaps(path: impl AsRef<Path>, columns: &[Column<'_>]) -> Result<(), Error> {
     let cell = |number: f64| if number.is_nan() { String::new() } else { format!("{number:?}") };
     write_cells(path.as_ref(), columns, cell)

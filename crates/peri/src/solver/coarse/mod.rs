@@ -34,7 +34,7 @@ pub struct Body<'a, const D: usize> {
     pub displacement: &'a Field<D>,
     /// The law, kθ and the stretches it is fitted for.
     pub law: (&'a dyn BondPotential, f64, [f64; 2]),
-    /// Stiffness density of each slot, N/m⁵, which holds what is held.
+    /// Stiffness density of each slot, N/m⁵, which holds what is constrained.
     pub springs: &'a [f64],
     /// The bonds' survey.
     pub survey: &'a Survey,
@@ -71,7 +71,7 @@ impl<const D: usize> Coarse<D> {
         Some(Self { space, factor, parts, coefficients })
     }
 
-    /// Solves A_c c = Pᵀg; g is zero where components are held.
+    /// Solves A_c c = Pᵀg; g is zero where components are constrained.
     pub fn solve(&mut self, gradient: &Field<D>) {
         let (space, gradient) = (&self.space, gradient.components());
         let corners = 1 << D;

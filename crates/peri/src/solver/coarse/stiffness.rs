@@ -96,7 +96,7 @@ pub struct Assembly<'a, const D: usize> {
     survey: &'a Survey,
     tangents: Tangents,
     modulus: f64,
-    /// Stiffness density M_I at held components, N/m⁵.
+    /// Stiffness density M_I at constrained components, N/m⁵.
     springs: &'a [f64],
     /// C of particles without a bond missing, where bonds are as at rest.
     interior: Option<Tangent>,
@@ -219,10 +219,10 @@ impl<'a, const D: usize> Assembly<'a, D> {
         (matrix, measure)
     }
 
-    /// Adds the springs that hold what is held.
+    /// Adds the springs that hold what is constrained.
     fn hold(&self, matrix: &mut ElementMatrix, slot: usize, volume: f64, values: &[f64; CORNERS]) {
-        let held = self.loads.held(slot);
-        if held == 0 {
+        let constrained = self.loads.constrained(slot);
+        if constrained == 0 {
             return;
         }
         let mut at = 0;
@@ -231,7 +231,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
                 let spring = volume * self.springs[slot] * values[a] * values[b];
                 let mut pair = 0;
                 for i in 0..D {
-                    if held >> i & 1 == 1 {
+                    if constrained >> i & 1 == 1 {
                         matrix[at][pair] += spring;
                     }
                     pair += D - i;
