@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::Duration;
 
 /// A stated need above this is at most so many times what the run takes; below, constants dominate. Stated is what is
-/// allocated, taken what is ever written: most slots of a thin body are not.
+/// allocated, taken what is ever written: most sites of a thin body are not.
 const LARGE: f64 = 100e6;
 const FACTOR: f64 = 4.0;
 /// What a program may take before it refuses a scene.
@@ -90,7 +90,7 @@ fn of_bodies() {
     holds("peri", &(scenes::fracture("4 mm", "accept = 0.1") + "[contact]\nstiffness = 1.0\n"), &[]);
 }
 
-/// One row of cells and a long horizon: most slots are empty.
+/// One row of cells and a long horizon: most sites are empty.
 #[test]
 fn of_a_thin_body() {
     let thin = scenes::plate("\"100 mm\"", "1e-2")

@@ -18,7 +18,7 @@ fn dimension<const D: usize>(criterion: &mut Criterion) -> Result<(), Failure> {
     {
         let mut bonds = kernel::bonds::<D>(kernel::block(SIZE)?)?;
         let (_, displacement) = kernel::loaded(&mut bonds, law, range)?;
-        let mut out = Field::zeros(bonds.slots());
+        let mut out = Field::zeros(bonds.sites());
         let mut group = criterion.benchmark_group("directed bonds");
         group.throughput(Throughput::Elements(bonds.directed_bonds()));
         let name = format!("{D}D lattice {} {}–{}", law.name(), range[0], range[1]);

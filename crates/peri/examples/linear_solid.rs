@@ -42,7 +42,7 @@ impl<const D: usize> Material<D> for LinearSolid {
     fn begin(&self, family: &Family<D>) -> Point {
         let dimension = D as f64;
         let weighted = family.sum(|bond| bond.length * bond.length * bond.volume).max(f64::MIN_POSITIVE);
-        let alpha = dimension * (dimension + 2.0) * self.shear.at(family.slot()) / weighted;
+        let alpha = dimension * (dimension + 2.0) * self.shear.at(family.site()) / weighted;
         Point { alpha, share: dimension / weighted, ..Point::default() }
     }
 
@@ -56,7 +56,7 @@ impl<const D: usize> Material<D> for LinearSolid {
         });
         let dimension = D as f64;
         let both = 2.0 * dimension / point.share - weighted;
-        point.balance = self.bulk.at(family.slot()) - point.alpha * both / (dimension * dimension);
+        point.balance = self.bulk.at(family.site()) - point.alpha * both / (dimension * dimension);
         point.dilatation = point.share * extension;
         point.spread = point.share * spread;
     }
@@ -77,7 +77,7 @@ impl<const D: usize> Material<D> for LinearSolid {
 
     /// Springs αe and the bond's turn, both ends; then b(∂θ/∂u)² and bθ ∂²θ/∂u², where both are positive.
     fn stiffness(&self, family: &Family<D>, points: &[Point]) -> f64 {
-        let own = &points[family.slot()];
+        let own = &points[family.site()];
         let dilatation = own.balance.max(0.0) * own.spread * own.spread;
         dilatation
             + family.sum(|bond| {
@@ -101,28 +101,28 @@ impl<const D: usize> Material<D> for LinearSolid {
 pub fn poisson_ratio(solid: LinearSolid) -> Result<f64, peri::Error> {
     let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [60.0, 16.0] })];
     let mut bonds = LatticeBonds::new(lattice(&body, 1.0, 1.0)?, 3.015, VolumeCorrection::None, &[])?;
-    let slots = |from: [f64; 2], to: [f64; 2]| -> Vec<u32> {
-        let inside = |&slot: &u32| {
-            let place = bonds.position(slot as usize);
+    let sites = |from: [f64; 2], to: [f64; 2]| -> Vec<u32> {
+        let inside = |&site: &u32| {
+            let place = bonds.position(site as usize);
             (0..2).all(|d| (from[d]..to[d]).contains(&place[d]))
         };
         bonds.particles().iter().copied().filter(inside).collect()
     };
     let grip = |x| Support { displacement: [Some(x), None], body_force: [0.0; 2] };
-    let left = (slots([0.0; 2], [3.0, 16.0]), grip(0.0));
-    let right = (slots([57.0, 0.0], [60.0, 16.0]), grip(0.54));
+    let left = (sites([0.0; 2], [3.0, 16.0]), grip(0.0));
+    let right = (sites([57.0, 0.0], [60.0, 16.0]), grip(0.54));
     // one particle is held across, so that the strip cannot drift
     let pin = Support { displacement: [None, Some(0.0)], body_force: [0.0; 2] };
-    let pinned = (slots([30.0, 8.0], [31.0, 9.0]), pin);
-    let mark = |place: [f64; 2]| slots(place, [place[0] + 1.0, place[1] + 1.0])[0] as usize;
+    let pinned = (sites([30.0, 8.0], [31.0, 9.0]), pin);
+    let mark = |place: [f64; 2]| sites(place, [place[0] + 1.0, place[1] + 1.0])[0] as usize;
     let [west, east, south, north] = [[26.0, 8.0], [34.0, 8.0], [30.0, 5.0], [30.0, 11.0]].map(mark);
-    let loads = Loads::new(bonds.slots(), &[left, right, pinned]);
+    let loads = Loads::new(bonds.sites(), &[left, right, pinned]);
 
-    let mut state = State::new(bonds.slots());
+    let mut state = State::new(bonds.sites());
     let mut system = System::new(&mut bonds, solid, &loads, &[1.0]);
     let method = Lbfgs { tolerance: 1e-6, ..Default::default() };
     method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
-    let moved = |slot: usize, axis: usize| state.displacement.get(slot)[axis];
+    let moved = |site: usize, axis: usize| state.displacement.get(site)[axis];
     let along = (moved(east, 0) - moved(west, 0)) / 8.0;
     let across = (moved(north, 1) - moved(south, 1)) / 6.0;
     Ok(-across / along)

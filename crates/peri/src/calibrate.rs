@@ -60,7 +60,7 @@ pub fn modulus(space: Space, youngs_modulus: f64, horizon: f64, thickness: f64) 
 
 /// kθ of bonds in a solid or, in two dimensions, in a sheet of the thickness that its particles have.
 pub fn modulus_in<const D: usize>(bonds: &dyn Bonds<D>, youngs_modulus: f64) -> f64 {
-    let volume = bonds.particles().first().map_or(0.0, |&slot| bonds.volume(slot as usize));
+    let volume = bonds.particles().first().map_or(0.0, |&site| bonds.volume(site as usize));
     let thickness = volume / bonds.spacing().powi(D as i32);
     let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
     modulus(space, youngs_modulus, bonds.horizon(), thickness)

@@ -9,13 +9,13 @@ use rayon::prelude::*;
 /// the bonds' W_d = ¼ Σ_J 6kθ V_J |ξ| n_d⁴ ε² (dual force f = 2t, linear bond t = 3kθ(λ − 1)).
 /// A particle without bonds along d gets 1.
 pub fn surface_factors<const D: usize>(bonds: &dyn Bonds<D>, modulus: f64, stiffness_1111: f64) -> Field<D> {
-    let mut factors = Field::zeros(bonds.slots());
+    let mut factors = Field::zeros(bonds.sites());
     let values: Vec<[f64; D]> = bonds
         .particles()
         .par_iter()
-        .map(|&slot| {
+        .map(|&site| {
             let mut energy = [0.0; D];
-            bonds.neighbours(slot as usize, &mut |bond| {
+            bonds.neighbours(site as usize, &mut |bond| {
                 for d in 0..D {
                     let cosine = bond.bond[d] / bond.length;
                     energy[d] += 1.5 * modulus * bond.volume * bond.length * cosine.powi(4);
@@ -24,8 +24,8 @@ pub fn surface_factors<const D: usize>(bonds: &dyn Bonds<D>, modulus: f64, stiff
             energy.map(|w| if w > 0.0 { 0.5 * stiffness_1111 / w } else { 1.0 })
         })
         .collect();
-    for (&slot, value) in bonds.particles().iter().zip(values) {
-        factors.set(slot as usize, value);
+    for (&site, value) in bonds.particles().iter().zip(values) {
+        factors.set(site as usize, value);
     }
     factors
 }
@@ -40,10 +40,10 @@ pub fn bond_factors<const D: usize>(
     if micromodulus.uniform() == Some(1.0) {
         return surface;
     }
-    let mut factors = Field::zeros(bonds.slots());
-    for slot in bonds.particles().iter().map(|&slot| slot as usize) {
-        let surface = surface.as_ref().map_or([1.0; D], |surface| surface.get(slot));
-        factors.set(slot, surface.map(|g| g * micromodulus.at(slot)));
+    let mut factors = Field::zeros(bonds.sites());
+    for site in bonds.particles().iter().map(|&site| site as usize) {
+        let surface = surface.as_ref().map_or([1.0; D], |surface| surface.get(site));
+        factors.set(site, surface.map(|g| g * micromodulus.at(site)));
     }
     Some(factors)
 }

@@ -1,4 +1,4 @@
-//! Critical bond stretch: the readings of "1.2 √n̄", a number, or a fracture energy.
+//! Critical bond stretch: interpretations of "1.2 √n̄", a number, or a fracture energy.
 
 use crate::calibrate::Space;
 use crate::error::Error;
@@ -7,7 +7,7 @@ use polycore::units::EnergyPerArea;
 use serde::Deserialize;
 use std::f64::consts::PI;
 
-/// As written in a scene: one of `percent_over_contour` (with `reading`), `stretch`, `fracture_energy`.
+/// As written in a scene: one of `percent_over_contour` (with `interpretation`), `stretch`, `fracture_energy`.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -15,41 +15,42 @@ pub struct Critical {
     /// Factor f on the contour stretch √n̄, e.g. 1.2.
     pub percent_over_contour: Option<f64>,
     /// What f√n̄ is the stretch of.
-    pub reading: Option<Reading>,
+    pub interpretation: Option<Interpretation>,
     /// The critical bond stretch itself.
     pub stretch: Option<f64>,
     /// Fracture energy G, from which the stretch follows: the mesh-objective choice.
     pub fracture_energy: Option<EnergyPerArea>,
 }
 
-/// Readings of f√n̄ (formulation.md, Critical stretch). (2.38) is the trace of an isochoric deformation: the bond stretch
+/// Interpretations of f√n̄, R1 to R4 in the documents, (formulation.md, Critical stretch). (2.38) is the trace of an isochoric deformation: the bond stretch
 /// belongs on its right, the chain stretch g on its left.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
-pub enum Reading {
-    /// l = f√n̄.
-    R1,
-    /// l = f√(n̄/8).
-    R2,
-    /// g(l) solved the other way round: l = g(f√n̄).
-    R3,
-    /// l = g(f√(n̄/8)): the literal text, the only physical one.
+#[serde(rename_all = "kebab-case")]
+pub enum Interpretation {
+    /// R1: l = f√n̄.
+    BondFull,
+    /// R2: l = f√(n̄/8).
+    BondEighth,
+    /// R3: (2.38) solved the other way round: l = g(f√n̄).
+    ChainFull,
+    /// R4: l = g(f√(n̄/8)): the literal text, the only physical one.
     #[default]
-    R4,
+    ChainEighth,
 }
 
-impl Reading {
-    /// All readings.
-    pub const ALL: [Self; 4] = [Self::R1, Self::R2, Self::R3, Self::R4];
+impl Interpretation {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::BondFull, Self::BondEighth, Self::ChainFull, Self::ChainEighth];
 
     /// The critical bond stretch for a factor and a number of links.
     pub fn stretch(self, factor: f64, links: f64) -> f64 {
         let (contour, eighth) = (factor * links.sqrt(), factor * (links / 8.0).sqrt());
         match self {
-            Self::R1 => contour,
-            Self::R2 => eighth,
-            Self::R3 => NetworkStretch::chain_stretch(contour),
-            Self::R4 => NetworkStretch::chain_stretch(eighth),
+            Self::BondFull => contour,
+            Self::BondEighth => eighth,
+            Self::ChainFull => NetworkStretch::chain_stretch(contour),
+            Self::ChainEighth => NetworkStretch::chain_stretch(eighth),
         }
     }
 }
@@ -95,12 +96,14 @@ impl Critical {
             (Some(factor), None, None) => match context.links {
                 Some(links) => {
                     // below the contour of which (2.38) makes 1, its left branch compresses
-                    let contour = match self.reading.unwrap_or_default() {
-                        Reading::R1 | Reading::R3 => factor * links.sqrt(),
-                        Reading::R2 | Reading::R4 => factor * (links / 8.0).sqrt(),
+                    let contour = match self.interpretation.unwrap_or_default() {
+                        Interpretation::BondFull | Interpretation::ChainFull => factor * links.sqrt(),
+                        Interpretation::BondEighth | Interpretation::ChainEighth => {
+                            factor * (links / 8.0).sqrt()
+                        }
                     };
                     if contour > 1.0 && contour.is_finite() {
-                        Ok(self.reading.unwrap_or_default().stretch(factor, links))
+                        Ok(self.interpretation.unwrap_or_default().stretch(factor, links))
                     } else {
                         fault(
                             "critical.percent_over_contour",
@@ -159,7 +162,7 @@ mod tests {
 
     /// formulation.md, table of the four examples, to its printed digits.
     #[test]
-    fn readings_of_the_four_examples() {
+    fn interpretations_of_the_four_examples() {
         let table = [
             (1.2, 720.0, [32.20, 11.38, 5.849, 2.9442]),
             (1.1, 400.0, [22.0, 7.78, 4.542, 2.3037]),
@@ -168,7 +171,7 @@ mod tests {
         ];
         for (factor, links, expected) in table {
             for ((reading, expected), digits) in
-                Reading::ALL.iter().zip(expected).zip([6e-3, 6e-3, 6e-4, 6e-5])
+                Interpretation::ALL.iter().zip(expected).zip([6e-3, 6e-3, 6e-4, 6e-5])
             {
                 let found = reading.stretch(factor, links);
                 assert!(
@@ -177,8 +180,8 @@ mod tests {
                 );
             }
         }
-        let dent = |reading: Reading| reading.stretch(1.2, 720.0);
-        let [r1, r2, r3, r4] = Reading::ALL.map(dent);
+        let dent = |reading: Interpretation| reading.stretch(1.2, 720.0);
+        let [r1, r2, r3, r4] = Interpretation::ALL.map(dent);
         evidence::near("DENT, critical bond stretch by R1", r1, 32.20, 6e-3);
         evidence::near("DENT, critical bond stretch by R2", r2, 11.38, 6e-3);
         evidence::near("DENT, critical bond stretch by R3", r3, 5.849, 6e-4);
@@ -258,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn readings_that_break_at_rest_are_refused() {
+    fn interpretations_that_break_at_rest_are_refused() {
         let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
         let context = Context {
             law: &*law,
@@ -268,12 +271,15 @@ mod tests {
             horizon: 1.0,
             thickness: 1.0,
         };
-        for (factor, reading) in
-            [(0.03, Reading::R1), (0.1, Reading::R2), (0.05, Reading::R4), (f64::INFINITY, Reading::R4)]
-        {
+        for (factor, reading) in [
+            (0.03, Interpretation::BondFull),
+            (0.1, Interpretation::BondEighth),
+            (0.05, Interpretation::ChainEighth),
+            (f64::INFINITY, Interpretation::ChainEighth),
+        ] {
             let critical = Critical {
                 percent_over_contour: Some(factor),
-                reading: Some(reading),
+                interpretation: Some(interpretation),
                 ..Critical::default()
             };
             assert!(critical.resolve(&context).is_err(), "{factor} {reading:?}");

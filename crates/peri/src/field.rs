@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-/// Slots per work item. Fixed by the data, never by the number of threads: sums taken item by item give the same
+/// Sites per work item. Fixed by the data, never by the number of threads: sums taken item by item give the same
 /// bits on any number of threads. A multiple of [`crate::bonds::TILE`].
 pub const CHUNK: usize = 4096;
 
-/// A vector field of dimension `D` on `slots` storage slots.
+/// A vector field of dimension `D` on `sites` storage sites.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Field<const D: usize> {
     #[serde(with = "components")]
@@ -15,29 +15,29 @@ pub struct Field<const D: usize> {
 
 impl<const D: usize> Field<D> {
     /// The zero field.
-    pub fn zeros(slots: usize) -> Self {
-        Self { components: std::array::from_fn(|_| vec![0.0; slots]) }
+    pub fn zeros(sites: usize) -> Self {
+        Self { components: std::array::from_fn(|_| vec![0.0; sites]) }
     }
 
-    /// Number of slots.
-    pub fn slots(&self) -> usize {
+    /// Number of sites.
+    pub fn sites(&self) -> usize {
         self.components[0].len()
     }
 
-    /// The components, each a slice over all slots.
+    /// The components, each a slice over all sites.
     pub fn components(&self) -> [&[f64]; D] {
         std::array::from_fn(|d| self.components[d].as_slice())
     }
 
-    /// The vector in one slot.
-    pub fn get(&self, slot: usize) -> [f64; D] {
-        std::array::from_fn(|d| self.components[d][slot])
+    /// The vector in one site.
+    pub fn get(&self, site: usize) -> [f64; D] {
+        std::array::from_fn(|d| self.components[d][site])
     }
 
-    /// Replaces the vector in one slot.
-    pub fn set(&mut self, slot: usize, value: [f64; D]) {
+    /// Replaces the vector in one site.
+    pub fn set(&mut self, site: usize, value: [f64; D]) {
         for d in 0..D {
-            self.components[d][slot] = value[d];
+            self.components[d][site] = value[d];
         }
     }
 
@@ -48,15 +48,15 @@ impl<const D: usize> Field<D> {
         (0..count).map(|_| iterators.each_mut().map(|i| i.next().unwrap_or_default())).collect()
     }
 
-    /// First component (and slot) that is not finite, if any.
+    /// First component (and site) that is not finite, if any.
     pub fn non_finite(&self) -> Option<(usize, usize)> {
-        (0..D).find_map(|d| self.components[d].iter().position(|x| !x.is_finite()).map(|slot| (slot, d)))
+        (0..D).find_map(|d| self.components[d].iter().position(|x| !x.is_finite()).map(|site| (site, d)))
     }
 }
 
-/// The slots of work item `index` in a storage of `slots`.
-pub fn chunk_range(index: usize, slots: usize) -> Range<usize> {
-    index * CHUNK..((index + 1) * CHUNK).min(slots)
+/// The sites of work item `index` in a storage of `sites`.
+pub fn chunk_range(index: usize, sites: usize) -> Range<usize> {
+    index * CHUNK..((index + 1) * CHUNK).min(sites)
 }
 
 /// Serde for arrays of any length, which serde itself offers only up to 32 and not generically.

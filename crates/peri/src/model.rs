@@ -109,23 +109,23 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         let bonds = self.body.build()?;
         let (material, critical) = self.material.into_material(&self.body, &bonds)?;
         let mut regions = Vec::new();
-        let mut loaded = vec![false; bonds.slots()];
+        let mut loaded = vec![false; bonds.sites()];
         for (number, (region, support)) in self.regions.into_iter().enumerate() {
-            let inside = |&slot: &u32| region(bonds.position(slot as usize));
+            let inside = |&site: &u32| region(bonds.position(site as usize));
             let members: Vec<u32> = bonds.particles().iter().copied().filter(inside).collect();
             if members.is_empty() {
                 return Err(Error::geometry(format!("region {} of the loads has no particle", number + 1)));
             }
-            members.iter().for_each(|&slot| loaded[slot as usize] = true);
+            members.iter().for_each(|&site| loaded[site as usize] = true);
             regions.push((members, support));
         }
-        let loads = Loads::new(bonds.slots(), &regions);
+        let loads = Loads::new(bonds.sites(), &regions);
         let micromodulus = material.micromodulus(&bonds);
         let contact =
             self.contact.map(|stiffness| Contact::new(&bonds, micromodulus, stiffness)).transpose()?;
         let stretch = self.critical_stretch.or(critical.map(Property::from));
         let breaking = stretch.map(|stretch| Breaking { stretch, policy: Policy::default() });
-        let state = State::new(bonds.slots());
+        let state = State::new(bonds.sites());
         Ok(Simulation { bonds, material, loads, loaded, factors: self.factors, breaking, contact, state })
     }
 }
@@ -140,7 +140,7 @@ pub struct Simulation<const D: usize, M> {
     pub factors: Vec<f64>,
     material: M,
     loads: Loads<D>,
-    /// Slots of the regions that loads act on.
+    /// Sites of the regions that loads act on.
     loaded: Vec<bool>,
     breaking: Option<Breaking>,
     contact: Option<Contact<D>>,
@@ -181,8 +181,8 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
 
     /// Position X and displacement u of every particle, m.
     pub fn displacements(&self) -> impl Iterator<Item = ([f64; D], [f64; D])> {
-        let particles = self.bonds.particles().iter().map(|&slot| slot as usize);
-        particles.map(|slot| (self.bonds.position(slot), self.state.displacement.get(slot)))
+        let particles = self.bonds.particles().iter().map(|&site| site as usize);
+        particles.map(|site| (self.bonds.position(site), self.state.displacement.get(site)))
     }
 
     /// Pieces that the body has broken into.

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 /// A bond, seen from one of its ends, that is to be severed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Overstretched {
-    /// Slot of the particle.
-    pub slot: u32,
+    /// Site of the particle.
+    pub site: u32,
     /// Its number among the particle's bonds, see [`super::Neighbour::index`].
     pub index: u32,
     /// λ² − 1.
@@ -27,10 +27,10 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
     displacement: &Field<D>,
     critical: &Property,
 ) -> Vec<Overstretched> {
-    let slots = bonds.slots();
+    let sites = bonds.sites();
     let least = critical.least() * critical.least() - 1.0;
     let of_chunk = |chunk: usize| {
-        let range = chunk_range(chunk, slots);
+        let range = chunk_range(chunk, sites);
         // the vectorised kernel finds the items to look into
         let mut scratch = vec![0.0; D * range.len()];
         let mut parts = scratch.chunks_mut(range.len());
@@ -42,20 +42,20 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
         if observed.high * (1.0 + 1e-9) < least {
             return found;
         }
-        for slot in range {
-            let own = displacement.get(slot);
-            bonds.neighbours(slot, &mut |bond| {
-                let other = displacement.get(bond.slot);
+        for site in range {
+            let own = displacement.get(site);
+            bonds.neighbours(site, &mut |bond| {
+                let other = displacement.get(bond.site);
                 let mut e = 0.0;
                 for d in 0..D {
                     let eta = other[d] - own[d];
                     e += eta * (2.0 * bond.bond[d] + eta);
                 }
                 let e = e / (bond.length * bond.length);
-                let critical = critical.weaker(slot, bond.slot);
+                let critical = critical.weaker(site, bond.site);
                 if e > critical * critical - 1.0 {
                     found.push(Overstretched {
-                        slot: slot as u32,
+                        site: site as u32,
                         index: bond.index,
                         elongation: e,
                         length: bond.length,
@@ -66,30 +66,30 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
         }
         found
     };
-    let parts: Vec<Vec<Overstretched>> = (0..slots.div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect();
+    let parts: Vec<Vec<Overstretched>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect();
     parts.concat()
 }
 
 /// One number for a set of bonds: FNV-1a over their ends, in the order of [`overstretched`].
 pub fn fingerprint(bonds: &[Overstretched]) -> u64 {
-    let words = bonds.iter().flat_map(|bond| [bond.slot, bond.index]).flat_map(u32::to_le_bytes);
+    let words = bonds.iter().flat_map(|bond| [bond.site, bond.index]).flat_map(u32::to_le_bytes);
     words.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 /// Parts of the body that hang together by intact bonds, single particles not counted.
 pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> usize {
-    let mut root: Vec<u32> = (0..bonds.slots() as u32).collect();
-    let mut size = vec![1_u32; bonds.slots()];
-    let find = |root: &mut Vec<u32>, mut slot: u32| {
-        while root[slot as usize] != slot {
-            root[slot as usize] = root[root[slot as usize] as usize];
-            slot = root[slot as usize];
+    let mut root: Vec<u32> = (0..bonds.sites() as u32).collect();
+    let mut size = vec![1_u32; bonds.sites()];
+    let find = |root: &mut Vec<u32>, mut site: u32| {
+        while root[site as usize] != site {
+            root[site as usize] = root[root[site as usize] as usize];
+            site = root[site as usize];
         }
-        slot
+        site
     };
-    for &slot in bonds.particles() {
-        bonds.neighbours(slot as usize, &mut |bond| {
-            let (a, b) = (find(&mut root, slot), find(&mut root, bond.slot as u32));
+    for &site in bonds.particles() {
+        bonds.neighbours(site as usize, &mut |bond| {
+            let (a, b) = (find(&mut root, site), find(&mut root, bond.site as u32));
             if a != b {
                 let (small, large) = (a.max(b), a.min(b));
                 root[small as usize] = large;
@@ -97,6 +97,6 @@ pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> usize {
             }
         });
     }
-    let is_part = |&&slot: &&u32| root[slot as usize] == slot && size[slot as usize] > 1;
+    let is_part = |&&site: &&u32| root[site as usize] == site && size[site as usize] > 1;
     bonds.particles().iter().filter(is_part).count()
 }

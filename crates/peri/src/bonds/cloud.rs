@@ -16,7 +16,7 @@ use rayon::prelude::*;
 pub struct CloudBonds<const D: usize> {
     position: Field<D>,
     volumes: Vec<f64>,
-    /// Index of each slot's particle in the input.
+    /// Index of each site's particle in the input.
     input_order: Vec<u32>,
     particles: Vec<u32>,
     horizon: f64,
@@ -110,8 +110,8 @@ impl<const D: usize> CloudBonds<D> {
             starts.push(neighbours.len());
         }
         let mut position = Field::zeros(sorted.len());
-        for (slot, &point) in sorted.iter().enumerate() {
-            position.set(slot, point);
+        for (site, &point) in sorted.iter().enumerate() {
+            position.set(site, point);
         }
         let mut inverse_length = Vec::with_capacity(neighbours.len());
         for own in 0..sorted.len() {
@@ -150,26 +150,26 @@ impl<const D: usize> CloudBonds<D> {
         self.thickness
     }
 
-    /// Index in the input of the particle in each slot.
+    /// Index in the input of the particle in each site.
     pub fn input_order(&self) -> &[u32] {
         &self.input_order
     }
 
-    fn bond(&self, slot: usize, k: usize) -> Neighbour<D> {
+    fn bond(&self, site: usize, k: usize) -> Neighbour<D> {
         let other = self.neighbours[k] as usize;
-        let (here, there) = (self.position.get(slot), self.position.get(other));
+        let (here, there) = (self.position.get(site), self.position.get(other));
         let bond: [f64; D] = std::array::from_fn(|d| there[d] - here[d]);
         let length = bond.iter().map(|x| x * x).sum::<f64>().sqrt();
         let volume = self.volumes[other] * self.volume_correction.factor(length, self.horizon, self.spacing);
         let surface =
-            self.factors.as_ref().map_or(1.0, |g| surface_weight(bond, length, g.get(slot), g.get(other)));
-        let index = (k - self.starts[slot]) as u32;
-        Neighbour { slot: other, index, bond, length, volume, weight: volume * surface }
+            self.factors.as_ref().map_or(1.0, |g| surface_weight(bond, length, g.get(site), g.get(other)));
+        let index = (k - self.starts[site]) as u32;
+        Neighbour { site: other, index, bond, length, volume, weight: volume * surface }
     }
 }
 
 impl<const D: usize> Bonds<D> for CloudBonds<D> {
-    fn slots(&self) -> usize {
+    fn sites(&self) -> usize {
         self.volumes.len()
     }
 
@@ -177,12 +177,12 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         &self.particles
     }
 
-    fn position(&self, slot: usize) -> [f64; D] {
-        self.position.get(slot)
+    fn position(&self, site: usize) -> [f64; D] {
+        self.position.get(site)
     }
 
-    fn volume(&self, slot: usize) -> f64 {
-        self.volumes[slot]
+    fn volume(&self, site: usize) -> f64 {
+        self.volumes[site]
     }
 
     fn horizon(&self) -> f64 {
@@ -193,16 +193,16 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         self.spacing
     }
 
-    fn neighbours(&self, slot: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
-        for k in self.starts[slot]..self.starts[slot + 1] {
-            if self.neighbours[k] as usize != slot {
-                visit(self.bond(slot, k));
+    fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
+        for k in self.starts[site]..self.starts[site + 1] {
+            if self.neighbours[k] as usize != site {
+                visit(self.bond(site, k));
             }
         }
     }
 
-    fn is_bonded(&self, slot: usize, other: usize) -> bool {
-        slot != other && self.neighbours[self.starts[slot]..self.starts[slot + 1]].contains(&(other as u32))
+    fn is_bonded(&self, site: usize, other: usize) -> bool {
+        site != other && self.neighbours[self.starts[site]..self.starts[site + 1]].contains(&(other as u32))
     }
 
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
@@ -213,12 +213,12 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         self.stiffness = 2.0 * modulus * if alike { common } else { 1.0 };
         self.weights = Vec::new();
         if !alike {
-            let weight = |slot: usize, k: usize| {
-                if self.neighbours[k] as usize == slot { 0.0 } else { self.bond(slot, k).weight }
+            let weight = |site: usize, k: usize| {
+                if self.neighbours[k] as usize == site { 0.0 } else { self.bond(site, k).weight }
             };
-            let of_slot = |slot: usize| (self.starts[slot]..self.starts[slot + 1]).map(move |k| (slot, k));
+            let of_site = |site: usize| (self.starts[site]..self.starts[site + 1]).map(move |k| (site, k));
             self.weights =
-                (0..self.volumes.len()).flat_map(of_slot).map(|(slot, k)| weight(slot, k)).collect();
+                (0..self.volumes.len()).flat_map(of_site).map(|(site, k)| weight(site, k)).collect();
         }
         self.kernel = cloud_kernel(fit);
         self.table = self.kernel.is_none().then(|| (fit.clone(), modulus));
@@ -255,8 +255,8 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     fn sever(&mut self, bonds: &[Overstretched]) {
         for bond in bonds {
             // as the padding of the lists: a bond of no stiffness to itself
-            let k = self.starts[bond.slot as usize] + bond.index as usize;
-            self.neighbours[k] = bond.slot;
+            let k = self.starts[bond.site as usize] + bond.index as usize;
+            self.neighbours[k] = bond.site;
             self.inverse_length[k] = 0.0;
         }
         self.directed_bonds -= bonds.len() as u64;
@@ -273,10 +273,10 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         if words.len() != self.inverse_length.len().div_ceil(64) {
             return false;
         }
-        for slot in 0..self.volumes.len() {
-            for k in self.starts[slot]..self.starts[slot + 1] {
+        for site in 0..self.volumes.len() {
+            for k in self.starts[site]..self.starts[site + 1] {
                 if self.inverse_length[k] > 0.0 && words[k / 64] >> (k % 64) & 1 == 0 {
-                    self.neighbours[k] = slot as u32;
+                    self.neighbours[k] = site as u32;
                     self.inverse_length[k] = 0.0;
                     self.directed_bonds -= 1;
                 }
@@ -293,7 +293,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         let bonds = self.neighbours.len() * (4 + 8) + self.weights.len() * 8;
         bonds
             + self.volumes.len() * (8 * D + 8 + 4 + 4 + 8)
-            + self.factors.as_ref().map_or(0, |f| 8 * D * f.slots())
+            + self.factors.as_ref().map_or(0, |f| 8 * D * f.sites())
     }
 
     fn kind(&self) -> Kind<'_, D> {

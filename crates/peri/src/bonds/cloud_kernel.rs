@@ -32,7 +32,7 @@ pub struct CloudPass<'a, const D: usize, const P: usize, const Q: usize> {
     /// q(0), numerator and denominator of the law in e = λ² − 1.
     pub law: (f64, [f64; P], [f64; Q]),
     /// Ends of the law in e; outside of them q stays what it is there.
-    pub held: [f64; 2],
+    pub clamp: [f64; 2],
 }
 
 impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D, P, Q> {
@@ -87,7 +87,7 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
                         e = simd.mul_add_f64s(eta, simd.add_f64s(zeta[d], xi), e);
                     }
                     e = simd.mul_f64s(e, simd.mul_f64s(inverse, inverse));
-                    let q = law::<S, P, Q>(simd, e, self.held, self.law.0, &self.law.1, &self.law.2);
+                    let q = law::<S, P, Q>(simd, e, self.clamp, self.law.0, &self.law.1, &self.law.2);
                     let q = simd.mul_f64s(q, factor);
                     for d in 0..D {
                         sum[d] = simd.mul_add_f64s(q, zeta[d], sum[d]);

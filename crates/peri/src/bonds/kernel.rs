@@ -9,7 +9,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 /// A kernel with everything it reads in place.
 pub trait Pass<const D: usize> {
-    /// Force densities of the slots `start..start + force[0].len()`; `track` collects the stretches observed.
+    /// Force densities of the sites `start..start + force[0].len()`; `track` collects the stretches observed.
     fn run<S: Simd>(
         &self,
         simd: S,
@@ -44,17 +44,17 @@ pub fn dispatch<const D: usize>(
     Arch::new().dispatch(Call { pass, start, force, track });
 }
 
-/// constant + E·N(E)/D(E) by Horner's rule, E held within two ends.
+/// constant + E·N(E)/D(E) by Horner's rule, E clamped to two ends.
 #[inline(always)]
 pub fn law<S: Simd, const P: usize, const Q: usize>(
     simd: S,
     e: S::f64s,
-    held: [f64; 2],
+    clamp: [f64; 2],
     constant: f64,
     numerator: &[f64; P],
     denominator: &[f64; Q],
 ) -> S::f64s {
-    let e = simd.max_f64s(simd.splat_f64s(held[0]), simd.min_f64s(e, simd.splat_f64s(held[1])));
+    let e = simd.max_f64s(simd.splat_f64s(clamp[0]), simd.min_f64s(e, simd.splat_f64s(clamp[1])));
     let mut n = simd.splat_f64s(numerator[P - 1]);
     for k in (0..P - 1).rev() {
         n = simd.mul_add_f64s(n, e, simd.splat_f64s(numerator[k]));
@@ -70,7 +70,7 @@ pub fn law<S: Simd, const P: usize, const Q: usize>(
     simd.mul_add_f64s(n, e, simd.splat_f64s(constant))
 }
 
-/// A vector of consecutive slots.
+/// A vector of consecutive sites.
 ///
 /// # Safety
 /// `at + lanes ≤ slice.len()`.

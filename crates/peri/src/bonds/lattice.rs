@@ -25,7 +25,7 @@ impl<const D: usize> Stencil<D> {
         let side = (2 * reach + 1) as usize;
         let offsets = (0..side.pow(D as u32))
             .map(|index| {
-                // last axis slowest, so that consecutive offsets read consecutive slots
+                // last axis slowest, so that consecutive offsets read consecutive sites
                 std::array::from_fn(|d| (index / side.pow(d as u32) % side) as i32 - reach)
             })
             .filter(|o: &[i32; D]| {
@@ -42,7 +42,7 @@ impl<const D: usize> Stencil<D> {
     }
 }
 
-/// Steps in slots along each axis, empty slots before the first cell, and all slots of a box of cells.
+/// Steps in sites along each axis, empty sites before the first cell, and all sites of a box of cells.
 fn layout<const D: usize>(cells: [usize; D], ratio: f64) -> ([usize; D], usize, usize) {
     // empty cells between rows, so that nothing within twice the horizon and a cell wraps into the next row: stress
     // measures look that far; odd strides, or rows of a power of two would fall into the same cache sets
@@ -55,7 +55,7 @@ fn layout<const D: usize>(cells: [usize; D], ratio: f64) -> ([usize; D], usize, 
     (strides, guard, (2 * guard + strides[D - 1] * cells[D - 1]).next_multiple_of(TILE))
 }
 
-/// Slots of a box of cells and a horizon over the spacing, as a real number: a thin box has many more than cells.
+/// Sites of a box of cells and a horizon over the spacing, as a real number: a thin box has many more than cells.
 pub fn storage<const D: usize>(cells: [f64; D], ratio: f64) -> f64 {
     // larger boxes need no exact number, and have none
     if cells.iter().product::<f64>() < 1e12 && ratio < 1e3 {
@@ -72,7 +72,7 @@ pub struct LatticeBonds<const D: usize> {
     volume_correction: VolumeCorrection,
     strides: [usize; D],
     guard: usize,
-    slots: usize,
+    sites: usize,
     particles: Vec<u32>,
     intact: Vec<Vec<u64>>,
     classes: Vec<Class>,
@@ -112,17 +112,17 @@ impl<const D: usize> LatticeBonds<D> {
         if stencil.offsets.is_empty() {
             return Err(Error::geometry(format!("a horizon of {ratio} spacings reaches no neighbour")));
         }
-        let (strides, guard, slots) = layout(lattice.cells, ratio);
+        let (strides, guard, sites) = layout(lattice.cells, ratio);
         let mut bonds = Self {
             stencil,
             ratio,
             volume_correction,
             strides,
             guard,
-            slots,
+            sites,
             particles: Vec::new(),
             intact: Vec::new(),
-            classes: vec![Class::Empty; slots / TILE],
+            classes: vec![Class::Empty; sites / TILE],
             factors: None,
             interior_factor: 1.0,
             kernel: None,
@@ -130,7 +130,7 @@ impl<const D: usize> LatticeBonds<D> {
             directed_bonds: 0,
             lattice,
         };
-        bonds.particles = bonds.occupied_slots();
+        bonds.particles = bonds.occupied_sites();
         if bonds.particles.is_empty() {
             return Err(Error::geometry("the body contains no particle".to_owned()));
         }
@@ -160,50 +160,50 @@ impl<const D: usize> LatticeBonds<D> {
         self.volume_correction
     }
 
-    /// Distance in slots of an offset in cells.
+    /// Distance in sites of an offset in cells.
     pub fn shift(&self, offset: [i32; D]) -> isize {
         (0..D).map(|d| self.strides[d] as isize * offset[d] as isize).sum()
     }
 
-    /// Whether bond `k` of the particle in `slot` is intact.
-    pub fn is_intact(&self, slot: usize, k: usize) -> bool {
-        self.intact[k / 64][slot] >> (k % 64) & 1 == 1
+    /// Whether bond `k` of the particle in `site` is intact.
+    pub fn is_intact(&self, site: usize, k: usize) -> bool {
+        self.intact[k / 64][site] >> (k % 64) & 1 == 1
     }
 
-    /// Weight of bond `k` of the particle in `slot`: volume correction × surface correction.
-    pub fn weight(&self, slot: usize, k: usize) -> f64 {
+    /// Weight of bond `k` of the particle in `site`: volume correction × surface correction.
+    pub fn weight(&self, site: usize, k: usize) -> f64 {
         let spacing = self.lattice.spacing;
         let length = self.stencil.length(k) * spacing;
         let volume = self.volume_correction.factor(length, self.horizon(), spacing);
         let Some(factors) = &self.factors else { return volume };
         let offset = self.stencil.offsets[k];
-        let other = slot.wrapping_add_signed(self.shift(offset));
+        let other = site.wrapping_add_signed(self.shift(offset));
         let bond = offset.map(|o| f64::from(o) * spacing);
-        volume * self.interior_factor * surface_weight(bond, length, factors.get(slot), factors.get(other))
+        volume * self.interior_factor * surface_weight(bond, length, factors.get(site), factors.get(other))
     }
 
-    /// Which slots hold a particle.
+    /// Which sites hold a particle.
     pub fn occupancy(&self) -> Vec<bool> {
-        let mut occupied = vec![false; self.slots];
-        for &slot in &self.particles {
-            occupied[slot as usize] = true;
+        let mut occupied = vec![false; self.sites];
+        for &site in &self.particles {
+            occupied[site as usize] = true;
         }
         occupied
     }
 
-    /// The slot of the cell at `offset` from `cell`, if it lies in the box.
+    /// The site of the cell at `offset` from `cell`, if it lies in the box.
     pub fn cell_at(&self, cell: [usize; D], offset: [i32; D]) -> Option<usize> {
         let mut there = [0; D];
         for d in 0..D {
             there[d] =
                 cell[d].checked_add_signed(offset[d] as isize).filter(|&c| c < self.lattice.cells[d])?;
         }
-        Some(self.slot(there))
+        Some(self.site(there))
     }
 
-    /// The cell of a slot, if the slot is one of the box's.
-    pub fn cell_of(&self, slot: usize) -> Option<[usize; D]> {
-        let mut rest = slot.checked_sub(self.guard)?;
+    /// The cell of a site, if the site is one of the box's.
+    pub fn cell_of(&self, site: usize) -> Option<[usize; D]> {
+        let mut rest = site.checked_sub(self.guard)?;
         let mut cell = [0; D];
         for d in (0..D).rev() {
             cell[d] = rest / self.strides[d];
@@ -212,11 +212,11 @@ impl<const D: usize> LatticeBonds<D> {
         (0..D).all(|d| cell[d] < self.lattice.cells[d]).then_some(cell)
     }
 
-    fn slot(&self, cell: [usize; D]) -> usize {
+    fn site(&self, cell: [usize; D]) -> usize {
         self.guard + (0..D).map(|d| self.strides[d] * cell[d]).sum::<usize>()
     }
 
-    fn occupied_slots(&self) -> Vec<u32> {
+    fn occupied_sites(&self) -> Vec<u32> {
         let cells = self.lattice.cells;
         let mut particles: Vec<u32> = (0..self.lattice.occupied.len())
             .filter(|&index| self.lattice.occupied[index])
@@ -227,7 +227,7 @@ impl<const D: usize> LatticeBonds<D> {
                     rest /= cells[d];
                     c
                 });
-                self.slot(cell) as u32
+                self.site(cell) as u32
             })
             .collect();
         particles.sort_unstable();
@@ -237,28 +237,28 @@ impl<const D: usize> LatticeBonds<D> {
     fn connect(&mut self, cuts: &[Cut<D>]) {
         let words = self.stencil.offsets.len().div_ceil(64);
         let occupied = self.occupancy();
-        let bits = |slot: usize| -> Vec<u64> {
+        let bits = |site: usize| -> Vec<u64> {
             let mut bits = vec![0_u64; words];
-            let Some(cell) = self.cell_of(slot).filter(|_| occupied[slot]) else { return bits };
+            let Some(cell) = self.cell_of(site).filter(|_| occupied[site]) else { return bits };
             for (k, offset) in self.stencil.offsets.iter().enumerate() {
                 let there = self.cell_at(cell, *offset).filter(|&there| occupied[there]);
-                if there.is_some_and(|there| !severed(cuts, self.position(slot), self.position(there))) {
+                if there.is_some_and(|there| !severed(cuts, self.position(site), self.position(there))) {
                     bits[k / 64] |= 1 << (k % 64);
                 }
             }
             bits
         };
-        let mut intact = vec![vec![0; self.slots]; words];
-        let mut chunks: Vec<Vec<&mut [u64]>> = (0..self.slots.div_ceil(CHUNK)).map(|_| Vec::new()).collect();
+        let mut intact = vec![vec![0; self.sites]; words];
+        let mut chunks: Vec<Vec<&mut [u64]>> = (0..self.sites.div_ceil(CHUNK)).map(|_| Vec::new()).collect();
         for word in &mut intact {
             for (chunk, part) in chunks.iter_mut().zip(word.chunks_mut(CHUNK)) {
                 chunk.push(part);
             }
         }
         chunks.into_par_iter().enumerate().for_each(|(chunk, mut parts)| {
-            for (index, slot) in chunk_range(chunk, self.slots).enumerate() {
-                if occupied[slot] {
-                    for (part, value) in parts.iter_mut().zip(bits(slot)) {
+            for (index, site) in chunk_range(chunk, self.sites).enumerate() {
+                if occupied[site] {
+                    for (part, value) in parts.iter_mut().zip(bits(site)) {
                         part[index] = value;
                     }
                 }
@@ -274,18 +274,18 @@ impl<const D: usize> LatticeBonds<D> {
         let full: Vec<u64> =
             (0..self.intact.len()).map(|w| u64::MAX >> (64 - (bonds - 64 * w).min(64))).collect();
         let shifts: Vec<isize> = self.stencil.offsets.iter().map(|&o| self.shift(o)).collect();
-        let (intact, factors, guard, slots) = (&self.intact, &self.factors, self.guard, self.slots);
-        let uniform = |slot: usize| {
+        let (intact, factors, guard, sites) = (&self.intact, &self.factors, self.guard, self.sites);
+        let uniform = |site: usize| {
             let Some(factors) = factors else { return true };
             let one = |s: usize| factors.components().iter().all(|g| g[s] == 1.0);
-            one(slot) && shifts.iter().all(|&s| one(slot.wrapping_add_signed(s)))
+            one(site) && shifts.iter().all(|&s| one(site.wrapping_add_signed(s)))
         };
         let class = |tile: usize| {
             let mut range = tile * TILE..(tile + 1) * TILE;
             if range.clone().all(|s| intact.iter().all(|w| w[s] == 0)) {
                 Class::Empty
             } else if range.start >= guard
-                && range.end + guard <= slots
+                && range.end + guard <= sites
                 && range.all(|s| intact.iter().zip(&full).all(|(w, f)| w[s] == *f) && uniform(s))
             {
                 Class::Full
@@ -293,22 +293,22 @@ impl<const D: usize> LatticeBonds<D> {
                 Class::Partial
             }
         };
-        let classes = (0..slots / TILE).into_par_iter().map(class).collect();
+        let classes = (0..sites / TILE).into_par_iter().map(class).collect();
         self.classes = classes;
     }
 }
 
 impl<const D: usize> Bonds<D> for LatticeBonds<D> {
-    fn slots(&self) -> usize {
-        self.slots
+    fn sites(&self) -> usize {
+        self.sites
     }
 
     fn particles(&self) -> &[u32] {
         &self.particles
     }
 
-    fn position(&self, slot: usize) -> [f64; D] {
-        let mut rest = slot - self.guard;
+    fn position(&self, site: usize) -> [f64; D] {
+        let mut rest = site - self.guard;
         let mut position = self.lattice.origin;
         for d in (0..D).rev() {
             position[d] += self.lattice.spacing * (rest / self.strides[d]) as f64;
@@ -317,7 +317,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         position
     }
 
-    fn volume(&self, _slot: usize) -> f64 {
+    fn volume(&self, _site: usize) -> f64 {
         self.lattice.volume
     }
 
@@ -329,46 +329,46 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.lattice.spacing
     }
 
-    fn neighbours(&self, slot: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
+    fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
         let spacing = self.lattice.spacing;
         for (k, &offset) in self.stencil.offsets.iter().enumerate() {
-            if self.is_intact(slot, k) {
+            if self.is_intact(site, k) {
                 let length = self.stencil.length(k) * spacing;
                 let volume =
                     self.lattice.volume * self.volume_correction.factor(length, self.horizon(), spacing);
                 visit(Neighbour {
                     index: k as u32,
-                    slot: slot.wrapping_add_signed(self.shift(offset)),
+                    site: site.wrapping_add_signed(self.shift(offset)),
                     bond: offset.map(|o| f64::from(o) * spacing),
                     length,
                     volume,
-                    weight: self.lattice.volume * self.weight(slot, k),
+                    weight: self.lattice.volume * self.weight(site, k),
                 });
             }
         }
     }
 
-    fn is_bonded(&self, slot: usize, other: usize) -> bool {
-        let (Some(own), Some(there)) = (self.cell_of(slot), self.cell_of(other)) else { return false };
+    fn is_bonded(&self, site: usize, other: usize) -> bool {
+        let (Some(own), Some(there)) = (self.cell_of(site), self.cell_of(other)) else { return false };
         let offset: [i32; D] = std::array::from_fn(|d| there[d] as i32 - own[d] as i32);
         // offsets ascend, last axis slowest
         let found = self.stencil.offsets.binary_search_by(|o| o.iter().rev().cmp(offset.iter().rev()));
-        found.is_ok_and(|k| self.is_intact(slot, k))
+        found.is_ok_and(|k| self.is_intact(site, k))
     }
 
-    fn is_alone(&self, slot: usize) -> bool {
-        self.intact.iter().all(|words| words[slot] == 0)
+    fn is_alone(&self, site: usize) -> bool {
+        self.intact.iter().all(|words| words[site] == 0)
     }
 
     fn one_sided(&self) -> Option<[usize; 2]> {
         let opposite = self.stencil.offsets.len() - 1;
         let shifts: Vec<isize> = self.stencil.offsets.iter().map(|&o| self.shift(o)).collect();
-        self.particles.par_iter().find_map_first(|&slot| {
-            let slot = slot as usize;
-            let there = |k: usize| slot.wrapping_add_signed(shifts[k]);
+        self.particles.par_iter().find_map_first(|&site| {
+            let site = site as usize;
+            let there = |k: usize| site.wrapping_add_signed(shifts[k]);
             let lone = (0..=opposite)
-                .find(|&k| self.is_intact(slot, k) && !self.is_intact(there(k), opposite - k))?;
-            Some([slot, there(lone)])
+                .find(|&k| self.is_intact(site, k) && !self.is_intact(there(k), opposite - k))?;
+            Some([site, there(lone)])
         })
     }
 
@@ -397,15 +397,15 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
             .particles
             .iter()
             .map(|&s| s as usize)
-            .find(|&slot| (0..self.stencil.offsets.len()).all(|k| self.is_intact(slot, k)));
-        self.interior_factor = interior.map_or(1.0, |slot| factors.get(slot)[0]);
-        for slot in 0..self.slots {
-            let relative = factors.get(slot).map(|g| {
+            .find(|&site| (0..self.stencil.offsets.len()).all(|k| self.is_intact(site, k)));
+        self.interior_factor = interior.map_or(1.0, |site| factors.get(site)[0]);
+        for site in 0..self.sites {
+            let relative = factors.get(site).map(|g| {
                 let g = g / self.interior_factor;
                 // the same up to rounding of the sums: exactly the interior value
                 if g == 0.0 || (g - 1.0).abs() < 1e-12 { 1.0 } else { g }
             });
-            factors.set(slot, relative);
+            factors.set(site, relative);
         }
         self.factors = Some(factors);
         self.classify();
@@ -418,7 +418,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        let start = chunk_range(chunk, self.slots).start;
+        let start = chunk_range(chunk, self.sites).start;
         if let Some(kernel) = &self.kernel {
             let tiles = Tiles {
                 displacement: displacement.components(),
@@ -435,11 +435,11 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
 
     fn sever(&mut self, bonds: &[Overstretched]) {
         for bond in bonds {
-            let (slot, k) = (bond.slot as usize, bond.index as usize);
-            self.intact[k / 64][slot] &= !(1 << (k % 64));
+            let (site, k) = (bond.site as usize, bond.index as usize);
+            self.intact[k / 64][site] &= !(1 << (k % 64));
         }
         self.directed_bonds -= bonds.len() as u64;
-        let mut tiles: Vec<usize> = bonds.iter().map(|bond| bond.slot as usize / TILE).collect();
+        let mut tiles: Vec<usize> = bonds.iter().map(|bond| bond.site as usize / TILE).collect();
         tiles.dedup();
         for tile in tiles {
             let empty = (tile * TILE..(tile + 1) * TILE).all(|s| self.intact.iter().all(|w| w[s] == 0));
@@ -452,10 +452,10 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     }
 
     fn restore(&mut self, words: &[u64]) -> bool {
-        if words.len() != self.intact.len() * self.slots {
+        if words.len() != self.intact.len() * self.sites {
             return false;
         }
-        for (own, saved) in self.intact.iter_mut().zip(words.chunks(self.slots)) {
+        for (own, saved) in self.intact.iter_mut().zip(words.chunks(self.sites)) {
             for (own, saved) in own.iter_mut().zip(saved) {
                 *own &= saved;
             }
@@ -470,8 +470,8 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     }
 
     fn bytes(&self) -> usize {
-        let factors = self.factors.as_ref().map_or(0, |_| D * self.slots * 8);
-        self.slots * 8 * self.intact.len() + self.classes.len() + self.particles.len() * 4 + factors
+        let factors = self.factors.as_ref().map_or(0, |_| D * self.sites * 8);
+        self.sites * 8 * self.intact.len() + self.classes.len() + self.particles.len() * 4 + factors
     }
 
     fn kind(&self) -> Kind<'_, D> {

@@ -4,21 +4,21 @@ use super::kernel::{Pass, law, load};
 use crate::potential::StretchRange;
 use pulp::Simd;
 
-/// Slots per tile: the unit of the lattice kernel's classification. Storage is padded to a multiple of it.
+/// Sites per tile: the unit of the lattice kernel's classification. Storage is padded to a multiple of it.
 pub const TILE: usize = 16;
 
 /// One bond of the stencil with the law's coefficients scaled to its length and stiffness, for `P` numerator and
 /// `Q` denominator coefficients: q·c = E·ΣₖaₖEᵏ/(1 + ΣₖbₖEᵏ⁺¹), E = η·(2ξ + η).
 #[derive(Clone, Copy, Debug)]
 pub struct Row<const D: usize, const P: usize, const Q: usize> {
-    /// Distance to the neighbour in slots.
+    /// Distance to the neighbour in sites.
     pub shift: isize,
     /// Reference bond ξ.
     pub bond: [f64; D],
     /// 1/|ξ|².
     pub inverse_square: f64,
     /// Ends of the law in E; outside of them q stays what it is there.
-    pub held: [f64; 2],
+    pub clamp: [f64; 2],
     /// Value at E = 0 (0 for stress-free laws).
     pub constant: f64,
     /// Scaled numerator.
@@ -43,13 +43,13 @@ pub enum Class {
 pub struct Tiles<'a, const D: usize> {
     /// Displacement.
     pub displacement: [&'a [f64]; D],
-    /// Bit k of word w at a slot: bond 64w + k is intact.
+    /// Bit k of word w at a site: bond 64w + k is intact.
     pub intact: &'a [Vec<u64>],
     /// Class of each tile.
     pub classes: &'a [Class],
     /// Per-particle correction factors g (see [`super::correction`]), where the scene asks for them.
     pub factors: Option<[&'a [f64]; D]>,
-    /// Largest |shift|: slots closer than this to either end hold no particle.
+    /// Largest |shift|: sites closer than this to either end hold no particle.
     pub guard: usize,
 }
 
@@ -73,16 +73,16 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_,
     ) {
         let length = force[0].len();
         // SAFETY of the unchecked loads below: a tile is visited only where `classes` says that it holds a bond,
-        // and then every slot of it lies at least `guard` ≥ max|shift| from both ends of every slice.
+        // and then every site of it lies at least `guard` ≥ max|shift| from both ends of every slice.
         assert!(start.is_multiple_of(TILE) && length.is_multiple_of(TILE));
-        let slots = self.tiles.displacement[0].len();
-        assert!(start + length <= slots && self.tiles.displacement.iter().all(|c| c.len() == slots));
+        let sites = self.tiles.displacement[0].len();
+        assert!(start + length <= sites && self.tiles.displacement.iter().all(|c| c.len() == sites));
         assert!(force.iter().all(|f| f.len() == length));
         assert!(
-            self.tiles.intact.iter().all(|w| w.len() == slots)
+            self.tiles.intact.iter().all(|w| w.len() == sites)
                 && self.tiles.intact.len() * 64 >= self.rows.len()
         );
-        assert!(self.tiles.factors.is_none_or(|g| g.iter().all(|c| c.len() == slots)));
+        assert!(self.tiles.factors.is_none_or(|g| g.iter().all(|c| c.len() == sites)));
         assert!(self.rows.iter().all(|r| r.shift.unsigned_abs() <= self.tiles.guard));
         let mut seen = StretchRange::REST;
         let tracking = track.is_some();
@@ -95,7 +95,7 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_,
                 }
                 continue;
             }
-            assert!(base >= self.tiles.guard && base + TILE + self.tiles.guard <= slots);
+            assert!(base >= self.tiles.guard && base + TILE + self.tiles.guard <= sites);
             let lanes = S::F64_LANES;
             let pair = 2 * lanes <= TILE;
             let step = if pair { 2 * lanes } else { lanes };
@@ -131,7 +131,7 @@ impl<const D: usize, const P: usize, const Q: usize> LatticePass<'_, D, P, Q> {
     /// Every bond present: nothing but loads and arithmetic.
     ///
     /// # Safety
-    /// Slots `base − guard .. base + V·lanes + guard` exist in every slice; `out` takes V·lanes values.
+    /// Sites `base − guard .. base + V·lanes + guard` exist in every slice; `out` takes V·lanes values.
     #[inline(always)]
     unsafe fn full<S: Simd, const V: usize>(&self, simd: S, base: usize, out: [*mut f64; D]) {
         let zero = simd.splat_f64s(0.0);
@@ -152,7 +152,7 @@ impl<const D: usize, const P: usize, const Q: usize> LatticePass<'_, D, P, Q> {
                     zeta[d] = simd.add_f64s(eta[d], simd.splat_f64s(row.bond[d]));
                 }
                 let e = elongation::<S, D>(simd, &eta, &zeta, &row.bond);
-                let q = law::<S, P, Q>(simd, e, row.held, row.constant, &row.numerator, &row.denominator);
+                let q = law::<S, P, Q>(simd, e, row.clamp, row.constant, &row.numerator, &row.denominator);
                 for d in 0..D {
                     sum[d][v] = simd.mul_add_f64s(q, zeta[d], sum[d][v]);
                 }
@@ -199,7 +199,8 @@ impl<const D: usize, const P: usize, const Q: usize> LatticePass<'_, D, P, Q> {
                     zeta[d] = simd.add_f64s(eta[d], simd.splat_f64s(row.bond[d]));
                 }
                 let e = elongation::<S, D>(simd, &eta, &zeta, &row.bond);
-                let mut q = law::<S, P, Q>(simd, e, row.held, row.constant, &row.numerator, &row.denominator);
+                let mut q =
+                    law::<S, P, Q>(simd, e, row.clamp, row.constant, &row.numerator, &row.denominator);
                 if let Some(factors) = self.tiles.factors {
                     let weight = unsafe {
                         directional_weight::<S, D>(simd, factors, base, there, &row.bond, row.inverse_square)

@@ -28,8 +28,8 @@ use rayon::prelude::*;
 /// A neighbour J of a particle I, as set-up code sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Neighbour<const D: usize> {
-    /// Slot of J.
-    pub slot: usize,
+    /// Site of J.
+    pub site: usize,
     /// Number of this bond among those of I, intact or not.
     pub index: u32,
     /// Reference bond ξ = X_J − X_I, m.
@@ -53,39 +53,39 @@ pub enum Kind<'a, const D: usize> {
 /// The bonds of a body of dimension `D`: its particles, who is bonded to whom, and the kernels of bond laws. Whatever else acts
 /// along bonds is a [`crate::material::Material`].
 pub trait Bonds<const D: usize>: Send + Sync {
-    /// Storage slots; fields have this length.
-    fn slots(&self) -> usize;
-    /// Slots that hold a particle, ascending.
+    /// Storage sites; fields have this length.
+    fn sites(&self) -> usize;
+    /// Sites that hold a particle, ascending.
     fn particles(&self) -> &[u32];
-    /// Reference position of the particle in a slot, m.
-    fn position(&self, slot: usize) -> [f64; D];
-    /// Volume of the particle in a slot, m³.
-    fn volume(&self, slot: usize) -> f64;
+    /// Reference position of the particle in a site, m.
+    fn position(&self, site: usize) -> [f64; D];
+    /// Volume of the particle in a site, m³.
+    fn volume(&self, site: usize) -> f64;
     /// Horizon δ, m.
     fn horizon(&self) -> f64;
     /// Distance of neighbouring particles (of a cloud: the cube or square root of the mean volume), m.
     fn spacing(&self) -> f64;
-    /// Visits the intact bonds of a slot.
-    fn neighbours(&self, slot: usize, visit: &mut dyn FnMut(Neighbour<D>));
-    /// Whether an intact bond leads from a slot to another.
-    fn is_bonded(&self, slot: usize, other: usize) -> bool {
+    /// Visits the intact bonds of a site.
+    fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>));
+    /// Whether an intact bond leads from a site to another.
+    fn is_bonded(&self, site: usize, other: usize) -> bool {
         let mut bonded = false;
-        self.neighbours(slot, &mut |bond| bonded |= bond.slot == other);
+        self.neighbours(site, &mut |bond| bonded |= bond.site == other);
         bonded
     }
-    /// Whether a slot has no intact bond.
-    fn is_alone(&self, slot: usize) -> bool {
+    /// Whether a site has no intact bond.
+    fn is_alone(&self, site: usize) -> bool {
         let mut alone = true;
-        self.neighbours(slot, &mut |_| alone = false);
+        self.neighbours(site, &mut |_| alone = false);
         alone
     }
-    /// The slots of a bond that only the first of them has; `None` where every family is symmetric, as it must be.
+    /// The sites of a bond that only the first of them has; `None` where every family is symmetric, as it must be.
     fn one_sided(&self) -> Option<[usize; 2]> {
-        self.particles().par_iter().find_map_first(|&slot| {
+        self.particles().par_iter().find_map_first(|&site| {
             let mut lone = None;
-            self.neighbours(slot as usize, &mut |bond| {
-                if lone.is_none() && !self.is_bonded(bond.slot, slot as usize) {
-                    lone = Some([slot as usize, bond.slot]);
+            self.neighbours(site as usize, &mut |bond| {
+                if lone.is_none() && !self.is_bonded(bond.site, site as usize) {
+                    lone = Some([site as usize, bond.site]);
                 }
             });
             lone
@@ -93,7 +93,7 @@ pub trait Bonds<const D: usize>: Send + Sync {
     }
     /// Sets the bond law q(e) and its modulus kθ, N/m⁶.
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
-    /// Sets per-particle surface-correction factors (one field of `D` components over the slots).
+    /// Sets per-particle surface-correction factors (one field of `D` components over the sites).
     fn set_factors(&mut self, factors: Field<D>);
     /// Force densities Σ_J f V_J, N/m³, of work item `chunk`; collects the stretches observed if asked.
     fn force(
@@ -124,15 +124,15 @@ pub trait Bonds<const D: usize>: Send + Sync {
 /// Refuses a body in which a bond pulls at one of its ends only: its forces would not sum to zero.
 fn refuse_one_sided<const D: usize>(bonds: &dyn Bonds<D>) -> Result<(), Error> {
     let Some(pair) = bonds.one_sided() else { return Ok(()) };
-    let [here, there] = pair.map(|slot| bonds.position(slot));
+    let [here, there] = pair.map(|site| bonds.position(site));
     Err(Error::geometry(format!("the bond from {here:?} to {there:?} m has no counterpart")))
 }
 
 /// Force densities of the whole body, N/m³.
 pub fn force<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B, displacement: &Field<D>, force: &mut Field<D>) {
-    let slots = bonds.slots();
+    let sites = bonds.sites();
     force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
-        debug_assert_eq!(chunk_range(chunk, slots).len(), out[0].len());
+        debug_assert_eq!(chunk_range(chunk, sites).len(), out[0].len());
         bonds.force(displacement, chunk, &mut out, None);
     });
 }
@@ -142,11 +142,11 @@ pub fn stretch_range<const D: usize, B: Bonds<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
 ) -> StretchRange {
-    let slots = bonds.slots();
-    (0..slots.div_ceil(CHUNK))
+    let sites = bonds.sites();
+    (0..sites.div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
-            let length = chunk_range(chunk, slots).len();
+            let length = chunk_range(chunk, sites).len();
             let mut scratch = vec![0.0; D * length];
             let mut parts = scratch.chunks_mut(length);
             let mut out: [&mut [f64]; D] = std::array::from_fn(|_| parts.next().unwrap_or_default());
@@ -177,7 +177,7 @@ fn plain_force<const D: usize>(
         let own = displacement.get(start + offset);
         let mut sum = [0.0; D];
         bonds.neighbours(start + offset, &mut |bond| {
-            let other = displacement.get(bond.slot);
+            let other = displacement.get(bond.site);
             let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
             let square = bond.length * bond.length;
             let e = (0..D).map(|d| eta[d] * (2.0 * bond.bond[d] + eta[d])).sum::<f64>() / square;
@@ -248,12 +248,12 @@ mod tests {
             CloudBonds::new(&points, &[1.0; 30], 1.0, 3.015, VolumeCorrection::None, &[]).unwrap();
         for bonds in [&mut regular as &mut dyn Bonds<2>, &mut cloud] {
             assert_eq!(bonds.one_sided(), None);
-            let slot = bonds.particles()[7];
+            let site = bonds.particles()[7];
             let mut index = None;
-            bonds.neighbours(slot as usize, &mut |bond| index = index.or(Some(bond.index)));
+            bonds.neighbours(site as usize, &mut |bond| index = index.or(Some(bond.index)));
             let index = index.unwrap();
-            bonds.sever(&[Overstretched { slot, index, elongation: 0.0, length: 1.0, weight: 1.0 }]);
-            assert_eq!(bonds.one_sided().map(|pair| pair[1]), Some(slot as usize));
+            bonds.sever(&[Overstretched { site, index, elongation: 0.0, length: 1.0, weight: 1.0 }]);
+            assert_eq!(bonds.one_sided().map(|pair| pair[1]), Some(site as usize));
             assert!(refuse_one_sided(bonds).unwrap_err().to_string().contains("no counterpart"));
         }
     }
@@ -274,25 +274,25 @@ mod tests {
             CloudBonds::new(&points, &[1.0; 30], 1.0, 3.015, VolumeCorrection::None, &[]).unwrap();
         for bonds in [&mut regular as &mut dyn Bonds<2>, &mut cloud] {
             bonds.set_law(&fit, 0.7);
-            let mut displacement = Field::zeros(bonds.slots());
-            for &slot in bonds.particles() {
-                let [x, y] = bonds.position(slot as usize);
-                displacement.set(slot as usize, [20.0 * x + 0.1 * y, 0.3 * (x * y).sin()]);
+            let mut displacement = Field::zeros(bonds.sites());
+            for &site in bonds.particles() {
+                let [x, y] = bonds.position(site as usize);
+                displacement.set(site as usize, [20.0 * x + 0.1 * y, 0.3 * (x * y).sin()]);
             }
-            let mut found = Field::zeros(bonds.slots());
+            let mut found = Field::zeros(bonds.sites());
             force(bonds, &displacement, &mut found);
-            for &slot in bonds.particles() {
-                let own = displacement.get(slot as usize);
+            for &site in bonds.particles() {
+                let own = displacement.get(site as usize);
                 let (mut exact, mut scale) = ([0.0; 2], 0.0_f64);
-                bonds.neighbours(slot as usize, &mut |bond| {
-                    let other = displacement.get(bond.slot);
+                bonds.neighbours(site as usize, &mut |bond| {
+                    let other = displacement.get(bond.site);
                     let zeta: [f64; 2] = std::array::from_fn(|d| bond.bond[d] + other[d] - own[d]);
                     let length = zeta[0].hypot(zeta[1]);
                     let t = 2.0 * 0.7 * law.tension(length / bond.length);
                     scale = scale.max(t.abs());
                     exact = std::array::from_fn(|d| exact[d] + t * zeta[d] / length);
                 });
-                let found = found.get(slot as usize);
+                let found = found.get(site as usize);
                 // 28 bonds, each within the fit's bound of the largest
                 assert!(
                     (0..2).all(|d| (found[d] - exact[d]).abs() < 28.0 * 1e-9 * scale),

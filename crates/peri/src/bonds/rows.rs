@@ -6,10 +6,10 @@ use super::lattice_kernel::{LatticePass, Row, Tiles};
 use crate::potential::{KernelFit, StretchRange};
 use std::any::Any;
 
-/// One bond of the stencil: its distance in slots, ξ, and its stiffness 2kθ w V/|ξ|.
+/// One bond of the stencil: its distance in sites, ξ, and its stiffness 2kθ w V/|ξ|.
 #[derive(Clone, Copy, Debug)]
 pub struct StencilBond<const D: usize> {
-    /// Distance to the neighbour in slots.
+    /// Distance to the neighbour in sites.
     pub shift: isize,
     /// Reference bond.
     pub bond: [f64; D],
@@ -65,13 +65,13 @@ impl<const D: usize, const P: usize, const Q: usize> CloudKernel<D> for CloudLaw
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        dispatch(CloudPass { data, law: self.0, held: self.1 }, start, force, track);
+        dispatch(CloudPass { data, law: self.0, clamp: self.1 }, start, force, track);
     }
 }
 
 /// q(e) = constant + e·M(e)/(1 + Σ bₖ eᵏ⁺¹), the one form the kernels know.
 struct Rational {
-    held: [f64; 2],
+    clamp: [f64; 2],
     constant: f64,
     numerator: Vec<f64>,
     denominator: Vec<f64>,
@@ -85,14 +85,14 @@ impl Rational {
         }
         let denominator = denominator.clone();
         if *stress_free {
-            return Some(Self { held: fit.held, constant: 0.0, numerator: numerator.clone(), denominator });
+            return Some(Self { clamp: fit.clamp, constant: 0.0, numerator: numerator.clone(), denominator });
         }
         // N/D = q₀ + e·M/D with M = (N − q₀ D)/e
         let constant = numerator[0];
         let length = (numerator.len() - 1).max(denominator.len()).max(1);
         let at = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(0.0);
         let numerator = (0..length).map(|k| at(numerator, k + 1) - constant * at(&denominator, k)).collect();
-        Some(Self { held: fit.held, constant, numerator, denominator })
+        Some(Self { clamp: fit.clamp, constant, numerator, denominator })
     }
 }
 
@@ -169,7 +169,7 @@ fn lattice_rows<const D: usize, const P: usize, const Q: usize>(
             shift: bond.shift,
             bond: bond.bond,
             inverse_square,
-            held: law.held.map(|e| e / inverse_square),
+            clamp: law.clamp.map(|e| e / inverse_square),
             constant: law.constant * bond.stiffness,
             numerator: padded(&law.numerator, |k| bond.stiffness * scale(k)),
             denominator: padded(&law.denominator, scale),
@@ -180,5 +180,5 @@ fn lattice_rows<const D: usize, const P: usize, const Q: usize>(
 
 fn cloud_law<const D: usize, const P: usize, const Q: usize>(law: &Rational) -> Box<dyn CloudKernel<D>> {
     let coefficients = (law.constant, padded(&law.numerator, |_| 1.0), padded(&law.denominator, |_| 1.0));
-    Box::new(CloudLaw::<P, Q>(coefficients, law.held))
+    Box::new(CloudLaw::<P, Q>(coefficients, law.clamp))
 }

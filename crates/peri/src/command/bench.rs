@@ -148,7 +148,7 @@ fn measure_bonds<const D: usize>(
     rows: &mut Vec<Measurement>,
 ) -> Result<(), Failure> {
     let (fit, displacement) = kernel::loaded(bonds, law, range)?;
-    let mut out = Field::zeros(bonds.slots());
+    let mut out = Field::zeros(bonds.sites());
     force(bonds, &displacement, &mut out);
     // at least 20 ms a measurement
     let start = Instant::now();
@@ -171,7 +171,7 @@ fn measure_bonds<const D: usize>(
     rows.push(Measurement { what: what.clone(), size, threads, value: rate, unit: "directed bonds/s" });
     if law == Law::Linear || path == "list" {
         // bonds and particles; displacement, velocity, force and mass of the solver
-        let solver = bonds.slots() * 8 * (3 * D + 1);
+        let solver = bonds.sites() * 8 * (3 * D + 1);
         let bytes = (bonds.bytes() + solver) as f64 / size as f64;
         rows.push(Measurement {
             what: format!("{D}D {path} memory"),

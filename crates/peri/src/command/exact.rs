@@ -1,6 +1,6 @@
 //! `peri exact`: closed forms and law constants on the terminal.
 
-use crate::critical::Reading;
+use crate::critical::Interpretation;
 use crate::potential::{Chain, KernelFit, Law};
 use crate::run::Failure;
 use crate::{calibrate, exact};
@@ -163,7 +163,7 @@ fn print_law(name: LawName, links: f64, dissociation: f64, to: f64) -> Result<()
             top.stretch,
             top.force
         );
-        for reading in Reading::ALL {
+        for reading in Interpretation::ALL {
             polycore::say!(
                 "critical stretch of 1.2 √n̄ read as {reading:?}: {:.4}",
                 reading.stretch(1.2, links)

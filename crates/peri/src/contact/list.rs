@@ -32,7 +32,7 @@ pub struct List<const D: usize> {
 
 /// A particle that others are near to.
 pub struct Listed {
-    pub slot: u32,
+    pub site: u32,
     /// Ends of its candidates, of which the first begin where those of the particle before it end.
     end: usize,
     pub volume: f64,
@@ -43,7 +43,7 @@ pub struct Listed {
 /// A particle near another, seen from there.
 #[derive(Clone, Copy)]
 pub struct Candidate<const D: usize> {
-    pub slot: u32,
+    pub site: u32,
     /// ξ, m.
     bond: [f64; D],
     /// d, m.
@@ -54,14 +54,14 @@ pub struct Candidate<const D: usize> {
 impl<const D: usize> List<D> {
     /// Of the undeformed body.
     pub fn new(bonds: &dyn Bonds<D>, gap: f64) -> Self {
-        let volumes: Vec<f64> = bonds.particles().iter().map(|&slot| bonds.volume(slot as usize)).collect();
+        let volumes: Vec<f64> = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).collect();
         let mean = volumes.iter().sum::<f64>() / volumes.len() as f64;
         let alike = volumes.iter().all(|&volume| volume == volumes[0]);
         let radius = |volume: f64| 0.5 * bonds.spacing() * (volume / mean).powf(1.0 / D as f64);
         let (mut radii, mut largest) = (Vec::new(), 0.5 * bonds.spacing());
         if !alike {
-            radii = vec![0.0; bonds.slots()];
-            bonds.particles().iter().zip(volumes).for_each(|(&slot, v)| radii[slot as usize] = radius(v));
+            radii = vec![0.0; bonds.sites()];
+            bonds.particles().iter().zip(volumes).for_each(|(&site, v)| radii[site as usize] = radius(v));
             largest = radii.iter().copied().fold(0.0, f64::max);
         }
         let mut list = Self {
@@ -75,7 +75,7 @@ impl<const D: usize> List<D> {
             alone: Vec::new(),
             rebuilds: 0,
         };
-        list.rebuild(bonds, &Field::zeros(bonds.slots()));
+        list.rebuild(bonds, &Field::zeros(bonds.sites()));
         list
     }
 
@@ -90,9 +90,9 @@ impl<const D: usize> List<D> {
         // a little less, for rounding
         let limit = (0.49 * self.skin).powi(2);
         let (now, then) = (displacement.components(), self.listed_at.components());
-        let slots = bonds.slots();
+        let sites = bonds.sites();
         let moved = |chunk: usize| {
-            let range = chunk_range(chunk, slots);
+            let range = chunk_range(chunk, sites);
             let mut square = [0.0; CHUNK];
             for d in 0..D {
                 let parts = now[d][range.clone()].iter().zip(&then[d][range.clone()]);
@@ -101,8 +101,8 @@ impl<const D: usize> List<D> {
             // NaN has moved, too
             !square[..range.len()].iter().all(|&s| s <= limit)
         };
-        let stale = self.skin == 0.0 || self.listed_at.slots() != slots;
-        if stale || (0..slots.div_ceil(CHUNK)).into_par_iter().any(moved) {
+        let stale = self.skin == 0.0 || self.listed_at.sites() != sites;
+        if stale || (0..sites.div_ceil(CHUNK)).into_par_iter().any(moved) {
             self.rebuild(bonds, displacement);
         }
     }
@@ -113,16 +113,16 @@ impl<const D: usize> List<D> {
         let reach = self.gap + self.skin;
         let edge = 2.0 * OF_RADII * self.largest + reach;
         let far = FAR * edge;
-        let place = |&slot: &u32| {
-            let (position, moved) = (bonds.position(slot as usize), displacement.get(slot as usize));
+        let place = |&site: &u32| {
+            let (position, moved) = (bonds.position(site as usize), displacement.get(site as usize));
             std::array::from_fn(|d| (position[d] + moved[d]).clamp(-far, far))
         };
         let places: Vec<[f64; D]> = particles.par_iter().map(place).collect();
         let grid = CellGrid::with_edge(&places, edge);
         let near = |own: usize, found: &mut Vec<u32>| {
             found.clear();
-            let slot = particles[own] as usize;
-            let radius = OF_RADII * (self.radius(slot) + self.largest) + reach;
+            let site = particles[own] as usize;
+            let radius = OF_RADII * (self.radius(site) + self.largest) + reach;
             // a little more: far from the origin places are rounded to 2⁻¹⁴ of an edge
             grid.near(places[own], radius + 1e-3 * edge, |other| {
                 if other != own {
@@ -134,19 +134,19 @@ impl<const D: usize> List<D> {
         let of = |part: usize| {
             let (mut listed, mut candidates, mut found) = (Vec::new(), Vec::new(), Vec::new());
             for own in chunk_range(part, particles.len()) {
-                let slot = particles[own] as usize;
+                let site = particles[own] as usize;
                 near(own, &mut found);
                 let before = candidates.len();
                 for &other in &found {
-                    let candidate = self.candidate(bonds, slot, other as usize);
-                    let (_, r) = candidate.apart(displacement, slot);
-                    if r < candidate.distance + reach && !bonds.is_bonded(slot, other as usize) {
+                    let candidate = self.candidate(bonds, site, other as usize);
+                    let (_, r) = candidate.apart(displacement, site);
+                    if r < candidate.distance + reach && !bonds.is_bonded(site, other as usize) {
                         candidates.push(candidate);
                     }
                 }
                 if candidates.len() > before {
-                    let (volume, alone) = (bonds.volume(slot), bonds.is_alone(slot));
-                    listed.push(Listed { slot: slot as u32, end: candidates.len(), volume, alone });
+                    let (volume, alone) = (bonds.volume(site), bonds.is_alone(site));
+                    listed.push(Listed { site: site as u32, end: candidates.len(), volume, alone });
                 }
             }
             (listed, candidates)
@@ -160,26 +160,26 @@ impl<const D: usize> List<D> {
             self.listed.extend(listed.into_iter().map(|own| Listed { end: before + own.end, ..own }));
             self.candidates.extend(candidates);
         }
-        self.alone = particles.iter().copied().filter(|&slot| bonds.is_alone(slot as usize)).collect();
+        self.alone = particles.iter().copied().filter(|&site| bonds.is_alone(site as usize)).collect();
         self.listed_at.clone_from(displacement);
         self.rebuilds += 1;
     }
 
-    fn radius(&self, slot: usize) -> f64 {
-        self.radii.get(slot).copied().unwrap_or(self.largest)
+    fn radius(&self, site: usize) -> f64 {
+        self.radii.get(site).copied().unwrap_or(self.largest)
     }
 
-    fn candidate(&self, bonds: &dyn Bonds<D>, slot: usize, other: usize) -> Candidate<D> {
-        let (here, there) = (bonds.position(slot), bonds.position(other));
+    fn candidate(&self, bonds: &dyn Bonds<D>, site: usize, other: usize) -> Candidate<D> {
+        let (here, there) = (bonds.position(site), bonds.position(other));
         let bond: [f64; D] = std::array::from_fn(|d| there[d] - here[d]);
         let distance =
-            (OF_REFERENCE * length(&bond)).min(OF_RADII * (self.radius(slot) + self.radius(other)));
-        Candidate { slot: other as u32, bond, distance, volume: bonds.volume(other) }
+            (OF_REFERENCE * length(&bond)).min(OF_RADII * (self.radius(site) + self.radius(other)));
+        Candidate { site: other as u32, bond, distance, volume: bonds.volume(other) }
     }
 
     /// The particles of a work item that have candidates, with them.
     pub fn in_chunk(&self, chunk: usize) -> impl Iterator<Item = (&Listed, &[Candidate<D>])> {
-        let at = |chunk: usize| self.listed.partition_point(|own| (own.slot as usize) < chunk * CHUNK);
+        let at = |chunk: usize| self.listed.partition_point(|own| (own.site as usize) < chunk * CHUNK);
         (at(chunk)..at(chunk + 1)).map(|k| {
             let start = k.checked_sub(1).map_or(0, |before| self.listed[before].end);
             (&self.listed[k], &self.candidates[start..self.listed[k].end])
@@ -200,7 +200,7 @@ pub struct Touch<const D: usize> {
 impl<const D: usize> Candidate<D> {
     /// ζ and r; both have the same bits from either side, but for the sign of ζ.
     pub fn apart(&self, displacement: &Field<D>, own: usize) -> ([f64; D], f64) {
-        let (here, there) = (displacement.get(own), displacement.get(self.slot as usize));
+        let (here, there) = (displacement.get(own), displacement.get(self.site as usize));
         let zeta = std::array::from_fn(|d| self.bond[d] + (there[d] - here[d]));
         (zeta, length(&zeta))
     }

@@ -68,7 +68,7 @@ impl<const D: usize> Contact<D> {
                 return Err(Error::Parameter { name, found, allowed: allowed.into() });
             }
         }
-        let volumes = bonds.particles().iter().map(|&slot| bonds.volume(slot as usize));
+        let volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize));
         let near = NEAR * bonds.spacing();
         Ok(Self {
             stiffness: stiffness * 6.0 * modulus / bonds.horizon(),
@@ -109,7 +109,7 @@ impl<const D: usize> Contact<D> {
     pub fn force(&self, displacement: &Field<D>, chunk: usize, force: &mut [&mut [f64]; D]) {
         for (own, candidates) in self.list.in_chunk(chunk) {
             let mut sum = None;
-            for touch in candidates.iter().filter_map(|c| c.touch(displacement, own.slot as usize)) {
+            for touch in candidates.iter().filter_map(|c| c.touch(displacement, own.site as usize)) {
                 let push = self.stiffness * touch.overlap * touch.volume;
                 let sum = sum.get_or_insert([0.0; D]);
                 for d in 0..D {
@@ -119,7 +119,7 @@ impl<const D: usize> Contact<D> {
             // what is listed but does not touch must not even turn −0 into 0
             let Some(sum) = sum else { continue };
             for d in 0..D {
-                force[d][own.slot as usize - chunk * CHUNK] += sum[d];
+                force[d][own.site as usize - chunk * CHUNK] += sum[d];
             }
         }
     }
@@ -131,8 +131,8 @@ impl<const D: usize> Contact<D> {
             let mut part = none;
             for (own, candidates) in self.list.in_chunk(chunk) {
                 for candidate in candidates {
-                    let Some(touch) = candidate.touch(displacement, own.slot as usize) else { continue };
-                    part.pairs += u64::from(own.slot < candidate.slot);
+                    let Some(touch) = candidate.touch(displacement, own.site as usize) else { continue };
+                    part.pairs += u64::from(own.site < candidate.site);
                     part.overlap = part.overlap.max(touch.overlap / candidate.distance);
                     // half of a pair's from either side
                     part.energy +=
@@ -142,7 +142,7 @@ impl<const D: usize> Contact<D> {
             part
         };
         let parts: Vec<Touching> =
-            (0..displacement.slots().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+            (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
         parts.into_iter().fold(none, |a, b| Touching {
             pairs: a.pairs + b.pairs,
             overlap: a.overlap.max(b.overlap),
@@ -155,12 +155,12 @@ impl<const D: usize> Contact<D> {
     pub fn greatest_stiffness(&self, displacement: &Field<D>) -> f64 {
         let of = |chunk: usize| {
             let sums = self.list.in_chunk(chunk).map(|(own, candidates)| {
-                let touches = candidates.iter().filter_map(|c| c.touch(displacement, own.slot as usize));
+                let touches = candidates.iter().filter_map(|c| c.touch(displacement, own.site as usize));
                 touches.map(|touch| self.stiffness * touch.volume).sum::<f64>()
             });
             sums.fold(0.0, f64::max)
         };
-        (0..displacement.slots().div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max)
+        (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max)
     }
 
     /// κ(c/δ) V of the largest particle: the least that [`Contact::greatest_stiffness`] is where anything touches, if all
@@ -177,7 +177,7 @@ impl<const D: usize> Contact<D> {
         let of = |own: &Listed, candidates: &[Candidate<D>]| {
             let mut sum = 0.0;
             for candidate in candidates {
-                let (zeta, r) = candidate.apart(displacement, own.slot as usize);
+                let (zeta, r) = candidate.apart(displacement, own.site as usize);
                 if r < candidate.distance + self.near {
                     let mut mixed = 0.0_f64;
                     for d in 0..D {
@@ -197,7 +197,7 @@ impl<const D: usize> Contact<D> {
         });
         let sums: Vec<Vec<(&Listed, f64)>> = sums.collect();
         for (own, sum) in sums.into_iter().flatten() {
-            let mass = &mut masses[own.slot as usize];
+            let mass = &mut masses[own.site as usize];
             *mass = if own.alone { 2.0 * sum } else { *mass + sum };
         }
     }
@@ -205,32 +205,32 @@ impl<const D: usize> Contact<D> {
     /// How far a step along a direction may go so that none leaps past another: by a quarter of a spacing against each
     /// other where they touch or are about to, by half of one at all. ∞ along a direction of zeros.
     pub fn longest_step(&self, displacement: &Field<D>, direction: &Field<D>) -> f64 {
-        let slots = displacement.slots();
+        let sites = displacement.sites();
         let of = |chunk: usize| {
             let (mut farthest, mut closing) = (0.0_f64, 0.0_f64);
-            let parts = direction.components().map(|d| &d[chunk_range(chunk, slots)]);
+            let parts = direction.components().map(|d| &d[chunk_range(chunk, sites)]);
             for k in 0..parts[0].len() {
                 farthest = farthest.max((0..D).map(|d| parts[d][k] * parts[d][k]).sum());
             }
             for (own, candidates) in self.list.in_chunk(chunk) {
-                let slot = own.slot as usize;
-                let here = direction.get(slot);
+                let site = own.site as usize;
+                let here = direction.get(site);
                 for candidate in candidates {
-                    if candidate.apart(displacement, slot).1 < candidate.distance + self.near {
-                        let there = direction.get(candidate.slot as usize);
+                    if candidate.apart(displacement, site).1 < candidate.distance + self.near {
+                        let there = direction.get(candidate.site as usize);
                         closing = closing.max((0..D).map(|d| (there[d] - here[d]).powi(2)).sum());
                     }
                 }
             }
             [farthest, closing]
         };
-        let parts = (0..slots.div_ceil(CHUNK)).into_par_iter().map(of);
+        let parts = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of);
         let [farthest, closing] = parts.reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
         self.near / (0.5 * farthest.sqrt()).max(closing.sqrt())
     }
 
     /// Brings particles without bonds to rest: what is pushed aside does not fly on in a search for equilibrium.
     pub fn still(&self, velocity: &mut Field<D>) {
-        self.list.alone.iter().for_each(|&slot| velocity.set(slot as usize, [0.0; D]));
+        self.list.alone.iter().for_each(|&site| velocity.set(site as usize, [0.0; D]));
     }
 }

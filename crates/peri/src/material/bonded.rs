@@ -107,8 +107,8 @@ impl<const D: usize> Response<D> for Kernels<'_> {
     ) -> Result<f64, Error> {
         let (law, modulus) = (&*self.material.law, self.material.modulus);
         let mut fit = KernelFit::new(law, cover.stretches, cover.bound)?;
-        if cover.held {
-            fit = fit.held();
+        if cover.clamped {
+            fit = fit.clamped();
         }
         bonds.set_law(&fit, modulus);
         let tangent =
@@ -140,13 +140,13 @@ impl<const D: usize> Response<D> for Kernels<'_> {
             self.table = Some((observed, EnergyTable::new(law, observed)));
         }
         let Some((_, table)) = &self.table else { return 0.0 };
-        let of = |slots: &[u32]| {
+        let of = |sites: &[u32]| {
             let mut sum = 0.0;
-            for &slot in slots {
-                let own = displacement.get(slot as usize);
+            for &site in sites {
+                let own = displacement.get(site as usize);
                 let mut energy = 0.0;
-                bonds.neighbours(slot as usize, &mut |bond| {
-                    let other = displacement.get(bond.slot);
+                bonds.neighbours(site as usize, &mut |bond| {
+                    let other = displacement.get(bond.site);
                     let mut e = 0.0;
                     for d in 0..D {
                         let eta = other[d] - own[d];
@@ -154,7 +154,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
                     }
                     energy += bond.weight * bond.length * table.value(e / (bond.length * bond.length));
                 });
-                sum += bonds.volume(slot as usize) * energy;
+                sum += bonds.volume(site as usize) * energy;
             }
             sum
         };
@@ -162,7 +162,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         modulus * parts.iter().sum::<f64>()
     }
 
-    /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. Beyond what is fitted q is held: the energy grows with half
+    /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. Beyond what is fitted q is constant: the energy grows with half
     /// of it.
     fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64> {
         let law = &*self.material.law;
@@ -173,7 +173,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
                 let beyond = bond.elongation - (most * most - 1.0);
                 energy += 0.5 * beyond * law.tension(most) / most;
             }
-            bonds.volume(bond.slot as usize) * bond.weight * bond.length * energy
+            bonds.volume(bond.site as usize) * bond.weight * bond.length * energy
         };
         Some(self.material.modulus * list.iter().map(energy).sum::<f64>())
     }
@@ -195,11 +195,11 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         let table = TangentTable::new(law, StretchRange { low, high });
         // a bond past its greatest force is soft, but a light particle would leap when it meets a stiff one
         let least = LEAST_TANGENT * law.tangent().abs();
-        let of = |&slot: &u32| {
-            let own = displacement.get(slot as usize);
+        let of = |&site: &u32| {
+            let own = displacement.get(site as usize);
             let mut sum = 0.0;
-            bonds.neighbours(slot as usize, &mut |bond| {
-                let other = displacement.get(bond.slot);
+            bonds.neighbours(site as usize, &mut |bond| {
+                let other = displacement.get(bond.site);
                 let mut zeta = [0.0; D];
                 let mut square = 0.0;
                 for d in 0..D {

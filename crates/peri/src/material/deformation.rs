@@ -213,7 +213,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     /// Half of 1.75 (2D) or 1 (3D) times the greatest part of a particle and its neighbours: 1.1 to 3 times the true bound on
     /// lattices and clouds.
     fn stiffness(&self, family: &Family<D>, points: &[Point<D>]) -> f64 {
-        let mut most = points[family.slot()].own;
+        let mut most = points[family.site()].own;
         family.each(|bond| most = most.max(points[bond.to].own));
         0.5 * if D == 2 { 1.75 } else { 1.0 } * most
     }

@@ -7,15 +7,15 @@ use crate::field::Field;
 pub struct Family<'a, const D: usize> {
     bonds: &'a dyn Bonds<D>,
     displacement: &'a Field<D>,
-    slot: usize,
+    site: usize,
 }
 
 /// An intact bond from a particle I to a particle J.
 #[derive(Clone, Copy, Debug)]
 pub struct Bond<const D: usize> {
-    /// Slot of I.
+    /// Site of I.
     pub from: usize,
-    /// Slot of J.
+    /// Site of J.
     pub to: usize,
     /// ξ = X_J − X_I, m.
     pub reference: [f64; D],
@@ -60,24 +60,24 @@ impl<const D: usize> Bond<D> {
 }
 
 impl<'a, const D: usize> Family<'a, D> {
-    /// The family of the particle in a slot.
-    pub fn new(bonds: &'a dyn Bonds<D>, displacement: &'a Field<D>, slot: usize) -> Self {
-        Self { bonds, displacement, slot }
+    /// The family of the particle in a site.
+    pub fn new(bonds: &'a dyn Bonds<D>, displacement: &'a Field<D>, site: usize) -> Self {
+        Self { bonds, displacement, site }
     }
 
-    /// Slot of the particle.
-    pub fn slot(&self) -> usize {
-        self.slot
+    /// Site of the particle.
+    pub fn site(&self) -> usize {
+        self.site
     }
 
     /// Reference position of the particle, m.
     pub fn position(&self) -> [f64; D] {
-        self.bonds.position(self.slot)
+        self.bonds.position(self.site)
     }
 
     /// Volume of the particle, m³.
     pub fn volume(&self) -> f64 {
-        self.bonds.volume(self.slot)
+        self.bonds.volume(self.site)
     }
 
     /// Horizon δ, m.
@@ -87,12 +87,12 @@ impl<'a, const D: usize> Family<'a, D> {
 
     /// Visits the intact bonds.
     pub fn each(&self, mut visit: impl FnMut(Bond<D>)) {
-        let own = self.displacement.get(self.slot);
-        self.bonds.neighbours(self.slot, &mut |bond| {
-            let other = self.displacement.get(bond.slot);
+        let own = self.displacement.get(self.site);
+        self.bonds.neighbours(self.site, &mut |bond| {
+            let other = self.displacement.get(bond.site);
             visit(Bond {
-                from: self.slot,
-                to: bond.slot,
+                from: self.site,
+                to: bond.site,
                 reference: bond.bond,
                 length: bond.length,
                 change: std::array::from_fn(|d| other[d] - own[d]),

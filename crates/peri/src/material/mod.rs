@@ -70,7 +70,7 @@ pub trait Material<const D: usize>: Send + Sync {
     /// Half the sum of absolute values in the rows ∂f_I/∂u is one (Gershgorin).
     ///
     /// From it follow the fictitious mass of dynamic relaxation, the local part of the preconditioner and the bound ω² ≤ 2s/ρ of
-    /// the time step. `points` are the states of all slots: of the particle, `points[family.slot()]`, and of its neighbours.
+    /// the time step. `points` are the states of all sites: of the particle, `points[family.site()]`, and of its neighbours.
     fn stiffness(&self, family: &Family<D>, points: &[Self::Point]) -> f64;
 
     /// kθ, N/m⁶, of linear bonds t = 3kθ(λ − 1) that are about as stiff, see [`crate::calibrate::modulus_in`]: the scale of

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// A material with the states of all particles.
 pub struct Pointwise<M: Material<D>, const D: usize> {
     material: M,
-    /// Slot by slot.
+    /// Site by site.
     points: Vec<M::Point>,
     /// kθ of linear bonds about as stiff.
     modulus: f64,
@@ -21,12 +21,12 @@ pub struct Pointwise<M: Material<D>, const D: usize> {
 impl<M: Material<D>, const D: usize> Pointwise<M, D> {
     /// At rest in a body as it was built.
     pub fn new(material: M, bonds: &dyn Bonds<D>) -> Self {
-        let rest = Field::zeros(bonds.slots());
-        let begin = |&slot: &u32| material.begin(&Family::new(bonds, &rest, slot as usize));
+        let rest = Field::zeros(bonds.sites());
+        let begin = |&site: &u32| material.begin(&Family::new(bonds, &rest, site as usize));
         let begun: Vec<M::Point> = bonds.particles().par_iter().map(begin).collect();
-        let mut points = vec![M::Point::default(); bonds.slots()];
-        for (&slot, point) in bonds.particles().iter().zip(begun) {
-            points[slot as usize] = point;
+        let mut points = vec![M::Point::default(); bonds.sites()];
+        for (&site, point) in bonds.particles().iter().zip(begun) {
+            points[site as usize] = point;
         }
         let modulus = material.micromodulus(bonds);
         Self { material, points, modulus, tangent: 0.0 }
@@ -44,14 +44,14 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
         }
         let material = &self.material;
         self.points.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, points)| {
-            for &slot in particles_of(bonds, chunk) {
-                let slot = slot as usize;
-                visit(material, &Family::new(bonds, displacement, slot), &mut points[slot - chunk * CHUNK]);
+            for &site in particles_of(bonds, chunk) {
+                let site = site as usize;
+                visit(material, &Family::new(bonds, displacement, site), &mut points[site - chunk * CHUNK]);
             }
         });
     }
 
-    /// The states, slot by slot.
+    /// The states, site by site.
     pub fn points(&self) -> &[M::Point] {
         &self.points
     }
@@ -60,8 +60,8 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
 /// The particles of a work item.
 fn particles_of<const D: usize>(bonds: &dyn Bonds<D>, chunk: usize) -> &[u32] {
     let particles = bonds.particles();
-    let range = chunk_range(chunk, bonds.slots());
-    let place = |slot: usize| particles.partition_point(|&particle| (particle as usize) < slot);
+    let range = chunk_range(chunk, bonds.sites());
+    let place = |site: usize| particles.partition_point(|&particle| (particle as usize) < site);
     &particles[place(range.start)..place(range.end)]
 }
 
@@ -86,8 +86,8 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         }
         let bonds = &*bonds;
         self.visit(bonds, displacement, M::stiffen);
-        let of = |&slot: &u32| {
-            let family = Family::new(bonds, displacement, slot as usize);
+        let of = |&site: &u32| {
+            let family = Family::new(bonds, displacement, site as usize);
             let unit = family.sum(|bond| 2.0 * bond.weight / bond.length);
             if unit > 0.0 { self.material.stiffness(&family, &self.points) / unit } else { 0.0 }
         };
@@ -112,11 +112,11 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         mut track: Option<&mut StretchRange>,
     ) {
         force.iter_mut().for_each(|component| component.fill(0.0));
-        for &slot in particles_of(bonds, chunk) {
-            let slot = slot as usize;
+        for &site in particles_of(bonds, chunk) {
+            let site = site as usize;
             let mut sum = [0.0; D];
-            Family::new(bonds, displacement, slot).each(|bond| {
-                let density = self.material.force(&bond, &self.points[slot], &self.points[bond.to]);
+            Family::new(bonds, displacement, site).each(|bond| {
+                let density = self.material.force(&bond, &self.points[site], &self.points[bond.to]);
                 for d in 0..D {
                     sum[d] += density[d] * bond.volume;
                 }
@@ -126,17 +126,17 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
                 }
             });
             for d in 0..D {
-                force[d][slot - chunk * CHUNK] = sum[d];
+                force[d][site - chunk * CHUNK] = sum[d];
             }
         }
     }
 
     fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, _met: StretchRange) -> f64 {
         self.prepare(bonds, displacement);
-        let of = |slots: &[u32]| {
-            let each = slots.iter().map(|&slot| {
-                let family = Family::new(bonds, displacement, slot as usize);
-                family.volume() * self.material.energy(&family, &self.points[slot as usize])
+        let of = |sites: &[u32]| {
+            let each = sites.iter().map(|&site| {
+                let family = Family::new(bonds, displacement, site as usize);
+                family.volume() * self.material.energy(&family, &self.points[site as usize])
             });
             each.sum::<f64>()
         };
@@ -159,8 +159,8 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         _stretches: [f64; 2],
     ) -> Vec<f64> {
         self.visit(bonds, displacement, M::stiffen);
-        let of = |&slot: &u32| {
-            self.material.stiffness(&Family::new(bonds, displacement, slot as usize), &self.points)
+        let of = |&site: &u32| {
+            self.material.stiffness(&Family::new(bonds, displacement, site as usize), &self.points)
                 / self.modulus
         };
         bonds.particles().par_iter().map(of).collect()

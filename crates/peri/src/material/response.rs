@@ -13,7 +13,7 @@ pub struct Cover {
     /// Largest relative error of a fit.
     pub bound: f64,
     /// Whether the law stays what it is at the ends beyond them, as it must where bonds break.
-    pub held: bool,
+    pub clamped: bool,
     /// What [`Response::cover`] gave for these stretches, of a resumed run.
     pub known: Option<f64>,
 }

@@ -53,7 +53,7 @@ pub struct KernelFit {
     /// Largest relative error of q over the range, measured.
     pub max_error: f64,
     /// Outside of these e, q stays what it is at their ends; infinite unless set.
-    pub held: [f64; 2],
+    pub clamp: [f64; 2],
     /// Strain l − 1, tension and its derivative at the nodes.
     table: Vec<[f64; 3]>,
 }
@@ -92,7 +92,7 @@ impl KernelFit {
                 stress_free,
                 range,
                 max_error: 0.0,
-                held: [f64::NEG_INFINITY, f64::INFINITY],
+                clamp: [f64::NEG_INFINITY, f64::INFINITY],
                 table,
             };
             fit.max_error = fit.error(&dense);
@@ -103,17 +103,17 @@ impl KernelFit {
         target.table(range, bound, &dense)
     }
 
-    /// Holds q outside of the range, where a fit must not be followed: bonds beyond it are about to break, and bonds
+    /// Keeps q constant outside of the range, where a fit must not be followed: bonds beyond it are about to break, and bonds
     /// crushed below it push along ζ with a bounded stiffness, where the law's direction jumps as ζ passes through 0.
     #[must_use]
-    pub fn held(mut self) -> Self {
-        self.held = self.range.map(|stretch| stretch * stretch - 1.0);
+    pub fn clamped(mut self) -> Self {
+        self.clamp = self.range.map(|stretch| stretch * stretch - 1.0);
         self
     }
 
     /// q(e).
     pub fn value(&self, e: f64) -> f64 {
-        let e = e.clamp(self.held[0], self.held[1]);
+        let e = e.clamp(self.clamp[0], self.clamp[1]);
         if !self.table.is_empty() {
             let stretch = (1.0 + e).max(0.0).sqrt();
             return self.interpolate(e / (1.0 + stretch)) / stretch.max(f64::MIN_POSITIVE);
@@ -241,7 +241,7 @@ impl Target<'_> {
             stress_free: self.stress_free,
             range,
             max_error: 0.0,
-            held: [f64::NEG_INFINITY, f64::INFINITY],
+            clamp: [f64::NEG_INFINITY, f64::INFINITY],
             table: vec![node(low)],
         };
         while let (Some(&right), Some(&left)) = (pending.last(), fit.table.last()) {

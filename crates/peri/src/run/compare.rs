@@ -28,7 +28,7 @@ pub fn hole<const D: usize>(
         plate.map(|plate| positions.par_iter().map(|p| plate.stress(p[0], p[1])[0]).collect::<Vec<f64>>());
     let exact = truth.as_ref().unwrap_or(&kirsch);
     let near = radius + 2.0 * bonds.horizon();
-    let inner: Vec<bool> = bonds.particles().iter().map(|&slot| !loaded[slot as usize]).collect();
+    let inner: Vec<bool> = bonds.particles().iter().map(|&site| !loaded[site as usize]).collect();
     let distance: Vec<f64> = positions.iter().map(|p| p[0].hypot(p[1])).collect();
     let column = column(&positions, bonds.spacing());
     if !column.is_empty() {

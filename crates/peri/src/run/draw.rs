@@ -24,10 +24,10 @@ pub fn maps<const D: usize>(
     output: &Path,
 ) -> Result<(), Error> {
     let Some((measure, field)) = fields.first().filter(|_| D == 2) else { return Ok(()) };
-    let slots = bonds.particles().iter().map(|&slot| slot as usize);
+    let sites = bonds.particles().iter().map(|&site| site as usize);
     let rest: Vec<[f64; 2]> =
-        slots.clone().map(|slot| [bonds.position(slot)[0], bonds.position(slot)[1]]).collect();
-    let moved = slots.map(|slot| state.displacement.get(slot));
+        sites.clone().map(|site| [bonds.position(site)[0], bonds.position(site)[1]]).collect();
+    let moved = sites.map(|site| state.displacement.get(site));
     let places: Vec<[f64; 2]> = rest.iter().zip(moved).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect();
     let largest = field.iter().flatten().flatten().fold(0.0_f64, |most, s| most.max(s.abs()));
     let (scale, unit) = match &scene.exact {

@@ -25,7 +25,7 @@ pub struct Frames<'a> {
     path: PathBuf,
     /// The last step written.
     written: Option<usize>,
-    /// Slots in which stress measures make up for missing bonds by their window's share in the body.
+    /// Sites in which stress measures make up for missing bonds by their window's share in the body.
     by_window: Vec<bool>,
 }
 
@@ -37,15 +37,15 @@ pub struct Stresses<const D: usize> {
     pub cauchy: Fields<D>,
 }
 
-/// Intact bonds of a slot.
-pub(super) fn intact<const D: usize>(bonds: &dyn Bonds<D>, slot: usize) -> u32 {
+/// Intact bonds of a site.
+pub(super) fn intact<const D: usize>(bonds: &dyn Bonds<D>, site: usize) -> u32 {
     let mut count = 0;
-    bonds.neighbours(slot, &mut |_| count += 1);
+    bonds.neighbours(site, &mut |_| count += 1);
     count
 }
 
 fn all_intact<const D: usize>(bonds: &dyn Bonds<D>) -> Vec<u32> {
-    bonds.particles().iter().map(|&slot| intact(bonds, slot as usize)).collect()
+    bonds.particles().iter().map(|&site| intact(bonds, site as usize)).collect()
 }
 
 /// Whether the fields of the last step of a history are written during the run.
@@ -205,11 +205,11 @@ impl<'a> Frames<'a> {
         let damage = self.damage(bonds);
         let Some(series) = &mut self.series else { return Ok(()) };
         // lists of arrays are allocated once; flat ones would grow by doubling
-        let particles = bonds.particles().iter().map(|&slot| slot as usize);
+        let particles = bonds.particles().iter().map(|&site| site as usize);
         let displacement: Vec<[f64; 3]> =
-            particles.clone().map(|slot| in_space(state.displacement.get(slot))).collect();
-        let place = |(slot, u): (usize, &[f64; 3])| -> [f64; 3] {
-            let x = in_space(bonds.position(slot));
+            particles.clone().map(|site| in_space(state.displacement.get(site))).collect();
+        let place = |(site, u): (usize, &[f64; 3])| -> [f64; 3] {
+            let x = in_space(bonds.position(site));
             std::array::from_fn(|d| x[d] + u[d])
         };
         let points: Vec<[f64; 3]> = particles.zip(&displacement).map(place).collect();

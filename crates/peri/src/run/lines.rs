@@ -25,7 +25,7 @@ const FLAT: f64 = 1e-10;
 /// The particles around a line.
 struct Around<'a, const D: usize> {
     bonds: &'a dyn Bonds<D>,
-    slots: Vec<u32>,
+    sites: Vec<u32>,
     places: Vec<[f64; D]>,
     grid: CellGrid<D>,
     /// Greatest reach of a particle.
@@ -34,10 +34,10 @@ struct Around<'a, const D: usize> {
 
 /// How far a particle stands for the body along each axis, m: half its cell; in a cloud, which has no cells, the whole edge of
 /// the square or cube of its volume.
-fn reach<const D: usize>(bonds: &dyn Bonds<D>, slot: usize) -> f64 {
+fn reach<const D: usize>(bonds: &dyn Bonds<D>, site: usize) -> f64 {
     match bonds.kind() {
         Kind::Lattice(lattice) => 0.5 * lattice.spacing(),
-        Kind::Cloud(cloud) => (cloud.volume(slot) / cloud.thickness()).powf(1.0 / D as f64),
+        Kind::Cloud(cloud) => (cloud.volume(site) / cloud.thickness()).powf(1.0 / D as f64),
     }
 }
 
@@ -47,31 +47,31 @@ impl<'a, const D: usize> Around<'a, D> {
         let along: [f64; D] = std::array::from_fn(|d| ends[1][d] - ends[0][d]);
         let square: f64 = along.iter().map(|x| x * x).sum();
         let all = bonds.particles().iter();
-        let most = all.clone().map(|&slot| reach(bonds, slot as usize)).fold(0.0, f64::max);
-        let near = |&&slot: &&u32| {
-            let from: [f64; D] = std::array::from_fn(|d| bonds.position(slot as usize)[d] - ends[0][d]);
+        let most = all.clone().map(|&site| reach(bonds, site as usize)).fold(0.0, f64::max);
+        let near = |&&site: &&u32| {
+            let from: [f64; D] = std::array::from_fn(|d| bonds.position(site as usize)[d] - ends[0][d]);
             let part = (0..D).map(|d| from[d] * along[d]).sum::<f64>() / square;
             let part = part.clamp(0.0, 1.0);
             (0..D).all(|d| (from[d] - part * along[d]).abs() <= 2.0 * most)
         };
-        let slots: Vec<u32> = all.filter(near).copied().collect();
-        let places: Vec<[f64; D]> = slots.iter().map(|&slot| bonds.position(slot as usize)).collect();
-        Self { bonds, grid: CellGrid::new(&places, most), slots, places, most }
+        let sites: Vec<u32> = all.filter(near).copied().collect();
+        let places: Vec<[f64; D]> = sites.iter().map(|&site| bonds.position(site as usize)).collect();
+        Self { bonds, grid: CellGrid::new(&places, most), sites, places, most }
     }
 
-    /// Slots whose values make up that at a place, and their weights; none outside of the body, and where the nearest
+    /// Sites whose values make up that at a place, and their weights; none outside of the body, and where the nearest
     /// particles lie on both sides of a crack.
     fn weights(&self, at: [f64; D]) -> Option<Vec<(usize, f64)>> {
         let (bonds, small) = (self.bonds, self.bonds.spacing());
-        if self.slots.is_empty() {
+        if self.sites.is_empty() {
             return None;
         }
         let mut holds: Vec<(f64, usize)> = Vec::new();
         self.grid.near(at, self.most * (1.0 + NEAR), |k| {
-            let (slot, place) = (self.slots[k] as usize, self.places[k]);
-            let far = reach(bonds, slot) + NEAR * small;
+            let (site, place) = (self.sites[k] as usize, self.places[k]);
+            let far = reach(bonds, site) + NEAR * small;
             if (0..D).all(|d| (place[d] - at[d]).abs() <= far) {
-                holds.push((distance(place, at), slot));
+                holds.push((distance(place, at), site));
             }
         });
         holds.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -82,23 +82,23 @@ impl<'a, const D: usize> Around<'a, D> {
             distance(bonds.position(other), here) <= horizon * (1.0 + NEAR)
                 && !bonds.is_bonded(nearest, other)
         };
-        if holds[1..].iter().any(|&(other, slot)| other <= least + TIE * small && severed(slot)) {
+        if holds[1..].iter().any(|&(other, site)| other <= least + TIE * small && severed(site)) {
             return None;
         }
         if least <= NEAR * small {
             return Some(vec![(nearest, 1.0)]);
         }
-        // slot, weight, place from `at`
+        // site, weight, place from `at`
         let mut members = Vec::new();
-        let mut add = |slot: usize, place: [f64; D]| {
+        let mut add = |site: usize, place: [f64; D]| {
             let from: [f64; D] = std::array::from_fn(|d| place[d] - at[d]);
             let ratio = horizon / distance(place, at);
             if ratio > 1.0 {
-                members.push((slot, (ratio - 1.0).powi(4), vector(from)));
+                members.push((site, (ratio - 1.0).powi(4), vector(from)));
             }
         };
         add(nearest, here);
-        bonds.neighbours(nearest, &mut |bond| add(bond.slot, bonds.position(bond.slot)));
+        bonds.neighbours(nearest, &mut |bond| add(bond.site, bonds.position(bond.site)));
         let total: f64 = members.iter().map(|member| member.1).sum();
         if !(total > 0.0 && total.is_finite()) {
             return Some(vec![(nearest, 1.0)]);
@@ -118,9 +118,9 @@ impl<'a, const D: usize> Around<'a, D> {
         }
         // that of the nearest follows from their sum: on its own it is a difference of large numbers
         let mut weights = vec![(nearest, 1.0)];
-        for (slot, weight, from) in &members[1..] {
+        for (site, weight, from) in &members[1..] {
             let share = weight * (1.0 / total + slope.dot(&(from - mean)));
-            weights.push((*slot, share));
+            weights.push((*site, share));
             weights[0].1 -= share;
         }
         Some(weights)
@@ -166,10 +166,10 @@ pub fn write<const D: usize>(
     outcome: &Outcome,
     output: &Path,
 ) -> Result<(), Error> {
-    let value = |field: LineField, slot: usize| {
-        let particle = || bonds.particles().partition_point(|&other| (other as usize) < slot);
+    let value = |field: LineField, site: usize| {
+        let particle = || bonds.particles().partition_point(|&other| (other as usize) < site);
         match field {
-            LineField::Displacement(d) => state.displacement.get(slot)[d],
+            LineField::Displacement(d) => state.displacement.get(site)[d],
             LineField::Damage => {
                 damage.and_then(|damage| damage.get(particle()).copied()).unwrap_or(f64::NAN)
             }
@@ -188,7 +188,7 @@ pub fn write<const D: usize>(
         let columns: Vec<(String, &str, Vec<f64>)> = wanted
             .map(|(field, name, unit)| {
                 let sum = |weights: &Vec<(usize, f64)>| {
-                    weights.iter().map(|(slot, w)| w * value(field, *slot)).sum()
+                    weights.iter().map(|(site, w)| w * value(field, *site)).sum()
                 };
                 (name, unit, weights.iter().map(|weights| weights.as_ref().map_or(f64::NAN, sum)).collect())
             })
@@ -214,7 +214,7 @@ mod tests {
     /// The same particles, shifted by up to a fifth of the spacing.
     fn uneven(of: &LatticeBonds<2>) -> CloudBonds<2> {
         let shift = |k: usize, step: f64| 0.4 * ((k as f64 * step).fract() - 0.5);
-        let each = of.particles().iter().map(|&slot| of.position(slot as usize)).enumerate();
+        let each = of.particles().iter().map(|&site| of.position(site as usize)).enumerate();
         let points: Vec<[f64; 2]> =
             each.map(|(k, [x, y])| [x + shift(k, 0.618), y + shift(k, 0.732)]).collect();
         CloudBonds::new(&points, &vec![0.5; points.len()], 0.5, 3.015, VolumeCorrection::None, &[]).unwrap()
@@ -223,7 +223,7 @@ mod tests {
     fn value(bonds: &dyn Bonds<2>, at: [f64; 2], field: &dyn Fn([f64; 2]) -> f64) -> Option<f64> {
         let around = Around::new(bonds, &[[-1.0, at[1]], [13.0, at[1]]]);
         let weights = around.weights(at)?;
-        Some(weights.iter().map(|(slot, weight)| weight * field(bonds.position(*slot))).sum())
+        Some(weights.iter().map(|(site, weight)| weight * field(bonds.position(*site))).sum())
     }
 
     /// Linear fields are exact anywhere in the body, up to its faces, and particles have their own values.
@@ -242,8 +242,8 @@ mod tests {
                     assert!((found - linear(at)).abs() < 1e-11, "{at:?} {found}");
                 }
             }
-            for &slot in bonds.particles() {
-                let at = bonds.position(slot as usize);
+            for &site in bonds.particles() {
+                let at = bonds.position(site as usize);
                 let rough = |[x, y]: [f64; 2]| (7.0 * x).sin() + y * y * y;
                 assert_eq!(value(bonds, at, &rough), Some(rough(at)));
             }

@@ -144,14 +144,14 @@ fn run_variant<const D: usize>(
     let plate = scene::exact_plate(source, scene, &body)?;
     phases.stop();
     let warnings = scene::warnings(scene, &body);
-    let slots = body.bonds.slots();
+    let sites = body.bonds.sites();
     let fresh = state.is_none();
-    let mut state = state.unwrap_or_else(|| State::new(slots));
+    let mut state = state.unwrap_or_else(|| State::new(sites));
     if fresh && scene.dynamics.is_some() {
         state.velocity = scene::velocities_of(source, scene, &body)?;
     }
-    if state.displacement.slots() != slots {
-        let why = format!("it has {} particles' slots, the body now has {slots}", state.displacement.slots());
+    if state.displacement.sites() != sites {
+        let why = format!("it has {} particles' sites, the body now has {sites}", state.displacement.sites());
         let path = output.join(polycore::checkpoint::FILE_NAME);
         return Err(polycore::Error::Checkpoint { path, why }.into());
     }
@@ -236,7 +236,7 @@ struct Done<'a> {
 struct Built<const D: usize> {
     bonded: Bonded<D>,
     loads: Loads<D>,
-    /// Slots in any loading layer.
+    /// Sites in any loading layer.
     loaded: Vec<bool>,
     probes: Probes<D>,
     sections: Sections<D>,

@@ -113,8 +113,8 @@ impl Outcome {
     /// Largest displacement, force of the held regions, applied force.
     pub fn responses<const D: usize>(&mut self, bonds: &dyn Bonds<D>, loads: &Loads<D>, state: &State<D>) {
         let mut largest = 0.0_f64;
-        for &slot in bonds.particles() {
-            let displacement = state.displacement.get(slot as usize);
+        for &site in bonds.particles() {
+            let displacement = state.displacement.get(site as usize);
             largest = largest.max(displacement.iter().map(|x| x * x).sum::<f64>().sqrt());
         }
         let (reaction, applied) = (loads.reaction(bonds, &state.force), loads.applied(bonds));

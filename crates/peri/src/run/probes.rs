@@ -20,7 +20,7 @@ const TIP: f64 = 2.0;
 /// The probes of a scene, on a body.
 pub struct Probes<const D: usize> {
     probes: Vec<(Probe, Members)>,
-    /// Intact bonds of each slot as the body was built; only where a crack is looked for.
+    /// Intact bonds of each site as the body was built; only where a crack is looked for.
     whole: Vec<u32>,
 }
 
@@ -53,7 +53,7 @@ impl<const D: usize> Probes<D> {
         }
         let cracks = scene.probe.iter().any(|probe| probe.track == Track::Crack);
         let whole =
-            if cracks { (0..bonds.slots()).map(|slot| intact(bonds, slot)).collect() } else { Vec::new() };
+            if cracks { (0..bonds.sites()).map(|site| intact(bonds, site)).collect() } else { Vec::new() };
         Ok(Self { probes, whole })
     }
 
@@ -63,13 +63,13 @@ impl<const D: usize> Probes<D> {
         for (probe, members) in &self.probes {
             let axis = probe.axis.map_or(0, |axis| axis.index());
             match (probe.track, members) {
-                (Track::Displacement, Members::Region(slots)) => {
+                (Track::Displacement, Members::Region(sites)) => {
                     let sum: f64 =
-                        slots.iter().map(|&slot| state.displacement.get(slot as usize)[axis]).sum();
-                    seen.push(sum / slots.len() as f64);
+                        sites.iter().map(|&site| state.displacement.get(site as usize)[axis]).sum();
+                    seen.push(sum / sites.len() as f64);
                 }
-                (Track::Rotation, Members::Region(slots)) => seen.push(rotation(bonds, state, slots, axis)),
-                (Track::Crack, Members::Region(slots)) => seen.extend(self.tip(bonds, probe, slots, axis)),
+                (Track::Rotation, Members::Region(sites)) => seen.push(rotation(bonds, state, sites, axis)),
+                (Track::Crack, Members::Region(sites)) => seen.extend(self.tip(bonds, probe, sites, axis)),
                 (Track::Strain, Members::Marks(marks)) => seen.push(strain(bonds, state, marks)),
                 (Track::Front, Members::Planes(planes)) => {
                     seen.push(front(state, planes, axis, probe.threshold.unwrap_or(AT_THE_FRONT)));
@@ -81,15 +81,15 @@ impl<const D: usize> Probes<D> {
     }
 
     /// The farthest particle at rest with damage in the range, and the largest distance from 0 across of those near it.
-    fn tip(&self, bonds: &dyn Bonds<D>, probe: &Probe, slots: &[u32], axis: usize) -> [f64; 2] {
+    fn tip(&self, bonds: &dyn Bonds<D>, probe: &Probe, sites: &[u32], axis: usize) -> [f64; 2] {
         let [low, high] = probe.damage.unwrap_or(AT_THE_TIP);
-        let damaged = |&slot: &u32| {
-            let whole = self.whole[slot as usize];
-            let damage = 1.0 - f64::from(intact(bonds, slot as usize)) / f64::from(whole.max(1));
+        let damaged = |&site: &u32| {
+            let whole = self.whole[site as usize];
+            let damage = 1.0 - f64::from(intact(bonds, site as usize)) / f64::from(whole.max(1));
             whole > 0 && (low..=high).contains(&damage)
         };
         let torn: Vec<[f64; D]> =
-            slots.iter().copied().filter(damaged).map(|slot| bonds.position(slot as usize)).collect();
+            sites.iter().copied().filter(damaged).map(|site| bonds.position(site as usize)).collect();
         let Some(tip) = torn.iter().max_by(|a, b| a[axis].total_cmp(&b[axis])) else { return [f64::NAN; 2] };
         let near = |place: &&[f64; D]| {
             let square: f64 = (0..D).map(|d| (place[d] - tip[d]).powi(2)).sum();
@@ -103,14 +103,14 @@ impl<const D: usize> Probes<D> {
 }
 
 /// Particles by their place along an axis.
-fn planes<const D: usize>(bonds: &dyn Bonds<D>, mut slots: Vec<u32>, axis: usize) -> Vec<(f64, Vec<u32>)> {
-    let place = |slot: u32| bonds.position(slot as usize)[axis];
-    slots.sort_by(|&a, &b| place(a).total_cmp(&place(b)).then(a.cmp(&b)));
+fn planes<const D: usize>(bonds: &dyn Bonds<D>, mut sites: Vec<u32>, axis: usize) -> Vec<(f64, Vec<u32>)> {
+    let place = |site: u32| bonds.position(site as usize)[axis];
+    sites.sort_by(|&a, &b| place(a).total_cmp(&place(b)).then(a.cmp(&b)));
     let mut planes: Vec<(f64, Vec<u32>)> = Vec::new();
-    for slot in slots {
+    for site in sites {
         match planes.last_mut() {
-            Some((at, members)) if place(slot) - *at < 1e-3 * bonds.spacing() => members.push(slot),
-            _ => planes.push((place(slot), vec![slot])),
+            Some((at, members)) if place(site) - *at < 1e-3 * bonds.spacing() => members.push(site),
+            _ => planes.push((place(site), vec![site])),
         }
     }
     planes
@@ -118,8 +118,8 @@ fn planes<const D: usize>(bonds: &dyn Bonds<D>, mut slots: Vec<u32>, axis: usize
 
 /// Where the largest velocity of a plane falls below a part of the largest of all, between two planes linearly.
 fn front<const D: usize>(state: &State<D>, planes: &[(f64, Vec<u32>)], axis: usize, part: f64) -> f64 {
-    let speed = |(at, slots): &(f64, Vec<u32>)| {
-        let speeds = slots.iter().map(|&slot| state.velocity.get(slot as usize)[axis].abs());
+    let speed = |(at, sites): &(f64, Vec<u32>)| {
+        let speeds = sites.iter().map(|&site| state.velocity.get(site as usize)[axis].abs());
         (*at, speeds.fold(0.0, f64::max))
     };
     let profile: Vec<(f64, f64)> = planes.iter().map(speed).collect();
@@ -136,11 +136,11 @@ fn front<const D: usize>(state: &State<D>, planes: &[(f64, Vec<u32>)], axis: usi
 }
 
 /// The rotation about an axis through the origin that fits best: the angle of Σ (X × x, X · x) across the axis.
-fn rotation<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, slots: &[u32], axis: usize) -> f64 {
+fn rotation<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, sites: &[u32], axis: usize) -> f64 {
     let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
     let (mut cross, mut dot) = (0.0, 0.0);
-    for &slot in slots {
-        let (rest, moved) = (bonds.position(slot as usize), state.displacement.get(slot as usize));
+    for &site in sites {
+        let (rest, moved) = (bonds.position(site as usize), state.displacement.get(site as usize));
         let of = |d: usize| rest.get(d).map_or([0.0; 2], |x| [*x, x + moved[d]]);
         let ([x, x1], [y, y1]) = (of(a), of(b));
         cross += x * y1 - y * x1;
@@ -150,15 +150,15 @@ fn rotation<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, slots: &[u32
 }
 
 fn strain<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, marks: &[Vec<u32>; 2]) -> f64 {
-    let mean = |slots: &[u32], moved: bool| -> [f64; D] {
+    let mean = |sites: &[u32], moved: bool| -> [f64; D] {
         let mut sum = [0.0; D];
-        for &slot in slots {
-            let (rest, by) = (bonds.position(slot as usize), state.displacement.get(slot as usize));
+        for &site in sites {
+            let (rest, by) = (bonds.position(site as usize), state.displacement.get(site as usize));
             for d in 0..D {
                 sum[d] += rest[d] + if moved { by[d] } else { 0.0 };
             }
         }
-        sum.map(|x| x / slots.len() as f64)
+        sum.map(|x| x / sites.len() as f64)
     };
     let length = |moved: bool| {
         let (from, to) = (mean(&marks[0], moved), mean(&marks[1], moved));

@@ -24,7 +24,7 @@ pub struct Sections<const D: usize> {
 struct Section<const D: usize> {
     point: [f64; D],
     normal: [f64; D],
-    /// Slots behind the plane that bonds joined to those in front as the body was built.
+    /// Sites behind the plane that bonds joined to those in front as the body was built.
     behind: Vec<u32>,
     /// Distance up to which a particle counts as behind, m.
     on: f64,
@@ -35,7 +35,7 @@ pub struct Fitted<'a> {
     law: &'a dyn BondPotential,
     modulus: f64,
     bound: f64,
-    held: bool,
+    clamped: bool,
     /// The fit made last, with its stretches.
     last: Mutex<Option<([f64; 2], KernelFit)>>,
 }
@@ -43,13 +43,13 @@ pub struct Fitted<'a> {
 impl<'a> Fitted<'a> {
     /// A law with kθ = `modulus`, as the scene has it fitted.
     pub fn new(scene: &Scene, law: &'a dyn BondPotential, modulus: f64) -> Self {
-        let (bound, held) = (scene.fit_bound(), scene.material.critical.is_some());
-        Self { law, modulus, bound, held, last: Mutex::new(None) }
+        let (bound, clamped) = (scene.fit_bound(), scene.material.critical.is_some());
+        Self { law, modulus, bound, clamped, last: Mutex::new(None) }
     }
 
     fn over(&self, stretches: [f64; 2]) -> Option<KernelFit> {
         let fit = KernelFit::new(self.law, stretches, self.bound).ok()?;
-        Some(if self.held { fit.held() } else { fit })
+        Some(if self.clamped { fit.clamped() } else { fit })
     }
 }
 
@@ -71,20 +71,20 @@ impl<const D: usize> Sections<D> {
             let key = format!("output.section[{index}]");
             let (point, normal) = spec.plane(source, &key)?;
             let mut section = Section { point, normal, behind: Vec::new(), on: ON_PLANE * bonds.spacing() };
-            let crosses = |slot: usize| {
+            let crosses = |site: usize| {
                 let mut crosses = false;
-                bonds.neighbours(slot, &mut |bond| crosses |= section.is_in_front(bonds.position(bond.slot)));
+                bonds.neighbours(site, &mut |bond| crosses |= section.is_in_front(bonds.position(bond.site)));
                 crosses
             };
             let reach = bonds.horizon() * (1.0 + ON_PLANE);
-            let near = |slot: usize| {
-                let place = bonds.position(slot);
+            let near = |site: usize| {
+                let place = bonds.position(site);
                 let height = (0..D).map(|d| (place[d] - point[d]) * normal[d]).sum::<f64>();
                 (-reach..=section.on).contains(&height)
             };
             let all = bonds.particles().iter().copied();
             let behind: Vec<u32> =
-                all.filter(|&slot| near(slot as usize) && crosses(slot as usize)).collect();
+                all.filter(|&site| near(site as usize) && crosses(site as usize)).collect();
             if behind.is_empty() {
                 let allowed = "a point in the body: bonds must cross the plane";
                 return Err(source.error(&format!("{key}.point"), "a plane that no bond crosses", allowed));
@@ -110,16 +110,16 @@ impl<const D: usize> Sections<D> {
         let mut seen = Vec::new();
         for section in &self.each {
             let (mut force, mut moment) = ([0.0; D], [0.0; 3]);
-            for &slot in &section.behind {
-                let slot = slot as usize;
+            for &site in &section.behind {
+                let site = site as usize;
                 let (rest, own, volume) =
-                    (bonds.position(slot), state.displacement.get(slot), bonds.volume(slot));
+                    (bonds.position(site), state.displacement.get(site), bonds.volume(site));
                 let mut sum = [0.0; D];
-                bonds.neighbours(slot, &mut |bond| {
-                    if !section.is_in_front(bonds.position(bond.slot)) {
+                bonds.neighbours(site, &mut |bond| {
+                    if !section.is_in_front(bonds.position(bond.site)) {
                         return;
                     }
-                    let other = state.displacement.get(bond.slot);
+                    let other = state.displacement.get(bond.site);
                     let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
                     let pull = force_over_length(fit, law.modulus, bond.weight, volume, bond.bond, eta);
                     for d in 0..D {

@@ -112,9 +112,9 @@ pub fn end<const D: usize>(
     outcome: &Outcome,
     output: &Path,
 ) -> Result<(), Error> {
-    let slots = || bonds.particles().iter().map(|&slot| slot as usize);
-    let rest: Vec<[f64; 3]> = slots().map(|slot| in_space(bonds.position(slot))).collect();
-    let moved = || slots().map(|slot| in_space(state.displacement.get(slot)));
+    let sites = || bonds.particles().iter().map(|&site| site as usize);
+    let rest: Vec<[f64; 3]> = sites().map(|site| in_space(bonds.position(site))).collect();
+    let moved = || sites().map(|site| in_space(state.displacement.get(site)));
     let places: Vec<[f64; 3]> =
         rest.iter().zip(moved()).map(|(x, u)| [0, 1, 2].map(|d| x[d] + u[d])).collect();
     let (first, values) = match (&scene.stress, stresses.cauchy.first()) {

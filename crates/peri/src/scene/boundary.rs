@@ -25,9 +25,9 @@ pub struct Boundary {
     /// Velocity at the start, in explicit dynamics.
     pub velocity: Option<Vec<Speed>>,
     /// Displacement at the end of the last step, component by component: a length or `"free"`.
-    pub displacement: Option<Vec<Held>>,
+    pub displacement: Option<Vec<Prescribed>>,
     /// The same as formulas of the place, m.
-    pub displacement_field: Option<Vec<HeldBy>>,
+    pub displacement_field: Option<Vec<PrescribedField>>,
     /// Velocity at the start as formulas of the place, m/s.
     pub velocity_field: Option<Vec<Formula>>,
 }
@@ -90,16 +90,16 @@ impl Side {
 
 /// A displacement component: prescribed or free.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Held {
+pub enum Prescribed {
     /// Not prescribed.
     Free,
     /// Prescribed, m.
     At(f64),
 }
 
-impl schemars::JsonSchema for Held {
+impl schemars::JsonSchema for Prescribed {
     fn schema_name() -> std::borrow::Cow<'static, str> {
-        "Held".into()
+        "Prescribed".into()
     }
 
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
@@ -111,7 +111,7 @@ impl schemars::JsonSchema for Held {
     }
 }
 
-impl<'de> Deserialize<'de> for Held {
+impl<'de> Deserialize<'de> for Prescribed {
     fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let text = String::deserialize(from)?;
         if text.trim() == "free" {
@@ -126,16 +126,16 @@ impl<'de> Deserialize<'de> for Held {
 
 /// A displacement component: prescribed by a formula, or free.
 #[derive(Clone, Debug, PartialEq)]
-pub enum HeldBy {
+pub enum PrescribedField {
     /// Not prescribed.
     Free,
     /// Prescribed, m.
     By(Formula),
 }
 
-impl schemars::JsonSchema for HeldBy {
+impl schemars::JsonSchema for PrescribedField {
     fn schema_name() -> std::borrow::Cow<'static, str> {
-        "HeldBy".into()
+        "PrescribedField".into()
     }
 
     fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
@@ -147,7 +147,7 @@ impl schemars::JsonSchema for HeldBy {
     }
 }
 
-impl<'de> Deserialize<'de> for HeldBy {
+impl<'de> Deserialize<'de> for PrescribedField {
     fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let text = String::deserialize(from)?;
         if text.trim() == "free" {

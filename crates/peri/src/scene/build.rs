@@ -28,9 +28,9 @@ pub struct Body<const D: usize> {
     pub operations: Vec<Operation<D>>,
 }
 
-/// Cells and slots a body may have at most, whatever memory there is: slots are counted in 32 bits.
+/// Cells and sites a body may have at most, whatever memory there is: sites are counted in 32 bits.
 const MOST_CELLS: f64 = 2e9;
-const MOST_SLOTS: f64 = u32::MAX as f64;
+const MOST_SITES: f64 = u32::MAX as f64;
 
 /// Builds the body of a variant.
 ///
@@ -141,9 +141,9 @@ fn refuse_too_large<const D: usize>(
     ratio: f64,
 ) -> Result<(), SceneError> {
     let cells: f64 = counts.iter().product();
-    let (slots, needed) = memory::of_lattice(scene, counts, ratio);
+    let (sites, needed) = memory::of_lattice(scene, counts, ratio);
     let available = available();
-    if !(cells <= MOST_CELLS && slots <= MOST_SLOTS && needed <= available) {
+    if !(cells <= MOST_CELLS && sites <= MOST_SITES && needed <= available) {
         let found = format!("{cells:.3e} lattice cells, which need about {}", gib(needed));
         let allowed = format!(
             "at most {MOST_CELLS:.0e} cells and {} (the available memory); take a larger spacing",

@@ -57,7 +57,7 @@ pub(super) fn severed<const D: usize>(
                 (low..=high).contains(&point[d])
             })
         };
-        let places = bonds.particles().iter().map(|&slot| bonds.position(slot as usize));
+        let places = bonds.particles().iter().map(|&site| bonds.position(site as usize));
         let places: Vec<[f64; D]> = places.filter(near).collect();
         let mut severed = 0;
         if !places.is_empty() {

@@ -34,7 +34,7 @@ pub fn explain<const D: usize>(
     builds(format!(
         "bonds {:.1} MB, solver fields {:.1} MB",
         bonds.bytes() as f64 / 1e6,
-        (bonds.slots() * (3 * D + 1) * 8) as f64 / 1e6
+        (bonds.sites() * (3 * D + 1) * 8) as f64 / 1e6
     ));
     for (crack, severed) in scene.body.cracks.iter().zip(&body.severed) {
         let corners: Vec<String> = [Some(&crack.from), Some(&crack.to), crack.and.as_ref()]

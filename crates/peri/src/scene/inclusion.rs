@@ -11,7 +11,7 @@ use polycore::scene::{SceneError, Source};
 pub struct Inclusions<'a> {
     /// Micromodulus over that of the rest: the product of those that hold a particle.
     pub micromodulus: Property,
-    /// The inclusions, and their particles' slots.
+    /// The inclusions, and their particles' sites.
     each: Vec<(&'a Inclusion, Vec<u32>)>,
 }
 
@@ -27,22 +27,22 @@ impl<'a> Inclusions<'a> {
     ) -> Result<Self, SceneError> {
         let bonds = &*body.bonds;
         let mut each = Vec::new();
-        let mut stiffness = vec![1.0; if scene.material.inclusions.is_empty() { 0 } else { bonds.slots() }];
+        let mut stiffness = vec![1.0; if scene.material.inclusions.is_empty() { 0 } else { bonds.sites() }];
         for (index, inclusion) in scene.material.inclusions.iter().enumerate() {
             let key = format!("material.inclusions[{index}].shape");
             let Some(kind) = inclusion.shape.add.filter(|_| inclusion.shape.cut.is_none()) else {
                 return Err(source.error(&key, "no `add`", "`add` with the kind of shape"));
             };
             let shape = shape::<D>(source, &key, kind, &inclusion.shape)?;
-            let inside = |&slot: &u32| shape.contains(bonds.position(slot as usize));
+            let inside = |&site: &u32| shape.contains(bonds.position(site as usize));
             let members: Vec<u32> = bonds.particles().iter().copied().filter(inside).collect();
             if members.is_empty() {
                 return Err(source.error(&key, "a shape without particles", "a shape with at least one"));
             }
-            members.iter().for_each(|&slot| stiffness[slot as usize] *= inclusion.stiffness);
+            members.iter().for_each(|&site| stiffness[site as usize] *= inclusion.stiffness);
             each.push((inclusion, members));
         }
-        let at = |slot: usize, _| stiffness.get(slot).copied().unwrap_or(1.0);
+        let at = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
         Ok(Self { micromodulus: Property::new(bonds, at), each })
     }
 
@@ -58,7 +58,7 @@ impl<'a> Inclusions<'a> {
         rest: f64,
         resolve: &dyn Fn(Critical, f64) -> Result<f64, Error>,
     ) -> Result<Property, SceneError> {
-        let mut stretch = vec![rest; if self.each.is_empty() { 0 } else { bonds.slots() }];
+        let mut stretch = vec![rest; if self.each.is_empty() { 0 } else { bonds.sites() }];
         for (index, (inclusion, members)) in self.each.iter().enumerate() {
             let Some(critical) = inclusion.critical else { continue };
             let key = format!("material.inclusions[{index}].critical");
@@ -68,16 +68,16 @@ impl<'a> Inclusions<'a> {
             };
             // one bisection for neighbours of one stiffness
             let mut last = None;
-            for &slot in members {
-                let stiffness = self.micromodulus.at(slot as usize);
+            for &site in members {
+                let stiffness = self.micromodulus.at(site as usize);
                 let own = match last {
                     Some((before, own)) if before == stiffness => own,
                     _ => resolve(critical, stiffness).map_err(fault)?,
                 };
-                stretch[slot as usize] = own;
+                stretch[site as usize] = own;
                 last = Some((stiffness, own));
             }
         }
-        Ok(Property::new(bonds, |slot, _| stretch.get(slot).copied().unwrap_or(rest)))
+        Ok(Property::new(bonds, |site, _| stretch.get(site).copied().unwrap_or(rest)))
     }
 }

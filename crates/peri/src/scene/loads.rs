@@ -2,12 +2,12 @@
 
 use super::build::{Body, ordered, vector};
 use super::formula::Formula;
-use super::{Boundary, Held, HeldBy, Method, Scene};
+use super::{Boundary, Method, Prescribed, PrescribedField, Scene};
 use crate::field::Field;
 use crate::solver::{Loads, Support};
 use polycore::scene::{SceneError, Source};
 
-/// Loads and supports of a body, and the slots where forces act on it, of loads or of holding.
+/// Loads and supports of a body, and the sites where forces act on it, of loads or of holding.
 ///
 /// # Errors
 /// As [`super::body_of`].
@@ -17,7 +17,7 @@ pub fn loads_of<const D: usize>(
     body: &Body<D>,
 ) -> Result<(Loads<D>, Vec<bool>), SceneError> {
     let mut regions = Vec::new();
-    let mut loaded = vec![false; body.bonds.slots()];
+    let mut loaded = vec![false; body.bonds.sites()];
     for (index, boundary) in scene.boundary.iter().enumerate() {
         let key = format!("boundary[{index}]");
         let (members, depth) = region(source, &key, boundary, body)?;
@@ -26,13 +26,13 @@ pub fn loads_of<const D: usize>(
         }
         let forced =
             boundary.traction.is_some() || boundary.force.is_some() || boundary.displacement.is_some();
-        for &slot in members.iter().filter(|_| forced) {
-            loaded[slot as usize] = true;
+        for &site in members.iter().filter(|_| forced) {
+            loaded[site as usize] = true;
         }
         let support = support(source, &key, boundary, body, &members, depth)?;
         regions.push((members, support));
     }
-    let mut loads = Loads::new(body.bonds.slots(), &regions);
+    let mut loads = Loads::new(body.bonds.sites(), &regions);
     follow_formulas(source, scene, body, &regions, &mut loads)?;
     if scene.method() == Method::Verlet {
         // a body in motion needs neither balance nor hold
@@ -40,7 +40,7 @@ pub fn loads_of<const D: usize>(
     }
     balanced(source, scene, body, &loads)?;
     let all = (1_u8 << D) - 1;
-    if body.bonds.particles().iter().all(|&slot| loads.constrained(slot as usize) == all) {
+    if body.bonds.particles().iter().all(|&site| loads.constrained(site as usize) == all) {
         return Err(source.error(
             "boundary",
             "every component of every particle is prescribed",
@@ -59,14 +59,14 @@ pub fn velocities_of<const D: usize>(
     scene: &Scene,
     body: &Body<D>,
 ) -> Result<Field<D>, SceneError> {
-    let mut field = Field::zeros(body.bonds.slots());
+    let mut field = Field::zeros(body.bonds.sites());
     for (index, boundary) in scene.boundary.iter().enumerate() {
         if !boundary.moves() {
             continue;
         }
         let (members, _) = region(source, &format!("boundary[{index}]"), boundary, body)?;
-        for slot in members {
-            let place = body.bonds.position(slot as usize);
+        for site in members {
+            let place = body.bonds.position(site as usize);
             let mut value = [0.0; D];
             for (d, value) in value.iter_mut().enumerate() {
                 if let Some(velocity) = boundary.velocity.as_ref().and_then(|v| v.get(d)) {
@@ -75,7 +75,7 @@ pub fn velocities_of<const D: usize>(
                     *value = at(source, &format!("boundary[{index}].velocity_field[{d}]"), formula, place)?;
                 }
             }
-            field.set(slot as usize, value);
+            field.set(site as usize, value);
         }
     }
     Ok(field)
@@ -109,18 +109,18 @@ fn follow_formulas<const D: usize>(
     }
     let Some(field) = &mut loads.displacement else { return Ok(()) };
     for ((index, boundary), (members, support)) in scene.boundary.iter().enumerate().zip(regions) {
-        for &slot in members {
-            let mut value = field.get(slot as usize);
+        for &site in members {
+            let mut value = field.get(site as usize);
             for (d, value) in value.iter_mut().enumerate() {
                 match boundary.displacement_field.as_ref().and_then(|field| field.get(d)) {
-                    Some(HeldBy::By(formula)) => {
+                    Some(PrescribedField::By(formula)) => {
                         let key = format!("boundary[{index}].displacement_field[{d}]");
-                        *value = at(source, &key, formula, body.bonds.position(slot as usize))?;
+                        *value = at(source, &key, formula, body.bonds.position(site as usize))?;
                     }
                     _ => *value = support.displacement[d].unwrap_or(*value),
                 }
             }
-            field.set(slot as usize, value);
+            field.set(site as usize, value);
         }
     }
     Ok(())
@@ -136,11 +136,11 @@ fn balanced<const D: usize>(
     let Some(field) = &loads.body_force else { return Ok(()) };
     for d in 0..D {
         let (mut sum, mut size, mut constrained) = (0.0, 0.0, false);
-        for &slot in body.bonds.particles() {
-            let force = field.get(slot as usize)[d] * body.bonds.volume(slot as usize);
+        for &site in body.bonds.particles() {
+            let force = field.get(site as usize)[d] * body.bonds.volume(site as usize);
             sum += force;
             size += force.abs();
-            constrained |= loads.constrained(slot as usize) >> d & 1 == 1;
+            constrained |= loads.constrained(site as usize) >> d & 1 == 1;
         }
         if !constrained && sum.abs() > scene.tolerance() * size {
             let axis = ["x", "y", "z"][d];
@@ -285,8 +285,8 @@ pub(super) fn region<const D: usize>(
         }
         _ => return Err(source.error(key, "no region", "either `side`, or `min` and `max`")),
     };
-    let inside = |&slot: &u32| {
-        let position = body.bonds.position(slot as usize);
+    let inside = |&site: &u32| {
+        let position = body.bonds.position(site as usize);
         (0..D).all(|d| low[d] <= position[d] && position[d] <= high[d])
     };
     Ok((body.bonds.particles().iter().copied().filter(inside).collect(), depth))
@@ -336,7 +336,7 @@ fn support<const D: usize>(
     }
     if let Some(force) = &boundary.force {
         count("force", force.len())?;
-        let volume: f64 = members.iter().map(|&slot| body.bonds.volume(slot as usize)).sum();
+        let volume: f64 = members.iter().map(|&site| body.bonds.volume(site as usize)).sum();
         for d in 0..D {
             support.body_force[d] += force[d].si() / volume;
         }
@@ -344,15 +344,15 @@ fn support<const D: usize>(
     if let Some(displacement) = &boundary.displacement {
         count("displacement", displacement.len())?;
         support.displacement = std::array::from_fn(|d| match displacement[d] {
-            Held::Free => None,
-            Held::At(value) => Some(value),
+            Prescribed::Free => None,
+            Prescribed::At(value) => Some(value),
         });
     }
     if let Some(field) = &boundary.displacement_field {
         count("displacement_field", field.len())?;
         either("displacement_field", boundary.displacement.is_some(), "displacement")?;
         for (d, constrained) in field.iter().enumerate() {
-            if let HeldBy::By(formula) = constrained {
+            if let PrescribedField::By(formula) = constrained {
                 of_place(&format!("displacement_field[{d}]"), formula)?;
                 support.displacement[d] = Some(0.0);
             }

@@ -1,6 +1,6 @@
 //! Memory that a variant needs, stated before it is solved and, as far as its lattice determines it, before it is built.
 //!
-//! Counted are the arrays that live at once, in bytes a slot or a particle; the test `memory` of the workspace compares
+//! Counted are the arrays that live at once, in bytes a site or a particle; the test `memory` of the workspace compares
 //! the sum with what whole runs take.
 
 use super::{Method, Scene};
@@ -19,7 +19,7 @@ const PAST: f64 = 6.0;
 /// Fields of L-BFGS beside its pairs, and bytes of its coarse level a particle.
 const FIELDS_OF_LBFGS: f64 = 8.0;
 const COARSE: f64 = 150.0;
-/// Slots and particles of contact: cells, their order, the list of near pairs.
+/// Sites and particles of contact: cells, their order, the list of near pairs.
 const CONTACT: f64 = 160.0;
 /// Damage: bonds at the start, what breaks.
 const BREAKING: f64 = 24.0;
@@ -36,7 +36,7 @@ const DRAWN_IN_SPACE: f64 = 350.0;
 const BOND_LISTS: f64 = 12.0;
 
 /// Bytes of a lattice's bonds and of the solver's fields: what is known from its box of cells.
-fn of_slots<const D: usize>(scene: &Scene, slots: f64, stencil: usize) -> f64 {
+fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
     let masks = 8.0 * stencil.div_ceil(64) as f64;
     let vector = 8.0 * D as f64;
     // a bit for what is occupied, its number, a surface factor twice while it is found
@@ -51,7 +51,7 @@ fn of_slots<const D: usize>(scene: &Scene, slots: f64, stencil: usize) -> f64 {
     if scene.material.critical.is_some() {
         each += BREAKING;
     }
-    slots * each
+    sites * each
 }
 
 /// Bytes of results, of `particles`.
@@ -81,14 +81,14 @@ fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
 
 /// Bytes that the run of a variant needs at most, of a body that is built.
 pub fn needed<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> f64 {
-    let (slots, particles) = (bonds.slots() as f64, bonds.particles().len() as f64);
+    let (sites, particles) = (bonds.sites() as f64, bonds.particles().len() as f64);
     let body = match bonds.as_lattice() {
-        Some(lattice) => of_slots::<D>(scene, slots, lattice.stencil().offsets.len()),
+        Some(lattice) => of_sites::<D>(scene, sites, lattice.stencil().offsets.len()),
         None => {
             let directed = bonds.directed_bonds() as f64;
             // the weights by which bonds are shared out, in lists that grow
             let shared = if scene.stress.is_some() { 16.0 * directed + 24.0 * particles } else { 0.0 };
-            of_slots::<D>(scene, slots, 0) + of_cloud::<D>(particles, directed) + shared
+            of_sites::<D>(scene, sites, 0) + of_cloud::<D>(particles, directed) + shared
         }
     };
     ALWAYS + body + of_results::<D>(scene, particles)
@@ -102,8 +102,8 @@ pub(super) fn of_cloud<const D: usize>(particles: f64, bonds: f64) -> f64 {
 
 /// What a run takes at least, whose lattice has these cells: before any of it is allocated.
 pub(super) fn of_lattice<const D: usize>(scene: &Scene, cells: [f64; D], ratio: f64) -> (f64, f64) {
-    let slots = storage(cells, ratio);
-    (slots, of_slots::<D>(scene, slots, Stencil::<D>::new(ratio).offsets.len()))
+    let sites = storage(cells, ratio);
+    (sites, of_sites::<D>(scene, sites, Stencil::<D>::new(ratio).offsets.len()))
 }
 
 /// Refuses a body that is built where its run would not fit.

@@ -18,7 +18,7 @@ mod probe;
 mod variant;
 mod warn;
 
-pub use boundary::{Boundary, Held, HeldBy, Side};
+pub use boundary::{Boundary, Prescribed, PrescribedField, Side};
 pub use build::{Body, body_of, least_memory};
 pub use check::{check, check_variant, plain};
 pub use expect::{quantities, quantities_of};

@@ -94,7 +94,7 @@ pub fn exact_plate<const D: usize>(
 
 /// No particle inside the radius, and some at the rim.
 fn hole<const D: usize>(source: &Source, body: &Body<D>, radius: f64) -> Result<(), SceneError> {
-    let places = body.bonds.particles().iter().map(|&slot| body.bonds.position(slot as usize));
+    let places = body.bonds.particles().iter().map(|&site| body.bonds.position(site as usize));
     let distance = |place: &[f64; D]| place[0].hypot(place[1]);
     let Some(nearest) = places.min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return Ok(()) };
     let rim = radius + 1.5 * body.bonds.spacing();

@@ -97,7 +97,7 @@ impl Probe {
         if named.unit == "*" { named.in_unit(self.track.unit()) } else { named }
     }
 
-    /// Slots of its region, of the whole body where it names none.
+    /// Sites of its region, of the whole body where it names none.
     ///
     /// # Errors
     /// As [`super::body_of`].
@@ -136,18 +136,18 @@ impl Probe {
     ) -> Result<[Vec<u32>; 2], SceneError> {
         let near = |name: &str, mark: &Option<Vec<Length>>| {
             let mark = vector::<D>(source, &format!("{key}.{name}"), mark.as_deref().unwrap_or_default())?;
-            let distance = |slot: u32| {
-                let place = body.bonds.position(slot as usize);
+            let distance = |site: u32| {
+                let place = body.bonds.position(site as usize);
                 (0..D).map(|d| (place[d] - mark[d]).powi(2)).sum::<f64>().sqrt()
             };
             let particles = body.bonds.particles();
-            let least = particles.iter().map(|&slot| distance(slot)).fold(f64::INFINITY, f64::min);
+            let least = particles.iter().map(|&site| distance(site)).fold(f64::INFINITY, f64::min);
             if least > 1.5 * body.bonds.spacing() {
                 let found = format!("{mark:?} m, {least:.3e} m from the nearest particle");
                 return Err(source.error(&format!("{key}.{name}"), found, "a place in the body"));
             }
             let most = least + 1e-6 * body.bonds.spacing();
-            Ok(particles.iter().copied().filter(|&slot| distance(slot) <= most).collect::<Vec<u32>>())
+            Ok(particles.iter().copied().filter(|&site| distance(site) <= most).collect::<Vec<u32>>())
         };
         let marks = [near("from", &self.from)?, near("to", &self.to)?];
         if marks[0] == marks[1] {

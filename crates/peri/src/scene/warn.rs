@@ -28,13 +28,13 @@ fn volumes<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>, thickness: f64) 
     if D == 3 || !scene.body.has_points() {
         return None;
     }
-    let slots: Vec<usize> = bonds.particles().iter().map(|&slot| slot as usize).collect();
-    let places: Vec<[f64; D]> = slots.iter().map(|&slot| bonds.position(slot)).collect();
+    let sites: Vec<usize> = bonds.particles().iter().map(|&site| site as usize).collect();
+    let places: Vec<[f64; D]> = sites.iter().map(|&site| bonds.position(site)).collect();
     let middle = |mut values: Vec<f64>| {
         values.sort_by(f64::total_cmp);
         values.get(values.len() / 2).copied()
     };
-    let volume = middle(slots.iter().map(|&slot| bonds.volume(slot)).collect())?;
+    let volume = middle(sites.iter().map(|&site| bonds.volume(site)).collect())?;
     let grid = CellGrid::new(&places, bonds.horizon());
     let nearest = |own: usize| {
         let mut least = f64::INFINITY;
@@ -60,9 +60,9 @@ fn volumes<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>, thickness: f64) 
 fn thin<const D: usize>(bonds: &dyn Bonds<D>) -> Option<String> {
     let lattice = bonds.as_lattice()?;
     let spacing = lattice.spacing();
-    let lonely = |&&slot: &&u32| {
+    let lonely = |&&site: &&u32| {
         let mut beside = [false; D];
-        lattice.neighbours(slot as usize, &mut |bond| {
+        lattice.neighbours(site as usize, &mut |bond| {
             for d in 0..D {
                 let along = (bond.bond[d].abs() / spacing - 1.0).abs() < 0.01;
                 beside[d] |= along && bond.length < 1.01 * spacing;
@@ -83,15 +83,15 @@ fn thin<const D: usize>(bonds: &dyn Bonds<D>) -> Option<String> {
 /// Particles on a crack: bonds that end on it stay.
 fn on_crack<const D: usize>(bonds: &dyn Bonds<D>, index: usize, cut: &Cut<D>) -> Option<String> {
     let spacing = bonds.spacing();
-    let places = bonds.particles().iter().map(|&slot| (slot, bonds.position(slot as usize)));
+    let places = bonds.particles().iter().map(|&site| (site, bonds.position(site as usize)));
     let on: Vec<(u32, [f64; D])> =
         places.filter(|(_, place)| cut.distance(*place) < ON_CRACK * spacing).collect();
     let &(_, first) = on.first()?;
     let normal = cut.normal();
     let along = |bond: &[f64; D]| (0..D).map(|d| bond[d] * normal[d]).sum::<f64>().abs();
     let mut kept = 0;
-    for &(slot, _) in &on {
-        bonds.neighbours(slot as usize, &mut |bond| {
+    for &(site, _) in &on {
+        bonds.neighbours(site as usize, &mut |bond| {
             kept += u64::from(along(&bond.bond) > ON_CRACK * spacing);
         });
     }
@@ -122,12 +122,12 @@ fn bridged<const D: usize>(
         (0..D).all(|d| (low[d] - horizon..=high[d] + horizon).contains(&place[d])) && place[axis] <= low[axis]
     };
     let mut across = 0_u64;
-    for &slot in bonds.particles() {
-        let place = bonds.position(slot as usize);
+    for &site in bonds.particles() {
+        let place = bonds.position(site as usize);
         if !near(&place) {
             continue;
         }
-        bonds.neighbours(slot as usize, &mut |bond| {
+        bonds.neighbours(site as usize, &mut |bond| {
             let part = (middle - place[axis]) / bond.bond[axis];
             let there = std::array::from_fn(|d| place[d] + part * bond.bond[d]);
             let beyond = place[axis] + bond.bond[axis] >= high[axis];
@@ -151,8 +151,8 @@ fn long_steps<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> Option<Str
     }
     let prescribed = scene.boundary.iter().flat_map(|boundary| boundary.displacement.iter().flatten());
     let largest = prescribed.fold(0.0_f64, |most, held| match held {
-        super::Held::At(value) => most.max(value.abs()),
-        super::Held::Free => most,
+        super::Prescribed::At(value) => most.max(value.abs()),
+        super::Prescribed::Free => most,
     });
     let step = largest / scene.solver.steps as f64;
     let horizons = step / bonds.horizon();

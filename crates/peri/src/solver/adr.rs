@@ -125,9 +125,9 @@ impl RelaxationSolver {
             // after a refit this force still belongs to the old fit, whose range it left by little: go on
             system.widen(state)?;
             if system.breaks_on_the_way() && system.is_overstretched(observed) {
-                let slots = system.break_bonds(state);
-                broken = !slots.is_empty();
-                Equilibrium::broke(self, system, &slots);
+                let sites = system.break_bonds(state);
+                broken = !sites.is_empty();
+                Equilibrium::broke(self, system, &sites);
             }
         }
         let quotient = if state.iteration > 0 && sums.quotient_bottom > 0.0 {
@@ -174,8 +174,8 @@ impl<const D: usize> Equilibrium<D> for RelaxationSolver {
         state: &mut State<D>,
         watch: &mut Watch<D>,
     ) -> Result<(), Error> {
-        if self.unit_mass.len() != system.bonds.slots() {
-            self.unit_mass = vec![1.0; system.bonds.slots()];
+        if self.unit_mass.len() != system.bonds.sites() {
+            self.unit_mass = vec![1.0; system.bonds.sites()];
             let particles = system.bonds.particles();
             update_unit_mass(&*system.bonds, particles, &mut self.unit_mass);
         }
@@ -184,7 +184,7 @@ impl<const D: usize> Equilibrium<D> for RelaxationSolver {
         Ok(())
     }
 
-    fn broke(&mut self, system: &System<D>, slots: &[u32]) {
-        update_unit_mass(&*system.bonds, slots, &mut self.unit_mass);
+    fn broke(&mut self, system: &System<D>, sites: &[u32]) {
+        update_unit_mass(&*system.bonds, sites, &mut self.unit_mass);
     }
 }

@@ -96,20 +96,20 @@ impl Balance {
         let particles = bonds.particles();
         let middle: [f64; D] = match (particles.first(), particles.last()) {
             (Some(&a), Some(&b)) => {
-                let ends = [a, b].map(|slot| bonds.position(slot as usize));
+                let ends = [a, b].map(|site| bonds.position(site as usize));
                 std::array::from_fn(|d| 0.5 * (ends[0][d] + ends[1][d]))
             }
             _ => [0.0; D],
         };
         // force, external force, moment (yz, zx, xy), size
-        let of = |slots: &[u32]| {
+        let of = |sites: &[u32]| {
             let mut sums = [0.0; 10];
-            for &slot in slots {
-                let slot = slot as usize;
-                let (volume, constrained) = (bonds.volume(slot), system.loads.constrained(slot));
-                let body = system.loads.body_force.as_ref().map_or([0.0; D], |b| b.get(slot));
+            for &site in sites {
+                let site = site as usize;
+                let (volume, constrained) = (bonds.volume(site), system.loads.constrained(site));
+                let body = system.loads.body_force.as_ref().map_or([0.0; D], |b| b.get(site));
                 let (total, position, moved) =
-                    (state.force.get(slot), bonds.position(slot), state.displacement.get(slot));
+                    (state.force.get(site), bonds.position(site), state.displacement.get(site));
                 let internal: [f64; D] = std::array::from_fn(|d| volume * (total[d] - factor * body[d]));
                 let arm: [f64; D] = std::array::from_fn(|d| position[d] + moved[d] - middle[d]);
                 for d in 0..D {

@@ -1,43 +1,60 @@
-//! When bonds break.
+//! Bonds that break.
 
-use crate::bonds::Property;
-use serde::Deserialize;
+use super::criterion::{Policy, most};
+use super::state::{Event, State};
+use super::system::System;
+use crate::bonds::{fingerprint, overstretched};
+use crate::potential::StretchRange;
 
-/// When bonds break: in tension only, for good.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Breaking {
-    /// Critical bond stretch λ_c of the particles; a bond breaks at that of the weaker of its ends.
-    pub stretch: Property,
-    /// When stretches are looked at.
-    pub policy: Policy,
-}
+impl<const D: usize> System<'_, D> {
+    /// Severs all bonds beyond the critical stretch; the sites of their ends.
+    pub fn break_bonds(&mut self, state: &mut State<D>) -> Vec<u32> {
+        let Some(breaking) = &self.breaking else { return Vec::new() };
+        let list = overstretched(&*self.bonds, &state.displacement, &breaking.stretch);
+        self.count_evaluation(state);
+        if list.is_empty() {
+            return Vec::new();
+        }
+        let released = self.material.released(&*self.bonds, &list, most(self.breaking.as_ref()));
+        // what does not follow bond by bond is what the whole body loses
+        let before = released.is_none().then(|| self.stored_energy(state, state.observed));
+        let bonds = list.len() as u64 / 2;
+        state.broken += bonds;
+        let [factor, pull, push] = state.balanced;
+        let load = self.loads.response(&*self.bonds, factor, (pull, push)).0;
+        state.events.push(Event { step: state.step, bonds, fingerprint: fingerprint(&list), load });
+        self.bonds.sever(&list);
+        state.released +=
+            released.unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.observed));
+        self.rebuild_contact(&state.displacement);
+        state.intact = Some(self.bonds.intact());
+        let mut sites: Vec<u32> = list.iter().map(|bond| bond.site).collect();
+        sites.dedup();
+        state.detached += self.release(sites.iter().copied());
+        sites
+    }
 
-/// When stretches are compared with the critical one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Policy {
-    /// In equilibrium: all overstretched bonds break at once, and a new equilibrium is sought until none is left.
-    /// Independent of the method.
-    #[default]
-    AtEquilibrium,
-    /// In every iteration of dynamic relaxation, on its way to equilibrium: cheaper, and breaks bonds that an overshoot
-    /// stretches.
-    EachIteration,
-}
+    /// Takes the body forces off particles without bonds, which nothing could balance; their number.
+    pub(super) fn release(&mut self, sites: impl Iterator<Item = u32>) -> u64 {
+        let mut count = 0;
+        for site in sites {
+            if self.bonds.is_alone(site as usize) {
+                count += 1;
+                if self.loads.body_force.as_ref().is_some_and(|b| b.get(site as usize) != [0.0; D]) {
+                    self.loads.to_mut().unload(site as usize);
+                }
+            }
+        }
+        count
+    }
 
-/// Stretches below this are not fitted …
-const SMALLEST_STRETCH: f64 = 1e-3;
-/// … nor below this where bonds break: beside a crack without contact bonds are crushed to nothing.
-const CRUSHED: f64 = 0.1;
+    /// Whether bonds break on the way to equilibrium.
+    pub(super) fn breaks_on_the_way(&self) -> bool {
+        self.breaking.as_ref().is_some_and(|b| b.policy == Policy::EachIteration)
+    }
 
-/// The smallest stretch that is fitted.
-pub(super) fn least(breaking: Option<&Breaking>) -> f64 {
-    if breaking.is_some() { CRUSHED } else { SMALLEST_STRETCH }
-}
-
-/// The largest stretch that is fitted: bonds beyond it are about to break, however long they are.
-pub(super) fn most(breaking: Option<&Breaking>) -> f64 {
-    let most = |stretch: f64| stretch + 0.25 * (stretch - 1.0);
-    breaking.map_or(f64::INFINITY, |b| most(b.stretch.greatest()))
+    /// Whether stretches reach the critical one.
+    pub(super) fn is_overstretched(&self, observed: StretchRange) -> bool {
+        self.breaking.as_ref().is_some_and(|b| observed.high > b.stretch.least() * b.stretch.least() - 1.0)
+    }
 }

@@ -1,6 +1,6 @@
 //! The stretches that a law is evaluated over, and how they follow those that are observed.
 
-use super::breaking::{least, most};
+use super::criterion::{least, most};
 use super::state::State;
 use super::system::System;
 use crate::bonds::stretch_range;
@@ -54,7 +54,7 @@ impl<const D: usize> System<'_, D> {
         Ok(true)
     }
 
-    /// The part of stretches that the law itself covers; beyond it q is held, and energies grow with e.
+    /// The part of stretches that the law itself covers; beyond it q is constant, and energies grow with e.
     pub fn fitted_part(&self, observed: StretchRange) -> StretchRange {
         if self.breaking.is_none() {
             return observed;
@@ -67,8 +67,8 @@ impl<const D: usize> System<'_, D> {
     }
 
     fn fit(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {
-        let (bound, held) = (self.fit_bound, self.breaking.is_some());
-        let cover = Cover { stretches: state.fitted, bound, held, known };
+        let (bound, clamped) = (self.fit_bound, self.breaking.is_some());
+        let cover = Cover { stretches: state.fitted, bound, clamped, known };
         state.tangent = self.material.cover(&mut *self.bonds, &state.displacement, &cover)?;
         Ok(())
     }

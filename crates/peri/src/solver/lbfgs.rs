@@ -161,7 +161,7 @@ impl<const D: usize> LbfgsSolver<D> {
     fn begin(&mut self, system: &mut System<D>, state: &State<D>, watch: &mut Watch<D>) -> Result<(), Error> {
         watch(&self.status(system, state, true), state)?;
         system.prepare(&state.displacement);
-        let slots = system.bonds.slots();
+        let sites = system.bonds.sites();
         let fields = [
             &mut self.gradient,
             &mut self.trial,
@@ -169,8 +169,8 @@ impl<const D: usize> LbfgsSolver<D> {
             &mut self.trial_image,
             &mut self.direction,
         ];
-        if fields[0].slots() != slots {
-            fields.into_iter().for_each(|field| *field = Field::zeros(slots));
+        if fields[0].sites() != sites {
+            fields.into_iter().for_each(|field| *field = Field::zeros(sites));
         }
         self.memory.clear(true);
         self.local_only = false;
@@ -200,7 +200,7 @@ impl<const D: usize> LbfgsSolver<D> {
         // at rest the velocity leaves the pass' quotients at 0
         let (sums, observed) = force_pass(system, state, self.preconditioner.local(), 1.0, factor, true);
         system.count_evaluation(state);
-        let (slots, volumes) = (system.bonds.slots(), self.preconditioner.volumes());
+        let (sites, volumes) = (system.bonds.sites(), self.preconditioner.volumes());
         let (force, direction) = (state.force.components(), self.direction.components());
         let loads = &*system.loads;
         let parts: Vec<f64> = self
@@ -209,7 +209,7 @@ impl<const D: usize> LbfgsSolver<D> {
             .into_par_iter()
             .enumerate()
             .map(|(chunk, gradient)| {
-                let range = chunk_range(chunk, slots);
+                let range = chunk_range(chunk, sites);
                 let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
                 let volumes = &volumes[range.clone()];
                 let mut slope = 0.0;
@@ -243,10 +243,10 @@ impl<const D: usize> LbfgsSolver<D> {
 
     /// u += step·d.
     fn step(&self, state: &mut State<D>, step: f64) {
-        let slots = state.displacement.slots();
+        let sites = state.displacement.sites();
         let direction = self.direction.components();
         state.displacement.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, u)| {
-            let range = chunk_range(chunk, slots);
+            let range = chunk_range(chunk, sites);
             for d in 0..D {
                 u[d].iter_mut().zip(&direction[d][range.clone()]).for_each(|(u, d)| *u += step * d);
             }
@@ -422,10 +422,10 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
                 point = self.arrive(system, state)?;
             }
             if system.breaks_on_the_way() && system.is_overstretched(point.observed) {
-                let slots = system.break_bonds(state);
-                broken = !slots.is_empty();
+                let sites = system.break_bonds(state);
+                broken = !sites.is_empty();
                 if broken {
-                    self.broke(system, &slots);
+                    self.broke(system, &sites);
                     point = self.arrive(system, state)?;
                 }
             }
@@ -437,8 +437,8 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         }
     }
 
-    fn broke(&mut self, system: &System<D>, slots: &[u32]) {
-        self.preconditioner.broke(&*system.bonds, slots);
+    fn broke(&mut self, system: &System<D>, sites: &[u32]) {
+        self.preconditioner.broke(&*system.bonds, sites);
         self.memory.clear(false);
     }
 }

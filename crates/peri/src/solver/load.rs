@@ -13,59 +13,59 @@ pub struct Support<const D: usize> {
     pub body_force: [f64; D],
 }
 
-/// The loads of a body, slot by slot. What no region asks for is not stored.
+/// The loads of a body, site by site. What no region asks for is not stored.
 #[derive(Clone, Debug, Default)]
 pub struct Loads<const D: usize> {
     /// Body force density at load factor 1, N/m³.
     pub body_force: Option<Field<D>>,
     /// Prescribed displacement at load factor 1, m, where constrained.
     pub displacement: Option<Field<D>>,
-    /// Bit d of a slot: component d is constrained. Empty where nothing is.
+    /// Bit d of a site: component d is constrained. Empty where nothing is.
     pub constrained: Vec<u8>,
-    /// Slots of each region of prescribed displacement, in the order given.
+    /// Sites of each region of prescribed displacement, in the order given.
     pub held_regions: Vec<Vec<u32>>,
 }
 
 impl<const D: usize> Loads<D> {
-    /// Collects regions, each given as its slots and what holds there; body forces add up, the last displacement applies.
-    pub fn new(slots: usize, regions: &[(Vec<u32>, Support<D>)]) -> Self {
+    /// Collects regions, each given as its sites and what holds there; body forces add up, the last displacement applies.
+    pub fn new(sites: usize, regions: &[(Vec<u32>, Support<D>)]) -> Self {
         let mut loads = Self::default();
         for (members, support) in regions {
             if support.body_force.iter().any(|&b| b != 0.0) {
-                let field = loads.body_force.get_or_insert_with(|| Field::zeros(slots));
-                for &slot in members {
-                    let old = field.get(slot as usize);
-                    field.set(slot as usize, std::array::from_fn(|d| old[d] + support.body_force[d]));
+                let field = loads.body_force.get_or_insert_with(|| Field::zeros(sites));
+                for &site in members {
+                    let old = field.get(site as usize);
+                    field.set(site as usize, std::array::from_fn(|d| old[d] + support.body_force[d]));
                 }
             }
             if support.displacement.iter().any(Option::is_some) {
                 loads.held_regions.push(members.clone());
-                let field = loads.displacement.get_or_insert_with(|| Field::zeros(slots));
-                loads.constrained.resize(slots, 0);
-                for &slot in members {
-                    let mut value = field.get(slot as usize);
+                let field = loads.displacement.get_or_insert_with(|| Field::zeros(sites));
+                loads.constrained.resize(sites, 0);
+                for &site in members {
+                    let mut value = field.get(site as usize);
                     for d in 0..D {
                         if let Some(prescribed) = support.displacement[d] {
                             value[d] = prescribed;
-                            loads.constrained[slot as usize] |= 1 << d;
+                            loads.constrained[site as usize] |= 1 << d;
                         }
                     }
-                    field.set(slot as usize, value);
+                    field.set(site as usize, value);
                 }
             }
         }
         loads
     }
 
-    /// Bits of the constrained components of a slot.
-    pub fn constrained(&self, slot: usize) -> u8 {
-        self.constrained.get(slot).copied().unwrap_or(0)
+    /// Bits of the constrained components of a site.
+    pub fn constrained(&self, site: usize) -> u8 {
+        self.constrained.get(site).copied().unwrap_or(0)
     }
 
-    /// Takes the body force off a slot.
-    pub fn unload(&mut self, slot: usize) {
+    /// Takes the body force off a site.
+    pub fn unload(&mut self, site: usize) {
         if let Some(field) = &mut self.body_force {
-            field.set(slot, [0.0; D]);
+            field.set(site, [0.0; D]);
         }
     }
 
@@ -73,16 +73,16 @@ impl<const D: usize> Loads<D> {
     /// Σ b V·u with b the body force at factor 1. `force` holds out-of-balance force densities.
     pub fn conjugates(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, force: &Field<D>) -> (f64, f64) {
         let (mut pull, mut push) = (0.0, 0.0);
-        for &slot in bonds.particles() {
-            let slot = slot as usize;
-            let (constrained, volume) = (self.constrained(slot), bonds.volume(slot));
+        for &site in bonds.particles() {
+            let site = site as usize;
+            let (constrained, volume) = (self.constrained(site), bonds.volume(site));
             if let Some(prescribed) = self.displacement.as_ref().filter(|_| constrained != 0) {
-                let (full, force) = (prescribed.get(slot), force.get(slot));
+                let (full, force) = (prescribed.get(site), force.get(site));
                 pull -= (0..D).filter(|d| constrained >> d & 1 == 1).map(|d| full[d] * force[d]).sum::<f64>()
                     * volume;
             }
             if let Some(body) = &self.body_force {
-                let (body, moved) = (body.get(slot), displacement.get(slot));
+                let (body, moved) = (body.get(site), displacement.get(site));
                 push += (0..D).map(|d| body[d] * moved[d]).sum::<f64>() * volume;
             }
         }
@@ -130,12 +130,12 @@ impl<const D: usize> Loads<D> {
 
     /// Reaction on each region of prescribed displacement, N; components that are not constrained give none.
     pub fn reactions(&self, bonds: &dyn Bonds<D>, force: &Field<D>) -> Vec<[f64; 3]> {
-        let of_region = |slots: &Vec<u32>| {
+        let of_region = |sites: &Vec<u32>| {
             let mut sum = [0.0; 3];
-            for &slot in slots {
-                let (force, volume) = (force.get(slot as usize), bonds.volume(slot as usize));
+            for &site in sites {
+                let (force, volume) = (force.get(site as usize), bonds.volume(site as usize));
                 for d in 0..D {
-                    if self.constrained(slot as usize) >> d & 1 == 1 {
+                    if self.constrained(site as usize) >> d & 1 == 1 {
                         sum[d] -= force[d] * volume;
                     }
                 }
@@ -150,15 +150,15 @@ impl<const D: usize> Loads<D> {
     pub fn reaction(&self, bonds: &dyn Bonds<D>, force: &Field<D>) -> [f64; D] {
         let mut counted = vec![false; self.constrained.len()];
         let (mut up, mut down) = ([0.0; D], [0.0; D]);
-        for slots in &self.held_regions {
+        for sites in &self.held_regions {
             let mut sum = [0.0; D];
-            for &slot in slots {
-                let slot = slot as usize;
-                if std::mem::replace(&mut counted[slot], true) {
+            for &site in sites {
+                let site = site as usize;
+                if std::mem::replace(&mut counted[site], true) {
                     continue;
                 }
-                let (force, volume) = (force.get(slot), bonds.volume(slot));
-                for d in (0..D).filter(|d| self.constrained(slot) >> d & 1 == 1) {
+                let (force, volume) = (force.get(site), bonds.volume(site));
+                for d in (0..D).filter(|d| self.constrained(site) >> d & 1 == 1) {
                     sum[d] -= force[d] * volume;
                 }
             }
@@ -190,8 +190,8 @@ impl<const D: usize> Loads<D> {
             let constrained: Vec<usize> = bonds
                 .particles()
                 .iter()
-                .map(|&slot| slot as usize)
-                .filter(|&slot| self.constrained(slot) >> d & 1 == 1)
+                .map(|&site| site as usize)
+                .filter(|&site| self.constrained(site) >> d & 1 == 1)
                 .collect();
             let mut normal = nalgebra::Matrix4::<f64>::zeros();
             let mut right = nalgebra::Vector4::<f64>::zeros();
@@ -201,16 +201,16 @@ impl<const D: usize> Loads<D> {
                 .flat_map(|&s| bonds.position(s))
                 .fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
             // a body that is moved as a whole stays unstrained to the last bit
-            let first = constrained.first().map_or(0.0, |&slot| field.get(slot)[d]);
-            for &slot in &constrained {
-                let position = bonds.position(slot);
+            let first = constrained.first().map_or(0.0, |&site| field.get(site)[d]);
+            for &site in &constrained {
+                let position = bonds.position(site);
                 let mut row = nalgebra::Vector4::zeros();
                 row[0] = 1.0;
                 for e in 0..D {
                     row[e + 1] = position[e] / scale;
                 }
                 normal += row * row.transpose();
-                right += row * (field.get(slot)[d] - first);
+                right += row * (field.get(site)[d] - first);
             }
             let count = constrained.len().max(1) as f64;
             if let Ok(inverse) = (normal / count).pseudo_inverse(1e-10) {
@@ -233,13 +233,13 @@ impl<const D: usize> Loads<D> {
         // components (a, b) of H, a ≤ b; off the diagonal each stands for two
         let pairs: Vec<(usize, usize)> = (0..D).flat_map(|a| (a..D).map(move |b| (a, b))).collect();
         let twice = |(a, b): (usize, usize)| if a == b { 1.0 } else { 2.0 };
-        let part = |slots: &[u32]| {
+        let part = |sites: &[u32]| {
             let mut matrix = [[0.0; 6]; 6];
             let mut right = [0.0; 6];
-            for &slot in slots {
-                let slot = slot as usize;
-                let volume = bonds.volume(slot);
-                bonds.neighbours(slot, &mut |bond| {
+            for &site in sites {
+                let site = site as usize;
+                let volume = bonds.volume(site);
+                bonds.neighbours(site, &mut |bond| {
                     let mut dyad = [0.0; 6];
                     for (value, &(a, b)) in dyad.iter_mut().zip(&pairs) {
                         *value = twice((a, b)) * bond.bond[a] * bond.bond[b] / (bond.length * bond.length);
@@ -251,7 +251,7 @@ impl<const D: usize> Loads<D> {
                         }
                     }
                 });
-                let (force, position) = (body_force.get(slot), bonds.position(slot));
+                let (force, position) = (body_force.get(site), bonds.position(site));
                 for (value, &(a, b)) in right.iter_mut().zip(&pairs) {
                     *value +=
                         0.5 * twice((a, b)) * volume * (force[a] * position[b] + force[b] * position[a]);

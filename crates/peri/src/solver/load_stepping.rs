@@ -21,8 +21,8 @@ pub trait Equilibrium<const D: usize> {
         watch: &mut Watch<D>,
     ) -> Result<(), Error>;
 
-    /// Takes notice of the slots whose bonds have broken since the last equilibrium.
-    fn broke(&mut self, system: &System<D>, slots: &[u32]);
+    /// Takes notice of the sites whose bonds have broken since the last equilibrium.
+    fn broke(&mut self, system: &System<D>, sites: &[u32]);
 }
 
 /// Solves the remaining load steps of `state`; `finished` sees every finished step and, with [`State::round`] above 0,
@@ -57,20 +57,20 @@ pub fn load_stepping<const D: usize>(
                 }
             }
             work_of_loads(system, state);
-            let slots = if system.is_overstretched(state.balanced_stretches) {
+            let sites = if system.is_overstretched(state.balanced_stretches) {
                 system.break_bonds(state)
             } else {
                 Vec::new()
             };
             state.round += 1;
             state.iteration = 0;
-            if slots.is_empty() {
+            if sites.is_empty() {
                 break;
             }
-            method.broke(system, &slots);
+            method.broke(system, &sites);
             finished(&*system.bonds, state)?;
             let particles = system.bonds.particles();
-            particles.iter().for_each(|&slot| state.velocity.set(slot as usize, [0.0; D]));
+            particles.iter().for_each(|&site| state.velocity.set(site as usize, [0.0; D]));
         }
         record(system, state);
         state.step += 1;
@@ -110,24 +110,24 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
         _ => &[],
     };
     let past = &state.past[state.past.len() - weights.len()..];
-    for &slot in system.bonds.particles() {
-        let slot = slot as usize;
-        let position = system.bonds.position(slot);
-        let mut value = state.displacement.get(slot);
-        let constrained = system.loads.constrained(slot);
+    for &site in system.bonds.particles() {
+        let site = site as usize;
+        let position = system.bonds.position(site);
+        let mut value = state.displacement.get(site);
+        let constrained = system.loads.constrained(site);
         for d in 0..D {
             if constrained >> d & 1 == 1 {
                 value[d] =
-                    factor * system.loads.displacement.as_ref().map_or(0.0, |field| field.get(slot)[d]);
+                    factor * system.loads.displacement.as_ref().map_or(0.0, |field| field.get(site)[d]);
             } else if weights.is_empty() {
                 let affine: f64 = (0..D).map(|e| predictor[d][e + 1] * position[e]).sum();
                 value[d] += increment * (predictor[d][0] + affine);
             } else {
-                value[d] = past.iter().zip(weights).map(|(u, weight)| weight * u.get(slot)[d]).sum();
+                value[d] = past.iter().zip(weights).map(|(u, weight)| weight * u.get(site)[d]).sum();
             }
         }
-        state.displacement.set(slot, value);
-        state.velocity.set(slot, [0.0; D]);
+        state.displacement.set(site, value);
+        state.velocity.set(site, [0.0; D]);
     }
 }
 

@@ -11,13 +11,13 @@ pub fn has_own_mass<const D: usize>(system: &System<D>, state: &State<D>) -> boo
 }
 
 /// Σ_J (2 w V_J/|ξ|)(1 + max_{d≠e} |n_d n_e|): the Gershgorin sum of a particle for a unit bond tangent.
-/// 1 where there is no bond, so that empty slots and detached particles stay at rest.
-pub fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, slots: &[u32], mass: &mut [f64]) {
-    let sums: Vec<f64> = slots
+/// 1 where there is no bond, so that empty sites and detached particles stay at rest.
+pub fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, sites: &[u32], mass: &mut [f64]) {
+    let sums: Vec<f64> = sites
         .par_iter()
-        .map(|&slot| {
+        .map(|&site| {
             let mut sum = 0.0;
-            bonds.neighbours(slot as usize, &mut |bond| {
+            bonds.neighbours(site as usize, &mut |bond| {
                 let cosine: [f64; D] = bond.bond.map(|x| (x / bond.length).abs());
                 let mixed = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
                 let mixed = mixed.map(|(d, e)| cosine[d] * cosine[e]).fold(0.0, f64::max);
@@ -26,16 +26,16 @@ pub fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, slots: &[u32], mas
             if sum > 0.0 { sum } else { 1.0 }
         })
         .collect();
-    for (&slot, sum) in slots.iter().zip(sums) {
-        mass[slot as usize] = sum;
+    for (&site, sum) in sites.iter().zip(sums) {
+        mass[site as usize] = sum;
     }
 }
 
 /// The bounds of all particles with each bond's own tangent, over kθ.
 pub fn own_mass<const D: usize>(system: &mut System<D>, state: &State<D>, mass: &mut Vec<f64>) {
     let sums = system.material.own_stiffness(&*system.bonds, &state.displacement, state.fitted);
-    mass.resize(system.bonds.slots(), 1.0);
-    for (&slot, sum) in system.bonds.particles().iter().zip(sums) {
-        mass[slot as usize] = if sum > 0.0 { sum } else { 1.0 };
+    mass.resize(system.bonds.sites(), 1.0);
+    for (&site, sum) in system.bonds.particles().iter().zip(sums) {
+        mass[site as usize] = if sum > 0.0 { sum } else { 1.0 };
     }
 }

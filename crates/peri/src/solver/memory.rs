@@ -85,14 +85,14 @@ impl<const D: usize> Memory<D> {
             }
             weights[i] = back[i] - value / pair.curvature;
         }
-        let (slots, scale) = (gradient.slots(), self.scale);
+        let (sites, scale) = (gradient.sites(), self.scale);
         let (gradient, image) = (gradient.components(), image.components());
         let parts: Vec<f64> = result
             .chunks_mut()
             .into_par_iter()
             .enumerate()
             .map(|(chunk, d)| {
-                let range = chunk_range(chunk, slots);
+                let range = chunk_range(chunk, sites);
                 let mut sum = 0.0;
                 for c in 0..D {
                     let out = &mut *d[c];
@@ -123,14 +123,14 @@ impl<const D: usize> Memory<D> {
         (gradient, image): (&Field<D>, &Field<D>),
         least: f64,
     ) {
-        let slots = gradient.slots();
+        let sites = gradient.sites();
         let (g0, g1, z1) = (old_gradient.components(), gradient.components(), image.components());
         let pairs = &self.pairs;
         // s·y, w·y, s·g, w·g of the new pair, then of each other with the new y and g
         let items = direction.chunks_mut().into_par_iter().zip(old_image.chunks_mut()).enumerate();
         let parts: Vec<Vec<f64>> = items
             .map(|(chunk, (s, w))| {
-                let range = chunk_range(chunk, slots);
+                let range = chunk_range(chunk, sites);
                 let mut sums = vec![0.0; 4 * (pairs.len() + 1)];
                 let mut change = [0.0; CHUNK];
                 let change = &mut change[..range.len()];
@@ -173,7 +173,7 @@ impl<const D: usize> Memory<D> {
         {
             self.spare.extend([oldest.step, oldest.image]);
         }
-        let mut fresh = || self.spare.pop().unwrap_or_else(|| Field::zeros(slots));
+        let mut fresh = || self.spare.pop().unwrap_or_else(|| Field::zeros(sites));
         let (step, image) = (std::mem::replace(direction, fresh()), std::mem::replace(old_image, fresh()));
         let (later, gradient) = (VecDeque::new(), [sums[2], sums[3]]);
         self.pairs.push_back(Pair { step, image, curvature, size, later, gradient });

@@ -1,4 +1,4 @@
-//! The two passes of an iteration over all slots: new forces with every sum over them, and the move.
+//! The two passes of an iteration over all sites: new forces with every sum over them, and the move.
 
 use super::load::Loads;
 use super::state::State;
@@ -7,7 +7,7 @@ use crate::bonds::StretchRange;
 use crate::field::{CHUNK, chunk_range};
 use rayon::prelude::*;
 
-/// Sums over all slots, item by item in a fixed order.
+/// Sums over all sites, item by item in a fixed order.
 #[derive(Clone, Copy, Default)]
 pub struct Sums {
     /// Σ v·ΔF over free components.
@@ -42,7 +42,7 @@ pub fn force_pass<const D: usize>(
     factor: f64,
     look: bool,
 ) -> (Sums, StretchRange) {
-    let slots = system.bonds.slots();
+    let sites = system.bonds.sites();
     let loads = &*system.loads;
     let (displacement, velocity) = (&state.displacement, state.velocity.components());
     let results: Vec<(Sums, StretchRange)> = state
@@ -53,7 +53,7 @@ pub fn force_pass<const D: usize>(
         .map_init(
             || vec![0.0; D * CHUNK],
             |scratch, (chunk, old)| {
-                let range = chunk_range(chunk, slots);
+                let range = chunk_range(chunk, sites);
                 let mut parts = scratch.chunks_mut(CHUNK);
                 let mut new: [&mut [f64]; D] =
                     std::array::from_fn(|_| &mut parts.next().unwrap_or_default()[..range.len()]);
@@ -123,7 +123,7 @@ pub fn move_pass<const D: usize>(
     mass: f64,
     damping: f64,
 ) {
-    let slots = unit_mass.len();
+    let sites = unit_mass.len();
     let (keep, push) = if state.iteration == 0 {
         (0.0, 0.5 / mass)
     } else {
@@ -132,7 +132,7 @@ pub fn move_pass<const D: usize>(
     let force = state.force.components();
     let (displacement, velocity) = (state.displacement.chunks_mut(), state.velocity.chunks_mut());
     displacement.into_par_iter().zip(velocity).enumerate().for_each(|(chunk, (u, v))| {
-        let range = chunk_range(chunk, slots);
+        let range = chunk_range(chunk, sites);
         let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
         for d in 0..D {
             let (f, m) = (&force[d][range.clone()], &unit_mass[range.clone()]);

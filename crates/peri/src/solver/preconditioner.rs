@@ -15,9 +15,9 @@ const MOST: [usize; 2] = [30_000, 8_000];
 
 /// The approximate inverse.
 pub struct Preconditioner<const D: usize> {
-    /// ω/(V M) of each slot.
+    /// ω/(V M) of each site.
     local: Vec<f64>,
-    /// V of each slot.
+    /// V of each site.
     volumes: Vec<f64>,
     /// Gershgorin sums for a unit bond tangent.
     unit_mass: Vec<f64>,
@@ -47,10 +47,10 @@ impl<const D: usize> Preconditioner<D> {
             own_mass(system, state, &mut springs);
         }
         let system = &*system;
-        let (bonds, slots) = (&*system.bonds, system.bonds.slots());
+        let (bonds, sites) = (&*system.bonds, system.bonds.sites());
         let survey = Survey::new(bonds, &state.displacement);
-        self.unit_mass.resize(slots, 1.0);
-        self.volumes.resize(slots, 0.0);
+        self.unit_mass.resize(sites, 1.0);
+        self.volumes.resize(sites, 0.0);
         bonds.particles().iter().for_each(|&s| self.volumes[s as usize] = bonds.volume(s as usize));
         update_unit_mass(bonds, bonds.particles(), &mut self.unit_mass);
         let (law, modulus) = system.material.bond_law();
@@ -58,27 +58,27 @@ impl<const D: usize> Preconditioner<D> {
         if !own {
             springs.clone_from(&self.unit_mass);
         }
-        let particles = bonds.particles().iter().map(|&slot| slot as usize);
-        particles.filter(|&slot| survey.bonded[slot] == 0).for_each(|slot| springs[slot] = 0.0);
+        let particles = bonds.particles().iter().map(|&site| site as usize);
+        particles.filter(|&site| survey.bonded[site] == 0).for_each(|site| springs[site] = 0.0);
         if let Some(contact) = system.repulsion() {
             contact.add_stiffness(&state.displacement, tangent, &mut springs);
         }
         springs.iter_mut().for_each(|m| *m *= 0.5 * tangent);
         self.local.clear();
-        self.local.resize(slots, 0.0);
+        self.local.resize(sites, 0.0);
         self.least = f64::INFINITY;
-        for &slot in bonds.particles() {
-            let slot = slot as usize;
-            if springs[slot] > 0.0 {
-                self.local[slot] = weight / (bonds.volume(slot) * springs[slot]);
-                self.least = self.least.min(self.local[slot]);
+        for &site in bonds.particles() {
+            let site = site as usize;
+            if springs[site] > 0.0 {
+                self.local[site] = weight / (bonds.volume(site) * springs[site]);
+                self.least = self.least.min(self.local[site]);
             }
         }
         if !self.least.is_finite() {
             self.least = 1.0;
         }
-        for &slot in bonds.particles() {
-            let local = &mut self.local[slot as usize];
+        for &site in bonds.particles() {
+            let local = &mut self.local[site as usize];
             if *local == 0.0 {
                 *local = self.least;
             }
@@ -96,13 +96,13 @@ impl<const D: usize> Preconditioner<D> {
     }
 
     /// Brings the local part up to date where bonds broke; the coarse one stays.
-    pub fn broke(&mut self, bonds: &dyn Bonds<D>, slots: &[u32]) {
-        let before: Vec<f64> = slots.iter().map(|&slot| self.unit_mass[slot as usize]).collect();
-        update_unit_mass(bonds, slots, &mut self.unit_mass);
-        for (&slot, before) in slots.iter().zip(before) {
-            let local = &mut self.local[slot as usize];
-            let alone = bonds.is_alone(slot as usize);
-            *local = if alone { self.least } else { *local * before / self.unit_mass[slot as usize] };
+    pub fn broke(&mut self, bonds: &dyn Bonds<D>, sites: &[u32]) {
+        let before: Vec<f64> = sites.iter().map(|&site| self.unit_mass[site as usize]).collect();
+        update_unit_mass(bonds, sites, &mut self.unit_mass);
+        for (&site, before) in sites.iter().zip(before) {
+            let local = &mut self.local[site as usize];
+            let alone = bonds.is_alone(site as usize);
+            *local = if alone { self.least } else { *local * before / self.unit_mass[site as usize] };
         }
     }
 
@@ -111,35 +111,35 @@ impl<const D: usize> Preconditioner<D> {
         if let Some(coarse) = self.coarse.as_mut().filter(|_| !local_only) {
             coarse.solve(gradient);
         }
-        let slots = gradient.slots();
+        let sites = gradient.sites();
         let coarse = self.coarse.as_ref().filter(|_| !local_only);
         let (g, local) = (gradient.components(), &self.local);
         result.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, z)| {
-            let range = chunk_range(chunk, slots);
+            let range = chunk_range(chunk, sites);
             let start = chunk * CHUNK;
             for d in 0..D {
                 let parts = z[d].iter_mut().zip(&g[d][range.clone()]).zip(&local[range.clone()]);
                 parts.for_each(|((z, g), local)| *z = g * local);
             }
             let Some(coarse) = coarse else { return };
-            for slot in range {
-                let value = coarse.value(slot);
-                let constrained = loads.constrained(slot);
+            for site in range {
+                let value = coarse.value(site);
+                let constrained = loads.constrained(site);
                 for d in 0..D {
                     if constrained >> d & 1 == 0 {
-                        z[d][slot - start] += value[d];
+                        z[d][site - start] += value[d];
                     }
                 }
             }
         });
     }
 
-    /// The local part, slot by slot.
+    /// The local part, site by site.
     pub fn local(&self) -> &[f64] {
         &self.local
     }
 
-    /// Volume of each slot's particle, m³.
+    /// Volume of each site's particle, m³.
     pub fn volumes(&self) -> &[f64] {
         &self.volumes
     }

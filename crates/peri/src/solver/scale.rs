@@ -12,7 +12,7 @@ const LEAST_STRAIN: f64 = 0.01;
 /// What a body's forces are measured by, beside its reactions: of the body as it was built.
 #[derive(Clone, Debug, Default)]
 pub struct Scale {
-    /// s of each slot, N/m⁴.
+    /// s of each site, N/m⁴.
     springs: Vec<f64>,
     /// U at load factor 1, m, and L, m.
     largest: f64,
@@ -25,25 +25,25 @@ pub struct Scale {
 impl Scale {
     /// Of a body with its loads; `stiffness` is kθK.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, stiffness: f64) -> Self {
-        let of = |&slot: &u32| {
+        let of = |&site: &u32| {
             let mut sum = 0.0;
-            bonds.neighbours(slot as usize, &mut |bond| sum += 2.0 * stiffness * bond.weight / bond.length);
+            bonds.neighbours(site as usize, &mut |bond| sum += 2.0 * stiffness * bond.weight / bond.length);
             sum
         };
         let sums: Vec<f64> = bonds.particles().par_iter().map(of).collect();
-        let mut scale = Self { springs: vec![0.0; bonds.slots()], ..Self::default() };
+        let mut scale = Self { springs: vec![0.0; bonds.sites()], ..Self::default() };
         let (mut low, mut high, mut square) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D], 0.0);
-        for (&slot, sum) in bonds.particles().iter().zip(sums) {
-            let slot = slot as usize;
-            scale.springs[slot] = sum;
-            let position = bonds.position(slot);
+        for (&site, sum) in bonds.particles().iter().zip(sums) {
+            let site = site as usize;
+            scale.springs[site] = sum;
+            let position = bonds.position(site);
             low = std::array::from_fn(|d| low[d].min(position[d]));
             high = std::array::from_fn(|d| high[d].max(position[d]));
-            if let Some(prescribed) = loads.displacement.as_ref().filter(|_| loads.constrained(slot) != 0) {
-                let moved = prescribed.get(slot).iter().map(|x| x * x).sum::<f64>().sqrt();
+            if let Some(prescribed) = loads.displacement.as_ref().filter(|_| loads.constrained(site) != 0) {
+                let moved = prescribed.get(site).iter().map(|x| x * x).sum::<f64>().sqrt();
                 scale.largest = scale.largest.max(moved);
                 square += sum * sum;
-                scale.held_sum += bonds.horizon() * bonds.volume(slot) * sum;
+                scale.held_sum += bonds.horizon() * bonds.volume(site) * sum;
             }
         }
         scale.diagonal = (0..D).map(|d| (high[d] - low[d]).powi(2)).sum::<f64>().sqrt();

@@ -131,11 +131,11 @@ pub struct State<const D: usize> {
 
 impl<const D: usize> State<D> {
     /// The undeformed body.
-    pub fn new(slots: usize) -> Self {
+    pub fn new(sites: usize) -> Self {
         Self {
-            displacement: Field::zeros(slots),
-            velocity: Field::zeros(slots),
-            force: Field::zeros(slots),
+            displacement: Field::zeros(sites),
+            velocity: Field::zeros(sites),
+            force: Field::zeros(sites),
             step: 0,
             predicted: false,
             round: 0,

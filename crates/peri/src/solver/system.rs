@@ -1,6 +1,6 @@
 //! What is solved: a body under its material and loads.
 
-use super::breaking::Breaking;
+use super::criterion::Breaking;
 use super::load::Loads;
 use super::scale::Scale;
 use super::state::State;
@@ -145,25 +145,25 @@ impl<'a, const D: usize> System<'a, D> {
         let fields =
             [("displacement", &state.displacement), ("velocity", &state.velocity), ("force", &state.force)];
         for (quantity, field) in fields {
-            if let Some((slot, _)) = field.non_finite() {
-                let particle = bonds.particles().partition_point(|&s| (s as usize) < slot);
+            if let Some((site, _)) = field.non_finite() {
+                let particle = bonds.particles().partition_point(|&s| (s as usize) < site);
                 return Error::NotFinite {
                     quantity,
                     particle,
-                    position: bonds.position(slot).to_vec(),
+                    position: bonds.position(site).to_vec(),
                     step: state.step,
                     iteration: state.iteration,
                 };
             }
         }
         // every entry is finite, their squares are not: the greatest force is to blame
-        let size = |slot: u32| state.force.get(slot as usize).iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+        let size = |site: u32| state.force.get(site as usize).iter().fold(0.0_f64, |m, f| m.max(f.abs()));
         let particles = bonds.particles().iter().enumerate();
         let greatest = particles.max_by(|a, b| size(*a.1).total_cmp(&size(*b.1)));
         Error::NotFinite {
             quantity: "sum of squared forces",
             particle: greatest.map_or(0, |(particle, _)| particle),
-            position: greatest.map_or_else(Vec::new, |(_, &slot)| bonds.position(slot as usize).to_vec()),
+            position: greatest.map_or_else(Vec::new, |(_, &site)| bonds.position(site as usize).to_vec()),
             step: state.step,
             iteration: state.iteration,
         }

@@ -29,17 +29,17 @@ pub struct BondSums {
 impl BondSums {
     /// One visit of all bonds.
     pub fn new<const D: usize>(system: &System<D>) -> Self {
-        let of = |slots: &[u32]| {
+        let of = |sites: &[u32]| {
             let mut part = Self { stiffness: 0.0, shortest: f64::INFINITY, extent: 0.0 };
-            for &slot in slots {
+            for &site in sites {
                 let (mut stiffness, mut extent) = (0.0, 0.0);
-                system.bonds.neighbours(slot as usize, &mut |bond| {
+                system.bonds.neighbours(site as usize, &mut |bond| {
                     stiffness += 2.0 * bond.weight / bond.length;
                     extent += bond.weight * bond.length;
                     part.shortest = part.shortest.min(bond.length);
                 });
                 part.stiffness = part.stiffness.max(stiffness);
-                part.extent += system.bonds.volume(slot as usize) * extent;
+                part.extent += system.bonds.volume(site as usize) * extent;
             }
             part
         };
@@ -73,7 +73,7 @@ pub fn largest_frequency_squared<const D: usize>(
         return 0.0;
     }
     let mut now = start(system);
-    let mut before = Field::zeros(system.bonds.slots());
+    let mut before = Field::zeros(system.bonds.sites());
     let mut product = before.clone();
     let mut scratch = [before.clone(), before.clone()];
     let size = product_of(&now, &now, volumes).sqrt();
@@ -152,44 +152,44 @@ fn tangent<const D: usize>(
     if system.loads.constrained.is_empty() {
         return;
     }
-    for &slot in system.bonds.particles() {
-        let constrained = system.loads.constrained(slot as usize);
+    for &site in system.bonds.particles() {
+        let constrained = system.loads.constrained(site as usize);
         if constrained != 0 {
-            let value = product.get(slot as usize);
+            let value = product.get(site as usize);
             let value = std::array::from_fn(|d| if constrained >> d & 1 == 1 { 0.0 } else { value[d] });
-            product.set(slot as usize, value);
+            product.set(site as usize, value);
         }
     }
 }
 
 /// A start with a part of every mode: Knuth's linear congruential generator, free components only.
 fn start<const D: usize>(system: &System<D>) -> Field<D> {
-    let mut field = Field::zeros(system.bonds.slots());
+    let mut field = Field::zeros(system.bonds.sites());
     let mut seed = 1_u64;
-    for &slot in system.bonds.particles() {
-        let constrained = system.loads.constrained(slot as usize);
+    for &site in system.bonds.particles() {
+        let constrained = system.loads.constrained(site as usize);
         let value = std::array::from_fn(|d| {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             if constrained >> d & 1 == 1 { 0.0 } else { (seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0 }
         });
-        field.set(slot as usize, value);
+        field.set(site as usize, value);
     }
     field
 }
 
 /// Σ V x·y, work item by work item in order.
 fn product_of<const D: usize>(a: &Field<D>, b: &Field<D>, volumes: &[f64]) -> f64 {
-    let slots = volumes.len();
+    let sites = volumes.len();
     let (a, b) = (a.components(), b.components());
     let of = |chunk: usize| {
-        let range = chunk_range(chunk, slots);
+        let range = chunk_range(chunk, sites);
         let of_axis = |d: usize| {
             let parts = a[d][range.clone()].iter().zip(&b[d][range.clone()]).zip(&volumes[range.clone()]);
             parts.map(|((x, y), v)| x * y * v).sum::<f64>()
         };
         (0..D).map(of_axis).sum()
     };
-    let parts: Vec<f64> = (0..slots.div_ceil(CHUNK)).into_par_iter().map(of).collect();
+    let parts: Vec<f64> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).collect();
     parts.iter().sum()
 }
 
@@ -202,11 +202,11 @@ fn scale<const D: usize>(field: &mut Field<D>, factor: f64) {
 
 /// field += Σ factor·other.
 fn combine<const D: usize>(field: &mut Field<D>, others: [(f64, &Field<D>); 2]) {
-    let slots = field.slots();
+    let sites = field.sites();
     let [(first, a), (second, b)] = others;
     let (a, b) = (a.components(), b.components());
     field.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, out)| {
-        let range = chunk_range(chunk, slots);
+        let range = chunk_range(chunk, sites);
         for (d, out) in out.into_iter().enumerate() {
             for ((x, a), b) in out.iter_mut().zip(&a[d][range.clone()]).zip(&b[d][range.clone()]) {
                 *x += first * a + second * b;

@@ -139,16 +139,16 @@ impl VelocityVerlet {
         volumes: &[f64],
     ) -> Result<(), Error> {
         let (factor, rate) = self.factor(system, 0.0);
-        for &slot in system.bonds.particles() {
-            let slot = slot as usize;
-            let constrained = system.loads.constrained(slot);
-            let Some(full) = system.loads.displacement.as_ref().map(|field| field.get(slot)) else { break };
-            let (mut u, mut v) = (state.displacement.get(slot), state.velocity.get(slot));
+        for &site in system.bonds.particles() {
+            let site = site as usize;
+            let constrained = system.loads.constrained(site);
+            let Some(full) = system.loads.displacement.as_ref().map(|field| field.get(site)) else { break };
+            let (mut u, mut v) = (state.displacement.get(site), state.velocity.get(site));
             for d in (0..D).filter(|d| constrained >> d & 1 == 1) {
                 (u[d], v[d]) = (factor * full[d], rate * full[d]);
             }
-            state.displacement.set(slot, u);
-            state.velocity.set(slot, v);
+            state.displacement.set(site, u);
+            state.velocity.set(site, v);
         }
         if state.displacement.non_finite().is_some() || state.velocity.non_finite().is_some() {
             return Err(system.not_finite(state));
@@ -161,9 +161,9 @@ impl VelocityVerlet {
         system.count_evaluation(state);
         let observed = state.balanced_stretches;
         let stored = system.stored_energy(state, observed);
-        let square = |slot: u32| state.velocity.get(slot as usize).iter().map(|v| v * v).sum::<f64>();
+        let square = |site: u32| state.velocity.get(site as usize).iter().map(|v| v * v).sum::<f64>();
         let particles = system.bonds.particles().iter();
-        let kinetic = particles.map(|&slot| volumes[slot as usize] * square(slot)).sum::<f64>();
+        let kinetic = particles.map(|&site| volumes[site as usize] * square(site)).sum::<f64>();
         let kinetic = 0.5 * self.density * kinetic;
         if state.force.non_finite().is_some() || !(kinetic + stored).is_finite() {
             return Err(system.not_finite(state));
@@ -304,8 +304,8 @@ impl VelocityVerlet {
         factor: f64,
     ) {
         if system.is_overstretched(observed) {
-            let slots = system.break_bonds(state);
-            refresh(system, state, factor, Some(&chunks_of(&slots)));
+            let sites = system.break_bonds(state);
+            refresh(system, state, factor, Some(&chunks_of(&sites)));
         }
     }
 

@@ -1,4 +1,4 @@
-//! The passes of a step of velocity Verlet over all slots: half a kick and the drift; forces; the other half; and
+//! The passes of a step of velocity Verlet over all sites: half a kick and the drift; forces; the other half; and
 //! what a row of history sums.
 
 use super::load::Loads;
@@ -23,7 +23,7 @@ pub struct VerletStep {
     pub rate: f64,
 }
 
-/// Sums over all slots, item by item in a fixed order.
+/// Sums over all sites, item by item in a fixed order.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Sums {
     /// Kinetic energy Σ ½ρV v², J (only after the whole step).
@@ -148,11 +148,11 @@ pub fn refresh<const D: usize>(
     let chunks = chunks.filter(|_| !system.material.has_points());
     let system = &*system;
     let (loads, displacement) = (&*system.loads, &state.displacement);
-    let slots = displacement.slots();
+    let sites = displacement.sites();
     state.force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut f)| {
         if chunks.is_none_or(|list| list.binary_search(&chunk).is_ok()) {
             system.internal_force(displacement, chunk, &mut f, None);
-            load(loads, chunk, slots, factor, &mut f);
+            load(loads, chunk, sites, factor, &mut f);
         }
     });
 }
@@ -161,13 +161,13 @@ pub fn refresh<const D: usize>(
 fn load<const D: usize>(
     loads: &Loads<D>,
     chunk: usize,
-    slots: usize,
+    sites: usize,
     factor: f64,
     force: &mut [&mut [f64]; D],
 ) {
     let Some(body) = &loads.body_force else { return };
     for d in 0..D {
-        for (f, b) in force[d].iter_mut().zip(&body.components()[d][chunk_range(chunk, slots)]) {
+        for (f, b) in force[d].iter_mut().zip(&body.components()[d][chunk_range(chunk, sites)]) {
             *f += factor * b;
         }
     }
@@ -288,9 +288,9 @@ fn free_kick(v: &mut [f64], f: &[f64], volumes: &[f64], push: f64) -> f64 {
     square.iter().sum()
 }
 
-/// Slots of the work items that hold some particles, ascending.
-pub fn chunks_of(slots: &[u32]) -> Vec<usize> {
-    let mut chunks: Vec<usize> = slots.iter().map(|&slot| slot as usize / CHUNK).collect();
+/// Sites of the work items that hold some particles, ascending.
+pub fn chunks_of(sites: &[u32]) -> Vec<usize> {
+    let mut chunks: Vec<usize> = sites.iter().map(|&site| site as usize / CHUNK).collect();
     chunks.sort_unstable();
     chunks.dedup();
     chunks
@@ -303,11 +303,11 @@ pub fn stored<const D: usize>(system: &mut System<D>, state: &State<D>, observed
     system.stored_energy(state, if inside { StretchRange { low, high } } else { observed })
 }
 
-/// Volumes of all slots, 0 where there is no particle.
+/// Volumes of all sites, 0 where there is no particle.
 pub fn volumes<const D: usize>(system: &System<D>) -> Vec<f64> {
-    let mut volumes = vec![0.0; system.bonds.slots()];
-    for &slot in system.bonds.particles() {
-        volumes[slot as usize] = system.bonds.volume(slot as usize);
+    let mut volumes = vec![0.0; system.bonds.sites()];
+    for &site in system.bonds.particles() {
+        volumes[site as usize] = system.bonds.volume(site as usize);
     }
     volumes
 }

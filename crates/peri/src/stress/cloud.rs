@@ -44,19 +44,19 @@ pub fn piola<const D: usize>(
     // scenes refuse measures that need a lattice
     let window = if measure.needs_lattice() { Window::Ball } else { Window::of(measure) };
     let totals = measure.is_partition().then(|| totals(bonds, &points, &grid, window));
-    let one = |slot: usize| -> Tensor<D> {
-        let here = points[slot];
+    let one = |site: usize| -> Tensor<D> {
+        let here = points[site];
         let mut sum = [[0.0; D]; D];
         let mut add = |own: usize, weight_of: &dyn Fn([f64; D], [f64; D], usize, usize) -> f64| {
             let mut count = 0;
             bonds.neighbours(own, &mut |bond| {
                 let p = std::array::from_fn(|d| points[own][d] - here[d]);
                 // not p + ξ: seen from the other end, both must be the same numbers or ties are counted twice or never
-                let q = std::array::from_fn(|d| points[bond.slot][d] - here[d]);
-                let weight = weight_of(p, q, bond.slot, count);
+                let q = std::array::from_fn(|d| points[bond.site][d] - here[d]);
+                let weight = weight_of(p, q, bond.site, count);
                 count += 1;
                 if weight > 0.0 {
-                    let (u, v) = (state.displacement.get(own), state.displacement.get(bond.slot));
+                    let (u, v) = (state.displacement.get(own), state.displacement.get(bond.site));
                     let eta: [f64; D] = std::array::from_fn(|d| v[d] - u[d]);
                     let volume = bonds.volume(own);
                     let scale = weight
@@ -70,8 +70,8 @@ pub fn piola<const D: usize>(
             });
         };
         let volume = if measure == Measure::OnePoint {
-            add(slot, &|_, _, _, _| 0.5);
-            bonds.volume(slot)
+            add(site, &|_, _, _, _| 0.5);
+            bonds.volume(site)
         } else {
             let norm = |x: [f64; D]| x.iter().map(|c| c * c).sum::<f64>();
             grid.near(here, reach, |own| {
@@ -92,7 +92,7 @@ pub fn piola<const D: usize>(
                     _ => 0.0,
                 });
             });
-            if totals.is_some() { 1.0 } else { filled[slot] }
+            if totals.is_some() { 1.0 } else { filled[site] }
         };
         sum.map(|row| row.map(|x| x / volume))
     };
@@ -110,7 +110,7 @@ fn totals<const D: usize>(
         let mut sums = Vec::new();
         bonds.neighbours(own, &mut |bond| {
             // the same bond from either end in the same order: the same bits
-            let (a, b) = (points[own.min(bond.slot)], points[own.max(bond.slot)]);
+            let (a, b) = (points[own.min(bond.site)], points[own.max(bond.site)]);
             let middle = std::array::from_fn(|d| 0.5 * (a[d] + b[d]));
             let mut sum = 0.0;
             // half a bond and a ball away from its middle

@@ -22,10 +22,10 @@ pub fn piola<const D: usize>(
     measure: Measure,
     ball: BallVolume,
 ) -> Vec<Tensor<D>> {
-    let slots = bonds.slots();
-    let mut columns: [Field<D>; D] = std::array::from_fn(|_| Field::zeros(slots));
-    let mut forces = Field::zeros(slots);
-    let mut averages = Field::zeros(slots);
+    let sites = bonds.sites();
+    let mut columns: [Field<D>; D] = std::array::from_fn(|_| Field::zeros(sites));
+    let mut forces = Field::zeros(sites);
+    let mut averages = Field::zeros(sites);
     let window = measure.is_partition().then(|| Averaged::<D>::new(Window::of(measure), bonds.ratio()));
     let rim = Rim::new(bonds, state, measure);
     // one direction of every bond; the other adds the same f ⊗ ξ, which the factor ½ of the definition undoes
@@ -44,27 +44,27 @@ pub fn piola<const D: usize>(
     let volumes = volumes(bonds, state, measure, ball, window.as_ref());
     let particles = bonds.particles().iter().zip(volumes);
     particles
-        .map(|(&slot, volume)| {
-            let columns: [[f64; D]; D] = std::array::from_fn(|b| columns[b].get(slot as usize));
+        .map(|(&site, volume)| {
+            let columns: [[f64; D]; D] = std::array::from_fn(|b| columns[b].get(site as usize));
             std::array::from_fn(|a| std::array::from_fn(|b| columns[b][a] / volume))
         })
         .collect()
 }
 
-/// f V_I V_J, N, of bond `k` from every slot; zero where it is not intact.
+/// f V_I V_J, N, of bond `k` from every site; zero where it is not intact.
 fn bond_forces<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, k: usize, forces: &mut Field<D>) {
     let offset = bonds.stencil().offsets[k];
     let shift = bonds.shift(offset);
     let bond = offset.map(|o| f64::from(o) * bonds.lattice().spacing);
     let volume = bonds.lattice().volume;
     forces.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, out)| {
-        for (index, slot) in chunk_range(chunk, bonds.slots()).enumerate() {
+        for (index, site) in chunk_range(chunk, bonds.sites()).enumerate() {
             let mut force = [0.0; D];
-            if bonds.is_intact(slot, k) {
+            if bonds.is_intact(site, k) {
                 let (own, other) =
-                    (state.displacement.get(slot), state.displacement.get(slot.wrapping_add_signed(shift)));
+                    (state.displacement.get(site), state.displacement.get(site.wrapping_add_signed(shift)));
                 let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
-                let weight = bonds.weight(slot, k) * volume;
+                let weight = bonds.weight(site, k) * volume;
                 let scale = force_over_length(state.fit, state.modulus, weight, volume, bond, eta);
                 force = std::array::from_fn(|d| scale * (bond[d] + eta[d]));
             }
@@ -118,16 +118,16 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
 
 /// Particles so near a surface that bonds of their windows are missing, where existing ones make up for them.
 struct Rim {
-    slots: Vec<u32>,
+    sites: Vec<u32>,
     occupied: Vec<bool>,
 }
 
 impl Rim {
     fn new<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Self {
-        let wanted = |slot: usize| match measure {
+        let wanted = |site: usize| match measure {
             Measure::HardyBonds => true,
             Measure::HardyWindow => false,
-            _ => measure.is_partition() && !state.missing.is_window(slot),
+            _ => measure.is_partition() && !state.missing.is_window(site),
         };
         let occupied = bonds.occupancy();
         // no bond that crosses a window begins farther away
@@ -138,39 +138,39 @@ impl Rim {
             let mut offset = [0; D];
             offset[d] = 1;
             let stride = bonds.shift(offset);
-            let full = |slot: usize| {
-                let at = |k: i32| slot.wrapping_add_signed(k as isize * stride);
+            let full = |site: usize| {
+                let at = |k: i32| site.wrapping_add_signed(k as isize * stride);
                 (-reach..=reach).all(|k| whole.get(at(k)).copied().unwrap_or(false))
             };
             let next: Vec<bool> =
-                (0..whole.len()).into_par_iter().map(|slot| whole[slot] && full(slot)).collect();
+                (0..whole.len()).into_par_iter().map(|site| whole[site] && full(site)).collect();
             whole = next;
         }
         let particles = bonds.particles().iter().copied();
-        let slots = particles.filter(|&s| !whole[s as usize] && wanted(s as usize)).collect();
-        Self { slots, occupied }
+        let sites = particles.filter(|&s| !whole[s as usize] && wanted(s as usize)).collect();
+        Self { sites, occupied }
     }
 
     /// Divides the averages of a bond by the weights of those whose two particles exist.
     fn complete<const D: usize>(&self, shift: isize, taps: &[Tap], averages: &mut Field<D>) {
-        let there = |slot: usize| self.occupied.get(slot).copied().unwrap_or(false);
-        let one = |&slot: &u32| -> f64 {
+        let there = |site: usize| self.occupied.get(site).copied().unwrap_or(false);
+        let one = |&site: &u32| -> f64 {
             let at = |tap: &&Tap| {
-                let start = (slot as usize).wrapping_add_signed(tap.shift);
+                let start = (site as usize).wrapping_add_signed(tap.shift);
                 there(start) && there(start.wrapping_add_signed(shift))
             };
             taps.iter().filter(at).map(|tap| tap.weight).sum()
         };
-        let weights: Vec<f64> = self.slots.par_iter().map(one).collect();
-        for (&slot, weight) in self.slots.iter().zip(weights) {
-            let average = averages.get(slot as usize);
+        let weights: Vec<f64> = self.sites.par_iter().map(one).collect();
+        for (&site, weight) in self.sites.iter().zip(weights) {
+            let average = averages.get(site as usize);
             // where no such bond exists, the average is zero
-            averages.set(slot as usize, average.map(|f| if weight > 0.0 { f / weight } else { 0.0 }));
+            averages.set(site as usize, average.map(|f| if weight > 0.0 { f / weight } else { 0.0 }));
         }
     }
 }
 
-/// Slots that a convolution sums at a time, in registers.
+/// Sites that a convolution sums at a time, in registers.
 const BLOCK: usize = 32;
 
 /// averages(p) = Σ weight·forces(p + shift); nothing lies beyond the ends.
@@ -216,11 +216,11 @@ fn add_scaled(out: &mut [f64], values: &[f64], factor: f64) {
 }
 
 fn accumulate<const D: usize>(averages: &Field<D>, edge: f64, column: &mut Field<D>) {
-    let slots = averages.slots();
+    let sites = averages.sites();
     let averages = averages.components();
     column.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, out)| {
         for (d, out) in out.into_iter().enumerate() {
-            add_scaled(out, &averages[d][chunk_range(chunk, slots)], edge);
+            add_scaled(out, &averages[d][chunk_range(chunk, sites)], edge);
         }
     });
 }
@@ -249,10 +249,10 @@ fn volumes<const D: usize>(
         (_, _, Some(window)) => (window.cells(), lattice.volume),
         _ => (Vec::new(), whole),
     };
-    let shared = |slot: usize| match measure {
+    let shared = |site: usize| match measure {
         Measure::HardyWindow => true,
         Measure::HardyBonds => false,
-        _ => !measure.is_partition() || state.missing.is_window(slot),
+        _ => !measure.is_partition() || state.missing.is_window(site),
     };
     shares(bonds, &cells, shared).into_iter().map(|s| s * volume).collect()
 }
@@ -267,11 +267,11 @@ fn shares<const D: usize>(
     bonds
         .particles()
         .par_iter()
-        .map(|&slot| {
-            if cells.is_empty() || !wanted(slot as usize) {
+        .map(|&site| {
+            if cells.is_empty() || !wanted(site as usize) {
                 return 1.0;
             }
-            let cell = bonds.cell_of(slot as usize);
+            let cell = bonds.cell_of(site as usize);
             cells
                 .iter()
                 .filter(|(offset, _)| {

@@ -103,16 +103,16 @@ pub enum Missing<'a> {
     Bonds,
     /// All are divided by the share of the window that the body's cells cover.
     Window,
-    /// [`Self::Window`] in the slots marked (where body forces act), [`Self::Bonds`] elsewhere.
+    /// [`Self::Window`] in the sites marked (where body forces act), [`Self::Bonds`] elsewhere.
     WindowAt(&'a [bool]),
 }
 
 impl Missing<'_> {
-    fn is_window(self, slot: usize) -> bool {
+    fn is_window(self, site: usize) -> bool {
         match self {
             Self::Bonds => false,
             Self::Window => true,
-            Self::WindowAt(marked) => marked.get(slot).copied().unwrap_or(false),
+            Self::WindowAt(marked) => marked.get(site).copied().unwrap_or(false),
         }
     }
 }
@@ -201,12 +201,12 @@ pub fn deformation_gradients<const D: usize>(
     bonds: &dyn Bonds<D>,
     displacement: &Field<D>,
 ) -> Vec<Tensor<D>> {
-    let one = |&slot: &u32| {
-        let own = displacement.get(slot as usize);
+    let one = |&site: &u32| {
+        let own = displacement.get(site as usize);
         let mut shape = nalgebra::SMatrix::<f64, D, D>::zeros();
         let mut change = nalgebra::SMatrix::<f64, D, D>::zeros();
-        bonds.neighbours(slot as usize, &mut |bond| {
-            let other = displacement.get(bond.slot);
+        bonds.neighbours(site as usize, &mut |bond| {
+            let other = displacement.get(bond.site);
             let unit = 1.0 / (bond.length * bond.length);
             for a in 0..D {
                 for b in 0..D {

@@ -78,11 +78,11 @@ fn unequal_volumes_balance() {
         .map(|x| [0.2 * x[0] + 0.3 * x[1], -0.1 * x[1] - 0.3 * x[0], 0.1 * x[2] * x[0]])
         .collect();
     cloud.set_law(&KernelFit::new(&*law, [0.5, 1.8], 1e-9).unwrap(), MODULUS);
-    let mut slots = vec![0; points.len()];
-    for (slot, &particle) in cloud.input_order().iter().enumerate() {
-        slots[particle as usize] = slot;
+    let mut sites = vec![0; points.len()];
+    for (site, &particle) in cloud.input_order().iter().enumerate() {
+        sites[particle as usize] = site;
     }
-    let found = forces(&cloud, &slots, &u);
+    let found = forces(&cloud, &sites, &u);
     let positions: Vec<[f64; 3]> =
         points.iter().zip(&u).map(|(x, u)| std::array::from_fn(|d| x[d] + u[d])).collect();
     let worst = imbalance(&positions, &found, &volumes);
@@ -262,8 +262,8 @@ fn stretches_are_tracked() {
         let stretches = pairs.iter().map(|p| p.deformed(&u).1);
         let (low, high) = stretches.fold((1.0_f64, 1.0_f64), |(l, h), x| (l.min(x), h.max(x)));
         let lattice: &dyn Bonds<D> = &built.lattice;
-        for (bonds, slots) in [(lattice, &built.on_lattice), (&built.cloud, &built.in_cloud)] {
-            let observed = peri::bonds::stretch_range(bonds, &scatter(bonds.slots(), slots, &u));
+        for (bonds, sites) in [(lattice, &built.on_lattice), (&built.cloud, &built.in_cloud)] {
+            let observed = peri::bonds::stretch_range(bonds, &scatter(bonds.sites(), sites, &u));
             let found = ((1.0 + observed.low).sqrt(), (1.0 + observed.high).sqrt());
             // roundings of λ²
             assert!(

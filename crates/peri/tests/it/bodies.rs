@@ -98,8 +98,8 @@ impl<const D: usize> Body<D> {
         let mut cloud =
             CloudBonds::new(&points, &volumes, 1.0, self.horizon(), correction, &self.cuts()).unwrap();
         let mut in_cloud = vec![0; points.len()];
-        for (slot, &particle) in cloud.input_order().iter().enumerate() {
-            in_cloud[particle as usize] = slot;
+        for (site, &particle) in cloud.input_order().iter().enumerate() {
+            in_cloud[particle as usize] = site;
         }
         if let Some(stiffness) = self.surface {
             let factors = surface_factors(&lattice, MODULUS, stiffness);
@@ -217,23 +217,23 @@ pub fn stretch_range<const D: usize>(pairs: &[Pair<D>], displacement: &[[f64; D]
     [range[0] - 1e-3, range[1] + 1e-3]
 }
 
-/// Forces of every particle in input order; `slots` says where each is stored.
+/// Forces of every particle in input order; `sites` says where each is stored.
 pub fn forces<const D: usize>(
     bonds: &dyn Bonds<D>,
-    slots: &[usize],
+    sites: &[usize],
     displacement: &[[f64; D]],
 ) -> Vec<[f64; D]> {
-    let field = scatter(bonds.slots(), slots, displacement);
-    let mut result = Field::zeros(bonds.slots());
+    let field = scatter(bonds.sites(), sites, displacement);
+    let mut result = Field::zeros(bonds.sites());
     force(bonds, &field, &mut result);
-    slots.iter().map(|&slot| result.get(slot)).collect()
+    sites.iter().map(|&site| result.get(site)).collect()
 }
 
-/// Particle values put into their slots.
-pub fn scatter<const D: usize>(count: usize, slots: &[usize], values: &[[f64; D]]) -> Field<D> {
+/// Particle values put into their sites.
+pub fn scatter<const D: usize>(count: usize, sites: &[usize], values: &[[f64; D]]) -> Field<D> {
     let mut field = Field::zeros(count);
-    for (&slot, &value) in slots.iter().zip(values) {
-        field.set(slot, value);
+    for (&site, &value) in sites.iter().zip(values) {
+        field.set(site, value);
     }
     field
 }
@@ -262,12 +262,12 @@ pub fn hold<const D: usize>(
     bonds: &dyn Bonds<D>,
     choose: impl Fn([f64; D]) -> Option<(u8, [f64; D])>,
 ) -> Loads<D> {
-    let mut displacement = Field::zeros(bonds.slots());
-    let mut constrained = vec![0; bonds.slots()];
-    for &slot in bonds.particles() {
-        if let Some((bits, value)) = choose(bonds.position(slot as usize)) {
-            constrained[slot as usize] = bits;
-            displacement.set(slot as usize, value);
+    let mut displacement = Field::zeros(bonds.sites());
+    let mut constrained = vec![0; bonds.sites()];
+    for &site in bonds.particles() {
+        if let Some((bits, value)) = choose(bonds.position(site as usize)) {
+            constrained[site as usize] = bits;
+            displacement.set(site as usize, value);
         }
     }
     Loads { displacement: Some(displacement), constrained, ..Loads::default() }

@@ -7,15 +7,15 @@ use peri::contact::{Contact, STIFFNESS};
 use peri::field::Field;
 
 /// Contact forces on particles in input order, and the energy.
-fn contact<const D: usize>(bonds: &dyn Bonds<D>, slots: &[usize], u: &[[f64; D]]) -> (Vec<[f64; D]>, f64) {
-    let field = scatter(bonds.slots(), slots, u);
+fn contact<const D: usize>(bonds: &dyn Bonds<D>, sites: &[usize], u: &[[f64; D]]) -> (Vec<[f64; D]>, f64) {
+    let field = scatter(bonds.sites(), sites, u);
     let mut contact = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
     contact.update(bonds, &field);
-    let mut force = Field::zeros(bonds.slots());
+    let mut force = Field::zeros(bonds.sites());
     for (chunk, mut out) in force.chunks_mut().into_iter().enumerate() {
         contact.force(&field, chunk, &mut out);
     }
-    (slots.iter().map(|&slot| force.get(slot)).collect(), contact.touching(&field).energy)
+    (sites.iter().map(|&site| force.get(site)).collect(), contact.touching(&field).energy)
 }
 
 /// The same by comparing all pairs: volumes and radii given, `bonded` by (I, J), I < J.
@@ -53,10 +53,10 @@ fn two_particles() {
     // volumes 1 and 1, thickness 1: radii ½; beyond the horizon, so no bond. d = 1.35 = min(0.9·2, 1.35·1)
     let points = [[0.0, 0.0], [2.0, 0.0]];
     let cloud = CloudBonds::new(&points, &[1.0; 2], 1.0, 1.5, VolumeCorrection::None, &[]).unwrap();
-    let slots = [0, 1].map(|p| cloud.input_order().iter().position(|&i| i == p).unwrap());
+    let sites = [0, 1].map(|p| cloud.input_order().iter().position(|&i| i == p).unwrap());
     let stiffness = 15.0 * 6.0 * MODULUS / 1.5;
     for (r, overlap) in [(2.0, 0.0), (1.36, 0.0), (1.35, 0.0), (1.0, 0.35), (0.1, 1.25), (1e-200, 1.35)] {
-        let (force, energy) = contact(&cloud, &slots, &[[0.0; 2], [r - 2.0, 0.0]]);
+        let (force, energy) = contact(&cloud, &sites, &[[0.0; 2], [r - 2.0, 0.0]]);
         let push = stiffness * overlap;
         // rounding of 1.35
         assert!((force[1][0] - push).abs() <= 1e-14 * stiffness, "r = {r}: {force:?}");
@@ -64,11 +64,11 @@ fn two_particles() {
         assert!((energy - 0.5 * push * overlap).abs() <= 1e-14 * stiffness, "r = {r}: {energy}");
     }
     // past each other: pushed on, contact knows distances only
-    let (force, _) = contact(&cloud, &slots, &[[0.0; 2], [-3.0, 0.0]]);
+    let (force, _) = contact(&cloud, &sites, &[[0.0; 2], [-3.0, 0.0]]);
     assert!(force[1][0] < 0.0);
     // bonded: never
     let near = CloudBonds::new(&points, &[1.0; 2], 1.0, 2.5, VolumeCorrection::None, &[]).unwrap();
-    assert_eq!(contact(&near, &slots, &[[0.0; 2], [-1.0, 0.0]]), (vec![[0.0; 2]; 2], 0.0));
+    assert_eq!(contact(&near, &sites, &[[0.0; 2], [-1.0, 0.0]]), (vec![[0.0; 2]; 2], 0.0));
 }
 
 /// In one place (r = 0) the force is κcd/δ along the reference bond, at any distance from home; the other limits are 0.
@@ -76,11 +76,11 @@ fn two_particles() {
 fn degenerate_states() {
     let points = [[0.0, 0.0, 0.0], [1.2, 0.0, 1.6]];
     let cloud = CloudBonds::new(&points, &[1.0; 2], 1.0, 1.0, VolumeCorrection::None, &[]).unwrap();
-    let slots = [0, 1].map(|p| cloud.input_order().iter().position(|&i| i == p).unwrap());
+    let sites = [0, 1].map(|p| cloud.input_order().iter().position(|&i| i == p).unwrap());
     let full = 15.0 * 6.0 * MODULUS * 1.35;
     for there in [[0.0; 3], [0.5, 0.25, -8.0], [0.0, 1e6, 0.0]] {
         let u = [there, std::array::from_fn(|d| there[d] - points[1][d])];
-        let (force, energy) = contact(&cloud, &slots, &u);
+        let (force, energy) = contact(&cloud, &sites, &u);
         if there == [0.0; 3] {
             assert!(
                 (norm(force[1]) / full - 1.0).abs() < 1e-14
@@ -93,7 +93,7 @@ fn degenerate_states() {
         assert!(norm(std::array::from_fn::<f64, 3, _>(|d| force[0][d] + force[1][d])) <= 1e-15 * full);
     }
     for far in [1e30, 1e200, f64::MAX, f64::INFINITY, f64::NAN] {
-        let (force, energy) = contact(&cloud, &slots, &[[0.0; 3], [far, -far, 0.0]]);
+        let (force, energy) = contact(&cloud, &sites, &[[0.0; 3], [far, -far, 0.0]]);
         assert_eq!((force, energy), (vec![[0.0; 3]; 2], 0.0), "{far}");
     }
     let one = CloudBonds::new(&points[..1], &[1.0], 1.0, 1.0, VolumeCorrection::None, &[]).unwrap();
@@ -146,9 +146,9 @@ fn unequal_volumes() {
     let points = random.vectors::<3>(400, 1.0);
     let volumes: Vec<f64> = (0..400).map(|_| 0.01 * (3.0 + 2.0 * random.next())).collect();
     let cloud = CloudBonds::new(&points, &volumes, 1.0, 0.3, VolumeCorrection::None, &[]).unwrap();
-    let mut slots = vec![0; 400];
-    for (slot, &particle) in cloud.input_order().iter().enumerate() {
-        slots[particle as usize] = slot;
+    let mut sites = vec![0; 400];
+    for (site, &particle) in cloud.input_order().iter().enumerate() {
+        sites[particle as usize] = site;
     }
     let radii: Vec<f64> = volumes.iter().map(|v| 0.5 * v.cbrt()).collect();
     let bonded = |i: usize, j: usize| {
@@ -157,7 +157,7 @@ fn unequal_volumes() {
     };
     let u = random.vectors(400, 0.2);
     let (expected, energy) = plainly(&points, &volumes, &radii, 0.3, &bonded, &u);
-    let (force, stored) = contact(&cloud, &slots, &u);
+    let (force, stored) = contact(&cloud, &sites, &u);
     // rounding, as above
     assert!(distance(&force, &expected) / rms(&expected) < 1e-12 && (stored / energy - 1.0).abs() < 1e-12);
     let momentum: [f64; 3] = std::array::from_fn(|d| force.iter().zip(&volumes).map(|(f, v)| f[d] * v).sum());
@@ -169,7 +169,7 @@ fn unequal_volumes() {
             let energy = |step: f64| {
                 let mut moved = u.clone();
                 moved[particle][d] += step;
-                contact(&cloud, &slots, &moved).1
+                contact(&cloud, &sites, &moved).1
             };
             let slope = (energy(1e-6) - energy(-1e-6)) / 2e-6;
             let exact = -volumes[particle] * force[particle][d];

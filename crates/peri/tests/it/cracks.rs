@@ -63,7 +63,7 @@ fn check<const D: usize>(
     let ratio = 3.015;
     let whole = LatticeBonds::new(box_of_cells.clone(), ratio, VolumeCorrection::None, &[]).unwrap();
     let points: Vec<[f64; D]> = whole.particles().iter().map(|&s| whole.position(s as usize)).collect();
-    let cell = |slot: usize| whole.cell_of(slot).unwrap().map(|c| 4 * c as i64);
+    let cell = |site: usize| whole.cell_of(site).unwrap().map(|c| 4 * c as i64);
     for swapped in [false, true] {
         let cuts = cuts(swapped);
         let lattice = LatticeBonds::new(box_of_cells.clone(), ratio, VolumeCorrection::None, &cuts).unwrap();
@@ -71,19 +71,19 @@ fn check<const D: usize>(
         let cloud =
             CloudBonds::new(&points, &volumes, 1.0, ratio * spacing, VolumeCorrection::None, &cuts).unwrap();
         let mut place = vec![0; points.len()];
-        cloud.input_order().iter().enumerate().for_each(|(slot, &p)| place[p as usize] = slot);
-        for (particle, &slot) in whole.particles().iter().enumerate() {
-            let slot = slot as usize;
-            whole.neighbours(slot, &mut |bond| {
-                let there = whole.particles().partition_point(|&s| (s as usize) < bond.slot);
-                let cut = cracks.iter().any(|(c, e)| crosses(cell(slot), cell(bond.slot), *c, e));
+        cloud.input_order().iter().enumerate().for_each(|(site, &p)| place[p as usize] = site);
+        for (particle, &site) in whole.particles().iter().enumerate() {
+            let site = site as usize;
+            whole.neighbours(site, &mut |bond| {
+                let there = whole.particles().partition_point(|&s| (s as usize) < bond.site);
+                let cut = cracks.iter().any(|(c, e)| crosses(cell(site), cell(bond.site), *c, e));
                 let found = [
-                    lattice.is_bonded(slot, bond.slot),
-                    lattice.is_bonded(bond.slot, slot),
+                    lattice.is_bonded(site, bond.site),
+                    lattice.is_bonded(bond.site, site),
                     cloud.is_bonded(place[particle], place[there]),
                     cloud.is_bonded(place[there], place[particle]),
                 ];
-                assert_eq!(found, [!cut; 4], "{:?} to {:?}, {cuts:?}", cell(slot), cell(bond.slot));
+                assert_eq!(found, [!cut; 4], "{:?} to {:?}, {cuts:?}", cell(site), cell(bond.site));
             });
         }
     }

@@ -34,21 +34,21 @@ fn one_particle() {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let mut one = Body::<3>::solid([1, 1, 1], 0.1, 3.015).build();
     for bonds in [&mut one.lattice as &mut dyn Bonds<3>, &mut one.cloud] {
-        let slot = bonds.particles()[0] as usize;
-        let mut state = State::new(bonds.slots());
-        state.velocity.set(slot, [0.5, -0.25, 2.0]);
+        let site = bonds.particles()[0] as usize;
+        let mut state = State::new(bonds.sites());
+        state.velocity.set(site, [0.5, -0.25, 2.0]);
         let solver = VelocityVerlet { records: 4, ..VelocityVerlet::new(DENSITY, 8.0) };
         run(&solver, bonds, &*law, &Loads::default(), &mut state).unwrap();
-        assert_eq!(state.displacement.get(slot), [4.0, -2.0, 16.0]);
+        assert_eq!(state.displacement.get(site), [4.0, -2.0, 16.0]);
         assert_eq!(state.total_iterations, 4);
         assert_eq!(state.motion.critical_step, f64::INFINITY);
         // and it falls: u = ½bt²/ρ, which the method integrates without error
-        let mut force = Field::zeros(bonds.slots());
-        force.set(slot, [0.0, 3.0, 0.0]);
+        let mut force = Field::zeros(bonds.sites());
+        force.set(site, [0.0, 3.0, 0.0]);
         let loads = Loads { body_force: Some(force), ..Loads::default() };
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         run(&once(2.0, 0.125), bonds, &*law, &loads, &mut state).unwrap();
-        let fallen = state.displacement.get(slot)[1];
+        let fallen = state.displacement.get(site)[1];
         assert!((fallen / (0.5 * 3.0 * 4.0 / DENSITY) - 1.0).abs() < 1e-14, "{fallen}");
         let last = &state.history[0];
         assert!((last.work / last.kinetic - 1.0).abs() < 1e-13, "{} {}", last.work, last.kinetic);
@@ -61,14 +61,14 @@ fn damping_slows() {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
     let mut one = Body::<2>::solid([1, 1], 0.1, 3.015).build();
     let bonds = &mut one.lattice;
-    let slot = bonds.particles()[0] as usize;
+    let site = bonds.particles()[0] as usize;
     let errors = [16.0, 32.0, 64.0].map(|steps: f64| {
-        let mut state = State::new(bonds.slots());
-        state.velocity.set(slot, [0.7, 0.0]);
+        let mut state = State::new(bonds.sites());
+        state.velocity.set(site, [0.7, 0.0]);
         let step = 2.0 / steps;
         let solver = VelocityVerlet { damping: 1.3, ..once(2.0, step) };
         run(&solver, bonds, &*law, &Loads::default(), &mut state).unwrap();
-        let speed = state.velocity.get(slot)[0];
+        let speed = state.velocity.get(site)[0];
         let ratio = (1.0 - 0.65 * step) / (1.0 + 0.65 * step);
         assert!((speed / (0.7 * ratio.powf(steps)) - 1.0).abs() < 1e-13, "{speed}");
         let last = &state.history[0];
@@ -87,7 +87,7 @@ fn fully_held() {
     let mut built = Body::<2>::solid([9, 8], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
     let loads = hold(bonds, |x| Some((3, [0.2 * x[0], -0.1 * x[1]])));
-    let mut state = State::new(bonds.slots());
+    let mut state = State::new(bonds.sites());
     let solver = VelocityVerlet { ramp: 1.0, records: 200, ..VelocityVerlet::new(DENSITY, 2.0) };
     run(&solver, bonds, &*law, &loads, &mut state).unwrap();
     let [half, last] = [&state.history[49], &state.history[199]];
@@ -108,10 +108,10 @@ fn two_particles() {
     let omega = (12.0 * MODULUS * 0.01 / (DENSITY * 0.1)).sqrt();
     for bonds in [&mut two.lattice as &mut dyn Bonds<2>, &mut two.cloud] {
         let start = |bonds: &dyn Bonds<2>| {
-            let mut state = State::new(bonds.slots());
-            for &slot in bonds.particles() {
-                let right = bonds.position(slot as usize)[0] > 0.1;
-                state.velocity.set(slot as usize, [if right { 0.01 } else { -0.01 }, 0.0]);
+            let mut state = State::new(bonds.sites());
+            for &site in bonds.particles() {
+                let right = bonds.position(site as usize)[0] > 0.1;
+                state.velocity.set(site as usize, [if right { 0.01 } else { -0.01 }, 0.0]);
             }
             state
         };
@@ -152,7 +152,7 @@ fn energies_balance() {
     let body = Body::<2>::damaged([24, 20], 0.1, 3.015);
     let critical = {
         let mut built = body.build();
-        let mut state = State::new(built.lattice.slots());
+        let mut state = State::new(built.lattice.sites());
         let solver = VelocityVerlet { records: 1, ..VelocityVerlet::new(DENSITY, 1e-9) };
         run(&solver, &mut built.lattice, &*law, &Loads::default(), &mut state).unwrap();
         state.motion.critical_step
@@ -163,9 +163,9 @@ fn energies_balance() {
         let mut loads = hold(bonds, |x| {
             (x[0] < 0.3 || x[0] > 2.1).then(|| (3, if x[0] < 0.3 { [0.0; 2] } else { [0.25, 0.05] }))
         });
-        let mut force = Field::zeros(bonds.slots());
-        for &slot in bonds.particles() {
-            force.set(slot as usize, [0.0, -0.01]);
+        let mut force = Field::zeros(bonds.sites());
+        for &site in bonds.particles() {
+            force.set(site as usize, [0.0, -0.01]);
         }
         loads.body_force = Some(force);
         let end = 200.0 * critical;
@@ -176,7 +176,7 @@ fn energies_balance() {
             records: 50,
             ..VelocityVerlet::new(DENSITY, end)
         };
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
         system.breaking =
             breaking.map(|stretch: f64| Breaking { stretch: stretch.into(), policy: Policy::EachIteration });
@@ -219,10 +219,10 @@ struct Conserved {
 
 fn conserved(bonds: &dyn Bonds<2>, state: &State<2>) -> Conserved {
     let mut sum = Conserved { momentum: [0.0; 2], spin: 0.0, kinetic: 0.0 };
-    for &slot in bonds.particles() {
-        let slot = slot as usize;
-        let (mass, x) = (DENSITY * bonds.volume(slot), bonds.position(slot));
-        let (u, v, f) = (state.displacement.get(slot), state.velocity.get(slot), state.force.get(slot));
+    for &site in bonds.particles() {
+        let site = site as usize;
+        let (mass, x) = (DENSITY * bonds.volume(site), bonds.position(site));
+        let (u, v, f) = (state.displacement.get(site), state.velocity.get(site), state.force.get(site));
         for d in 0..2 {
             sum.momentum[d] += mass * v[d];
             let half = 0.5 * state.motion.time_step * f[d] / DENSITY;
@@ -241,8 +241,8 @@ fn shake(bonds: &dyn Bonds<2>, strain: f64, state: &mut State<2>) {
     let values = Random(5).vectors::<2>(particles.len(), strain * bonds.spacing() * omega);
     let mean = |d: usize| values.iter().map(|v| v[d]).sum::<f64>() / values.len() as f64;
     let mean = [mean(0), mean(1)];
-    for (&slot, v) in particles.iter().zip(&values) {
-        state.velocity.set(slot as usize, [v[0] - mean[0], v[1] - mean[1]]);
+    for (&site, v) in particles.iter().zip(&values) {
+        state.velocity.set(site as usize, [v[0] - mean[0], v[1] - mean[1]]);
     }
 }
 
@@ -253,7 +253,7 @@ fn energy_does_not_drift() {
     let mut built = Body::<2>::solid([7, 6], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
     let run = |bonds: &mut dyn Bonds<2>, part: f64, steps: f64, strain: f64| {
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         shake(bonds, strain, &mut state);
         let loads = Loads::default();
         let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
@@ -317,17 +317,17 @@ fn rigid_rotation() {
     let bonds = &mut built.lattice;
     let fit = crate::bodies::fit(&*law, [0.95, 1.05]);
     bonds.set_law(&fit, MODULUS);
-    let mut out = Field::zeros(bonds.slots());
+    let mut out = Field::zeros(bonds.sites());
     // force of a particle with 28 bonds strained by one, and Young's modulus
     let stiffness = 28.0 * 2.0 * MODULUS * law.tangent() * 0.01;
     let youngs = MODULUS * 2.0 * PI * 0.3015_f64.powi(3) / 3.0;
     let (mut largest, mut stress) = (0.0_f64, 0.0_f64);
     for degree in 0..=90 {
         let (sine, cosine) = f64::from(degree).to_radians().sin_cos();
-        let mut u = Field::zeros(bonds.slots());
-        for &slot in bonds.particles() {
-            let [x, y] = bonds.position(slot as usize);
-            u.set(slot as usize, [cosine * x - sine * y - x, sine * x + cosine * y - y]);
+        let mut u = Field::zeros(bonds.sites());
+        for &site in bonds.particles() {
+            let [x, y] = bonds.position(site as usize);
+            u.set(site as usize, [cosine * x - sine * y - x, sine * x + cosine * y - y]);
         }
         force(bonds, &u, &mut out);
         let each = bonds.particles().iter().map(|&s| norm(out.get(s as usize)));
@@ -346,11 +346,11 @@ fn rigid_rotation() {
     assert!(largest < 1e-13 && stress < 1e-13);
 
     // one free turn, slow beside the body's own vibrations, while it drifts
-    let mut state = State::new(bonds.slots());
+    let mut state = State::new(bonds.sites());
     let rate = 0.02;
-    for &slot in bonds.particles() {
-        let [x, y] = bonds.position(slot as usize);
-        state.velocity.set(slot as usize, [-rate * (y - 1.0) + 0.3, rate * (x - 1.2) - 0.1]);
+    for &site in bonds.particles() {
+        let [x, y] = bonds.position(site as usize);
+        state.velocity.set(site as usize, [-rate * (y - 1.0) + 0.3, rate * (x - 1.2) - 0.1]);
     }
     let start = conserved(bonds, &state);
     let solver = VelocityVerlet { records: 360, ..VelocityVerlet::new(DENSITY, 2.0 * PI / rate) };

@@ -24,7 +24,7 @@ fn pulled(
         x if x > LENGTH - 0.3 => Some((1, [strain * LENGTH, 0.0])),
         _ => None,
     });
-    let mut state = State::new(bonds.slots());
+    let mut state = State::new(bonds.sites());
     let mut system = System::new(bonds, material, &loads, &[1.0]);
     system.breaking = breaking;
     let method = Lbfgs { tolerance: 1e-6, ..Default::default() };
@@ -35,12 +35,12 @@ fn pulled(
 /// Strain along the bar's middle between two places.
 fn strain(bonds: &dyn Bonds<2>, state: &State<2>, from: f64, to: f64) -> f64 {
     let at = |x: f64| {
-        let near = |&slot: &u32| {
-            let p = bonds.position(slot as usize);
+        let near = |&site: &u32| {
+            let p = bonds.position(site as usize);
             (p[0] - x).abs() < 0.06 && (p[1] - 0.35).abs() < 0.06
         };
-        let slot = bonds.particles().iter().copied().find(near).unwrap() as usize;
-        (bonds.position(slot)[0], state.displacement.get(slot)[0])
+        let site = bonds.particles().iter().copied().find(near).unwrap() as usize;
+        (bonds.position(site)[0], state.displacement.get(site)[0])
     };
     let ((x, u), (y, v)) = (at(from), at(to));
     (v - u) / (y - x)
@@ -96,10 +96,10 @@ fn the_weaker_end_decides() {
         let mut built = body.build();
         let bonds = &mut built.lattice;
         let count = |bonds: &dyn Bonds<2>| -> Vec<[u32; 2]> {
-            let of = |&slot: &u32| {
+            let of = |&site: &u32| {
                 let (mut all, mut strong) = (0, 0);
-                bonds.neighbours(slot as usize, &mut |bond| {
-                    let ends = [slot as usize, bond.slot].map(|slot| bonds.position(slot)[0]);
+                bonds.neighbours(site as usize, &mut |bond| {
+                    let ends = [site as usize, bond.site].map(|site| bonds.position(site)[0]);
                     all += 1;
                     strong += u32::from(!ends.into_iter().any(weak));
                 });

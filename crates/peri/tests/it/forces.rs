@@ -86,7 +86,7 @@ fn paths_agree_on_a_tabulated_law() {
 }
 
 /// Instead of Miri, which cannot run the vector kernels: bodies whose particles touch every edge of the storage, at
-/// sizes that no tile of 16 slots or group of 8 neighbours divides. (By hand, valgrind 3.19 runs this test
+/// sizes that no tile of 16 sites or group of 8 neighbours divides. (By hand, valgrind 3.19 runs this test
 /// without a complaint; it does not know AVX-512, so probably on the 256-bit kernels.)
 #[test]
 fn thin_bodies_of_any_length() {
@@ -127,7 +127,7 @@ fn thin_bodies_of_any_length() {
             check([n, 1, 2], ratio, &fit, &*law);
         }
     }
-    // across the boundaries of work items, 4096 slots each
+    // across the boundaries of work items, 4096 sites each
     check([4097, 1], 3.015, &fit, &*law);
     check([1, 1033], 3.015, &fit, &*law);
 }

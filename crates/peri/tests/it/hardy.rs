@@ -38,7 +38,7 @@ fn on_lattice<const D: usize>(
     measure: Measure,
     missing: Missing,
 ) -> Vec<Tensor<D>> {
-    let field = scatter(built.lattice.slots(), &built.on_lattice, u);
+    let field = scatter(built.lattice.sites(), &built.on_lattice, u);
     let state = Loaded { displacement: &field, fit, modulus: MODULUS, missing };
     piola_on_lattice(&built.lattice, &state, measure, BallVolume::Particles)
 }
@@ -126,8 +126,8 @@ fn rows_below_a_free_edge() {
         }
     }
     // one row marked: it alone is taken by its window
-    let mut marked = vec![false; built.lattice.slots()];
-    built.on_lattice[..41].iter().for_each(|&slot| marked[slot] = true);
+    let mut marked = vec![false; built.lattice.sites()];
+    built.on_lattice[..41].iter().for_each(|&site| marked[site] = true);
     let mixed = rows(Measure::HardyScaled, Missing::WindowAt(&marked));
     assert!((mixed[0] - 0.897).abs() < 6e-4 && (mixed[1] - 1.0).abs() < 1e-12, "{mixed:?}");
 }
@@ -154,10 +154,10 @@ fn a_broken_bond_counts_with_no_force() {
         let mut ends = Vec::new();
         for (own, other) in [(i, j), (j, i)] {
             broken.lattice.neighbours(own, &mut |bond| {
-                if bond.slot == other {
-                    let (slot, index) = (own as u32, bond.index);
+                if bond.site == other {
+                    let (site, index) = (own as u32, bond.index);
                     let (length, weight) = (bond.length, bond.weight);
-                    ends.push(Overstretched { slot, index, elongation: 1.0, length, weight });
+                    ends.push(Overstretched { site, index, elongation: 1.0, length, weight });
                 }
             });
         }
@@ -185,7 +185,7 @@ fn clouds_share_bonds_out() {
     let shaken = Random(5).vectors(built.points.len(), 0.1);
     for measure in [Measure::Hardy, Measure::Gaussian, Measure::Spline] {
         let of = |u: &[[f64; 2]], measure: Measure| {
-            let field = scatter(built.cloud.slots(), &built.in_cloud, u);
+            let field = scatter(built.cloud.sites(), &built.in_cloud, u);
             let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
             piola_in_cloud(&built.cloud, &state, measure, BallVolume::Particles)
         };

@@ -27,16 +27,16 @@ fn check_affine<const D: usize>(cells: [usize; D], name: &str) {
             };
             bonds.particles().iter().map(error).fold(0.0, f64::max)
         };
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         relax(&solver, bonds, (&*law, 1.0), &loads, &[0.5, 1.0], &mut state).unwrap();
         // the affine predictor is the solution: nothing is left to iterate, but for rounding
         assert_eq!(state.total_iterations, 0, "{name}, {path}");
         assert!(farthest(&state, bonds) < 1e-14, "{name}, {path}: {:.1e}", farthest(&state, bonds));
         // from a start that is off by a fifth of the spacing everywhere
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         let mut random = Random(41);
-        for &slot in bonds.particles().to_vec().iter() {
-            state.displacement.set(slot as usize, std::array::from_fn(|_| 0.02 * random.next()));
+        for &site in bonds.particles().to_vec().iter() {
+            state.displacement.set(site as usize, std::array::from_fn(|_| 0.02 * random.next()));
         }
         relax(&solver, bonds, (&*law, 1.0), &loads, &[1.0], &mut state).unwrap();
         // u is off by at most the residual over the softest stiffness, about (spacing/size)² of the stiffest
@@ -68,7 +68,7 @@ fn a_sheet_between_rollers_is_in_uniaxial_stress() {
     for (stretch, printed) in [(1.2, 0.22269), (1.5, 0.59576), (2.0, 1.28691)] {
         let grip = |x: [f64; 2]| x[0] < 3.0 || x[0] > cells[0] as f64 - 3.0;
         let loads = hold(&built.lattice, |x| grip(x).then(|| (1, [(stretch - 1.0) * x[0], 0.0])));
-        let mut state = State::new(built.lattice.slots());
+        let mut state = State::new(built.lattice.sites());
         relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[0.3, 0.6, 1.0], &mut state).unwrap();
         let fit = fit(&*law, state.fitted);
         let loaded =
@@ -132,7 +132,7 @@ fn a_block_between_rollers_is_in_uniaxial_stress() {
         mass_safety: Law::ChainAffine.mass_safety(),
         ..Default::default()
     };
-    let mut state = State::new(built.lattice.slots());
+    let mut state = State::new(built.lattice.sites());
     relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[1.0], &mut state).unwrap();
     let fit = fit(&*law, state.fitted);
     let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing: Missing::Bonds };

@@ -44,20 +44,20 @@ fn two_particles_rebound() {
         for phase in 0..8 {
             let mut cloud =
                 CloudBonds::new(&points, &volumes, 1.0, horizon, VolumeCorrection::None, &[]).unwrap();
-            let slots = [0, 1].map(|p| cloud.input_order().iter().position(|&i| i == p).unwrap());
-            let mut state = State::new(cloud.slots());
-            for (slot, v) in slots.into_iter().zip(before) {
-                state.velocity.set(slot, [v, 0.0]);
+            let sites = [0, 1].map(|p| cloud.input_order().iter().position(|&i| i == p).unwrap());
+            let mut state = State::new(cloud.sites());
+            for (site, v) in sites.into_iter().zip(before) {
+                state.velocity.set(site, [v, 0.0]);
             }
             let shift = 1.2 * step * f64::from(phase) / 8.0;
-            state.displacement.set(slots[0], [0.3 - shift, 0.0]);
+            state.displacement.set(sites[0], [0.3 - shift, 0.0]);
             let solver = VelocityVerlet {
                 time_step: Some(step),
                 records: 1,
                 ..VelocityVerlet::new(DENSITY, 1.0 + 2.0 * PI / omega)
             };
             run(&solver, &mut cloud, &Loads::default(), STIFFNESS, &mut state).unwrap();
-            let after = slots.map(|slot| state.velocity.get(slot)[0]);
+            let after = sites.map(|site| state.velocity.get(site)[0]);
             let momentum = |v: [f64; 2]| v[0] * volumes[0] + v[1] * volumes[1];
             // rounding of some thousand steps
             assert!((momentum(after) - momentum(before)).abs() < 1e-13, "{after:?}");
@@ -89,11 +89,11 @@ fn cradle(bars: usize, particles: usize, safety: f64, kappa: f64) -> (Vec<f64>, 
     let loads = hold(bonds, |_| Some((1, [0.0; 2])));
     let speed = (6.0 * MODULUS / DENSITY).sqrt();
     let first = 0.01 * speed;
-    let mut state = State::new(bonds.slots());
-    let bar = |bonds: &dyn Bonds<2>, slot: u32| bonds.position(slot as usize)[1] as usize / particles;
-    for &slot in bonds.particles() {
-        if bar(bonds, slot) == 0 {
-            state.velocity.set(slot as usize, [0.0, first]);
+    let mut state = State::new(bonds.sites());
+    let bar = |bonds: &dyn Bonds<2>, site: u32| bonds.position(site as usize)[1] as usize / particles;
+    for &site in bonds.particles() {
+        if bar(bonds, site) == 0 {
+            state.velocity.set(site as usize, [0.0, first]);
         }
     }
     // to close the gaps, and for a wave to go up and down each bar
@@ -101,8 +101,8 @@ fn cradle(bars: usize, particles: usize, safety: f64, kappa: f64) -> (Vec<f64>, 
     let solver = VelocityVerlet { safety, records: 200, ..VelocityVerlet::new(DENSITY, end) };
     run(&solver, bonds, &loads, kappa, &mut state).unwrap();
     let mut centres = vec![0.0; bars];
-    for &slot in bonds.particles() {
-        centres[bar(bonds, slot)] += state.velocity.get(slot as usize)[1] / (particles as f64 * first);
+    for &site in bonds.particles() {
+        centres[bar(bonds, site)] += state.velocity.get(site as usize)[1] / (particles as f64 * first);
     }
     (centres, state)
 }
@@ -151,10 +151,10 @@ fn neither_threads_nor_restarts_change_a_bit() {
             let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
             let contact = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
             let mut state = from.unwrap_or_else(|| {
-                let mut state = State::new(bonds.slots());
-                for &slot in bonds.particles() {
-                    if bonds.position(slot as usize)[1] > 33.0 {
-                        state.velocity.set(slot as usize, [1.0, -2.0]);
+                let mut state = State::new(bonds.sites());
+                for &site in bonds.particles() {
+                    if bonds.position(site as usize)[1] > 33.0 {
+                        state.velocity.set(site as usize, [1.0, -2.0]);
                     }
                 }
                 state
@@ -176,7 +176,7 @@ fn neither_threads_nor_restarts_change_a_bit() {
     };
     let (one, saved) = run(1, None);
     eprintln!("askew: {:?}, {} steps", one.history[1].contact, one.total_iterations);
-    assert!(one.displacement.slots() > peri::field::CHUNK && one.history[1].contact.unwrap().pairs > 20);
+    assert!(one.displacement.sites() > peri::field::CHUNK && one.history[1].contact.unwrap().pairs > 20);
     // == of all fields and histories: no −0 and no NaN are here
     assert!(run(3, None).0 == one && run(2, Some(saved)).0 == one);
 }

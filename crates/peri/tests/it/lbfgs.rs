@@ -28,7 +28,7 @@ impl<'a, const D: usize> Problem<'a, D> {
     }
 
     fn solve(&self, bonds: &mut dyn Bonds<D>, method: &mut dyn Equilibrium<D>) -> Result<State<D>, Error> {
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         let mut system =
             System::new(bonds, BondMaterial::new(self.law, self.modulus), self.loads, self.factors);
         system.breaking.clone_from(&self.breaking);
@@ -51,7 +51,7 @@ fn method<const D: usize>(tolerance: f64) -> LbfgsSolver<D> {
 }
 
 fn displacements<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Vec<[f64; D]> {
-    bonds.particles().iter().map(|&slot| state.displacement.get(slot as usize)).collect()
+    bonds.particles().iter().map(|&site| state.displacement.get(site as usize)).collect()
 }
 
 /// Largest difference of two displacement fields over the rms of the first.
@@ -79,11 +79,11 @@ impl Plate {
         let bonds = LatticeBonds::new(cells, ratio, VolumeCorrection::None, &[]).unwrap();
         let depth = 3.0 * spacing;
         let side = |sign: f64| -> (Vec<u32>, Support<2>) {
-            let inside = |&slot: &u32| sign * bonds.position(slot as usize)[0] > half - depth;
-            let slots = bonds.particles().iter().copied().filter(inside).collect();
-            (slots, Support { displacement: [None; 2], body_force: [sign * 1e3 / depth, 0.0] })
+            let inside = |&site: &u32| sign * bonds.position(site as usize)[0] > half - depth;
+            let sites = bonds.particles().iter().copied().filter(inside).collect();
+            (sites, Support { displacement: [None; 2], body_force: [sign * 1e3 / depth, 0.0] })
         };
-        let loads = Loads::new(bonds.slots(), &[side(1.0), side(-1.0)]);
+        let loads = Loads::new(bonds.sites(), &[side(1.0), side(-1.0)]);
         let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
         let modulus = modulus(Space::PlaneStress, 1e6, ratio * spacing, thickness);
         Self { bonds, loads, law, modulus }
@@ -231,7 +231,7 @@ fn bits_do_not_depend_on_threads() {
             let mut problem = Problem::new(&*law, 1.0, &loads, &[0.5, 1.0]);
             problem.breaking = Some(Breaking { stretch: 1.5.into(), policy: Policy::AtEquilibrium });
             let mut state = problem.minimised(bonds, 1e-3);
-            assert!(bonds.slots() > 3 * peri::field::CHUNK && state.broken > 0);
+            assert!(bonds.sites() > 3 * peri::field::CHUNK && state.broken > 0);
             state.history.clear();
             state
         })
@@ -271,7 +271,7 @@ fn restarts_take_the_same_bits() {
         settings.solve(&mut system, state, &mut watch, &mut |_, _| Ok(())).unwrap();
     };
     let (built, _) = build();
-    let (mut whole, mut saved) = (State::new(built.lattice.slots()), Vec::new());
+    let (mut whole, mut saved) = (State::new(built.lattice.sites()), Vec::new());
     run(&mut whole, &mut saved);
     eprintln!("{} broken, {} restartable moments", whole.broken, saved.len());
     assert!(saved.len() >= 4 && whole.broken > 0);
@@ -346,7 +346,7 @@ fn smallest_bodies_and_errors() {
     let pull = 2.0 * MODULUS * law.tension(1.2) * 0.01;
     for bonds in [&mut two.lattice as &mut dyn Bonds<2>, &mut two.cloud] {
         let mut loads = hold(bonds, |x| (x[0] < 0.1).then_some((3, [0.0; 2])));
-        let mut force = Field::zeros(bonds.slots());
+        let mut force = Field::zeros(bonds.sites());
         let far = bonds.particles().iter().map(|&s| s as usize).find(|&s| bonds.position(s)[0] > 0.1);
         let far = far.unwrap();
         force.set(far, [pull, 0.0]);
@@ -363,7 +363,7 @@ fn smallest_bodies_and_errors() {
     assert_eq!(state.total_iterations, 0);
     // a body force on a particle without bonds has no equilibrium
     let mut one = Body::<2>::solid([1, 1], 0.125, 3.015).build();
-    let mut force = Field::zeros(one.lattice.slots());
+    let mut force = Field::zeros(one.lattice.sites());
     force.set(one.on_lattice[0], [1.0, 0.0]);
     let loads = Loads { body_force: Some(force), ..Default::default() };
     let settings = Lbfgs { max_iterations: 50, ..Default::default() };
@@ -373,7 +373,7 @@ fn smallest_bodies_and_errors() {
     assert!(matches!(error, Some(Error::NotConverged { residual: 1.0, iterations: 50, .. })), "{error:?}");
     for bad in [f64::NAN, f64::INFINITY, 1e200] {
         let mut loads = hold(&body.lattice, |x| (x[0] < 0.375).then_some((3, [0.0; 2])));
-        let mut force = Field::zeros(body.lattice.slots());
+        let mut force = Field::zeros(body.lattice.sites());
         force.set(body.on_lattice[31], [0.0, bad]);
         loads.body_force = Some(force);
         let problem = Problem::new(&*law, 1.0, &loads, &[1.0]);

@@ -144,7 +144,7 @@ fn smallest_and_large_horizons() {
         let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
         let end = 0.125 * cells[0] as f64 - 0.125;
         let loads = hold(&built.lattice, |x| (x[0] < 0.125 || x[0] > end).then(|| (3, [0.1 * x[0], 0.0])));
-        let mut state = State::new(built.lattice.slots());
+        let mut state = State::new(built.lattice.sites());
         let solver = DynamicRelaxation { tolerance: 1e-6, ..Default::default() };
         relax(&solver, &mut built.lattice, (&*law, 1.0), &loads, &[1.0], &mut state).unwrap();
         let middle = built.on_lattice[built.on_lattice.len() / 2];
@@ -163,25 +163,25 @@ fn one_particle_and_two() {
     assert_eq!((one.lattice.directed_bonds(), one.cloud.directed_bonds()), (0, 0));
     for bonds in [&mut one.lattice as &mut dyn Bonds<3>, &mut one.cloud] {
         let loads = hold(bonds, |_| Some((1, [0.3, 0.0, 0.0])));
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         relax(&solver, bonds, (&*law, 1.0), &loads, &[1.0], &mut state).unwrap();
-        let slot = bonds.particles()[0] as usize;
+        let site = bonds.particles()[0] as usize;
         // held along x; the least-norm predictor moves nothing else
-        assert_eq!(state.displacement.get(slot), [0.3, 0.0, 0.0]);
-        assert_eq!(state.force.get(slot), [0.0; 3]);
+        assert_eq!(state.displacement.get(site), [0.3, 0.0, 0.0]);
+        assert_eq!(state.force.get(site), [0.0; 3]);
     }
     // two particles 0.1 apart, one held, the other pulled by b: 2kθ t(λ) V = b
     let mut two = Body::<2>::solid([2, 1], 0.1, 3.015).build();
     let pull = 2.0 * MODULUS * law.tension(1.2) * 0.01;
     for bonds in [&mut two.lattice as &mut dyn Bonds<2>, &mut two.cloud] {
         let mut loads = hold(bonds, |x| (x[0] < 0.1).then_some((3, [0.0; 2])));
-        let mut force = Field::zeros(bonds.slots());
+        let mut force = Field::zeros(bonds.sites());
         let far =
             bonds.particles().iter().map(|&s| s as usize).find(|&s| bonds.position(s)[0] > 0.1).unwrap();
         force.set(far, [pull, 0.0]);
         loads.body_force = Some(force);
         let solver = DynamicRelaxation { tolerance: 1e-10, ..solver };
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         relax(&solver, bonds, (&*law, MODULUS), &loads, &[1.0], &mut state).unwrap();
         // tolerance over a tangent of order 1, and the fit's 1e-9
         let u = state.displacement.get(far);
@@ -203,14 +203,14 @@ fn loose_parts_stay_where_they_are_put() {
     });
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let solver = DynamicRelaxation { tolerance: 1e-6, max_iterations: 2000, ..Default::default() };
-    let mut state = State::new(bonds.slots());
+    let mut state = State::new(bonds.sites());
     relax(&solver, &mut bonds, (&*law, 1.0), &loads, &[1.0], &mut state).unwrap();
     let mut seen = 0;
-    for &slot in bonds.particles() {
-        let (x, f) = (bonds.position(slot as usize), state.force.get(slot as usize));
+    for &site in bonds.particles() {
+        let (x, f) = (bonds.position(site as usize), state.force.get(site as usize));
         if x[0] > 38.0 {
             let mut bonded = 0;
-            bonds.neighbours(slot as usize, &mut |_| bonded += 1);
+            bonds.neighbours(site as usize, &mut |_| bonded += 1);
             assert_eq!((bonded, f), (0, [0.0; 2]));
             seen += 1;
         }
@@ -218,10 +218,10 @@ fn loose_parts_stay_where_they_are_put() {
     assert_eq!(seen, 1);
     // the loose piece takes the predictor's strain and relaxes from it: its forces vanish with the residual
     let reference = state.force.components().iter().flat_map(|c| c.iter()).map(|f| f * f).sum::<f64>().sqrt();
-    for &slot in bonds.particles() {
-        let x = bonds.position(slot as usize);
+    for &site in bonds.particles() {
+        let x = bonds.position(site as usize);
         if x[0] > 26.0 {
-            assert!(norm(state.force.get(slot as usize)) <= 1e-6 * reference, "at {x:?}");
+            assert!(norm(state.force.get(site as usize)) <= 1e-6 * reference, "at {x:?}");
         }
     }
 }
@@ -239,7 +239,7 @@ fn results_scale_with_length_and_modulus() {
         });
         let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
         let solver = DynamicRelaxation { tolerance: 1e-8, ..Default::default() };
-        let mut state = State::new(built.lattice.slots());
+        let mut state = State::new(built.lattice.sites());
         relax(&solver, &mut built.lattice, (&*law, modulus), &loads, &[1.0], &mut state).unwrap();
         let u = built.on_lattice.iter().map(|&s| state.displacement.get(s).map(|x| x / length)).collect();
         (u, state.total_iterations)
@@ -270,10 +270,10 @@ fn what_is_not_finite_is_located() {
     let struck = 57;
     for bad in [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e200] {
         let mut loads = hold(&built.lattice, |x| (x[0] < 0.375).then_some((3, [0.0; 2])));
-        let mut force = Field::zeros(built.lattice.slots());
+        let mut force = Field::zeros(built.lattice.sites());
         force.set(built.on_lattice[struck], [0.0, bad]);
         loads.body_force = Some(force);
-        let mut state = State::new(built.lattice.slots());
+        let mut state = State::new(built.lattice.sites());
         let error = relax(&solver, &mut built.lattice, (&*law, 1.0), &loads, &[1.0], &mut state);
         let Err(Error::NotFinite { particle, position, step, iteration, .. }) = error else {
             panic!("{bad}: {error:?}");
@@ -284,7 +284,7 @@ fn what_is_not_finite_is_located() {
     let loads = hold(&built.lattice, |x| {
         (x[0] < 0.375).then(|| (3, [0.0, if x == built.points[1] { f64::NAN } else { 0.0 }]))
     });
-    let mut state = State::new(built.lattice.slots());
+    let mut state = State::new(built.lattice.sites());
     let error = relax(&solver, &mut built.lattice, (&*law, 1.0), &loads, &[1.0], &mut state);
     assert!(matches!(error, Err(Error::NotFinite { .. })), "{error:?}");
 }
@@ -296,7 +296,7 @@ fn what_does_not_converge_says_how_far_it_came() {
     let loads = hold(&built.lattice, |x| (x[0] < 0.375 || x[0] > 2.125).then(|| (3, [0.1 * x[0], 0.0])));
     let solver = DynamicRelaxation { tolerance: 1e-12, max_iterations: 15, ..Default::default() };
     let mut last = f64::NAN;
-    let mut state = State::new(built.lattice.slots());
+    let mut state = State::new(built.lattice.sites());
     let mut system =
         peri::solver::System::new(&mut built.lattice, BondMaterial::new(&*law, 1.0), &loads, &[0.5, 1.0]);
     let error = solver.solve(
@@ -313,10 +313,10 @@ fn what_does_not_converge_says_how_far_it_came() {
     assert!(residual > needed && residual < 1.0 && residual < 10.0 * last, "{residual}, before it {last}");
     // a body force on a particle without bonds has no equilibrium
     let mut one = Body::<2>::solid([1, 1], 0.125, 3.015).build();
-    let mut force = Field::zeros(one.lattice.slots());
+    let mut force = Field::zeros(one.lattice.sites());
     force.set(one.on_lattice[0], [1.0, 0.0]);
     let loads = Loads { body_force: Some(force), ..Default::default() };
-    let mut state = State::new(one.lattice.slots());
+    let mut state = State::new(one.lattice.sites());
     let solver = DynamicRelaxation { max_iterations: 50, ..Default::default() };
     let error = relax(&solver, &mut one.lattice, (&*law, 1.0), &loads, &[1.0], &mut state);
     assert!(matches!(error, Err(Error::NotConverged { residual: 1.0, .. })), "{error:?}");
@@ -337,7 +337,7 @@ fn strong_compression_of_the_network_law() {
             accept: 0.0,
             max_iterations: most,
         };
-        let mut state = State::new(built.lattice.slots());
+        let mut state = State::new(built.lattice.sites());
         let steps = [0.25, 0.5, 0.75, 1.0];
         let result = relax(&solver, &mut built.lattice, (&*law, 1.0), &loads, &steps, &mut state);
         match result {
@@ -363,7 +363,7 @@ fn a_leap_ends_where_steps_end() {
     let mut ends = Vec::new();
     for steps in [1, 4] {
         let factors: Vec<f64> = (1..=steps).map(|k| f64::from(k) / f64::from(steps)).collect();
-        let mut state = State::new(built.lattice.slots());
+        let mut state = State::new(built.lattice.sites());
         relax(&solver, &mut built.lattice, (&*law, 1.0), &loads, &factors, &mut state).unwrap();
         let u: Vec<[f64; 2]> = built.on_lattice.iter().map(|&s| state.displacement.get(s)).collect();
         eprintln!("{steps} steps: {} iterations", state.total_iterations);

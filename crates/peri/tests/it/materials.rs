@@ -25,21 +25,21 @@ struct Case<'a, 'm, const D: usize> {
 impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
     fn new(name: String, bonds: &'a mut dyn Bonds<D>, make: Make<'m, D>, displacement: Field<D>) -> Self {
         let mut material = make(bonds);
-        let cover = Cover { stretches: [0.7, 1.5], bound: 1e-10, held: false, known: None };
+        let cover = Cover { stretches: [0.7, 1.5], bound: 1e-10, clamped: false, known: None };
         material.cover(bonds, &displacement, &cover).unwrap();
         Self { name, bonds, material, displacement }
     }
 
-    /// Forces V F, N, of all slots.
+    /// Forces V F, N, of all sites.
     fn forces(&mut self, displacement: &Field<D>) -> Field<D> {
         self.material.prepare(self.bonds, displacement);
-        let mut force = Field::zeros(self.bonds.slots());
+        let mut force = Field::zeros(self.bonds.sites());
         for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
             self.material.force(self.bonds, displacement, chunk, &mut part, None);
         }
-        for &slot in self.bonds.particles() {
-            let volume = self.bonds.volume(slot as usize);
-            force.set(slot as usize, force.get(slot as usize).map(|f| f * volume));
+        for &site in self.bonds.particles() {
+            let volume = self.bonds.volume(site as usize);
+            force.set(site as usize, force.get(site as usize).map(|f| f * volume));
         }
         force
     }
@@ -49,15 +49,15 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         self.material.energy(self.bonds, displacement, observed)
     }
 
-    fn slots(&self) -> Vec<usize> {
-        self.bonds.particles().iter().map(|&slot| slot as usize).collect()
+    fn sites(&self) -> Vec<usize> {
+        self.bonds.particles().iter().map(|&site| site as usize).collect()
     }
 
-    fn moved(&self, slot: usize, axis: usize, by: f64) -> Field<D> {
+    fn moved(&self, site: usize, axis: usize, by: f64) -> Field<D> {
         let mut moved = self.displacement.clone();
-        let mut value = moved.get(slot);
+        let mut value = moved.get(site);
         value[axis] += by;
-        moved.set(slot, value);
+        moved.set(site, value);
         moved
     }
 
@@ -70,17 +70,17 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         let at = self.displacement.clone();
         let force = self.forces(&at);
         let (scale, step) = (self.largest(&force), 1e-4 * self.bonds.spacing());
-        for (k, slot) in self.slots().into_iter().enumerate().step_by(7) {
+        for (k, site) in self.sites().into_iter().enumerate().step_by(7) {
             let axis = k % D;
-            let [up, down] = [step, -step].map(|by| self.energy(&self.moved(slot, axis, by)));
+            let [up, down] = [step, -step].map(|by| self.energy(&self.moved(site, axis, by)));
             let slope = (up - down) / (2.0 * step);
-            let off = (force.get(slot)[axis] + slope).abs() / scale;
+            let off = (force.get(site)[axis] + slope).abs() / scale;
             // truncation (1e-4)²/6 of third derivatives, energies from tables of 1e-9, rounding of E over step·force
             assert!(
                 off < 2e-6,
-                "{}, slot {slot}: {:?} against {slope}, {off:.1e}",
+                "{}, site {site}: {:?} against {slope}, {off:.1e}",
                 self.name,
-                force.get(slot)
+                force.get(site)
             );
         }
     }
@@ -91,8 +91,8 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         let force = self.forces(&at);
         let (mut sum, mut size) = ([0.0; D], 0.0);
         let (mut moment, mut arm) = ([[0.0; D]; D], 0.0_f64);
-        for slot in self.slots() {
-            let (f, x, u) = (force.get(slot), self.bonds.position(slot), at.get(slot));
+        for site in self.sites() {
+            let (f, x, u) = (force.get(site), self.bonds.position(site), at.get(site));
             size += f.iter().map(|x| x.abs()).sum::<f64>();
             for d in 0..D {
                 sum[d] += f[d];
@@ -117,18 +117,18 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         };
         let at = self.displacement.clone();
         let mut turned = at.clone();
-        for slot in self.slots() {
-            let (x, u) = (self.bonds.position(slot), at.get(slot));
+        for site in self.sites() {
+            let (x, u) = (self.bonds.position(site), at.get(site));
             let y = turn(std::array::from_fn(|d| x[d] + u[d]));
-            turned.set(slot, std::array::from_fn(|d| y[d] - x[d]));
+            turned.set(site, std::array::from_fn(|d| y[d] - x[d]));
         }
         let (before, after) = (self.energy(&at), self.energy(&turned));
         // energies from tables are within 1e-9
         assert!((before - after).abs() < 1e-8 * before.abs(), "{}: {before} {after}", self.name);
         let (force, other) = (self.forces(&at), self.forces(&turned));
         let scale = self.largest(&force);
-        for slot in self.slots() {
-            let (f, g) = (turn(force.get(slot)), other.get(slot));
+        for site in self.sites() {
+            let (f, g) = (turn(force.get(site)), other.get(site));
             assert!((0..D).all(|d| (f[d] - g[d]).abs() < 1e-11 * scale), "{}: {f:?} {g:?}", self.name);
         }
     }
@@ -139,19 +139,19 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
         self.material.prepare(self.bonds, &at);
         let modulus = self.material.bond_law().1;
         let bounds = self.material.own_stiffness(self.bonds, &at, [0.7, 1.5]);
-        let slots = self.slots();
-        let weight: Vec<f64> = slots
+        let sites = self.sites();
+        let weight: Vec<f64> = sites
             .iter()
             .zip(&bounds)
-            .map(|(&slot, s)| (s * modulus * self.bonds.volume(slot)).max(f64::MIN_POSITIVE).sqrt())
+            .map(|(&site, s)| (s * modulus * self.bonds.volume(site)).max(f64::MIN_POSITIVE).sqrt())
             .collect();
-        let size = D * slots.len();
+        let size = D * sites.len();
         let step = 1e-5 * self.bonds.spacing();
         let mut matrix = nalgebra::DMatrix::zeros(size, size);
-        for (j, &slot) in slots.iter().enumerate().filter(|&(j, _)| bounds[j] > 0.0) {
+        for (j, &site) in sites.iter().enumerate().filter(|&(j, _)| bounds[j] > 0.0) {
             for axis in 0..D {
-                let [up, down] = [step, -step].map(|by| self.forces(&self.moved(slot, axis, by)));
-                for (i, &row) in slots.iter().enumerate().filter(|&(i, _)| bounds[i] > 0.0) {
+                let [up, down] = [step, -step].map(|by| self.forces(&self.moved(site, axis, by)));
+                for (i, &row) in sites.iter().enumerate().filter(|&(i, _)| bounds[i] > 0.0) {
                     for d in 0..D {
                         let slope = (down.get(row)[d] - up.get(row)[d]) / (2.0 * step);
                         matrix[(D * i + d, D * j + axis)] = slope / (weight[i] * weight[j]);
@@ -170,20 +170,20 @@ impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
 
     /// A particle whose bonds are severed feels nothing, and nothing feels it.
     fn broken_bonds_carry_nothing(&mut self) {
-        let slots = self.slots();
-        let lone = slots[slots.len() / 2];
+        let sites = self.sites();
+        let lone = sites[sites.len() / 2];
         let mut list = Vec::new();
         let both = |from: usize, index: u32| Overstretched {
-            slot: from as u32,
+            site: from as u32,
             index,
             elongation: 0.0,
             length: 1.0,
             weight: 1.0,
         };
-        for &slot in &slots {
-            self.bonds.neighbours(slot, &mut |bond| {
-                if slot == lone || bond.slot == lone {
-                    list.push(both(slot, bond.index));
+        for &site in &sites {
+            self.bonds.neighbours(site, &mut |bond| {
+                if site == lone || bond.site == lone {
+                    list.push(both(site, bond.index));
                 }
             });
         }
@@ -216,8 +216,8 @@ pub fn battery<const D: usize>(name: &str, cells: [usize; D], make: Make<D>) -> 
     let body = Body::damaged(cells, 0.1, 3.015);
     let mut built = body.build();
     let moved = displaced(&built, 0.1);
-    let on_lattice = scatter(built.lattice.slots(), &built.on_lattice, &moved);
-    let in_cloud = scatter(built.cloud.slots(), &built.in_cloud, &moved);
+    let on_lattice = scatter(built.lattice.sites(), &built.on_lattice, &moved);
+    let in_cloud = scatter(built.cloud.sites(), &built.in_cloud, &moved);
     let cases = [
         ("lattice", &mut built.lattice as &mut dyn Bonds<D>, on_lattice),
         ("cloud", &mut built.cloud, in_cloud),
@@ -266,7 +266,7 @@ fn loops_agree_with_kernels() {
         let material = BondMaterial::new(&*potential, MODULUS);
         let body = Body::<2>::damaged([14, 13], 0.1, 3.015);
         let mut built = body.build();
-        let displacement = scatter(built.lattice.slots(), &built.on_lattice, &displaced(&built, 0.1));
+        let displacement = scatter(built.lattice.sites(), &built.on_lattice, &displaced(&built, 0.1));
         let mut found = Vec::new();
         let makes: [Make<2>; 2] = [&|bonds| Material::<2>::respond(material.clone(), bonds), &|bonds| {
             Box::new(Pointwise::new(material.clone(), bonds))
@@ -302,7 +302,7 @@ fn the_linear_solid_has_its_bulk_modulus() {
         let body = Body::<D>::solid(cells, 0.1, 3.015);
         let mut built = body.build();
         let moved: Vec<[f64; D]> = built.points.iter().map(|x| x.map(|x| 0.2 * x)).collect();
-        let displacement = scatter(built.lattice.slots(), &built.on_lattice, &moved);
+        let displacement = scatter(built.lattice.sites(), &built.on_lattice, &moved);
         let volume = built.points.len() as f64 * 0.1_f64.powi(D as i32);
         let mut case = Case::new(
             "dilatation".to_owned(),
@@ -352,8 +352,8 @@ fn pulled(method: Scheme, setting: f64, threads: usize) -> State<2> {
         x if x > 6.7 => Some((3, [0.14, 0.0])),
         _ => None,
     });
-    assert!(built.lattice.slots() > peri::field::CHUNK);
-    let mut state = State::new(built.lattice.slots());
+    assert!(built.lattice.sites() > peri::field::CHUNK);
+    let mut state = State::new(built.lattice.sites());
     pool.install(|| {
         let mut system = System::new(&mut built.lattice, solid(), &loads, &[1.0]);
         let (watch, finished) = (&mut |_: &_, _: &_| Ok(()), &mut |_: &dyn Bonds<2>, _: &_| Ok(()));
@@ -420,7 +420,7 @@ fn a_state_based_material_tears() {
             y if y > 2.1 => Some((3, [0.0, 0.12])),
             _ => None,
         });
-        let mut state = state.cloned().unwrap_or_else(|| State::new(built.lattice.slots()));
+        let mut state = state.cloned().unwrap_or_else(|| State::new(built.lattice.sites()));
         let mut system = System::new(&mut built.lattice, solid(), &loads, &[0.25, 0.5, 0.75, 1.0]);
         system.breaking = Some(Breaking { stretch: 1.06.into(), policy: Policy::AtEquilibrium });
         let mut seen = 0;

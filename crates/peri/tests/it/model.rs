@@ -29,12 +29,12 @@ fn by_hand() -> (LatticeBonds<2>, State<2>) {
     let law = Law::ChainOffset.build(300.0, 900.0, false).unwrap();
     let modulus = modulus(Space::PlaneStress, 1e6, bonds.horizon(), 1e-3);
     let grip = |inside: &dyn Fn(f64) -> bool, y| {
-        let inside = |&slot: &u32| inside(bonds.position(slot as usize)[1]);
+        let inside = |&site: &u32| inside(bonds.position(site as usize)[1]);
         let members: Vec<u32> = bonds.particles().iter().copied().filter(inside).collect();
         (members, Support { displacement: [Some(0.0), Some(y)], body_force: [0.0; 2] })
     };
-    let loads = Loads::new(bonds.slots(), &[grip(&|y| y < 6e-3, 0.0), grip(&|y| y > 34e-3, 12e-3)]);
-    let mut state = State::new(bonds.slots());
+    let loads = Loads::new(bonds.sites(), &[grip(&|y| y < 6e-3, 0.0), grip(&|y| y > 34e-3, 12e-3)]);
+    let mut state = State::new(bonds.sites());
     let factors = [1.0 / 3.0, 2.0 / 3.0, 1.0];
     let mut system = System::new(&mut bonds, BondMaterial::new(&*law, modulus), &loads, &factors);
     system.breaking = Some(Breaking { stretch: 1.5.into(), policy: Policy::AtEquilibrium });
@@ -81,7 +81,7 @@ fn a_simulation_goes_on() {
     // nearly linear at strains of 4 and 7 %
     let ratio = twice.load / once.load;
     assert!((1.9..2.1).contains(&ratio), "{ratio}");
-    simulation.state = State::new(simulation.bonds.slots());
+    simulation.state = State::new(simulation.bonds.sites());
     simulation.solve(VelocityVerlet { records: 2, ..VelocityVerlet::new(1000.0, 1e-3) }).unwrap();
     assert_eq!(simulation.history().len(), 2);
 }

@@ -75,7 +75,7 @@ fn springs_in_series() {
             let loads = hold(bonds, |x| {
                 Some(if x[1] < 1.0 { (3, [0.0; 2]) } else { (if x[1] > 9.0 { 3 } else { 1 }, [0.0, -most]) })
             });
-            let mut state = State::new(bonds.slots());
+            let mut state = State::new(bonds.sites());
             let contact = Some([stiffness, 0.5]);
             let run =
                 Run { bonds, loads: &loads, factors: &factors, law: Law::Linear, contact, breaking: None };
@@ -116,17 +116,17 @@ fn elastic_blocks_press_each_other() {
     let mut seen: Vec<(State<2>, Vec<[f64; 2]>)> = Vec::new();
     for (cloud, which) in [(false, 0), (true, 0), (false, 1), (true, 1)] {
         let mut built = body.build();
-        let slots = if cloud { built.in_cloud } else { built.on_lattice };
+        let sites = if cloud { built.in_cloud } else { built.on_lattice };
         let bonds: &mut dyn Bonds<2> = if cloud { &mut built.cloud } else { &mut built.lattice };
         let mut loads = hold(bonds, |x| {
             Some(if x[1] < 3.0 { (3, [0.0; 2]) } else { (if x[1] > 17.0 { 3 } else { 1 }, [0.0, -1.0]) })
         });
         let region = |inside: &dyn Fn(f64) -> bool| {
-            let at = |slot: &&u32| inside(bonds.position(**slot as usize)[1]);
+            let at = |site: &&u32| inside(bonds.position(**site as usize)[1]);
             bonds.particles().iter().filter(at).copied().collect::<Vec<u32>>()
         };
         loads.held_regions = vec![region(&|y| y < 3.0), region(&|y| y > 17.0)];
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         let contact = Some([STIFFNESS, 0.5]);
         let run =
             Run { bonds, loads: &loads, factors: &factors, law: Law::ChainOffset, contact, breaking: None };
@@ -154,7 +154,7 @@ fn elastic_blocks_press_each_other() {
         );
         // a strain of 0.9/14 over 15 and over a part of the spacing
         assert!(touching(&state).pairs > 20 && touching(&state).overlap < 0.2);
-        let moved = slots.iter().map(|&slot| state.displacement.get(slot)).collect();
+        let moved = sites.iter().map(|&site| state.displacement.get(site)).collect();
         seen.push((state, moved));
     }
     for (state, moved) in &seen[1..] {
@@ -198,7 +198,7 @@ fn flanks_do_not_interpenetrate() {
             let deepest = [0.0, STIFFNESS].map(|stiffness| {
                 let (mut built, loads) = sheet(30, down);
                 let loads = loads(&built.lattice);
-                let mut state = State::new(built.lattice.slots());
+                let mut state = State::new(built.lattice.sites());
                 let (bonds, contact) = (&mut built.lattice, Some([stiffness, 0.5]));
                 let run = Run {
                     bonds,
@@ -232,7 +232,7 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
             let (mut built, loads) = sheet(66, 5.5);
             let bonds: &mut dyn Bonds<2> = if cloud { &mut built.cloud } else { &mut built.lattice };
             let loads = loads(bonds);
-            let mut state = from.unwrap_or_else(|| State::new(bonds.slots()));
+            let mut state = from.unwrap_or_else(|| State::new(bonds.sites()));
             let mut saved = None;
             let breaking = Some(Breaking { stretch: 1.17.into(), policy: Default::default() });
             let (law, contact) = (Law::ChainOffset, Some([STIFFNESS, skin]));
@@ -242,7 +242,7 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
                     saved = Some(state.clone());
                 }
             });
-            assert!(state.displacement.slots() > peri::field::CHUNK);
+            assert!(state.displacement.sites() > peri::field::CHUNK);
             (bits(&state), saved, lists, state)
         })
     };
@@ -270,7 +270,7 @@ fn contact_without_touch_changes_no_bit() {
         let mut built = Body::<2>::solid([30, 24], 0.1, 3.015).build();
         let bonds: &mut dyn Bonds<2> = &mut built.lattice;
         let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 2.7).then(|| (3, [0.05 * x[0], 0.0])));
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         let run = Run {
             bonds,
             loads: &loads,
@@ -290,7 +290,7 @@ fn contact_without_touch_changes_no_bit() {
     let pressed = |contact: Option<[f64; 2]>| {
         let (mut built, loads) = sheet(30, 4.0);
         let loads = loads(&built.lattice);
-        let mut state = State::new(built.lattice.slots());
+        let mut state = State::new(built.lattice.sites());
         let (bonds, law) = (&mut built.lattice, Law::ChainOffset);
         let run = Run { bonds, loads: &loads, factors: &[1.0], law, contact, breaking: None };
         run.solve(&mut *methods(1e-2)[0], &mut state, &mut |_, _| ());

@@ -44,7 +44,7 @@ impl Dent {
 
     fn relax(&mut self, tolerance: f64, factors: &[f64]) -> State<2> {
         let solver = DynamicRelaxation { tolerance, ..Default::default() };
-        let mut state = State::new(self.bonds.slots());
+        let mut state = State::new(self.bonds.sites());
         relax(&solver, &mut self.bonds, (&*self.law, self.modulus), &self.loads, factors, &mut state)
             .unwrap();
         state
@@ -105,10 +105,10 @@ fn bits_do_not_depend_on_threads() {
             let bonds: &mut dyn Bonds<2> = if cloud { &mut built.cloud } else { &mut built.lattice };
             let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 11.7).then(|| (3, [0.05 * x[0], 0.01 * x[0]])));
             let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-            let mut state = State::new(bonds.slots());
+            let mut state = State::new(bonds.sites());
             let solver = DynamicRelaxation { tolerance: 1e-2, ..Default::default() };
             relax(&solver, bonds, (&*law, 1.0), &loads, &[0.5, 1.0], &mut state).unwrap();
-            assert!(bonds.slots() > 3 * peri::field::CHUNK);
+            assert!(bonds.sites() > 3 * peri::field::CHUNK);
             let bits: Vec<u64> =
                 state.displacement.components().into_iter().flatten().map(|x| x.to_bits()).collect();
             (state.total_iterations, bits)
@@ -142,7 +142,7 @@ fn every_stress_free_law_converges() {
                 accept: 0.0,
                 max_iterations: 2000,
             };
-            let mut state = State::new(bonds.slots());
+            let mut state = State::new(bonds.sites());
             relax(&solver, bonds, (&*potential, 1.0), &loads, &[0.5, 1.0], &mut state)
                 .unwrap_or_else(|error| panic!("{}: {error}", law.name()));
             iterations.push(state.total_iterations);

@@ -49,12 +49,12 @@ fn a_body_moved_by_one_grip() {
         for (name, mut method) in methods(1e-10) {
             let mut bonds = sheet(&[]);
             let loads = grip(&bonds, far);
-            let mut state = State::new(bonds.slots());
+            let mut state = State::new(bonds.sites());
             solve(&mut *method, &mut bonds, &loads, &factors, &mut state).unwrap();
             assert!(state.total_iterations <= 10, "{name}, U = {far}: {} iterations", state.total_iterations);
             let size = far * WAY[0].hypot(WAY[1]);
-            for &slot in bonds.particles() {
-                let u = state.displacement.get(slot as usize);
+            for &site in bonds.particles() {
+                let u = state.displacement.get(site as usize);
                 let off = (u[0] - far * WAY[0]).hypot(u[1] - far * WAY[1]);
                 assert!(off < 1e-12 * size, "{name}, U = {far}: {off:e} m from rigid");
             }
@@ -70,14 +70,14 @@ fn a_strained_start_comes_to_rest() {
         for (name, mut method) in methods(tolerance) {
             let mut bonds = sheet(&[]);
             let loads = grip(&bonds, 1e-3);
-            let mut state = State::new(bonds.slots());
+            let mut state = State::new(bonds.sites());
             // the first guess moves all with the grip: what is free is put back before
-            for &slot in bonds.particles().iter().filter(|&&s| loads.constrained(s as usize) == 0) {
-                state.displacement.set(slot as usize, WAY.map(|w| -1e-3 * w));
+            for &site in bonds.particles().iter().filter(|&&s| loads.constrained(s as usize) == 0) {
+                state.displacement.set(site as usize, WAY.map(|w| -1e-3 * w));
             }
             solve(&mut *method, &mut bonds, &loads, &[1.0], &mut state).unwrap();
-            for &slot in bonds.particles() {
-                let u = state.displacement.get(slot as usize);
+            for &site in bonds.particles() {
+                let u = state.displacement.get(site as usize);
                 let off = (u[0] - 1e-3 * WAY[0]).hypot(u[1] - 1e-3 * WAY[1]);
                 assert!(off < most * 1.04e-3, "{name} at {tolerance}: {off:e} m from rigid");
             }
@@ -96,11 +96,11 @@ fn halves_go_with_their_grips() {
             y if y < 0.012 => Some((0b11, [0.0; 2])),
             _ => None,
         });
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         solve(&mut *method, &mut bonds, &loads, &[0.5, 1.0], &mut state).unwrap();
-        for &slot in bonds.particles() {
-            let up = if bonds.position(slot as usize)[1] > 0.052 { 2e-3 } else { 0.0 };
-            let u = state.displacement.get(slot as usize);
+        for &site in bonds.particles() {
+            let up = if bonds.position(site as usize)[1] > 0.052 { 2e-3 } else { 0.0 };
+            let u = state.displacement.get(site as usize);
             let off = u[0].hypot(u[1] - up);
             assert!(off < 2e-3 * 1e-4, "{name}: {off:e} m from rigid");
         }
@@ -114,7 +114,7 @@ fn a_body_at_rest_stays() {
         let body = Body::<2>::solid([6, 5], 1e-3, 3.015);
         let mut bonds = body.build().lattice;
         let loads = hold(&bonds, |x| (x[1] < 1e-3).then_some((0b11, [0.0; 2])));
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         solve(&mut *method, &mut bonds, &loads, &[0.5, 1.0], &mut state).unwrap();
         assert_eq!(state.total_iterations, 0, "{name}");
     }

@@ -56,7 +56,7 @@ fn solids_pass_the_battery() {
 /// A block of the independent program: cells of edge 1, the first at the origin.
 struct Block<const D: usize> {
     bonds: LatticeBonds<D>,
-    /// Slots in the program's order, whose last axis is the fastest.
+    /// Sites in the program's order, whose last axis is the fastest.
     order: Vec<usize>,
     displacement: Field<D>,
     rows: Vec<Vec<f64>>,
@@ -71,29 +71,29 @@ impl<const D: usize> Block<D> {
         let rows = file.lines().skip(1).map(|line| line.split(',').map(number).collect());
         let rows: Vec<Vec<f64>> = rows.collect();
         let find = |row: &Vec<f64>| {
-            let at = |&&slot: &&u32| {
-                let x = bonds.position(slot as usize);
+            let at = |&&site: &&u32| {
+                let x = bonds.position(site as usize);
                 (0..D).all(|d| (x[d] - row[1 + d]).abs() < 1e-9)
             };
             *bonds.particles().iter().find(at).unwrap() as usize
         };
         let order: Vec<usize> = rows.iter().map(find).collect();
-        let placed: Vec<[f64; D]> = order.iter().map(|&slot| displaced(bonds.position(slot))).collect();
-        let displacement = scatter(bonds.slots(), &order, &placed);
+        let placed: Vec<[f64; D]> = order.iter().map(|&site| displaced(bonds.position(site))).collect();
+        let displacement = scatter(bonds.sites(), &order, &placed);
         Self { bonds, order, displacement, rows }
     }
 
     /// Severs the bonds across x = `at` below y = `below`.
     fn sever(&mut self, at: f64, below: f64) {
         let mut list = Vec::new();
-        for &slot in &self.order {
-            let p = self.bonds.position(slot);
-            self.bonds.neighbours(slot, &mut |bond| {
-                let q = self.bonds.position(bond.slot);
+        for &site in &self.order {
+            let p = self.bonds.position(site);
+            self.bonds.neighbours(site, &mut |bond| {
+                let q = self.bonds.position(bond.site);
                 let crossing = p[1] + (at - p[0]) / (q[0] - p[0]) * (q[1] - p[1]);
                 if (p[0] - at) * (q[0] - at) < 0.0 && crossing < below - 1e-9 {
-                    let (slot, index) = (slot as u32, bond.index);
-                    list.push(Overstretched { slot, index, elongation: 0.0, length: 1.0, weight: 1.0 });
+                    let (site, index) = (site as u32, bond.index);
+                    list.push(Overstretched { site, index, elongation: 0.0, length: 1.0, weight: 1.0 });
                 }
             });
         }
@@ -111,7 +111,7 @@ impl<const D: usize> Block<D> {
             self.sever(at, below);
         }
         material.prepare(&self.bonds, &self.displacement);
-        let mut force = Field::zeros(self.bonds.slots());
+        let mut force = Field::zeros(self.bonds.sites());
         for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
             material.force(&self.bonds, &self.displacement, chunk, &mut part, None);
         }
@@ -121,11 +121,11 @@ impl<const D: usize> Block<D> {
             most[k] = most[k].max(truth.abs());
         };
         let mut energy = 0.0;
-        for (row, &slot) in self.rows.iter().zip(&self.order) {
-            let point = &material.points()[slot];
+        for (row, &site) in self.rows.iter().zip(&self.order) {
+            let point = &material.points()[site];
             let gradient = point.deformation().unwrap().gradient();
             for d in 0..D {
-                note(0, force.get(slot)[d], row[1 + D + d]);
+                note(0, force.get(site)[d], row[1 + D + d]);
                 for e in 0..D {
                     note(1, gradient[(d, e)], row[1 + 2 * D + D * d + e]);
                 }
@@ -134,7 +134,7 @@ impl<const D: usize> Block<D> {
             // the program's column E is I W with the stabilisation
             note(2, point.energy(), rest[1]);
             note(3, point.integrity(), rest[2]);
-            energy += solid.energy(&Family::new(&self.bonds, &self.displacement, slot), point);
+            energy += solid.energy(&Family::new(&self.bonds, &self.displacement, site), point);
         }
         (std::array::from_fn(|k| off[k] / most[k]), energy)
     }
@@ -187,10 +187,10 @@ fn long_chains_are_neo_hookean() {
     let body = Body::<2>::damaged([9, 8], 1.0, 3.015);
     let built = body.build();
     let moved = Random(3).vectors(built.points.len(), 0.05);
-    let displacement = scatter(built.lattice.slots(), &built.on_lattice, &moved);
+    let displacement = scatter(built.lattice.sites(), &built.on_lattice, &moved);
     let forces = |material: &mut dyn Response<2>| {
         material.prepare(&built.lattice, &displacement);
-        let mut force = Field::<2>::zeros(built.lattice.slots());
+        let mut force = Field::<2>::zeros(built.lattice.sites());
         for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
             material.force(&built.lattice, &displacement, chunk, &mut part, None);
         }
@@ -278,19 +278,19 @@ fn a_homogeneous_deformation_is_exact_everywhere() {
     let body = Body::<2>::damaged([14, 13], 0.1, 3.015);
     let built = body.build();
     let gradient = [[1.31, 0.22], [-0.17, 0.84]];
-    for (path, bonds, slots) in [
+    for (path, bonds, sites) in [
         ("lattice", &built.lattice as &dyn Bonds<2>, &built.on_lattice),
         ("cloud", &built.cloud, &built.in_cloud),
     ] {
         let moved: Vec<[f64; 2]> = (built.points.iter())
             .map(|x| std::array::from_fn(|a| (0..2).map(|b| gradient[a][b] * x[b]).sum::<f64>() - x[a]))
             .collect();
-        let displacement = scatter(bonds.slots(), slots, &moved);
+        let displacement = scatter(bonds.sites(), sites, &moved);
         let mut material = Pointwise::new(rubber(Space::PlaneStrain, 100.0), bonds);
         material.prepare(bonds, &displacement);
         let (mut off, mut rough) = (0.0_f64, 0.0_f64);
-        for &slot in slots {
-            let found = material.points()[slot].deformation().unwrap();
+        for &site in sites {
+            let found = material.points()[site].deformation().unwrap();
             for a in 0..2 {
                 for b in 0..2 {
                     off = off.max((found.gradient()[(a, b)] - gradient[a][b]).abs());
@@ -300,9 +300,9 @@ fn a_homogeneous_deformation_is_exact_everywhere() {
         }
         at_most(&format!("solid_homogeneous_{path}_gradient"), off, 1e-13);
         at_most(&format!("solid_homogeneous_{path}_residual"), rough, 1e-13);
-        let rest = Field::zeros(bonds.slots());
+        let rest = Field::zeros(bonds.sites());
         material.prepare(bonds, &rest);
-        let mut force = Field::<2>::zeros(bonds.slots());
+        let mut force = Field::<2>::zeros(bonds.sites());
         for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
             material.force(bonds, &rest, chunk, &mut part, None);
         }

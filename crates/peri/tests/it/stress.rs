@@ -39,12 +39,12 @@ fn measured<const D: usize>(
     let fit = fit(&*Law::Linear.build(1.0, 1.0, false).unwrap(), [0.9, 1.1]);
     let modulus = modulus(space(D), 1.0, ratio, 1.0);
     let diagonal = |p: Tensor<D>| [p[0][0] / STRAIN, p[1][1] / STRAIN];
-    let field = scatter(built.lattice.slots(), &built.on_lattice, &u);
+    let field = scatter(built.lattice.sites(), &built.on_lattice, &u);
     let state = Loaded { displacement: &field, fit: &fit, modulus, missing: Missing::Bonds };
     let stress = piola_on_lattice(&built.lattice, &state, measure, ball);
     let mut results = vec![("lattice", diagonal(stress[particle]))];
     if cloud {
-        let field = scatter(built.cloud.slots(), &built.in_cloud, &u);
+        let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
         let state = Loaded { displacement: &field, fit: &fit, modulus, missing: Missing::Bonds };
         let stress = piola_in_cloud(&built.cloud, &state, measure, ball);
         results.push(("cloud", diagonal(stress[built.in_cloud[particle]])));
@@ -289,10 +289,10 @@ fn check_definition<const D: usize>(cells: [usize; D], ratio: f64) {
     let u = Random(31).vectors(built.points.len(), 0.012);
     let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
     let fit = fit(&*law, stretch_range(&pairs, &u));
-    let field = scatter(built.lattice.slots(), &built.on_lattice, &u);
+    let field = scatter(built.lattice.sites(), &built.on_lattice, &u);
     let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
     let on_lattice = piola_on_lattice(&built.lattice, &state, Measure::BallShare, BallVolume::Whole);
-    let field = scatter(built.cloud.slots(), &built.in_cloud, &u);
+    let field = scatter(built.cloud.sites(), &built.in_cloud, &u);
     let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };
     let in_cloud = piola_in_cloud(&built.cloud, &state, Measure::BallShare, BallVolume::Whole);
     let size = |p: &Tensor<D>| p.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
@@ -379,7 +379,7 @@ fn cauchy_stress_of_a_homogeneous_strain() {
             .iter()
             .map(|x| std::array::from_fn(|a| (0..D).map(|b| h[a][b] * x[b]).sum()))
             .collect();
-        let field: Field<D> = scatter(built.lattice.slots(), &built.on_lattice, &u);
+        let field: Field<D> = scatter(built.lattice.sites(), &built.on_lattice, &u);
         let law = Law::ChainAffine.build(720.0, 1200.0, true).unwrap();
         let fit = fit(&*law, [0.5, 2.0]);
         let state = Loaded { displacement: &field, fit: &fit, modulus: MODULUS, missing: Missing::Bonds };

@@ -30,18 +30,18 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
         let members = bonds.particles().iter().copied().filter(there).collect();
         (members, Support { displacement: [None; 2], body_force: [sign * stress / layers, 0.0] })
     };
-    let loads = Loads::new(bonds.slots(), &[side(1.0), side(-1.0)]);
+    let loads = Loads::new(bonds.sites(), &[side(1.0), side(-1.0)]);
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
     let solver = DynamicRelaxation { tolerance: 1e-4, ..Default::default() };
-    let mut state = State::new(bonds.slots());
+    let mut state = State::new(bonds.sites());
     relax(&solver, &mut bonds, (&*law, modulus), &loads, &[1.0], &mut state).unwrap();
-    let slots: Vec<usize> = bonds.particles().iter().map(|&s| s as usize).collect();
+    let sites: Vec<usize> = bonds.particles().iter().map(|&s| s as usize).collect();
     let nearest = |x: f64, y: f64| {
         let distance = |&s: &usize| {
             let p = bonds.position(s);
             (p[0] - x).abs() + (p[1] - y).abs()
         };
-        slots.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+        sites.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
     };
     let (right, left) = (nearest(0.4, 0.3), nearest(-0.4, 0.3));
     let length = bonds.position(right)[0] - bonds.position(left)[0];
@@ -51,8 +51,8 @@ fn plate(spacing: f64, volume: VolumeCorrection, surface: bool) -> [f64; 3] {
     let largest = |tensors: Vec<Tensor<2>>| {
         // the two columns beside the axis, averaged row by row
         let mut rows = std::collections::BTreeMap::<i64, f64>::new();
-        for (&slot, p) in slots.iter().zip(&tensors) {
-            let [x, y] = bonds.position(slot);
+        for (&site, p) in sites.iter().zip(&tensors) {
+            let [x, y] = bonds.position(site);
             if x.abs() < 0.6 * spacing && y > 0.0 && y < 0.06 + 8.0 * spacing {
                 *rows.entry((y / spacing * 2.0).round() as i64).or_default() += 0.5 * p[0][0] / stress;
             }

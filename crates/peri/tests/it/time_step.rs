@@ -15,7 +15,7 @@ fn steps_beyond_the_critical_are_refused() {
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
     let mut built = Body::<2>::damaged([24, 20], 0.1, 3.015).build();
     let bonds = &mut built.lattice;
-    let mut state = State::new(bonds.slots());
+    let mut state = State::new(bonds.sites());
     let solver = VelocityVerlet { records: 1, ..VelocityVerlet::new(DENSITY, 1e-3) };
     run(&solver, bonds, &*law, &Loads::default(), &mut state).unwrap();
     let Motion { critical_step, gershgorin_step, covered_step, .. } = state.motion;
@@ -25,7 +25,7 @@ fn steps_beyond_the_critical_are_refused() {
     );
     assert!(gershgorin_step <= covered_step && covered_step <= critical_step);
     for factor in [1.05, 3.0] {
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         let solver = once(1.0, factor * critical_step);
         let error = run(&solver, bonds, &*law, &Loads::default(), &mut state).unwrap_err();
         let Error::TimeStep { found, critical } = error else { panic!("{error}") };
@@ -40,11 +40,11 @@ fn steps_beyond_the_critical_are_refused() {
         VelocityVerlet { damping: f64::NAN, ..once(1.0, 1e-3) },
         VelocityVerlet { records: 0, ..once(1.0, 1e-3) },
     ] {
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         let error = run(&solver, bonds, &*law, &Loads::default(), &mut state);
         assert!(matches!(error, Err(Error::Parameter { .. })), "{solver:?}");
     }
-    let mut state = State::new(bonds.slots());
+    let mut state = State::new(bonds.sites());
     state.velocity.set(bonds.particles()[3] as usize, [f64::NAN, 0.0]);
     let error = run(&once(1.0, 1e-3), bonds, &*law, &Loads::default(), &mut state).unwrap_err();
     assert!(matches!(error, Error::NotFinite { quantity: "velocity", .. }), "{error}");
@@ -59,7 +59,7 @@ fn stiffening_beyond_the_step_is_named() {
         let mut built = Body::<2>::solid([16, 8], 0.1, 3.015).build();
         let bonds = &mut built.lattice;
         let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 1.3).then(|| (3, [-part * x[0], 0.0])));
-        let mut state = State::new(bonds.slots());
+        let mut state = State::new(bonds.sites());
         let solver =
             VelocityVerlet { time_step, ramp: 60.0, records: 10, ..VelocityVerlet::new(DENSITY, 60.0) };
         let result = run(&solver, bonds, &*law, &loads, &mut state);
@@ -101,7 +101,7 @@ fn tear(cloud: bool, pause: Option<u64>) -> State<2> {
         let mut built = build();
         let bonds: &mut dyn Bonds<2> = if cloud { &mut built.cloud } else { &mut built.lattice };
         let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 11.7).then(|| (3, [0.1 * x[0], 0.05 * x[0]])));
-        let state = state.get_or_insert_with(|| State::new(bonds.slots()));
+        let state = state.get_or_insert_with(|| State::new(bonds.sites()));
         let mut system = System::new(bonds, BondMaterial::new(&*law, 1.0), &loads, &[]);
         system.breaking = Some(Breaking { stretch: 1.1.into(), policy: Policy::EachIteration });
         let mut watch = |status: &peri::solver::Status, state: &State<2>| {

@@ -30,9 +30,9 @@ fn waves_in_a_chain() {
         let pulse = |x: f64| 1e-3 * (-(x / width).powi(2)).exp();
         let places: Vec<f64> =
             bonds.particles().iter().map(|&s| bonds.position(s as usize)[0] - centre).collect();
-        let mut state = State::new(bonds.slots());
-        for (&slot, &x) in bonds.particles().iter().zip(&places) {
-            state.displacement.set(slot as usize, [pulse(x), 0.0]);
+        let mut state = State::new(bonds.sites());
+        for (&site, &x) in bonds.particles().iter().zip(&places) {
+            state.displacement.set(site as usize, [pulse(x), 0.0]);
         }
         let time = 0.5 / speed;
         let fastest =
@@ -97,22 +97,22 @@ fn wave_in_a_thin_bar() {
         let mut short = bar(8 * rows);
         let end = 0.8 - 3.0 * spacing;
         let loads = hold(&short, |x| (x[0] < 3.0 * spacing || x[0] > end).then(|| (1, [1e-4 * x[0], 0.0])));
-        let mut state = State::new(short.slots());
+        let mut state = State::new(short.sites());
         let solver = DynamicRelaxation { tolerance: 1e-8, ..Default::default() };
         relax(&solver, &mut short, (&*law, MODULUS), &loads, &[1.0], &mut state).unwrap();
         let volume = short.volume(short.particles()[0] as usize);
         let mut mean = [[0.0, 0.0]; 2];
         let mut pull = 0.0;
-        for &slot in short.particles() {
-            let (slot, x) = (slot as usize, short.position(slot as usize)[0]);
-            let u = state.displacement.get(slot)[0];
+        for &site in short.particles() {
+            let (site, x) = (site as usize, short.position(site as usize)[0]);
+            let u = state.displacement.get(site)[0];
             for (side, at) in [0.25, 0.55].into_iter().enumerate() {
                 if (x - at).abs() < 1.01 * spacing {
                     mean[side] = [mean[side][0] + u, mean[side][1] + 1.0];
                 }
             }
             if x > end {
-                pull -= state.force.get(slot)[0] * volume;
+                pull -= state.force.get(site)[0] * volume;
             }
         }
         let strain = (mean[1][0] / mean[1][1] - mean[0][0] / mean[0][1]) / 0.3;
@@ -121,10 +121,10 @@ fn wave_in_a_thin_bar() {
         // a pulse of eight heights, released at rest in the middle; its right half after a flight of 20 heights
         let mut long = bar(80 * rows);
         let width = 8.0 * height;
-        let mut state = State::new(long.slots());
-        for &slot in long.particles() {
-            let x = long.position(slot as usize)[0] - 4.0;
-            state.displacement.set(slot as usize, [1e-5 * (-(x / width).powi(2)).exp(), 0.0]);
+        let mut state = State::new(long.sites());
+        for &site in long.particles() {
+            let x = long.position(site as usize)[0] - 4.0;
+            state.displacement.set(site as usize, [1e-5 * (-(x / width).powi(2)).exp(), 0.0]);
         }
         let speed = (modulus / DENSITY).sqrt();
         let time = 2.0 / speed;
@@ -132,10 +132,10 @@ fn wave_in_a_thin_bar() {
         run(&solver, &mut long, &*law, &Loads::default(), &mut state).unwrap();
         // first moment of the strain energy's root |u′|: rather of u² on the right, whose centre is the pulse's
         let (mut top, mut bottom) = (0.0, 0.0);
-        for &slot in long.particles() {
-            let x = long.position(slot as usize)[0] - 4.0;
+        for &site in long.particles() {
+            let x = long.position(site as usize)[0] - 4.0;
             if x > 0.0 {
-                let u = state.displacement.get(slot as usize)[0];
+                let u = state.displacement.get(site as usize)[0];
                 top += x * u * u;
                 bottom += u * u;
             }
@@ -180,9 +180,9 @@ fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     let grip = 3.0 * spacing;
     let pull = |x: [f64; 2]| [0.0, strain * (x[1] - 0.5 * height)];
     let loads = hold(bonds, |x| (x[1] < grip || x[1] > height - grip).then(|| (3, pull(x))));
-    let mut state = State::new(bonds.slots());
-    for &slot in bonds.particles() {
-        state.displacement.set(slot as usize, pull(bonds.position(slot as usize)));
+    let mut state = State::new(bonds.sites());
+    for &site in bonds.particles() {
+        state.displacement.set(site as usize, pull(bonds.position(site as usize)));
     }
     // c_R of ν = 1/3 in plane stress: (c_R/c_S)² = 2 − 2/√3 solves Rayleigh's equation with c_S²/c_L² = 1/3
     let square = 2.0 - 2.0 / 3.0_f64.sqrt();
@@ -196,11 +196,11 @@ fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     let solver = VelocityVerlet { records: 100, ..VelocityVerlet::new(DENSITY, 4.0 * height / rayleigh) };
     let mut tip_of = |bonds: &dyn Bonds<2>, state: &State<2>| {
         let mut tip = 0.0_f64;
-        for &slot in bonds.particles() {
-            let x = bonds.position(slot as usize);
+        for &site in bonds.particles() {
+            let x = bonds.position(site as usize);
             if x[1] > 2.0 * grip && x[1] < height - 2.0 * grip && x[0] < 4.0 - 2.0 * grip {
                 let mut count = 0;
-                bonds.neighbours(slot as usize, &mut |_| count += 1);
+                bonds.neighbours(site as usize, &mut |_| count += 1);
                 if count < 22 && x[0] > 2.0 * grip {
                     tip = tip.max(x[0]);
                 }

@@ -54,7 +54,7 @@ fn bonds_of_a_box() {
 fn bytes_per_particle() {
     fn check<const D: usize>(cells: [usize; D], most: f64) {
         let bonds = boxed(cells, 3.015);
-        let solver = bonds.slots() * (3 * D + 1) * 8;
+        let solver = bonds.sites() * (3 * D + 1) * 8;
         let each = (bonds.bytes() + solver) as f64 / bonds.particles().len() as f64;
         eprintln!("{D}D {cells:?}: {each:.1} bytes per particle");
         assert!(each <= most, "{D}D: {each}");
@@ -75,7 +75,7 @@ fn force_evaluations() {
         (x[0] < 0.3 || x[0] > 2.1).then(|| (3, if x[0] < 0.3 { [0.0; 2] } else { [0.1, 0.02] }))
     });
     for (factors, name) in [(&[1.0][..], "one step"), (&[0.2, 0.5, 1.0], "three steps")] {
-        let mut state = State::new(built.lattice.slots());
+        let mut state = State::new(built.lattice.sites());
         let solver = DynamicRelaxation::default();
         relax(&solver, &mut built.lattice, (&*law, 1.0), &loads, factors, &mut state).unwrap();
         assert_eq!(state.step, factors.len());

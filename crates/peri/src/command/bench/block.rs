@@ -121,12 +121,12 @@ impl Block {
         let fit = KernelFit::new(&*law, range, options.fit_bound)?;
         let youngs_modulus = 3.0 * BULK_MODULUS * (1.0 - 2.0 * poisson_ratio(Space::Solid));
         bonds.set_law(&fit, modulus(Space::Solid, youngs_modulus, bonds.horizon(), 1.0));
-        let zero = Field::zeros(bonds.slots());
+        let zero = Field::zeros(bonds.sites());
         let mut displacement = zero.clone();
-        for &slot in bonds.particles() {
-            let position = bonds.position(slot as usize);
+        for &site in bonds.particles() {
+            let position = bonds.position(site as usize);
             displacement
-                .set(slot as usize, initial_displacement(position, options.strain, cells as f64 * SPACING));
+                .set(site as usize, initial_displacement(position, options.strain, cells as f64 * SPACING));
         }
         let mut block = Self { bonds, displacement, velocity: zero.clone(), force: zero };
         force(&block.bonds, &block.displacement, &mut block.force);
@@ -135,12 +135,12 @@ impl Block {
 
     /// Velocity Verlet: v ← v + ½Δt f/ρ, u ← u + Δt v, new f, v ← v + ½Δt f/ρ.
     fn step(&mut self) {
-        let (slots, kick) = (self.bonds.slots(), 0.5 * TIME_STEP / DENSITY);
+        let (sites, kick) = (self.bonds.sites(), 0.5 * TIME_STEP / DENSITY);
         let forces = self.force.components();
         let (u, v) = (self.displacement.chunks_mut(), self.velocity.chunks_mut());
         u.into_par_iter().zip(v).enumerate().for_each(|(chunk, (u, v))| {
             for ((u, v), f) in u.into_iter().zip(v).zip(forces) {
-                for ((u, v), f) in u.iter_mut().zip(v).zip(&f[chunk_range(chunk, slots)]) {
+                for ((u, v), f) in u.iter_mut().zip(v).zip(&f[chunk_range(chunk, sites)]) {
                     *v += kick * f;
                     *u += TIME_STEP * *v;
                 }
@@ -150,7 +150,7 @@ impl Block {
         let forces = self.force.components();
         self.velocity.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, v)| {
             for (v, f) in v.into_iter().zip(forces) {
-                for (v, f) in v.iter_mut().zip(&f[chunk_range(chunk, slots)]) {
+                for (v, f) in v.iter_mut().zip(&f[chunk_range(chunk, sites)]) {
                     *v += kick * f;
                 }
             }
@@ -159,17 +159,17 @@ impl Block {
 
     fn write(&self, path: &Path) -> Result<(), Error> {
         let values = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            self.bonds.particles().iter().map(|&slot| of(slot as usize)).collect()
+            self.bonds.particles().iter().map(|&site| of(site as usize)).collect()
         };
         let mut data = Vec::new();
         for (d, name) in ["x", "y", "z"].into_iter().enumerate() {
-            data.push((name, "m", values(&|slot| self.bonds.position(slot)[d])));
+            data.push((name, "m", values(&|site| self.bonds.position(site)[d])));
         }
         for (d, name) in ["ux", "uy", "uz"].into_iter().enumerate() {
-            data.push((name, "m", values(&|slot| self.displacement.get(slot)[d])));
+            data.push((name, "m", values(&|site| self.displacement.get(site)[d])));
         }
         for (d, name) in ["fx", "fy", "fz"].into_iter().enumerate() {
-            data.push((name, "N/m3", values(&|slot| self.force.get(slot)[d])));
+            data.push((name, "N/m3", values(&|site| self.force.get(site)[d])));
         }
         let columns: Vec<Column> =
             data.iter().map(|(name, unit, data)| (*name, *unit, data.as_slice())).collect();
@@ -210,21 +210,21 @@ mod tests {
         }
         let mut largest = 0.0_f64;
         let mut momentum = [0.0; 3];
-        for &slot in block.bonds.particles() {
-            let velocity = block.velocity.get(slot as usize);
+        for &site in block.bonds.particles() {
+            let velocity = block.velocity.get(site as usize);
             for d in 0..3 {
                 largest = largest.max(velocity[d].abs());
                 momentum[d] += velocity[d];
             }
-            block.velocity.set(slot as usize, velocity.map(|v| -v));
+            block.velocity.set(site as usize, velocity.map(|v| -v));
         }
         // 216 terms, 50 steps of rounding
         assert!(largest > 1.0 && momentum.iter().all(|p| p.abs() < 216.0 * 1e-14 * largest), "{momentum:?}");
         for _ in 0..options.steps {
             block.step();
         }
-        for &slot in block.bonds.particles() {
-            let (found, start) = (block.displacement.get(slot as usize), before.get(slot as usize));
+        for &site in block.bonds.particles() {
+            let (found, start) = (block.displacement.get(site as usize), before.get(site as usize));
             // 100 steps of rounding of displacements up to 4e-5 m
             assert!((0..3).all(|d| (found[d] - start[d]).abs() < 1e-16), "{found:?} {start:?}");
         }

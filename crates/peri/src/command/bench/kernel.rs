@@ -32,10 +32,10 @@ pub fn loaded<const D: usize>(
     let built = law.build(720.0, 1200.0, false)?;
     let fit = KernelFit::new(&*built, range, 1e-9)?;
     bonds.set_law(&fit, modulus(space, 1.0, bonds.horizon(), 1.0));
-    let mut displacement = Field::<D>::zeros(bonds.slots());
-    for &slot in bonds.particles() {
-        let x = bonds.position(slot as usize);
-        displacement.set(slot as usize, std::array::from_fn(|d| 1e-3 * (0.37 * x[d]).sin()));
+    let mut displacement = Field::<D>::zeros(bonds.sites());
+    for &site in bonds.particles() {
+        let x = bonds.position(site as usize);
+        displacement.set(site as usize, std::array::from_fn(|d| 1e-3 * (0.37 * x[d]).sin()));
     }
     Ok((fit, displacement))
 }

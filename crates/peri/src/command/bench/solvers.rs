@@ -87,11 +87,11 @@ impl Plate {
         let bonds = LatticeBonds::new(cells, RATIO, VolumeCorrection::None, &[])?;
         let depth = RATIO.floor() * spacing;
         let side = |sign: f64| -> (Vec<u32>, Support<2>) {
-            let inside = |&slot: &u32| sign * bonds.position(slot as usize)[0] > HALF - depth;
-            let slots = bonds.particles().iter().copied().filter(inside).collect();
-            (slots, Support { displacement: [None; 2], body_force: [sign * 1e3 / depth, 0.0] })
+            let inside = |&site: &u32| sign * bonds.position(site as usize)[0] > HALF - depth;
+            let sites = bonds.particles().iter().copied().filter(inside).collect();
+            (sites, Support { displacement: [None; 2], body_force: [sign * 1e3 / depth, 0.0] })
         };
-        let loads = Loads::new(bonds.slots(), &[side(1.0), side(-1.0)]);
+        let loads = Loads::new(bonds.sites(), &[side(1.0), side(-1.0)]);
         let law = Law::ChainOffset.build(720.0, 1200.0, Law::ChainOffset.rescales())?;
         let modulus = modulus(Space::PlaneStress, 1e6, RATIO * spacing, THICKNESS);
         Ok(Self { bonds, loads, law, modulus })
@@ -103,7 +103,7 @@ impl Plate {
         } else {
             Box::new(LbfgsSolver::new(Lbfgs { tolerance, ..Default::default() }))
         };
-        let mut state = State::new(self.bonds.slots());
+        let mut state = State::new(self.bonds.sites());
         let mut system =
             System::new(&mut self.bonds, BondMaterial::new(&*self.law, self.modulus), &self.loads, &[1.0]);
         load_stepping(&mut *method, &mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
@@ -114,8 +114,8 @@ impl Plate {
     fn apart(&self, state: &State<2>, exact: &State<2>) -> f64 {
         let (mut largest, mut sum) = (0.0_f64, 0.0);
         let particles = self.bonds.particles();
-        for &slot in particles {
-            let (a, b) = (state.displacement.get(slot as usize), exact.displacement.get(slot as usize));
+        for &site in particles {
+            let (a, b) = (state.displacement.get(site as usize), exact.displacement.get(site as usize));
             for d in 0..2 {
                 largest = largest.max((a[d] - b[d]).abs());
                 sum += b[d] * b[d];

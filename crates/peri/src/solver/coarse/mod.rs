@@ -34,7 +34,7 @@ pub struct Body<'a, const D: usize> {
     pub displacement: &'a Field<D>,
     /// The law, kθ and the stretches it is fitted for.
     pub law: (&'a dyn BondPotential, f64, [f64; 2]),
-    /// Stiffness density of each slot, N/m⁵, which holds what is constrained.
+    /// Stiffness density of each site, N/m⁵, which holds what is constrained.
     pub springs: &'a [f64],
     /// The bonds' survey.
     pub survey: &'a Survey,
@@ -78,10 +78,10 @@ impl<const D: usize> Coarse<D> {
         self.parts.par_chunks_mut(BATCH * CORNERS * D).enumerate().for_each(|(batch, parts)| {
             for (part, element) in parts.chunks_mut(CORNERS * D).zip(&space.elements[batch * BATCH..]) {
                 part.fill(0.0);
-                for &slot in &space.members[element.members[0]..element.members[1]] {
-                    let hats = hat_values(space.local.get(slot as usize));
+                for &site in &space.members[element.members[0]..element.members[1]] {
+                    let hats = hat_values(space.local.get(site as usize));
                     for d in 0..D {
-                        let g = gradient[d][slot as usize];
+                        let g = gradient[d][site as usize];
                         for a in 0..corners {
                             part[a * D + d] += hats[a] * g;
                         }
@@ -102,12 +102,12 @@ impl<const D: usize> Coarse<D> {
 
     /// (P c)_I with the coefficients of the last [`Self::solve`].
     #[inline]
-    pub fn value(&self, slot: usize) -> [f64; D] {
-        let element = self.space.element_of[slot];
+    pub fn value(&self, site: usize) -> [f64; D] {
+        let element = self.space.element_of[site];
         let mut value = [0.0; D];
         if element != NONE {
             let functions = &self.space.elements[element as usize].functions;
-            let hats = hat_values(self.space.local.get(slot));
+            let hats = hat_values(self.space.local.get(site));
             for a in 0..1 << D {
                 let at = functions[a] as usize * D;
                 for d in 0..D {
@@ -127,7 +127,7 @@ impl<const D: usize> Coarse<D> {
 /// Diagonal of the bounding box, m.
 fn extent<const D: usize>(bonds: &dyn Bonds<D>) -> f64 {
     let span = |d: usize| {
-        let places = bonds.particles().iter().map(|&slot| bonds.position(slot as usize)[d]);
+        let places = bonds.particles().iter().map(|&site| bonds.position(site as usize)[d]);
         let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
         high - low + bonds.spacing()
     };

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// Corners of a cell in three dimensions.
 pub const CORNERS: usize = 8;
-/// Marks a slot without element.
+/// Marks a site without element.
 pub const NONE: u32 = u32::MAX;
 
 /// Particles of one cell that share all functions.
@@ -30,11 +30,11 @@ pub struct Space<const D: usize> {
     pub functions: usize,
     /// The elements.
     pub elements: Vec<Element>,
-    /// Slots, element by element.
+    /// Sites, element by element.
     pub members: Vec<u32>,
-    /// Element of each slot; particles without bonds have none.
+    /// Element of each site; particles without bonds have none.
     pub element_of: Vec<u32>,
-    /// Coordinates of each slot in its cell, 0 to 1.
+    /// Coordinates of each site in its cell, 0 to 1.
     pub local: Field<D>,
 }
 
@@ -49,8 +49,8 @@ impl<const D: usize> Grid<D> {
     /// Cells of about `edge`, which the box holds a whole number of.
     fn new(bonds: &dyn Bonds<D>, edge: f64) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
-        for &slot in bonds.particles() {
-            let position = bonds.position(slot as usize);
+        for &site in bonds.particles() {
+            let position = bonds.position(site as usize);
             for d in 0..D {
                 low[d] = low[d].min(position[d]);
                 high[d] = high[d].max(position[d]);
@@ -113,7 +113,7 @@ impl<const D: usize> Grid<D> {
     }
 }
 
-/// Parts of a hat's support: the part of each slot in it, slots ascending.
+/// Parts of a hat's support: the part of each site in it, sites ascending.
 struct Split {
     parts: u32,
     part_of: Vec<(u32, u32)>,
@@ -121,7 +121,7 @@ struct Split {
 
 impl<const D: usize> Space<D> {
     /// Cells of about `edge`, more if there would be more than `most` functions; `None` where even that does not help.
-    /// `bonded` has the number of bonds of each slot, `whole` that from which on nothing is missing around a particle.
+    /// `bonded` has the number of bonds of each site, `whole` that from which on nothing is missing around a particle.
     pub fn new(bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32, edge: f64, most: usize) -> Option<Self> {
         let mut edge = edge;
         for _ in 0..24 {
@@ -143,33 +143,33 @@ impl<const D: usize> Space<D> {
     }
 
     fn on(grid: &Grid<D>, bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32) -> Self {
-        let slots = bonds.slots();
-        let mut local = Field::zeros(slots);
+        let sites = bonds.sites();
+        let mut local = Field::zeros(sites);
         let cells: usize = grid.cells.iter().product();
-        // particles of each cell, slots ascending
+        // particles of each cell, sites ascending
         let mut starts = vec![0_usize; cells + 1];
         let mut cell_of = Vec::with_capacity(bonds.particles().len());
         let mut is_whole = vec![true; cells];
-        for &slot in bonds.particles() {
-            let slot = slot as usize;
-            if bonded[slot] == 0 {
+        for &site in bonds.particles() {
+            let site = site as usize;
+            if bonded[site] == 0 {
                 cell_of.push(NONE);
                 continue;
             }
-            let (cell, at) = grid.locate(bonds.position(slot));
-            local.set(slot, at);
+            let (cell, at) = grid.locate(bonds.position(site));
+            local.set(site, at);
             cell_of.push(cell as u32);
             starts[cell + 1] += 1;
-            is_whole[cell] &= bonded[slot] >= whole;
+            is_whole[cell] &= bonded[site] >= whole;
         }
         for cell in 0..cells {
             starts[cell + 1] += starts[cell];
         }
         let mut members = vec![0; starts[cells]];
         let mut next = starts.clone();
-        for (&slot, &cell) in bonds.particles().iter().zip(&cell_of) {
+        for (&site, &cell) in bonds.particles().iter().zip(&cell_of) {
             if cell != NONE {
-                members[next[cell as usize]] = slot;
+                members[next[cell as usize]] = site;
                 next[cell as usize] += 1;
             }
         }
@@ -178,12 +178,12 @@ impl<const D: usize> Space<D> {
         let nodes: usize = grid.node_counts().iter().product();
         let suspects: Vec<usize> =
             (0..nodes).filter(|&node| !grid.cells_around(node).all(|cell| is_whole[cell])).collect();
-        // few batches: each looks slots up in a table of its own
+        // few batches: each looks sites up in a table of its own
         let batch = suspects.len().div_ceil(4 * rayon::current_num_threads()).max(1);
         let found: Vec<Vec<(usize, Split)>> = suspects
             .par_chunks(batch)
             .map(|batch| {
-                let mut place = vec![NONE; slots];
+                let mut place = vec![NONE; sites];
                 let window = |node: usize| -> Vec<u32> {
                     grid.cells_around(node).flat_map(|cell| of_cell(cell).iter().copied()).collect()
                 };
@@ -205,7 +205,7 @@ impl<const D: usize> Space<D> {
             functions: functions as usize,
             elements: Vec::new(),
             members: Vec::with_capacity(members.len()),
-            element_of: vec![NONE; slots],
+            element_of: vec![NONE; sites],
             local,
         };
         for cell in 0..cells {
@@ -221,7 +221,7 @@ impl<const D: usize> Space<D> {
         &mut self,
         grid: &Grid<D>,
         cell: usize,
-        slots: &[u32],
+        sites: &[u32],
         splits: &BTreeMap<usize, Split>,
         first: &[u32],
     ) {
@@ -236,42 +236,42 @@ impl<const D: usize> Space<D> {
             }
         }
         if cut.is_empty() {
-            groups.insert(plain, slots.to_vec());
+            groups.insert(plain, sites.to_vec());
         } else {
-            for &slot in slots {
+            for &site in sites {
                 let mut functions = plain;
                 for (corner, split) in &cut {
-                    if let Ok(at) = split.part_of.binary_search_by_key(&slot, |pair| pair.0) {
+                    if let Ok(at) = split.part_of.binary_search_by_key(&site, |pair| pair.0) {
                         functions[*corner] += split.part_of[at].1;
                     }
                 }
-                groups.entry(functions).or_default().push(slot);
+                groups.entry(functions).or_default().push(site);
             }
         }
-        for (functions, slots) in groups {
+        for (functions, sites) in groups {
             let start = self.members.len();
-            slots.iter().for_each(|&slot| self.element_of[slot as usize] = self.elements.len() as u32);
-            self.members.extend(slots);
+            sites.iter().for_each(|&site| self.element_of[site as usize] = self.elements.len() as u32);
+            self.members.extend(sites);
             self.elements.push(Element { functions, members: [start, self.members.len()] });
         }
     }
 }
 
-/// The parts of a window that hang together by bonds within it, numbered by their first slot; `None` for one part.
-/// `place` holds [`NONE`] for every slot, before and after.
+/// The parts of a window that hang together by bonds within it, numbered by their first site; `None` for one part.
+/// `place` holds [`NONE`] for every site, before and after.
 fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut [u32]) -> Option<Split> {
     window.sort_unstable();
-    for (index, &slot) in window.iter().enumerate() {
-        place[slot as usize] = index as u32;
+    for (index, &site) in window.iter().enumerate() {
+        place[site as usize] = index as u32;
     }
     let mut parent: Vec<u32> = (0..window.len() as u32).collect();
     let mut parts = window.len();
-    for (index, &slot) in window.iter().enumerate() {
+    for (index, &site) in window.iter().enumerate() {
         if parts == 1 {
             break;
         }
-        bonds.neighbours(slot as usize, &mut |bond| {
-            let other = place[bond.slot];
+        bonds.neighbours(site as usize, &mut |bond| {
+            let other = place[bond.site];
             if other != NONE {
                 let (a, b) = (root(&mut parent, index as u32), root(&mut parent, other));
                 if a != b {
@@ -282,7 +282,7 @@ fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut
             }
         });
     }
-    window.iter().for_each(|&slot| place[slot as usize] = NONE);
+    window.iter().for_each(|&site| place[site as usize] = NONE);
     if parts <= 1 {
         return None;
     }

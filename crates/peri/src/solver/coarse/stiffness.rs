@@ -30,7 +30,7 @@ pub type ElementMatrix = [[f64; SYMMETRIC]; PAIRS];
 
 /// What is known of all bonds before anything is built.
 pub struct Survey {
-    /// Number of bonds of each slot.
+    /// Number of bonds of each site.
     pub bonded: Vec<u32>,
     /// The most bonds of any particle.
     pub most: u32,
@@ -41,11 +41,11 @@ pub struct Survey {
 impl Survey {
     /// Looks at every bond.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Self {
-        let of = |&slot: &u32| {
-            let own = displacement.get(slot as usize);
+        let of = |&site: &u32| {
+            let own = displacement.get(site as usize);
             let (mut count, mut most) = (0_u32, 0.0_f64);
-            bonds.neighbours(slot as usize, &mut |bond| {
-                let other = displacement.get(bond.slot);
+            bonds.neighbours(site as usize, &mut |bond| {
+                let other = displacement.get(bond.site);
                 let eta: f64 = (0..D).map(|d| (other[d] - own[d]).powi(2)).sum();
                 count += 1;
                 most = most.max(eta / (bond.length * bond.length));
@@ -53,10 +53,10 @@ impl Survey {
             (count, most)
         };
         let each: Vec<(u32, f64)> = bonds.particles().par_iter().map(of).collect();
-        let mut bonded = vec![0; bonds.slots()];
+        let mut bonded = vec![0; bonds.sites()];
         let (mut most, mut moved) = (0, 0.0_f64);
-        for (&slot, (count, square)) in bonds.particles().iter().zip(each) {
-            bonded[slot as usize] = count;
+        for (&site, (count, square)) in bonds.particles().iter().zip(each) {
+            bonded[site as usize] = count;
             most = most.max(count);
             moved = moved.max(square);
         }
@@ -118,7 +118,7 @@ impl<'a, const D: usize> Assembly<'a, D> {
     ) -> Self {
         let (law, modulus, stretches) = law;
         let tangents = Tangents::new(law, stretches);
-        let volumes: f64 = bonds.particles().iter().map(|&slot| bonds.volume(slot as usize)).sum();
+        let volumes: f64 = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).sum();
         let thickness = volumes / bonds.particles().len().max(1) as f64 / bonds.spacing().powi(D as i32);
         let cell = thickness * edge.iter().product::<f64>();
         // Gauss' two points along each axis are exact
@@ -132,19 +132,19 @@ impl<'a, const D: usize> Assembly<'a, D> {
         let mut assembly =
             Self { bonds, loads, displacement, survey, tangents, modulus, springs, interior, cell, full };
         if bonds.as_lattice().is_some() && survey.moved < SMALL {
-            let whole = |&&slot: &&u32| survey.bonded[slot as usize] == survey.most;
-            let slot = bonds.particles().iter().find(whole);
-            assembly.interior = slot.map(|&slot| assembly.tangent(slot as usize));
+            let whole = |&&site: &&u32| survey.bonded[site as usize] == survey.most;
+            let site = bonds.particles().iter().find(whole);
+            assembly.interior = site.map(|&site| assembly.tangent(site as usize));
         }
         assembly
     }
 
     /// C_I.
-    fn tangent(&self, slot: usize) -> Tangent {
-        let own = self.displacement.get(slot);
+    fn tangent(&self, site: usize) -> Tangent {
+        let own = self.displacement.get(site);
         let mut result = [[0.0; SYMMETRIC]; SYMMETRIC];
-        self.bonds.neighbours(slot, &mut |bond| {
-            let other = self.displacement.get(bond.slot);
+        self.bonds.neighbours(site, &mut |bond| {
+            let other = self.displacement.get(bond.site);
             let mut zeta = [0.0; D];
             let (mut square, mut e) = (0.0, 0.0);
             for d in 0..D {
@@ -184,28 +184,28 @@ impl<'a, const D: usize> Assembly<'a, D> {
         let mut shared = [[0.0; SYMMETRIC]; PAIRS];
         let mut sum = [[0.0; SYMMETRIC]; SYMMETRIC];
         let (mut filled, mut common) = (0.0, 0.0);
-        for &slot in &space.members[element.members[0]..element.members[1]] {
-            let slot = slot as usize;
-            let volume = self.bonds.volume(slot);
-            let (values, slopes) = hats::<D>(space.local.get(slot), space.edge);
+        for &site in &space.members[element.members[0]..element.members[1]] {
+            let site = site as usize;
+            let volume = self.bonds.volume(site);
+            let (values, slopes) = hats::<D>(space.local.get(site), space.edge);
             filled += volume;
             for a in 0..corners {
                 measure[a] += volume * values[a];
             }
             match &self.interior {
-                Some(_) if self.survey.bonded[slot] == self.survey.most => {
+                Some(_) if self.survey.bonded[site] == self.survey.most => {
                     add_products(&mut shared, volume, &slopes);
                     common += volume;
                 }
                 _ => {
-                    let tangent = self.tangent(slot);
+                    let tangent = self.tangent(site);
                     let mut own = [[0.0; SYMMETRIC]; PAIRS];
                     add_products(&mut own, volume, &slopes);
                     contract::<D>(&mut matrix, &tangent, &own);
                     add_tangent(&mut sum, &tangent, volume);
                 }
             }
-            self.hold(&mut matrix, slot, volume, &values);
+            self.hold(&mut matrix, site, volume, &values);
         }
         if let Some(interior) = &self.interior {
             contract::<D>(&mut matrix, interior, &shared);
@@ -220,15 +220,15 @@ impl<'a, const D: usize> Assembly<'a, D> {
     }
 
     /// Adds the springs that hold what is constrained.
-    fn hold(&self, matrix: &mut ElementMatrix, slot: usize, volume: f64, values: &[f64; CORNERS]) {
-        let constrained = self.loads.constrained(slot);
+    fn hold(&self, matrix: &mut ElementMatrix, site: usize, volume: f64, values: &[f64; CORNERS]) {
+        let constrained = self.loads.constrained(site);
         if constrained == 0 {
             return;
         }
         let mut at = 0;
         for a in 0..1 << D {
             for b in a..1 << D {
-                let spring = volume * self.springs[slot] * values[a] * values[b];
+                let spring = volume * self.springs[site] * values[a] * values[b];
                 let mut pair = 0;
                 for i in 0..D {
                     if constrained >> i & 1 == 1 {
@@ -244,9 +244,9 @@ impl<'a, const D: usize> Assembly<'a, D> {
     /// Σ_I V_I C_1111 / Σ_I V_I, or so: how stiff the body is.
     pub fn stiffness(&self) -> f64 {
         let particles = self.bonds.particles();
-        let slot = particles.iter().max_by_key(|&&s| (self.survey.bonded[s as usize], u32::MAX - s));
-        slot.map_or(0.0, |&slot| {
-            let tangent = self.tangent(slot as usize);
+        let site = particles.iter().max_by_key(|&&s| (self.survey.bonded[s as usize], u32::MAX - s));
+        site.map_or(0.0, |&site| {
+            let tangent = self.tangent(site as usize);
             tangent[0][0]
         })
     }
