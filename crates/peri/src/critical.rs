@@ -170,17 +170,17 @@ mod tests {
             (1.1, 100.0, [11.0, 3.89, 2.879, 1.5193]),
         ];
         for (factor, links, expected) in table {
-            for ((reading, expected), digits) in
+            for ((interpretation, expected), digits) in
                 Interpretation::ALL.iter().zip(expected).zip([6e-3, 6e-3, 6e-4, 6e-5])
             {
-                let found = reading.stretch(factor, links);
+                let found = interpretation.stretch(factor, links);
                 assert!(
                     (found - expected).abs() <= digits,
-                    "{reading:?} {factor} {links}: {found} {expected}"
+                    "{interpretation:?} {factor} {links}: {found} {expected}"
                 );
             }
         }
-        let dent = |reading: Interpretation| reading.stretch(1.2, 720.0);
+        let dent = |interpretation: Interpretation| interpretation.stretch(1.2, 720.0);
         let [r1, r2, r3, r4] = Interpretation::ALL.map(dent);
         evidence::near("DENT, critical bond stretch by R1", r1, 32.20, 6e-3);
         evidence::near("DENT, critical bond stretch by R2", r2, 11.38, 6e-3);
@@ -271,7 +271,7 @@ mod tests {
             horizon: 1.0,
             thickness: 1.0,
         };
-        for (factor, reading) in [
+        for (factor, interpretation) in [
             (0.03, Interpretation::BondFull),
             (0.1, Interpretation::BondEighth),
             (0.05, Interpretation::ChainEighth),
@@ -282,7 +282,7 @@ mod tests {
                 interpretation: Some(interpretation),
                 ..Critical::default()
             };
-            assert!(critical.resolve(&context).is_err(), "{factor} {reading:?}");
+            assert!(critical.resolve(&context).is_err(), "{factor} {interpretation:?}");
         }
     }
 }

@@ -25,6 +25,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
+mod constitutive;
 mod error;
 mod failure;
 mod line;
@@ -33,6 +34,7 @@ mod overlay;
 mod schema;
 mod solid;
 
+pub use constitutive::{Constant, ConstitutiveSpec};
 pub use error::SceneError;
 pub use failure::Failure;
 pub use line::{LineSpec, check_name};

@@ -4,7 +4,7 @@ use crate::critical::Interpretation;
 use crate::potential::{Chain, KernelFit, Law};
 use crate::run::Failure;
 use crate::{calibrate, exact};
-use clap::{Subcommand, ValueEnum};
+use clap::Subcommand;
 
 /// What to print.
 #[derive(Subcommand)]
@@ -18,8 +18,8 @@ pub enum Exact {
     /// Tension, tangent and energy of a bond law, its force maximum, critical stretches and kernel fit.
     Law {
         /// The law.
-        #[arg(long, value_enum, default_value_t = LawName::ChainOffset)]
-        law: LawName,
+        #[arg(long, value_enum, default_value_t = Law::ChainOffset)]
+        law: Law,
         /// Links per bond n̄.
         #[arg(long, default_value_t = 720.0)]
         links: f64,
@@ -36,21 +36,6 @@ pub enum Exact {
         #[arg(long, default_value_t = 3.015)]
         horizon_ratio: f64,
     },
-}
-
-/// Bond laws on the command line.
-#[derive(Clone, Copy, ValueEnum)]
-pub enum LawName {
-    /// T(l) − T(1).
-    ChainOffset,
-    /// T(l − 1).
-    ChainShifted,
-    /// T(g(l)) g′(l).
-    ChainAffine,
-    /// T(l).
-    AsPublished,
-    /// 3(l − 1).
-    Linear,
 }
 
 /// Far beyond any rubber.
@@ -126,14 +111,7 @@ impl Exact {
     }
 }
 
-fn print_law(name: LawName, links: f64, dissociation: f64, to: f64) -> Result<(), Failure> {
-    let law = match name {
-        LawName::ChainOffset => Law::ChainOffset,
-        LawName::ChainShifted => Law::ChainShifted,
-        LawName::ChainAffine => Law::ChainAffine,
-        LawName::AsPublished => Law::AsPublished,
-        LawName::Linear => Law::Linear,
-    };
+fn print_law(law: Law, links: f64, dissociation: f64, to: f64) -> Result<(), Failure> {
     if !(1.0 < to && to <= LARGEST_STRETCH) {
         let allowed = format!("above 1, at most {LARGEST_STRETCH}");
         return Err(crate::Error::Parameter { name: "--to", found: to, allowed }.into());
@@ -163,10 +141,10 @@ fn print_law(name: LawName, links: f64, dissociation: f64, to: f64) -> Result<()
             top.stretch,
             top.force
         );
-        for reading in Interpretation::ALL {
+        for interpretation in Interpretation::ALL {
             polycore::say!(
-                "critical stretch of 1.2 √n̄ read as {reading:?}: {:.4}",
-                reading.stretch(1.2, links)
+                "critical stretch of 1.2 √n̄ by {interpretation:?}: {:.4}",
+                interpretation.stretch(1.2, links)
             );
         }
     }

@@ -1,7 +1,6 @@
 //! Any constitutive law C → (W, S, ℂ) as the law of a family's mean deformation.
 
-use super::deformation::{Deformation, PointLaw, PointStress, Tensor};
-use super::eight_chain::embed;
+use super::deformation::{Deformation, PointLaw, PointStress, Tensor, embed};
 use crate::calibrate::Space;
 use crate::error::Error;
 use nalgebra::Matrix3;
@@ -17,6 +16,7 @@ pub struct Correspondence<L> {
     law: L,
     space: Space,
     shear: f64,
+    bulk: f64,
     stabilisation: f64,
 }
 
@@ -60,11 +60,11 @@ impl<L: Law> Correspondence<L> {
         if !(stabilisation >= 0.0 && stabilisation.is_finite()) {
             return wrong("stabilisation", stabilisation, "at least 0");
         }
-        Ok(Self { law, space, shear: moduli.shear, stabilisation })
+        Ok(Self { law, space, shear: moduli.shear, bulk: moduli.bulk, stabilisation })
     }
 
-    /// C in three dimensions and what the law predicts at it, with ℂ if asked for.
-    fn predict<const D: usize>(&self, gradient: &Tensor<D>, tangent: bool) -> Option<Prediction> {
+    /// λ₃² and what the law predicts at C, with ℂ if asked for.
+    fn predict<const D: usize>(&self, gradient: &Tensor<D>, tangent: bool) -> Option<(f64, Prediction)> {
         let mut c = voigt::from_stress(&embed(&(gradient.transpose() * gradient), 1.0));
         MEMORY.with_borrow_mut(|memory| {
             if self.space == Space::PlaneStress {
@@ -82,7 +82,7 @@ impl<L: Law> Correspondence<L> {
                 }
             }
             let found = if tangent { self.law.tangent(&c, memory) } else { self.law.stress(&c, memory) };
-            found.ok()
+            Some((c[2], found.ok()?))
         })
     }
 }
@@ -93,7 +93,7 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L> {
         // W(C) does not see a body turned inside out
         let upright = embed(&gradient, 1.0).determinant() > 0.0;
         let found = self.predict(&gradient, false).filter(|_| upright);
-        let (energy, stress) = found.map_or((f64::NAN, Matrix3::from_element(f64::NAN)), |found| {
+        let (energy, stress) = found.map_or((f64::NAN, Matrix3::from_element(f64::NAN)), |(_, found)| {
             (found.energy.unwrap_or(f64::NAN), voigt::to_stress(&found.stress))
         });
         let stabilisation = self.stabilisation * self.shear;
@@ -108,7 +108,7 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L> {
     /// √(‖A‖₁‖A‖∞) of A_iJkL = F_iM ℂ_MJNL F_kN + δ_ik S_JL: 3K at rest where K > 2μ/3.
     fn stiffness(&self, deformation: &Deformation<D>) -> f64 {
         let f = deformation.gradient();
-        let Some(Prediction { stress, tangent: Some(c), .. }) = self.predict(&f, true) else {
+        let Some((_, Prediction { stress, tangent: Some(c), .. })) = self.predict(&f, true) else {
             return f64::NAN;
         };
         let stress = voigt::to_stress(&stress);
@@ -134,5 +134,18 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L> {
 
     fn shear_modulus(&self) -> f64 {
         self.shear
+    }
+
+    fn bulk_modulus(&self) -> f64 {
+        if self.space == Space::PlaneStress { 0.0 } else { self.bulk }
+    }
+
+    fn thickness_stretch(&self, deformation: &Deformation<D>) -> f64 {
+        match self.space {
+            Space::PlaneStress => {
+                self.predict(&deformation.gradient(), false).map_or(f64::NAN, |(square, _)| square.sqrt())
+            }
+            _ => 1.0,
+        }
     }
 }

@@ -3,10 +3,20 @@
 use super::{Bond, Family, Material};
 use crate::bonds::Bonds;
 use crate::calibrate::modulus_in;
-use nalgebra::SMatrix;
+use nalgebra::{Matrix3, SMatrix};
+use std::sync::Arc;
 
 /// A tensor in the space of a body.
 pub type Tensor<const D: usize> = SMatrix<f64, D, D>;
+
+/// A tensor embedded in three dimensions.
+pub(super) fn embed<const D: usize>(tensor: &Tensor<D>, third: f64) -> Matrix3<f64> {
+    Matrix3::from_fn(|a, b| match (a < D && b < D, a == b) {
+        (true, _) => tensor[(a, b)],
+        (false, true) => third,
+        (false, false) => 0.0,
+    })
+}
 
 /// The mean deformation of a family: with ω_IJ = V_J/(|ξ|² Σ_K V_K) over the whole family, I = Σ_J V_J/Σ_K V_K over the intact
 /// bonds, M = Σ_J ω ξ⊗ξ/I and η = u_J − u_I.
@@ -22,6 +32,11 @@ impl<const D: usize> Deformation<D> {
     /// F.
     pub fn gradient(&self) -> Tensor<D> {
         self.displacement_gradient + Tensor::identity()
+    }
+
+    /// J = det F.
+    pub fn volume_ratio(&self) -> f64 {
+        embed(&self.gradient(), 1.0).determinant()
     }
 
     /// tr FᵀF − D + residual, which loses no digits at small strains.
@@ -51,6 +66,33 @@ pub trait PointLaw<const D: usize>: Send + Sync {
 
     /// Shear modulus at rest, Pa.
     fn shear_modulus(&self) -> f64;
+
+    /// Bulk modulus at rest, Pa; 0 in plane stress, where the thickness gives way.
+    fn bulk_modulus(&self) -> f64;
+
+    /// Stretch λ₃ of the thickness in plane stress; 1 elsewhere.
+    fn thickness_stretch(&self, deformation: &Deformation<D>) -> f64 {
+        let _ = deformation;
+        1.0
+    }
+}
+
+impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
+    fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
+        (**self).respond(deformation)
+    }
+    fn stiffness(&self, deformation: &Deformation<D>) -> f64 {
+        (**self).stiffness(deformation)
+    }
+    fn shear_modulus(&self) -> f64 {
+        (**self).shear_modulus()
+    }
+    fn bulk_modulus(&self) -> f64 {
+        (**self).bulk_modulus()
+    }
+    fn thickness_stretch(&self, deformation: &Deformation<D>) -> f64 {
+        (**self).thickness_stretch(deformation)
+    }
 }
 
 /// A solid of [`PointLaw`] as a material: W_I = I W(F, residual), an exact variation for any law, whose bonds
@@ -126,8 +168,7 @@ impl<const D: usize> Point<D> {
 
 /// M⁻¹ and the least eigenvalue of M = `shape`, a tensor of trace 1.
 fn invert<const D: usize>(shape: &Tensor<D>) -> (Tensor<D>, f64) {
-    let entry = |a, b| if a < D && b < D { shape[(a, b)] } else { f64::from(u8::from(a == b)) };
-    let values = nalgebra::Matrix3::from_fn(entry).symmetric_eigenvalues();
+    let values = embed(shape, 1.0).symmetric_eigenvalues();
     // the third of two dimensions is 1, and none of the others is larger
     (shape.try_inverse().unwrap_or_else(Tensor::zeros), values.min())
 }
@@ -221,6 +262,11 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     /// Of Young's modulus E ≈ 3μ.
     fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
         modulus_in(bonds, 3.0 * self.0.shear_modulus())
+    }
+
+    /// Bonds of E = 3μ have λ = 1.2μ and K = 2μ in space and in plane strain.
+    fn volumetric(&self) -> f64 {
+        (self.0.bulk_modulus() - 2.0 * self.0.shear_modulus()).max(0.0)
     }
 }
 

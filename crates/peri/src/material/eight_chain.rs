@@ -1,9 +1,8 @@
 //! Rubber as a network of Langevin chains whose volume is kept by a pressure.
 
-use super::deformation::{Deformation, PointLaw, PointStress, Tensor};
+use super::deformation::{Deformation, PointLaw, PointStress, Tensor, embed};
 use crate::calibrate::Space;
 use crate::error::Error;
-use nalgebra::Matrix3;
 use polycore::langevin;
 
 /// Eight chains of n links each (Arruda & Boyce 1993, doi:10.1016/0022-5096(93)90013-6) on the nonlocal trace of C,
@@ -17,6 +16,7 @@ pub struct EightChain {
     space: Space,
     modulus: f64,
     links: f64,
+    bulk: f64,
     /// κ, Pa; infinite of an incompressible sheet.
     volumetric: f64,
     /// β₁.
@@ -54,7 +54,7 @@ impl EightChain {
         }
         let start = 1.0 / links.sqrt();
         let rest = langevin::inverse(start);
-        let mut law = Self { space, modulus, links, volumetric: bulk, rest, rest_energy: 0.0 };
+        let mut law = Self { space, modulus, links, bulk, volumetric: bulk, rest, rest_energy: 0.0 };
         let at_rest = law.chains(3.0);
         law.rest_energy = at_rest.energy;
         let least = 2.0 / 3.0 * modulus + 2.0 * at_rest.slope;
@@ -183,15 +183,6 @@ fn inverse_square(jacobian: f64) -> [f64; 3] {
     [r * r + first * s + 0.5 * second * s * s, first + second * s, second]
 }
 
-/// A tensor embedded in three dimensions.
-pub(super) fn embed<const D: usize>(tensor: &Tensor<D>, third: f64) -> Matrix3<f64> {
-    Matrix3::from_fn(|a, b| match (a < D && b < D, a == b) {
-        (true, _) => tensor[(a, b)],
-        (false, true) => third,
-        (false, false) => 0.0,
-    })
-}
-
 /// det F and cof F = J F⁻ᵀ.
 fn cofactor<const D: usize>(gradient: &Tensor<D>) -> (f64, Tensor<D>) {
     let full = embed(gradient, 1.0);
@@ -227,5 +218,17 @@ impl<const D: usize> PointLaw<D> for EightChain {
 
     fn shear_modulus(&self) -> f64 {
         self.modulus
+    }
+
+    fn bulk_modulus(&self) -> f64 {
+        if self.space == Space::PlaneStress { 0.0 } else { self.bulk }
+    }
+
+    fn thickness_stretch(&self, deformation: &Deformation<D>) -> f64 {
+        if self.space != Space::PlaneStress {
+            return 1.0;
+        }
+        let (jacobian, _) = cofactor(&deformation.gradient());
+        self.thickness(D as f64 + deformation.excess_trace(), jacobian).square[0].sqrt()
     }
 }

@@ -77,6 +77,12 @@ pub trait Material<const D: usize>: Send + Sync {
     /// forces, of first guesses and of the preconditioner's coarse level. Equilibria do not depend on it.
     fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64;
 
+    /// Lamé's λ, Pa, in addition to that of bonds of [`Self::micromodulus`], for the preconditioner's coarse level: a solid of large
+    /// bulk modulus needs it for fast solutions, not for right ones.
+    fn volumetric(&self) -> f64 {
+        0.0
+    }
+
     /// The material at work in a body. The default loops over bonds as [`Self::force`] says.
     fn respond<'a>(self, bonds: &dyn Bonds<D>) -> Box<dyn Response<D> + 'a>
     where

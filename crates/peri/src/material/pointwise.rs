@@ -1,6 +1,6 @@
 //! Materials by plain loops over families: any [`Material`] at work, with the states of all particles.
 
-use super::{Cover, Family, LawRange, Material, Response};
+use super::{Bond, Cover, Family, LawRange, Material, Response};
 use crate::bonds::{Bonds, Overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
@@ -51,6 +51,19 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
         });
     }
 
+    /// Force densities τ_IJ − τ_JI, N/m⁶, of the intact bonds of a particle, after [`Response::prepare`].
+    pub fn bond_forces(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        site: usize,
+        mut visit: impl FnMut(&Bond<D>, [f64; D]),
+    ) {
+        Family::new(bonds, displacement, site).each(|bond| {
+            visit(&bond, self.material.force(&bond, &self.points[site], &self.points[bond.to]));
+        });
+    }
+
     /// The states, site by site.
     pub fn points(&self) -> &[M::Point] {
         &self.points
@@ -68,6 +81,10 @@ fn particles_of<const D: usize>(bonds: &dyn Bonds<D>, chunk: usize) -> &[u32] {
 impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
     fn bond_law(&self) -> (&dyn BondPotential, f64) {
         (&LinearBond, self.modulus)
+    }
+
+    fn volumetric(&self) -> f64 {
+        self.material.volumetric()
     }
 
     fn cover(
@@ -115,8 +132,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         for &site in particles_of(bonds, chunk) {
             let site = site as usize;
             let mut sum = [0.0; D];
-            Family::new(bonds, displacement, site).each(|bond| {
-                let density = self.material.force(&bond, &self.points[site], &self.points[bond.to]);
+            self.bond_forces(bonds, displacement, site, |bond, density| {
                 for d in 0..D {
                     sum[d] += density[d] * bond.volume;
                 }

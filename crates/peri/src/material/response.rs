@@ -34,6 +34,11 @@ pub trait Response<const D: usize>: Send + Sync {
     /// A bond law and its kθ, N/m⁶, about as stiff as this material: its own where it is one.
     fn bond_law(&self) -> (&dyn BondPotential, f64);
 
+    /// Lamé's λ, Pa, in addition to that of [`Self::bond_law`]: how much stiffer volumes are than those of bonds.
+    fn volumetric(&self) -> f64 {
+        0.0
+    }
+
     /// Brings the law to a range of stretches; a bound of the relative tangent of bonds, N/m⁶: with u_I = Σ_J 2 w V_J/|ξ|
     /// no particle is stiffer than tangent × u_I.
     ///

@@ -67,11 +67,11 @@ macro_rules! pointers_are_laws {
         }
     )*};
 }
-pointers_are_laws!(&L, Box<L>);
+pointers_are_laws!(&L, Box<L>, std::sync::Arc<L>);
 
 /// The laws by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema, clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
     /// t = T(l) − T(1): the printed chain force less its value at rest.

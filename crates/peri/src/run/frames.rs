@@ -1,8 +1,9 @@
 //! Fields of single steps: what is written during a run.
 
+use super::material::Observed;
 use crate::bonds::{Bonds, Kind, covered_stretches};
 use crate::error::Error;
-use crate::potential::{BondPotential, KernelFit};
+use crate::potential::KernelFit;
 use crate::scene::Scene;
 use crate::solver::{Record, State};
 use crate::stress::{self, Loaded, Measure, Missing, Tensor, cauchy, deformation_gradients};
@@ -15,10 +16,9 @@ use std::time::Instant;
 pub type Fields<const D: usize> = Vec<(Measure, Vec<Tensor<D>>)>;
 
 /// What stays the same over the steps of a variant.
-pub struct Frames<'a> {
+pub struct Frames<'a, const D: usize> {
     scene: &'a Scene,
-    law: &'a dyn BondPotential,
-    modulus: f64,
+    observed: &'a Observed<'a, D>,
     /// Intact bonds of each particle as the body was built, cracks taken off; only where bonds break.
     whole: Option<Vec<u32>>,
     series: Option<ParticleSeries>,
@@ -85,15 +85,14 @@ pub(super) fn tensor_in_space<const D: usize>(t: &Tensor<D>) -> [f64; 9] {
     std::array::from_fn(|k| t.get(k / 3).and_then(|row| row.get(k % 3)).copied().unwrap_or(0.0))
 }
 
-impl<'a> Frames<'a> {
+impl<'a, const D: usize> Frames<'a, D> {
     /// Begins, or continues after the steps in `state`. `bonds` are those of the body as it was built.
     ///
     /// # Errors
     /// Files that cannot be written or read.
-    pub fn new<const D: usize>(
+    pub fn new(
         scene: &'a Scene,
-        law: &'a dyn BondPotential,
-        modulus: f64,
+        observed: &'a Observed<'a, D>,
         bonds: &dyn Bonds<D>,
         state: &State<D>,
         path: PathBuf,
@@ -109,19 +108,14 @@ impl<'a> Frames<'a> {
         };
         let last = |every| (1..=state.history.len()).rev().find(|&k| wanted(every, &state.history[..k]));
         let written = every.and_then(last);
-        Ok(Self { scene, law, modulus, whole, series, path, written, by_window })
+        Ok(Self { scene, observed, whole, series, path, written, by_window })
     }
 
     /// After a step, or an equilibrium in which bonds broke: writes its fields if the scene wants them.
     ///
     /// # Errors
     /// Files that cannot be written.
-    pub fn step<const D: usize>(
-        &mut self,
-        bonds: &dyn Bonds<D>,
-        state: &State<D>,
-        phases: &mut Phases,
-    ) -> Result<(), Error> {
+    pub fn step(&mut self, bonds: &dyn Bonds<D>, state: &State<D>, phases: &mut Phases) -> Result<(), Error> {
         let Some(every) = self.scene.output.every.filter(|_| self.scene.output.fields) else { return Ok(()) };
         if is_stage(state.round) {
             let stresses = self.stresses(bonds, state, phases)?;
@@ -139,7 +133,7 @@ impl<'a> Frames<'a> {
     ///
     /// # Errors
     /// Files that cannot be written.
-    pub fn finish<const D: usize>(
+    pub fn finish(
         mut self,
         bonds: &dyn Bonds<D>,
         state: &State<D>,
@@ -155,7 +149,7 @@ impl<'a> Frames<'a> {
     }
 
     /// Broken bonds over those that the body was built with, particle by particle; cracks are no damage.
-    pub fn damage<const D: usize>(&self, bonds: &dyn Bonds<D>) -> Option<Vec<f64>> {
+    pub fn damage(&self, bonds: &dyn Bonds<D>) -> Option<Vec<f64>> {
         let whole = self.whole.as_ref()?;
         let now = all_intact(bonds);
         let part = |(&whole, &now): (&u32, &u32)| {
@@ -168,7 +162,7 @@ impl<'a> Frames<'a> {
     ///
     /// # Errors
     /// As [`KernelFit::new`].
-    pub fn stresses<const D: usize>(
+    pub fn stresses(
         &self,
         bonds: &dyn Bonds<D>,
         state: &State<D>,
@@ -176,26 +170,36 @@ impl<'a> Frames<'a> {
     ) -> Result<Stresses<D>, Error> {
         let mut stresses = Stresses { piola: Vec::new(), cauchy: Vec::new() };
         let Some(spec) = &self.scene.stress else { return Ok(stresses) };
-        let fit =
-            KernelFit::new(self.law, covered_stretches(bonds, &state.displacement), self.scene.fit_bound())?;
+        let keeps = self.scene.output.fields || !self.scene.output.line.is_empty();
+        let (law, modulus) = match self.observed {
+            Observed::Bonds { material, .. } => (material.law(), material.modulus()),
+            _ => {
+                let found = phases.time("stress constitutive", || self.observed.stress(bonds, state));
+                if let Some([piola, cauchy]) = found {
+                    stresses.cauchy.push((Measure::Constitutive, cauchy));
+                    stresses.piola.extend(keeps.then_some((Measure::Constitutive, piola)));
+                }
+                return Ok(stresses);
+            }
+        };
+        let fit = KernelFit::new(law, covered_stretches(bonds, &state.displacement), self.scene.fit_bound())?;
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
         for &measure in &spec.measures {
             let missing = Missing::WindowAt(&self.by_window);
-            let loaded =
-                Loaded { displacement: &state.displacement, fit: &fit, modulus: self.modulus, missing };
+            let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing };
             let started = Instant::now();
             let piola = stress::piola(bonds, &loaded, measure, spec.ball);
             stresses.cauchy.push((measure, cauchy(&piola, &gradients)));
             phases.add(&format!("stress {}", measure.name()), started.elapsed().as_secs_f64());
-            if self.scene.output.fields || !self.scene.output.line.is_empty() {
+            if keeps {
                 stresses.piola.push((measure, piola));
             }
         }
         Ok(stresses)
     }
 
-    fn write<const D: usize>(
+    fn write(
         &mut self,
         bonds: &dyn Bonds<D>,
         state: &State<D>,

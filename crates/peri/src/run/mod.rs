@@ -1,12 +1,12 @@
 //! A whole scene: every variant solved, measured, compared, drawn and judged; restartable at any moment.
 
 mod against;
-mod bonded;
 mod compare;
 mod draw;
 mod frames;
 mod history;
 mod lines;
+mod material;
 mod outcome;
 mod probes;
 mod program;
@@ -18,17 +18,17 @@ mod stages;
 pub use outcome::{Outcome, Profile};
 pub use program::Peri;
 
-use bonded::Bonded;
 use frames::Frames;
+use material::{Acting, Bonded, Observed};
 use probes::Probes;
-use sections::{Fitted, Sections};
+use sections::Sections;
 
+use crate::bonds::Property;
 use crate::bonds::{Bonds, covered_stretches, fragments};
 use crate::calibrate::Space;
 use crate::contact::Contact;
 use crate::error::Error;
-use crate::material::{BondMaterial, Property};
-use crate::potential::{BondPotential, KernelFit};
+use crate::potential::KernelFit;
 use crate::quantities as q;
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
 use crate::solver::{Breaking, Loads, Method, State, Status, System, load_stepping};
@@ -140,7 +140,7 @@ fn run_variant<const D: usize>(
     let mut phases = Phases::new();
     phases.start("build");
     let Built { bonded, loads, loaded, probes, sections } = Built::<D>::new(source, scene, variant)?;
-    let Bonded { mut body, law, modulus, critical_stretch } = bonded;
+    let Bonded { mut body, material, critical_stretch } = bonded;
     let plate = scene::exact_plate(source, scene, &body)?;
     phases.stop();
     let warnings = scene::warnings(scene, &body);
@@ -161,22 +161,24 @@ fn run_variant<const D: usize>(
     // where forces act, and where the surface correction has already made up for missing bonds
     let corrected = variant.surface == scene::SurfaceCorrection::Energy;
     let by_window = loaded.iter().map(|&loaded| loaded || corrected).collect();
-    let mut frames = Frames::new(scene, &*law, modulus, &*body.bonds, &state, path, by_window)?;
-    let (law_used, loads_used) = (&*law, &loads);
+    let observed = Observed::new(scene, &material, &*body.bonds);
+    let mut frames = Frames::new(scene, &observed, &*body.bonds, &state, path, by_window)?;
     let solution = Solution {
         variant,
         done,
-        law: law_used,
-        modulus,
-        loads: loads_used,
+        material: &material,
+        observed: &observed,
+        loads: &loads,
         probes: &probes,
         sections: &sections,
         critical_stretch: critical_stretch.as_ref(),
     };
     solve(scene, &solution, run, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
-    let fit = KernelFit::new(&*law, covered_stretches(&*body.bonds, &state.displacement), scene.fit_bound())?;
-    outcome.value(q::FIT_ERROR, fit.max_error);
+    if let Acting::Bonds(bonded) = &material {
+        let stretches = covered_stretches(&*body.bonds, &state.displacement);
+        outcome.value(q::FIT_ERROR, KernelFit::new(bonded.law(), stretches, scene.fit_bound())?.max_error);
+    }
     if let Some(critical) = &critical_stretch {
         outcome.value(q::CRITICAL_STRETCH, critical.least());
         outcome.value(q::FRAGMENTS, fragments(&*body.bonds) as f64);
@@ -259,8 +261,8 @@ impl<const D: usize> Built<D> {
 struct Solution<'a, const D: usize> {
     variant: &'a Variant,
     done: &'a Done<'a>,
-    law: &'a dyn BondPotential,
-    modulus: f64,
+    material: &'a Acting<D>,
+    observed: &'a Observed<'a, D>,
     loads: &'a Loads<D>,
     probes: &'a Probes<D>,
     sections: &'a Sections<D>,
@@ -274,9 +276,9 @@ fn solve<const D: usize>(
     body: &mut scene::Body<D>,
     state: &mut State<D>,
     phases: &mut Phases,
-    frames: &mut Frames,
+    frames: &mut Frames<D>,
 ) -> Result<(), Failure> {
-    let Solution { variant, done, law, modulus, loads, probes, sections, critical_stretch } = *solution;
+    let Solution { variant, done, material, observed, loads, probes, sections, critical_stretch } = *solution;
     let factors = scene.solver.factors();
     let name = variant.name();
     let mut watch = |status: &Status, state: &State<D>| -> Result<(), Error> {
@@ -287,20 +289,21 @@ fn solve<const D: usize>(
         let reached = || (done.finished, Some(state));
         Ok(run.pause(|| status.restartable.then(reached))?)
     };
+    let modulus = material.micromodulus(&*body.bonds);
     let contact =
         scene.contact.map(|contact| Contact::new(&*body.bonds, modulus, contact.stiffness)).transpose()?;
     let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
     let course = course.map(|formula| |time: f64| formula.in_time(time));
-    let fitted = Fitted::new(scene, law, modulus);
     let observer = |bonds: &dyn Bonds<D>, state: &State<D>| {
         let mut seen = probes.see(bonds, state);
-        seen.extend(sections.see(bonds, state, &fitted));
+        seen.extend(sections.see(bonds, state, observed));
         seen
     };
-    let observed = !scene.probe.is_empty() || !scene.output.section.is_empty();
-    let mut system = System::new(&mut *body.bonds, BondMaterial::new(law, modulus), loads, &factors);
+    let sees = !scene.probe.is_empty() || !scene.output.section.is_empty();
+    let response = material.respond(&*body.bonds);
+    let mut system = System::of_response(&mut *body.bonds, response, loads, &factors);
     system.course = course.as_ref().map(|course| course as _);
-    system.observer = observed.then_some(&observer as _);
+    system.observer = sees.then_some(&observer as _);
     system.fit_bound = scene.fit_bound();
     system.breaking =
         critical_stretch.map(|stretch| Breaking { stretch: stretch.clone(), policy: scene.solver.breaking });

@@ -1,17 +1,15 @@
 //! Forces across sections of the body: the sum of the bond forces that cross a plane, as the areal force density of Silling
 //! (2000), doi:10.1016/S0022-5096(99)00029-0, over the whole plane.
 
+use super::material::Observed;
 use super::outcome::Outcome;
 use crate::bonds::Bonds;
-use crate::potential::{BondPotential, KernelFit};
 use crate::scene::{Body, Scene, SectionSpec};
 use crate::solver::State;
-use crate::stress::force_over_length;
 use polycore::Error;
 use polycore::output::csv;
 use polycore::scene::{SceneError, Source};
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 
 /// Distance from a plane, over the spacing, up to which a particle counts as behind it.
 const ON_PLANE: f64 = 1e-9;
@@ -28,29 +26,6 @@ struct Section<const D: usize> {
     behind: Vec<u32>,
     /// Distance up to which a particle counts as behind, m.
     on: f64,
-}
-
-/// A bond law, and how the solver fits it: sections then carry the solver's own forces.
-pub struct Fitted<'a> {
-    law: &'a dyn BondPotential,
-    modulus: f64,
-    bound: f64,
-    clamped: bool,
-    /// The fit made last, with its stretches.
-    last: Mutex<Option<([f64; 2], KernelFit)>>,
-}
-
-impl<'a> Fitted<'a> {
-    /// A law with kθ = `modulus`, as the scene has it fitted.
-    pub fn new(scene: &Scene, law: &'a dyn BondPotential, modulus: f64) -> Self {
-        let (bound, clamped) = (scene.fit_bound(), scene.material.critical.is_some());
-        Self { law, modulus, bound, clamped, last: Mutex::new(None) }
-    }
-
-    fn over(&self, stretches: [f64; 2]) -> Option<KernelFit> {
-        let fit = KernelFit::new(self.law, stretches, self.bound).ok()?;
-        Some(if self.clamped { fit.clamped() } else { fit })
-    }
 }
 
 impl<const D: usize> Section<D> {
@@ -95,37 +70,15 @@ impl<const D: usize> Sections<D> {
         Ok(Self { each })
     }
 
-    /// Forces and moments of every section, as [`SectionSpec::values`] names them: F = Σ f V_I V_J ζ/|ζ| over the intact bonds
+    /// Forces and moments of every section, as [`SectionSpec::values`] names them: F = Σ f_IJ V_I V_J over the intact bonds
     /// from behind a plane to its front, and the moments of these forces, in deformed positions, about its point.
-    pub fn see(&self, bonds: &dyn Bonds<D>, state: &State<D>, law: &Fitted) -> Vec<f64> {
-        if self.each.is_empty() {
-            return Vec::new();
-        }
-        let mut last = law.last.lock().unwrap_or_else(PoisonError::into_inner);
-        if last.as_ref().is_none_or(|(stretches, _)| *stretches != state.fitted) {
-            *last = law.over(state.fitted).map(|fit| (state.fitted, fit));
-        }
-        // the solver has made the same fit
-        let Some((_, fit)) = &*last else { return Vec::new() };
+    pub fn see(&self, bonds: &dyn Bonds<D>, state: &State<D>, observed: &Observed<D>) -> Vec<f64> {
         let mut seen = Vec::new();
         for section in &self.each {
             let (mut force, mut moment) = ([0.0; D], [0.0; 3]);
-            for &site in &section.behind {
-                let site = site as usize;
-                let (rest, own, volume) =
-                    (bonds.position(site), state.displacement.get(site), bonds.volume(site));
-                let mut sum = [0.0; D];
-                bonds.neighbours(site, &mut |bond| {
-                    if !section.is_in_front(bonds.position(bond.site)) {
-                        return;
-                    }
-                    let other = state.displacement.get(bond.site);
-                    let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
-                    let pull = force_over_length(fit, law.modulus, bond.weight, volume, bond.bond, eta);
-                    for d in 0..D {
-                        sum[d] += pull * (bond.bond[d] + eta[d]);
-                    }
-                });
+            let in_front = |site: usize| section.is_in_front(bonds.position(site));
+            observed.forces(bonds, state, &section.behind, &in_front, &mut |site, sum| {
+                let (rest, own) = (bonds.position(site), state.displacement.get(site));
                 let arm: [f64; D] = std::array::from_fn(|d| rest[d] + own[d] - section.point[d]);
                 let at = |of: [f64; D], d: usize| of.get(d).copied().unwrap_or(0.0);
                 for d in 0..3 {
@@ -135,7 +88,7 @@ impl<const D: usize> Sections<D> {
                 for d in 0..D {
                     force[d] += sum[d];
                 }
-            }
+            });
             seen.extend(force);
             seen.extend(&moment[if D == 3 { 0 } else { 2 }..]);
         }

@@ -3,6 +3,7 @@
 use super::variant::{Variant, variants};
 use super::{Method, Scene};
 use crate::calibrate::{Calibration, Space};
+use crate::stress::Measure;
 use polycore::scene::{SceneError, Source};
 
 /// Largest horizon ratio: a stencil beyond it has more bonds than any use.
@@ -299,8 +300,26 @@ pub(super) fn ratio(source: &Source, key: &str, ratio: f64) -> Result<(), SceneE
 
 fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let material = &scene.material;
-    positive(source, "material.youngs_modulus", material.youngs_modulus.si(), "Pa")?;
-    let chain = material.law.is_chain();
+    if let Some(solid) = &material.solid {
+        return super::solid::check(source, scene, solid);
+    }
+    let Some(youngs_modulus) = material.youngs_modulus else {
+        let allowed = "a stress, or a `solid` in place of a bond law";
+        return Err(source.error("material.youngs_modulus", "nothing", allowed));
+    };
+    positive(source, "material.youngs_modulus", youngs_modulus.si(), "Pa")?;
+    if let Some(index) =
+        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m == Measure::Constitutive)
+    {
+        let key = format!("stress.measures[{index}]");
+        return Err(source.error(
+            &key,
+            "`constitutive` of a bond law",
+            "a measure of bond forces, such as `hardy`",
+        ));
+    }
+    let law = material.law.unwrap_or_default();
+    let chain = law.is_chain();
     // far beyond any polymer, and far from where the chain's force overflows
     let most = 1e9;
     for (key, value, least) in [("links", material.links, 2.0), ("dissociation", material.dissociation, 1.0)]
@@ -311,7 +330,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 return Err(source.error(
                     &key,
                     "nothing",
-                    format!("a number of at least {least}: `{}` needs it", material.law.name()),
+                    format!("a number of at least {least}: `{}` needs it", law.name()),
                 ));
             }
             Some(value) if !(least..=most).contains(&value) => {
@@ -321,7 +340,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                 return Err(source.error(
                     &key,
                     "a chain's parameter",
-                    format!("nothing: `{}` has no chains", material.law.name()),
+                    format!("nothing: `{}` has no chains", law.name()),
                 ));
             }
             _ => {}

@@ -12,7 +12,8 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     let mut all: Vec<Named> = Vec::new();
     let mut add =
         |given: bool, more: &[Quantity]| all.extend(more.iter().filter(|_| given).map(|&q| Named::from(q)));
-    add(true, &[q::SMALLEST_STRETCH, q::LARGEST_STRETCH, q::FIT_ERROR, q::LARGEST_DISPLACEMENT]);
+    add(true, &[q::SMALLEST_STRETCH, q::LARGEST_STRETCH, q::LARGEST_DISPLACEMENT]);
+    add(scene.material.solid.is_none(), &[q::FIT_ERROR]);
     add(true, &[q::WORK_OF_LOADS, q::STORED_ENERGY, q::DAMPED_ENERGY, q::LARGEST_RESIDUAL]);
     let records = scene.dynamics.as_ref().map_or(scene.solver.steps, |dynamics| dynamics.method().records);
     add(records > 1, &[q::PEAK_LOAD, q::DISPLACEMENT_AT_PEAK]);

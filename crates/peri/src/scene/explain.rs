@@ -4,6 +4,7 @@ use super::check::plain;
 use super::variant::Variant;
 use super::{Body, Method, Scene, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;
+use crate::material::Point;
 use polycore::report::Named;
 use polycore::scene::{SceneError, Source};
 
@@ -36,6 +37,10 @@ pub fn explain<const D: usize>(
         bonds.bytes() as f64 / 1e6,
         (bonds.sites() * (3 * D + 1) * 8) as f64 / 1e6
     ));
+    if let Some(solid) = &scene.material.solid {
+        let states = (bonds.sites() * size_of::<Point<D>>()) as f64 / 1e6;
+        builds(format!("a solid, `{}`: states of particles {states:.1} MB", solid.law.name()));
+    }
     for (crack, severed) in scene.body.cracks.iter().zip(&body.severed) {
         let corners: Vec<String> = [Some(&crack.from), Some(&crack.to), crack.and.as_ref()]
             .into_iter()

@@ -5,6 +5,7 @@
 
 use super::{Method, Scene};
 use crate::bonds::{Bonds, Stencil, storage};
+use crate::material::Point;
 use crate::solver::{Lbfgs, Record};
 use polycore::memory::{available, gib};
 use polycore::scene::{SceneError, Source};
@@ -47,6 +48,11 @@ fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
     }
     if scene.contact.is_some() {
         each += CONTACT;
+    }
+    if scene.material.solid.is_some() {
+        // states of particles, while they are made, and another set for outputs
+        let state = size_of::<Point<D>>() as f64;
+        each += if scene.observes_forces() { 3.0 } else { 2.0 } * state;
     }
     if scene.material.critical.is_some() {
         each += BREAKING;

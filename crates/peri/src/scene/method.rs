@@ -118,7 +118,8 @@ impl Scene {
                 Box::new(LbfgsSolver::new(Lbfgs { tolerance, max_iterations, accept, ..plain }))
             }
             Method::Adr | Method::Verlet => {
-                let mass_safety = self.solver.mass_safety.unwrap_or(self.material.law.mass_safety());
+                let mass_safety =
+                    self.solver.mass_safety.unwrap_or(self.material.law.unwrap_or_default().mass_safety());
                 let settings = DynamicRelaxation { tolerance, max_iterations, accept, mass_safety };
                 Box::new(RelaxationSolver::new(settings))
             }

@@ -15,6 +15,7 @@ mod memory;
 mod method;
 mod placement;
 mod probe;
+mod solid;
 mod variant;
 mod warn;
 
@@ -31,6 +32,7 @@ pub use memory::needed as memory_needed;
 pub use method::{Dynamics, Method, Solver};
 pub use placement::{check_placement, exact_plate};
 pub use probe::{Probe, Track};
+pub use solid::{SolidKind, SolidLaw};
 pub use variant::Variant;
 pub use warn::warnings;
 
@@ -209,15 +211,16 @@ pub struct CrackSpec {
     pub and: Option<Vec<Length>>,
 }
 
-/// The bond law and its constants.
+/// The bond law and its constants, or a solid.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
-    /// Young's modulus E of the continuum; ν follows from the space.
-    pub youngs_modulus: Stress,
-    /// Bond law.
-    #[serde(default)]
-    pub law: Law,
+    /// Young's modulus E of the continuum, of bond laws; ν follows from the space.
+    pub youngs_modulus: Option<Stress>,
+    /// Bond law; default: `chain-offset`.
+    pub law: Option<Law>,
+    /// A solid with any Poisson ratio in place of a bond law.
+    pub solid: Option<SolidLaw>,
     /// Links per bond n̄, for the chain laws.
     pub links: Option<f64>,
     /// Dissociation energy over kθ, D̂, for the chain laws.
@@ -454,6 +457,11 @@ pub fn schema() -> serde_json::Value {
 }
 
 impl Scene {
+    /// Whether outputs ask for forces or stresses.
+    pub fn observes_forces(&self) -> bool {
+        self.stress.is_some() || !self.output.section.is_empty()
+    }
+
     /// Largest relative error of the fitted bond law.
     pub fn fit_bound(&self) -> f64 {
         self.solver.fit_bound.unwrap_or(if self.material.critical.is_some() { 1e-6 } else { 1e-9 })
@@ -466,7 +474,8 @@ impl Material {
     /// # Errors
     /// [`crate::Error::Parameter`] where a chain parameter is out of its domain.
     pub fn bond_law(&self) -> Result<Box<dyn crate::potential::BondPotential>, crate::Error> {
-        let rescale = self.rescale.unwrap_or(self.law.rescales());
-        self.law.build(self.links.unwrap_or(1.0), self.dissociation.unwrap_or(1.0), rescale)
+        let law = self.law.unwrap_or_default();
+        let rescale = self.rescale.unwrap_or(law.rescales());
+        law.build(self.links.unwrap_or(1.0), self.dissociation.unwrap_or(1.0), rescale)
     }
 }

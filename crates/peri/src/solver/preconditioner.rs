@@ -88,6 +88,7 @@ impl<const D: usize> Preconditioner<D> {
             loads: &system.loads,
             displacement: &state.displacement,
             law: (law, modulus, state.fitted),
+            volumetric: system.material.volumetric(),
             springs: &springs,
             survey: &survey,
         };

@@ -52,8 +52,19 @@ impl<'a, const D: usize> System<'a, D> {
         loads: &'a Loads<D>,
         factors: &'a [f64],
     ) -> Self {
+        let material = material.respond(bonds);
+        Self::of_response(bonds, material, loads, factors)
+    }
+
+    /// As [`Self::new`], of a material that is at work already.
+    pub fn of_response(
+        bonds: &'a mut dyn Bonds<D>,
+        material: Box<dyn Response<D> + 'a>,
+        loads: &'a Loads<D>,
+        factors: &'a [f64],
+    ) -> Self {
         Self {
-            material: material.respond(bonds),
+            material,
             bonds,
             loads: Cow::Borrowed(loads),
             factors,

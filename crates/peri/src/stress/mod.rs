@@ -50,10 +50,13 @@ pub enum Measure {
     OnePoint,
     /// Eq. (2.31) as printed: t for f, bonds with both ends in the ball only, the whole ball's volume.
     AsPublished,
+    /// P of the law itself at the mean deformation of a family, times its intact part: of solids in place of bond laws.
+    /// [`piola`] of bond forces gives NaN.
+    Constitutive,
 }
 
 impl Measure {
-    /// All measures.
+    /// All measures of bond forces.
     pub const ALL: [Self; 10] = [
         Self::Hardy,
         Self::HardyBonds,
@@ -80,6 +83,7 @@ impl Measure {
             Self::BallShare => "ball-share",
             Self::OnePoint => "one-point",
             Self::AsPublished => "as-published",
+            Self::Constitutive => "constitutive",
         }
     }
 
@@ -90,7 +94,7 @@ impl Measure {
 
     /// Whether it shares every bond out with weights of sum 1.
     fn is_partition(self) -> bool {
-        !matches!(self, Self::BallShare | Self::OnePoint | Self::AsPublished)
+        !matches!(self, Self::BallShare | Self::OnePoint | Self::AsPublished | Self::Constitutive)
     }
 }
 
@@ -163,6 +167,9 @@ pub fn piola_on_lattice<const D: usize>(
     measure: Measure,
     ball: BallVolume,
 ) -> Vec<Tensor<D>> {
+    if measure == Measure::Constitutive {
+        return vec![[[f64::NAN; D]; D]; bonds.particles().len()];
+    }
     lattice::piola(bonds, state, measure, ball)
 }
 
@@ -178,6 +185,9 @@ pub fn piola_in_cloud<const D: usize>(
     measure: Measure,
     ball: BallVolume,
 ) -> Vec<Tensor<D>> {
+    if measure == Measure::Constitutive {
+        return vec![[[f64::NAN; D]; D]; bonds.particles().len()];
+    }
     cloud::piola(bonds, state, measure, ball)
 }
 

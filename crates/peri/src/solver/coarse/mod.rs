@@ -34,6 +34,8 @@ pub struct Body<'a, const D: usize> {
     pub displacement: &'a Field<D>,
     /// The law, kθ and the stretches it is fitted for.
     pub law: (&'a dyn BondPotential, f64, [f64; 2]),
+    /// λ of the volume in addition to that of bonds, Pa.
+    pub volumetric: f64,
     /// Stiffness density of each site, N/m⁵, which holds what is constrained.
     pub springs: &'a [f64],
     /// The bonds' survey.
@@ -57,8 +59,9 @@ impl<const D: usize> Coarse<D> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
         let whole = if body.bonds.as_lattice().is_some() { body.survey.most } else { u32::MAX };
         let space = Space::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
-        let Body { bonds, loads, displacement, law, springs, survey } = *body;
-        let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
+        let Body { bonds, loads, displacement, law, volumetric, springs, survey } = *body;
+        let assembly =
+            Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge, volumetric);
         let matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
             space.elements.par_iter().map(|element| assembly.element(&space, element)).collect();
         let extent = extent(body.bonds);
@@ -190,18 +193,17 @@ fn assemble<const D: usize>(
                 let others = &blocks.others[blocks.starts[column]..blocks.starts[column + 1]];
                 // every pair of an element's functions is in the pattern
                 let place = others.partition_point(|&other| other < row);
-                let mut pair = 0;
                 for i in 0..D {
-                    for j in i..D {
-                        let mut value = matrix[at][pair];
+                    for j in 0..D {
+                        // the upper triangle alone is kept
+                        if row as usize == column && i > j {
+                            continue;
+                        }
+                        let mut value = if f <= g { matrix[at][i * D + j] } else { matrix[at][j * D + i] };
                         if a == b && i == j {
                             value += shift * measure[a];
                         }
                         entries[pattern.starts[column * D + j] + place * D + i] += value;
-                        if i != j && row as usize != column {
-                            entries[pattern.starts[column * D + i] + place * D + j] += value;
-                        }
-                        pair += 1;
                     }
                 }
                 at += 1;

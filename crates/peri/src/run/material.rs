@@ -1,0 +1,232 @@
+//! A body with its material, as a variant of a scene asks for them.
+
+use crate::bonds::{Bonds, Property};
+use crate::calibrate;
+use crate::correction::{bond_factors, surface_factors};
+use crate::critical::{Context, Critical};
+use crate::error::Error;
+use crate::material::{BondMaterial, Material, NonlocalSolid, PointLaw, Pointwise, Response};
+use crate::potential::{BondPotential, KernelFit};
+use crate::run::Failure;
+use crate::scene::{self, Body, Inclusions, Scene, SurfaceCorrection, Variant};
+use crate::solver::State;
+use crate::stress::{Tensor, force_over_length};
+use polycore::scene::Source;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A solid of any law.
+pub type Solid<const D: usize> = NonlocalSolid<Arc<dyn PointLaw<D>>>;
+
+/// What acts between the particles of a scene.
+pub enum Acting<const D: usize> {
+    /// A bond law.
+    Bonds(BondMaterial<'static>),
+    /// A solid of the mean deformation of a family.
+    Solid(Solid<D>),
+}
+
+impl<const D: usize> Acting<D> {
+    /// For the solver.
+    pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn Response<D>> {
+        match self {
+            Self::Bonds(bonded) => bonded.clone().respond(bonds),
+            Self::Solid(solid) => solid.clone().respond(bonds),
+        }
+    }
+
+    /// kθ, N/m⁶, of linear bonds about as stiff.
+    pub fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+        match self {
+            Self::Bonds(bonded) => bonded.modulus(),
+            Self::Solid(solid) => solid.micromodulus(bonds),
+        }
+    }
+}
+
+/// A body, its material and their constants.
+pub struct Bonded<const D: usize> {
+    /// The body; its bonds do not have their law yet.
+    pub body: Body<D>,
+    /// The material.
+    pub material: Acting<D>,
+    /// Where the scene names one.
+    pub critical_stretch: Option<Property>,
+}
+
+impl<const D: usize> Bonded<D> {
+    /// Calibrates and corrects a body.
+    ///
+    /// # Errors
+    /// A fault of the material.
+    pub fn new(
+        source: &Source,
+        scene: &Scene,
+        variant: &Variant,
+        mut body: Body<D>,
+    ) -> Result<Self, Failure> {
+        let (space, spec) = (scene.body.space, &scene.material);
+        let (horizon, thickness) = (body.bonds.horizon(), body.thickness);
+        if let Some(solid) = &spec.solid {
+            let material = Acting::Solid(NonlocalSolid(solid.build::<D>(source, space)?));
+            let critical_stretch = spec.critical.and_then(|critical| critical.stretch).map(Property::from);
+            return Ok(Self { body, material, critical_stretch });
+        }
+        let law: Arc<dyn BondPotential> = Arc::from(spec.bond_law()?);
+        let youngs_modulus = spec.youngs_modulus.map_or(f64::NAN, |modulus| modulus.si());
+        let mut modulus = calibrate::modulus(space, youngs_modulus, horizon, thickness);
+        if let Some(lattice) = body.bonds.as_lattice() {
+            modulus *= calibrate::lattice_factor::<D>(spec.calibration, lattice);
+        }
+        let surface = (variant.surface == SurfaceCorrection::Energy).then(|| {
+            surface_factors(&*body.bonds, modulus, calibrate::stiffness_1111(space, youngs_modulus))
+        });
+        let inclusions = Inclusions::new(source, scene, &body)?;
+        if let Some(factors) = bond_factors(&*body.bonds, surface, &inclusions.micromodulus) {
+            body.bonds.set_factors(factors);
+        }
+        let resolve = |critical: Critical, stiffness: f64| {
+            let modulus = stiffness * modulus;
+            let context = Context { law: &*law, links: spec.links, space, modulus, horizon, thickness };
+            critical.resolve(&context)
+        };
+        let fault = |error| match error {
+            Error::Parameter { name, found, allowed } => {
+                let unit = if name == "critical.fracture_energy" { " J/m²" } else { "" };
+                source.error(&format!("material.{name}"), scene::plain(found) + unit, allowed)
+            }
+            other => source.error("material.critical", other, "a critical stretch"),
+        };
+        let critical_stretch = match spec.critical {
+            Some(critical) => {
+                let stretch = resolve(critical, 1.0).map_err(fault)?;
+                let own = |critical, stiffness| resolve(critical, stiffness);
+                Some(inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?)
+            }
+            None => None,
+        };
+        Ok(Self { body, material: Acting::Bonds(BondMaterial::new(law, modulus)), critical_stretch })
+    }
+}
+
+/// Forces and stresses of a state, as outputs need them.
+pub enum Observed<'a, const D: usize> {
+    /// Of a bond law, with the fit that the solver makes: bonds then carry the solver's own forces.
+    Bonds {
+        /// The law.
+        material: &'a BondMaterial<'static>,
+        /// Largest relative error of the fit.
+        bound: f64,
+        /// Whether the law is constant beyond the fitted stretches.
+        clamped: bool,
+        /// The fit made last, with its stretches.
+        last: Mutex<Option<([f64; 2], KernelFit)>>,
+    },
+    /// Of a solid of which no output asks.
+    Nothing,
+    /// Of a solid, with states of its particles.
+    Solid {
+        /// Its law.
+        law: &'a dyn PointLaw<D>,
+        /// The solid at work.
+        states: Mutex<Pointwise<Solid<D>, D>>,
+    },
+}
+
+impl<'a, const D: usize> Observed<'a, D> {
+    /// `bonds` are those of the body as it was built.
+    pub fn new(scene: &Scene, material: &'a Acting<D>, bonds: &dyn Bonds<D>) -> Self {
+        match material {
+            Acting::Bonds(material) => Self::Bonds {
+                material,
+                bound: scene.fit_bound(),
+                clamped: scene.material.critical.is_some(),
+                last: Mutex::new(None),
+            },
+            Acting::Solid(_) if !scene.observes_forces() => Self::Nothing,
+            Acting::Solid(solid) => {
+                Self::Solid { law: &*solid.0, states: Mutex::new(Pointwise::new(solid.clone(), bonds)) }
+            }
+        }
+    }
+
+    /// Forces of the bonds of `sites` to the sites that `wanted` names, N, each on the particle in the first: `visit` takes that site
+    /// and their sum.
+    pub fn forces(
+        &self,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        sites: &[u32],
+        wanted: &dyn Fn(usize) -> bool,
+        visit: &mut dyn FnMut(usize, [f64; D]),
+    ) {
+        match self {
+            Self::Nothing => {}
+            Self::Bonds { material, bound, clamped, last } => {
+                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+                if last.as_ref().is_none_or(|(stretches, _)| *stretches != state.fitted) {
+                    let fit = KernelFit::new(material.law(), state.fitted, *bound).ok();
+                    *last = fit.map(|fit| (state.fitted, if *clamped { fit.clamped() } else { fit }));
+                }
+                // the solver has made the same fit
+                let Some((_, fit)) = &*last else { return };
+                for site in sites.iter().map(|&site| site as usize) {
+                    let (own, volume) = (state.displacement.get(site), bonds.volume(site));
+                    let mut sum = [0.0; D];
+                    bonds.neighbours(site, &mut |bond| {
+                        if wanted(bond.site) {
+                            let other = state.displacement.get(bond.site);
+                            let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
+                            let pull = force_over_length(
+                                fit,
+                                material.modulus(),
+                                bond.weight,
+                                volume,
+                                bond.bond,
+                                eta,
+                            );
+                            for d in 0..D {
+                                sum[d] += pull * (bond.bond[d] + eta[d]);
+                            }
+                        }
+                    });
+                    visit(site, sum);
+                }
+            }
+            Self::Solid { states, .. } => {
+                let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
+                states.prepare(bonds, &state.displacement);
+                for site in sites.iter().map(|&site| site as usize) {
+                    let (mut sum, volume) = ([0.0; D], bonds.volume(site));
+                    states.bond_forces(bonds, &state.displacement, site, |bond, density| {
+                        if wanted(bond.to) {
+                            for d in 0..D {
+                                sum[d] += volume * bond.volume * density[d];
+                            }
+                        }
+                    });
+                    visit(site, sum);
+                }
+            }
+        }
+    }
+
+    /// First Piola–Kirchhoff and Cauchy stress of a solid's law in every particle, Pa; `None` for bond laws.
+    pub fn stress(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[Vec<Tensor<D>>; 2]> {
+        let Self::Solid { law, states } = self else { return None };
+        let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
+        states.prepare(bonds, &state.displacement);
+        let both = bonds.particles().iter().map(|&site| {
+            let point = &states.points()[site as usize];
+            let Some(deformation) = point.deformation() else { return ([[0.0; D]; D], [[0.0; D]; D]) };
+            let gradient = deformation.gradient();
+            let piola = law.respond(deformation).piola * point.integrity();
+            let volume = deformation.volume_ratio() * law.thickness_stretch(deformation);
+            let cauchy = piola * gradient.transpose() / volume;
+            let rows =
+                |t: &crate::material::Tensor<D>| std::array::from_fn(|a| std::array::from_fn(|b| t[(a, b)]));
+            (rows(&piola), rows(&cauchy))
+        });
+        let (piola, cauchy) = both.unzip();
+        Some([piola, cauchy])
+    }
+}

@@ -1,0 +1,158 @@
+//! Solids with any Poisson ratio in place of a bond law.
+
+use super::Scene;
+use super::SurfaceCorrection;
+use super::check::{plain, positive};
+use crate::bonds::VolumeCorrection;
+use crate::calibrate::{Calibration, Space};
+use crate::error::Error;
+use crate::material::{Correspondence, EightChain, PointLaw};
+use crate::stress::Measure;
+use polycore::scene::{ConstitutiveSpec, SceneError, Source};
+use polycore::units::Stress;
+use serde::Deserialize;
+use std::sync::Arc;
+
+/// A solid whose energy follows from the mean deformation of a family.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SolidLaw {
+    /// Its law.
+    pub law: SolidKind,
+    /// Shear modulus at rest, of `eight-chain`.
+    pub shear_modulus: Option<Stress>,
+    /// Bulk modulus at rest, of `eight-chain`; default in plane stress: incompressible.
+    pub bulk_modulus: Option<Stress>,
+    /// Links of a chain, of `eight-chain`.
+    pub links: Option<f64>,
+    /// The constitutive law of `correspondence`.
+    pub constitutive: Option<ConstitutiveSpec>,
+    /// Factor on the stabilisation of `correspondence`; default 1.
+    pub stabilisation: Option<f64>,
+}
+
+/// Laws of such solids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolidKind {
+    /// Arruda and Boyce's network over the directions of a family.
+    EightChain,
+    /// Any constitutive law at the mean deformation of a family.
+    Correspondence,
+}
+
+impl SolidKind {
+    /// Name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::EightChain => "eight-chain",
+            Self::Correspondence => "correspondence",
+        }
+    }
+}
+
+/// Where the block stands.
+const KEY: &str = "material.solid";
+
+impl SolidLaw {
+    /// The law in a space.
+    ///
+    /// # Errors
+    /// A key that the law lacks or does not know, or a value out of its domain.
+    pub fn build<const D: usize>(
+        &self,
+        source: &Source,
+        space: Space,
+    ) -> Result<Arc<dyn PointLaw<D>>, SceneError> {
+        let chains = self.law == SolidKind::EightChain;
+        let other = if chains { SolidKind::Correspondence } else { SolidKind::EightChain }.name();
+        for (key, given, of_chains) in [
+            ("shear_modulus", self.shear_modulus.is_some(), true),
+            ("bulk_modulus", self.bulk_modulus.is_some(), true),
+            ("links", self.links.is_some(), true),
+            ("constitutive", self.constitutive.is_some(), false),
+            ("stabilisation", self.stabilisation.is_some(), false),
+        ] {
+            if given && of_chains != chains {
+                let allowed = format!("nothing: it belongs to `{other}`");
+                return Err(source.error(
+                    &format!("{KEY}.{key}"),
+                    format!("`{key}` of `{}`", self.law.name()),
+                    allowed,
+                ));
+            }
+        }
+        let missing = |key: &str, what: &str| source.error(&format!("{KEY}.{key}"), "nothing", what);
+        let wrong = |error: Error| match error {
+            Error::Parameter { name, found, allowed } => {
+                let key = format!("{KEY}.{}", name.replace(' ', "_"));
+                source.error(&key, plain(found), allowed)
+            }
+            other => source.error(KEY, other, "a law with an energy, and without stress at rest"),
+        };
+        if chains {
+            let shear = self.shear_modulus.ok_or_else(|| missing("shear_modulus", "a stress"))?;
+            let links = self.links.ok_or_else(|| missing("links", "a number above 1"))?;
+            let bulk = match self.bulk_modulus {
+                Some(bulk) => bulk.si(),
+                None if space == Space::PlaneStress => f64::INFINITY,
+                None => {
+                    return Err(missing(
+                        "bulk_modulus",
+                        "a stress; only plane stress is incompressible without it",
+                    ));
+                }
+            };
+            return Ok(Arc::new(EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?));
+        }
+        let spec = self
+            .constitutive
+            .as_ref()
+            .ok_or_else(|| missing("constitutive", "a block with `model`, `parameters`, `bulk_modulus`"))?;
+        let law = spec.law(source, &format!("{KEY}.constitutive"))?;
+        let solid =
+            Correspondence::stabilised(law, space, self.stabilisation.unwrap_or(1.0)).map_err(wrong)?;
+        Ok(Arc::new(solid))
+    }
+}
+
+/// Checks what a scene with such a solid may and may not have.
+///
+/// # Errors
+/// A key of bond laws, or a block that the law does not take.
+pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<(), SceneError> {
+    let material = &scene.material;
+    for (key, given) in [
+        ("youngs_modulus", material.youngs_modulus.is_some()),
+        ("law", material.law.is_some()),
+        ("links", material.links.is_some()),
+        ("dissociation", material.dissociation.is_some()),
+        ("rescale", material.rescale.is_some()),
+        ("calibration", material.calibration != Calibration::default()),
+        ("volume_correction", material.volume_correction != VolumeCorrection::default()),
+        ("surface_correction", material.surface_correction != SurfaceCorrection::default()),
+        ("inclusions", !material.inclusions.is_empty()),
+    ] {
+        if given {
+            let found = format!("`{key}` of bond laws together with `solid`");
+            return Err(source.error(&format!("material.{key}"), found, "one of them"));
+        }
+    }
+    if let Some(critical) = material.critical.filter(|critical| critical.given() != ["stretch"]) {
+        let found = critical.given().join(" and ");
+        return Err(source.error("material.critical", format!("`{found}` of a solid"), "`stretch`"));
+    }
+    let other =
+        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m != Measure::Constitutive);
+    if let Some(index) = other {
+        let allowed = "`constitutive`, the stress of the law itself";
+        return Err(source.error(&format!("stress.measures[{index}]"), "a measure of bond forces", allowed));
+    }
+    match scene.body.space {
+        Space::Solid => solid.build::<3>(source, Space::Solid).map(|_| ()),
+        plane => {
+            positive(source, "body.thickness", scene.body.thickness.map_or(1.0, |t| t.si()), "m")?;
+            solid.build::<2>(source, plane).map(|_| ())
+        }
+    }
+}
