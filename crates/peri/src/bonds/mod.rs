@@ -7,6 +7,7 @@ mod cloud_kernel;
 mod kernel;
 mod lattice;
 mod lattice_kernel;
+mod linear_kernel;
 mod property;
 mod rows;
 
@@ -18,6 +19,7 @@ pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
 pub use lattice::{LatticeBonds, Stencil, storage};
 pub use lattice_kernel::TILE;
+pub use linear_kernel::{LinearRow, Moments};
 pub use property::Property;
 
 use crate::error::Error;

@@ -1,6 +1,7 @@
 //! Solids of the mean deformation of a family, with any Poisson ratio: correspondence and its stabilisation as one energy.
 
-use super::{Bond, Family, Material};
+use super::solid_passes::SolidPasses;
+use super::{Bond, Family, Material, Passes};
 use crate::bonds::Bonds;
 use crate::calibrate::modulus_in;
 use nalgebra::{Matrix3, SMatrix};
@@ -150,9 +151,43 @@ impl<const D: usize> Default for Point<D> {
 }
 
 impl<const D: usize> Point<D> {
+    /// Σ_J V_J, M⁻¹ and D λ_min(M) of the intact bonds.
+    pub(super) fn reshape(&mut self, family: &Family<D>) {
+        let (mut shape, mut intact) = (Tensor::<D>::zeros(), 0.0);
+        family.each(|bond| {
+            let share = bond.volume / (bond.length * bond.length);
+            intact += bond.volume;
+            shape += Tensor::from_fn(|a, b| share * bond.reference[a] * bond.reference[b]);
+        });
+        self.intact = intact;
+        let (inverse, least) = if intact > 0.0 { invert(&(shape / intact)) } else { (shape, 0.0) };
+        (self.inverse, self.shape) = (inverse, D as f64 * least);
+    }
+
+    /// Whether the intact bonds span space.
+    pub(super) fn has_gradient(&self) -> bool {
+        self.shape > LEAST_SHAPE
+    }
+
+    /// A/Σ_K V_K and (Q + A 1)/Σ_K V_K, rows first.
+    pub(super) fn terms(&self) -> impl Iterator<Item = f64> + '_ {
+        let stress = (0..D * D).map(|k| self.stress[(k / D, k % D)]);
+        std::iter::once(self.slope).chain(stress)
+    }
+
+    /// Force density of the springs of both ends, N/m⁶.
+    pub(super) fn pull(&self, other: &Self, bond: &Bond<D>) -> [f64; D] {
+        let spring = self.spring + other.spring;
+        if spring <= 0.0 {
+            return [0.0; D];
+        }
+        let size = spring * bond.strain() / bond.length;
+        bond.direction().map(|x| size * x)
+    }
+
     /// The mean deformation; `None` where too few bonds are left.
     pub fn deformation(&self) -> Option<&Deformation<D>> {
-        (self.shape > LEAST_SHAPE).then_some(&self.deformation)
+        self.has_gradient().then_some(&self.deformation)
     }
 
     /// I: the part of the family that is intact, 0 to 1.
@@ -181,43 +216,27 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     }
 
     fn prepare(&self, family: &Family<D>, point: &mut Point<D>) {
-        let (mut shape, mut moment) = (Tensor::<D>::zeros(), Tensor::<D>::zeros());
-        let (mut intact, mut square) = (0.0, 0.0);
+        let (mut moment, mut intact, mut square) = (Tensor::<D>::zeros(), 0.0, 0.0);
         family.each(|bond| {
             let share = bond.volume / (bond.length * bond.length);
             intact += bond.volume;
-            for b in 0..D {
-                let weighted = share * bond.reference[b];
-                for a in 0..D {
-                    shape[(a, b)] += weighted * bond.reference[a];
-                    moment[(a, b)] += weighted * bond.change[a];
+            for a in 0..D {
+                let weighted = share * bond.change[a];
+                square += weighted * bond.change[a];
+                for b in 0..D {
+                    moment[(a, b)] += weighted * bond.reference[b];
                 }
-                square += share * bond.change[b] * bond.change[b];
             }
         });
         if intact != point.intact {
-            point.intact = intact;
-            let (inverse, least) = if intact > 0.0 { invert(&(shape / intact)) } else { (shape, 0.0) };
-            (point.inverse, point.shape) = (inverse, D as f64 * least);
+            point.reshape(family);
         }
-        if point.shape <= LEAST_SHAPE {
-            return self.spring(family, point);
-        }
-        let dimension = D as f64;
-        moment /= intact;
-        let gradient = moment * point.inverse;
-        let residual = dimension * (square / intact - gradient.dot(&moment));
-        point.deformation = Deformation { displacement_gradient: gradient, residual: residual.max(0.0) };
-        let found = self.0.respond(&point.deformation);
-        point.energy = intact / point.whole * found.energy;
-        point.slope = dimension * found.stabilisation / point.whole;
-        point.stress = found.piola * point.inverse / point.whole - gradient * point.slope;
-        point.spring = 0.0;
+        if point.has_gradient() { self.update(point, moment, square) } else { self.spring(family, point) }
     }
 
     fn stiffen(&self, family: &Family<D>, point: &mut Point<D>) {
         let squares = family.sum(|bond| bond.volume / (bond.length * bond.length));
-        point.own = if point.shape <= LEAST_SHAPE {
+        point.own = if !point.has_gradient() {
             4.0 * point.spring * squares
         } else {
             // Σ_J ω 2(1 − cos kξ) is at most 2.6 (2D) or 2.4 (3D) Σ_J ω in all lattices
@@ -226,25 +245,27 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
             let gradient = self.0.stiffness(&point.deformation) - shear;
             // λ_max(M⁻¹)/D = 1/(D λ_min(M))
             let reach = GRADIENT.sqrt() / (family.horizon() * point.shape);
-            springs + point.integrity() * gradient.max(0.0) * reach * reach
+            springs + if gradient < 0.0 { 0.0 } else { point.integrity() * gradient * reach * reach }
         };
     }
 
     /// T_IJ/V_J = (A ζ + Q ξ)/(|ξ|² Σ_K V_K) of both ends, with ζ = ξ + η.
     fn force(&self, bond: &Bond<D>, own: &Point<D>, other: &Point<D>) -> [f64; D] {
-        let (slope, spring) = (own.slope + other.slope, own.spring + other.spring);
-        let unit = 1.0 / (bond.length * bond.length);
-        let mut sum: [f64; D] = std::array::from_fn(|a| {
+        let (slope, unit) = (own.slope + other.slope, 1.0 / (bond.length * bond.length));
+        let pull = own.pull(other, bond);
+        std::array::from_fn(|a| {
             let stress = (0..D).map(|b| (own.stress[(a, b)] + other.stress[(a, b)]) * bond.reference[b]);
-            unit * (slope * bond.change[a] + stress.sum::<f64>())
-        });
-        if spring > 0.0 {
-            let (pull, direction) = (spring * bond.strain() * bond.length * unit, bond.direction());
-            for a in 0..D {
-                sum[a] += pull * direction[a];
-            }
+            unit * (slope * bond.change[a] + stress.sum::<f64>()) + pull[a]
+        })
+    }
+
+    fn passes(&self, bonds: &dyn Bonds<D>) -> Option<Box<dyn Passes<Self, D>>> {
+        // 1 + D², which a type cannot compute
+        if D == 2 {
+            SolidPasses::<D, 5>::new(bonds).map(|passes| Box::new(passes) as _)
+        } else {
+            SolidPasses::<D, 10>::new(bonds).map(|passes| Box::new(passes) as _)
         }
-        sum
     }
 
     fn energy(&self, _family: &Family<D>, point: &Point<D>) -> f64 {
@@ -271,8 +292,26 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
 }
 
 impl<L> NonlocalSolid<L> {
+    /// Brings a state to Σ_J (V_J/|ξ|²) η⊗ξ and Σ_J (V_J/|ξ|²)|η|² over the intact bonds.
+    pub(super) fn update<const D: usize>(&self, point: &mut Point<D>, moment: Tensor<D>, square: f64)
+    where
+        L: PointLaw<D>,
+    {
+        let (dimension, moment) = (D as f64, moment / point.intact);
+        let gradient = moment * point.inverse;
+        let residual = dimension * (square / point.intact - gradient.dot(&moment));
+        // NaN stays: a state that is not finite is reported
+        let residual = if residual < 0.0 { 0.0 } else { residual };
+        point.deformation = Deformation { displacement_gradient: gradient, residual };
+        let found = self.0.respond(&point.deformation);
+        point.energy = point.intact / point.whole * found.energy;
+        point.slope = dimension * found.stabilisation / point.whole;
+        point.stress = found.piola * point.inverse / point.whole - gradient * point.slope;
+        point.spring = 0.0;
+    }
+
     /// Springs in place of the law.
-    fn spring<const D: usize>(&self, family: &Family<D>, point: &mut Point<D>)
+    pub(super) fn spring<const D: usize>(&self, family: &Family<D>, point: &mut Point<D>)
     where
         L: PointLaw<D>,
     {

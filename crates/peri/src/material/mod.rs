@@ -16,13 +16,14 @@ mod eight_chain;
 mod family;
 mod pointwise;
 mod response;
+mod solid_passes;
 
 pub use bonded::BondMaterial;
 pub use constitutive::Correspondence;
 pub use deformation::{Deformation, NonlocalSolid, Point, PointLaw, PointStress, Tensor};
 pub use eight_chain::EightChain;
 pub use family::{Bond, Family};
-pub use pointwise::Pointwise;
+pub use pointwise::{Passes, Pointwise};
 pub use response::{Cover, LawRange, Response};
 
 pub use crate::bonds::Property;
@@ -81,6 +82,12 @@ pub trait Material<const D: usize>: Send + Sync {
     /// bulk modulus needs it for fast solutions, not for right ones.
     fn volumetric(&self) -> f64 {
         0.0
+    }
+
+    /// Faster passes over a body than bond by bond, where there are any.
+    fn passes(&self, bonds: &dyn Bonds<D>) -> Option<Box<dyn Passes<Self, D>>> {
+        let _ = bonds;
+        None
     }
 
     /// The material at work in a body. The default loops over bonds as [`Self::force`] says.

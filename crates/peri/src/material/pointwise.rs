@@ -7,11 +7,38 @@ use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::{BondPotential, KernelFit, LinearBond, StretchRange};
 use rayon::prelude::*;
 
+/// Both passes of a material over a whole body, for one that has something faster than plain loops over bonds. The states and
+/// forces must be those of [`Material::prepare`] and [`Material::force`] but for rounding.
+pub trait Passes<M: Material<D> + ?Sized, const D: usize>: Send + Sync {
+    /// The first pass: states of all sites.
+    fn prepare(
+        &mut self,
+        material: &M,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        points: &mut [M::Point],
+    );
+
+    /// The second pass, of a work item; see [`Response::force`].
+    #[expect(clippy::too_many_arguments, reason = "those of the response, and what it has")]
+    fn force(
+        &self,
+        material: &M,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        points: &[M::Point],
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    );
+}
+
 /// A material with the states of all particles.
 pub struct Pointwise<M: Material<D>, const D: usize> {
     material: M,
     /// Site by site.
     points: Vec<M::Point>,
+    passes: Option<Box<dyn Passes<M, D>>>,
     /// kθ of linear bonds about as stiff.
     modulus: f64,
     /// Greatest s_I/u_I when stretches last left the covered range.
@@ -29,7 +56,8 @@ impl<M: Material<D>, const D: usize> Pointwise<M, D> {
             points[site as usize] = point;
         }
         let modulus = material.micromodulus(bonds);
-        Self { material, points, modulus, tangent: 0.0 }
+        let passes = material.passes(bonds);
+        Self { material, points, passes, modulus, tangent: 0.0 }
     }
 
     /// Brings the states of all particles up to date.
@@ -113,7 +141,10 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
     }
 
     fn prepare(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
-        self.visit(bonds, displacement, M::prepare);
+        match &mut self.passes {
+            Some(passes) => passes.prepare(&self.material, bonds, displacement, &mut self.points),
+            None => self.visit(bonds, displacement, M::prepare),
+        }
     }
 
     fn has_points(&self) -> bool {
@@ -128,6 +159,9 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         force: &mut [&mut [f64]; D],
         mut track: Option<&mut StretchRange>,
     ) {
+        if let Some(passes) = &self.passes {
+            return passes.force(&self.material, bonds, displacement, &self.points, chunk, force, track);
+        }
         force.iter_mut().for_each(|component| component.fill(0.0));
         for &site in particles_of(bonds, chunk) {
             let site = site as usize;

@@ -51,8 +51,8 @@ fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
     }
     if scene.material.solid.is_some() {
         // states of particles, while they are made, and another set for outputs
-        let state = size_of::<Point<D>>() as f64;
-        each += if scene.observes_forces() { 3.0 } else { 2.0 } * state;
+        let (state, passes) = (size_of::<Point<D>>() as f64, 8.0 * (1 + D * D) as f64 + 5.0);
+        each += if scene.observes_forces() { 3.0 * state + 2.0 * passes } else { 2.0 * state + passes };
     }
     if scene.material.critical.is_some() {
         each += BREAKING;

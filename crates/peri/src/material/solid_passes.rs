@@ -1,0 +1,111 @@
+//! Both passes of a solid on a lattice, by the kernels of [`crate::bonds`].
+
+use super::deformation::{NonlocalSolid, Point, PointLaw, Tensor};
+use super::family::Family;
+use super::pointwise::Passes;
+use crate::bonds::{Bonds, LinearRow, StretchRange};
+use crate::field::{CHUNK, Field};
+use rayon::prelude::*;
+
+/// What the second pass reads, N = 1 + D²: A and S of every site.
+pub struct SolidPasses<const D: usize, const N: usize> {
+    rows: Vec<LinearRow<D>>,
+    terms: Field<N>,
+    /// Intact bonds of each site when its shape tensor was last computed.
+    bonded: Vec<u32>,
+    /// Intact directed bonds of the body then; none before the first pass.
+    known: Option<u64>,
+    /// Particles with springs in place of the law, and their neighbours; empty where there are none.
+    sprung: Vec<bool>,
+}
+
+impl<const D: usize, const N: usize> SolidPasses<D, N> {
+    /// On a lattice; `None` elsewhere.
+    pub fn new(bonds: &dyn Bonds<D>) -> Option<Self> {
+        let rows = bonds.as_lattice()?.linear_rows();
+        let (terms, bonded) = (Field::zeros(bonds.sites()), vec![0; bonds.sites()]);
+        Some(Self { rows, terms, bonded, known: None, sprung: Vec::new() })
+    }
+}
+
+impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D> for SolidPasses<D, N> {
+    fn prepare(
+        &mut self,
+        solid: &NonlocalSolid<L>,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        points: &mut [Point<D>],
+    ) {
+        let Some(lattice) = bonds.as_lattice() else { return };
+        let (rows, changed) = (&self.rows, self.known != Some(bonds.directed_bonds()));
+        self.known = Some(bonds.directed_bonds());
+        let items = self.terms.chunks_mut().into_par_iter().zip(self.bonded.par_chunks_mut(CHUNK));
+        let items = items.zip(points.par_chunks_mut(CHUNK)).enumerate();
+        let springs = items.map(|(chunk, ((mut terms, bonded), points))| {
+            let mut springs = false;
+            let first = chunk * CHUNK;
+            for at in (0..bonded.len()).filter(|_| changed) {
+                let (site, now) = (first + at, lattice.bonded(first + at));
+                if bonded[at] != now {
+                    bonded[at] = now;
+                    points[at].reshape(&Family::new(bonds, displacement, site));
+                    if now == 0 {
+                        solid.spring(&Family::new(bonds, displacement, site), &mut points[at]);
+                    }
+                }
+            }
+            lattice.moments::<N>(rows, displacement, chunk, &mut |base, moments| {
+                for lane in 0..moments[0].len() {
+                    let (site, at) = (base + lane, base + lane - first);
+                    let point = &mut points[at];
+                    if point.has_gradient() {
+                        let moment = Tensor::<D>::from_fn(|a, b| moments[1 + a * D + b][lane]);
+                        solid.update(point, moment, moments[0][lane]);
+                    } else if bonded[at] > 0 {
+                        solid.spring(&Family::new(bonds, displacement, site), point);
+                        springs = true;
+                    }
+                    for (n, value) in point.terms().enumerate() {
+                        terms[n][at] = value;
+                    }
+                }
+            });
+            springs
+        });
+        let springs = springs.reduce(|| false, |one, other| one | other);
+        self.sprung.clear();
+        if springs {
+            self.sprung.resize(bonds.sites(), false);
+            for site in bonds.particles().iter().map(|&site| site as usize) {
+                if !points[site].has_gradient() {
+                    self.sprung[site] = true;
+                    bonds.neighbours(site, &mut |bond| self.sprung[bond.site] = true);
+                }
+            }
+        }
+    }
+
+    fn force(
+        &self,
+        _solid: &NonlocalSolid<L>,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        points: &[Point<D>],
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
+        let Some(lattice) = bonds.as_lattice() else { return };
+        lattice.linear_force::<N>(&self.rows, displacement, &self.terms, chunk, force, track);
+        let first = chunk * CHUNK;
+        let here = self.sprung.iter().enumerate().skip(first).take(force[0].len());
+        for (site, _) in here.filter(|(_, sprung)| **sprung) {
+            Family::new(bonds, displacement, site).each(|bond| {
+                let pull = points[site].pull(&points[bond.to], &bond);
+                for d in 0..D {
+                    force[d][site - first] += bond.volume * pull[d];
+                }
+            });
+        }
+    }
+}
