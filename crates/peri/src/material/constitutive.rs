@@ -12,7 +12,7 @@ use std::cell::RefCell;
 /// stabilisation a = 1 (Silling 2017, doi:10.1016/j.cma.2017.03.043, made exact). In plane stress the law gives the stretch of the
 /// thickness by S₃₃ = 0.
 #[derive(Clone, Debug)]
-pub struct Correspondence<L> {
+pub struct Correspondence<L, const D: usize> {
     law: L,
     space: Space,
     shear: f64,
@@ -25,7 +25,7 @@ thread_local! {
     static MEMORY: RefCell<Workspace> = RefCell::default();
 }
 
-impl<L: Law> Correspondence<L> {
+impl<L: Law, const D: usize> Correspondence<L, D> {
     /// With the stabilisation a = 1: accurate in the bulk and at free surfaces.
     ///
     /// # Errors
@@ -57,28 +57,42 @@ impl<L: Law> Correspondence<L> {
         if stress.is_nan() || stress >= 1e-6 {
             return wrong("stress at rest over the shear modulus", stress, "below 1e-6");
         }
+        if (space == Space::Solid) != (D == 3) {
+            return Err(Error::geometry(format!("{space:?} in {D} dimensions")));
+        }
         if !(stabilisation >= 0.0 && stabilisation.is_finite()) {
             return wrong("stabilisation", stabilisation, "at least 0");
         }
         Ok(Self { law, space, shear: moduli.shear, bulk: moduli.bulk, stabilisation })
     }
 
+    /// What the law predicts: W(C) does not see a body turned inside out.
+    fn upright(&self, deformation: &Deformation<D>) -> Option<Prediction> {
+        let upright = deformation.volume_change() > -1.0;
+        self.predict(&deformation.gradient(), false).filter(|_| upright).map(|(_, found)| found)
+    }
+
     /// λ₃² and what the law predicts at C, with ℂ if asked for.
-    fn predict<const D: usize>(&self, gradient: &Tensor<D>, tangent: bool) -> Option<(f64, Prediction)> {
+    fn predict(&self, gradient: &Tensor<D>, tangent: bool) -> Option<(f64, Prediction)> {
         let mut c = voigt::from_stress(&embed(&(gradient.transpose() * gradient), 1.0));
         MEMORY.with_borrow_mut(|memory| {
             if self.space == Space::PlaneStress {
                 // from the stretch of a body that keeps its volume
                 c[2] = 1.0 / (c[0] * c[1] - c[3] * c[3]);
+                let mut change = f64::INFINITY;
                 for _ in 0..60 {
                     let found = self.law.tangent(&c, memory).ok()?;
                     let step = found.stress[2] / (0.5 * found.tangent?[(2, 2)]);
                     let next = (c[2] - step).clamp(0.5 * c[2], 2.0 * c[2]);
-                    let done = (next - c[2]).abs() <= 1e-15 * next;
+                    change = (next - c[2]).abs() / next;
                     c[2] = next;
-                    if done {
+                    if change <= 1e-15 {
                         break;
                     }
+                }
+                // no thickness without stress: not a solution
+                if change.is_nan() || change > 1e-9 {
+                    return None;
                 }
             }
             let found = if tangent { self.law.tangent(&c, memory) } else { self.law.stress(&c, memory) };
@@ -87,22 +101,17 @@ impl<L: Law> Correspondence<L> {
     }
 }
 
-impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L> {
+impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L, D> {
+    fn energy(&self, deformation: &Deformation<D>) -> f64 {
+        let energy = self.upright(deformation).and_then(|found| found.energy).unwrap_or(f64::NAN);
+        energy + 0.5 * self.stabilisation * self.shear * deformation.residual
+    }
+
     fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
-        let gradient = deformation.gradient();
-        // W(C) does not see a body turned inside out
-        let upright = embed(&gradient, 1.0).determinant() > 0.0;
-        let found = self.predict(&gradient, false).filter(|_| upright);
-        let (energy, stress) = found.map_or((f64::NAN, Matrix3::from_element(f64::NAN)), |(_, found)| {
-            (found.energy.unwrap_or(f64::NAN), voigt::to_stress(&found.stress))
-        });
-        let stabilisation = self.stabilisation * self.shear;
+        let found = self.upright(deformation);
+        let stress = found.map_or(Matrix3::from_element(f64::NAN), |found| voigt::to_stress(&found.stress));
         let plane = Tensor::<D>::from_fn(|a, b| stress[(a, b)]);
-        PointStress {
-            energy: energy + 0.5 * stabilisation * deformation.residual,
-            piola: gradient * plane,
-            stabilisation,
-        }
+        PointStress { piola: deformation.gradient() * plane, stabilisation: self.stabilisation * self.shear }
     }
 
     /// √(‖A‖₁‖A‖∞) of A_iJkL = F_iM ℂ_MJNL F_kN + δ_ik S_JL: 3K at rest where K > 2μ/3.

@@ -35,9 +35,11 @@ impl<const D: usize> Deformation<D> {
         self.displacement_gradient + Tensor::identity()
     }
 
-    /// J = det F.
-    pub fn volume_ratio(&self) -> f64 {
-        embed(&self.gradient(), 1.0).determinant()
+    /// J − 1 = det F − 1, which loses no digits at small strains.
+    pub fn volume_change(&self) -> f64 {
+        let h = embed(&self.displacement_gradient, 0.0);
+        let trace = h.trace();
+        trace + 0.5 * (trace * trace - (h * h).trace()) + h.determinant()
     }
 
     /// tr FᵀF − D + residual, which loses no digits at small strains.
@@ -49,8 +51,6 @@ impl<const D: usize> Deformation<D> {
 /// What a solid does at a deformation.
 #[derive(Clone, Copy, Debug)]
 pub struct PointStress<const D: usize> {
-    /// Energy density W, J/m³, 0 at rest.
-    pub energy: f64,
     /// P = ∂W/∂F at a constant residual, Pa.
     pub piola: Tensor<D>,
     /// 2 ∂W/∂(residual), Pa: the shear modulus of the stabilisation.
@@ -59,7 +59,10 @@ pub struct PointStress<const D: usize> {
 
 /// A solid whose energy follows from the mean deformation of a family. [`NonlocalSolid`] makes a material of it.
 pub trait PointLaw<const D: usize>: Send + Sync {
-    /// Energy and stress. A deformation outside the law's domain gives values that are not finite; solvers report them.
+    /// Energy density W, J/m³, 0 at rest.
+    fn energy(&self, deformation: &Deformation<D>) -> f64;
+
+    /// Stress. A deformation outside the law's domain gives values that are not finite; solvers report them.
     fn respond(&self, deformation: &Deformation<D>) -> PointStress<D>;
 
     /// A bound of ‖∂P/∂F‖₂, Pa.
@@ -79,6 +82,9 @@ pub trait PointLaw<const D: usize>: Send + Sync {
 }
 
 impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
+    fn energy(&self, deformation: &Deformation<D>) -> f64 {
+        (**self).energy(deformation)
+    }
     fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
         (**self).respond(deformation)
     }
@@ -127,7 +133,6 @@ pub struct Point<const D: usize> {
     slope: f64,
     stress: Tensor<D>,
     spring: f64,
-    energy: f64,
     /// The particle's own part in the bound of the stiffness, N/m⁴.
     own: f64,
 }
@@ -144,7 +149,6 @@ impl<const D: usize> Default for Point<D> {
             slope: 0.0,
             stress: zero,
             spring: 0.0,
-            energy: 0.0,
             own: 0.0,
         }
     }
@@ -194,11 +198,6 @@ impl<const D: usize> Point<D> {
     pub fn integrity(&self) -> f64 {
         if self.whole > 0.0 { self.intact / self.whole } else { 0.0 }
     }
-
-    /// Energy density W_I, J/m³.
-    pub fn energy(&self) -> f64 {
-        self.energy
-    }
 }
 
 /// M⁻¹ and the least eigenvalue of M = `shape`, a tensor of trace 1.
@@ -231,7 +230,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         if intact != point.intact {
             point.reshape(family);
         }
-        if point.has_gradient() { self.update(point, moment, square) } else { self.spring(family, point) }
+        if point.has_gradient() { self.update(point, moment, square) } else { self.spring(point) }
     }
 
     fn stiffen(&self, family: &Family<D>, point: &mut Point<D>) {
@@ -268,8 +267,11 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         }
     }
 
-    fn energy(&self, _family: &Family<D>, point: &Point<D>) -> f64 {
-        point.energy
+    fn energy(&self, family: &Family<D>, point: &Point<D>) -> f64 {
+        match point.deformation() {
+            Some(deformation) => point.integrity() * self.0.energy(deformation),
+            None => 0.5 * point.spring * family.sum(|bond| bond.volume * bond.strain().powi(2)),
+        }
     }
 
     /// Half of 1.75 (2D) or 1 (3D) times the greatest part of a particle and its neighbours: 1.1 to 3 times the true bound on
@@ -304,14 +306,13 @@ impl<L> NonlocalSolid<L> {
         let residual = if residual < 0.0 { 0.0 } else { residual };
         point.deformation = Deformation { displacement_gradient: gradient, residual };
         let found = self.0.respond(&point.deformation);
-        point.energy = point.intact / point.whole * found.energy;
         point.slope = dimension * found.stabilisation / point.whole;
         point.stress = found.piola * point.inverse / point.whole - gradient * point.slope;
         point.spring = 0.0;
     }
 
     /// Springs in place of the law.
-    pub(super) fn spring<const D: usize>(&self, family: &Family<D>, point: &mut Point<D>)
+    pub(super) fn spring<const D: usize>(&self, point: &mut Point<D>)
     where
         L: PointLaw<D>,
     {
@@ -320,7 +321,6 @@ impl<L> NonlocalSolid<L> {
         (point.slope, point.stress) = (0.0, Tensor::zeros());
         if point.whole > 0.0 {
             point.spring = stiffness / point.whole;
-            point.energy = 0.5 * point.spring * family.sum(|bond| bond.volume * bond.strain().powi(2));
         }
     }
 }

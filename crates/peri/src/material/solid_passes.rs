@@ -50,19 +50,19 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
                     bonded[at] = now;
                     points[at].reshape(&Family::new(bonds, displacement, site));
                     if now == 0 {
-                        solid.spring(&Family::new(bonds, displacement, site), &mut points[at]);
+                        solid.spring(&mut points[at]);
                     }
                 }
             }
             lattice.moments::<N>(rows, displacement, chunk, &mut |base, moments| {
                 for lane in 0..moments[0].len() {
-                    let (site, at) = (base + lane, base + lane - first);
+                    let at = base + lane - first;
                     let point = &mut points[at];
                     if point.has_gradient() {
                         let moment = Tensor::<D>::from_fn(|a, b| moments[1 + a * D + b][lane]);
                         solid.update(point, moment, moments[0][lane]);
                     } else if bonded[at] > 0 {
-                        solid.spring(&Family::new(bonds, displacement, site), point);
+                        solid.spring(point);
                         springs = true;
                     }
                     for (n, value) in point.terms().enumerate() {

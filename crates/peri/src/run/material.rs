@@ -220,7 +220,7 @@ impl<'a, const D: usize> Observed<'a, D> {
             let Some(deformation) = point.deformation() else { return ([[0.0; D]; D], [[0.0; D]; D]) };
             let gradient = deformation.gradient();
             let piola = law.respond(deformation).piola * point.integrity();
-            let volume = deformation.volume_ratio() * law.thickness_stretch(deformation);
+            let volume = (1.0 + deformation.volume_change()) * law.thickness_stretch(deformation);
             let cauchy = piola * gradient.transpose() / volume;
             let rows =
                 |t: &crate::material::Tensor<D>| std::array::from_fn(|a| std::array::from_fn(|b| t[(a, b)]));

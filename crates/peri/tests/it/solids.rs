@@ -4,7 +4,7 @@
 use crate::bodies::{Body, Random, scatter};
 use crate::materials::battery;
 use evidence::{at_most, near};
-use peri::bonds::{Bonds, LatticeBonds, Overstretched, VolumeCorrection};
+use peri::bonds::{Bonds, LatticeBonds, Overstretched, StretchRange, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
@@ -15,13 +15,16 @@ use peri::material::{
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 
 /// W = ½μ(I₁ − 3 − 2 ln J) + ¼κ(J² − 1 − 2 ln J), μ = 1, of a bulk modulus K.
-fn neo_hooke(space: Space, bulk: f64) -> NonlocalSolid<Correspondence<Compressible<NeoHookean>>> {
+fn neo_hooke<const D: usize>(
+    space: Space,
+    bulk: f64,
+) -> NonlocalSolid<Correspondence<Compressible<NeoHookean>, D>> {
     let volumetric = Volumetric::Ciarlet { lame: bulk - 2.0 / 3.0 };
     let law = Compressible::new(NeoHookean::new(1.0).unwrap(), volumetric).unwrap();
     NonlocalSolid(Correspondence::new(law, space).unwrap())
 }
 
-fn rubber(space: Space, bulk: f64) -> NonlocalSolid<EightChain> {
+fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChain<D>> {
     NonlocalSolid(EightChain::new(space, 1.0, 25.0, bulk).unwrap())
 }
 
@@ -132,7 +135,7 @@ impl<const D: usize> Block<D> {
             }
             let rest = &row[1 + 2 * D + D * D..];
             // the program's column E is I W with the stabilisation
-            note(2, point.energy(), rest[1]);
+            note(2, solid.energy(&Family::new(&self.bonds, &self.displacement, site), point), rest[1]);
             note(3, point.integrity(), rest[2]);
             energy += solid.energy(&Family::new(&self.bonds, &self.displacement, site), point);
         }
@@ -230,7 +233,7 @@ fn nominal_stresses_of_the_network() {
         }
     }
     for (links, truth) in [(8.0, 99.2738375096), (25.0, 99.3164676363)] {
-        let law = EightChain::new(Space::Solid, 1.0, links, 100.0).unwrap();
+        let law = EightChain::<3>::new(Space::Solid, 1.0, links, 100.0).unwrap();
         near(&format!("eight_chain_kappa_{links}"), law.volumetric(), truth, 1e-9);
     }
 }
@@ -238,7 +241,7 @@ fn nominal_stresses_of_the_network() {
 /// P/μ₀ at l = 2 where the sides are free: 3D, plane strain, plane stress with a finite K.
 #[test]
 fn free_sides_follow_the_bulk_modulus() {
-    fn pulled<const D: usize>(law: &EightChain) -> f64 {
+    fn pulled<const D: usize>(law: &EightChain<D>) -> f64 {
         // P₂₂ = 0 by bisection in the stretch of the sides
         let respond = |side: f64| {
             let mut stretches = [side; D];
@@ -259,8 +262,11 @@ fn free_sides_follow_the_bulk_modulus() {
     ];
     for (space, truth) in tables {
         for (bulk, truth) in bulk.into_iter().zip(truth) {
-            let law = EightChain::new(space, 1.0, 25.0, bulk).unwrap();
-            let found = if space == Space::Solid { pulled::<3>(&law) } else { pulled::<2>(&law) };
+            let found = if space == Space::Solid {
+                pulled::<3>(&EightChain::new(space, 1.0, 25.0, bulk).unwrap())
+            } else {
+                pulled::<2>(&EightChain::new(space, 1.0, 25.0, bulk).unwrap())
+            };
             near(&format!("eight_chain_pulled_{space:?}_{bulk}"), found, truth, 2e-5);
         }
     }
@@ -324,4 +330,136 @@ fn a_bonded_strip_is_stiff_because_it_keeps_its_volume() {
     let [coarse, fine] = [1e-3, 0.5e-3].map(|spacing| modulus(spacing, 5.0 / 3.0));
     near("bonded_strip_k_5_3_extrapolated", 2.0 * fine - coarse, 2.913, 0.04 * 2.913);
     near("bonded_strip_k_100", modulus(0.5e-3, 100.0), 16.49, 0.08 * 16.49);
+}
+
+/// W of simple shear is ½μγ²(1 + O(γ²)) down to strains at which I₁ − 3 has lost all digits of a difference.
+#[test]
+fn energies_of_small_strains_keep_their_digits() {
+    fn worst<const D: usize>(law: &impl PointLaw<D>) -> f64 {
+        let mut worst = 0.0_f64;
+        for shear in [1e-3, 1e-5, 1e-7] {
+            let mut displacement_gradient = Tensor::<D>::zeros();
+            displacement_gradient[(0, 1)] = shear;
+            let found = law.energy(&Deformation { displacement_gradient, residual: 0.0 });
+            worst = worst.max((found / (0.5 * shear * shear) - 1.0).abs());
+        }
+        worst
+    }
+    let chains = |space, bulk| EightChain::<2>::new(space, 1.0, 25.0, bulk).unwrap();
+    let planes = [chains(Space::PlaneStress, f64::INFINITY), chains(Space::PlaneStress, 10.0)];
+    let worst_plane = planes.iter().map(worst).fold(worst(&chains(Space::PlaneStrain, 100.0)), f64::max);
+    let solid = worst(&EightChain::<3>::new(Space::Solid, 1.0, 25.0, 100.0).unwrap());
+    at_most("eight_chain_energy_small_strain", worst_plane.max(solid), 2e-6);
+}
+
+/// Energy and its slope of a sheet crushed to nothing belong together.
+#[test]
+fn crushed_sheets_have_the_energy_of_their_force() {
+    let law = EightChain::<2>::new(Space::PlaneStress, 1.0, 400.0, 10.0).unwrap();
+    let at = |x: f64| homogeneous([x, 0.8]);
+    for stretch in [0.03, 0.05, 0.075, 0.3] {
+        let step = 1e-6;
+        let slope = (law.energy(&at(stretch + step)) - law.energy(&at(stretch - step))) / (2.0 * step);
+        let piola = law.respond(&at(stretch)).piola[(0, 0)];
+        assert!((slope / piola - 1.0).abs() < 1e-6, "{stretch}: {slope} and {piola}");
+    }
+}
+
+#[test]
+fn laws_of_another_dimension_are_refused() {
+    assert!(EightChain::<2>::new(Space::Solid, 1.0, 25.0, 100.0).is_err());
+    assert!(EightChain::<3>::new(Space::PlaneStress, 1.0, 25.0, 100.0).is_err());
+    let law = Compressible::new(NeoHookean::new(1.0).unwrap(), Volumetric::Ciarlet { lame: 1.0 }).unwrap();
+    assert!(Correspondence::<_, 2>::new(law, Space::Solid).is_err());
+}
+
+/// A solid without its kernels: plain loops over bonds.
+struct Plain<M>(M);
+
+impl<const D: usize, M: Material<D>> Material<D> for Plain<M> {
+    type Point = M::Point;
+
+    fn begin(&self, family: &Family<D>) -> M::Point {
+        self.0.begin(family)
+    }
+    fn prepare(&self, family: &Family<D>, point: &mut M::Point) {
+        self.0.prepare(family, point);
+    }
+    fn force(&self, bond: &peri::material::Bond<D>, own: &M::Point, other: &M::Point) -> [f64; D] {
+        self.0.force(bond, own, other)
+    }
+    fn energy(&self, family: &Family<D>, point: &M::Point) -> f64 {
+        self.0.energy(family, point)
+    }
+    fn stiffness(&self, family: &Family<D>, points: &[M::Point]) -> f64 {
+        self.0.stiffness(family, points)
+    }
+    fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+        self.0.micromodulus(bonds)
+    }
+}
+
+/// The kernels against plain loops: a body with a hole, whole, cut, and severed until particles have springs or no bond at all.
+fn kernels_are_plain_loops<const D: usize>(space: Space, side: usize, volume: VolumeCorrection) {
+    let mut body = vec![Operation::Add(Shape::Box { min: [0.0; D], max: [side as f64; D] })];
+    body.push(Operation::Cut(Shape::Ball { centre: [0.5 * side as f64; D], radius: 1.6 }));
+    let mut bonds = LatticeBonds::new(lattice(&body, 1.0, 1.0).unwrap(), 3.015, volume, &[]).unwrap();
+    let sites: Vec<usize> = bonds.particles().iter().map(|&site| site as usize).collect();
+    let placed: Vec<[f64; D]> = sites.iter().map(|&site| displaced(bonds.position(site))).collect();
+    let displacement = scatter(bonds.sites(), &sites, &placed);
+    let mut fast = rubber::<D>(space, 10.0).respond(&bonds);
+    let mut plain = Plain(rubber::<D>(space, 10.0)).respond(&bonds);
+    let mut random = Random(7);
+    let rest = StretchRange::REST;
+    for severed in [-1.0, -0.4, 0.6, 1.0] {
+        let mut list = Vec::new();
+        for &site in &sites {
+            // both ends of a bond, and all bonds of the first particles in the last round
+            let alone = severed == 1.0 && site < sites[sites.len() / 2];
+            bonds.neighbours(site, &mut |bond| {
+                if site < bond.site && (alone || random.next() < severed && severed < 1.0) {
+                    let entry = |site: usize, index| Overstretched {
+                        site: site as u32,
+                        index,
+                        elongation: 0.0,
+                        length: 1.0,
+                        weight: 1.0,
+                    };
+                    list.push(entry(site, bond.index));
+                    let count = bonds.stencil().offsets.len() as u32;
+                    list.push(entry(bond.site, count - 1 - bond.index));
+                }
+            });
+        }
+        list.sort_by_key(|bond| bond.site);
+        bonds.sever(&list);
+        let mut found = Vec::new();
+        for material in [&mut fast, &mut plain] {
+            material.prepare(&bonds, &displacement);
+            let (mut force, mut seen) = (Field::<D>::zeros(bonds.sites()), rest);
+            for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
+                material.force(&bonds, &displacement, chunk, &mut part, Some(&mut seen));
+            }
+            found.push((force, seen, material.energy(&bonds, &displacement, rest)));
+        }
+        let scale =
+            sites.iter().flat_map(|&site| found[1].0.get(site)).fold(1e-12_f64, |m, x| m.max(x.abs()));
+        for &site in &sites {
+            let (a, b) = (found[0].0.get(site), found[1].0.get(site));
+            for d in 0..D {
+                assert!((a[d] - b[d]).abs() < 1e-12 * scale, "{space:?} {severed} {site}: {a:?} {b:?}");
+            }
+        }
+        assert!((found[0].2 - found[1].2).abs() <= 1e-12 * found[1].2.abs(), "{severed}: {found:?}");
+        let off = |a: f64, b: f64| (a - b).abs() < 1e-13;
+        assert!(off(found[0].1.low, found[1].1.low) && off(found[0].1.high, found[1].1.high), "{severed}");
+    }
+}
+
+#[test]
+fn kernels_of_solids_are_plain_loops() {
+    for volume in [VolumeCorrection::None, VolumeCorrection::Linear] {
+        kernels_are_plain_loops::<2>(Space::PlaneStrain, 11, volume);
+        kernels_are_plain_loops::<3>(Space::Solid, 7, volume);
+    }
 }
