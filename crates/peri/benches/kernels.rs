@@ -25,6 +25,17 @@ fn dimension<const D: usize>(criterion: &mut Criterion) -> Result<(), Failure> {
         group.bench_function(name, |bencher| bencher.iter(|| force(&bonds, &displacement, &mut out)));
         group.finish();
     }
+    let mut bonds = kernel::bonds::<D>(kernel::block(SIZE)?)?;
+    let (_, displacement) = kernel::loaded(&mut bonds, Law::Linear, [0.95, 1.05])?;
+    let mut out = Field::zeros(bonds.sites());
+    for (name, mut solid) in kernel::solids(&bonds)? {
+        let mut group = criterion.benchmark_group("directed bonds");
+        group.throughput(Throughput::Elements(bonds.directed_bonds()));
+        group.bench_function(format!("{D}D lattice {name}, both passes"), |bencher| {
+            bencher.iter(|| kernel::both_passes(&mut *solid, &bonds, &displacement, &mut out));
+        });
+        group.finish();
+    }
     Ok(())
 }
 

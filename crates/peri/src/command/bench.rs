@@ -130,13 +130,54 @@ fn measure_dimension<const D: usize>(
     {
         measure_bonds(&mut bonds, "lattice", law, range, threads, rows)?;
     }
+    measure_solids(&mut bonds, "lattice", threads, rows)?;
     // a neighbour list of 3D bonds takes 2.5 kB a particle
     if size <= 1e6 {
         let points: Vec<[f64; D]> = (0..total).map(points).collect();
         let mut cloud = CloudBonds::new(&points, &vec![1.0; total], 1.0, RATIO, VolumeCorrection::None, &[])?;
         measure_bonds(&mut cloud, "list", Law::ChainOffset, [0.95, 1.05], threads, rows)?;
+        measure_solids(&mut cloud, "list", threads, rows)?;
     }
     Ok(())
+}
+
+/// Both passes of solids with any Poisson ratio.
+fn measure_solids<const D: usize>(
+    bonds: &mut dyn Bonds<D>,
+    path: &str,
+    threads: usize,
+    rows: &mut Vec<Measurement>,
+) -> Result<(), Failure> {
+    let (_, displacement) = kernel::loaded(bonds, Law::Linear, [0.95, 1.05])?;
+    let (bonds, mut out) = (&*bonds, Field::<D>::zeros(bonds.sites()));
+    for (name, mut solid) in kernel::solids(bonds)? {
+        let seconds = median(|| {
+            kernel::both_passes(&mut *solid, bonds, &displacement, &mut out);
+            black_box(&out);
+        });
+        let (size, rate) = (bonds.particles().len() as u64, bonds.directed_bonds() as f64 / seconds);
+        let what = format!("{D}D {path} {name}, both passes");
+        rows.push(Measurement { what, size, threads, value: rate, unit: "directed bonds/s" });
+    }
+    Ok(())
+}
+
+/// Median of the seconds that something takes, after a first time.
+fn median(mut run: impl FnMut()) -> f64 {
+    run();
+    // at least 20 ms a measurement
+    let start = Instant::now();
+    run();
+    let inner = (0.02 / start.elapsed().as_secs_f64()).ceil().clamp(1.0, 1000.0) as usize;
+    let mut times: Vec<f64> = (0..REPEATS)
+        .map(|_| {
+            let start = Instant::now();
+            (0..inner).for_each(|_| run());
+            start.elapsed().as_secs_f64() / inner as f64
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    times[REPEATS / 2]
 }
 
 fn measure_bonds<const D: usize>(
@@ -149,25 +190,13 @@ fn measure_bonds<const D: usize>(
 ) -> Result<(), Failure> {
     let (fit, displacement) = kernel::loaded(bonds, law, range)?;
     let mut out = Field::zeros(bonds.sites());
-    force(bonds, &displacement, &mut out);
-    // at least 20 ms a measurement
-    let start = Instant::now();
-    force(bonds, &displacement, &mut out);
-    let inner = (0.02 / start.elapsed().as_secs_f64()).ceil().clamp(1.0, 1000.0) as usize;
-    let mut times: Vec<f64> = (0..REPEATS)
-        .map(|_| {
-            let start = Instant::now();
-            for _ in 0..inner {
-                force(bonds, &displacement, &mut out);
-            }
-            black_box(&out);
-            start.elapsed().as_secs_f64() / inner as f64
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
+    let seconds = median(|| {
+        force(bonds, &displacement, &mut out);
+        black_box(&out);
+    });
     let size = bonds.particles().len() as u64;
     let what = format!("{D}D {path} {} {}–{} ({})", law.name(), range[0], range[1], fit.kind());
-    let rate = bonds.directed_bonds() as f64 / times[REPEATS / 2];
+    let rate = bonds.directed_bonds() as f64 / seconds;
     rows.push(Measurement { what: what.clone(), size, threads, value: rate, unit: "directed bonds/s" });
     if law == Law::Linear || path == "list" {
         // bonds and particles; displacement, velocity, force and mass of the solver

@@ -37,9 +37,12 @@ impl<const D: usize> Deformation<D> {
 
     /// J − 1 = det F − 1, which loses no digits at small strains.
     pub fn volume_change(&self) -> f64 {
-        let h = embed(&self.displacement_gradient, 0.0);
-        let trace = h.trace();
-        trace + 0.5 * (trace * trace - (h * h).trace()) + h.determinant()
+        let h = &self.displacement_gradient;
+        let minor = |a: usize, b: usize| h[(a, a)] * h[(b, b)] - h[(a, b)] * h[(b, a)];
+        if D == 2 {
+            return h.trace() + minor(0, 1);
+        }
+        h.trace() + minor(0, 1) + minor(1, 2) + minor(0, 2) + embed(h, 1.0).determinant()
     }
 
     /// tr FᵀF − D + residual, which loses no digits at small strains.

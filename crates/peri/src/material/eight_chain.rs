@@ -24,14 +24,6 @@ pub struct EightChain<const D: usize> {
     rest: f64,
 }
 
-/// Chains at an I₁.
-struct Chains {
-    /// μ.
-    modulus: f64,
-    /// dμ/dI₁.
-    slope: f64,
-}
-
 /// Relative extension beyond which β grows linearly: a chain that a load step stretches too far has a force nevertheless.
 const LINEAR: f64 = 0.995;
 /// J below which ln J and J⁻² go on as parabolas.
@@ -61,7 +53,7 @@ impl<const D: usize> EightChain<D> {
         let start = 1.0 / links.sqrt();
         let rest = langevin::inverse(start);
         let mut law = Self { space, modulus, links, bulk, volumetric: bulk, rest };
-        let least = 2.0 / 3.0 * modulus + 2.0 * law.chains(0.0).slope;
+        let least = 2.0 / 3.0 * modulus + 2.0 * law.chains(0.0)[1];
         if bulk.is_infinite() && space != Space::PlaneStress {
             return wrong("bulk modulus", bulk, "finite, except in plane stress");
         }
@@ -78,41 +70,51 @@ impl<const D: usize> EightChain<D> {
         self.volumetric
     }
 
-    /// β and its derivative at x = Λ/√n.
-    fn extension(x: f64) -> [f64; 2] {
-        let end = x.min(LINEAR);
-        let slope = langevin::inverse_derivative(end);
-        [langevin::inverse(end) + slope * (x - end), slope]
+    /// β at x = Λ/√n.
+    fn extension(x: f64) -> f64 {
+        if x < LINEAR {
+            return langevin::inverse(x);
+        }
+        langevin::inverse(LINEAR) + langevin::inverse_derivative(LINEAR) * (x - LINEAR)
     }
 
-    /// At I₁ = 3 + `excess`.
-    fn chains(&self, excess: f64) -> Chains {
-        let root = self.links.sqrt();
+    /// Λ and Λ/√n at I₁ = 3 + `excess`.
+    fn stretches(&self, excess: f64) -> [f64; 2] {
         let stretch = (1.0 + excess / 3.0).sqrt();
-        let x = stretch / root;
-        let [beta, tangent] = Self::extension(x);
-        let network = self.modulus / (root * self.rest);
-        Chains {
-            // μ₀ to the last bit at rest
-            modulus: self.modulus * (beta / self.rest) / stretch,
-            slope: network * (tangent - beta / x) / (6.0 * stretch * stretch),
-        }
+        [stretch, stretch / self.links.sqrt()]
+    }
+
+    /// μ at I₁ = 3 + `excess`, μ₀ to the last bit at rest.
+    fn shear(&self, excess: f64) -> f64 {
+        let [stretch, x] = self.stretches(excess);
+        self.modulus * (Self::extension(x) / self.rest) / stretch
+    }
+
+    /// μ and dμ/dI₁ at I₁ = 3 + `excess`.
+    fn chains(&self, excess: f64) -> [f64; 2] {
+        let [stretch, x] = self.stretches(excess);
+        let (modulus, tangent) = (self.shear(excess), langevin::inverse_derivative(x.min(LINEAR)));
+        let network = self.modulus / (self.links.sqrt() * self.rest);
+        [
+            modulus,
+            (network * tangent - modulus * stretch / (self.links.sqrt() * x)) / (6.0 * stretch * stretch),
+        ]
     }
 
     /// ψ(3 + `excess`) − ψ(3).
     fn chain_energy(&self, excess: f64) -> f64 {
         if excess.abs() < SMALL {
-            return excess * mean(0.0, excess, |part| 0.5 * self.chains(part).modulus);
+            return excess * mean(0.0, excess, |part| 0.5 * self.shear(part));
         }
         let root = self.links.sqrt();
         let free = |x: f64| {
             let end = x.min(LINEAR);
-            let ([beta, _], [start, slope]) = (Self::extension(x), Self::extension(end));
-            end * start + langevin::ln_beta_over_sinh(start) + (beta - 0.5 * slope * (x - end)) * (x - end)
+            let [beta, start] = [x, end].map(Self::extension);
+            end * start + langevin::ln_beta_over_sinh(start) + 0.5 * (beta + start) * (x - end)
         };
         let network = 3.0 * self.modulus / (root * self.rest);
-        let stretch = (1.0 + excess / 3.0).sqrt();
-        network * self.links * (free(stretch / root) - free(1.0 / root))
+        let [_, x] = self.stretches(excess);
+        network * self.links * (free(x) - free(1.0 / root))
     }
 
     /// λ₃² and what W_J and W_JJ need of it, in plane stress.
@@ -123,15 +125,7 @@ impl<const D: usize> EightChain<D> {
             // J⁻² − 1 with all digits
             let third =
                 if jacobian > CRUSHED { -change * (2.0 + change) * square[0] } else { square[0] - 1.0 };
-            let found = self.chains(excess + third);
-            let curvature = 0.5 * found.modulus * square[2] + 0.5 * found.slope * square[1] * square[1];
-            return Thickness {
-                chains: found,
-                third,
-                change: 0.0,
-                slope: [0.0, curvature],
-                explicit: square[1],
-            };
+            return Thickness { third, change: 0.0, square };
         }
         // ∂W/∂λ₃ = μλ₃ + U′(Jλ₃) J = 0
         let area = jacobian.max(THINNEST);
@@ -140,48 +134,60 @@ impl<const D: usize> EightChain<D> {
         let third = |stretch: f64| (stretch - 1.0) * (stretch + 1.0);
         let whole = |stretch: f64| change + (stretch - 1.0) * area;
         for _ in 0..60 {
-            let (found, [first, second]) =
+            let ([shear, rise], [first, second]) =
                 (self.chains(excess + third(stretch)), self.volume(whole(stretch)));
-            let force = found.modulus * stretch + first * area;
-            let slope = found.modulus + 2.0 * found.slope * stretch * stretch + second * area * area;
+            let force = shear * stretch + first * area;
+            let slope = shear + 2.0 * rise * stretch * stretch + second * area * area;
             let step = (force / slope).clamp(-stretch, 0.5 * stretch);
             stretch -= step;
             if step.abs() < 1e-15 * stretch {
                 break;
             }
         }
-        let [first, second] = self.volume(whole(stretch));
-        Thickness {
-            chains: self.chains(excess + third(stretch)),
-            third: third(stretch),
-            change: whole(stretch),
-            slope: [first * stretch, second * stretch * stretch],
-            explicit: 0.0,
-        }
+        Thickness { third: third(stretch), change: whole(stretch), square: [stretch * stretch, 0.0, 0.0] }
     }
 
     /// U′ and U″ of U = −μ₀ ln J + ¼κ(J² − 1 − 2 ln J) at J = 1 + `change`.
     fn volume(&self, change: f64) -> [f64; 2] {
-        let (jacobian, [_, first, second]) = (1.0 + change, logarithm(change));
+        let (jacobian, [first, second]) = (1.0 + change, logarithm_slopes(change));
         let (shear, bulk) = (self.modulus, self.volumetric);
         [-shear * first + 0.5 * bulk * (jacobian - first), -shear * second + 0.5 * bulk * (1.0 - second)]
     }
 
     /// U.
     fn volume_energy(&self, change: f64) -> f64 {
-        let log = logarithm(change)[0];
+        let log = logarithm(change);
         -self.modulus * log + 0.25 * self.volumetric * (change * (2.0 + change) - 2.0 * log)
     }
 
-    /// W_S, W_J, W_SS, W_JJ at S − D and J − 1.
-    fn derivatives(&self, excess: f64, change: f64) -> [f64; 4] {
-        if self.space == Space::PlaneStress {
-            let Thickness { chains, slope, explicit, .. } = self.thickness(excess, change);
-            let pressure = slope[0] + 0.5 * chains.modulus * explicit;
-            return [0.5 * chains.modulus, pressure, 0.5 * chains.slope, slope[1]];
+    /// W_S and W_J at S − D and J − 1.
+    fn slopes(&self, excess: f64, change: f64) -> [f64; 2] {
+        if self.space != Space::PlaneStress {
+            return [0.5 * self.shear(excess), self.volume(change)[0]];
         }
-        let (found, [pressure, curvature]) = (self.chains(excess), self.volume(change));
-        [0.5 * found.modulus, pressure, 0.5 * found.slope, curvature]
+        let Thickness { third, change, square } = self.thickness(excess, change);
+        let shear = self.shear(excess + third);
+        let pressure = if self.volumetric.is_infinite() {
+            0.5 * shear * square[1]
+        } else {
+            self.volume(change)[0] * square[0].sqrt()
+        };
+        [0.5 * shear, pressure]
+    }
+
+    /// W_SS and W_JJ.
+    fn curvatures(&self, excess: f64, change: f64) -> [f64; 2] {
+        if self.space != Space::PlaneStress {
+            return [0.5 * self.chains(excess)[1], self.volume(change)[1]];
+        }
+        let Thickness { third, change, square } = self.thickness(excess, change);
+        let [shear, rise] = self.chains(excess + third);
+        let volume = if self.volumetric.is_infinite() {
+            0.5 * shear * square[2] + 0.5 * rise * square[1] * square[1]
+        } else {
+            self.volume(change)[1] * square[0]
+        };
+        [0.5 * rise, volume]
     }
 }
 
@@ -189,25 +195,27 @@ impl<const D: usize> EightChain<D> {
 const THINNEST: f64 = 0.05;
 
 struct Thickness {
-    chains: Chains,
     /// λ₃² − 1.
     third: f64,
     /// Jλ₃ − 1.
     change: f64,
-    /// W_J and W_JJ but for those of λ₃², and all W_JJ of an incompressible sheet.
-    slope: [f64; 2],
-    /// dλ₃²/dJ where it is explicit.
-    explicit: f64,
+    /// λ₃², and of an incompressible sheet its derivatives by J.
+    square: [f64; 3],
 }
 
-/// ln J and its derivatives at J = 1 + `change`, a parabola below [`CRUSHED`].
-fn logarithm(change: f64) -> [f64; 3] {
-    let jacobian = 1.0 + change;
+/// ln J at J = 1 + `change`, a parabola below [`CRUSHED`].
+fn logarithm(change: f64) -> f64 {
+    let (s, r) = (1.0 + change - CRUSHED, 1.0 / CRUSHED);
+    if s > 0.0 { change.ln_1p() } else { CRUSHED.ln() + s * r - 0.5 * s * s * r * r }
+}
+
+/// Its derivatives.
+fn logarithm_slopes(change: f64) -> [f64; 2] {
+    let (jacobian, r) = (1.0 + change, 1.0 / CRUSHED);
     if jacobian > CRUSHED {
-        return [change.ln_1p(), 1.0 / jacobian, -1.0 / (jacobian * jacobian)];
+        return [1.0 / jacobian, -1.0 / (jacobian * jacobian)];
     }
-    let (s, r) = (jacobian - CRUSHED, 1.0 / CRUSHED);
-    [CRUSHED.ln() + s * r - 0.5 * s * s * r * r, r - s * r * r, -r * r]
+    [r - (jacobian - CRUSHED) * r * r, -r * r]
 }
 
 /// J⁻² and its derivatives, a parabola below [`CRUSHED`].
@@ -223,6 +231,10 @@ fn inverse_square(jacobian: f64) -> [f64; 3] {
 
 /// cof F = J F⁻ᵀ.
 fn cofactor<const D: usize>(gradient: &Tensor<D>) -> Tensor<D> {
+    if D == 2 {
+        let sign = |i: usize, k: usize| if i == k { 1.0 } else { -1.0 };
+        return Tensor::from_fn(|i, k| sign(i, k) * gradient[(1 - i, 1 - k)]);
+    }
     let full = embed(gradient, 1.0);
     let [a, b, c] = [0, 1, 2].map(|k| full.column(k).into_owned());
     let rows = [b.cross(&c), c.cross(&a), a.cross(&b)];
@@ -241,13 +253,13 @@ impl<const D: usize> PointLaw<D> for EightChain<D> {
             return chains;
         }
         // below the thinnest, along the slope there
-        chains + self.volume_energy(found.change) + found.slope[0] * (1.0 + change - THINNEST).min(0.0)
+        let slope = self.volume(found.change)[0] * found.square[0].sqrt();
+        chains + self.volume_energy(found.change) + slope * (1.0 + change - THINNEST).min(0.0)
     }
 
     fn respond(&self, deformation: &Deformation<D>) -> PointStress<D> {
         let gradient = deformation.gradient();
-        let [by_trace, by_volume, ..] =
-            self.derivatives(deformation.excess_trace(), deformation.volume_change());
+        let [by_trace, by_volume] = self.slopes(deformation.excess_trace(), deformation.volume_change());
         PointStress {
             piola: gradient * (2.0 * by_trace) + cofactor(&gradient) * by_volume,
             stabilisation: 2.0 * by_trace,
@@ -256,8 +268,9 @@ impl<const D: usize> PointLaw<D> for EightChain<D> {
 
     fn stiffness(&self, deformation: &Deformation<D>) -> f64 {
         let gradient = deformation.gradient();
-        let [by_trace, by_volume, second_trace, second_volume] =
-            self.derivatives(deformation.excess_trace(), deformation.volume_change());
+        let (excess, change) = (deformation.excess_trace(), deformation.volume_change());
+        let [by_trace, by_volume] = self.slopes(excess, change);
+        let [second_trace, second_volume] = self.curvatures(excess, change);
         let size = gradient.norm();
         2.0 * by_trace
             + 4.0 * second_trace.max(0.0) * size * size

@@ -1,11 +1,15 @@
 //! What force kernels are measured on; `cargo bench` takes it, too.
 
+use peri::Error;
 use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
+use peri::material::{Correspondence, EightChain, Material, NonlocalSolid, Response};
 use peri::potential::{KernelFit, Law};
 use peri::run::Failure;
+use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
+use rayon::prelude::*;
 
 /// Horizon over spacing of every measurement.
 pub const RATIO: f64 = 3.015;
@@ -38,4 +42,32 @@ pub fn loaded<const D: usize>(
         displacement.set(site as usize, std::array::from_fn(|d| 1e-3 * (0.37 * x[d]).sin()));
     }
     Ok((fit, displacement))
+}
+
+/// Solids with two passes, by name: chains of 25 links, and neo-Hookean rubber by correspondence, K/μ = 100.
+pub fn solids<const D: usize>(
+    bonds: &dyn Bonds<D>,
+) -> Result<[(&'static str, Box<dyn Response<D>>); 2], Failure> {
+    let space = if D == 2 { Space::PlaneStrain } else { Space::Solid };
+    let law =
+        NeoHookean::new(1.0).and_then(|law| Compressible::new(law, Volumetric::Ciarlet { lame: 100.0 }));
+    let law = law.map_err(|error| Error::geometry(error.to_string()))?;
+    let chains = NonlocalSolid(EightChain::new(space, 1.0, 25.0, 100.0)?).respond(bonds);
+    let neo_hookean = NonlocalSolid(Correspondence::new(law, space)?).respond(bonds);
+    Ok([("eight-chain", chains), ("correspondence neo-hookean", neo_hookean)])
+}
+
+/// States of all particles, and their forces.
+pub fn both_passes<const D: usize>(
+    solid: &mut dyn Response<D>,
+    bonds: &dyn Bonds<D>,
+    displacement: &Field<D>,
+    out: &mut Field<D>,
+) {
+    solid.prepare(bonds, displacement);
+    let solid = &*solid;
+    out.chunks_mut()
+        .into_par_iter()
+        .enumerate()
+        .for_each(|(chunk, mut force)| solid.force(bonds, displacement, chunk, &mut force, None));
 }
