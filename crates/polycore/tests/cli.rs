@@ -131,7 +131,7 @@ fn what_a_newcomer_sees() {
     assert_eq!(std::fs::read_dir(folder.path().join("out")).unwrap().count(), 2);
     assert!(texts[0].contains("neo-hookean           shear_modulus 0.50000 ± "), "{}", texts[0]);
     assert!(
-        texts[0].contains("youngs_modulus = \"1.5") && texts[0].contains("law = \"linear\""),
+        texts[0].contains("shear_modulus = \"0.500000 MPa\"") && texts[0].contains("model = \"neo-hookean\""),
         "{}",
         texts[0]
     );

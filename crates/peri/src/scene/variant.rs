@@ -102,6 +102,11 @@ pub(super) fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Ve
         if scene.body.has_points() && !(study.spacing.is_empty() && study.horizon_ratio.is_empty()) {
             return Err(source.error(&format!("study[{index}]"), "spacings of a cloud", "corrections only"));
         }
+        let stops = |c: char| c.is_control() || "/\\[]".contains(c);
+        if let Some(name) = study.name.as_ref().filter(|name| name.contains(stops)) {
+            let allowed = "a name without `/`, `\\`, `[`, `]`: files and values have it";
+            return Err(source.error(&format!("study[{index}].name"), format!("`{name}`"), allowed));
+        }
         let replaces = study.set.is_some() || study.replaced().iter().any(|(_, _, given)| *given);
         let is_quick = study.quick.unwrap_or(true);
         if quick && !is_quick {

@@ -11,26 +11,36 @@ use polycore::output::atomic_write;
 
 use super::MPA;
 
-/// Laws whose chain stretch is that of the bond law `chain-affine`, (2.38).
+/// Laws of which the printed block is taken before others.
 const EIGHT_CHAINS: &str = "eight-chain";
 
-/// Fewest links that `peri` takes.
-const FEWEST_LINKS: f64 = 2.0;
+/// Bulk over shear modulus: nearly incompressible. Tests at constant volume do not determine it.
+const BULK_RATIO: f64 = 100.0;
 
-/// `[material]` of `peri` for a fitted law: E = 3μ of an incompressible solid, and its links where it has chains.
+/// Standard errors to either side of a value that hold 95 % of a normal distribution.
+const HALF_WIDTH: f64 = 1.96;
+
+/// `[material.solid]` of `peri` for a fitted law: the law itself, with its intervals of confidence.
 fn block(fit: &Fit) -> String {
-    let modulus = 3.0 * fit.law.shear_modulus() / MPA;
-    let links = fit.parameters.iter().find(|parameter| parameter.name == "links");
-    let mut text = format!("[material] # {}: E = 3 mu, exact at small strains\n", fit.model.key);
-    let _ = writeln!(text, "youngs_modulus = \"{modulus:.6} MPa\"");
-    let eight = fit.model.key.starts_with(EIGHT_CHAINS);
-    match links.filter(|_| eight) {
-        Some(links) if links.standard_error.is_some() && links.value >= FEWEST_LINKS => {
-            let _ = writeln!(text, "law = \"chain-affine\"\nlinks = {:.5}", links.value);
-            text += "dissociation = 1200 # tests without rupture do not determine it: the thesis' value\n";
-        }
-        Some(_) => text += "law = \"linear\" # the data do not determine the number of links\n",
-        None => text += "law = \"linear\" # peri takes only the modulus of this law\n",
+    let shear = fit.law.shear_modulus();
+    let mut text = format!("[material.solid] # {}, rms {:.5} MPa\n", fit.model.key, fit.rms / MPA);
+    let _ = writeln!(text, "law = \"correspondence\"");
+    let _ = writeln!(text, "[material.solid.constitutive]\nmodel = \"{}\"", fit.model.key);
+    let _ = writeln!(
+        text,
+        "bulk_modulus = \"{:.6} MPa\" # {BULK_RATIO} times the shear modulus of {:.6} MPa: these tests do not determine it",
+        BULK_RATIO * shear / MPA,
+        shear / MPA
+    );
+    text += "[material.solid.constitutive.parameters]\n";
+    for parameter in &fit.parameters {
+        let (unit, scale) = if parameter.unit == "Pa" { (" MPa", MPA) } else { ("", 1.0) };
+        let quote = if unit.is_empty() { "" } else { "\"" };
+        let _ = write!(text, "{} = {quote}{:.6}{unit}{quote}", parameter.name, parameter.value / scale);
+        let _ = match parameter.standard_error {
+            Some(error) => writeln!(text, " # ± {:.2e}{unit}, 95 %", HALF_WIDTH * error / scale),
+            None => writeln!(text, " # not determined by the data"),
+        };
     }
     text
 }
@@ -49,7 +59,7 @@ pub fn write(directory: &Path, all: &[(&str, &Table, Vec<Fit>)]) -> Result<(), E
         writeln!(file, "# Take one block: docs/guide/src/how-to/fit.md says what it can and cannot do.")?;
         for (data, _, fits) in all {
             for fit in fits {
-                write!(file, "\n# fitted to {data}, rms {:.5} MPa\n{}", fit.rms / MPA, block(fit))?;
+                write!(file, "\n# fitted to {data}\n{}", block(fit))?;
             }
         }
         Ok(())
