@@ -14,6 +14,7 @@
 //! * [`loads`]: loads, displacements and names of values in reports;
 //! * [`memory`]: no run takes more memory than is stated, absurd sizes are refused before they are allocated;
 //! * [`packages`]: what each crate is built with;
+//! * [`rubber`]: from tests of rubber to a simulated specimen;
 //! * [`schemas`]: JSON Schemas, by which every case is valid;
 //! * [`words`]: slips that would pass in silence, and how much is said;
 //! * [`documents`]: the commands and links that README and docs show.
@@ -36,6 +37,7 @@ mod printing;
 mod probes;
 mod program;
 mod results;
+mod rubber;
 mod scenes;
 mod schemas;
 mod words;
