@@ -124,7 +124,8 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         let contact =
             self.contact.map(|stiffness| Contact::new(&bonds, micromodulus, stiffness)).transpose()?;
         let stretch = self.critical_stretch.or(critical.map(Property::from));
-        let breaking = stretch.map(|stretch| Breaking { stretch, policy: Policy::default() });
+        let breaking =
+            stretch.map(|stretch| Breaking { criterion: stretch.into(), policy: Policy::default() });
         let state = State::new(bonds.sites());
         Ok(Simulation { bonds, material, loads, loaded, factors: self.factors, breaking, contact, state })
     }

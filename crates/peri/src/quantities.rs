@@ -17,6 +17,7 @@ polycore::quantities! {
     DAMPED_ENERGY = "damped_energy", "J", "work less stored and released energy; of a quasi-static run the work is summed by the trapezoidal rule, and the value may be as small as this error, about 1e-3 of the work, and negative";
     RELEASED_ENERGY = "released_energy", "J", "with `material.critical`: energy that broken bonds held when they broke";
     CRITICAL_STRETCH = "critical_stretch", "", "with `material.critical`: least stretch at which a bond of the body breaks";
+    CRITICAL_ENERGY = "critical_energy", "J/m³", "with `fracture_energy` of a `solid`: energy, over a bond's share of a family, beyond which it breaks";
     FRAGMENTS = "fragments", "", "with `material.critical`: pieces of two particles or more that intact bonds hold together";
     FIRST_BREAK = "first_break", "m", "displacement of the step in which the first bond breaks";
     LOAD_AT_FIRST_BREAK = "load_at_first_break", "N", "load of the equilibrium before the first bond breaks";

@@ -261,6 +261,23 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         })
     }
 
+    /// W − ½Gr + [z·PM⁻¹ξ + ½ D G|z|²]/|ξ|² with z = ζ − Fξ; of springs their energy per share.
+    fn released_energy(&self, bond: &Bond<D>, own: &Point<D>, weighed: f64) -> Option<f64> {
+        let square = bond.length * bond.length;
+        let Some(deformation) = own.deformation() else {
+            return Some(0.5 * own.spring * own.whole * bond.strain().powi(2));
+        };
+        let reference = nalgebra::SVector::<f64, D>::from(bond.reference);
+        let gradient = &deformation.displacement_gradient;
+        let z = nalgebra::SVector::<f64, D>::from(bond.change) - gradient * reference;
+        // A = D G and P M⁻¹
+        let slope = own.slope * own.whole;
+        let piola = own.stress * own.whole + gradient * slope;
+        let own_part = z.dot(&(piola * reference)) + 0.5 * slope * z.norm_squared();
+        let energy = weighed / own.integrity() - 0.5 * slope / D as f64 * deformation.residual;
+        Some(energy + own_part / square)
+    }
+
     fn passes(&self, bonds: &dyn Bonds<D>) -> Option<Box<dyn Passes<Self, D>>> {
         // 1 + D², which a type cannot compute
         if D == 2 {

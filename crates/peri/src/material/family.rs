@@ -1,6 +1,6 @@
 //! Families and bonds, as a material sees them.
 
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, Neighbour};
 use crate::field::Field;
 
 /// A particle with its intact bonds under a displacement.
@@ -30,6 +30,20 @@ pub struct Bond<const D: usize> {
 }
 
 impl<const D: usize> Bond<D> {
+    /// The bond of the particle in `from` to a neighbour, under a displacement.
+    pub fn new(from: usize, neighbour: &Neighbour<D>, displacement: &Field<D>) -> Self {
+        let (own, other) = (displacement.get(from), displacement.get(neighbour.site));
+        Self {
+            from,
+            to: neighbour.site,
+            reference: neighbour.bond,
+            length: neighbour.length,
+            change: std::array::from_fn(|d| other[d] - own[d]),
+            volume: neighbour.volume,
+            weight: neighbour.weight,
+        }
+    }
+
     /// ζ = ξ + η, m.
     pub fn current(&self) -> [f64; D] {
         std::array::from_fn(|d| self.reference[d] + self.change[d])
@@ -87,19 +101,7 @@ impl<'a, const D: usize> Family<'a, D> {
 
     /// Visits the intact bonds.
     pub fn each(&self, mut visit: impl FnMut(Bond<D>)) {
-        let own = self.displacement.get(self.site);
-        self.bonds.neighbours(self.site, &mut |bond| {
-            let other = self.displacement.get(bond.site);
-            visit(Bond {
-                from: self.site,
-                to: bond.site,
-                reference: bond.bond,
-                length: bond.length,
-                change: std::array::from_fn(|d| other[d] - own[d]),
-                volume: bond.volume,
-                weight: bond.weight,
-            });
-        });
+        self.bonds.neighbours(self.site, &mut |bond| visit(Bond::new(self.site, &bond, self.displacement)));
     }
 
     /// Σ over the intact bonds.

@@ -67,6 +67,14 @@ pub trait Material<const D: usize>: Send + Sync {
     /// Energy density W_I of a particle, J/m³.
     fn energy(&self, family: &Family<D>, point: &Self::Point) -> f64;
 
+    /// Energy that breaking a bond releases at its first end, over the bond's share V_J/Σ_K V_K of the family and the particle's volume,
+    /// J/m³: −(∂E/∂d_IJ)/(V_I ŵ_IJ) of a bond of integrity d. `weighed` is [`Self::energy`] of the particle. `None` for materials whose
+    /// bonds break at a stretch only.
+    fn released_energy(&self, bond: &Bond<D>, own: &Self::Point, weighed: f64) -> Option<f64> {
+        let _ = (bond, own, weighed);
+        None
+    }
+
     /// A bound s_I of the stiffness, N/m⁴, with K ≤ 2 Σ_I s_I V_I for the Hessian K = ∂²E/∂u² of the present displacement.
     /// Half the sum of absolute values in the rows ∂f_I/∂u is one (Gershgorin).
     ///

@@ -198,6 +198,45 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         None
     }
 
+    fn overloaded(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        limit: f64,
+        free: &(dyn Fn(usize) -> bool + Sync),
+    ) -> Vec<Overstretched> {
+        self.prepare(bonds, displacement);
+        let energy = |&site: &u32| {
+            let family = Family::new(bonds, displacement, site as usize);
+            self.material.energy(&family, &self.points[site as usize])
+        };
+        let mut energies = vec![0.0; bonds.sites()];
+        let each: Vec<f64> = bonds.particles().par_iter().map(energy).collect();
+        bonds.particles().iter().zip(each).for_each(|(&site, energy)| energies[site as usize] = energy);
+        let released = |bond: &Bond<D>, site: usize| {
+            self.material.released_energy(bond, &self.points[site], energies[site]).unwrap_or(0.0)
+        };
+        let of = |sites: &[u32]| {
+            let mut found = Vec::new();
+            for &site in sites.iter().filter(|&&site| free(site as usize)) {
+                bonds.neighbours(site as usize, &mut |neighbour| {
+                    let bond = Bond::new(site as usize, &neighbour, displacement);
+                    let elongation = bond.elongation();
+                    if elongation > 0.0
+                        && free(bond.to)
+                        && 0.5 * (released(&bond, bond.from) + released(&bond, bond.to)) > limit
+                    {
+                        let (index, length, weight) = (neighbour.index, bond.length, bond.weight);
+                        found.push(Overstretched { site, index, elongation, length, weight });
+                    }
+                });
+            }
+            found
+        };
+        let parts: Vec<Vec<Overstretched>> = bonds.particles().par_chunks(CHUNK).map(of).collect();
+        parts.concat()
+    }
+
     fn has_own_stiffness(&self, _tangent: f64) -> bool {
         true
     }

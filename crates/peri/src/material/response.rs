@@ -74,6 +74,19 @@ pub trait Response<const D: usize>: Send + Sync {
     /// itself. `None`: what the body loses when they are.
     fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64>;
 
+    /// Intact bonds of free particles that are stretched, and whose breaking would release more than `limit`, J/m³, each from both
+    /// ends; none of materials without [`super::Material::released_energy`].
+    fn overloaded(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        limit: f64,
+        free: &(dyn Fn(usize) -> bool + Sync),
+    ) -> Vec<Overstretched> {
+        let _ = (bonds, displacement, limit, free);
+        Vec::new()
+    }
+
     /// Whether bonds differ so much in their tangent, of which `tangent` is the greatest, that every particle needs the
     /// stiffness of its own.
     fn has_own_stiffness(&self, tangent: f64) -> bool;

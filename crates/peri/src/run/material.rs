@@ -1,15 +1,15 @@
 //! A body with its material, as a variant of a scene asks for them.
 
-use crate::bonds::{Bonds, Property};
+use crate::bonds::Bonds;
 use crate::calibrate;
 use crate::correction::{bond_factors, surface_factors};
-use crate::critical::{Context, Critical};
+use crate::critical::{Context, Critical, energy_limit};
 use crate::error::Error;
 use crate::material::{BondMaterial, Material, NonlocalSolid, PointLaw, Pointwise, Response};
 use crate::potential::{BondPotential, KernelFit};
 use crate::run::Failure;
 use crate::scene::{self, Body, Inclusions, Scene, SurfaceCorrection, Variant};
-use crate::solver::State;
+use crate::solver::{Criterion, State};
 use crate::stress::{Tensor, force_over_length};
 use polycore::scene::Source;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -49,8 +49,8 @@ pub struct Bonded<const D: usize> {
     pub body: Body<D>,
     /// The material.
     pub material: Acting<D>,
-    /// Where the scene names one.
-    pub critical_stretch: Option<Property>,
+    /// When bonds break, where the scene says so.
+    pub criterion: Option<Criterion>,
 }
 
 impl<const D: usize> Bonded<D> {
@@ -68,8 +68,13 @@ impl<const D: usize> Bonded<D> {
         let (horizon, thickness) = (body.bonds.horizon(), body.thickness);
         if let Some(solid) = &spec.solid {
             let material = Acting::Solid(NonlocalSolid(solid.build::<D>(source, space)?));
-            let critical_stretch = spec.critical.and_then(|critical| critical.stretch).map(Property::from);
-            return Ok(Self { body, material, critical_stretch });
+            let limit = |critical: Critical| match (critical.stretch, critical.fracture_energy) {
+                (Some(stretch), _) => Some(stretch.into()),
+                (_, Some(energy)) => Some(Criterion::Energy(energy_limit(&*body.bonds, energy.si()))),
+                _ => None,
+            };
+            let criterion = spec.critical.and_then(limit);
+            return Ok(Self { body, material, criterion });
         }
         let law: Arc<dyn BondPotential> = Arc::from(spec.bond_law()?);
         let youngs_modulus = spec.youngs_modulus.map_or(f64::NAN, |modulus| modulus.si());
@@ -96,15 +101,15 @@ impl<const D: usize> Bonded<D> {
             }
             other => source.error("material.critical", other, "a critical stretch"),
         };
-        let critical_stretch = match spec.critical {
+        let criterion = match spec.critical {
             Some(critical) => {
                 let stretch = resolve(critical, 1.0).map_err(fault)?;
                 let own = |critical, stiffness| resolve(critical, stiffness);
-                Some(inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?)
+                Some(inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?.into())
             }
             None => None,
         };
-        Ok(Self { body, material: Acting::Bonds(BondMaterial::new(law, modulus)), critical_stretch })
+        Ok(Self { body, material: Acting::Bonds(BondMaterial::new(law, modulus)), criterion })
     }
 }
 

@@ -23,7 +23,6 @@ use material::{Acting, Bonded, Observed};
 use probes::Probes;
 use sections::Sections;
 
-use crate::bonds::Property;
 use crate::bonds::{Bonds, covered_stretches, fragments};
 use crate::calibrate::Space;
 use crate::contact::Contact;
@@ -31,7 +30,7 @@ use crate::error::Error;
 use crate::potential::KernelFit;
 use crate::quantities as q;
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
-use crate::solver::{Breaking, Loads, Method, State, Status, System, load_stepping};
+use crate::solver::{Breaking, Criterion, Loads, Method, State, Status, System, load_stepping};
 use polycore::case::{Fault, Run};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
@@ -140,7 +139,7 @@ fn run_variant<const D: usize>(
     let mut phases = Phases::new();
     phases.start("build");
     let Built { bonded, loads, loaded, probes, sections } = Built::<D>::new(source, scene, variant)?;
-    let Bonded { mut body, material, critical_stretch } = bonded;
+    let Bonded { mut body, material, criterion } = bonded;
     let plate = scene::exact_plate(source, scene, &body)?;
     phases.stop();
     let warnings = scene::warnings(scene, &body);
@@ -171,7 +170,7 @@ fn run_variant<const D: usize>(
         loads: &loads,
         probes: &probes,
         sections: &sections,
-        critical_stretch: critical_stretch.as_ref(),
+        criterion: criterion.as_ref(),
     };
     solve(scene, &solution, run, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
@@ -179,8 +178,11 @@ fn run_variant<const D: usize>(
         let stretches = covered_stretches(&*body.bonds, &state.displacement);
         outcome.value(q::FIT_ERROR, KernelFit::new(bonded.law(), stretches, scene.fit_bound())?.max_error);
     }
-    if let Some(critical) = &critical_stretch {
-        outcome.value(q::CRITICAL_STRETCH, critical.least());
+    if let Some(criterion) = &criterion {
+        match criterion {
+            Criterion::Stretch(stretch) => outcome.value(q::CRITICAL_STRETCH, stretch.least()),
+            Criterion::Energy(limit) => outcome.value(q::CRITICAL_ENERGY, *limit),
+        }
         outcome.value(q::FRAGMENTS, fragments(&*body.bonds) as f64);
     }
     if scene.dynamics.is_some() {
@@ -210,10 +212,8 @@ fn run_variant<const D: usize>(
     }
     outcome.seconds(&phases);
     let path = frames.path().to_path_buf();
-    let staged = scene.output.fields
-        && scene.output.every.is_some()
-        && scene.stress.is_some()
-        && critical_stretch.is_some();
+    let staged =
+        scene.output.fields && scene.output.every.is_some() && scene.stress.is_some() && criterion.is_some();
     let seen_at_end = D == 3 && scene.output.pictures && !staged;
     let damage = if seen_at_end { frames.damage(&*body.bonds) } else { None };
     frames.finish(&*body.bonds, &state, &stresses)?;
@@ -266,7 +266,7 @@ struct Solution<'a, const D: usize> {
     loads: &'a Loads<D>,
     probes: &'a Probes<D>,
     sections: &'a Sections<D>,
-    critical_stretch: Option<&'a Property>,
+    criterion: Option<&'a Criterion>,
 }
 
 fn solve<const D: usize>(
@@ -278,7 +278,7 @@ fn solve<const D: usize>(
     phases: &mut Phases,
     frames: &mut Frames<D>,
 ) -> Result<(), Failure> {
-    let Solution { variant, done, material, observed, loads, probes, sections, critical_stretch } = *solution;
+    let Solution { variant, done, material, observed, loads, probes, sections, criterion } = *solution;
     let factors = scene.solver.factors();
     let name = variant.name();
     let mut watch = |status: &Status, state: &State<D>| -> Result<(), Error> {
@@ -306,7 +306,7 @@ fn solve<const D: usize>(
     system.observer = sees.then_some(&observer as _);
     system.fit_bound = scene.fit_bound();
     system.breaking =
-        critical_stretch.map(|stretch| Breaking { stretch: stretch.clone(), policy: scene.solver.breaking });
+        criterion.map(|criterion| Breaking { criterion: criterion.clone(), policy: scene.solver.breaking });
     system.contact = contact;
     system.stop_below = scene.solver.stop_below.unwrap_or(0.0);
     phases.start("solve");
@@ -363,9 +363,8 @@ fn explanation_in<const D: usize>(
         }
         let (source, scene) = variant.resolve(source, scene)?;
         let built = Built::<D>::new(&source, &scene, &variant)?;
-        let Bonded { body, critical_stretch, .. } = &built.bonded;
-        let critical_stretch = critical_stretch.as_ref().map(Property::least);
-        lines.extend(scene::explain(&source, &scene, &variant, body, critical_stretch)?);
+        let Bonded { body, criterion, .. } = &built.bonded;
+        lines.extend(scene::explain(&source, &scene, &variant, body, criterion.as_ref())?);
     }
     Ok(lines)
 }

@@ -19,10 +19,10 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     add(records > 1, &[q::PEAK_LOAD, q::DISPLACEMENT_AT_PEAK]);
     add(scene.dynamics.is_none(), &q::BALANCES);
     let critical = scene.material.critical.is_some();
-    add(
-        critical,
-        &[q::CRITICAL_STRETCH, q::FRAGMENTS, q::FIRST_BREAK, q::LOAD_AT_FIRST_BREAK, q::BROKEN_BONDS],
-    );
+    add(critical, &[q::FRAGMENTS, q::FIRST_BREAK, q::LOAD_AT_FIRST_BREAK, q::BROKEN_BONDS]);
+    let energy = scene.material.solid.is_some()
+        && scene.material.critical.is_some_and(|critical| critical.fracture_energy.is_some());
+    add(critical, &[if energy { q::CRITICAL_ENERGY } else { q::CRITICAL_STRETCH }]);
     add(critical && scene.dynamics.is_none(), &[q::BREAKING_EVENTS]);
     add(critical, &[q::DETACHED_PARTICLES, q::LAST_LOAD, q::LAST_DISPLACEMENT, q::RELEASED_ENERGY]);
     add(scene.contact.is_some(), &[q::CONTACT_ENERGY, q::CONTACTS, q::DEEPEST_OVERLAP]);

@@ -5,6 +5,7 @@ use super::variant::Variant;
 use super::{Body, Method, Scene, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;
 use crate::material::Point;
+use crate::solver::Criterion;
 use polycore::report::Named;
 use polycore::scene::{SceneError, Source};
 
@@ -14,7 +15,7 @@ pub fn explain<const D: usize>(
     scene: &Scene,
     variant: &Variant,
     body: &Body<D>,
-    critical: Option<f64>,
+    criterion: Option<&Criterion>,
 ) -> Result<Vec<String>, SceneError> {
     let bonds = &*body.bonds;
     let particles = bonds.particles().len();
@@ -52,10 +53,12 @@ pub fn explain<const D: usize>(
     lines.extend(super::loads::explain(source, scene, body)?);
     lines.push(format!("  needs      {}", polycore::memory::needs(super::memory_needed(scene, bonds))));
     let mut builds = |text: String| lines.push(format!("  builds     {text}"));
-    if let Some(critical) = critical {
-        builds(format!(
-            "bonds that break at a stretch of {critical:.6}, damage, a count of each particle's bonds"
-        ));
+    if let Some(criterion) = criterion {
+        let limit = match criterion {
+            Criterion::Stretch(stretch) => format!("at a stretch of {:.6}", stretch.least()),
+            Criterion::Energy(limit) => format!("that release more than {limit:.4e} J/m³"),
+        };
+        builds(format!("bonds that break {limit}, damage, a count of each particle's bonds"));
     }
     if scene.method() == Method::Lbfgs {
         builds("ten pairs of steps and gradient changes, a coarse level with its factors".to_owned());

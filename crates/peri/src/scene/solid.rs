@@ -138,9 +138,18 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
             return Err(source.error(&format!("material.{key}"), found, "one of them"));
         }
     }
-    if let Some(critical) = material.critical.filter(|critical| critical.given() != ["stretch"]) {
-        let found = critical.given().join(" and ");
-        return Err(source.error("material.critical", format!("`{found}` of a solid"), "`stretch`"));
+    if let Some(critical) = &material.critical {
+        let allowed = "either `stretch`, above 1, or `fracture_energy`, above 0";
+        let found = match (critical.given().len(), critical.stretch, critical.fracture_energy) {
+            (1, Some(stretch), _) if stretch > 1.0 && stretch.is_finite() => None,
+            (1, _, Some(energy)) if energy.si() > 0.0 && energy.si().is_finite() => None,
+            (1, Some(stretch), _) => Some(format!("a stretch of {}", plain(stretch))),
+            (1, _, Some(energy)) => Some(format!("{} J/m²", plain(energy.si()))),
+            _ => Some(format!("`{}` of a solid", critical.given().join("` and `"))),
+        };
+        if let Some(found) = found {
+            return Err(source.error("material.critical", found, allowed));
+        }
     }
     let other =
         scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m != Measure::Constitutive);

@@ -1,16 +1,23 @@
 //! Bonds that break.
 
-use super::criterion::{Policy, most};
+use super::criterion::{Criterion, Policy, most};
 use super::state::{Event, State};
 use super::system::System;
 use crate::bonds::{fingerprint, overstretched};
 use crate::potential::StretchRange;
 
 impl<const D: usize> System<'_, D> {
-    /// Severs all bonds beyond the critical stretch; the sites of their ends.
+    /// Severs all bonds beyond what they bear; the sites of their ends.
     pub fn break_bonds(&mut self, state: &mut State<D>) -> Vec<u32> {
         let Some(breaking) = &self.breaking else { return Vec::new() };
-        let list = overstretched(&*self.bonds, &state.displacement, &breaking.stretch);
+        let list = match &breaking.criterion {
+            Criterion::Stretch(stretch) => overstretched(&*self.bonds, &state.displacement, stretch),
+            Criterion::Energy(limit) => {
+                let loads = &self.loads;
+                let free = |site: usize| loads.constrained(site) == 0;
+                self.material.overloaded(&*self.bonds, &state.displacement, *limit, &free)
+            }
+        };
         self.count_evaluation(state);
         if list.is_empty() {
             return Vec::new();
@@ -55,6 +62,7 @@ impl<const D: usize> System<'_, D> {
 
     /// Whether stretches reach the critical one.
     pub(super) fn is_overstretched(&self, observed: StretchRange) -> bool {
-        self.breaking.as_ref().is_some_and(|b| observed.high > b.stretch.least() * b.stretch.least() - 1.0)
+        let least = self.breaking.as_ref().map(|b| b.criterion.least_stretch());
+        least.is_some_and(|least| observed.high > least * least - 1.0)
     }
 }

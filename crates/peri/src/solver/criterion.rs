@@ -6,10 +6,50 @@ use serde::Deserialize;
 /// When bonds break: in tension only, for good.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Breaking {
-    /// Critical bond stretch λ_c of the particles; a bond breaks at that of the weaker of its ends.
-    pub stretch: Property,
-    /// When stretches are looked at.
+    /// What a bond bears.
+    pub criterion: Criterion,
+    /// When bonds are looked at.
     pub policy: Policy,
+}
+
+/// What a bond bears.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Criterion {
+    /// Critical bond stretch λ_c of the particles; a bond breaks at that of the weaker of its ends.
+    Stretch(Property),
+    /// Energy that breaking a bond releases, over its share of the family, J/m³: the mean of both ends. For materials with
+    /// [`crate::material::Material::released_energy`]. Bonds of constrained particles do not break by it: grips do not tear.
+    Energy(f64),
+}
+
+impl From<Property> for Criterion {
+    fn from(stretch: Property) -> Self {
+        Self::Stretch(stretch)
+    }
+}
+
+impl From<f64> for Criterion {
+    fn from(stretch: f64) -> Self {
+        Self::Stretch(stretch.into())
+    }
+}
+
+impl Criterion {
+    /// No bond breaks below this stretch.
+    pub fn least_stretch(&self) -> f64 {
+        match self {
+            Self::Stretch(stretch) => stretch.least(),
+            Self::Energy(_) => 1.0,
+        }
+    }
+
+    /// Every bond breaks beyond this stretch.
+    pub fn greatest_stretch(&self) -> f64 {
+        match self {
+            Self::Stretch(stretch) => stretch.greatest(),
+            Self::Energy(_) => f64::INFINITY,
+        }
+    }
 }
 
 /// When stretches are compared with the critical one.
@@ -38,6 +78,6 @@ pub(super) fn least(breaking: Option<&Breaking>) -> f64 {
 
 /// The largest stretch that is fitted: bonds beyond it are about to break, however long they are.
 pub(super) fn most(breaking: Option<&Breaking>) -> f64 {
-    let most = |stretch: f64| stretch + 0.25 * (stretch - 1.0);
-    breaking.map_or(f64::INFINITY, |b| most(b.stretch.greatest()))
+    let most = |stretch: f64| 1.25 * stretch - 0.25;
+    breaking.map_or(f64::INFINITY, |b| most(b.criterion.greatest_stretch()))
 }

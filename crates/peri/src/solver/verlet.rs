@@ -240,7 +240,9 @@ impl VelocityVerlet {
         // two ends, √D components
         state.motion.slack += 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
         system.prepare(&state.displacement);
-        let look = state.motion.must_look(state.fitted, system.breaking.as_ref().map(|b| b.stretch.least()));
+        let look = state
+            .motion
+            .must_look(state.fitted, system.breaking.as_ref().map(|b| b.criterion.least_stretch()));
         let (mut second, observed) = force_pass(system, state, volumes, &leap, look);
         system.count_evaluation(state);
         if look {

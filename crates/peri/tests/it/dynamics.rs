@@ -178,8 +178,8 @@ fn energies_balance() {
         };
         let mut state = State::new(bonds.sites());
         let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
-        system.breaking =
-            breaking.map(|stretch: f64| Breaking { stretch: stretch.into(), policy: Policy::EachIteration });
+        system.breaking = breaking
+            .map(|stretch: f64| Breaking { criterion: stretch.into(), policy: Policy::EachIteration });
         solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
         assert_eq!(state.history.len(), 50);
         let last = state.history.last().unwrap();

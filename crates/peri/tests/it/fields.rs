@@ -109,7 +109,7 @@ fn the_weaker_end_decides() {
         };
         let before = count(bonds);
         let field = Property::new(bonds, |_, [x, _]| if weak(x) { stretch } else { 1.5 });
-        let breaking = Some(Breaking { stretch: field, policy: Policy::AtEquilibrium });
+        let breaking = Some(Breaking { criterion: field.into(), policy: Policy::AtEquilibrium });
         let state = pulled(bonds, BondMaterial::new(&LinearBond, MODULUS), 0.008, breaking);
         let after = count(bonds);
         assert_eq!(state.broken > 0, breaks, "{stretch}");

@@ -191,7 +191,7 @@ fn dent_through_breaking() {
     for fast in [false, true] {
         let (mut bonds, loads, law, modulus) = dent(spacing);
         let mut problem = Problem::new(&*law, modulus, &loads, &factors);
-        problem.breaking = Some(Breaking { stretch: 2.9442.into(), policy: Policy::AtEquilibrium });
+        problem.breaking = Some(Breaking { criterion: 2.9442.into(), policy: Policy::AtEquilibrium });
         let start = std::time::Instant::now();
         let state =
             if fast { problem.minimised(&mut bonds, 1e-4) } else { problem.relaxed(&mut bonds, 1e-4) };
@@ -229,7 +229,7 @@ fn bits_do_not_depend_on_threads() {
             let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 11.7).then(|| (3, [0.2 * x[0], 0.01 * x[0]])));
             let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
             let mut problem = Problem::new(&*law, 1.0, &loads, &[0.5, 1.0]);
-            problem.breaking = Some(Breaking { stretch: 1.5.into(), policy: Policy::AtEquilibrium });
+            problem.breaking = Some(Breaking { criterion: 1.5.into(), policy: Policy::AtEquilibrium });
             let mut state = problem.minimised(bonds, 1e-3);
             assert!(bonds.sites() > 3 * peri::field::CHUNK && state.broken > 0);
             state.history.clear();
@@ -256,7 +256,7 @@ fn restarts_take_the_same_bits() {
         (built, loads)
     };
     let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-    let breaking = Some(Breaking { stretch: 1.8.into(), policy: Policy::AtEquilibrium });
+    let breaking = Some(Breaking { criterion: 1.8.into(), policy: Policy::AtEquilibrium });
     let run = |state: &mut State<2>, saved: &mut Vec<State<2>>| {
         let (mut built, loads) = build();
         let mut system = System::new(&mut built.lattice, BondMaterial::new(&*law, MODULUS), &loads, &factors);

@@ -422,7 +422,7 @@ fn a_state_based_material_tears() {
         });
         let mut state = state.cloned().unwrap_or_else(|| State::new(built.lattice.sites()));
         let mut system = System::new(&mut built.lattice, solid(), &loads, &[0.25, 0.5, 0.75, 1.0]);
-        system.breaking = Some(Breaking { stretch: 1.06.into(), policy: Policy::AtEquilibrium });
+        system.breaking = Some(Breaking { criterion: 1.06.into(), policy: Policy::AtEquilibrium });
         let mut seen = 0;
         let mut watch = |status: &Status, state: &State<2>| {
             seen += 1;

@@ -37,7 +37,7 @@ fn by_hand() -> (LatticeBonds<2>, State<2>) {
     let mut state = State::new(bonds.sites());
     let factors = [1.0 / 3.0, 2.0 / 3.0, 1.0];
     let mut system = System::new(&mut bonds, BondMaterial::new(&*law, modulus), &loads, &factors);
-    system.breaking = Some(Breaking { stretch: 1.5.into(), policy: Policy::AtEquilibrium });
+    system.breaking = Some(Breaking { criterion: 1.5.into(), policy: Policy::AtEquilibrium });
     DynamicRelaxation::default()
         .solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
         .unwrap();

@@ -234,7 +234,7 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
             let loads = loads(bonds);
             let mut state = from.unwrap_or_else(|| State::new(bonds.sites()));
             let mut saved = None;
-            let breaking = Some(Breaking { stretch: 1.17.into(), policy: Default::default() });
+            let breaking = Some(Breaking { criterion: 1.17.into(), policy: Default::default() });
             let (law, contact) = (Law::ChainOffset, Some([STIFFNESS, skin]));
             let run = Run { bonds, loads: &loads, factors: &[0.4, 0.7, 1.0], law, contact, breaking };
             let lists = run.solve(&mut *methods(1e-2)[which], &mut state, &mut |state, restartable| {

@@ -103,7 +103,7 @@ fn tear(cloud: bool, pause: Option<u64>) -> State<2> {
         let loads = hold(bonds, |x| (x[0] < 0.3 || x[0] > 11.7).then(|| (3, [0.1 * x[0], 0.05 * x[0]])));
         let state = state.get_or_insert_with(|| State::new(bonds.sites()));
         let mut system = System::new(bonds, BondMaterial::new(&*law, 1.0), &loads, &[]);
-        system.breaking = Some(Breaking { stretch: 1.1.into(), policy: Policy::EachIteration });
+        system.breaking = Some(Breaking { criterion: 1.1.into(), policy: Policy::EachIteration });
         let mut watch = |status: &peri::solver::Status, state: &State<2>| {
             assert!(status.restartable);
             let stop = pause.is_some_and(|steps| state.total_iterations == steps);

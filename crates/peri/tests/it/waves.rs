@@ -192,7 +192,7 @@ fn crack_speed(rows: usize, drive: f64, law: Law) -> f64 {
     // the tip: the farthest particle that has lost more than six of its 28 bonds, ends and edges apart
     let mut tips: Vec<[f64; 2]> = Vec::new();
     let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), &loads, &[]);
-    system.breaking = Some(Breaking { stretch: (1.0 + stretch).into(), policy: Policy::EachIteration });
+    system.breaking = Some(Breaking { criterion: (1.0 + stretch).into(), policy: Policy::EachIteration });
     let solver = VelocityVerlet { records: 100, ..VelocityVerlet::new(DENSITY, 4.0 * height / rayleigh) };
     let mut tip_of = |bonds: &dyn Bonds<2>, state: &State<2>| {
         let mut tip = 0.0_f64;
