@@ -2,7 +2,7 @@
 //! outside.
 
 use super::celsius::{TEMPERATURE, of_kelvin};
-use super::outside::Outside;
+use super::outside::{Frame, Outside};
 use super::section::Section;
 use crate::error::Error;
 use crate::mesh::Mesh;
@@ -32,13 +32,6 @@ enum Origin<'a> {
     File(Series),
     /// Only the end is there.
     End(&'a Simulation),
-}
-
-/// A frame: what it is called, the values of its fields at the nodes, and which elements exist.
-pub(super) struct Frame {
-    pub(super) title: String,
-    pub(super) values: Vec<Vec<f64>>,
-    pub(super) exists: Vec<bool>,
 }
 
 /// sections.png, solid.png: stages beside one another, temperature and crystallinity; process.png, process_solid.png: all

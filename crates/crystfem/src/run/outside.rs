@@ -1,10 +1,16 @@
 //! What is seen of a part from outside.
 
-use super::animation::Frame;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::mesh::surface::Surface;
 use polycore::output::picture::{Corner, Plane, Skin};
+
+/// A frame: what it is called, the values of its fields at the nodes, and which elements exist.
+pub(super) struct Frame {
+    pub(super) title: String,
+    pub(super) values: Vec<Vec<f64>>,
+    pub(super) exists: Vec<bool>,
+}
 
 /// Elements that may be seen, and who borders on whom.
 pub struct Outside<'a> {

@@ -1,6 +1,6 @@
 //! Pictures of trained laws: Figs 3.7 and 3.9–3.11 of the thesis, and error against time.
 
-use super::judge::{Heldout, percentages};
+use super::heldout::{Heldout, percentages};
 use crate::dataset::Row;
 use crate::error::Error;
 use crate::kinematics::NAMES;

@@ -1,11 +1,11 @@
 //! Laws judged on the data of a scene: errors, physics, error against time; figures and tables.
 
+use super::heldout::{Heldout, percentages};
 use super::{Failure, Prepared, draw, short};
-use crate::dataset::{Method, Path as Path_, Row, noise};
+use crate::dataset::{Method, Row, noise};
 use crate::error::Error;
 use crate::eval::{
-    Errors, FLAGS, Physics, Uncertainty, agreement, errors, percentage_error, seconds_of_a_stress,
-    within_rates,
+    Errors, FLAGS, Physics, Uncertainty, agreement, errors, seconds_of_a_stress, within_rates,
 };
 use crate::quantities as q;
 use crate::surrogate::{Surrogate, Workspace};
@@ -33,27 +33,6 @@ pub struct Named<'a> {
     pub seconds: Option<f64>,
     /// How its rows were divided, if not as the scene's.
     pub split: Option<Method>,
-}
-
-/// A held-out run as laws see it.
-pub(super) struct Heldout<'a> {
-    pub run: &'a Path_,
-    /// The axis that is pulled most; of all, where it is not known which ones are.
-    pub axis: usize,
-    /// Whether its rates lie within those of the training runs, where that is known.
-    pub within: Option<bool>,
-    /// Of each law: S at the rows, or what was measured there ([`Row::compared`]).
-    pub predicted: Vec<Vec<[f64; 6]>>,
-}
-
-impl Heldout<'_> {
-    /// What was measured along the axis, and its name.
-    pub fn measured(&self) -> (String, Vec<f64>) {
-        let rows = &self.run.rows;
-        let letter = if rows.iter().any(|row| row.nominal.is_some()) { "P" } else { "S" };
-        let along = rows.iter().map(|row| row.compared(&row.s)[0][self.axis] / 1e6).collect();
-        (format!("{letter}{}", crate::kinematics::NAMES[self.axis]), along)
-    }
 }
 
 /// Judges laws: values into the report, CSV and pictures into `output`; gives a table in lines.
@@ -324,12 +303,4 @@ fn write_heldout(seen: &Heldout, names: &[&str], output: &Path) -> Result<(), Er
     let columns: Vec<csv::Column> =
         columns.iter().map(|(name, unit, data)| (name.as_str(), *unit, data.as_slice())).collect();
     Ok(csv::write(output.join(format!("heldout-{}.csv", seen.run.id)), &columns)?)
-}
-
-/// (3.13) row by row; NaN where there is no stress.
-pub(super) fn percentages(rows: &[Row], predicted: &[[f64; 6]]) -> Vec<f64> {
-    let error = |(row, stress): (&Row, &[f64; 6])| {
-        percentage_error(&row.compared(&row.s)[0], &(*stress).into()).unwrap_or(f64::NAN)
-    };
-    rows.iter().zip(predicted).map(error).collect()
 }

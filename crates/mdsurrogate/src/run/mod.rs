@@ -3,6 +3,7 @@
 mod crystal;
 mod data;
 mod draw;
+mod heldout;
 mod judge;
 mod program;
 mod search;

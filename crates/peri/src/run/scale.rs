@@ -22,6 +22,19 @@ pub fn bridge(outcome: &Outcome) -> f64 {
     (1.02 * most).clamp(1.5, 100.0)
 }
 
+/// What a moment of a run is called: a load step's displacement and load, or a place within a step.
+pub fn title(outcome: &Outcome, time: f64) -> String {
+    let step = time.ceil() as usize;
+    let Some(record) = step.checked_sub(1).and_then(|k| outcome.history.get(k)) else { return String::new() };
+    let place = format!("U = {} mm", short(record.displacement * 1e3));
+    let part = time - time.floor();
+    if part > 0.0 {
+        format!("{place}, equilibrium {:.0}", part / (1.0 - part))
+    } else {
+        format!("{place}, F = {} N", short(record.load))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

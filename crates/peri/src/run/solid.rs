@@ -2,8 +2,8 @@
 
 use super::frames::{Stresses, in_space, tensor_in_space};
 use super::outcome::Outcome;
-use super::scale::{bridge, stress_unit};
-use super::stages;
+use super::scale::{self, bridge, stress_unit};
+
 use crate::bonds::Bonds;
 use crate::error::Error;
 use crate::scene::{Scene, StressSpec};
@@ -131,7 +131,7 @@ pub fn end<const D: usize>(
     let damage = damage.filter(|damage| damage.iter().any(|&damage| damage > 0.0));
     let fields = std::iter::once(first).chain(damage.is_some().then(damage_field)).collect();
     let mut bounds = NOWHERE;
-    let title = stages::title(outcome, outcome.history.len() as f64);
+    let title = scale::title(outcome, outcome.history.len() as f64);
     widen(&mut bounds, &places);
     let look = Look { title, places, rest, values: [values, damage.unwrap_or_default()] };
     let picture = Picture { scene, outcome, spacing: bonds.spacing(), bounds };

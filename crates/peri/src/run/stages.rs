@@ -1,7 +1,7 @@
 //! Pictures of the stages of a run: the body as its fields show it.
 
 use super::outcome::Outcome;
-use super::scale::{bridge, short};
+use super::scale::{self, bridge};
 use super::solid::{self, Look, shown};
 use crate::error::Error;
 use crate::scene::Scene;
@@ -38,7 +38,7 @@ pub fn stages(
         let tensors = frames.data(frame, &measure)?;
         let at_rest = |(k, x): (usize, &[f64; 3])| [0, 1, 2].map(|d| x[d] - moved[3 * k + d]);
         Ok(Look {
-            title: title(outcome, frames.times()[frame]),
+            title: scale::title(outcome, frames.times()[frame]),
             rest: places.iter().enumerate().map(at_rest).collect(),
             places,
             values: [
@@ -127,19 +127,6 @@ impl Layout {
             narrow if narrow < 0.5 => Self { pairs: false, columns: stages, size: 720 },
             _ => Self { pairs: false, columns: stages, size: 420 },
         }
-    }
-}
-
-/// What a moment of a run is called: a load step's displacement and load, or a place within a step.
-pub(super) fn title(outcome: &Outcome, time: f64) -> String {
-    let step = time.ceil() as usize;
-    let Some(record) = step.checked_sub(1).and_then(|k| outcome.history.get(k)) else { return String::new() };
-    let place = format!("U = {} mm", short(record.displacement * 1e3));
-    let part = time - time.floor();
-    if part > 0.0 {
-        format!("{place}, equilibrium {:.0}", part / (1.0 - part))
-    } else {
-        format!("{place}, F = {} N", short(record.load))
     }
 }
 

@@ -3,6 +3,7 @@
 use super::cloud::cloud;
 use super::crack::{cracks, severed};
 use super::memory;
+use super::values::{Body, needed, ordered, vector};
 use super::variant::Variant;
 use super::{Axis, Scene, ShapeKind, ShapeSpec};
 use crate::bonds::{Bonds, LatticeBonds};
@@ -11,22 +12,6 @@ use crate::geometry::{Cut, Operation, Shape, bounds, cell_counts, lattice};
 use polycore::memory::{available, gib};
 use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
-
-/// A discretised body.
-pub struct Body<const D: usize> {
-    /// Its bonds.
-    pub bonds: Box<dyn Bonds<D>>,
-    /// Lower and upper corner of its particles' cells, m.
-    pub bounds: ([f64; D], [f64; D]),
-    /// Thickness (1 in 3D), m.
-    pub thickness: f64,
-    /// How many bonds each crack severs.
-    pub severed: Vec<u64>,
-    /// Its cracks.
-    pub cuts: Vec<Cut<D>>,
-    /// The shapes added and cut; empty for points and grids.
-    pub operations: Vec<Operation<D>>,
-}
 
 /// Cells and sites a body may have at most, whatever memory there is: sites are counted in 32 bits.
 const MOST_CELLS: f64 = 2e9;
@@ -157,41 +142,6 @@ fn refuse_too_large<const D: usize>(
 /// Where the spacings stand.
 fn spacing_key(scene: &Scene) -> &'static str {
     if scene.study.iter().any(|study| !study.spacing.is_empty()) { "study" } else { "body.spacing" }
-}
-
-pub(super) fn vector<const D: usize>(
-    source: &Source,
-    key: &str,
-    value: &[Length],
-) -> Result<[f64; D], SceneError> {
-    let values: Vec<f64> = value.iter().map(|l| l.si()).collect();
-    <[f64; D]>::try_from(values.as_slice())
-        .map_err(|_| source.error(key, format!("{} components", value.len()), format!("{D} components")))
-}
-
-/// The corners of a box must span one.
-pub(super) fn ordered<const D: usize>(
-    source: &Source,
-    key: &str,
-    min: [f64; D],
-    max: [f64; D],
-) -> Result<(), SceneError> {
-    match (0..D).find(|&d| min[d] >= max[d]) {
-        Some(d) => {
-            let found = format!("{} m, not below `max` {} m in component {d}", min[d], max[d]);
-            Err(source.error(&format!("{key}.min[{d}]"), found, "below `max`"))
-        }
-        None => Ok(()),
-    }
-}
-
-pub(super) fn needed<T: Copy>(
-    source: &Source,
-    key: &str,
-    value: Option<T>,
-    what: &str,
-) -> Result<T, SceneError> {
-    value.ok_or_else(|| source.error(key, "nothing", what))
 }
 
 fn operations<const D: usize>(source: &Source, scene: &Scene) -> Result<Vec<Operation<D>>, SceneError> {

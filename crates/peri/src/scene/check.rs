@@ -1,13 +1,11 @@
 //! Values that can be judged without building anything, and the list of variants to run.
 
+use super::values::{plain, positive};
 use super::variant::{Variant, variants};
 use super::{Method, Scene};
 use crate::calibrate::{Calibration, Space};
 use crate::stress::Measure;
 use polycore::scene::{SceneError, Source};
-
-/// Largest horizon ratio: a stencil beyond it has more bonds than any use.
-pub const LARGEST_RATIO: f64 = 20.0;
 
 /// Rows of history of a run in time.
 const MOST_RECORDS: usize = 1_000_000;
@@ -214,14 +212,6 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     }
 }
 
-pub(super) fn positive(source: &Source, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
-    if value > 0.0 && value.is_finite() {
-        Ok(())
-    } else {
-        Err(source.error(key, format!("{value} {unit}").trim_end(), "above 0"))
-    }
-}
-
 fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let body = &scene.body;
     if body.points.is_some() && body.grid.is_some() {
@@ -275,27 +265,6 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     }
     Ok(())
-}
-
-/// A number as a user would write it.
-pub fn plain(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() || (1e-3..1e5).contains(&value.abs()) {
-        value.to_string()
-    } else {
-        format!("{value:e}")
-    }
-}
-
-pub(super) fn ratio(source: &Source, key: &str, ratio: f64) -> Result<(), SceneError> {
-    if (1.0..=LARGEST_RATIO).contains(&ratio) {
-        Ok(())
-    } else {
-        Err(source.error(
-            key,
-            plain(ratio),
-            format!("1 to {LARGEST_RATIO}: the horizon must reach a neighbour"),
-        ))
-    }
 }
 
 fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {

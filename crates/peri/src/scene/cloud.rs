@@ -1,10 +1,10 @@
 //! Bodies from a CSV file of points.
 
 use super::GridSpec;
-use super::build::{Body, needed, ordered, vector};
+use super::Scene;
 use super::memory;
+use super::values::{Body, LARGEST_RATIO, needed, ordered, positive, vector};
 use super::variant::Variant;
-use super::{Scene, check};
 use crate::bonds::{Bonds, CloudBonds, LatticeBonds};
 use crate::geometry::{Cut, recognise};
 use polycore::memory::{available, gib};
@@ -28,7 +28,7 @@ pub fn cloud<const D: usize>(
 ) -> Result<Body<D>, SceneError> {
     let horizon =
         needed(source, "body.horizon", scene.body.horizon, "a length; a cloud needs its `horizon`")?.si();
-    check::positive(source, "body.horizon", horizon, "m")?;
+    positive(source, "body.horizon", horizon, "m")?;
     let (positions, volumes, key) = match (&scene.body.points, &scene.body.grid) {
         (Some(points), _) => {
             let path = source.path.parent().unwrap_or(Path::new("")).join(points);
@@ -86,7 +86,7 @@ fn regular<const D: usize>(
     // bonds as long as the horizon count, whatever the rounding, as in a cloud
     let ratio = horizon / lattice.spacing * (1.0 + 1e-9);
     // longer stencils are refused for lattices: a list takes what it gets
-    if !(1.0..=check::LARGEST_RATIO).contains(&ratio) {
+    if !(1.0..=LARGEST_RATIO).contains(&ratio) {
         return None;
     }
     let low = lattice.origin.map(|x| x - 0.5 * lattice.spacing);

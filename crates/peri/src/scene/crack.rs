@@ -1,7 +1,7 @@
 //! Cracks of zero width, and the bonds that they sever.
 
 use super::Scene;
-use super::build::vector;
+use super::values::vector;
 use crate::bonds::{Bonds, CellGrid};
 use crate::geometry::Cut;
 use polycore::scene::{SceneError, Source};

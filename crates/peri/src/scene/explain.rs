@@ -1,6 +1,6 @@
 //! What a scene will build, and what it leaves out.
 
-use super::check::plain;
+use super::values::plain;
 use super::variant::Variant;
 use super::{Body, Method, Scene, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;

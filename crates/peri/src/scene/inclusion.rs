@@ -1,6 +1,7 @@
 //! Parts of a body that are stiffer or softer than the rest, or break earlier or later.
 
-use super::build::{Body, shape};
+use super::build::shape;
+use super::values::Body;
 use super::{Inclusion, Scene, plain};
 use crate::bonds::{Bonds, Property};
 use crate::critical::Critical;

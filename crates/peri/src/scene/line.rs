@@ -1,7 +1,7 @@
 //! Lines and sections whose values are written as tables.
 
 use super::Scene;
-use super::build::vector;
+use super::values::vector;
 use crate::calibrate::Space;
 use crate::quantities as q;
 use polycore::report::Named;

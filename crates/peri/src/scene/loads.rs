@@ -1,7 +1,7 @@
 //! From a scene's boundaries to the loads and supports of a body.
 
-use super::build::{Body, ordered, vector};
 use super::formula::Formula;
+use super::values::{Body, ordered, vector};
 use super::{Boundary, Method, Prescribed, PrescribedField, Scene};
 use crate::field::Field;
 use crate::solver::{Loads, Support};

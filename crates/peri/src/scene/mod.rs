@@ -16,12 +16,13 @@ mod method;
 mod placement;
 mod probe;
 mod solid;
+mod values;
 mod variant;
 mod warn;
 
 pub use boundary::{Boundary, Prescribed, PrescribedField, Side};
-pub use build::{Body, body_of, least_memory};
-pub use check::{check, check_variant, plain};
+pub use build::{body_of, least_memory};
+pub use check::{check, check_variant};
 pub use expect::{quantities, quantities_of};
 pub use explain::explain;
 pub use formula::Formula;
@@ -33,6 +34,7 @@ pub use method::{Dynamics, Method, Solver};
 pub use placement::{check_placement, exact_plate};
 pub use probe::{Probe, Track};
 pub use solid::{SolidKind, SolidLaw};
+pub use values::{Body, plain};
 pub use variant::Variant;
 pub use warn::warnings;
 

@@ -1,7 +1,7 @@
 //! What a scene names beside its body must lie where the body is: a closed form's hole, displacements of the loads.
 
-use super::build::Body;
 use super::loads::layers;
+use super::values::Body;
 use super::{ExactSpec, Scene, Side};
 use crate::exact::Plate;
 use crate::solver::Loads;

@@ -1,8 +1,8 @@
 //! Quantities that a scene records in every row of the history: displacements, strains between marks, rotations, crack tips, wave
 //! fronts.
 
-use super::build::{Body, vector};
 use super::loads::region;
+use super::values::{Body, vector};
 use super::{Axis, Boundary, Method, Scene, Side};
 use crate::calibrate::Space;
 use crate::quantities as q;

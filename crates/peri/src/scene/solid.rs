@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::SurfaceCorrection;
-use super::check::{plain, positive};
+use super::values::{plain, positive};
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
 use crate::error::Error;

@@ -1,6 +1,6 @@
 //! The variants of a scene: its own discretisation, or the combinations that its studies list.
 
-use super::check::{positive, ratio};
+use super::values::{positive, ratio};
 use super::{HORIZON_RATIO, Scene, Study, SurfaceCorrection};
 use crate::bonds::VolumeCorrection;
 use polycore::scene::{SceneError, Source};

@@ -21,6 +21,7 @@ use crate::tensor::{DeformationGradient, PrincipalFrame, Tensor, Voigt6x6, voigt
 
 mod chain;
 mod compressible;
+mod descriptor;
 mod gent;
 mod models;
 mod ogden;
@@ -36,9 +37,10 @@ mod table;
 
 pub use chain::{EightChain, EightChainRootI2, ThreeChain};
 pub use compressible::{Compressible, Coupling, Volumetric};
+pub use descriptor::{Domain, Kind, ModelDescriptor, Parameter};
 pub use gent::Gent;
 pub use homogeneous::{PlaneStress, plane_stress};
-pub use models::{Domain, Kind, MODELS, ModelDescriptor, Parameter, all, model};
+pub use models::{MODELS, all, model};
 pub use ogden::{Ogden, OgdenConvention};
 pub use polynomial::{MooneyRivlin, NeoHookean};
 pub use principal::PrincipalResponse;

@@ -1,6 +1,6 @@
 //! Langevin chain networks: three chains, eight chains, and eight chains with a √I₂ term.
 
-use super::models::{Domain, Kind, ModelDescriptor, Parameter, Start};
+use super::descriptor::{Domain, Kind, ModelDescriptor, Parameter, Start};
 use super::polynomial::{first_invariant_excess, second_invariant_excess};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};

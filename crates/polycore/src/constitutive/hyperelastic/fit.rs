@@ -11,7 +11,7 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 
 use super::data::Table;
-use super::models::Start;
+use super::descriptor::Start;
 use super::{Domain, Error, Hyperelastic, ModelDescriptor, homogeneous};
 
 /// A fitted law.

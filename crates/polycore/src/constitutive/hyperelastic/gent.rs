@@ -1,6 +1,6 @@
 //! Gent's law of limited chain extensibility.
 
-use super::models::{Domain, Kind, ModelDescriptor, Parameter};
+use super::descriptor::{Domain, Kind, ModelDescriptor, Parameter};
 use super::polynomial::first_invariant_excess;
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, positive};

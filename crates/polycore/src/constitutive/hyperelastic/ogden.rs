@@ -1,6 +1,6 @@
 //! Ogden's law in powers of the principal stretches.
 
-use super::models::{Domain, Kind, ModelDescriptor, Parameter};
+use super::descriptor::{Domain, Kind, ModelDescriptor, Parameter};
 use super::{Error, Hyperelastic, PrincipalResponse, finite, ogden_starts, parameter, positive};
 
 /// W = Σᵢ cᵢ (λ₁^αᵢ + λ₂^αᵢ + λ₃^αᵢ − 3) (1.24); doi:10.1098/rspa.1972.0026.

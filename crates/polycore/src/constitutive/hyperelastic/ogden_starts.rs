@@ -4,8 +4,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::{Ogden, OgdenConvention};
+use crate::constitutive::hyperelastic::descriptor::Start;
 use crate::constitutive::hyperelastic::homogeneous;
-use crate::constitutive::hyperelastic::models::Start;
 
 /// |α| of the grid; both signs are tried.
 const EXPONENTS: [f64; 14] = [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0];

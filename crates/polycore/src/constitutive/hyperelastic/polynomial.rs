@@ -1,6 +1,6 @@
 //! Neo-Hookean and Mooney–Rivlin: linear in the invariants.
 
-use super::models::{Domain, Kind, ModelDescriptor, Parameter};
+use super::descriptor::{Domain, Kind, ModelDescriptor, Parameter};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
 

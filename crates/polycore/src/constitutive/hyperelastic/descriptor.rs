@@ -1,0 +1,80 @@
+//! How a law is named, built from numbers, and started in a fit.
+
+use super::data::Table;
+use super::{Error, Hyperelastic};
+
+type Build = fn(&[f64]) -> Result<Box<dyn Hyperelastic>, Error>;
+
+/// A law as a function of its parameters. To add one: a file, and its name in [`super::MODELS`].
+#[derive(Debug, Clone, Copy)]
+pub struct ModelDescriptor {
+    /// The name in scenes and reports.
+    pub key: &'static str,
+    /// Where it comes from.
+    pub kind: Kind,
+    /// Names, units and domains of the parameters.
+    pub parameters: &'static [Parameter],
+    /// The law with the given parameters, as many as [`ModelDescriptor::parameters`]; see [`ModelDescriptor::law`].
+    pub(super) build: Build,
+    /// Plausible values for a rubber.
+    pub example: &'static [f64],
+    /// Where fits start.
+    pub(super) starts: fn(&Start<'_>) -> Vec<Vec<f64>>,
+}
+
+/// The thesis' two categories of laws (§1.1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// In invariants or stretches, chosen to fit.
+    Phenomenological,
+    /// From the statistics of a network of chains.
+    Micromechanical,
+}
+
+/// What is known before a fit.
+pub(super) struct Start<'a> {
+    /// Lower limit of each parameter.
+    pub limits: &'a [f64],
+    /// The best neo-Hookean modulus, Pa.
+    pub modulus: f64,
+    /// The data.
+    pub table: &'a Table,
+}
+
+/// A material parameter.
+#[derive(Debug, Clone, Copy)]
+pub struct Parameter {
+    /// Its name.
+    pub name: &'static str,
+    /// `Pa` or `1`.
+    pub unit: &'static str,
+    /// Where it may lie.
+    pub domain: Domain,
+}
+
+/// The domain of a parameter in a fit.
+#[derive(Debug, Clone, Copy)]
+pub enum Domain {
+    /// (−∞, ∞).
+    Real,
+    /// (0, ∞).
+    Positive,
+    /// Above the largest value of this function of the stretches in the data: a locking limit.
+    Above(fn([f64; 3]) -> f64),
+}
+
+impl ModelDescriptor {
+    /// The law with these parameters (SI, in the order of [`ModelDescriptor::parameters`]).
+    ///
+    /// # Errors
+    /// [`Error::Parameter`]; [`Error::Data`] for a wrong number of parameters.
+    pub fn law(&self, parameters: &[f64]) -> Result<Box<dyn Hyperelastic>, Error> {
+        if parameters.len() != self.parameters.len() {
+            return Err(Error::Data {
+                what: format!("law `{}`", self.key),
+                reason: format!("{} parameters given, {} needed", parameters.len(), self.parameters.len()),
+            });
+        }
+        (self.build)(parameters)
+    }
+}
