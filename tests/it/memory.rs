@@ -90,6 +90,22 @@ fn of_bodies() {
     holds("peri", &(scenes::fracture("4 mm", "accept = 0.1") + "[contact]\nstiffness = 1.0\n"), &[]);
 }
 
+/// Lines of many points with many particles around each; lines with many points in all.
+#[test]
+fn of_lines() {
+    let line = |name: usize, points: usize| {
+        format!(
+            "[[output.line]]\nname = \"l{name}\"\nfrom = [\"1 mm\", \"1 mm\", \"1 mm\"]\n\
+             to = [\"39 mm\", \"39 mm\", \"39 mm\"]\npoints = {points}\n"
+        )
+    };
+    let bar = scenes::bar().replace("spacing =", "horizon_ratio = 6.015\nspacing =");
+    holds("peri", &(bar + "\n[output]\nfields = false\npictures = false\n" + &line(0, 30_000)), &[]);
+    let lines: String = (0..10).map(|name| line(name, 100_000)).collect();
+    let brick = brick([20; 3], "").replace("every = \"1 s\"", "fields = false\npictures = false");
+    holds("crystfem", &(brick + &lines), &[]);
+}
+
 /// One row of cells and a long horizon: most sites are empty.
 #[test]
 fn of_a_thin_body() {

@@ -307,7 +307,8 @@ impl<const D: usize> Cut<D> {
 /// Part of a bond's length within which it counts as touching a cut's rim, or as ending on a cut.
 const NEAR: f64 = 1e-9;
 
-fn length<const D: usize>(x: [f64; D]) -> f64 {
+/// ‖x‖.
+pub(crate) fn length<const D: usize>(x: [f64; D]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 

@@ -29,8 +29,8 @@ pub struct Run {
     pub temperatures: Vec<f64>,
     /// α there.
     pub degrees: Vec<f64>,
-    /// Where the history begins, before the first measurement: time, s, and temperature, K.
-    pub origin: [f64; 2],
+    /// The history before the first measurement: times, s, increasing, and temperatures, K; linear between.
+    pub history: Vec<[f64; 2]>,
 }
 
 impl Run {
@@ -58,14 +58,17 @@ impl Run {
             before = temperature;
         }
         let times = temperatures.iter().map(|t| (start - t) / rate).collect();
-        Ok(Self { times, temperatures, degrees, origin: [0.0, start] })
+        Ok(Self { times, temperatures, degrees, history: vec![[0.0, start]] })
     }
 
     /// z at each measurement.
     fn z(&self, kinetics: &Kinetics) -> Vec<f64> {
-        let ([mut time, mut temperature], mut z) = (self.origin, 0.0);
-        let rows = self.times.iter().zip(&self.temperatures);
-        rows.map(|(&next, &end)| {
+        let rows = self.times.iter().zip(&self.temperatures).map(|(&time, &temperature)| [time, temperature]);
+        let mut all = self.history.iter().copied().chain(rows);
+        let Some([mut time, mut temperature]) = all.next() else { return Vec::new() };
+        let mut z = 0.0;
+        let mut found: Vec<f64> = if self.history.is_empty() { vec![z] } else { Vec::new() };
+        let later = all.map(|[next, end]| {
             let parts = ((end - temperature).abs() / STEP).ceil().clamp(1.0, 1000.0);
             for part in 0..parts as usize {
                 let [a, b] = [part, part + 1].map(|k| temperature + (end - temperature) * (k as f64 / parts));
@@ -73,8 +76,9 @@ impl Run {
             }
             (time, temperature) = (next, end);
             z
-        })
-        .collect()
+        });
+        found.extend(later.skip(self.history.len().saturating_sub(1)));
+        found
     }
 
     fn check(&self, what: &str) -> Result<(), Error> {
@@ -86,7 +90,16 @@ impl Run {
         }
         check_finite(what, "time (s)", &self.times, f64::MIN)?;
         check_finite(what, "temperature (K)", &self.temperatures, 0.0)?;
-        let mut before = self.origin[0];
+        let [times, temperatures] = [0, 1].map(|k| self.history.iter().map(|row| row[k]).collect::<Vec<_>>());
+        check_finite(what, "time (s) of the history", &times, f64::MIN)?;
+        check_finite(what, "temperature (K) of the history", &temperatures, 0.0)?;
+        if let Some(row) = (1..times.len()).find(|&row| times[row] < times[row - 1]) {
+            let (time, before) = (times[row], times[row - 1]);
+            let reason =
+                format!("row {} of the history: time = {time} s; allowed: {before} or later", row + 1);
+            return Err(Error::Data { what: what.to_owned(), reason });
+        }
+        let mut before = times.last().copied().unwrap_or(f64::NEG_INFINITY);
         for (row, &time) in self.times.iter().enumerate() {
             if time < before {
                 let reason = format!("measurement {}: time = {time} s; allowed: {before} or later", row + 1);

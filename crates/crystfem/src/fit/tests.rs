@@ -178,7 +178,7 @@ fn degenerate_data_have_named_errors() {
         times: (0..30).map(|k| 10.0 * f64::from(k)).collect(),
         temperatures: vec![430.0; 30],
         degrees: (0..30).map(|k| pa12().degree(pa12().rate(430.0) * 10.0 * f64::from(k))).collect(),
-        origin: [0.0, 430.0],
+        history: Vec::new(),
     };
     let error = nakamura(std::slice::from_ref(&hold), &KNOWN).unwrap_err().to_string();
     assert!(error.contains("do not determine all parameters"), "{error}");
@@ -199,8 +199,33 @@ fn degenerate_data_have_named_errors() {
             Run::cooling(rate, temperatures.to_vec(), vec![0.1, 0.2], &KNOWN).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
     }
+    let back = Run { history: vec![[-1.0, 440.0], [-2.0, 435.0]], ..runs(None).remove(0) };
+    let error = nakamura(&[back], &KNOWN).unwrap_err().to_string();
+    assert!(error.contains("row 2 of the history: time = -2 s; allowed: -1 or later"), "{error}");
     let same: Vec<Cooling> = (0..4).map(|_| coolings(&[10.0]).remove(0)).collect();
     assert!(ozawa(&same, 426.0).is_err());
+}
+
+/// What grew while the sample was held, before the first measurement, belongs to the history.
+#[test]
+fn a_hold_before_the_measurements_counts() {
+    let mut held = runs(None);
+    for run in &mut held {
+        // a kelvin above the first measurement, until z is 0.3 larger
+        let temperature = run.temperatures[0] + 1.0;
+        let reached =
+            run.times[0] - (run.times[1] - run.times[0]) / (run.temperatures[0] - run.temperatures[1]);
+        let hold = 0.3 / pa12().rate(temperature);
+        for (time, degree) in run.times.iter_mut().zip(&mut run.degrees) {
+            (*time, *degree) = (*time + hold, pa12().degree(pa12().z_of_degree(*degree) + 0.3));
+        }
+        run.history.extend([[reached, temperature], [reached + hold, temperature]]);
+    }
+    let value = |runs: &[Run]| nakamura(runs, &KNOWN).unwrap().estimates[1].value;
+    let truth = Constants::TABLE_4_1_COLUMN_1.nucleation;
+    assert!((value(&held) / truth - 1.0).abs() < 1e-5, "{}", value(&held));
+    held.iter_mut().for_each(|run| run.history.truncate(1));
+    assert!((value(&held) / truth - 1.0).abs() > 1e-3);
 }
 
 proptest::proptest! {
@@ -212,7 +237,7 @@ proptest::proptest! {
             proptest::prop_assert!(fit.rms.is_finite());
         }
         let temperatures: Vec<f64> = times.iter().map(|t| t.abs() % 700.0).collect();
-        let run = Run { times: (0..times.len()).map(|k| k as f64).collect(), temperatures, degrees, origin: [0.0, 480.0] };
+        let run = Run { times: (0..times.len()).map(|k| k as f64).collect(), temperatures, degrees, history: vec![[0.0, 480.0]] };
         if let Ok(fit) = nakamura(&[run], &KNOWN) {
             proptest::prop_assert!(fit.rms.is_finite());
         }

@@ -6,6 +6,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Natural coordinates, and distances over an element's diagonal, that count as none: a place on a node has its value.
 const NEAR: f64 = 1e-9;
+/// What is added around an element's box, over its largest edge, where lines are cut: above rounding, and above `NEAR`.
+const BOX: f64 = 1e-6;
 /// Iterations for the natural coordinates in a hexahedron; a parallelepiped needs two.
 const MOST_ITERATIONS: usize = 50;
 /// Part of an element by which a place may lie outside of the mesh.
@@ -58,9 +60,43 @@ impl Mesh {
         self.locate_in(0..self.element_count() as u32, at)
     }
 
-    /// As [`Self::locate`], in some of the elements.
-    pub fn locate_among(&self, elements: &[u32], at: [f64; 3]) -> Option<Place> {
-        self.locate_in(elements.iter().copied(), at)
+    /// Where points in order along the line from `a` to `b` lie; `None` outside of the mesh.
+    pub fn locate_along(&self, a: [f64; 3], b: [f64; 3], points: &[[f64; 3]]) -> Vec<Option<Place>> {
+        let along = [0, 1, 2].map(|d| b[d] - a[d]);
+        let square: f64 = along.iter().map(|x| x * x).sum();
+        // the part of the line in each element's box, a little larger
+        let part = |element: u32| {
+            let [low, high] = self.bounds_of(&[element])?;
+            let around = BOX * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+            let (mut first, mut last) = (f64::NEG_INFINITY, f64::INFINITY);
+            for d in 0..3 {
+                let ends = [low[d] - around - a[d], high[d] + around - a[d]];
+                if along[d] == 0.0 {
+                    if ends[0] > 0.0 || ends[1] < 0.0 {
+                        return None;
+                    }
+                    continue;
+                }
+                let [p, q] = ends.map(|end| end / along[d]);
+                (first, last) = (first.max(p.min(q)), last.min(p.max(q)));
+            }
+            (first <= last).then_some((first, last, element))
+        };
+        let mut parts: Vec<(f64, f64, u32)> = (0..self.element_count() as u32).filter_map(part).collect();
+        parts.sort_by(|p, q| p.0.total_cmp(&q.0));
+        let (mut parts, mut open) = (parts.into_iter().peekable(), Vec::new());
+        let locate = |at: &[f64; 3]| {
+            let here = (0..3).map(|d| (at[d] - a[d]) * along[d]).sum::<f64>() / square;
+            while let Some(part) = parts.next_if(|part| part.0 <= here) {
+                open.push(part);
+            }
+            open.retain(|part| part.1 >= here);
+            // in the order of all elements, as `locate` tries them
+            open.sort_unstable_by_key(|part| part.2);
+            let place = self.locate_in(open.iter().map(|part| part.2), *at)?;
+            (place.distance == 0.0).then_some(place)
+        };
+        points.iter().map(locate).collect()
     }
 
     fn locate_in(&self, elements: impl Iterator<Item = u32>, at: [f64; 3]) -> Option<Place> {
@@ -189,6 +225,25 @@ mod tests {
                 let around = (0..mesh.element_count() as u32)
                     .filter(|element| mesh.nodes(*element).contains(&(node as u32)));
                 assert_eq!(place.elements(), around.collect::<Vec<_>>());
+            }
+        }
+    }
+
+    /// Along lines through nodes, in faces, oblique and past the mesh: the places of `locate`, elements included.
+    #[test]
+    fn lines_find_what_single_places_find() {
+        for mesh in meshes() {
+            for (a, b) in [
+                ([0.0; 3], [3.0, 2.0, 1.0]),
+                ([-1.0, 0.3, 0.2], [4.0, 1.9, 0.7]),
+                ([3.0, 2.0, 0.0], [3.0, 2.0, 1.0]),
+                ([2.7, 2.0, 1.0], [0.1, 0.0, 1.0]),
+                ([0.5, 5.0, 0.5], [0.7, 5.0, 0.5]),
+            ] {
+                let at = |k: i32| [0, 1, 2].map(|d| a[d] + (b[d] - a[d]) * f64::from(k) / 60.0);
+                let points: Vec<[f64; 3]> = (0..=60).map(at).collect();
+                let single = |at: &[f64; 3]| mesh.locate(*at).filter(|place| place.distance() == 0.0);
+                assert_eq!(mesh.locate_along(a, b, &points), points.iter().map(single).collect::<Vec<_>>());
             }
         }
     }

@@ -119,6 +119,16 @@ impl FitScene {
                     "another name",
                 ));
             }
+            let tables = |other: &&FitSpec| {
+                other.heat_flow.is_some() && fit.name.strip_prefix(&other.name) == Some("-heat-flow")
+            };
+            let taken =
+                self.fit.iter().find(tables).map(|other| format!("the heat flow of `{}`", other.name));
+            let taken = taken.or_else(|| (fit.name == "estimates").then(|| "all estimates".to_owned()));
+            if let Some(taken) = taken {
+                let found = format!("`{0}`, but {0}.csv has {taken}", fit.name);
+                return Err(source.error(&key("name"), found, "another name"));
+            }
             fit.check_keys(source, &key)?;
             fit.check_heat_flow(source, &key)?;
             let measured = |flow| {
@@ -223,17 +233,16 @@ impl FitSpec {
                             let run = Run::cooling(rate.si(), temperatures, degrees, &known);
                             run.map_err(|error| source.error(&at, error, "temperatures that fall"))?
                         }
-                        (None, Some(Measured { peak, temperatures, origin })) => Run {
+                        (None, Some(Measured { peak, temperatures, history })) => Run {
                             times: peak.times.clone(),
                             temperatures: temperatures.clone(),
                             degrees: peak.degrees.clone(),
-                            origin: *origin,
+                            history: history.clone(),
                         },
                         (None, None) => {
                             let columns = [time(), temperature(), alpha()];
                             let [times, temperatures, degrees] = table(source, &at, &data.file, columns)?;
-                            let origin = [times[0], temperatures[0]];
-                            Run { times, temperatures, degrees, origin }
+                            Run { times, temperatures, degrees, history: Vec::new() }
                         }
                     });
                 }

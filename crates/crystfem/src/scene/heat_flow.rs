@@ -64,8 +64,8 @@ pub struct Measured {
     pub peak: Peak,
     /// Temperatures there, K; empty of an isothermal run.
     pub temperatures: Vec<f64>,
-    /// Time, s, and temperature, K, of the last row before it at which nothing can crystallize.
-    pub origin: [f64; 2],
+    /// Times, s, and temperatures, K, of the rows before it, from the last one at which nothing can crystallize.
+    pub history: Vec<[f64; 2]>,
 }
 
 /// Times, temperatures (none of an isothermal run), heat flows and lines of a file.
@@ -157,10 +157,12 @@ impl FitSpec {
             if isothermal { Vec::new() } else { peak.times.iter().map(along).collect() };
         // what lies before it in the melt has no part in it
         let melting = self.equilibrium_melting.map_or(f64::INFINITY, |melting| melting.si());
-        let molten = |row: &usize| table.times[*row] <= from && table.temperatures[*row] >= melting;
-        let row = if isothermal { 0 } else { (0..table.times.len()).rev().find(molten).unwrap_or(0) };
-        let origin = [table.times[row], table.temperatures.get(row).copied().unwrap_or(f64::NAN)];
-        Ok(Measured { peak, temperatures, origin })
+        let rows =
+            table.times.iter().zip(&table.temperatures).map(|(&time, &temperature)| [time, temperature]);
+        let mut history: Vec<[f64; 2]> = rows.take_while(|[time, _]| *time <= from).collect();
+        let molten = history.iter().rposition(|[_, temperature]| *temperature >= melting).unwrap_or(0);
+        history.drain(..molten);
+        Ok(Measured { peak, temperatures, history })
     }
 
     /// Reads a file; a mass must be given of heat flows in watts, and not of others.
@@ -240,10 +242,10 @@ impl Table {
                     let celsius = |kelvin: f64| kelvin - CELSIUS;
                     let low = self.temperatures.iter().fold(f64::INFINITY, |low, &t| low.min(t));
                     let high = self.temperatures.iter().fold(0.0, |high: f64, &t| high.max(t));
-                    let found =
-                        format!("{:.2} degC, which the file does not pass on cooling", celsius(wanted));
-                    let allowed = format!("within its {:.2} to {:.2} degC", celsius(low), celsius(high));
-                    Refused([found, format!("{allowed}; `to` is passed after `from`")])
+                    let found = format!("{:.2} degC", celsius(wanted));
+                    let allowed = "a temperature that the file falls through, `to` after `from`";
+                    let range = format!("it has {:.2} to {:.2} degC", celsius(low), celsius(high));
+                    Refused([found, format!("{allowed}; {range}")])
                 })
             }
         }

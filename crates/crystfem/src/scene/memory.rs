@@ -7,7 +7,7 @@ use super::PartScene;
 use crate::simulation::Simulation;
 use crate::time::Steps;
 use polycore::memory::{available, gib};
-use polycore::scene::{SceneError, Source};
+use polycore::scene::{LineSpec, SceneError, Source};
 
 /// Threads and tables.
 const ALWAYS: f64 = 20e6;
@@ -33,6 +33,9 @@ const FACTOR: f64 = 16.0;
 const WRITTEN_NODE: f64 = 100.0;
 const WRITTEN_ELEMENT: f64 = 80.0;
 const FIELD: f64 = 64.0;
+/// A point of a line: its element's nodes with their weights, the elements around it, its place; a number of a table.
+const LINE_POINT: f64 = 24.0 + 2.0 * 56.0 + 8.0 * 16.0 + 32.0 + 24.0;
+const CELL: f64 = 8.0;
 /// Most fixed steps, and most times at which fields are written.
 const MOST_STEPS: f64 = 1e9;
 const MOST_FRAMES: f64 = 1e5;
@@ -96,6 +99,10 @@ impl PartScene {
         if self.output.fields || self.output.pictures {
             bytes += nodes * (WRITTEN_NODE + fields * FIELD) + elements * WRITTEN_ELEMENT;
         }
+        // the places of all lines, and one table at a time: arc length, position twice, fields
+        let points = |line: &LineSpec| line.points as f64;
+        bytes += LINE_POINT * self.output.line.iter().map(points).sum::<f64>();
+        bytes += CELL * (7.0 + fields) * self.output.line.iter().map(points).fold(0.0, f64::max);
         // a row for each step in a list that grows, and a checkpoint of it
         let Steps::Fixed { dt } = simulation.settings.steps else { return bytes };
         bytes + 4.0 * 8.0 * (end / dt) * (1.0 + fields) * self.probe.len() as f64

@@ -183,19 +183,8 @@ impl PartScene {
         let mut lines = Vec::new();
         for (index, line) in self.output.line.iter().enumerate() {
             let places = line.places::<3>();
-            let (a, b) = (places[0], places[places.len() - 1]);
-            let touches = |element: &u32| {
-                let [low, high] = mesh.bounds_of(&[*element]).unwrap_or_default();
-                (0..3).all(|d| {
-                    let around = 1e-6 * (high[d] - low[d]);
-                    a[d].min(b[d]) <= high[d] + around && a[d].max(b[d]) >= low[d] - around
-                })
-            };
-            let near: Vec<u32> = (0..mesh.element_count() as u32).filter(touches).collect();
-            let inside =
-                |at: &[f64; 3]| mesh.locate_among(&near, *at).filter(|place| place.distance() == 0.0);
-            let places: Vec<Option<Place>> = places.iter().map(inside).collect();
-            line.refuse_outside(source, index, places.iter().flatten().count())?;
+            let places = mesh.locate_along(places[0], places[places.len() - 1], &places);
+            line.refuse_outside(source, index, places.iter().any(Option::is_some))?;
             lines.push(places);
         }
         Ok(lines)

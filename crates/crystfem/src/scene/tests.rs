@@ -218,6 +218,8 @@ fn bad_fits() {
     assert!(lines.ends_with("; peaks of 4.5000 J/g"), "{lines}");
     let lines = complaint(&flow("w.csv", ", from = \"4.5 s\", to = \"162.5 degC\"", "up"), folder.path());
     assert!(lines.ends_with("; peaks of 2.2500 J/g"), "{lines}");
+    let two = flow("w.csv", "", "up");
+    let block = two.find("[[fit]]").unwrap();
     let level = flow("w.csv", "", "up").replace("exothermal", "latent_heat = \"0 J/g\", exothermal");
     let cases: &[(String, &[&str])] = &[
         (flow("mw.csv", "", "down"), &["`fit[0].data[0].mass`", "mw.csv is a power", "5.2 mg"]),
@@ -236,12 +238,20 @@ fn bad_fits() {
         (flow("w.csv", ", from = \"20 s\"", "up"), &["`fit[0].data[0].from`", "20 s", "0 to 18 s"]),
         (
             flow("w.csv", ", to = \"150 degC\"", "up"),
-            &["`fit[0].data[0].to`", "150.00 degC", "160.00 to 170.00"],
+            &["`fit[0].data[0].to`", "150.00 degC", "falls through", "160.00 to 170.00"],
         ),
         (flow("w.csv", ", from = \"9 s\", to = \"3 s\"", "up"), &["`fit[0].data[0].to`", "after `from`"]),
         (
             flow("w.csv", ", from = \"9 mm\"", "up"),
             &["found `9 mm`", "a time, e.g. \"90 s\", or a temperature"],
+        ),
+        (
+            flow("w.csv", "", "up").replace("name = \"a\"", "name = \"estimates\""),
+            &["`fit[0].name`", "estimates.csv has all estimates", "another name"],
+        ),
+        (
+            [two.as_str(), &two[block..].replace("name = \"a\"", "name = \"a-heat-flow\"")].concat(),
+            &["`fit[1].name`", "a-heat-flow.csv has the heat flow of `a`", "another name"],
         ),
         (level, &["`fit[0].heat_flow.latent_heat`", "above 0"]),
         (
@@ -257,6 +267,15 @@ fn bad_fits() {
         let message = complaint(text, folder.path());
         assert!(parts.iter().all(|part| message.contains(part)), "{parts:?}: {message}");
     }
+    // rows before `from`, from the last one in the melt on
+    let text = "time [s],temperature [degC],heat_flow [W/g]\n0,200,0\n1,195,0\n9,165,0\n19,165,0\n20,160,0\n30,150,1\n40,140,0\n";
+    std::fs::write(folder.path().join("held.csv"), text).unwrap();
+    let held = flow("held.csv", ", from = \"20 s\"", "up").replace(", rate = \"1 K/min\"", "");
+    let source = Source::new(folder.path().join("case.toml"), &held);
+    let scene: super::FitScene = source.parse().unwrap();
+    let (_, peaks) = &scene.jobs(&source).unwrap()[0];
+    let times: Vec<f64> = peaks[0].history.iter().map(|row| row[0]).collect();
+    assert_eq!(times, [1.0, 9.0, 19.0, 20.0]);
     // two rows for three constants are found by the fit itself
     let source = Source::new(folder.path().join("case.toml"), good);
     let output = folder.path().join("out");

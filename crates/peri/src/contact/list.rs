@@ -2,6 +2,7 @@
 
 use crate::bonds::{Bonds, CellGrid};
 use crate::field::{CHUNK, Field, chunk_range};
+use crate::geometry::length;
 use rayon::prelude::*;
 
 /// Largest contact distance over the reference distance, and over the sum of the radii.
@@ -172,8 +173,7 @@ impl<const D: usize> List<D> {
     fn candidate(&self, bonds: &dyn Bonds<D>, site: usize, other: usize) -> Candidate<D> {
         let (here, there) = (bonds.position(site), bonds.position(other));
         let bond: [f64; D] = std::array::from_fn(|d| there[d] - here[d]);
-        let distance =
-            (OF_REFERENCE * length(&bond)).min(OF_RADII * (self.radius(site) + self.radius(other)));
+        let distance = (OF_REFERENCE * length(bond)).min(OF_RADII * (self.radius(site) + self.radius(other)));
         Candidate { site: other as u32, bond, distance, volume: bonds.volume(other) }
     }
 
@@ -202,23 +202,18 @@ impl<const D: usize> Candidate<D> {
     pub fn apart(&self, displacement: &Field<D>, own: usize) -> ([f64; D], f64) {
         let (here, there) = (displacement.get(own), displacement.get(self.site as usize));
         let zeta = std::array::from_fn(|d| self.bond[d] + (there[d] - here[d]));
-        (zeta, length(&zeta))
+        (zeta, length(zeta))
     }
 
     /// Where it touches.
     pub fn touch(&self, displacement: &Field<D>, own: usize) -> Option<Touch<D>> {
         let (zeta, r) = self.apart(displacement, own);
         if r < self.distance {
-            let (along, size) = if r > 0.0 { (zeta, r) } else { (self.bond, length(&self.bond)) };
+            let (along, size) = if r > 0.0 { (zeta, r) } else { (self.bond, length(self.bond)) };
             let direction = along.map(|x| x / size);
             Some(Touch { direction, overlap: self.distance - r, volume: self.volume })
         } else {
             None
         }
     }
-}
-
-/// ‖x‖.
-pub fn length<const D: usize>(vector: &[f64; D]) -> f64 {
-    vector.iter().map(|x| x * x).sum::<f64>().sqrt()
 }

@@ -2,14 +2,16 @@
 //!
 //! Between particles by moving least squares with a linear basis (Lancaster & Salkauskas 1981,
 //! doi:10.1090/S0025-5718-1981-0616367-1) over the nearest particle and those that intact bonds join to it, with the weights
-//! w = (δ/d − 1)⁴ of their distances d: a linear field is exact, and a particle has its own value. No value crosses a crack:
-//! what is bonded to the nearest particle lies on its side.
+//! w = (δ/d − 1)⁴ of their distances d: a linear field is exact, and a particle has its own value. No value crosses a crack of
+//! the scene: the nearest particle is one on the same side, and so is what is bonded to it. Where bonds broke later, the side is that
+//! of the nearest particle.
 
 use super::frames::Stresses;
 use super::outcome::Outcome;
 use crate::bonds::{Bonds, CellGrid, Kind};
 use crate::error::Error;
-use crate::scene::{LineField, Scene, line_fields};
+use crate::geometry::{Cut, length, severed};
+use crate::scene::{LineField, Scene, cuts_of, line_fields};
 use crate::solver::State;
 use nalgebra::{Matrix3, Vector3};
 use polycore::scene::{LineSpec, SceneError, Source};
@@ -21,6 +23,9 @@ const NEAR: f64 = 1e-9;
 const TIE: f64 = 1e-6;
 /// Extent along a direction, over the largest, below which particles have none there.
 const FLAT: f64 = 1e-10;
+/// How often a value may enter through the slope along one direction: from particles nearly in a row, a place beside it would
+/// take large multiples of small differences.
+const MOST: f64 = 5.0;
 
 /// The particles around a line.
 struct Around<'a, const D: usize> {
@@ -28,6 +33,7 @@ struct Around<'a, const D: usize> {
     sites: Vec<u32>,
     places: Vec<[f64; D]>,
     grid: CellGrid<D>,
+    cuts: &'a [Cut<D>],
     /// Greatest reach of a particle.
     most: f64,
 }
@@ -42,7 +48,7 @@ fn reach<const D: usize>(bonds: &dyn Bonds<D>, site: usize) -> f64 {
 }
 
 impl<'a, const D: usize> Around<'a, D> {
-    fn new(bonds: &'a dyn Bonds<D>, line: &[[f64; D]]) -> Self {
+    fn new(bonds: &'a dyn Bonds<D>, cuts: &'a [Cut<D>], line: &[[f64; D]]) -> Self {
         let ends = [line[0], line[line.len() - 1]];
         let along: [f64; D] = std::array::from_fn(|d| ends[1][d] - ends[0][d]);
         let square: f64 = along.iter().map(|x| x * x).sum();
@@ -56,7 +62,7 @@ impl<'a, const D: usize> Around<'a, D> {
         };
         let sites: Vec<u32> = all.filter(near).copied().collect();
         let places: Vec<[f64; D]> = sites.iter().map(|&site| bonds.position(site as usize)).collect();
-        Self { bonds, grid: CellGrid::new(&places, most), sites, places, most }
+        Self { bonds, cuts, grid: CellGrid::new(&places, most), sites, places, most }
     }
 
     /// Sites whose values make up that at a place, and their weights; none outside of the body, and where the nearest
@@ -66,26 +72,36 @@ impl<'a, const D: usize> Around<'a, D> {
         if self.sites.is_empty() {
             return None;
         }
-        let mut holds: Vec<(f64, usize)> = Vec::new();
-        self.grid.near(at, self.most * (1.0 + NEAR), |k| {
+        let (mut near, mut inside): (Vec<(f64, usize)>, _) = (Vec::new(), false);
+        // beside a crack the nearest on the same side may be a spacing away along each axis
+        self.grid.near(at, 2.0 * self.most * (1.0 + NEAR), |k| {
             let (site, place) = (self.sites[k] as usize, self.places[k]);
             let far = reach(bonds, site) + NEAR * small;
-            if (0..D).all(|d| (place[d] - at[d]).abs() <= far) {
-                holds.push((distance(place, at), site));
-            }
+            inside |= (0..D).all(|d| (place[d] - at[d]).abs() <= far);
+            near.push((distance(place, at), site));
         });
-        holds.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let &(least, nearest) = holds.first()?;
+        if !inside {
+            return None;
+        }
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut near = near.into_iter().filter(|(_, site)| !severed(self.cuts, at, bonds.position(*site)));
+        let (least, nearest) = near.next()?;
+        if least <= NEAR * small {
+            return Some(vec![(nearest, 1.0)]);
+        }
         let here = bonds.position(nearest);
         let horizon = bonds.horizon();
-        let severed = |other: usize| {
+        let apart = |other: usize| {
             distance(bonds.position(other), here) <= horizon * (1.0 + NEAR)
                 && !bonds.is_bonded(nearest, other)
         };
-        if holds[1..].iter().any(|&(other, site)| other <= least + TIE * small && severed(site)) {
+        let on_crack = self.cuts.iter().any(|cut| cut.distance(at) <= NEAR * small);
+        if on_crack
+            || near.take_while(|(other, _)| *other <= least + TIE * small).any(|(_, site)| apart(site))
+        {
             return None;
         }
-        if least <= NEAR * small {
+        if least >= horizon {
             return Some(vec![(nearest, 1.0)]);
         }
         // site, weight, place from `at`
@@ -112,8 +128,13 @@ impl<'a, const D: usize> Around<'a, D> {
         let largest = eigen.eigenvalues.max();
         let mut slope = Vector3::zeros();
         for (value, axis) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            if *value > FLAT * largest {
-                slope -= axis * (axis.dot(&mean) / *value);
+            let share = axis.dot(&mean) / *value;
+            let enters: f64 = members
+                .iter()
+                .map(|(_, weight, from)| (weight * share * axis.dot(&(from - mean))).abs())
+                .sum();
+            if *value > FLAT * largest && enters <= MOST {
+                slope -= axis * share;
             }
         }
         // that of the nearest follows from their sum: on its own it is a difference of large numbers
@@ -132,7 +153,7 @@ fn vector<const D: usize>(of: [f64; D]) -> Vector3<f64> {
 }
 
 fn distance<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
-    (0..D).map(|d| (a[d] - b[d]).powi(2)).sum::<f64>().sqrt()
+    length::<D>(std::array::from_fn(|d| a[d] - b[d]))
 }
 
 /// Refuses lines of which no point lies in the body.
@@ -146,8 +167,8 @@ pub fn check<const D: usize>(
 ) -> Result<(), SceneError> {
     for (index, line) in lines.iter().enumerate() {
         let places = line.places::<D>();
-        let around = Around::new(bonds, &places);
-        let inside = places.iter().filter(|at| around.weights(**at).is_some()).count();
+        let around = Around::new(bonds, &[], &places);
+        let inside = places.iter().any(|at| around.weights(*at).is_some());
         line.refuse_outside(source, index, inside)?;
     }
     Ok(())
@@ -179,20 +200,26 @@ pub fn write<const D: usize>(
             }
         }
     };
+    let cuts = cuts_of(scene);
     for line in &scene.output.line {
         let places = line.places::<D>();
-        let around = Around::new(bonds, &places);
-        let weights: Vec<Option<Vec<(usize, f64)>>> = places.iter().map(|at| around.weights(*at)).collect();
+        let around = Around::new(bonds, &cuts, &places);
         let by_default = |field| !matches!(field, LineField::Stress { piola: true, .. });
         let wanted = line_fields(scene).into_iter().filter(|(f, name, _)| line.wants(name, by_default(*f)));
-        let columns: Vec<(String, &str, Vec<f64>)> = wanted
-            .map(|(field, name, unit)| {
+        let (fields, mut columns): (Vec<LineField>, Vec<(String, &str, Vec<f64>)>) =
+            wanted.map(|(field, name, unit)| (field, (name, unit, Vec::with_capacity(places.len())))).unzip();
+        // point by point: the weights of all would take more than the body
+        for at in &places {
+            let weights = around.weights(*at);
+            for (field, (_, _, values)) in fields.iter().zip(&mut columns) {
                 let sum = |weights: &Vec<(usize, f64)>| {
-                    weights.iter().map(|(site, w)| w * value(field, *site)).sum()
+                    weights.iter().map(|(site, weight)| weight * value(*field, *site)).sum()
                 };
-                (name, unit, weights.iter().map(|weights| weights.as_ref().map_or(f64::NAN, sum)).collect())
-            })
-            .collect();
+                let found: f64 = weights.as_ref().map_or(f64::NAN, sum);
+                // a slope leads out of the range of a share
+                values.push(if *field == LineField::Damage { found.clamp(0.0, 1.0) } else { found });
+            }
+        }
         line.write::<D>(&output.join(format!("line_{}_{}.csv", line.name, outcome.file_name())), &columns)?;
     }
     Ok(())
@@ -202,7 +229,7 @@ pub fn write<const D: usize>(
 mod tests {
     use super::*;
     use crate::bonds::{CloudBonds, LatticeBonds, VolumeCorrection};
-    use crate::geometry::{Cut, Operation, Shape, lattice};
+    use crate::geometry::{Operation, Shape, lattice};
 
     const CRACK: Cut<2> = Cut { corner: [-1.0, 3.0], edges: [[4.5, 0.0], [0.0; 2]] };
 
@@ -221,7 +248,16 @@ mod tests {
     }
 
     fn value(bonds: &dyn Bonds<2>, at: [f64; 2], field: &dyn Fn([f64; 2]) -> f64) -> Option<f64> {
-        let around = Around::new(bonds, &[[-1.0, at[1]], [13.0, at[1]]]);
+        beside(bonds, &[], at, field)
+    }
+
+    fn beside(
+        bonds: &dyn Bonds<2>,
+        cuts: &[Cut<2>],
+        at: [f64; 2],
+        field: &dyn Fn([f64; 2]) -> f64,
+    ) -> Option<f64> {
+        let around = Around::new(bonds, cuts, &[[-1.0, at[1]], [13.0, at[1]]]);
         let weights = around.weights(at)?;
         Some(weights.iter().map(|(site, weight)| weight * field(bonds.position(*site))).sum())
     }
@@ -267,5 +303,48 @@ mod tests {
         assert!((value(&bonds, [1.2, 3.1], &jump).unwrap() - 1.0).abs() < 1e-12);
         assert_eq!(value(&bonds, [1.2, 3.0], &jump), None);
         assert!(value(&bonds, [9.2, 3.0], &jump).is_some());
+    }
+
+    /// A crack nearer to one row: what lies in the cells of that row but below the crack belongs to the row below.
+    #[test]
+    fn no_value_crosses_a_crack_beside_a_row() {
+        let cut = Cut { corner: [-1.0, 3.4], edges: [[4.5, 0.0], [0.0; 2]] };
+        let bonds = regular([12.0, 6.0], std::slice::from_ref(&cut));
+        let jump = |[_, y]: [f64; 2]| if y > 3.4 { 1.0 } else { 0.0 };
+        for y in [2.9, 3.1, 3.3, 3.399] {
+            assert_eq!(beside(&bonds, std::slice::from_ref(&cut), [1.2, y], &jump), Some(0.0), "{y}");
+        }
+        let above = beside(&bonds, std::slice::from_ref(&cut), [1.2, 3.41], &jump);
+        assert!((above.unwrap() - 1.0).abs() < 1e-12);
+        assert_eq!(beside(&bonds, std::slice::from_ref(&cut), [1.2, 3.4], &jump), None);
+    }
+
+    /// A row of particles that is straight but for rounding: beside it the value is that along it.
+    #[test]
+    fn nearly_straight_rows() {
+        for uneven in [1e-8, 1e-4, 1e-2] {
+            let points: Vec<[f64; 2]> = (0..40)
+                .map(|k| [f64::from(k) + 0.5, uneven * ((f64::from(k) * 0.618).fract() - 0.5)])
+                .collect();
+            let bonds =
+                CloudBonds::new(&points, &[1.0; 40], 1.0, 3.015, VolumeCorrection::None, &[]).unwrap();
+            let curved = |[x, _]: [f64; 2]| 0.01 * x * x;
+            for y in [0.0, 0.3, 0.9] {
+                let found = value(&bonds, [6.2, y], &curved).unwrap();
+                assert!((found - curved([6.2, y])).abs() < 0.02, "{uneven} {y} {found}");
+            }
+        }
+    }
+
+    /// A large particle holds places that are nearer to small ones, or farther than the horizon from all.
+    #[test]
+    fn nearest_of_unequal_particles() {
+        let small = [[2.0, 0.0], [2.0, 0.6], [2.6, -0.6], [2.6, 0.5]];
+        let points: Vec<[f64; 2]> = [[0.0, 0.0]].into_iter().chain(small).collect();
+        let volumes = [9.0, 0.01, 0.01, 0.01, 0.01];
+        let bonds = CloudBonds::new(&points, &volumes, 1.0, 2.1, VolumeCorrection::None, &[]).unwrap();
+        let own = |[x, y]: [f64; 2]| if [x, y] == [0.0, 0.0] { 1000.0 } else { x };
+        assert!((value(&bonds, [2.3, 0.0], &own).unwrap() - 2.3).abs() < 1.0);
+        assert_eq!(value(&bonds, [-2.5, 0.5], &own), Some(1000.0));
     }
 }

@@ -5,22 +5,21 @@ use super::values::vector;
 use crate::bonds::{Bonds, CellGrid};
 use crate::geometry::Cut;
 use polycore::scene::{SceneError, Source};
+use polycore::units::Length;
 
 /// The cracks of a scene.
 ///
 /// # Errors
 /// As [`super::body_of`].
 pub(super) fn cracks<const D: usize>(source: &Source, scene: &Scene) -> Result<Vec<Cut<D>>, SceneError> {
-    let each = scene.body.cracks.iter().enumerate().map(|(index, crack)| {
+    let cuts = cuts_of(scene);
+    for (index, (crack, Cut { edges, .. })) in scene.body.cracks.iter().zip(&cuts).enumerate() {
         let key = |name: &str| format!("body.cracks[{index}].{name}");
-        let from: [f64; D] = vector(source, &key("from"), &crack.from)?;
-        let to: [f64; D] = vector(source, &key("to"), &crack.to)?;
-        let mut edges = [[0.0; D]; D];
-        edges[0] = std::array::from_fn(|d| to[d] - from[d]);
+        vector::<D>(source, &key("from"), &crack.from)?;
+        vector::<D>(source, &key("to"), &crack.to)?;
         match (&crack.and, D) {
             (Some(and), 3) => {
-                let and: [f64; D] = vector(source, &key("and"), and)?;
-                edges[1] = std::array::from_fn(|d| and[d] - from[d]);
+                vector::<D>(source, &key("and"), and)?;
             }
             (None, 2) => {}
             (Some(_), _) => return Err(source.error(&key("and"), "a third corner", "none in a plane body")),
@@ -32,7 +31,21 @@ pub(super) fn cracks<const D: usize>(source: &Source, scene: &Scene) -> Result<V
         if D == 3 && parallel(edges[0], edges[1]) {
             return Err(source.error(&key("and"), "a corner on the line `from`–`to`", "a corner beside it"));
         }
-        Ok(Cut { corner: from, edges })
+    }
+    Ok(cuts)
+}
+
+/// The same of a scene that is checked.
+pub fn cuts_of<const D: usize>(scene: &Scene) -> Vec<Cut<D>> {
+    let each = scene.body.cracks.iter().map(|crack| {
+        let place =
+            |of: &[Length]| -> [f64; D] { std::array::from_fn(|d| of.get(d).map_or(0.0, |x| x.si())) };
+        let corner = place(&crack.from);
+        let edge = |end: &Vec<Length>| -> [f64; D] { std::array::from_fn(|d| place(end)[d] - corner[d]) };
+        let mut edges = [[0.0; D]; D];
+        edges[0] = edge(&crack.to);
+        edges[1] = crack.and.as_ref().map_or([0.0; D], edge);
+        Cut { corner, edges }
     });
     each.collect()
 }

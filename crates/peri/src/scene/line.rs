@@ -3,6 +3,7 @@
 use super::Scene;
 use super::values::vector;
 use crate::calibrate::Space;
+use crate::geometry::length;
 use crate::quantities as q;
 use polycore::report::Named;
 use polycore::scene::{LineSpec, SceneError, Source, check_name};
@@ -89,11 +90,14 @@ impl SectionSpec {
             let found = format!("{} components", self.normal.len());
             return Err(source.error(&key, found, format!("{D} components")));
         };
-        let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if !length.is_normal() {
-            return Err(source.error(&key, format!("{normal:?}"), "numbers, not all of them 0"));
+        let largest = normal.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+        if largest == 0.0 || !normal.iter().all(|x| x.is_finite()) {
+            return Err(source.error(&key, format!("{normal:?}"), "finite numbers, not all of them 0"));
         }
-        Ok((point, normal.map(|x| x / length)))
+        // squares of what is very small or large are 0 or infinite
+        let normal = normal.map(|x| x / largest);
+        let size = length(normal);
+        Ok((point, normal.map(|x| x / size)))
     }
 }
 
@@ -123,4 +127,27 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_of_any_length() {
+        let source = Source::new("scene.toml", "");
+        let plane = |normal: [f64; 2]| {
+            let point = vec!["1 mm".parse().unwrap(); 2];
+            let spec = SectionSpec { name: "s".into(), point, normal: normal.to_vec() };
+            spec.plane::<2>(&source, "output.section[0]").map(|(_, normal)| normal)
+        };
+        for size in [1e-300, 1e-200, 1.0, 1e200, f64::MAX] {
+            assert_eq!(plane([0.0, -size]).unwrap(), [0.0, -1.0]);
+        }
+        assert_eq!(plane([3e-200, 4e-200]).unwrap(), [0.6, 0.8]);
+        for wrong in [[0.0; 2], [f64::NAN, 1.0], [1.0, f64::INFINITY]] {
+            let message = plane(wrong).unwrap_err().to_string();
+            assert!(message.contains("finite numbers, not all of them 0"), "{message}");
+        }
+    }
 }

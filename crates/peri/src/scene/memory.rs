@@ -33,6 +33,8 @@ const PICTURES: f64 = 60e6;
 const DRAWN: f64 = 150.0;
 /// The same of a solid: two places, two values, its place in the lattice, its neighbours, the faces of its surface.
 const DRAWN_IN_SPACE: f64 = 350.0;
+/// A particle near a line: its site, its place, its cell, as they are sorted.
+const NEAR_LINE: f64 = 100.0;
 /// A bond of a cloud beside what it keeps: the lists while they are built.
 const BOND_LISTS: f64 = 12.0;
 
@@ -78,9 +80,12 @@ fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     };
     // a row of history and its copy in a checkpoint
     let row = size_of::<Record>() + 24 * scene.boundary.len() + 48 * scene.output.section.len();
-    // weights of the particles around each point, and every column
+    // a table: arc length, position twice, every column; near particles and their cells
     let points = scene.output.line.iter().map(|line| line.points).max().unwrap_or(0) as f64;
-    let line = points * (16.0 * 150.0 + 8.0 * (8.0 + 2.0 * measures * (D * D) as f64));
+    let line = points * 8.0 * (2.0 + 4.0 * D as f64 + 2.0 * measures * (D * D) as f64);
+    if points > 0.0 {
+        each += NEAR_LINE;
+    }
     let canvas = if scene.output.pictures { PICTURES } else { 0.0 };
     canvas + line + particles * each + 2.0 * rows as f64 * row as f64
 }

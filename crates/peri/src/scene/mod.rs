@@ -23,6 +23,7 @@ mod warn;
 pub use boundary::{Boundary, Prescribed, PrescribedField, Side};
 pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
+pub use crack::cuts_of;
 pub use expect::{quantities, quantities_of};
 pub use explain::explain;
 pub use formula::Formula;

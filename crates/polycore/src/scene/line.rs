@@ -10,6 +10,8 @@ use crate::units::Length;
 
 /// Points of a line at most.
 const MOST_POINTS: usize = 100_000;
+/// Characters of a name at most: with what is added it must still name a file.
+const MOST_CHARACTERS: usize = 64;
 
 /// A straight line through a body at rest, along which fields are written at the end of the run.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -35,13 +37,14 @@ fn points() -> usize {
 /// Checks a name that may be part of a file's name and of a value's.
 ///
 /// # Errors
-/// Other characters than letters, digits, `-` and `_`, or none.
+/// Other characters than letters, digits, `-` and `_`, none, or more than 64.
 pub fn check_name(source: &Source, key: &str, name: &str) -> Result<(), SceneError> {
     let valid = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if !name.is_empty() && name.chars().all(valid) {
+    if (1..=MOST_CHARACTERS).contains(&name.len()) && name.chars().all(valid) {
         return Ok(());
     }
-    Err(source.error(key, format!("`{name}`"), "letters, digits, `-` and `_`: it names files"))
+    let allowed = format!("1 to {MOST_CHARACTERS} letters, digits, `-` and `_`: it names files");
+    Err(source.error(key, format!("`{name}`"), allowed))
 }
 
 impl LineSpec {
@@ -112,14 +115,14 @@ impl LineSpec {
         (0..self.points).map(at).collect()
     }
 
-    /// Refuses a line of which no point lies in the body.
+    /// Refuses a line of which no point lies `inside` the body.
     ///
     /// # Errors
     /// The line at `index`.
-    pub fn refuse_outside(&self, source: &Source, index: usize, inside: usize) -> Result<(), SceneError> {
+    pub fn refuse_outside(&self, source: &Source, index: usize, inside: bool) -> Result<(), SceneError> {
         let found = "a line of which no point lies in the body";
         let fault = || source.error(&format!("output.line[{index}].from"), found, "a line through the body");
-        if inside == 0 { Err(fault()) } else { Ok(()) }
+        if inside { Ok(()) } else { Err(fault()) }
     }
 
     /// Writes arc length, reference position and columns of values; NaN leaves a cell empty.
