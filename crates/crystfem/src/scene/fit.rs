@@ -1,7 +1,8 @@
 //! The scene of a fit.
 
 use super::fault::{located, located_in};
-use super::heat_flow::{HeatFlowSpec, Limit, Measured};
+use super::fit_spec::{FitLaw, FitSpec, temperature, time};
+use super::heat_flow::Measured;
 use super::material::KINETICS_KEYS;
 use super::{OutputSpec, Program, check_name};
 use crate::fit::{Cooling, DEGREES, Known, Run};
@@ -9,10 +10,9 @@ use crate::kinetics::{Constants, Kinetics};
 use crate::table::{Column, read};
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
-use polycore::units::dimension::{RatioDimension, TemperatureDimension, TimeDimension};
-use polycore::units::{Mass, MolarEnergy, Temperature, TemperatureRate};
+use polycore::units::dimension::RatioDimension;
 use serde::Deserialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A whole scene.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -31,62 +31,6 @@ pub struct FitScene {
     /// Expected results.
     #[serde(default)]
     pub expect: Vec<Expect>,
-}
-
-/// Laws that can be fitted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum FitLaw {
-    /// Eq. (4.2), from one isothermal run: columns `time` and `alpha`.
-    Avrami,
-    /// Eq. (4.3), at each of `temperatures`, from runs at constant cooling rates: columns `temperature` and `alpha`.
-    Ozawa,
-    /// Eqs (4.4) to (4.7): K₀, K_G and n, from runs at constant cooling rates (`rate`; columns `temperature` and `alpha`) or
-    /// along any histories that begin in the melt (columns `time`, `temperature` and `alpha`).
-    Nakamura,
-}
-
-/// One fit.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FitSpec {
-    /// Its name: the values are `NAME.half_time`, `NAME.half_time.lower` …
-    pub name: String,
-    /// Law.
-    pub law: FitLaw,
-    /// Measurements.
-    pub data: Vec<DataSpec>,
-    /// The files have raw heat flow of a calorimeter: columns `time` and `heat_flow` in place of `alpha`.
-    pub heat_flow: Option<HeatFlowSpec>,
-    /// Where rates are compared, of `ozawa`.
-    #[serde(default)]
-    pub temperatures: Vec<Temperature>,
-    /// Equilibrium melting temperature T₀, of `nakamura`.
-    pub equilibrium_melting: Option<Temperature>,
-    /// Temperature T∞ of frozen chains, of `nakamura`.
-    pub frozen: Option<Temperature>,
-    /// Glass transition T_g, of `nakamura`, instead of `frozen`: T∞ = T_g − 30 K.
-    pub glass_transition: Option<Temperature>,
-    /// Activation energy U, of `nakamura`; default 6270 J/mol.
-    pub activation_energy: Option<MolarEnergy>,
-}
-
-/// A table of measurements.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct DataSpec {
-    /// CSV file, relative to the scene.
-    pub file: PathBuf,
-    /// Cooling rate.
-    pub rate: Option<TemperatureRate>,
-    /// Mass of the sample, of heat flow in W.
-    pub mass: Option<Mass>,
-    /// Where the integration of the heat flow begins, a time or a temperature; default the first row.
-    #[schemars(with = "Option<String>")]
-    pub from: Option<Limit>,
-    /// Where it ends; default the last row.
-    #[schemars(with = "Option<String>")]
-    pub to: Option<Limit>,
 }
 
 /// A fit with its data, checked.
@@ -285,14 +229,6 @@ impl FitSpec {
         Kinetics::new(trial).map_err(|error| located_in(source, block, &KINETICS_KEYS, &error))?;
         Ok(known)
     }
-}
-
-pub(super) fn time() -> Column {
-    Column::of::<TimeDimension>("time")
-}
-
-pub(super) fn temperature() -> Column {
-    Column::of::<TemperatureDimension>("temperature")
 }
 
 fn alpha() -> Column {

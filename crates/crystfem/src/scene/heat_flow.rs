@@ -1,61 +1,14 @@
 //! Raw heat flow of a calorimeter as measurements of a fit.
 
 use super::fault::located;
-use super::fit::{DataSpec, FitLaw, FitSpec, temperature, time};
+use super::fit_spec::{DataSpec, Direction, FitLaw, FitSpec, HeatFlowSpec, Limit, temperature, time};
 use crate::error::Error;
-use crate::fit::{Baseline, Peak, at};
+use crate::fit::{Peak, at};
 use crate::run::celsius::CELSIUS;
 use crate::table::{Column, read_with_lines};
 use polycore::scene::{SceneError, Source};
 use polycore::units::dimension::{PowerDimension, SpecificPowerDimension};
-use polycore::units::{SpecificEnergy, Temperature, Time};
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer};
 use std::path::Path;
-
-/// How the heat flows of a fit are to be read.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct HeatFlowSpec {
-    /// Where exothermal peaks point.
-    pub exothermal: Direction,
-    /// What is subtracted.
-    #[serde(default)]
-    pub baseline: Baseline,
-    /// Heat of fusion of the perfect crystal: gives the degree of crystallinity.
-    pub latent_heat: Option<SpecificEnergy>,
-}
-
-/// Direction of a peak.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Direction {
-    /// Positive values are heat given off.
-    Up,
-    /// Positive values are heat taken up.
-    Down,
-}
-
-/// A limit of integration.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Limit {
-    /// The time.
-    Time(Time),
-    /// Where this temperature is passed on cooling.
-    Temperature(Temperature),
-}
-
-impl<'de> Deserialize<'de> for Limit {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        let temperature = || text.parse().map(Self::Temperature);
-        text.parse().map(Self::Time).or_else(|_| temperature()).map_err(|why| {
-            D::Error::custom(format!(
-                "found `{text}`; allowed: a time, e.g. \"90 s\", or a temperature; {why}"
-            ))
-        })
-    }
-}
 
 /// The peak of a file.
 #[derive(Clone, Debug)]

@@ -463,3 +463,65 @@ fn kernels_of_solids_are_plain_loops() {
         kernels_are_plain_loops::<3>(Space::Solid, 7, volume);
     }
 }
+
+/// A bond of 1/196 of its families releases what it is said to, but for terms of second order in that share.
+#[test]
+fn a_broken_bond_releases_its_energy() {
+    fn off<L: PointLaw<2> + Clone>(solid: NonlocalSolid<L>) -> f64 {
+        let body = [Operation::Add(Shape::Box { min: [0.0; 2], max: [22.0; 2] })];
+        let lattice = lattice(&body, 1.0, 1.0).unwrap();
+        let mut bonds = LatticeBonds::new(lattice, 8.015, VolumeCorrection::None, &[]).unwrap();
+        let sites: Vec<usize> = bonds.particles().iter().map(|&site| site as usize).collect();
+        let placed: Vec<[f64; 2]> = sites.iter().map(|&site| displaced(bonds.position(site))).collect();
+        let displacement = scatter(bonds.sites(), &sites, &placed);
+        let count = bonds.stencil().offsets.len() as u32;
+        // a particle with every bond, and one of its bonds
+        let site = *sites.iter().find(|&&site| bonds.position(site) == [10.5, 10.5]).unwrap();
+        let mut found = None;
+        bonds.neighbours(site, &mut |bond| found = if bond.bond == [3.0, 2.0] { Some(bond) } else { found });
+        let bond = found.unwrap();
+        let seen = peri::material::Bond::new(site, &bond, &displacement);
+        let mut states = Pointwise::new(solid.clone(), &bonds);
+        let before = states.energy(&bonds, &displacement, StretchRange::REST);
+        let end = |end: usize| {
+            let point = &states.points()[end];
+            let weighed = solid.energy(&Family::new(&bonds, &displacement, end), point);
+            solid.released_energy(&seen, point, weighed).unwrap()
+        };
+        let said = (end(site) + end(bond.site)) / f64::from(count);
+        let entry = |site: usize, index| Overstretched {
+            site: site as u32,
+            index,
+            elongation: 0.0,
+            length: 1.0,
+            weight: 1.0,
+        };
+        bonds.sever(&[entry(site, bond.index), entry(bond.site, count - 1 - bond.index)]);
+        let released = before - states.energy(&bonds, &displacement, StretchRange::REST);
+        (released / said - 1.0).abs()
+    }
+    let worst = off(rubber::<2>(Space::PlaneStrain, 5.0)).max(off(neo_hooke::<2>(Space::PlaneStrain, 5.0)));
+    at_most("released_energy_of_a_bond", worst, 0.03);
+}
+
+/// The coarse level knows the bulk modulus: iterations grow as its root, not as itself.
+#[test]
+fn iterations_at_large_bulk_moduli() {
+    let iterations = |bulk: f64| {
+        let strip = Shape::rectangle([0.0, -3e-3], [32e-3, 11e-3]);
+        let body = peri::model::Body::lattice(strip, 0.5e-3).plane_strain(1e-3);
+        let rubber = NonlocalSolid(EightChain::new(Space::PlaneStrain, 0.4e6, 25.0, bulk * 0.4e6).unwrap());
+        let model = peri::model::Model::new(body, rubber)
+            .clamp(|[_, y]| y < 0.0)
+            .displace(|[_, y]| y > 8e-3, [0.0, -0.08e-3]);
+        let mut simulation = model.build().unwrap();
+        let method = peri::solver::Lbfgs { tolerance: 1e-4, ..Default::default() };
+        simulation.solve(method).unwrap();
+        simulation.state.total_iterations as f64
+    };
+    let found = [10.0, 100.0, 1000.0].map(iterations);
+    // without the volume in the coarse level: 23, 205, 2470
+    for (found, most) in found.into_iter().zip([25.0, 75.0, 280.0]) {
+        at_most("iterations_at_large_bulk_moduli", found, most);
+    }
+}
