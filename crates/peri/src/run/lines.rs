@@ -206,12 +206,14 @@ pub fn write<const D: usize>(
         let around = Around::new(bonds, &cuts, &places);
         let by_default = |field| !matches!(field, LineField::Stress { piola: true, .. });
         let wanted = line_fields(scene).into_iter().filter(|(f, name, _)| line.wants(name, by_default(*f)));
-        let (fields, mut columns): (Vec<LineField>, Vec<(String, &str, Vec<f64>)>) =
-            wanted.map(|(field, name, unit)| (field, (name, unit, Vec::with_capacity(places.len())))).unzip();
+        let wanted: Vec<_> = wanted.collect();
+        let empty = || Vec::with_capacity(places.len());
+        let mut columns: Vec<(String, &str, Vec<f64>)> =
+            wanted.iter().map(|(_, name, unit)| (name.clone(), *unit, empty())).collect();
         // point by point: the weights of all would take more than the body
         for at in &places {
             let weights = around.weights(*at);
-            for (field, (_, _, values)) in fields.iter().zip(&mut columns) {
+            for ((field, ..), (_, _, values)) in wanted.iter().zip(&mut columns) {
                 let sum = |weights: &Vec<(usize, f64)>| {
                     weights.iter().map(|(site, weight)| weight * value(*field, *site)).sum()
                 };
