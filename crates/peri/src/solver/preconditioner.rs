@@ -87,8 +87,7 @@ impl<const D: usize> Preconditioner<D> {
             bonds,
             loads: &system.loads,
             displacement: &state.displacement,
-            law: (law, modulus, state.fitted),
-            volumetric: system.material.volumetric(),
+            law: (law, [modulus, system.material.volumetric()], state.fitted),
             springs: &springs,
             survey: &survey,
         };

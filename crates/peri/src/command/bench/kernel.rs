@@ -44,10 +44,11 @@ pub fn loaded<const D: usize>(
     Ok((fit, displacement))
 }
 
+/// A material at work, and its name.
+pub type Named<const D: usize> = (&'static str, Box<dyn Response<D>>);
+
 /// Solids with two passes, by name: chains of 25 links, and neo-Hookean rubber by correspondence, K/μ = 100.
-pub fn solids<const D: usize>(
-    bonds: &dyn Bonds<D>,
-) -> Result<[(&'static str, Box<dyn Response<D>>); 2], Failure> {
+pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 2], Failure> {
     let space = if D == 2 { Space::PlaneStrain } else { Space::Solid };
     let law =
         NeoHookean::new(1.0).and_then(|law| Compressible::new(law, Volumetric::Ciarlet { lame: 100.0 }));

@@ -32,10 +32,8 @@ pub struct Body<'a, const D: usize> {
     pub loads: &'a Loads<D>,
     /// Where the body is.
     pub displacement: &'a Field<D>,
-    /// The law, kθ and the stretches it is fitted for.
-    pub law: (&'a dyn BondPotential, f64, [f64; 2]),
-    /// λ of the volume in addition to that of bonds, Pa.
-    pub volumetric: f64,
+    /// The law; kθ, N/m⁶, and λ of the volume in addition to that of bonds, Pa; the stretches that the law is fitted for.
+    pub law: (&'a dyn BondPotential, [f64; 2], [f64; 2]),
     /// Stiffness density of each site, N/m⁵, which holds what is constrained.
     pub springs: &'a [f64],
     /// The bonds' survey.
@@ -59,9 +57,8 @@ impl<const D: usize> Coarse<D> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
         let whole = if body.bonds.as_lattice().is_some() { body.survey.most } else { u32::MAX };
         let space = Space::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
-        let Body { bonds, loads, displacement, law, volumetric, springs, survey } = *body;
-        let assembly =
-            Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge, volumetric);
+        let Body { bonds, loads, displacement, law, springs, survey } = *body;
+        let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
         let matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
             space.elements.par_iter().map(|element| assembly.element(&space, element)).collect();
         let extent = extent(body.bonds);

@@ -111,18 +111,17 @@ pub struct Assembly<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Assembly<'a, D> {
-    /// `law` is fitted over `stretches`.
+    /// `law` comes with kθ and the λ of the volume beside it, and the stretches that it is fitted over.
     pub fn new(
         bonds: &'a dyn Bonds<D>,
         loads: &'a Loads<D>,
         displacement: &'a Field<D>,
         survey: &'a Survey,
-        law: (&dyn BondPotential, f64, [f64; 2]),
+        law: (&dyn BondPotential, [f64; 2], [f64; 2]),
         springs: &'a [f64],
         edge: [f64; D],
-        volumetric: f64,
     ) -> Self {
-        let (law, modulus, stretches) = law;
+        let (law, [modulus, volumetric], stretches) = law;
         let tangents = Tangents::new(law, stretches);
         let volumes: f64 = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).sum();
         let thickness = volumes / bonds.particles().len().max(1) as f64 / bonds.spacing().powi(D as i32);
