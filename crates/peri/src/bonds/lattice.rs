@@ -1,8 +1,6 @@
 //! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
 
-use super::kernel::dispatch;
 use super::lattice_kernel::{Class, TILE, Tiles};
-use super::linear_kernel::{self, LinearPass, LinearRow, MomentPass, Moments};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::{
     Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
@@ -184,24 +182,8 @@ impl<const D: usize> LatticeBonds<D> {
         volume * self.interior_factor * surface_weight(bond, length, factors.get(site), factors.get(other))
     }
 
-    /// The stencil for [`Self::moments`] and [`Self::linear_force`].
-    pub fn linear_rows(&self) -> Vec<LinearRow<D>> {
-        let spacing = self.lattice.spacing;
-        let row = |(k, &offset): (usize, &[i32; D])| {
-            let length = self.stencil.length(k) * spacing;
-            let volume = self.lattice.volume * self.volume_correction.factor(length, self.horizon(), spacing);
-            let inverse_square = 1.0 / (length * length);
-            LinearRow {
-                shift: self.shift(offset),
-                bond: offset.map(|o| f64::from(o) * spacing),
-                share: volume * inverse_square,
-                inverse_square,
-            }
-        };
-        self.stencil.offsets.iter().enumerate().map(row).collect()
-    }
-
-    fn tiles<'a>(&'a self, displacement: &'a Field<D>) -> Tiles<'a, D> {
+    /// What lattice kernels read, with a displacement.
+    pub(super) fn tiles<'a>(&'a self, displacement: &'a Field<D>) -> Tiles<'a, D> {
         Tiles {
             displacement: displacement.components(),
             intact: &self.intact,
@@ -209,35 +191,6 @@ impl<const D: usize> LatticeBonds<D> {
             factors: self.factors.as_ref().map(Field::components),
             guard: self.guard,
         }
-    }
-
-    /// Σ_J (V_J/|ξ|²)|η|² and Σ_J (V_J/|ξ|²) η⊗ξ of the particles of work item `chunk`, tile by tile: `visit` takes the first site
-    /// of a tile. N = 1 + D²; tiles without bonds are left out.
-    pub fn moments<const N: usize>(
-        &self,
-        rows: &[LinearRow<D>],
-        displacement: &Field<D>,
-        chunk: usize,
-        visit: &mut dyn FnMut(usize, &Moments<N>),
-    ) {
-        let range = chunk_range(chunk, self.sites);
-        let (start, length, tiles) = (range.start, range.len(), &self.tiles(displacement));
-        linear_kernel::moments(MomentPass { rows, tiles, start, length, visit });
-    }
-
-    /// Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ] of the particles of work item `chunk`, with `terms` = (A, S rows first).
-    pub fn linear_force<const N: usize>(
-        &self,
-        rows: &[LinearRow<D>],
-        displacement: &Field<D>,
-        terms: &Field<N>,
-        chunk: usize,
-        force: &mut [&mut [f64]; D],
-        track: Option<&mut StretchRange>,
-    ) {
-        let (tiles, terms) = (&self.tiles(displacement), terms.components());
-        let start = chunk_range(chunk, self.sites).start;
-        dispatch(LinearPass { rows, tiles, terms }, start, force, track);
     }
 
     /// Number of intact bonds of a site.

@@ -7,6 +7,7 @@ mod cloud_kernel;
 mod kernel;
 mod lattice;
 mod lattice_kernel;
+mod linear;
 mod linear_kernel;
 mod property;
 mod rows;

@@ -1,0 +1,56 @@
+//! Both passes of materials whose forces are linear in a bond, on a lattice.
+
+use super::kernel::dispatch;
+use super::linear_kernel::{self, LinearPass, LinearRow, MomentPass, Moments};
+use super::{Bonds, LatticeBonds};
+use crate::field::{Field, chunk_range};
+use crate::potential::StretchRange;
+
+impl<const D: usize> LatticeBonds<D> {
+    /// The stencil for [`Self::moments`] and [`Self::linear_force`].
+    pub fn linear_rows(&self) -> Vec<LinearRow<D>> {
+        let spacing = self.spacing();
+        let row = |(k, &offset): (usize, &[i32; D])| {
+            let length = self.stencil().length(k) * spacing;
+            let volume =
+                self.lattice().volume * self.volume_correction().factor(length, self.horizon(), spacing);
+            let inverse_square = 1.0 / (length * length);
+            LinearRow {
+                shift: self.shift(offset),
+                bond: offset.map(|o| f64::from(o) * spacing),
+                share: volume * inverse_square,
+                inverse_square,
+            }
+        };
+        self.stencil().offsets.iter().enumerate().map(row).collect()
+    }
+
+    /// Σ_J (V_J/|ξ|²)|η|² and Σ_J (V_J/|ξ|²) η⊗ξ of the particles of work item `chunk`, tile by tile: `visit` takes the first site
+    /// of a tile. N = 1 + D²; tiles without bonds are left out.
+    pub fn moments<const N: usize>(
+        &self,
+        rows: &[LinearRow<D>],
+        displacement: &Field<D>,
+        chunk: usize,
+        visit: &mut dyn FnMut(usize, &Moments<N>),
+    ) {
+        let range = chunk_range(chunk, self.sites());
+        let (start, length, tiles) = (range.start, range.len(), &self.tiles(displacement));
+        linear_kernel::moments(MomentPass { rows, tiles, start, length, visit });
+    }
+
+    /// Σ_J (V_J/|ξ|²)[(A_I + A_J) η + (S_I + S_J) ξ] of the particles of work item `chunk`, with `terms` = (A, S rows first).
+    pub fn linear_force<const N: usize>(
+        &self,
+        rows: &[LinearRow<D>],
+        displacement: &Field<D>,
+        terms: &Field<N>,
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
+        let (tiles, terms) = (&self.tiles(displacement), terms.components());
+        let start = chunk_range(chunk, self.sites()).start;
+        dispatch(LinearPass { rows, tiles, terms }, start, force, track);
+    }
+}
