@@ -44,6 +44,16 @@ impl Interpretation {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::BondFull, Self::BondEighth, Self::ChainFull, Self::ChainEighth];
 
+    /// Name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::BondFull => "bond-full",
+            Self::BondEighth => "bond-eighth",
+            Self::ChainFull => "chain-full",
+            Self::ChainEighth => "chain-eighth",
+        }
+    }
+
     /// The critical bond stretch for a factor and a number of links.
     pub fn stretch(self, factor: f64, links: f64) -> f64 {
         let (contour, eighth) = (factor * links.sqrt(), factor * (links / 8.0).sqrt());

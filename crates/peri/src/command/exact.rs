@@ -143,7 +143,8 @@ fn print_law(law: Law, links: f64, dissociation: f64, to: f64) -> Result<(), Fai
         );
         for interpretation in Interpretation::ALL {
             polycore::say!(
-                "critical stretch of 1.2 √n̄ by {interpretation:?}: {:.4}",
+                "critical stretch of 1.2 √n̄ by {}: {:.4}",
+                interpretation.name(),
                 interpretation.stretch(1.2, links)
             );
         }
