@@ -141,7 +141,11 @@ impl FromStr for Tolerance {
 impl fmt::Display for Tolerance {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Relative(share) => write!(f, "{} %", share * 100.0),
+            // twelve digits: as it was written
+            Self::Relative(share) => {
+                let percent = share * 100.0;
+                write!(f, "{} %", format!("{percent:.12e}").parse().unwrap_or(percent))
+            }
             Self::Absolute(distance) => write!(f, "{distance}"),
         }
     }
