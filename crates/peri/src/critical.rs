@@ -83,18 +83,19 @@ pub struct Context<'a> {
 }
 
 /// Energy density Y_c, J/m³, beyond which bonds of a solid break that has the fracture energy G, J/m²: G/(c Σ ŵ|ξ₁|), with the sum over
-/// a family with every bond. c = 1.13 + 0.98/m, m the horizon over the spacing, makes the crack of a pure-shear strip run at G
+/// the largest family of the body. c = 1.13 + 0.98/m, m the horizon over the spacing, makes the crack of a pure-shear strip run at G
 /// (cases/ch5/rubber-tearing): bonds ahead of a tip release less than the mean of those that a crack cuts.
 pub fn energy_limit<const D: usize>(bonds: &dyn Bonds<D>, fracture_energy: f64) -> f64 {
+    // the axis along which the family reaches farthest, in bodies thinner than it
     let mut most = [0.0_f64; 2];
     for &site in bonds.particles() {
-        let mut own = [0.0; 2];
+        let (mut whole, mut reach) = (0.0, [0.0; D]);
         bonds.neighbours(site as usize, &mut |bond| {
-            own[0] += bond.volume;
-            own[1] += bond.volume * bond.bond[0].abs();
+            whole += bond.volume;
+            (0..D).for_each(|d| reach[d] += bond.volume * bond.bond[d].abs());
         });
-        if own[0] > most[0] {
-            most = own;
+        if whole > most[0] {
+            most = [whole, reach.into_iter().fold(0.0, f64::max)];
         }
     }
     let calibration = 1.13 + 0.98 * bonds.spacing() / bonds.horizon();

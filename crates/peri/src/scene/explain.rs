@@ -56,7 +56,7 @@ pub fn explain<const D: usize>(
     if let Some(criterion) = criterion {
         let limit = match criterion {
             Criterion::Stretch(stretch) => format!("at a stretch of {:.6}", stretch.least()),
-            Criterion::Energy(limit) => format!("that release more than {limit:.4e} J/m³"),
+            Criterion::Energy(limit) => format!("where that releases more than {limit:.4e} J/m³"),
         };
         builds(format!("bonds that break {limit}, damage, a count of each particle's bonds"));
     }
