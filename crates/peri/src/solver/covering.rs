@@ -66,7 +66,7 @@ impl<const D: usize> System<'_, D> {
         }
     }
 
-    fn fit(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {
+    pub(super) fn fit(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {
         let (bound, clamped) = (self.fit_bound, self.breaking.is_some());
         let cover = Cover { stretches: state.fitted, bound, clamped, known };
         state.tangent = self.material.cover(&mut *self.bonds, &state.displacement, &cover)?;

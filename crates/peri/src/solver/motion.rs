@@ -39,6 +39,8 @@ pub struct Motion {
     pub(super) floor: f64,
     /// Largest of what was available and what has gone.
     pub(super) turnover: f64,
+    /// Stretches up to which `frequency` is good for a material whose stiffness is known at one displacement only.
+    pub(super) known: Option<[f64; 2]>,
     /// Stretches at the last look, and how much they may have changed since.
     pub(super) looked: [f64; 2],
     pub(super) slack: f64,
@@ -66,9 +68,17 @@ impl Motion {
         self.slack = 0.0;
     }
 
+    /// Whether stretches have left what `frequency` is good for.
+    pub(super) fn is_outgrown(&self) -> bool {
+        self.known.is_some_and(|[low, high]| self.looked[0] < low || self.looked[1] > high)
+    }
+
     /// Whether stretches may have left what is fitted, or reached the critical one. A bond's stretch changes by no more
     /// than its ends' increments over its length.
-    pub(super) fn must_look(&self, fitted: [f64; 2], critical: Option<f64>) -> bool {
+    pub(super) fn must_look(&self, mut fitted: [f64; 2], critical: Option<f64>) -> bool {
+        if let Some([low, high]) = self.known {
+            fitted = [fitted[0].max(low), fitted[1].min(high)];
+        }
         let [low, high] = [self.looked[0] - self.slack, self.looked[1] + self.slack];
         // NaN looks, too
         let inside = low >= fitted[0] && high <= fitted[1] && critical.is_none_or(|c| high <= c);

@@ -46,8 +46,12 @@ pub struct VelocityVerlet {
     pub records: usize,
 }
 
-/// Factor on ω² of materials whose stiffness is known at one displacement only.
+/// Factor on ω² of materials whose stiffness is known at one displacement only …
 const MARGIN: f64 = 1.3;
+/// … which is looked for again where strains have grown by this part of themselves, or of …
+const GROWS: f64 = 0.25;
+/// … this strain.
+const LEAST: f64 = 0.1;
 
 impl VelocityVerlet {
     /// Steps of 0.9 of the critical one up to `end_time`, no damping, loads at once, 100 rows of history.
@@ -175,8 +179,6 @@ impl VelocityVerlet {
         (state.step, state.iteration, state.step_iterations) = (0, 0, 0);
         let BondSums { stiffness, shortest, extent } = BondSums::new(system);
         let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
-        let range = [observed.low, observed.high].map(|e| (1.0 + e).max(0.0).sqrt());
-        let tangent = system.material.range(range).least_tangent;
         let contact = system.repulsion().map_or(0.0, |contact| {
             contact.greatest_stiffness(&state.displacement).max(contact.pair_stiffness())
         });
@@ -188,17 +190,29 @@ impl VelocityVerlet {
             stiffness,
             shortest,
             extent,
-            frequency: if frequency > 0.0 { frequency / tangent } else { 0.0 },
             turnover: state.work,
             ..Motion::default()
         };
         if let Some(found) = self.time_step.filter(|&found| found > state.motion.critical_step) {
             return Err(Error::TimeStep { found, critical: state.motion.critical_step });
         }
-        self.cover(system, state);
         state.motion.see(observed);
+        self.know(system, state, frequency);
+        self.cover(system, state);
         self.sever(system, state, observed, factor);
         Ok(())
+    }
+
+    /// Notes the sharp frequency of the present stretches in units of the law's tangent there.
+    fn know<const D: usize>(&self, system: &System<D>, state: &mut State<D>, frequency: f64) {
+        let motion = &mut state.motion;
+        let tangent = system.material.range(motion.looked).least_tangent;
+        motion.frequency = if frequency > 0.0 { frequency / tangent } else { 0.0 };
+        if system.material.has_points() {
+            let [low, high] = motion.looked;
+            motion.known =
+                Some([low - GROWS * (1.0 - low).max(LEAST), high + GROWS * (high - 1.0).max(LEAST)]);
+        }
     }
 
     /// What follows from the stretches that the fitted law covers: bounds of the critical time step and of the energy.
@@ -253,7 +267,15 @@ impl VelocityVerlet {
         if look {
             state.observed = state.observed.join(observed);
             state.motion.see(observed);
-            if state.observed.high.is_finite() && system.widen(state)? {
+            let wider = state.observed.high.is_finite() && system.widen(state)?;
+            let outgrown = state.motion.is_outgrown() && observed.high.is_finite();
+            if outgrown {
+                system.fit(state, None)?;
+                let shortest = state.motion.shortest;
+                let frequency = largest_frequency_squared(system, state, volumes, density, shortest);
+                self.know(system, state, frequency);
+            }
+            if wider || outgrown {
                 refresh(system, state, factor, None);
                 system.count_evaluation(state);
                 self.cover(system, state);
