@@ -1,5 +1,6 @@
 //! Regions of a body and what holds there.
 
+use super::ShapeSpec;
 use super::formula::Formula;
 use polycore::units::{Force, Length, Speed, Stress};
 use serde::Deserialize;
@@ -18,6 +19,9 @@ pub struct Boundary {
     pub min: Option<Vec<Length>>,
     /// … and upper corner.
     pub max: Option<Vec<Length>>,
+    /// Or shapes, as those of the body.
+    #[serde(default)]
+    pub shapes: Vec<ShapeSpec>,
     /// Traction on the side, applied as a uniform body force over its layers.
     pub traction: Option<Vec<Stress>>,
     /// Total force on the region, spread over its volume.

@@ -96,7 +96,7 @@ pub fn least_memory<const D: usize>(
 type Outline<const D: usize> = (Vec<Operation<D>>, [f64; D], [f64; D]);
 
 fn outline<const D: usize>(source: &Source, scene: &Scene) -> Result<Outline<D>, SceneError> {
-    let operations = operations(source, scene)?;
+    let operations = operations(source, "body.shapes", scene.body.shapes())?;
     let (low, high) = bounds(&operations)
         .ok_or_else(|| source.error("body.shapes", "no shape is added", "at least one shape with `add`"))?;
     Ok((operations, low, high))
@@ -144,10 +144,14 @@ fn spacing_key(scene: &Scene) -> &'static str {
     if scene.study.iter().any(|study| !study.spacing.is_empty()) { "study" } else { "body.spacing" }
 }
 
-fn operations<const D: usize>(source: &Source, scene: &Scene) -> Result<Vec<Operation<D>>, SceneError> {
-    let shapes = scene.body.shapes();
+/// The list of shapes that stands at `list`.
+pub(super) fn operations<const D: usize>(
+    source: &Source,
+    list: &str,
+    shapes: &[ShapeSpec],
+) -> Result<Vec<Operation<D>>, SceneError> {
     let each = shapes.iter().enumerate().map(|(index, spec)| {
-        let key = format!("body.shapes[{index}]");
+        let key = format!("{list}[{index}]");
         match (spec.add, spec.cut) {
             (Some(kind), None) => Ok(Operation::Add(shape(source, &key, kind, spec)?)),
             (None, Some(kind)) => Ok(Operation::Cut(shape(source, &key, kind, spec)?)),

@@ -1,9 +1,11 @@
 //! From a scene's boundaries to the loads and supports of a body.
 
+use super::build::operations;
 use super::formula::Formula;
 use super::values::{Body, ordered, vector};
 use super::{Boundary, Method, Prescribed, PrescribedField, Scene};
 use crate::field::Field;
+use crate::geometry::inside;
 use crate::solver::{Loads, Support};
 use polycore::scene::{SceneError, Source};
 
@@ -222,7 +224,8 @@ fn name_of(index: usize, boundary: &Boundary) -> String {
     match (&boundary.name, boundary.side) {
         (Some(name), _) => name.clone(),
         (None, Some(side)) => side.to_string(),
-        (None, None) => format!("box{}", index + 1),
+        (None, None) if boundary.shapes.is_empty() => format!("box{}", index + 1),
+        (None, None) => format!("shapes{}", index + 1),
     }
 }
 
@@ -239,7 +242,7 @@ pub(super) fn region<const D: usize>(
 ) -> Result<(Vec<u32>, Option<f64>), SceneError> {
     let spacing = body.bonds.spacing();
     let (low, high, depth) = match (boundary.side, &boundary.min, &boundary.max) {
-        (Some(side), None, None) => {
+        (Some(side), None, None) if boundary.shapes.is_empty() => {
             let (axis, upper) = side.axis();
             if axis >= D {
                 return Err(source.error(
@@ -270,7 +273,7 @@ pub(super) fn region<const D: usize>(
             }
             (low, high, Some(depth))
         }
-        (None, Some(min), Some(max)) => {
+        (None, Some(min), Some(max)) if boundary.shapes.is_empty() => {
             if boundary.layers.is_some() {
                 return Err(source.error(
                     &format!("{key}.layers"),
@@ -283,11 +286,21 @@ pub(super) fn region<const D: usize>(
             ordered(source, key, min, max)?;
             (min, max, None)
         }
-        _ => return Err(source.error(key, "no region", "either `side`, or `min` and `max`")),
+        (None, None, None) if !boundary.shapes.is_empty() && boundary.layers.is_none() => {
+            ([f64::NEG_INFINITY; D], [f64::INFINITY; D], None)
+        }
+        (side, min, max) => {
+            let given = [side.is_some(), min.is_some() || max.is_some(), !boundary.shapes.is_empty()];
+            let several = given.iter().filter(|given| **given).count() > 1;
+            let found = if several { "several kinds of region" } else { "no region" };
+            return Err(source.error(key, found, "one of `side`, `shapes`, or `min` and `max`"));
+        }
     };
+    let shapes = operations(source, &format!("{key}.shapes"), &boundary.shapes)?;
     let inside = |&site: &u32| {
         let position = body.bonds.position(site as usize);
-        (0..D).all(|d| low[d] <= position[d] && position[d] <= high[d])
+        let boxed = (0..D).all(|d| low[d] <= position[d] && position[d] <= high[d]);
+        boxed && (shapes.is_empty() || inside(&shapes, position))
     };
     Ok((body.bonds.particles().iter().copied().filter(inside).collect(), depth))
 }
