@@ -38,7 +38,7 @@ polycore::quantities! {
     REACTION_IMBALANCE = "reaction_imbalance", "", "the same of reactions and loads: what free particles still have out of balance";
     LARGEST_RESIDUAL = "largest_residual", "", "largest residual of any step";
     FAILED_AS_EXPECTED = "failed_as_expected", "", "1 if a variant with `expect_error` ended with this error, else 0";
-    PROBE = "{probe}", "*", "value of a probe at the end (m, rad or a strain)";
+    PROBE = "{probe}", "*", "value of a probe at the end (m, rad, J/m² or a strain)";
     PROBE_PEAK = "{probe}_peak", "*", "its value of the largest size; of a rotation up to the end of its first half swing";
     PROBE_FREQUENCY = "{probe}_frequency", "rad/s", "of a rotation: π over the time of the zero that ends its first half swing";
     PROBE_RATE = "{probe}_rate", "rad/s", "frequency times peak: the rate at which a harmonic swing of this peak begins";

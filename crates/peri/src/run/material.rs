@@ -234,4 +234,27 @@ impl<'a, const D: usize> Observed<'a, D> {
         let (piola, cauchy) = both.unzip();
         Some([piola, cauchy])
     }
+
+    /// Eshelby's energy–momentum ∇uᵀP − W 1 of a solid at some sites, Pa; `visit` takes the place in `sites` with it. Nothing
+    /// of bond laws, and of particles without deformation gradient.
+    pub fn energy_momentum(
+        &self,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        sites: &[u32],
+        visit: &mut dyn FnMut(usize, Tensor<D>),
+    ) {
+        let Self::Solid { law, states } = self else { return };
+        let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
+        states.prepare(bonds, &state.displacement);
+        for (at, &site) in sites.iter().enumerate() {
+            let point = &states.points()[site as usize];
+            let Some(deformation) = point.deformation() else { continue };
+            let piola = law.respond(deformation).piola;
+            let tensor = (deformation.displacement_gradient.transpose() * piola
+                - crate::material::Tensor::<D>::identity() * law.energy(deformation))
+                * point.integrity();
+            visit(at, std::array::from_fn(|a| std::array::from_fn(|b| tensor[(a, b)])));
+        }
+    }
 }

@@ -295,7 +295,7 @@ fn solve<const D: usize>(
     let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
     let course = course.map(|formula| |time: f64| formula.in_time(time));
     let observer = |bonds: &dyn Bonds<D>, state: &State<D>| {
-        let mut seen = probes.see(bonds, state);
+        let mut seen = probes.see(bonds, state, observed);
         seen.extend(sections.see(bonds, state, observed));
         seen
     };

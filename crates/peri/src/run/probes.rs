@@ -1,5 +1,6 @@
 //! What a scene's probes see in every row of the history, and the values that follow from their columns.
 
+use super::material::Observed;
 use super::outcome::Outcome;
 use crate::bonds::Bonds;
 use crate::quantities as q;
@@ -30,6 +31,8 @@ enum Members {
     Marks([Vec<u32>; 2]),
     /// Planes at right angles to the axis, ascending: place and particles.
     Planes(Vec<(f64, Vec<u32>)>),
+    /// Particles of a ring about a crack tip, each with V/t ∇q, m.
+    Ring(Vec<u32>, Vec<[f64; 2]>),
 }
 
 impl<const D: usize> Probes<D> {
@@ -44,6 +47,10 @@ impl<const D: usize> Probes<D> {
             let key = format!("probe[{index}]");
             let members = match (probe.track, probe.axis) {
                 (Track::Strain, _) => Members::Marks(probe.marks(source, &key, body)?),
+                (Track::JIntegral, _) => {
+                    let (sites, weights) = probe.ring(source, &key, body)?;
+                    Members::Ring(sites, weights)
+                }
                 (Track::Front, Some(axis)) => {
                     Members::Planes(planes(bonds, probe.members(source, &key, body)?, axis.index()))
                 }
@@ -58,7 +65,7 @@ impl<const D: usize> Probes<D> {
     }
 
     /// A number of each probe, two of a crack: its tip, and how far from 0 it is across.
-    pub fn see(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Vec<f64> {
+    pub fn see(&self, bonds: &dyn Bonds<D>, state: &State<D>, observed: &Observed<D>) -> Vec<f64> {
         let mut seen = Vec::new();
         for (probe, members) in &self.probes {
             let axis = probe.axis.map_or(0, |axis| axis.index());
@@ -73,6 +80,9 @@ impl<const D: usize> Probes<D> {
                 (Track::Strain, Members::Marks(marks)) => seen.push(strain(bonds, state, marks)),
                 (Track::Front, Members::Planes(planes)) => {
                     seen.push(front(state, planes, axis, probe.threshold.unwrap_or(AT_THE_FRONT)));
+                }
+                (Track::JIntegral, Members::Ring(sites, weights)) => {
+                    seen.push(j_integral(bonds, state, observed, sites, weights, axis));
                 }
                 _ => seen.push(f64::NAN),
             }
@@ -100,6 +110,23 @@ impl<const D: usize> Probes<D> {
         });
         [tip[axis], across]
     }
+}
+
+/// J = Σ V/t (P_ij u_i,1 − W δ_1j) ∂q/∂X_j along the axis 1, J/m²: the domain form of Li, Shih & Needleman (1985),
+/// doi:10.1016/0013-7944(85)90029-3, of Rice's integral in the reference configuration, for flanks without traction.
+fn j_integral<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    state: &State<D>,
+    observed: &Observed<D>,
+    sites: &[u32],
+    weights: &[[f64; 2]],
+    axis: usize,
+) -> f64 {
+    let mut sum = 0.0;
+    observed.energy_momentum(bonds, state, sites, &mut |at, tensor| {
+        sum += weights[at].iter().zip(tensor[axis]).map(|(weight, entry)| weight * entry).sum::<f64>();
+    });
+    sum
 }
 
 /// Particles by their place along an axis.

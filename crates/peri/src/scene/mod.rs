@@ -462,7 +462,8 @@ pub fn schema() -> serde_json::Value {
 impl Scene {
     /// Whether outputs ask for forces or stresses.
     pub fn observes_forces(&self) -> bool {
-        self.stress.is_some() || !self.output.section.is_empty()
+        let j_integral = self.probe.iter().any(|probe| probe.track == Track::JIntegral);
+        self.stress.is_some() || !self.output.section.is_empty() || j_integral
     }
 
     /// Largest relative error of the fitted bond law.

@@ -1,5 +1,5 @@
 //! Quantities that a scene records in every row of the history: displacements, strains between marks, rotations, crack tips, wave
-//! fronts.
+//! fronts, J-integrals.
 
 use super::loads::region;
 use super::values::{Body, vector};
@@ -41,6 +41,10 @@ pub struct Probe {
     pub gauges: Option<[Length; 2]>,
     /// Velocity of a front, as a fraction of the largest.
     pub threshold: Option<f64>,
+    /// Crack tip of a J-integral.
+    pub tip: Option<Vec<Length>>,
+    /// Radii about the tip between which it is taken.
+    pub radii: Option<[Length; 2]>,
 }
 
 /// Quantities of a probe.
@@ -57,6 +61,8 @@ pub enum Track {
     Crack,
     /// Farthest place along the axis at which the velocity along it is a part of the largest, m.
     Front,
+    /// J-integral of a crack that grows along the axis, J/m².
+    JIntegral,
 }
 
 impl Track {
@@ -66,6 +72,7 @@ impl Track {
             Self::Displacement | Self::Crack | Self::Front => "m",
             Self::Rotation => "rad",
             Self::Strain => "",
+            Self::JIntegral => "J/m²",
         }
     }
 }
@@ -82,7 +89,7 @@ impl Probe {
     pub fn values(&self) -> Vec<Named> {
         let front = [q::PROBE_SPEED, q::PROBE_BETWEEN_GAUGES, q::PROBE_BACKSTEP];
         let more = match self.track {
-            Track::Displacement | Track::Strain => Vec::new(),
+            Track::Displacement | Track::Strain | Track::JIntegral => Vec::new(),
             Track::Rotation => vec![q::PROBE_FREQUENCY, q::PROBE_RATE],
             Track::Crack => [&front[..], &[q::PROBE_ACROSS]].concat(),
             Track::Front => front.to_vec(),
@@ -156,6 +163,37 @@ impl Probe {
         }
         Ok(marks)
     }
+
+    /// The particles between the radii of a J-integral, each with its area times ∇q, m: q falls linearly from 1 at the inner radius
+    /// to 0 at the outer.
+    ///
+    /// # Errors
+    /// A ring without particles.
+    pub fn ring<const D: usize>(
+        &self,
+        source: &Source,
+        key: &str,
+        body: &Body<D>,
+    ) -> Result<(Vec<u32>, Vec<[f64; 2]>), SceneError> {
+        let tip = vector::<D>(source, &format!("{key}.tip"), self.tip.as_deref().unwrap_or_default())?;
+        let [inner, outer] = self.radii.map_or([0.0; 2], |radii| radii.map(|r| r.si()));
+        let (mut sites, mut weights) = (Vec::new(), Vec::new());
+        for &site in body.bonds.particles() {
+            let place = body.bonds.position(site as usize);
+            let arm = [place[0] - tip[0], place[1] - tip[1]];
+            let radius = arm[0].hypot(arm[1]);
+            if radius > inner && radius < outer {
+                let area = body.bonds.volume(site as usize) / body.thickness;
+                sites.push(site);
+                weights.push(arm.map(|x| -area * x / (radius * (outer - inner))));
+            }
+        }
+        if sites.is_empty() {
+            let found = format!("{inner} m to {outer} m about {tip:?} m, where no particle is");
+            return Err(source.error(&format!("{key}.radii"), found, "a ring with particles"));
+        }
+        Ok((sites, weights))
+    }
 }
 
 /// Checks what can be judged without a body.
@@ -184,13 +222,17 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         // name, given, belongs, needed
         let of_crack = track == Track::Crack;
         let moving = of_crack || track == Track::Front;
+        let of_j = track == Track::JIntegral;
+        let in_region = track != Track::Strain && !of_j;
         for (name, given, belongs, needed) in [
             ("axis", probe.axis.is_some(), track != Track::Strain, track != Track::Strain),
             ("from", probe.from.is_some(), track == Track::Strain, track == Track::Strain),
             ("to", probe.to.is_some(), track == Track::Strain, track == Track::Strain),
-            ("side", probe.side.is_some(), track != Track::Strain, false),
-            ("min", probe.min.is_some(), track != Track::Strain, false),
-            ("max", probe.max.is_some(), track != Track::Strain, false),
+            ("side", probe.side.is_some(), in_region, false),
+            ("min", probe.min.is_some(), in_region, false),
+            ("max", probe.max.is_some(), in_region, false),
+            ("tip", probe.tip.is_some(), of_j, of_j),
+            ("radii", probe.radii.is_some(), of_j, of_j),
             ("damage", probe.damage.is_some(), of_crack, false),
             ("across", probe.across.is_some(), of_crack, false),
             ("gauges", probe.gauges.is_some(), moving, false),
@@ -217,6 +259,20 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         if of_crack && scene.material.critical.is_none() {
             let allowed = "nothing, or `material.critical`: without it nothing breaks";
             return Err(source.error(&key("track"), "`crack`", allowed));
+        }
+        if of_j && (dimension == 3 || scene.material.solid.is_none()) {
+            let found = if dimension == 3 {
+                "`j-integral` in three dimensions"
+            } else {
+                "`j-integral` of a bond law"
+            };
+            return Err(source.error(&key("track"), found, "a plane body with `material.solid`"));
+        }
+        if let Some([inner, outer]) = probe.radii
+            && !(inner.si() >= 0.0 && inner.si() < outer.si() && outer.si().is_finite())
+        {
+            let found = format!("{} m to {} m", inner.si(), outer.si());
+            return Err(source.error(&key("radii"), found, "0 ≤ inner < outer"));
         }
         if track == Track::Front && scene.method() != Method::Verlet {
             return Err(source.error(
@@ -252,5 +308,6 @@ fn name_of(track: Track) -> &'static str {
         Track::Rotation => "rotation",
         Track::Crack => "crack",
         Track::Front => "front",
+        Track::JIntegral => "j-integral",
     }
 }
