@@ -24,6 +24,7 @@ mod rigid;
 #[path = "../../examples/rubber_bearing.rs"]
 mod rubber_bearing;
 mod solids;
+mod spectra;
 mod stress;
 mod surface;
 mod time_step;
