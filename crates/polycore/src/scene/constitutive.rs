@@ -98,12 +98,18 @@ impl ConstitutiveSpec {
             let allowed = format!("a law that fits into {}", crate::memory::gib(available));
             return Err(source.error(&key, found, allowed));
         }
-        Surrogate::read(&path).map(Some).map_err(|error| match error {
-            crate::Error::Constitutive(Error::File { found, allowed, .. }) => {
-                source.error(&key, format!("{}: {found}", path.display()), allowed)
-            }
-            other => source.error(&key, other, "a law that `mdsurrogate` wrote"),
-        })
+        let read = if path.exists() && !path.is_file() {
+            // a device may never end
+            Err(format!("{}, which is no file", path.display()))
+        } else {
+            Surrogate::read(&path).map_err(|error| match error {
+                crate::Error::Constitutive(Error::File { found, .. }) => {
+                    format!("{}: {found}", path.display())
+                }
+                other => other.to_string(),
+            })
+        };
+        read.map(Some).map_err(|found| source.error(&key, found, "a law that `mdsurrogate` wrote"))
     }
 
     /// The law in closed form; `key` is where this block stands.
