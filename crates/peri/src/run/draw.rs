@@ -72,7 +72,9 @@ pub fn flagged<const D: usize>(
 ) -> Result<(), Error> {
     let [rest, places] = in_plane(bonds, state);
     let panel = Panel::new("where the learnt law is uncertain", "flagged", &places, values, bonds.spacing());
-    let map = FieldMap::new().lengths("mm", 1e-3).panel(panel.reference(&rest).bridge(bridge(outcome)));
+    let map = FieldMap::new()
+        .lengths("mm", 1e-3)
+        .panel(panel.range(0.0, 1.0).reference(&rest).bridge(bridge(outcome)));
     map.write(output.join(format!("flags_{}.png", outcome.file_name())))
 }
 

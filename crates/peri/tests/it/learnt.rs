@@ -12,12 +12,12 @@ use peri::material::{
 use peri::run::{Finished, Peri, run};
 use peri::scene::{self, Scene};
 use polycore::case::{Case, Options, Run};
-use polycore::constitutive::Workspace;
 use polycore::constitutive::network::Activation::Softplus;
 use polycore::constitutive::surrogate::{Header, Kind, Surrogate, Symmetry};
+use polycore::constitutive::{Error, Law, Prediction, Workspace};
 use polycore::output::vtkhdf;
 use polycore::scene::Source;
-use polycore::tensor::voigt::{self, Voigt};
+use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
 use std::path::Path;
 
 /// The law of `cases/ch5/learnt-sheet`.
@@ -226,6 +226,37 @@ fn laws_that_no_solid_can_have_are_refused() {
     let error = message(Surrogate::new(header, turned.collect()).unwrap()).unwrap_err();
     assert!(
         error.contains("`material.solid.constitutive`: found") && error.contains("above 0 Pa"),
+        "{error}"
+    );
+}
+
+/// S = C₀ : E with a shear modulus of 1 but in one plane, where it is −0.1: stiff in the mean over all directions.
+struct Soft;
+
+impl Law for Soft {
+    fn name(&self) -> String {
+        "soft".into()
+    }
+
+    fn stress(&self, c: &Voigt, memory: &mut Workspace) -> Result<Prediction, Error> {
+        self.tangent(c, memory)
+    }
+
+    fn tangent(&self, c: &Voigt, _: &mut Workspace) -> Result<Prediction, Error> {
+        let tangent = Voigt6x6::from_diagonal(&Voigt::new(2.0, 2.0, 2.0, -0.1, 1.0, 1.0));
+        let strain = Voigt::from_fn(|a, _| if a < 3 { 0.5 * (c[a] - 1.0) } else { c[a] });
+        let stress = tangent * strain;
+        let energy = Some(0.5 * stress.dot(&strain));
+        Ok(Prediction { stress, tangent: Some(tangent), energy, ..Prediction::default() })
+    }
+}
+
+#[test]
+fn a_law_that_is_unstable_in_one_direction_is_refused() {
+    assert!(Soft.moduli(&mut Workspace::default()).unwrap().shear > 0.5);
+    let error = Correspondence::<_, 3>::new(Soft, Space::Solid).err().unwrap().to_string();
+    assert!(
+        error.contains("least eigenvalue of the law's tangent at rest") && error.contains("-0.1"),
         "{error}"
     );
 }
