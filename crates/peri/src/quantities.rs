@@ -37,6 +37,9 @@ polycore::quantities! {
     MOMENT_IMBALANCE = "moment_imbalance", "", "the same of their moments about the body's middle, in deformed positions, over half the body's diagonal as well";
     REACTION_IMBALANCE = "reaction_imbalance", "", "the same of reactions and loads: what free particles still have out of balance";
     LARGEST_RESIDUAL = "largest_residual", "", "largest residual of any step";
+    OUTSIDE_SHARE = "outside_share", "", "of a learnt law: share of particles outside of the box of its training data at the end";
+    FLAGGED_SHARE = "flagged_share", "", "of a learnt law: share of particles where it is uncertain at the end, for any reason: outside of the box, in a gap of the data, a spread of its members";
+    FIRST_STEP_OUTSIDE = "first_step_outside", "", "of a learnt law: first load step (with `[dynamics]` row of the history) in which a particle leaves the box of its training data, if one does";
     FAILED_AS_EXPECTED = "failed_as_expected", "", "1 if a variant with `expect_error` ended with this error, else 0";
     PROBE = "{probe}", "*", "value of a probe at the end (m, rad, J/m² or a strain)";
     PROBE_PEAK = "{probe}_peak", "*", "its value of the largest size; of a rotation up to the end of its first half swing";

@@ -4,13 +4,16 @@ use super::deformation::{Deformation, PointLaw, PointStress, Tensor, embed};
 use crate::calibrate::Space;
 use crate::error::Error;
 use nalgebra::Matrix3;
-use polycore::constitutive::{Law, Prediction, Workspace};
+use polycore::constitutive::{Flags, Law, Prediction, Workspace};
 use polycore::tensor::voigt::{self, Voigt, component};
 use std::cell::RefCell;
 
 /// W = W(C) + ½ a μ · residual, C = FᵀF, for any [`Law`] that has an energy and no stress at rest: correspondence with the
 /// stabilisation a = 1 (Silling 2017, doi:10.1016/j.cma.2017.03.043, made exact). In plane stress the law gives the stretch of the
 /// thickness by S₃₃ = 0.
+///
+/// The axes of an anisotropic law are those of the body; its μ is the mean over all directions ([`Law::moduli`]), and in a plane
+/// body z must be normal to one of its planes of symmetry. A learnt law is one with an energy: its stress at rest is 0 by construction.
 #[derive(Clone, Debug)]
 pub struct Correspondence<L, const D: usize> {
     law: L,
@@ -29,7 +32,8 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
     /// With the stabilisation a = 1: accurate in the bulk and at free surfaces.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a law without energy, without shear modulus or with stress at rest.
+    /// [`Error::Parameter`] for a law without energy, with stress or without stiffness at rest, or, in a plane body, with shear stress out of
+    /// the plane.
     pub fn new(law: L, space: Space) -> Result<Self, Error> {
         Self::stabilised(law, space, 1.0)
     }
@@ -53,12 +57,24 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
         if !(moduli.shear > 0.0 && moduli.bulk > 0.0) {
             return wrong("shear or bulk modulus of the law", moduli.shear.min(moduli.bulk), "above 0 Pa");
         }
+        let tangent = found.tangent.unwrap_or_default();
+        let least = (0.5 * (tangent + tangent.transpose())).symmetric_eigenvalues().min();
+        if least.is_nan() || least <= 0.0 {
+            return wrong("least eigenvalue of the law's tangent at rest", least, "above 0 Pa");
+        }
         let stress = found.stress.amax() / moduli.shear;
         if stress.is_nan() || stress >= 1e-6 {
             return wrong("stress at rest over the shear modulus", stress, "below 1e-6");
         }
         if (space == Space::Solid) != (D == 3) {
             return Err(Error::geometry(format!("{space:?} in {D} dimensions")));
+        }
+        if D == 2 {
+            let shear = out_of_plane(&law, &mut memory) / moduli.shear;
+            if shear.is_nan() || shear >= 1e-6 {
+                let name = "shear stress out of the plane over the shear modulus";
+                return wrong(name, shear, "below 1e-6: z normal to a plane of symmetry of the law");
+            }
         }
         if !(stabilisation >= 0.0 && stabilisation.is_finite()) {
             return wrong("stabilisation", stabilisation, "at least 0");
@@ -70,6 +86,11 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
     fn upright(&self, deformation: &Deformation<D>) -> Option<Prediction> {
         let upright = deformation.volume_change() > -1.0;
         self.predict(&deformation.gradient(), false).filter(|_| upright).map(|(_, found)| found)
+    }
+
+    /// The law.
+    pub fn law(&self) -> &L {
+        &self.law
     }
 
     /// λ₃² and what the law predicts at C, with ℂ if asked for.
@@ -84,9 +105,11 @@ impl<L: Law, const D: usize> Correspondence<L, D> {
                     let found = self.law.tangent(&c, memory).ok()?;
                     let step = found.stress[2] / (0.5 * found.tangent?[(2, 2)]);
                     let next = (c[2] - step).clamp(0.5 * c[2], 2.0 * c[2]);
+                    let before = change;
                     change = (next - c[2]).abs() / next;
                     c[2] = next;
-                    if change <= 1e-15 {
+                    // or nothing but rounding is left
+                    if change <= 1e-15 || (change >= before && change < 1e-13) {
                         break;
                     }
                 }
@@ -157,4 +180,28 @@ impl<L: Law, const D: usize> PointLaw<D> for Correspondence<L, D> {
             _ => 1.0,
         }
     }
+
+    fn flags(&self, deformation: &Deformation<D>) -> Flags {
+        let found = self.predict(&deformation.gradient(), false);
+        // where it has no answer
+        found.map_or(Flags { outside: [true; 6], ..Flags::default() }, |(_, found)| found.flags)
+    }
+}
+
+/// The largest of |S₁₃| and |S₂₃| at in-plane strains of 1, and of 2 % over 2 %, Pa: 0 if z is normal to a plane of symmetry.
+fn out_of_plane(law: &impl Law, memory: &mut Workspace) -> f64 {
+    let rest = Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
+    let tangent = law.tangent(&rest, memory).ok().and_then(|found| found.tangent);
+    let mut largest = f64::NAN;
+    for column in 0..4 {
+        let mut strain = Voigt::zeros();
+        strain[column] = 0.02;
+        // a law that locks has no answer
+        let finite = law.stress(&(rest + strain), memory).map_or(Voigt::zeros(), |found| found.stress / 0.02);
+        for row in 4..6 {
+            largest =
+                largest.max(finite[row].abs()).max(tangent.map_or(f64::NAN, |t| t[(row, column)].abs()));
+        }
+    }
+    largest
 }

@@ -5,6 +5,7 @@ use super::{Bond, Family, Material, Passes};
 use crate::bonds::Bonds;
 use crate::calibrate::modulus_in;
 use nalgebra::{Matrix3, SMatrix};
+use polycore::constitutive::Flags;
 use std::sync::Arc;
 
 /// A tensor in the space of a body.
@@ -82,6 +83,12 @@ pub trait PointLaw<const D: usize>: Send + Sync {
         let _ = deformation;
         1.0
     }
+
+    /// Why the answer of a law learnt from data is uncertain; nothing of other laws.
+    fn flags(&self, deformation: &Deformation<D>) -> Flags {
+        let _ = deformation;
+        Flags::default()
+    }
 }
 
 impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
@@ -102,6 +109,9 @@ impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
     }
     fn thickness_stretch(&self, deformation: &Deformation<D>) -> f64 {
         (**self).thickness_stretch(deformation)
+    }
+    fn flags(&self, deformation: &Deformation<D>) -> Flags {
+        (**self).flags(deformation)
     }
 }
 

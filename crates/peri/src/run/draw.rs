@@ -24,11 +24,7 @@ pub fn maps<const D: usize>(
     output: &Path,
 ) -> Result<(), Error> {
     let Some((measure, field)) = fields.first().filter(|_| D == 2) else { return Ok(()) };
-    let sites = bonds.particles().iter().map(|&site| site as usize);
-    let rest: Vec<[f64; 2]> =
-        sites.clone().map(|site| [bonds.position(site)[0], bonds.position(site)[1]]).collect();
-    let moved = sites.map(|site| state.displacement.get(site));
-    let places: Vec<[f64; 2]> = rest.iter().zip(moved).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect();
+    let [rest, places] = in_plane(bonds, state);
     let largest = field.iter().flatten().flatten().fold(0.0_f64, |most, s| most.max(s.abs()));
     let (scale, unit) = match &scene.exact {
         Some(exact) => (1.0 / exact.hole().1, "/σ∞".to_owned()),
@@ -61,6 +57,35 @@ pub fn maps<const D: usize>(
         map = map.panel(panel.bridge(bridge(outcome)));
     }
     map.write(output.join(format!("stress_{}.png", outcome.file_name())))
+}
+
+/// Map of the particles of a plane body at which a learnt law is uncertain.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn flagged<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    state: &State<D>,
+    values: &[f64],
+    outcome: &Outcome,
+    output: &Path,
+) -> Result<(), Error> {
+    let [rest, places] = in_plane(bonds, state);
+    let panel = Panel::new("where the learnt law is uncertain", "flagged", &places, values, bonds.spacing());
+    let map = FieldMap::new()
+        .lengths("mm", 1e-3)
+        .panel(panel.range(0.0, 1.0).reference(&rest).bridge(bridge(outcome)));
+    map.write(output.join(format!("flags_{}.png", outcome.file_name())))
+}
+
+/// Where the particles of a plane body were and are.
+fn in_plane<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> [Vec<[f64; 2]>; 2] {
+    let sites = bonds.particles().iter().map(|&site| site as usize);
+    let rest: Vec<[f64; 2]> =
+        sites.clone().map(|site| [bonds.position(site)[0], bonds.position(site)[1]]).collect();
+    let moved = sites.map(|site| state.displacement.get(site));
+    let places = rest.iter().zip(moved).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect();
+    [rest, places]
 }
 
 /// Profiles (Fig. 2.7), convergence (Fig. 2.8), error against run time.

@@ -7,6 +7,7 @@ use crate::potential::KernelFit;
 use crate::scene::Scene;
 use crate::solver::{Record, State};
 use crate::stress::{self, Loaded, Measure, Missing, Tensor, cauchy, deformation_gradients};
+use polycore::constitutive::Flags;
 use polycore::output::vtkhdf::ParticleSeries;
 use polycore::report::Phases;
 use std::path::{Path, PathBuf};
@@ -73,6 +74,13 @@ fn frames_of<const D: usize>(every: usize, state: &State<D>) -> usize {
         in_between(state.history[step].rounds.saturating_sub(1)) + usize::from(last)
     };
     (0..state.history.len()).map(of_step).sum::<usize>() + in_between(state.round)
+}
+
+/// Flags as a number, the sum of 1 for a component of C outside of the box of the training data, 2 for one that never changed there,
+/// 4 for a gap in the data and 8 for members that disagree.
+fn reasons(flags: &Flags) -> f64 {
+    let reasons = [flags.outside.contains(&true), flags.unseen.contains(&true), flags.far, flags.spread];
+    reasons.iter().zip([1.0, 2.0, 4.0, 8.0]).map(|(&given, bit)| if given { bit } else { 0.0 }).sum()
 }
 
 /// A vector with zeros for what a plane body lacks.
@@ -207,6 +215,8 @@ impl<'a, const D: usize> Frames<'a, D> {
         time: f64,
     ) -> Result<(), Error> {
         let damage = self.damage(bonds);
+        let flags = self.scene.output.flags.then(|| self.observed.flags(bonds, state)).flatten();
+        let flags: Option<Vec<f64>> = flags.map(|flags| flags.iter().map(reasons).collect());
         let Some(series) = &mut self.series else { return Ok(()) };
         // lists of arrays are allocated once; flat ones would grow by doubling
         let particles = bonds.particles().iter().map(|&site| site as usize);
@@ -234,6 +244,7 @@ impl<'a, const D: usize> Frames<'a, D> {
         };
         data.extend(lines.iter().map(|lines| ("input_index", 1, lines.as_slice())));
         data.extend(damage.iter().map(|damage| ("damage", 1, damage.as_slice())));
+        data.extend(flags.iter().map(|flags| ("flags", 1, flags.as_slice())));
         data.extend(tensors.iter().map(|(name, values)| (name.as_str(), 9, values.as_slice())));
         // between two steps a load is that of neither
         let record = state.history.last().filter(|_| time.fract() == 0.0);

@@ -14,7 +14,7 @@ use std::path::Path;
 type Column = (String, String, Vec<f64>);
 
 impl Outcome {
-    fn is_dynamic(&self) -> bool {
+    pub(super) fn is_dynamic(&self) -> bool {
         self.history.iter().any(|r| r.time > 0.0)
     }
 

@@ -11,7 +11,9 @@ use crate::run::Failure;
 use crate::scene::{self, Body, Inclusions, Scene, SurfaceCorrection, Variant};
 use crate::solver::{Criterion, State};
 use crate::stress::{Tensor, force_over_length};
+use polycore::constitutive::Flags;
 use polycore::scene::Source;
+use rayon::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A solid of any law.
@@ -132,6 +134,8 @@ pub enum Observed<'a, const D: usize> {
     Solid {
         /// Its law.
         law: &'a dyn PointLaw<D>,
+        /// Whether it is learnt from data.
+        learnt: bool,
         /// The solid at work.
         states: Mutex<Pointwise<Solid<D>, D>>,
     },
@@ -149,7 +153,8 @@ impl<'a, const D: usize> Observed<'a, D> {
             },
             Acting::Solid(_) if !scene.observes_forces() => Self::Nothing,
             Acting::Solid(solid) => {
-                Self::Solid { law: &*solid.0, states: Mutex::new(Pointwise::new(solid.clone(), bonds)) }
+                let (learnt, states) = (scene.is_learnt(), Mutex::new(Pointwise::new(solid.clone(), bonds)));
+                Self::Solid { law: &*solid.0, learnt, states }
             }
         }
     }
@@ -217,7 +222,7 @@ impl<'a, const D: usize> Observed<'a, D> {
 
     /// First Piola–Kirchhoff and Cauchy stress of a solid's law in every particle, Pa; `None` for bond laws.
     pub fn stress(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[Vec<Tensor<D>>; 2]> {
-        let Self::Solid { law, states } = self else { return None };
+        let Self::Solid { law, states, .. } = self else { return None };
         let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
         states.prepare(bonds, &state.displacement);
         let both = bonds.particles().iter().map(|&site| {
@@ -244,7 +249,7 @@ impl<'a, const D: usize> Observed<'a, D> {
         sites: &[u32],
         visit: &mut dyn FnMut(usize, Tensor<D>),
     ) {
-        let Self::Solid { law, states } = self else { return };
+        let Self::Solid { law, states, .. } = self else { return };
         let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
         states.prepare(bonds, &state.displacement);
         for (at, &site) in sites.iter().enumerate() {
@@ -256,5 +261,25 @@ impl<'a, const D: usize> Observed<'a, D> {
                 * point.integrity();
             visit(at, std::array::from_fn(|a| std::array::from_fn(|b| tensor[(a, b)])));
         }
+    }
+
+    /// Where and why a learnt law is uncertain, particle by particle; none where it is not at work; `None` for laws in closed form.
+    pub fn flags(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<Vec<Flags>> {
+        let Self::Solid { law, learnt: true, states } = self else { return None };
+        let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
+        states.prepare(bonds, &state.displacement);
+        let of = |&site: &u32| {
+            states.points()[site as usize].deformation().map_or(Flags::default(), |found| law.flags(found))
+        };
+        Some(bonds.particles().par_iter().map(of).collect())
+    }
+
+    /// The shares of particles outside of the box of the training data, and with any flag.
+    pub fn flagged(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[f64; 2]> {
+        let flags = self.flags(bonds, state)?;
+        let share = |is: &dyn Fn(&Flags) -> bool| {
+            flags.iter().filter(|flags| is(flags)).count() as f64 / flags.len().max(1) as f64
+        };
+        Some([share(&|flags| flags.outside.contains(&true)), share(&Flags::any)])
     }
 }

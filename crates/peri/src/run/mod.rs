@@ -200,7 +200,7 @@ fn run_variant<const D: usize>(
     phases.time("compare", || {
         outcome.responses(&*body.bonds, &loads, &state);
         outcome.values_of_history(scene);
-        outcome.values_of_probes(&scene.probe);
+        outcome.values_of_probes(scene);
         if let Some(exact) = &scene.exact {
             compare::hole(&*body.bonds, exact, plate.as_ref(), &stresses.cauchy, &loaded, &mut outcome);
         }
@@ -215,14 +215,23 @@ fn run_variant<const D: usize>(
     let staged =
         scene.output.fields && scene.output.every.is_some() && scene.stress.is_some() && criterion.is_some();
     let seen_at_end = D == 3 && scene.output.pictures && !staged;
-    let damage = if seen_at_end { frames.damage(&*body.bonds) } else { None };
+    let flagged = scene.output.pictures && scene.output.flags;
+    let flagged = if flagged { observed.flags(&*body.bonds, &state) } else { None };
+    let flagged: Option<Vec<f64>> =
+        flagged.map(|flags| flags.iter().map(|flags| f64::from(u8::from(flags.any()))).collect());
+    let damage = if seen_at_end && flagged.is_none() { frames.damage(&*body.bonds) } else { None };
     frames.finish(&*body.bonds, &state, &stresses)?;
     if scene.output.pictures {
         draw::maps(scene, &*body.bonds, &state, &stresses.cauchy, &outcome, output)?;
+        if let Some(values) = flagged.as_ref().filter(|_| D == 2) {
+            draw::flagged(&*body.bonds, &state, values, &outcome, output)?;
+        }
         if staged {
             stages::stages(scene, &outcome, body.bonds.spacing(), &path, output)?;
         } else if seen_at_end {
-            solid::end(scene, &*body.bonds, &state, &stresses, damage, &outcome, output)?;
+            let damage = damage.map(|damage| (solid::damage_field(), damage));
+            let second = flagged.map(|flagged| (solid::flagged_field(), flagged)).or(damage);
+            solid::end(scene, &*body.bonds, &state, &stresses, second, &outcome, output)?;
         }
     }
     Ok(outcome)
@@ -296,10 +305,11 @@ fn solve<const D: usize>(
     let course = course.map(|formula| |time: f64| formula.in_time(time));
     let observer = |bonds: &dyn Bonds<D>, state: &State<D>| {
         let mut seen = probes.see(bonds, state, observed);
+        seen.extend(observed.flagged(bonds, state).into_iter().flatten());
         seen.extend(sections.see(bonds, state, observed));
         seen
     };
-    let sees = !scene.probe.is_empty() || !scene.output.section.is_empty();
+    let sees = !scene.probe.is_empty() || !scene.output.section.is_empty() || scene.is_learnt();
     let response = material.respond(&*body.bonds);
     let mut system = System::of_response(&mut *body.bonds, response, loads, &factors);
     system.course = course.as_ref().map(|course| course as _);

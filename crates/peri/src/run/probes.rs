@@ -196,7 +196,7 @@ fn strain<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>, marks: &[Vec<u
 
 impl Outcome {
     /// Which columns of [`crate::solver::Record::seen`] are whose, with their units.
-    pub(super) fn seen_columns(probes: &[Probe]) -> Vec<(String, String)> {
+    pub(super) fn seen_columns(scene: &Scene) -> Vec<(String, String)> {
         let each = |probe: &Probe| {
             let mut columns = vec![(probe.name.clone(), probe.track.unit().to_owned())];
             if probe.track == Track::Crack {
@@ -205,14 +205,15 @@ impl Outcome {
             }
             columns
         };
-        probes.iter().flat_map(each).collect()
+        let flags = [q::OUTSIDE_SHARE, q::FLAGGED_SHARE].map(|share| (share.name.to_owned(), String::new()));
+        scene.probe.iter().flat_map(each).chain(flags.into_iter().filter(|_| scene.is_learnt())).collect()
     }
 
     /// The values of the probes; what was never seen has none.
-    pub(super) fn values_of_probes(&mut self, probes: &[Probe]) {
-        self.probes = Self::seen_columns(probes);
+    pub(super) fn values_of_probes(&mut self, scene: &Scene) {
+        self.probes = Self::seen_columns(scene);
         let mut column = 0;
-        for probe in probes {
+        for probe in &scene.probe {
             let own = column;
             let rows: Vec<(f64, f64)> =
                 self.history.iter().map(|r| (r.time, r.seen[own])).filter(|(_, x)| x.is_finite()).collect();
@@ -260,6 +261,35 @@ impl Outcome {
                 }
                 column += 1;
             }
+        }
+        if scene.is_learnt() {
+            self.values_of_flags(column);
+        }
+    }
+
+    /// The shares of flagged particles, which `see` noted from `column` on; a warning where there were any.
+    fn values_of_flags(&mut self, column: usize) {
+        let Some(&[outside, flagged]) = self.history.last().and_then(|r| r.seen.get(column..column + 2))
+        else {
+            return;
+        };
+        self.value(q::OUTSIDE_SHARE, outside);
+        self.value(q::FLAGGED_SHARE, flagged);
+        let first = |column: usize| self.history.iter().position(|r| r.seen[column] > 0.0).map(|row| row + 1);
+        let steps = if self.is_dynamic() { "row" } else { "step" };
+        let (left, any) = (first(column), first(column + 1));
+        if let Some(left) = left {
+            self.value(q::FIRST_STEP_OUTSIDE, left as f64);
+            self.warnings.push(format!(
+                "the learnt law leaves the box of its training data from {steps} {left} on; in the last {steps} in {:.3} % of the particles",
+                100.0 * outside
+            ));
+        } else if let Some(any) = any {
+            self.warnings.push(format!(
+                "the learnt law is uncertain inside the box of its training data from {steps} {any} on; in the last {steps} in {:.3} % \
+                 of the particles",
+                100.0 * flagged
+            ));
         }
     }
 }

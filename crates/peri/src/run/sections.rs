@@ -101,7 +101,7 @@ impl<const D: usize> Sections<D> {
 /// # Errors
 /// A file that cannot be written.
 pub fn write<const D: usize>(scene: &Scene, outcome: &mut Outcome, output: &Path) -> Result<(), Error> {
-    let mut first = Outcome::seen_columns(&scene.probe).len();
+    let mut first = Outcome::seen_columns(scene).len();
     for section in &scene.output.section {
         let names = section.values(D);
         let own = first..first + names.len();

@@ -93,13 +93,18 @@ pub fn damage_field() -> Field {
     field("damage".to_owned(), 1.0, (0.0, 0.6))
 }
 
+/// Where a learnt law is uncertain: 1, elsewhere 0.
+pub fn flagged_field() -> Field {
+    field("flagged".to_owned(), 1.0, (0.0, 1.0))
+}
+
 fn field(label: String, scale: f64, (low, high): (f64, f64)) -> Field {
     let range = (low * scale, high * scale);
     let range = if range.0 < range.1 && (range.1 - range.0).is_finite() { range } else { (0.0, 1.0) };
     Field { scale, strip: Strip { label, range, colors: ColorMap::Viridis } }
 }
 
-/// The end of a run without stages: stress, or the length of the displacement, and damage.
+/// The end of a run without stages: stress, or the length of the displacement, and a second field.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -108,7 +113,7 @@ pub fn end<const D: usize>(
     bonds: &dyn Bonds<D>,
     state: &State<D>,
     stresses: &Stresses<D>,
-    damage: Option<Vec<f64>>,
+    second: Option<(Field, Vec<f64>)>,
     outcome: &Outcome,
     output: &Path,
 ) -> Result<(), Error> {
@@ -128,12 +133,12 @@ pub fn end<const D: usize>(
             (field("|u| (mm)".to_owned(), 1e3, (0.0, largest)), values)
         }
     };
-    let damage = damage.filter(|damage| damage.iter().any(|&damage| damage > 0.0));
-    let fields = std::iter::once(first).chain(damage.is_some().then(damage_field)).collect();
+    let (second, others) = second.filter(|(_, values)| values.iter().any(|&value| value > 0.0)).unzip();
+    let fields = std::iter::once(first).chain(second).collect();
     let mut bounds = NOWHERE;
     let title = scale::title(outcome, outcome.history.len() as f64);
     widen(&mut bounds, &places);
-    let look = Look { title, places, rest, values: [values, damage.unwrap_or_default()] };
+    let look = Look { title, places, rest, values: [values, others.unwrap_or_default()] };
     let picture = Picture { scene, outcome, spacing: bonds.spacing(), bounds };
     picture.draw(output, fields, 1, |_| Ok(Cow::Borrowed(&look)))
 }

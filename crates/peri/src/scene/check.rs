@@ -200,6 +200,10 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     if scene.output.every == Some(0) {
         return Err(source.error("output.every", 0, "at least 1 step"));
     }
+    if scene.output.flags && !scene.is_learnt() && scene.study.is_empty() {
+        let allowed = "only with `material.solid.constitutive.learnt`: other laws have none";
+        return Err(source.error("output.flags", "flags of a law in closed form", allowed));
+    }
     if !(1..=12).contains(&scene.output.stages) {
         return Err(source.error("output.stages", scene.output.stages, "1 to 12"));
     }

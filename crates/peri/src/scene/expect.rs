@@ -20,6 +20,7 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     add(scene.dynamics.is_none(), &q::BALANCES);
     let critical = scene.material.critical.is_some();
     add(critical, &[q::FRAGMENTS, q::FIRST_BREAK, q::LOAD_AT_FIRST_BREAK, q::BROKEN_BONDS]);
+    add(scene.is_learnt(), &[q::OUTSIDE_SHARE, q::FLAGGED_SHARE, q::FIRST_STEP_OUTSIDE]);
     let energy = scene.material.solid.is_some()
         && scene.material.critical.is_some_and(|critical| critical.fracture_energy.is_some());
     add(critical, &[if energy { q::CRITICAL_ENERGY } else { q::CRITICAL_STRETCH }]);

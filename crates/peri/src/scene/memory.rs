@@ -7,6 +7,7 @@ use super::{Method, Scene};
 use crate::bonds::{Bonds, Stencil, storage};
 use crate::material::Point;
 use crate::solver::{Lbfgs, Record};
+use polycore::constitutive::Flags;
 use polycore::memory::{available, gib};
 use polycore::scene::{SceneError, Source};
 
@@ -70,6 +71,10 @@ fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
     let mut each = if measures > 0.0 { (3.0 + kept * measures) * tensor } else { 0.0 };
     if scene.output.fields {
         each += WRITTEN + PACKED + WRITTEN_TENSORS * measures;
+    }
+    if scene.is_learnt() {
+        // flags, and as numbers
+        each += size_of::<Flags>() as f64 + 16.0;
     }
     if scene.output.pictures {
         each += if D == 2 { DRAWN } else { DRAWN_IN_SPACE };

@@ -369,6 +369,8 @@ pub struct OutputSpec {
     pub stages: usize,
     /// How pictures show a solid.
     pub solid: Option<SolidSpec>,
+    /// Where a learnt law is uncertain, as a field and in pictures.
+    pub flags: bool,
     /// Displacements at which the load becomes a value of the report: `load_at_20mm`.
     pub load_at: Vec<Length>,
     /// The integrals over the horizon of Appendix A, by quadrature, among the values of the report.
@@ -401,6 +403,7 @@ impl Default for OutputSpec {
             every: None,
             stages: 5,
             solid: None,
+            flags: false,
             load_at: Vec::new(),
             integrals: false,
             compare: None,
@@ -460,10 +463,15 @@ pub fn schema() -> serde_json::Value {
 }
 
 impl Scene {
-    /// Whether outputs ask for forces or stresses.
+    /// Whether outputs ask for forces, stresses or flags.
     pub fn observes_forces(&self) -> bool {
         let j_integral = self.probe.iter().any(|probe| probe.track == Track::JIntegral);
-        self.stress.is_some() || !self.output.section.is_empty() || j_integral
+        self.stress.is_some() || !self.output.section.is_empty() || j_integral || self.is_learnt()
+    }
+
+    /// Whether its law is learnt from data.
+    pub fn is_learnt(&self) -> bool {
+        self.material.solid.as_ref().is_some_and(SolidLaw::is_learnt)
     }
 
     /// Largest relative error of the fitted bond law.

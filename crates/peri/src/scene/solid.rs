@@ -8,6 +8,7 @@ use crate::calibrate::{Calibration, Space};
 use crate::error::Error;
 use crate::material::{Correspondence, EightChain, PointLaw};
 use crate::stress::Measure;
+use polycore::constitutive::surrogate::Kind;
 use polycore::scene::{ConstitutiveSpec, SceneError, Source};
 use polycore::units::Stress;
 use serde::Deserialize;
@@ -55,6 +56,11 @@ impl SolidKind {
 const KEY: &str = "material.solid";
 
 impl SolidLaw {
+    /// Whether its law is learnt from data.
+    pub fn is_learnt(&self) -> bool {
+        self.constitutive.as_ref().is_some_and(|spec| spec.learnt.is_some())
+    }
+
     /// The law in a space.
     ///
     /// # Errors
@@ -84,9 +90,11 @@ impl SolidLaw {
         }
         let missing = |key: &str, what: &str| source.error(&format!("{KEY}.{key}"), "nothing", what);
         let wrong = |error: Error| match error {
+            Error::Parameter { name, found, allowed } if chains || name == "stabilisation" => {
+                source.error(&format!("{KEY}.{}", name.replace(' ', "_")), plain(found), allowed)
+            }
             Error::Parameter { name, found, allowed } => {
-                let key = format!("{KEY}.{}", name.replace(' ', "_"));
-                source.error(&key, plain(found), allowed)
+                source.error(&format!("{KEY}.constitutive"), format!("{name}: {}", plain(found)), allowed)
             }
             other => source.error(KEY, other, "a law with an energy, and without stress at rest"),
         };
@@ -105,14 +113,19 @@ impl SolidLaw {
             };
             return Ok(Arc::new(EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?));
         }
-        let spec = self
-            .constitutive
-            .as_ref()
-            .ok_or_else(|| missing("constitutive", "a block with `model`, `parameters`, `bulk_modulus`"))?;
-        let law = spec.law(source, &format!("{KEY}.constitutive"))?;
-        let solid =
-            Correspondence::stabilised(law, space, self.stabilisation.unwrap_or(1.0)).map_err(wrong)?;
-        Ok(Arc::new(solid))
+        let spec = self.constitutive.as_ref().ok_or_else(|| {
+            missing("constitutive", "a block with `model`, `parameters`, `bulk_modulus`, or `learnt`")
+        })?;
+        let (key, stabilisation) = (format!("{KEY}.constitutive"), self.stabilisation.unwrap_or(1.0));
+        let Some(learnt) = spec.learnt(source, &key)? else {
+            let law = spec.law(source, &key)?;
+            return Ok(Arc::new(Correspondence::stabilised(law, space, stabilisation).map_err(wrong)?));
+        };
+        if learnt.header().kind == Kind::Ann {
+            let allowed = "a law of the kind `energy`: forces follow from one, and it has no stress at rest";
+            return Err(source.error(&format!("{key}.learnt"), "a law of the kind `ann`", allowed));
+        }
+        Ok(Arc::new(Correspondence::stabilised(learnt, space, stabilisation).map_err(wrong)?))
     }
 }
 

@@ -12,6 +12,7 @@ mod hardy;
 mod homogeneous;
 mod impact;
 mod lbfgs;
+mod learnt;
 mod limits;
 #[path = "../../examples/linear_solid.rs"]
 mod linear_solid;

@@ -1,24 +1,31 @@
-//! A constitutive law of Chapter 1, as a scene names it.
+//! A constitutive law, of Chapter 1 or learnt from data, as a scene names it.
 
 use std::collections::BTreeMap;
+#[cfg(feature = "surrogate")]
+use std::path::Path;
+use std::path::PathBuf;
 
 use serde::{Deserialize, Deserializer};
 
 use super::{SceneError, Source};
 use crate::constitutive::Error;
 use crate::constitutive::hyperelastic::{Compressible, Hyperelastic, MODELS, ModelDescriptor, Volumetric};
+#[cfg(feature = "surrogate")]
+use crate::constitutive::surrogate::Surrogate;
 use crate::units::Stress;
 
-/// A hyperelastic law with a volumetric energy ¼λ(J² − 1 − 2 ln J) that gives it a bulk modulus.
+/// A hyperelastic law with a volumetric energy ¼λ(J² − 1 − 2 ln J) that gives it a bulk modulus, or a law learnt from data.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstitutiveSpec {
     /// Name of the law.
-    pub model: String,
+    pub model: Option<String>,
     /// Its parameters by their names: stresses with a unit, other numbers without.
-    pub parameters: BTreeMap<String, Constant>,
+    pub parameters: Option<BTreeMap<String, Constant>>,
     /// Bulk modulus at rest.
-    pub bulk_modulus: Stress,
+    pub bulk_modulus: Option<Stress>,
+    /// In their place: a law learnt from data, a file of `mdsurrogate`, relative to the scene.
+    pub learnt: Option<PathBuf>,
 }
 
 /// A parameter in SI units, and whether it has been written as a stress.
@@ -65,21 +72,66 @@ impl<'de> Deserialize<'de> for Constant {
 }
 
 impl ConstitutiveSpec {
-    /// The law; `key` is where this block stands.
+    /// The learnt law, where the block names one; `key` is where it stands.
+    ///
+    /// # Errors
+    /// Another key beside it, a file that is missing, larger than the memory, or no law.
+    #[cfg(feature = "surrogate")]
+    pub fn learnt(&self, source: &Source, key: &str) -> Result<Option<Surrogate>, SceneError> {
+        let Some(file) = &self.learnt else { return Ok(None) };
+        for (other, given) in [
+            ("model", self.model.is_some()),
+            ("parameters", self.parameters.is_some()),
+            ("bulk_modulus", self.bulk_modulus.is_some()),
+        ] {
+            if given {
+                let found = format!("`{other}` together with `learnt`");
+                return Err(source.error(&format!("{key}.{other}"), found, "one of them"));
+            }
+        }
+        let (path, key) = (source.path.parent().unwrap_or(Path::new("")).join(file), format!("{key}.learnt"));
+        // the file, its numbers, and these by rows and in panels
+        let needed = 4.0 * std::fs::metadata(&path).map_or(0.0, |file| file.len() as f64);
+        let available = crate::memory::available();
+        if needed > available {
+            let found = format!("{}, which needs {}", path.display(), crate::memory::gib(needed));
+            let allowed = format!("a law that fits into {}", crate::memory::gib(available));
+            return Err(source.error(&key, found, allowed));
+        }
+        let read = if path.exists() && !path.is_file() {
+            // a device may never end
+            Err(format!("{}, which is no file", path.display()))
+        } else {
+            Surrogate::read(&path).map_err(|error| match error {
+                crate::Error::Constitutive(Error::File { found, .. }) => {
+                    format!("{}: {found}", path.display())
+                }
+                other => other.to_string(),
+            })
+        };
+        read.map(Some).map_err(|found| source.error(&key, found, "a law that `mdsurrogate` wrote"))
+    }
+
+    /// The law in closed form; `key` is where this block stands.
     ///
     /// # Errors
     /// A [`SceneError`] that names the key, the value found and what is allowed.
     pub fn law(&self, source: &Source, key: &str) -> Result<Compressible<Box<dyn Hyperelastic>>, SceneError> {
         let names: Vec<&str> = MODELS.iter().map(|model| model.key).collect();
-        let Some(model) = MODELS.iter().find(|model| model.key == self.model) else {
-            return Err(source.unknown(&format!("{key}.model"), &self.model, &names));
+        let missing = |name: &str, allowed: &str| source.error(&format!("{key}.{name}"), "nothing", allowed);
+        let Some(name) = &self.model else {
+            return Err(missing("model", &format!("one of {}, or `learnt`, a file", names.join(", "))));
         };
-        let values = self.values(source, &format!("{key}.parameters"), model)?;
+        let Some(model) = MODELS.iter().find(|model| model.key == name) else {
+            return Err(source.unknown(&format!("{key}.model"), name, &names));
+        };
+        let parameters = self.parameters.clone().unwrap_or_default();
+        let values = values(&parameters, source, &format!("{key}.parameters"), model)?;
         let wrong =
             |error: Error| source.error(&format!("{key}.parameters"), error, "values of their domains");
         let compressible = |lame: f64| Compressible::new(model.law(&values)?, Volumetric::Ciarlet { lame });
         let least = compressible(0.0).and_then(|law| law.bulk_modulus()).map_err(wrong)?;
-        let bulk = self.bulk_modulus.si();
+        let bulk = self.bulk_modulus.ok_or_else(|| missing("bulk_modulus", "a stress"))?.si();
         if !(bulk >= least && bulk.is_finite()) {
             let allowed =
                 format!("at least {least:.6e} Pa, that of `{}` without a volumetric energy", model.key);
@@ -87,27 +139,32 @@ impl ConstitutiveSpec {
         }
         compressible(bulk - least).map_err(wrong)
     }
+}
 
-    /// The parameters in the model's order, SI.
-    fn values(&self, source: &Source, key: &str, model: &ModelDescriptor) -> Result<Vec<f64>, SceneError> {
-        let names: Vec<&str> = model.parameters.iter().map(|parameter| parameter.name).collect();
-        if let Some(other) = self.parameters.keys().find(|name| !names.contains(&name.as_str())) {
-            return Err(source.unknown(&format!("{key}.{other}"), other, &names));
-        }
-        let each = model.parameters.iter().map(|parameter| {
-            let path = format!("{key}.{}", parameter.name);
-            match (self.parameters.get(parameter.name), parameter.unit) {
-                (Some(&Constant::Stress(value)), "Pa") | (Some(&Constant::Number(value)), "1") => Ok(value),
-                (Some(_), "Pa") => {
-                    Err(source.error(&path, "a number without a unit", "a stress such as \"0.4 MPa\""))
-                }
-                (Some(_), _) => Err(source.error(&path, "a stress", "a number")),
-                (None, _) => {
-                    let allowed = format!("the parameters of `{}`: {}", model.key, names.join(", "));
-                    Err(source.error(key, format!("no `{}`", parameter.name), allowed))
-                }
-            }
-        });
-        each.collect()
+/// The parameters in the model's order, SI.
+fn values(
+    given: &BTreeMap<String, Constant>,
+    source: &Source,
+    key: &str,
+    model: &ModelDescriptor,
+) -> Result<Vec<f64>, SceneError> {
+    let names: Vec<&str> = model.parameters.iter().map(|parameter| parameter.name).collect();
+    if let Some(other) = given.keys().find(|name| !names.contains(&name.as_str())) {
+        return Err(source.unknown(&format!("{key}.{other}"), other, &names));
     }
+    let each = model.parameters.iter().map(|parameter| {
+        let path = format!("{key}.{}", parameter.name);
+        match (given.get(parameter.name), parameter.unit) {
+            (Some(&Constant::Stress(value)), "Pa") | (Some(&Constant::Number(value)), "1") => Ok(value),
+            (Some(_), "Pa") => {
+                Err(source.error(&path, "a number without a unit", "a stress such as \"0.4 MPa\""))
+            }
+            (Some(_), _) => Err(source.error(&path, "a stress", "a number")),
+            (None, _) => {
+                let allowed = format!("the parameters of `{}`: {}", model.key, names.join(", "));
+                Err(source.error(key, format!("no `{}`", parameter.name), allowed))
+            }
+        }
+    });
+    each.collect()
 }

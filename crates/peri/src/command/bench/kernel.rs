@@ -9,6 +9,8 @@ use peri::material::{Correspondence, EightChain, Material, NonlocalSolid, Respon
 use peri::potential::{KernelFit, Law};
 use peri::run::Failure;
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
+use polycore::constitutive::network::Activation::Softplus;
+use polycore::constitutive::surrogate::{Header, Kind, Surrogate, Symmetry};
 use rayon::prelude::*;
 
 /// Horizon over spacing of every measurement.
@@ -47,15 +49,24 @@ pub fn loaded<const D: usize>(
 /// A material at work, and its name.
 pub type Named<const D: usize> = (&'static str, Box<dyn Response<D>>);
 
-/// Solids with two passes, by name: chains of 25 links, and neo-Hookean rubber by correspondence, K/μ = 100.
-pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 2], Failure> {
+/// Solids with two passes, by name: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100, and a learnt law, a
+/// network of 209 weights that are random: its speed does not depend on them.
+pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Failure> {
     let space = if D == 2 { Space::PlaneStrain } else { Space::Solid };
     let law =
         NeoHookean::new(1.0).and_then(|law| Compressible::new(law, Volumetric::Ciarlet { lame: 100.0 }));
     let law = law.map_err(|error| Error::geometry(error.to_string()))?;
+    let kind = Kind::polyconvex_energy(Symmetry::Isotropic);
+    let learnt = Surrogate::random(Header::new(kind, &[(16, Softplus), (8, Softplus)], 1), 1);
+    let learnt = learnt.map_err(|error| Error::geometry(error.to_string()))?;
     let chains = NonlocalSolid(EightChain::new(space, 1.0, 25.0, 100.0)?).respond(bonds);
     let neo_hookean = NonlocalSolid(Correspondence::new(law, space)?).respond(bonds);
-    Ok([("eight-chain", chains), ("correspondence neo-hookean", neo_hookean)])
+    let learnt = NonlocalSolid(Correspondence::new(learnt, space)?).respond(bonds);
+    Ok([
+        ("eight-chain", chains),
+        ("correspondence neo-hookean", neo_hookean),
+        ("correspondence learnt", learnt),
+    ])
 }
 
 /// States of all particles, and their forces.
