@@ -65,6 +65,9 @@ fn forces<const D: usize>(
     force
 }
 
+/// A way to compute forces: its name, bonds, material and displacement.
+type Path<'a, const D: usize> = (&'a str, &'a dyn Bonds<D>, Box<dyn Response<D>>, Field<D>);
+
 /// At constant integrities forces are slopes of the energy and sum to zero, on lattices by kernels and by plain loops, and in clouds.
 fn slopes<const D: usize>(space: Space, cells: [usize; D]) {
     let body = Body::damaged(cells, 1.0, 3.015);
@@ -76,7 +79,7 @@ fn slopes<const D: usize>(space: Space, cells: [usize; D]) {
     soften(&mut built.lattice);
     soften(&mut built.cloud);
     let (lattice, cloud): (&dyn Bonds<D>, &CloudBonds<D>) = (&built.lattice, &built.cloud);
-    let cases: [(&str, &dyn Bonds<D>, Box<dyn Response<D>>, Field<D>); 3] = [
+    let cases: [Path<D>; 3] = [
         ("kernels", lattice, solid().respond(lattice), in_lattice.clone()),
         ("loops", lattice, Plain(solid()).respond(lattice), in_lattice),
         ("cloud", cloud, solid().respond(cloud), in_cloud),
