@@ -4,7 +4,8 @@ use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::potential::{BondPotential, NetworkStretch};
-use polycore::units::EnergyPerArea;
+use crate::solver::Bilinear;
+use polycore::units::{EnergyPerArea, Stress};
 use serde::Deserialize;
 use std::f64::consts::PI;
 
@@ -21,6 +22,8 @@ pub struct Critical {
     pub stretch: Option<f64>,
     /// Fracture energy G, from which the stretch follows: the mesh-objective choice.
     pub fracture_energy: Option<EnergyPerArea>,
+    /// Uniaxial tensile strength of a solid, force over the undeformed section, beside its fracture energy: bonds soften.
+    pub strength: Option<Stress>,
 }
 
 /// Interpretations of f√n̄, R1 to R4 in the documents, (formulation.md, Critical stretch). (2.38) is the trace of an isochoric deformation: the bond stretch
@@ -86,6 +89,12 @@ pub struct Context<'a> {
 /// the largest family of the body. c = 1.13 + 0.98/m, m the horizon over the spacing, makes the crack of a pure-shear strip run at G
 /// (cases/ch5/rubber-tearing): bonds ahead of a tip release less than the mean of those that a crack cuts.
 pub fn energy_limit<const D: usize>(bonds: &dyn Bonds<D>, fracture_energy: f64) -> f64 {
+    let (reach, calibration) = share_of_crack(bonds);
+    fracture_energy / (calibration * reach)
+}
+
+/// Σ ŵ|ξ₁| of the largest family, m, and c of bonds that break at once.
+fn share_of_crack<const D: usize>(bonds: &dyn Bonds<D>) -> (f64, f64) {
     // the axis along which the family reaches farthest, in bodies thinner than it
     let mut most = [0.0_f64; 2];
     for &site in bonds.particles() {
@@ -98,8 +107,41 @@ pub fn energy_limit<const D: usize>(bonds: &dyn Bonds<D>, fracture_energy: f64) 
             most = [whole, reach.into_iter().fold(0.0, f64::max)];
         }
     }
-    let calibration = 1.13 + 0.98 * bonds.spacing() / bonds.horizon();
-    fracture_energy * most[0] / (calibration * most[1])
+    (most[1] / most[0], 1.13 + 0.98 * bonds.spacing() / bonds.horizon())
+}
+
+/// c of bonds of ductility 1, 2, 4, and 8 or more, over that of bonds that break at once: softening spreads the load over what is ahead
+/// of the tip. Between them it is linear in log₂ e_f. From pure-shear strips of rubber and of small strains: theory/fracture.md of the guide.
+const CALIBRATION: [f64; 4] = [1.0, 0.85, 0.73, 0.62];
+
+/// Bonds with the strength whose uniform state has the energy density Y₀ = `onset`, J/m³, and the fracture energy G, J/m²: Y_c =
+/// G/(c(Y_c/Y₀) Σ ŵ|ξ₁|), see [`energy_limit`]. The limit Y_c of bonds that break at once where it is below Y₀, which such bonds reach
+/// before their strength.
+///
+/// # Errors
+/// That limit.
+pub fn bilinear<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    fracture_energy: f64,
+    onset: f64,
+) -> Result<Bilinear, f64> {
+    let (reach, brittle) = share_of_crack(bonds);
+    let calibration = |ductility: f64| {
+        let place = ductility.log2().clamp(0.0, 3.0);
+        let at = (place as usize).min(2);
+        brittle * (CALIBRATION[at] + (place - at as f64) * (CALIBRATION[at + 1] - CALIBRATION[at]))
+    };
+    // e_f c(e_f) grows with e_f
+    let wanted = fracture_energy / (reach * onset);
+    if wanted.is_nan() || wanted < brittle {
+        return Err(fracture_energy / (brittle * reach));
+    }
+    let (mut low, mut high) = (1.0, wanted / calibration(8.0));
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if middle * calibration(middle) < wanted { low = middle } else { high = middle }
+    }
+    Ok(Bilinear { onset, limit: high * onset })
 }
 
 /// What [`Critical`] must be given.
@@ -123,6 +165,13 @@ impl Critical {
     pub fn resolve(&self, context: &Context) -> Result<f64, Error> {
         let fault =
             |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
+        if let Some(strength) = self.strength {
+            return fault(
+                "critical.strength",
+                strength.si(),
+                "nothing: bond laws have none, `[material.solid]` has",
+            );
+        }
         match (self.percent_over_contour, self.stretch, self.fracture_energy) {
             (Some(factor), None, None) => match context.links {
                 Some(links) => {

@@ -3,6 +3,7 @@
 use super::cells::CellGrid;
 use super::cloud_kernel::{CloudData, GROUP};
 use super::rows::{CloudKernel, cloud_kernel};
+use super::softening::{Softened, Softening, integrity};
 use super::{
     Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
 };
@@ -36,6 +37,7 @@ pub struct CloudBonds<const D: usize> {
     /// A law that only a table represents, and kθ.
     table: Option<(KernelFit, f64)>,
     directed_bonds: u64,
+    softening: Softening,
 }
 
 impl<const D: usize> CloudBonds<D> {
@@ -140,6 +142,7 @@ impl<const D: usize> CloudBonds<D> {
             kernel: None,
             table: None,
             directed_bonds,
+            softening: Softening::default(),
         };
         refuse_one_sided(&bonds)?;
         Ok(bonds)
@@ -194,9 +197,12 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     }
 
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
+        let soft = self.softening.among(site..site + 1);
         for k in self.starts[site]..self.starts[site + 1] {
             if self.neighbours[k] as usize != site {
-                visit(self.bond(site, k));
+                let bond = self.bond(site, k);
+                let part = integrity(soft, bond.index);
+                visit(Neighbour { volume: part * bond.volume, weight: part * bond.weight, ..bond });
             }
         }
     }
@@ -260,6 +266,14 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
             self.inverse_length[k] = 0.0;
         }
         self.directed_bonds -= bonds.len() as u64;
+    }
+
+    fn softening(&self) -> &Softening {
+        &self.softening
+    }
+
+    fn soften(&mut self, bonds: Vec<Softened>) {
+        self.softening.replace(bonds);
     }
 
     fn intact(&self) -> Vec<u64> {

@@ -2,6 +2,7 @@
 
 use super::lattice_kernel::{Class, TILE, Tiles};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
+use super::softening::{Softened, Softening, integrity};
 use super::{
     Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
 };
@@ -83,6 +84,7 @@ pub struct LatticeBonds<const D: usize> {
     /// A law that only a table represents, and kθ.
     table: Option<(KernelFit, f64)>,
     directed_bonds: u64,
+    softening: Softening,
 }
 
 impl<const D: usize> LatticeBonds<D> {
@@ -128,6 +130,7 @@ impl<const D: usize> LatticeBonds<D> {
             kernel: None,
             table: None,
             directed_bonds: 0,
+            softening: Softening::default(),
             lattice,
         };
         bonds.particles = bonds.occupied_sites();
@@ -346,19 +349,19 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     }
 
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
-        let spacing = self.lattice.spacing;
+        let (spacing, soft) = (self.lattice.spacing, self.softening.among(site..site + 1));
         for (k, &offset) in self.stencil.offsets.iter().enumerate() {
             if self.is_intact(site, k) {
                 let length = self.stencil.length(k) * spacing;
-                let volume =
-                    self.lattice.volume * self.volume_correction.factor(length, self.horizon(), spacing);
+                let whole = integrity(soft, k as u32) * self.lattice.volume;
+                let factor = self.volume_correction.factor(length, self.horizon(), spacing);
                 visit(Neighbour {
                     index: k as u32,
                     site: site.wrapping_add_signed(self.shift(offset)),
                     bond: offset.map(|o| f64::from(o) * spacing),
                     length,
-                    volume,
-                    weight: self.lattice.volume * self.weight(site, k),
+                    volume: whole * factor,
+                    weight: whole * self.weight(site, k),
                 });
             }
         }
@@ -454,6 +457,14 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
             let empty = (tile * TILE..(tile + 1) * TILE).all(|s| self.intact.iter().all(|w| w[s] == 0));
             self.classes[tile] = if empty { Class::Empty } else { Class::Partial };
         }
+    }
+
+    fn softening(&self) -> &Softening {
+        &self.softening
+    }
+
+    fn soften(&mut self, bonds: Vec<Softened>) {
+        self.softening.replace(bonds);
     }
 
     fn intact(&self) -> Vec<u64> {

@@ -11,6 +11,7 @@ mod linear;
 mod linear_kernel;
 mod property;
 mod rows;
+mod softening;
 
 pub use crate::geometry::Lattice;
 pub use crate::potential::StretchRange;
@@ -22,6 +23,7 @@ pub use lattice::{LatticeBonds, Stencil, storage};
 pub use lattice_kernel::TILE;
 pub use linear_kernel::{LinearRow, Moments};
 pub use property::Property;
+pub use softening::{Softened, Softening, among};
 
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
@@ -39,7 +41,7 @@ pub struct Neighbour<const D: usize> {
     pub bond: [f64; D],
     /// |ξ|, m.
     pub length: f64,
-    /// Volume correction times V_J, m³ (without surface correction).
+    /// Volume correction times V_J, m³ (without surface correction), of a softened bond times its integrity.
     pub volume: f64,
     /// All corrections: volume × surface factor.
     pub weight: f64,
@@ -108,6 +110,11 @@ pub trait Bonds<const D: usize>: Send + Sync {
     );
     /// Severs bonds, each named from both of its ends.
     fn sever(&mut self, bonds: &[Overstretched]);
+    /// The bonds that bear a part of what they bore.
+    fn softening(&self) -> &Softening;
+    /// Takes these to be the softened bonds, each named from both of its ends: [`Bonds::neighbours`] weighs them by their integrity,
+    /// [`Bonds::force`] does not.
+    fn soften(&mut self, bonds: Vec<Softened>);
     /// Which bonds are intact, for checkpoints: as many words as [`Bonds::restore`] takes.
     fn intact(&self) -> Vec<u64>;
     /// Severs what is not intact in `words`; false where their number does not fit these bonds.

@@ -17,6 +17,7 @@ mod family;
 mod pointwise;
 mod response;
 mod solid_passes;
+mod strength;
 
 pub use bonded::BondMaterial;
 pub use constitutive::Correspondence;
@@ -25,6 +26,7 @@ pub use eight_chain::EightChain;
 pub use family::{Bond, Family};
 pub use pointwise::{Passes, Pointwise};
 pub use response::{Cover, LawRange, Response};
+pub use strength::energy_at_strength;
 
 pub use crate::bonds::Property;
 

@@ -204,7 +204,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         displacement: &Field<D>,
         limit: f64,
         free: &(dyn Fn(usize) -> bool + Sync),
-    ) -> Vec<Overstretched> {
+    ) -> Vec<(Overstretched, f64)> {
         self.prepare(bonds, displacement);
         let energy = |&site: &u32| {
             let family = Family::new(bonds, displacement, site as usize);
@@ -222,18 +222,18 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
                 bonds.neighbours(site as usize, &mut |neighbour| {
                     let bond = Bond::new(site as usize, &neighbour, displacement);
                     let elongation = bond.elongation();
-                    if elongation > 0.0
-                        && free(bond.to)
-                        && 0.5 * (released(&bond, bond.from) + released(&bond, bond.to)) > limit
-                    {
-                        let (index, length, weight) = (neighbour.index, bond.length, bond.weight);
-                        found.push(Overstretched { site, index, elongation, length, weight });
+                    if elongation > 0.0 && free(bond.to) {
+                        let energy = 0.5 * (released(&bond, bond.from) + released(&bond, bond.to));
+                        if energy > limit {
+                            let (index, length, weight) = (neighbour.index, bond.length, bond.weight);
+                            found.push((Overstretched { site, index, elongation, length, weight }, energy));
+                        }
                     }
                 });
             }
             found
         };
-        let parts: Vec<Vec<Overstretched>> = bonds.particles().par_chunks(CHUNK).map(of).collect();
+        let parts: Vec<Vec<(Overstretched, f64)>> = bonds.particles().par_chunks(CHUNK).map(of).collect();
         parts.concat()
     }
 

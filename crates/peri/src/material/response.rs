@@ -74,15 +74,15 @@ pub trait Response<const D: usize>: Send + Sync {
     /// itself. `None`: what the body loses when they are.
     fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64>;
 
-    /// Intact bonds of free particles that are stretched, and whose breaking would release more than `limit`, J/m³, each from both
-    /// ends; none of materials without [`super::Material::released_energy`].
+    /// Intact bonds of free particles that are stretched, and whose breaking would release more than `limit`, J/m³, with that
+    /// energy, each from both ends, by site and index; none of materials without [`super::Material::released_energy`].
     fn overloaded(
         &mut self,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
         limit: f64,
         free: &(dyn Fn(usize) -> bool + Sync),
-    ) -> Vec<Overstretched> {
+    ) -> Vec<(Overstretched, f64)> {
         let _ = (bonds, displacement, limit, free);
         Vec::new()
     }

@@ -3,8 +3,8 @@
 use super::deformation::{NonlocalSolid, Point, PointLaw, Tensor};
 use super::family::Family;
 use super::pointwise::Passes;
-use crate::bonds::{Bonds, LinearRow, StretchRange};
-use crate::field::{CHUNK, Field};
+use crate::bonds::{Bonds, LinearRow, Softened, StretchRange, among};
+use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 
 /// What the second pass reads, N = 1 + D²: A and S of every site.
@@ -15,6 +15,8 @@ pub struct SolidPasses<const D: usize, const N: usize> {
     bonded: Vec<u32>,
     /// Intact directed bonds of the body then; none before the first pass.
     known: Option<u64>,
+    /// Revision of its softened bonds then.
+    revision: u64,
     /// Particles with springs in place of the law, and their neighbours; empty where there are none.
     sprung: Vec<bool>,
 }
@@ -24,8 +26,21 @@ impl<const D: usize, const N: usize> SolidPasses<D, N> {
     pub fn new(bonds: &dyn Bonds<D>) -> Option<Self> {
         let rows = bonds.as_lattice()?.linear_rows();
         let (terms, bonded) = (Field::zeros(bonds.sites()), vec![0; bonds.sites()]);
-        Some(Self { rows, terms, bonded, known: None, sprung: Vec::new() })
+        Some(Self { rows, terms, bonded, known: None, revision: 0, sprung: Vec::new() })
     }
+}
+
+/// What a softened bond lacks of V/|ξ|², as a negative number, its other end, η and ξ.
+fn lack<const D: usize>(
+    rows: &[LinearRow<D>],
+    bond: &Softened,
+    displacement: &Field<D>,
+) -> (f64, usize, [f64; D], [f64; D]) {
+    let (row, site) = (&rows[bond.index as usize], bond.site as usize);
+    let there = site.wrapping_add_signed(row.shift);
+    let (own, other) = (displacement.get(site), displacement.get(there));
+    let lack = (bond.integrity - 1.0) * row.share;
+    (lack, there, std::array::from_fn(|d| other[d] - own[d]), row.bond)
 }
 
 impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D> for SolidPasses<D, N> {
@@ -37,16 +52,20 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         points: &mut [Point<D>],
     ) {
         let Some(lattice) = bonds.as_lattice() else { return };
-        let (rows, changed) = (&self.rows, self.known != Some(bonds.directed_bonds()));
-        self.known = Some(bonds.directed_bonds());
+        let softening = lattice.softening();
+        let softer = self.revision != softening.revision();
+        let changed = softer || self.known != Some(bonds.directed_bonds());
+        (self.known, self.revision) = (Some(bonds.directed_bonds()), softening.revision());
+        let rows = &self.rows;
         let items = self.terms.chunks_mut().into_par_iter().zip(self.bonded.par_chunks_mut(CHUNK));
         let items = items.zip(points.par_chunks_mut(CHUNK)).enumerate();
         let springs = items.map(|(chunk, ((mut terms, bonded), points))| {
             let mut springs = false;
             let first = chunk * CHUNK;
+            let soft = softening.among(chunk_range(chunk, lattice.sites()));
             for at in (0..bonded.len()).filter(|_| changed) {
                 let (site, now) = (first + at, lattice.bonded(first + at));
-                if bonded[at] != now {
+                if bonded[at] != now || softer && !among(soft, site..site + 1).is_empty() {
                     bonded[at] = now;
                     points[at].reshape(&Family::new(bonds, displacement, site));
                     if now == 0 {
@@ -59,8 +78,15 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
                     let at = base + lane - first;
                     let point = &mut points[at];
                     if point.has_gradient() {
-                        let moment = Tensor::<D>::from_fn(|a, b| moments[1 + a * D + b][lane]);
-                        solid.update(point, moment, moments[0][lane]);
+                        let mut moment = Tensor::<D>::from_fn(|a, b| moments[1 + a * D + b][lane]);
+                        let mut square = moments[0][lane];
+                        // the kernel takes every bond for intact
+                        for bond in among(soft, base + lane..base + lane + 1) {
+                            let (lack, _, change, reference) = lack(rows, bond, displacement);
+                            square += change.iter().map(|x| lack * x * x).sum::<f64>();
+                            moment += Tensor::from_fn(|a, b| lack * change[a] * reference[b]);
+                        }
+                        solid.update(point, moment, square);
                     } else if bonded[at] > 0 {
                         solid.spring(point);
                         springs = true;
@@ -98,6 +124,15 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         let Some(lattice) = bonds.as_lattice() else { return };
         lattice.linear_force::<N>(&self.rows, displacement, &self.terms, chunk, force, track);
         let first = chunk * CHUNK;
+        let terms = self.terms.components();
+        for bond in lattice.softening().among(first..first + force[0].len()) {
+            let (lack, there, change, reference) = lack(&self.rows, bond, displacement);
+            let at = |n: usize| terms[n][bond.site as usize] + terms[n][there];
+            for a in 0..D {
+                let stress: f64 = (0..D).map(|b| at(1 + a * D + b) * reference[b]).sum();
+                force[a][bond.site as usize - first] += lack * (at(0) * change[a] + stress);
+            }
+        }
         let here = self.sprung.iter().enumerate().skip(first).take(force[0].len());
         for (site, _) in here.filter(|(_, sprung)| **sprung) {
             Family::new(bonds, displacement, site).each(|bond| {

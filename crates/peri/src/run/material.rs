@@ -3,9 +3,11 @@
 use crate::bonds::Bonds;
 use crate::calibrate;
 use crate::correction::{bond_factors, surface_factors};
-use crate::critical::{Context, Critical, energy_limit};
+use crate::critical::{Context, Critical, bilinear, energy_limit};
 use crate::error::Error;
-use crate::material::{BondMaterial, Material, NonlocalSolid, PointLaw, Pointwise, Response};
+use crate::material::{
+    BondMaterial, Material, NonlocalSolid, PointLaw, Pointwise, Response, energy_at_strength,
+};
 use crate::potential::{BondPotential, KernelFit};
 use crate::run::Failure;
 use crate::scene::{self, Body, Inclusions, Scene, SurfaceCorrection, Variant};
@@ -69,13 +71,32 @@ impl<const D: usize> Bonded<D> {
         let (space, spec) = (scene.body.space, &scene.material);
         let (horizon, thickness) = (body.bonds.horizon(), body.thickness);
         if let Some(solid) = &spec.solid {
-            let material = Acting::Solid(NonlocalSolid(solid.build::<D>(source, space)?));
-            let limit = |critical: Critical| match (critical.stretch, critical.fracture_energy) {
-                (Some(stretch), _) => Some(stretch.into()),
-                (_, Some(energy)) => Some(Criterion::Energy(energy_limit(&*body.bonds, energy.si()))),
+            let law = solid.build::<D>(source, space)?;
+            let criterion = match spec.critical {
+                Some(Critical { stretch: Some(stretch), .. }) => Some(stretch.into()),
+                Some(Critical { fracture_energy: Some(energy), strength: Some(strength), .. }) => {
+                    let strength = strength.si();
+                    let fault = |allowed: String| {
+                        let found = scene::plain(strength) + " Pa";
+                        source.error("material.critical.strength", found, allowed)
+                    };
+                    let onset = energy_at_strength(&*law, strength).ok_or_else(|| {
+                        fault("a stress that the law reaches in uniaxial tension".to_owned())
+                    })?;
+                    let softening = bilinear(&*body.bonds, energy.si(), onset).map_err(|limit| {
+                        fault(format!(
+                            "less, or a finer spacing: at it W = {onset:.4e} J/m³, and bonds of this fracture energy \
+                             break at {limit:.4e} J/m³"
+                        ))
+                    })?;
+                    Some(Criterion::Softening(softening))
+                }
+                Some(Critical { fracture_energy: Some(energy), .. }) => {
+                    Some(Criterion::Energy(energy_limit(&*body.bonds, energy.si())))
+                }
                 _ => None,
             };
-            let criterion = spec.critical.and_then(limit);
+            let material = Acting::Solid(NonlocalSolid(law));
             return Ok(Self { body, material, criterion });
         }
         let law: Arc<dyn BondPotential> = Arc::from(spec.bond_law()?);

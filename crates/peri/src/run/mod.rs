@@ -30,7 +30,7 @@ use crate::error::Error;
 use crate::potential::KernelFit;
 use crate::quantities as q;
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
-use crate::solver::{Breaking, Criterion, Loads, Method, State, Status, System, load_stepping};
+use crate::solver::{Bilinear, Breaking, Criterion, Loads, Method, State, Status, System, load_stepping};
 use polycore::case::{Fault, Run};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
@@ -181,7 +181,9 @@ fn run_variant<const D: usize>(
     if let Some(criterion) = &criterion {
         match criterion {
             Criterion::Stretch(stretch) => outcome.value(q::CRITICAL_STRETCH, stretch.least()),
-            Criterion::Energy(limit) => outcome.value(q::CRITICAL_ENERGY, *limit),
+            Criterion::Energy(limit) | Criterion::Softening(Bilinear { limit, .. }) => {
+                outcome.value(q::CRITICAL_ENERGY, *limit);
+            }
         }
         outcome.value(q::FRAGMENTS, fragments(&*body.bonds) as f64);
     }

@@ -57,6 +57,12 @@ pub fn explain<const D: usize>(
         let limit = match criterion {
             Criterion::Stretch(stretch) => format!("at a stretch of {:.6}", stretch.least()),
             Criterion::Energy(limit) => format!("where that releases more than {limit:.4e} J/m³"),
+            Criterion::Softening(law) => format!(
+                "where that has taken {:.4e} J/m³ and soften from {:.4e} J/m³ on (e_f = {:.3})",
+                law.limit,
+                law.onset,
+                law.ductility()
+            ),
         };
         builds(format!("bonds that break {limit}, damage, a count of each particle's bonds"));
     }

@@ -163,6 +163,13 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         if let Some(found) = found {
             return Err(source.error("material.critical", found, allowed));
         }
+        if let Some(strength) = critical.strength {
+            let key = "material.critical.strength";
+            positive(source, key, strength.si(), "Pa")?;
+            if critical.fracture_energy.is_none() {
+                return Err(source.error(key, "a strength without `fracture_energy`", "both of them"));
+            }
+        }
     }
     let other =
         scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m != Measure::Constitutive);

@@ -1,25 +1,69 @@
 //! Bonds that break.
 
-use super::criterion::{Criterion, Policy, most};
+use super::criterion::{Bilinear, Criterion, Policy, most};
 use super::state::{Event, State};
 use super::system::System;
-use crate::bonds::{fingerprint, overstretched};
+use crate::bonds::{Overstretched, Softened, fingerprint, overstretched};
 use crate::potential::StretchRange;
 
+/// Softening that an equilibrium may still lack: bonds of it bear up to this part of an intact bond's force too much.
+const LAG: f64 = 0.01;
+
+/// What bonds beyond the onset come to, each with what its breaking would release: those that break, and all that are soft then; `None`
+/// where no integrity falls by more than `lag`.
+fn soften(
+    law: Bilinear,
+    soft: &[Softened],
+    found: Vec<(Overstretched, f64)>,
+    lag: f64,
+) -> Option<(Vec<Overstretched>, Vec<Softened>)> {
+    let (mut after, mut list, mut fall) = (soft.to_vec(), Vec::new(), 0.0_f64);
+    for (bond, energy) in found {
+        let known = soft.binary_search_by_key(&(bond.site, bond.index), |b| (b.site, b.index)).ok();
+        let before = known.map_or(1.0, |at| soft[at].integrity);
+        if known.is_some_and(|at| energy <= soft[at].greatest) {
+            continue;
+        }
+        let integrity = law.integrity(energy);
+        fall = fall.max(before - integrity);
+        if integrity <= 0.0 {
+            list.push(bond);
+        }
+        let bond = Softened { site: bond.site, index: bond.index, greatest: energy, integrity };
+        match known {
+            Some(at) => after[at] = bond,
+            None => after.push(bond),
+        }
+    }
+    after.retain(|bond| bond.integrity > 0.0);
+    (fall > lag).then_some((list, after))
+}
+
 impl<const D: usize> System<'_, D> {
-    /// Severs all bonds beyond what they bear; the sites of their ends.
+    /// Severs all bonds beyond what they bear, and softens those on the way there; the sites of their ends.
     pub fn break_bonds(&mut self, state: &mut State<D>) -> Vec<u32> {
         let Some(breaking) = &self.breaking else { return Vec::new() };
+        let free = |site: usize| self.loads.constrained(site) == 0;
+        let mut softened = None;
         let list = match &breaking.criterion {
             Criterion::Stretch(stretch) => overstretched(&*self.bonds, &state.displacement, stretch),
             Criterion::Energy(limit) => {
-                let loads = &self.loads;
-                let free = |site: usize| loads.constrained(site) == 0;
-                self.material.overloaded(&*self.bonds, &state.displacement, *limit, &free)
+                let found = self.material.overloaded(&*self.bonds, &state.displacement, *limit, &free);
+                found.into_iter().map(|(bond, _)| bond).collect()
+            }
+            Criterion::Softening(law) => {
+                let found = self.material.overloaded(&*self.bonds, &state.displacement, law.onset, &free);
+                // in dynamics forces follow at once
+                let lag = if state.motion.begun { 0.0 } else { LAG };
+                let changed = soften(*law, &state.softened, found, lag);
+                changed.map_or_else(Vec::new, |(list, after)| {
+                    softened = Some(after);
+                    list
+                })
             }
         };
         self.count_evaluation(state);
-        if list.is_empty() {
+        if list.is_empty() && softened.is_none() {
             return Vec::new();
         }
         let released = self.material.released(&*self.bonds, &list, most(self.breaking.as_ref()));
@@ -29,13 +73,24 @@ impl<const D: usize> System<'_, D> {
         state.broken += bonds;
         let [factor, pull, push] = state.balanced;
         let load = self.loads.response(&*self.bonds, factor, (pull, push)).0;
-        state.events.push(Event { step: state.step, bonds, fingerprint: fingerprint(&list), load });
-        self.bonds.sever(&list);
+        if bonds > 0 {
+            state.events.push(Event { step: state.step, bonds, fingerprint: fingerprint(&list), load });
+            self.bonds.sever(&list);
+        }
+        let mut sites: Vec<u32> = list.iter().map(|bond| bond.site).collect();
+        if let Some(mut softened) = softened {
+            softened.sort_unstable_by_key(|bond| (bond.site, bond.index));
+            sites.extend(softened.iter().map(|bond| bond.site));
+            sites.sort_unstable();
+            self.bonds.soften(softened.clone());
+            state.softened = softened;
+        }
         state.released +=
             released.unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.observed));
         self.rebuild_contact(&state.displacement);
-        state.intact = Some(self.bonds.intact());
-        let mut sites: Vec<u32> = list.iter().map(|bond| bond.site).collect();
+        if bonds > 0 {
+            state.intact = Some(self.bonds.intact());
+        }
         sites.dedup();
         state.detached += self.release(sites.iter().copied());
         sites

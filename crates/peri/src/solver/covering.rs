@@ -22,6 +22,9 @@ impl<const D: usize> System<'_, D> {
             let particles = self.bonds.particles().to_vec();
             self.release(particles.iter().copied());
         }
+        if !state.softened.is_empty() {
+            self.bonds.soften(state.softened.clone());
+        }
         self.rebuild_contact(&state.displacement);
         state.fitted[1] = state.fitted[1].min(most(self.breaking.as_ref()));
         // a bound that depends on the displacement stays that of the run before

@@ -20,6 +20,38 @@ pub enum Criterion {
     /// Energy that breaking a bond releases, over its share of the family, J/m³: the mean of both ends. For materials with
     /// [`crate::material::Material::released_energy`]. Bonds of constrained particles do not break by it: grips do not tear.
     Energy(f64),
+    /// The same of bonds that have a strength: they soften on their way to breaking.
+    Softening(Bilinear),
+}
+
+/// A bond that softens, of energies over its share of the family, J/m³: with the greatest energy κ that its breaking would have
+/// released, e = √(κ/Y₀) and e_f = Y_c/Y₀ its integrity is d = 1 up to e = 1, (e_f − e)/[e(e_f − 1)] up to e_f, then 0: force over
+/// stretch is bilinear, and ∫Y(−dd) = Y_c. Cf. Camanho & Dávila, NASA/TM-2002-211737.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bilinear {
+    /// Y₀, at which bonds begin to soften.
+    pub onset: f64,
+    /// Y_c ≥ Y₀, which breaking takes in all.
+    pub limit: f64,
+}
+
+impl Bilinear {
+    /// e_f = Y_c/Y₀.
+    pub fn ductility(&self) -> f64 {
+        self.limit / self.onset
+    }
+
+    /// d of a bond that would have released κ = `greatest`.
+    pub fn integrity(&self, greatest: f64) -> f64 {
+        let (e, last) = ((greatest / self.onset).sqrt(), self.ductility());
+        if e <= 1.0 {
+            1.0
+        } else if e < last {
+            (last - e) / (e * (last - 1.0))
+        } else {
+            0.0
+        }
+    }
 }
 
 impl From<Property> for Criterion {
@@ -39,7 +71,7 @@ impl Criterion {
     pub fn least_stretch(&self) -> f64 {
         match self {
             Self::Stretch(stretch) => stretch.least(),
-            Self::Energy(_) => 1.0,
+            Self::Energy(_) | Self::Softening(_) => 1.0,
         }
     }
 
@@ -47,7 +79,7 @@ impl Criterion {
     pub fn greatest_stretch(&self) -> f64 {
         match self {
             Self::Stretch(stretch) => stretch.greatest(),
-            Self::Energy(_) => f64::INFINITY,
+            Self::Energy(_) | Self::Softening(_) => f64::INFINITY,
         }
     }
 }

@@ -145,7 +145,8 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let [factor, pull, push] = state.balanced;
     let observed = state.balanced_stretches;
     let (load, displacement) = system.loads.response(&*system.bonds, factor, (pull, push));
-    if state.history.last().map_or(0, |r| r.broken) != state.broken {
+    // softening takes rounds of its own
+    if state.round > 1 || state.history.last().map_or(0, |r| r.broken) != state.broken {
         state.past.clear();
     }
     let balance = Balance::new(system, state);

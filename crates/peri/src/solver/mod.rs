@@ -23,7 +23,7 @@ mod verlet;
 mod verlet_step;
 
 pub use adr::{DynamicRelaxation, RelaxationSolver};
-pub use criterion::{Breaking, Criterion, Policy};
+pub use criterion::{Bilinear, Breaking, Criterion, Policy};
 pub use lbfgs::{Lbfgs, LbfgsSolver};
 pub use load::{Loads, Support};
 pub use load_stepping::{Equilibrium, load_stepping};

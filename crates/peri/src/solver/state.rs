@@ -2,6 +2,7 @@
 
 use super::motion::Motion;
 use super::scale::Balance;
+use crate::bonds::Softened;
 use crate::contact::Touching;
 use crate::error::Error;
 use crate::field::Field;
@@ -115,7 +116,7 @@ pub struct State<const D: usize> {
     pub events: Vec<Event>,
     /// Particles that have lost all their bonds so far.
     pub detached: u64,
-    /// Energy of broken bonds when they broke, J.
+    /// Energy of broken bonds when they broke, and what softening took, J.
     pub released: f64,
     /// Work of the loads so far, J.
     pub work: f64,
@@ -123,6 +124,8 @@ pub struct State<const D: usize> {
     pub(super) balanced: [f64; 3],
     /// Intact bonds, once any has broken.
     pub(super) intact: Option<Vec<u64>>,
+    /// Bonds that bear a part of what they bore.
+    pub softened: Vec<Softened>,
     /// Time and energies of explicit dynamics.
     pub motion: Motion,
     /// The finished steps.
@@ -161,6 +164,7 @@ impl<const D: usize> State<D> {
             work: 0.0,
             balanced: [0.0; 3],
             intact: None,
+            softened: Vec::new(),
             motion: Motion::default(),
             history: Vec::new(),
         }

@@ -24,6 +24,7 @@ mod relaxation;
 mod rigid;
 #[path = "../../examples/rubber_bearing.rs"]
 mod rubber_bearing;
+mod softening;
 mod solids;
 mod spectra;
 mod stress;

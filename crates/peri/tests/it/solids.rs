@@ -15,7 +15,7 @@ use peri::material::{
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 
 /// W = ½μ(I₁ − 3 − 2 ln J) + ¼κ(J² − 1 − 2 ln J), μ = 1, of a bulk modulus K.
-fn neo_hooke<const D: usize>(
+pub fn neo_hooke<const D: usize>(
     space: Space,
     bulk: f64,
 ) -> NonlocalSolid<Correspondence<Compressible<NeoHookean>, D>> {
@@ -24,7 +24,7 @@ fn neo_hooke<const D: usize>(
     NonlocalSolid(Correspondence::new(law, space).unwrap())
 }
 
-fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChain<D>> {
+pub fn rubber<const D: usize>(space: Space, bulk: f64) -> NonlocalSolid<EightChain<D>> {
     NonlocalSolid(EightChain::new(space, 1.0, 25.0, bulk).unwrap())
 }
 
@@ -144,7 +144,7 @@ impl<const D: usize> Block<D> {
 }
 
 /// The displacement of the independent program's blocks.
-fn displaced<const D: usize>(position: [f64; D]) -> [f64; D] {
+pub fn displaced<const D: usize>(position: [f64; D]) -> [f64; D] {
     let [x, y] = [position[0], position[1]];
     let z = if D == 3 { position[2] } else { 0.0 };
     let all = [
@@ -374,7 +374,7 @@ fn laws_of_another_dimension_are_refused() {
 }
 
 /// A solid without its kernels: plain loops over bonds.
-struct Plain<M>(M);
+pub struct Plain<M>(pub M);
 
 impl<const D: usize, M: Material<D>> Material<D> for Plain<M> {
     type Point = M::Point;

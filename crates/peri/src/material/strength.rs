@@ -1,0 +1,49 @@
+//! Uniform states at which a solid has its strength.
+
+use super::deformation::{Deformation, PointLaw, Tensor};
+
+/// No solid is strained farther.
+const GREATEST: f64 = 1e3;
+
+/// Uniaxial tension of stretch λ₁: the other stretch, at which the sides are free, by bisection.
+fn pulled<const D: usize>(law: &(impl PointLaw<D> + ?Sized), stretch: f64) -> (Deformation<D>, Tensor<D>) {
+    let at = |side: f64| {
+        let entry = |a: usize| if a == 0 { stretch - 1.0 } else { side - 1.0 };
+        let displacement_gradient = Tensor::from_fn(|a, b| if a == b { entry(a) } else { 0.0 });
+        let deformation = Deformation { displacement_gradient, residual: 0.0 };
+        let piola = law.respond(&deformation).piola;
+        (deformation, piola)
+    };
+    // a body without volume is outside of most laws
+    let (mut low, mut high) = (0.0, 2.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if at(middle).1[(1, 1)] > 0.0 { high = middle } else { low = middle }
+    }
+    at(high)
+}
+
+/// Energy density W, J/m³, of the uniform state of uniaxial tension in which the stress is first `strength`, Pa: force over the
+/// undeformed section (first Piola–Kirchhoff), as tensile tests of rubber report it (ISO 37). In plane strain the thickness is held. `None`
+/// where the law does not reach it.
+pub fn energy_at_strength<const D: usize>(law: &(impl PointLaw<D> + ?Sized), strength: f64) -> Option<f64> {
+    let beyond = |strain: f64| {
+        let stress = pulled(law, 1.0 + strain).1[(0, 0)];
+        // beyond the domain of a law that locks
+        stress.is_nan() || stress >= strength
+    };
+    let (mut low, mut high) = (0.0, (0.01 * strength / law.shear_modulus()).min(1e-3));
+    while !beyond(high) {
+        (low, high) = (high, 1.1 * high);
+        if high > GREATEST {
+            return None;
+        }
+    }
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if beyond(middle) { high = middle } else { low = middle }
+    }
+    let (deformation, stress) = pulled(law, 1.0 + low);
+    let reached = (stress[(0, 0)] / strength - 1.0).abs() < 1e-6;
+    reached.then(|| law.energy(&deformation)).filter(|energy| *energy > 0.0)
+}
