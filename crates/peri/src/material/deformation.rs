@@ -126,10 +126,10 @@ impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
 pub struct NonlocalSolid<L>(pub L);
 
 /// D λ_min(M) below which a family has no deformation gradient. Intact corners have 0.50 and more.
-const LEAST_SHAPE: f64 = 0.1;
+pub(super) const LEAST_SHAPE: f64 = 0.1;
 
 /// (|q̂|δ)² of the largest gradient that particles one spacing apart feel: 2.69 to 3.09 for δ of 2 to 6 spacings.
-const GRADIENT: f64 = 3.1;
+pub(super) const GRADIENT: f64 = 3.1;
 
 /// What a particle knows of its family.
 #[derive(Clone, Debug)]
@@ -214,7 +214,7 @@ impl<const D: usize> Point<D> {
 }
 
 /// M⁻¹ and the least eigenvalue of M = `shape`, a tensor of trace 1.
-fn invert<const D: usize>(shape: &Tensor<D>) -> (Tensor<D>, f64) {
+pub(super) fn invert<const D: usize>(shape: &Tensor<D>) -> (Tensor<D>, f64) {
     let values = embed(shape, 1.0).symmetric_eigenvalues();
     // the third of two dimensions is 1, and none of the others is larger
     (shape.try_inverse().unwrap_or_else(Tensor::zeros), values.min())

@@ -25,7 +25,7 @@ pub struct EightChain<const D: usize> {
 }
 
 /// Relative extension beyond which β grows linearly: a chain that a load step stretches too far has a force nevertheless.
-const LINEAR: f64 = 0.995;
+pub(super) const LINEAR: f64 = 0.995;
 /// J below which ln J and J⁻² go on as parabolas.
 const CRUSHED: f64 = 0.2;
 
@@ -204,13 +204,13 @@ struct Thickness {
 }
 
 /// ln J at J = 1 + `change`, a parabola below [`CRUSHED`].
-fn logarithm(change: f64) -> f64 {
+pub(super) fn logarithm(change: f64) -> f64 {
     let (s, r) = (1.0 + change - CRUSHED, 1.0 / CRUSHED);
     if s > 0.0 { change.ln_1p() } else { CRUSHED.ln() + s * r - 0.5 * s * s * r * r }
 }
 
 /// Its derivatives.
-fn logarithm_slopes(change: f64) -> [f64; 2] {
+pub(super) fn logarithm_slopes(change: f64) -> [f64; 2] {
     let (jacobian, r) = (1.0 + change, 1.0 / CRUSHED);
     if jacobian > CRUSHED {
         return [1.0 / jacobian, -1.0 / (jacobian * jacobian)];
@@ -230,7 +230,7 @@ fn inverse_square(jacobian: f64) -> [f64; 3] {
 }
 
 /// cof F = J F⁻ᵀ.
-fn cofactor<const D: usize>(gradient: &Tensor<D>) -> Tensor<D> {
+pub(super) fn cofactor<const D: usize>(gradient: &Tensor<D>) -> Tensor<D> {
     if D == 2 {
         let sign = |i: usize, k: usize| if i == k { 1.0 } else { -1.0 };
         return Tensor::from_fn(|i, k| sign(i, k) * gradient[(1 - i, 1 - k)]);

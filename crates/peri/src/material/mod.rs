@@ -9,6 +9,7 @@
 //! Solvers know a material as a [`Response`], which [`Material::respond`] makes of it: forces by work items, the energy, bounds
 //! of the stiffness. A material of the first kind needs no word about them.
 
+mod affine;
 mod bonded;
 mod constitutive;
 mod deformation;
@@ -19,6 +20,7 @@ mod response;
 mod solid_passes;
 mod strength;
 
+pub use affine::{Affine, AffinePoint};
 pub use bonded::BondMaterial;
 pub use constitutive::Correspondence;
 pub use deformation::{Deformation, NonlocalSolid, Point, PointLaw, PointStress, Tensor};

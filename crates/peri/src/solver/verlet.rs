@@ -208,7 +208,8 @@ impl VelocityVerlet {
         let motion = &mut state.motion;
         let tangent = system.material.range(motion.looked).least_tangent;
         motion.frequency = if frequency > 0.0 { frequency / tangent } else { 0.0 };
-        if system.material.has_points() {
+        // a given time step does not follow it
+        if system.material.has_points() && self.time_step.is_none() {
             let [low, high] = motion.looked;
             motion.known =
                 Some([low - GROWS * (1.0 - low).max(LEAST), high + GROWS * (high - 1.0).max(LEAST)]);

@@ -1,6 +1,7 @@
 //! Tests of the public interface against plain sums, closed forms and the independent tables of `formulation.md`
 //! (chapter 2), whose scripts wrote `stress_patch.csv` and `stress_surface.csv`.
 
+mod affine;
 mod balance;
 mod bodies;
 mod contact;
