@@ -152,6 +152,13 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         }
     }
     if let Some(critical) = &material.critical {
+        if let Some(strength) = critical.strength {
+            let key = "material.critical.strength";
+            positive(source, key, strength.si(), "Pa")?;
+            if critical.fracture_energy.is_none() {
+                return Err(source.error(key, "a strength without `fracture_energy`", "both of them"));
+            }
+        }
         let allowed = "either `stretch`, above 1, or `fracture_energy`, above 0";
         let found = match (critical.given().len(), critical.stretch, critical.fracture_energy) {
             (1, Some(stretch), _) if stretch > 1.0 && stretch.is_finite() => None,
@@ -162,13 +169,6 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         };
         if let Some(found) = found {
             return Err(source.error("material.critical", found, allowed));
-        }
-        if let Some(strength) = critical.strength {
-            let key = "material.critical.strength";
-            positive(source, key, strength.si(), "Pa")?;
-            if critical.fracture_energy.is_none() {
-                return Err(source.error(key, "a strength without `fracture_energy`", "both of them"));
-            }
         }
     }
     let other =
