@@ -52,6 +52,40 @@ fn every_program_sweeps() {
     }
 }
 
+/// A sweep over draws gives the band of a value, one for each value of another key; wrong samples are named.
+#[test]
+fn a_sample_makes_a_band() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let rows: String = (0..=10).map(|k| format!("{},1.36e5\n", 37_000.0 + 100.0 * f64::from(k))).collect();
+    fs::write(here.join("draws.csv"), format!("growth_rate [1/s],nucleation [K^2]\n{rows}")).unwrap();
+    let scene = "cases/ch5/kinetics-uncertainty/case.toml --column fast.*temperature_at_0.5";
+    let sweep = |flags: &str| {
+        let line = format!("sweep {scene} {flags} -o {}", here.join("out").display());
+        finish(command("crystfem", &line, workspace()).spawn().unwrap())
+    };
+    let sample = format!("--sample materials.pa12.kinetics={}", here.join("draws.csv").display());
+    sweep(&format!("{sample} --count 11 --vary materials.pa12.kinetics.avrami_exponent=2.5,2.7"))
+        .with_code(0);
+    let table = fs::read_to_string(here.join("out/sweep_bands.csv")).unwrap();
+    let found: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    assert_eq!(found.len(), 2, "{table}");
+    for (row, exponent) in found.iter().zip(["2.5", "2.7"]) {
+        let [lower, median, upper] = [5, 6, 7].map(|k: usize| row[k].parse::<f64>().unwrap());
+        // the temperature rises with the rate, nearly in proportion to its logarithm
+        assert!(row[0] == exponent && row[2] == "11" && lower < median && median < upper, "{row:?}");
+        assert!(((upper - median) / (median - lower) - 1.0).abs() < 0.05, "{row:?}");
+    }
+    for (flags, told) in [
+        (format!("{sample} --count 22"), "1 to 11"),
+        ("--sample materials.pa12.kinetics=absent.csv".to_owned(), "absent.csv"),
+        (sample.replace("kinetics=", "kinetic="), "did you mean `kinetics`?"),
+    ] {
+        let ended = sweep(&flags).with_code(2);
+        assert!(ended.stderr.contains(told), "{}", ended.stderr);
+    }
+}
+
 /// A quick run is not taken for a whole one, and the table of a sweep takes no other keys.
 #[test]
 fn a_quick_sweep_is_another_sweep() {

@@ -69,6 +69,15 @@ fn killed_while_it_breaks() {
     survives_kills(&scenes::fracture("2 mm", "method = \"lbfgs\""));
 }
 
+/// Friction, which is a part of the forces of a state, and planes that move.
+#[test]
+fn killed_while_it_rubs() {
+    let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../cases/ch5/rubber-friction/case.toml");
+    let scene = fs::read_to_string(case).unwrap();
+    let (scene, _) = scene.split_once("[[expect]]").unwrap();
+    survives_kills(&scene.replace("end_time = \"0.5 s\"", "end_time = \"0.2 s\""));
+}
+
 /// Layers, crystallization with its latent heat, probes and fields.
 #[test]
 fn killed_while_it_prints() {
@@ -188,7 +197,7 @@ fn checkpoints_that_cannot_be_used() {
     let points = scenes::points();
     let half: Vec<&str> = points.lines().take(800).collect();
     fs::write(here.join("points.csv"), half.join("\n")).unwrap();
-    peri("resume out", here).with_code(2).tells("the body now has");
+    peri("resume out", here).with_code(2).tells("the file points.csv has changed since this run began");
     fs::remove_file(here.join("points.csv")).unwrap();
     peri("resume out", here).with_code(2).tells("points.csv");
 

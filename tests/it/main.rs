@@ -22,6 +22,7 @@
 mod allocations;
 mod bad;
 mod bits;
+mod chains;
 mod commands;
 mod documents;
 mod examples;

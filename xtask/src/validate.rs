@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
+use polycore::scene::Source;
 
 use crate::report;
 use crate::table::print;
@@ -47,6 +48,45 @@ pub struct Options {
 pub struct Case {
     name: String,
     file: PathBuf,
+    /// The folder of all cases.
+    root: PathBuf,
+}
+
+impl Case {
+    /// Names and files of the scenes whose results it reads; what is wrong with them its program says.
+    fn named_inputs(&self) -> Vec<(String, PathBuf)> {
+        let Ok(source) = Source::read(&self.file) else { return Vec::new() };
+        let inputs = source.inputs().unwrap_or_default().into_iter();
+        let file = |path: PathBuf| source.folder().join(path).canonicalize();
+        inputs.filter_map(|(name, path)| Some((name, file(path).ok()?))).collect()
+    }
+
+    fn inputs(&self) -> Vec<PathBuf> {
+        self.named_inputs().into_iter().map(|(_, file)| file).collect()
+    }
+
+    /// The name of another case.
+    fn name_of(&self, file: &Path) -> String {
+        name(&self.root, file)
+    }
+}
+
+/// Puts cases behind those whose results they read; otherwise they keep their order. Those in a cycle come last: their program
+/// names it.
+fn in_order(cases: Vec<Case>) -> Vec<Case> {
+    let mut waiting = cases;
+    let mut ordered: Vec<Case> = Vec::new();
+    loop {
+        let files: Vec<PathBuf> = waiting.iter().map(|case| case.file.clone()).collect();
+        let is_ready = |case: &Case| case.inputs().iter().all(|input| !files.contains(input));
+        let (ready, rest): (Vec<Case>, Vec<Case>) = waiting.into_iter().partition(is_ready);
+        if ready.is_empty() {
+            ordered.extend(rest);
+            return ordered;
+        }
+        ordered.extend(ready);
+        waiting = rest;
+    }
 }
 
 /// Runs, prints, writes target/validation/{report.html, report.json}; passes if every case did.
@@ -97,7 +137,7 @@ fn command(outcome: &Outcome, quick: bool) -> String {
     format!("cargo run --release -p {} -- run {}{quick}", outcome.program, outcome.file)
 }
 
-/// The cases requested, in alphabetical order.
+/// The cases requested, in alphabetical order, each behind those whose results it reads.
 fn find(workspace: &Workspace, options: &Options) -> Result<Vec<Case>> {
     let all = workspace.root().join("cases");
     let mut files = Vec::new();
@@ -119,7 +159,8 @@ fn find(workspace: &Workspace, options: &Options) -> Result<Vec<Case>> {
     if files.is_empty() {
         return Err(miette!("no case.toml found; cases live in {}", workspace.short(&all)));
     }
-    Ok(files.into_iter().map(|file| Case { name: name(&all, &file), file }).collect())
+    let case = |file: PathBuf| Case { name: name(&all, &file), file, root: all.clone() };
+    Ok(in_order(files.into_iter().map(case).collect()))
 }
 
 fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
@@ -158,5 +199,28 @@ mod tests {
         let cases = Path::new("/p/cases");
         assert_eq!(name(cases, Path::new("/p/cases/ch2/plate/case.toml")), "ch2/plate");
         assert_eq!(name(cases, Path::new("/elsewhere/mine/case.toml")), "mine");
+    }
+
+    #[test]
+    fn cases_come_behind_their_inputs() {
+        let root = tempfile::tempdir().expect("a folder");
+        let root = root.path().canonicalize().expect("a folder");
+        let case = |name: &str, input: Option<&str>| {
+            let folder = root.join(name);
+            fs::create_dir(&folder).expect("a folder");
+            let file = folder.join("case.toml");
+            let text = input.map_or(String::new(), |input| format!("[inputs]\na = '../{input}/case.toml'"));
+            fs::write(&file, text).expect("a scene");
+            Case { name: name.to_owned(), file, root: root.clone() }
+        };
+        let cases = vec![
+            case("a", Some("c")),
+            case("b", None),
+            case("c", Some("d")),
+            case("d", None),
+            case("e", Some("e")),
+        ];
+        let names: Vec<String> = in_order(cases).into_iter().map(|case| case.name).collect();
+        assert_eq!(names, ["b", "d", "c", "a", "e"]);
     }
 }

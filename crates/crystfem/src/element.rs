@@ -1,13 +1,23 @@
-//! Linear hexahedra (2 × 2 × 2 Gauss points) and tetrahedra (4 points): shapes, gradients, volumes, faces.
+//! Hexahedra (2 × 2 × 2 Gauss points), tetrahedra (4 points) and wedges (6 points) of first order, and those of second
+//! order ([`natural`]): shapes, gradients, volumes, faces.
 //!
-//! Integration point g lies nearest to corner g, in both elements. With lumped capacity, energy is counted at the
+//! In first-order elements integration point g lies nearest to corner g. With lumped capacity, energy is counted at the
 //! corner and conduction at the Gauss point beside it, so each pair is one material point with one state.
 
-use crate::mesh::Mesh;
-use nalgebra::Matrix3;
+mod face;
+pub mod natural;
 
-/// Nodes of an element at most.
+use crate::mesh::{Mesh, Shape};
+pub use face::FaceGeometry;
+use nalgebra::Matrix3;
+use natural::Rule;
+
+/// Nodes of a first-order element at most, and its integration points.
 pub const MOST: usize = 8;
+/// Nodes of any element at most.
+pub const WIDE: usize = 20;
+/// Integration points of any element at most.
+pub const WIDE_POINTS: usize = 27;
 
 /// Corners of a hexahedron in natural coordinates, in the order of Abaqus and VTK.
 pub const CORNERS: [[f64; 3]; 8] = [
@@ -27,32 +37,89 @@ const GAUSS: f64 = 0.577_350_269_189_625_8;
 const NEAR: f64 = 0.585_410_196_624_968_5;
 const FAR: f64 = 0.138_196_601_125_010_5;
 
-/// Positions of the nodes of an element; the first 4 or 8 are set.
+/// Positions of the nodes of a first-order element; the first 4, 6 or 8 are set.
 pub fn corners(mesh: &Mesh, element: u32) -> ([[f64; 3]; MOST], usize) {
+    positions(mesh, element)
+}
+
+/// Positions of the nodes of any element.
+pub fn positions<const N: usize>(mesh: &Mesh, element: u32) -> ([[f64; 3]; N], usize) {
     let nodes = mesh.nodes(element);
-    let mut corners = [[0.0; 3]; MOST];
+    let mut corners = [[0.0; 3]; N];
     for (corner, &node) in corners.iter_mut().zip(nodes) {
         *corner = mesh.points[node as usize];
     }
     (corners, nodes.len())
 }
 
+/// Of any element of a mesh; `None` where a Jacobian is not positive.
+pub fn wide(mesh: &Mesh, element: u32) -> Option<Geometry<WIDE, WIDE_POINTS>> {
+    let (corners, nodes) = positions::<WIDE>(mesh, element);
+    Geometry::new(&corners[..nodes])
+}
+
+/// A positive part of an element's volume for each of its nodes, for means over nodes, m³: ∫ N dV, of second-order elements,
+/// where that is negative at corners, V ∫ N² dV over the sum of all (Hinton, Rock & Zienkiewicz 1976). `None` where a Jacobian
+/// is not positive.
+pub fn node_volumes(mesh: &Mesh, element: u32) -> Option<[f64; WIDE]> {
+    let mut volumes = [0.0; WIDE];
+    let (corners, nodes) = positions::<WIDE>(mesh, element);
+    if nodes <= MOST {
+        volumes[..MOST].copy_from_slice(&Geometry::<MOST, MOST>::new(&corners[..nodes])?.corner_volumes);
+        return Some(volumes);
+    }
+    let geometry = wide(mesh, element)?;
+    let mass = geometry.mass();
+    let sum: f64 = (0..nodes).map(|a| mass[a][a]).sum();
+    let volume: f64 = geometry.weights.iter().sum();
+    for (a, own) in volumes.iter_mut().enumerate().take(nodes) {
+        *own = volume * mass[a][a] / sum;
+    }
+    Some(volumes)
+}
+
+/// Volume, m³; 0 of an element that is not valid.
+pub fn volume(mesh: &Mesh, element: u32) -> f64 {
+    node_volumes(mesh, element).map_or(0.0, |volumes| volumes.iter().sum())
+}
+
 /// An element at its integration points.
 #[derive(Clone, Debug)]
-pub struct Geometry {
-    /// Nodes, and integration points: 8 or 4.
+pub struct Geometry<const N: usize = MOST, const P: usize = MOST> {
+    /// Number of nodes.
     pub nodes: usize,
+    /// Number of integration points: as many as nodes in first-order elements.
+    pub points: usize,
     /// Gauss weight times the Jacobian of each point, m³.
-    pub weights: [f64; MOST],
+    pub weights: [f64; P],
     /// ∇N of each node at each point, 1/m: `gradients[point][node]`.
-    pub gradients: [[[f64; 3]; MOST]; MOST],
+    pub gradients: [[[f64; 3]; N]; P],
     /// ∫ N dV of each node, m³.
-    pub corner_volumes: [f64; MOST],
+    pub corner_volumes: [f64; N],
+}
+
+/// Number of integration points of an element of so many nodes.
+pub fn points(nodes: usize) -> usize {
+    rule(nodes).map_or(nodes, |rule| rule.points)
+}
+
+/// The rule of an element that is neither an 8-node hexahedron nor a 4-node tetrahedron.
+fn rule(nodes: usize) -> Option<&'static Rule> {
+    match nodes {
+        8 | 4 => None,
+        _ => Shape::of(nodes).map(Rule::of),
+    }
 }
 
 /// N of each node at each integration point: `shapes(nodes)[point][node]`.
-pub fn shapes(nodes: usize) -> [[f64; MOST]; MOST] {
-    let mut shapes = [[0.0; MOST]; MOST];
+pub fn shapes<const N: usize, const P: usize>(nodes: usize) -> [[f64; N]; P] {
+    let mut shapes = [[0.0; N]; P];
+    if let Some(rule) = rule(nodes) {
+        for (shapes, natural) in shapes.iter_mut().zip(&rule.at) {
+            shapes[..nodes].copy_from_slice(&natural.shapes[..nodes]);
+        }
+        return shapes;
+    }
     for point in 0..nodes {
         for node in 0..nodes {
             shapes[point][node] = if nodes == 8 {
@@ -67,20 +134,25 @@ pub fn shapes(nodes: usize) -> [[f64; MOST]; MOST] {
     shapes
 }
 
-impl Geometry {
-    /// Of the element with these corners; `None` where a Jacobian is not positive (inverted, flat, folded).
+impl<const N: usize, const P: usize> Geometry<N, P> {
+    /// Of the element with these nodes, at most `N`; `None` where a Jacobian is not positive (inverted, flat, folded).
     pub fn new(corners: &[[f64; 3]]) -> Option<Self> {
         let nodes = corners.len();
         let mut geometry = Self {
             nodes,
-            weights: [0.0; MOST],
-            gradients: [[[0.0; 3]; MOST]; MOST],
-            corner_volumes: [0.0; MOST],
+            points: points(nodes),
+            weights: [0.0; P],
+            gradients: [[[0.0; 3]; N]; P],
+            corner_volumes: [0.0; N],
         };
-        let shapes = shapes(nodes);
-        for point in 0..nodes {
-            let mut natural = [[0.0; 3]; MOST];
-            natural_gradients(nodes, point, &mut natural);
+        let shapes = shapes::<N, P>(nodes);
+        let rule = rule(nodes);
+        for point in 0..geometry.points {
+            let mut natural = [[0.0; 3]; N];
+            match rule {
+                Some(rule) => natural[..nodes].copy_from_slice(&rule.at[point].gradients[..nodes]),
+                None => natural_gradients(nodes, point, &mut natural),
+            }
             // relative to the first corner: no cancellation far from the origin
             let mut jacobian = Matrix3::<f64>::zeros();
             for node in 1..nodes {
@@ -96,7 +168,11 @@ impl Geometry {
                 return None;
             }
             let inverse = jacobian.try_inverse()?;
-            let weight = if nodes == 8 { determinant } else { determinant / 24.0 };
+            let weight = match rule {
+                Some(rule) => determinant * rule.weights[point],
+                None if nodes == 8 => determinant,
+                None => determinant / 24.0,
+            };
             geometry.weights[point] = weight;
             for node in 0..nodes {
                 for d in 0..3 {
@@ -115,17 +191,17 @@ impl Geometry {
         self.weights.iter().sum()
     }
 
-    /// ∫ ∇N_a · k ∇N_b dV, W/K: row `a` at `8a`.
-    pub fn conduction(&self, conductivity: &Matrix3<f64>) -> [f64; 64] {
-        let mut matrix = [0.0; 64];
-        for point in 0..self.nodes {
+    /// ∫ ∇N_a · k ∇N_b dV, W/K.
+    pub fn conduction(&self, conductivity: &Matrix3<f64>) -> [[f64; N]; N] {
+        let mut matrix = [[0.0; N]; N];
+        for point in 0..self.points {
             self.add_conduction(point, conductivity, &mut matrix);
         }
         matrix
     }
 
     /// Adds one integration point's part of [`Self::conduction`], for a symmetric conductivity.
-    pub fn add_conduction(&self, point: usize, conductivity: &Matrix3<f64>, matrix: &mut [f64; 64]) {
+    pub fn add_conduction(&self, point: usize, conductivity: &Matrix3<f64>, matrix: &mut [[f64; N]; N]) {
         let gradients = &self.gradients[point];
         for b in 0..self.nodes {
             let mut image = [0.0; 3];
@@ -137,9 +213,9 @@ impl Geometry {
             // both triangles get the same bits: heat that leaves one node for another arrives there
             for a in 0..=b {
                 let value = (0..3).map(|d| gradients[a][d] * image[d]).sum::<f64>();
-                matrix[8 * a + b] += value;
+                matrix[a][b] += value;
                 if a < b {
-                    matrix[8 * b + a] += value;
+                    matrix[b][a] += value;
                 }
             }
         }
@@ -151,23 +227,25 @@ impl Geometry {
         point: usize,
         conductivity: &Matrix3<f64>,
         scale: &[f64],
-        matrix: &mut [f64; 64],
+        matrix: &mut [[f64; N]; N],
     ) {
-        let mut own = [0.0; 64];
+        let mut own = [[0.0; N]; N];
         self.add_conduction(point, conductivity, &mut own);
-        for (at, (value, own)) in matrix.iter_mut().zip(own).enumerate() {
-            *value += own * scale[at % 8];
+        for (row, own) in matrix.iter_mut().zip(own) {
+            for ((value, own), scale) in row.iter_mut().zip(own).zip(scale) {
+                *value += own * scale;
+            }
         }
     }
 
     /// ∫ N_a N_b dV, m³.
-    pub fn mass(&self) -> [f64; 64] {
-        let shapes = shapes(self.nodes);
-        let mut matrix = [0.0; 64];
-        for point in 0..self.nodes {
+    pub fn mass(&self) -> [[f64; N]; N] {
+        let shapes = shapes::<N, P>(self.nodes);
+        let mut matrix = [[0.0; N]; N];
+        for point in 0..self.points {
             for a in 0..self.nodes {
                 for b in 0..self.nodes {
-                    matrix[8 * a + b] += self.weights[point] * shapes[point][a] * shapes[point][b];
+                    matrix[a][b] += self.weights[point] * shapes[point][a] * shapes[point][b];
                 }
             }
         }
@@ -175,8 +253,8 @@ impl Geometry {
     }
 }
 
-/// ∂N/∂ξ of each node at an integration point.
-fn natural_gradients(nodes: usize, point: usize, gradients: &mut [[f64; 3]; MOST]) {
+/// ∂N/∂ξ of each node of an 8-node hexahedron or a 4-node tetrahedron at an integration point.
+fn natural_gradients(nodes: usize, point: usize, gradients: &mut [[f64; 3]]) {
     if nodes == 8 {
         for (gradient, corner) in gradients.iter_mut().zip(&CORNERS) {
             let factor = |d: usize| 0.5 * (1.0 + GAUSS * CORNERS[point][d] * corner[d]);
@@ -188,60 +266,6 @@ fn natural_gradients(nodes: usize, point: usize, gradients: &mut [[f64; 3]; MOST
         }
     } else {
         gradients[..4].copy_from_slice(&[[-1.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-    }
-}
-
-/// A face at its integration points: 2 × 2 Gauss points, or three on a triangle.
-#[derive(Clone, Debug)]
-pub struct FaceGeometry {
-    /// Nodes, and integration points: 4 or 3.
-    pub nodes: usize,
-    /// Gauss weight times the area of each point, m².
-    pub weights: [f64; 4],
-    /// N of each node at each point.
-    pub shapes: [[f64; 4]; 4],
-    /// ∫ N dA of each node, m².
-    pub corner_areas: [f64; 4],
-}
-
-impl FaceGeometry {
-    /// Of a face with these corners, in order around it.
-    pub fn new(corners: &[[f64; 3]]) -> Self {
-        let nodes = corners.len().min(4);
-        let mut face = Self { nodes, weights: [0.0; 4], shapes: [[0.0; 4]; 4], corner_areas: [0.0; 4] };
-        const AROUND: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
-        for point in 0..nodes {
-            let mut tangents = [[0.0; 3]; 2];
-            for node in 0..nodes {
-                let natural = if nodes == 4 {
-                    let factor = |d: usize| 0.5 * (1.0 + GAUSS * AROUND[point][d] * AROUND[node][d]);
-                    face.shapes[point][node] = factor(0) * factor(1);
-                    [0.5 * AROUND[node][0] * factor(1), 0.5 * AROUND[node][1] * factor(0)]
-                } else {
-                    face.shapes[point][node] = if point == node { 2.0 / 3.0 } else { 1.0 / 6.0 };
-                    [[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]][node]
-                };
-                for n in 0..2 {
-                    for d in 0..3 {
-                        tangents[n][d] += (corners[node][d] - corners[0][d]) * natural[n];
-                    }
-                }
-            }
-            let [s, t] = tangents;
-            let normal = [s[1] * t[2] - s[2] * t[1], s[2] * t[0] - s[0] * t[2], s[0] * t[1] - s[1] * t[0]];
-            let area = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
-            face.weights[point] = if nodes == 4 { area } else { area / 6.0 };
-            for node in 0..nodes {
-                face.corner_areas[node] += face.weights[point] * face.shapes[point][node];
-            }
-        }
-        face
-    }
-
-    /// Area, m².
-    #[cfg(test)]
-    pub fn area(&self) -> f64 {
-        self.weights.iter().sum()
     }
 }
 
@@ -259,7 +283,7 @@ mod tests {
     /// A hexahedron with plane but unequal faces: volume of a frustum, and ∇ of a linear field.
     #[test]
     fn volumes_and_gradients() {
-        let brick = Geometry::new(&brick()).unwrap();
+        let brick = <Geometry>::new(&brick()).unwrap();
         assert!((brick.volume() - 30.0).abs() < 1e-13);
         assert!(brick.corner_volumes.iter().all(|v| (v - 3.75).abs() < 1e-14));
         // top half as wide as the bottom: V = h (A + √(A a) + a)/3 = 2 (4 + 2 + 1)/3
@@ -268,9 +292,9 @@ mod tests {
             [x * scale, y * scale, z + 7.0]
         });
         let tetrahedron = [[0.0; 3], [1.0, 0.1, 0.0], [0.2, 1.0, 0.0], [0.0, 0.3, 1.0]];
-        let frustum_geometry = Geometry::new(&frustum).unwrap();
+        let frustum_geometry = <Geometry>::new(&frustum).unwrap();
         assert!((frustum_geometry.volume() - 14.0 / 3.0).abs() < 1e-13);
-        let small = Geometry::new(&tetrahedron).unwrap();
+        let small = <Geometry>::new(&tetrahedron).unwrap();
         // det/6 of the edges: (1·1 − 0.1·0.2)·1/6
         assert!((small.volume() - 0.98 / 6.0).abs() < 1e-15);
         for (corners, geometry) in [(&frustum[..], &frustum_geometry), (&tetrahedron[..], &small)] {
@@ -292,23 +316,23 @@ mod tests {
     /// (Zienkiewicz & Taylor); of the corner tetrahedron: 1/2, −1/6.
     #[test]
     fn matrices_of_unit_elements() {
-        let cube = Geometry::new(&CORNERS.map(|c| c.map(|x| 0.5 * (1.0 + x)))).unwrap();
+        let cube = <Geometry>::new(&CORNERS.map(|c| c.map(|x| 0.5 * (1.0 + x)))).unwrap();
         let matrix = cube.conduction(&Matrix3::identity());
         for (b, expected) in [1.0 / 3.0, 0.0, -1.0 / 12.0, 0.0, 0.0, -1.0 / 12.0, -1.0 / 12.0, -1.0 / 12.0]
             .into_iter()
             .enumerate()
         {
-            assert!((matrix[b] - expected).abs() < 1e-15, "{b}: {}", matrix[b]);
+            assert!((matrix[0][b] - expected).abs() < 1e-15, "{b}: {}", matrix[0][b]);
         }
         let mass = cube.mass();
-        assert!((mass[0] - 1.0 / 27.0).abs() < 1e-16 && (mass[6] - 1.0 / 216.0).abs() < 1e-16);
+        assert!((mass[0][0] - 1.0 / 27.0).abs() < 1e-16 && (mass[0][6] - 1.0 / 216.0).abs() < 1e-16);
         let corner = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let corner = Geometry::new(&corner).unwrap();
+        let corner = <Geometry>::new(&corner).unwrap();
         let matrix = corner.conduction(&Matrix3::identity());
-        assert!((matrix[0] - 0.5).abs() < 1e-15 && (matrix[1] + 1.0 / 6.0).abs() < 1e-15);
+        assert!((matrix[0][0] - 0.5).abs() < 1e-15 && (matrix[0][1] + 1.0 / 6.0).abs() < 1e-15);
         // V/10 and V/20
         let mass = corner.mass();
-        assert!((mass[0] - 1.0 / 60.0).abs() < 1e-15 && (mass[1] - 1.0 / 120.0).abs() < 1e-15);
+        assert!((mass[0][0] - 1.0 / 60.0).abs() < 1e-15 && (mass[0][1] - 1.0 / 120.0).abs() < 1e-15);
     }
 
     #[test]
@@ -316,12 +340,12 @@ mod tests {
         let hexahedron = brick();
         let mut area = 0.0;
         for side in HEXAHEDRON_SIDES {
-            let face = FaceGeometry::new(&side.map(|k| hexahedron[k]));
+            let face = <FaceGeometry>::new(&side.map(|k| hexahedron[k]));
             assert!((face.corner_areas.iter().sum::<f64>() - face.area()).abs() < 1e-13);
             area += face.area();
         }
         assert!((area - 62.0).abs() < 1e-12);
-        let triangle = FaceGeometry::new(&[[0.0; 3], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]]);
+        let triangle = <FaceGeometry>::new(&[[0.0; 3], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]]);
         assert!((triangle.area() - 3.0).abs() < 1e-15 && (triangle.corner_areas[1] - 1.0).abs() < 1e-15);
     }
 
@@ -329,9 +353,73 @@ mod tests {
     fn inverted_and_flat_elements_are_refused() {
         let mut inside_out = brick();
         inside_out.swap(0, 4);
-        assert!(Geometry::new(&inside_out).is_none());
+        assert!(<Geometry>::new(&inside_out).is_none());
         let flat = brick().map(|[x, y, _]| [x, y, 1.0]);
-        assert!(Geometry::new(&flat).is_none());
-        assert!(Geometry::new(&[[f64::NAN; 3]; 4]).is_none());
+        assert!(<Geometry>::new(&flat).is_none());
+        assert!(<Geometry>::new(&[[f64::NAN; 3]; 4]).is_none());
+    }
+
+    /// The sides of a second-order element close it, and a curved one has the volume that the divergence theorem gives.
+    #[test]
+    fn second_order_sides_close_the_element() {
+        for shape in Shape::ALL {
+            let corners: Vec<[f64; 3]> = (0..shape.corners()).map(|k| natural::corner(shape, k)).collect();
+            let middle = |&[p, q]: &[usize; 2]| [0, 1, 2].map(|d| 0.5 * (corners[p][d] + corners[q][d]));
+            let all = corners.iter().copied().chain(shape.edges().iter().map(middle));
+            // quadratic in place: second-order elements represent it
+            let curve = |[x, y, z]: [f64; 3]| match shape.is_second_order() {
+                true => [x + 0.1 * y * z, y - 0.05 * x * x, z + 0.04 * x * y],
+                false => [x + 0.3 * y, y + 0.1 * z, z],
+            };
+            let places: Vec<[f64; 3]> = all.take(shape.nodes()).map(curve).collect();
+            let geometry = Geometry::<WIDE, WIDE_POINTS>::new(&places).unwrap();
+            assert_eq!(geometry.points, points(shape.nodes()));
+            let mass = geometry.mass();
+            let volume = geometry.volume();
+            assert!((mass.iter().flatten().sum::<f64>() / volume - 1.0).abs() < 1e-14, "{shape:?}");
+            // ⅓ ∮ x·n dA by corner fans of many triangles
+            let mut flux = 0.0;
+            for side in 0..shape.side_count() {
+                let ring = shape.side(side);
+                let at = |r: f64, s: f64| {
+                    let weights = match *ring {
+                        [_, _, _] => vec![1.0 - r - s, r, s],
+                        _ => vec![(1.0 - r) * (1.0 - s), r * (1.0 - s), r * s, (1.0 - r) * s],
+                    };
+                    let place = |d: usize| ring.iter().zip(&weights).map(|(&k, w)| w * corners[k][d]).sum();
+                    let natural = natural::Natural::at(shape, [place(0), place(1), place(2)]);
+                    nalgebra::Vector3::from(
+                        [0, 1, 2].map(|d| {
+                            (0..shape.nodes()).map(|a| natural.shapes[a] * places[a][d]).sum::<f64>()
+                        }),
+                    )
+                };
+                let n = 40;
+                let step = 1.0 / f64::from(n);
+                for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                    let (r, s) = (f64::from(i) * step, f64::from(j) * step);
+                    let (a, b, c, d) = (at(r, s), at(r + step, s), at(r + step, s + step), at(r, s + step));
+                    if ring.len() == 4 || i + j < n {
+                        flux += a.cross(&b).dot(&d) / 6.0;
+                    }
+                    if ring.len() == 4 || i + j + 1 < n {
+                        flux += b.cross(&c).dot(&d) / 6.0;
+                    }
+                }
+            }
+            // facets of a fortieth: (1/40)²
+            assert!((flux / volume - 1.0).abs() < 1e-3, "{shape:?}: {flux} {volume}");
+        }
+        // 8-node and 6-node faces, flat and of quadratic shape
+        let quad = [[0.0; 3], [2.0, 0.0, 0.0], [2.0, 3.0, 0.0], [0.0, 3.0, 0.0]];
+        let middles = [[1.0, 0.0, 0.0], [2.0, 1.5, 0.0], [1.0, 3.0, 0.0], [0.0, 1.5, 0.0]];
+        let face = FaceGeometry::<8, 9>::new(&[quad, middles].concat());
+        assert!((face.area() - 6.0).abs() < 1e-14);
+        // −A/12 and A/3
+        assert!((face.corner_areas[0] + 0.5).abs() < 1e-14 && (face.corner_areas[4] - 2.0).abs() < 1e-14);
+        let triangle = [quad[0], quad[1], quad[3], middles[0], [1.0, 1.5, 0.0], middles[3]];
+        let face = FaceGeometry::<8, 9>::new(&triangle);
+        assert!((face.area() - 3.0).abs() < 1e-14);
+        assert!(face.corner_areas[0].abs() < 1e-14 && (face.corner_areas[3] - 1.0).abs() < 1e-14);
     }
 }

@@ -1,6 +1,6 @@
 //! States of materials as fields over nodes.
 
-use crate::element::{self, Geometry, MOST};
+use crate::element::{self, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::simulation::Simulation;
 use crate::system::Points;
@@ -54,20 +54,80 @@ impl Simulation {
             if place[material].is_none() {
                 continue;
             }
-            let (corners, count) = element::corners(&problem.mesh, number);
-            let volumes = Geometry::new(&corners[..count]).map_or([0.0; MOST], |g| g.corner_volumes);
+            let nodes = problem.mesh.nodes(number);
             let first = system.general.starts[index] as usize;
-            for (g, &node) in problem.mesh.nodes(number).iter().enumerate() {
-                let point = first + g;
+            let density = problem.materials[material].density();
+            let mut add = |node: u32, weight: f64, point: usize| {
                 if let Some(value) = value(&self.state.memory.general, system.general.stride, point, material)
                 {
-                    let weight = problem.materials[material].density() * volumes[g];
                     sum[node as usize] += weight * value;
                     mass[node as usize] += weight;
                 }
+            };
+            if nodes.len() > MOST {
+                // all points of a second-order element, by the square of the shape function there
+                let Some(geometry) = element::wide(&problem.mesh, number) else { continue };
+                let shapes = element::shapes::<WIDE, WIDE_POINTS>(nodes.len());
+                for (g, shapes) in shapes.iter().enumerate().take(geometry.points) {
+                    for (&node, shape) in nodes.iter().zip(shapes) {
+                        add(node, density * geometry.weights[g] * shape * shape, first + g);
+                    }
+                }
+                continue;
+            }
+            let volumes = element::node_volumes(&problem.mesh, number).unwrap_or([0.0; WIDE]);
+            for (g, &node) in nodes.iter().enumerate() {
+                add(node, density * volumes[g], first + g);
             }
         }
         sum.iter().zip(&mass).map(|(sum, mass)| (*mass > 0.0).then(|| sum / mass)).collect()
+    }
+
+    /// A quantity of the materials in each element: the mean of its own points, those of its material and birth; `None` where its material does not
+    /// have it or it does not exist.
+    pub fn element_means(&self, name: &str) -> Vec<Option<f64>> {
+        let (problem, system) = (&self.problem, &self.system);
+        let mut values = [0.0; 16];
+        let mut value = |points: &Points, stride: usize, point: usize, material: usize| -> Option<f64> {
+            let law = &problem.materials[material];
+            let place = law.field_names().iter().position(|other| *other == name)?;
+            let (states, fields) = (law.state_names().len(), law.field_names().len());
+            let values = values.get_mut(..fields)?;
+            law.fields(&points.state[point * stride..point * stride + states], values);
+            Some(values[place])
+        };
+        let mean = |sum: f64, count: usize| (count > 0).then(|| sum / count as f64);
+        let mut means = vec![None; problem.material_of.len()];
+        for (element, slot) in
+            means.iter_mut().enumerate().filter(|(element, _)| self.is_born(*element as u32))
+        {
+            let (material, birth) = (problem.material_of[element], self.state.born[element]);
+            let (mut sum, mut count) = (0.0, 0);
+            for &node in problem.mesh.nodes(element as u32) {
+                let equation = system.equation[node as usize];
+                let own = |point: &usize| {
+                    system.nodal.material[*point] == material && system.nodal.birth[*point] == birth
+                };
+                let found = system.nodal.of(equation as usize).find(own);
+                let found = found.and_then(|point| {
+                    value(&self.state.memory.nodal, system.nodal.stride, point, usize::from(material))
+                });
+                if let Some(found) = found {
+                    (sum, count) = (sum + found, count + 1);
+                }
+            }
+            *slot = mean(sum, count);
+        }
+        for (index, &element) in system.general.elements.iter().enumerate() {
+            let material = usize::from(problem.material_of[element as usize]);
+            let points = system.general.starts[index] as usize..system.general.starts[index + 1] as usize;
+            let count = points.len();
+            let sum: Option<f64> = points
+                .map(|point| value(&self.state.memory.general, system.general.stride, point, material))
+                .sum();
+            means[element as usize] = sum.and_then(|sum| mean(sum, count));
+        }
+        means
     }
 
     /// A quantity of the materials at a place, as [`Self::field`] at its nodes; `None` where no material there has it.
@@ -108,7 +168,9 @@ impl Simulation {
         if let Some((point, variable)) = wrong(general, system.general.stride) {
             let index = system.general.starts.partition_point(|&first| first as usize <= point) - 1;
             let number = system.general.elements[index];
-            let node = problem.mesh.nodes(number)[point - system.general.starts[index] as usize];
+            let nodes = problem.mesh.nodes(number);
+            // second-order elements have more points than nodes
+            let node = nodes[(point - system.general.starts[index] as usize).min(nodes.len() - 1)];
             return fail(named(usize::from(problem.material_of[number as usize]), variable), node);
         }
         Ok(())
@@ -118,11 +180,9 @@ impl Simulation {
     pub fn volumes(&self, elements: &[u32]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.problem.mesh.points.len()];
         for &number in elements.iter().filter(|&&element| self.is_born(element)) {
-            let (corners, count) = element::corners(&self.problem.mesh, number);
-            if let Some(geometry) = Geometry::new(&corners[..count]) {
-                for (g, &node) in self.problem.mesh.nodes(number).iter().enumerate() {
-                    volumes[node as usize] += geometry.corner_volumes[g];
-                }
+            let own = element::node_volumes(&self.problem.mesh, number).unwrap_or([0.0; WIDE]);
+            for (&node, own) in self.problem.mesh.nodes(number).iter().zip(own) {
+                volumes[node as usize] += own;
             }
         }
         volumes

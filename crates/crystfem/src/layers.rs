@@ -6,7 +6,7 @@
 //! in a jump of no duration (Δt = 0). Nothing is lost, however thin the layer; with linear materials it is the mixture
 //! by heat capacity. A prescribed temperature stays, and its support takes the difference.
 
-use crate::element::{self, Geometry, MOST};
+use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::material::Point;
 use crate::simulation::{Simulation, State};
@@ -104,10 +104,11 @@ impl Simulation {
         let general = &system.general;
         for (index, &number) in general.elements.iter().enumerate() {
             let first = general.starts[index] as usize;
-            let nodes = general.starts[index + 1] as usize - first;
-            let shapes = element::shapes(nodes);
-            let corner = |a: usize| self.state.temperature[general.equations[index][a] as usize];
-            for g in 0..nodes {
+            let equations = general.equations_of(index);
+            let nodes = equations.len();
+            let shapes = element::shapes::<WIDE, WIDE_POINTS>(nodes);
+            let corner = |a: usize| self.state.temperature[equations[a] as usize];
+            for g in 0..general.starts[index + 1] as usize - first {
                 let temperature = match system.consistent {
                     true => (0..nodes).map(|a| shapes[g][a] * corner(a)).sum(),
                     false => corner(g),
@@ -127,7 +128,7 @@ impl Simulation {
             for &number in &birth.elements {
                 let material = usize::from(self.problem.material_of[number as usize]);
                 let (corners, nodes) = element::corners(&self.problem.mesh, number);
-                let volumes = match Geometry::new(&corners[..nodes]) {
+                let volumes = match <Geometry>::new(&corners[..nodes]) {
                     Some(geometry) => geometry.corner_volumes,
                     None => return Err(Error::Mesh(format!("element {number}: inverted"))),
                 };
@@ -202,10 +203,10 @@ impl Simulation {
             let (corners, nodes) = element::corners(&problem.mesh, number);
             let material = problem.material_of[number as usize];
             let stride = new.general.stride;
-            let volumes = Geometry::new(&corners[..nodes]).map_or([0.0; MOST], |g| g.corner_volumes);
+            let volumes = <Geometry>::new(&corners[..nodes]).map_or([0.0; MOST], |g| g.corner_volumes);
             for g in 0..nodes {
                 let point = new.general.starts[index] as usize + g;
-                let equation = new.general.equations[index][g];
+                let equation = new.general.equations_of(index)[g];
                 let from = match kept {
                     Some(kept) => {
                         let from = old.general.starts[kept] as usize + g;

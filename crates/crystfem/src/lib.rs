@@ -41,6 +41,7 @@ pub mod kinetics;
 mod layers;
 pub mod ledger;
 pub mod material;
+pub mod mechanics;
 pub mod melting;
 pub mod mesh;
 pub mod point;

@@ -1,7 +1,7 @@
 //! What is solved: a mesh with materials, what acts on it, and when its elements appear.
 
 use crate::boundary::{Condition, Field, Source, Where};
-use crate::element::{self, Geometry};
+use crate::element;
 use crate::error::Error;
 use crate::material::ThermalMaterial;
 use crate::mesh::{Face, Mesh};
@@ -119,14 +119,21 @@ impl Problem {
             if let Some(node) = self.mesh.nodes(element).iter().find(|&&n| n as usize >= points) {
                 return mesh_error(format!("element {element}: found node {node}; allowed: below {points}"));
             }
-            let (corners, nodes) = element::corners(&self.mesh, element);
-            if Geometry::new(&corners[..nodes]).is_none() {
+            if element::node_volumes(&self.mesh, element).is_none() {
+                let first =
+                    self.mesh.nodes(element).first().map_or([0.0; 3], |&n| self.mesh.points[n as usize]);
                 return mesh_error(format!(
-                    "element {element}, first node at {:?} m: inverted, flat or folded; \
-                     allowed: a positive Jacobian at each Gauss point",
-                    corners[0]
+                    "element {element}, first node at {first:?} m: inverted, flat or folded; \
+                     allowed: a positive Jacobian at each Gauss point"
                 ));
             }
+        }
+        if self.mesh.is_second_order() && (self.capacity == Capacity::Lumped || !self.births.is_empty()) {
+            return mesh_error(
+                "found second-order elements with lumped capacity or births; allowed: `consistent` capacity and no births \
+                 (their row sums are negative at corners); print first-order elements"
+                    .into(),
+            );
         }
         for material in &self.materials {
             let density = material.density();

@@ -10,6 +10,14 @@ polycore::quantities! {
     HEAT_GIVEN_OFF = "heat_given_off", "J", "heat that left: exchanged and reaction energy, with the other sign";
     MISSING_ENERGY = "missing_energy", "J", "stored energy less all that came in";
     WORST_BALANCE = "worst_balance", "", "largest error of the balance in a step, over the energy that moved";
+    PRINTED_VOLUME = "printed_volume", "m^3", "of a mesh of a path or an STL surface: volume of what exists at the end, each element as far as it is filled";
+    CELLS_OVER_BODY = "cells_over_body", "", "volume of its cells over that of the body";
+    PATH_TIME = "path_time", "s", "how long its path takes, waits for temperatures left out";
+    FILAMENT = "filament", "m", "filament that its printing moves feed";
+    WARPAGE = "warpage", "m", "with `[mechanics]`: by how much the side of the bed is out of flat at the end, about its least-squares plane";
+    LARGEST_DISPLACEMENT = "largest_displacement", "m", "with `[mechanics]`: at the end";
+    MISES_ON_BED = "largest_mises_on_bed", "Pa", "with `[mechanics]`: largest Mises stress at the end, before the release";
+    MISES = "largest_mises", "Pa", "with `[mechanics]`: largest Mises stress after the release";
     MEAN = "{layer}mean_{field}", "*", "mean by volume at the end, of the part or of a layer";
     LEAST = "{layer}least_{field}", "*", "smallest value at a node";
     LARGEST = "{layer}largest_{field}", "*", "largest value at a node";

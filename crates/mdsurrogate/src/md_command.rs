@@ -57,9 +57,12 @@ pub struct Write {
     /// A factor on all rates of the grid.
     #[arg(long, default_value_t = 1.0)]
     rate_scale: f64,
-    /// A general path, rates in 1/fs: x=1e-5,xy=2e-5; may be repeated.
+    /// A general path, rates in 1/fs: x=1e-5,xy=2e-5, with unload=0.6 turned round after that share of the run; may be repeated.
     #[arg(long)]
     path: Vec<String>,
+    /// Runs of each path, from start configurations and velocities of their own.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=100))]
+    replicas: u16,
     /// Time step, fs.
     #[arg(long, default_value_t = 0.5)]
     time_step: f64,
@@ -181,6 +184,8 @@ impl Write {
         for (index, text) in self.path.iter().enumerate() {
             runs.push(Run::parse(text, format!("p{index}"), runs.len() % protocol.snapshots)?);
         }
+        let runs: Vec<Run> =
+            runs.into_iter().flat_map(|run| run.replicas(usize::from(self.replicas), &protocol)).collect();
         let atoms = 148 * protocol.cells.iter().product::<usize>();
         let atom_steps = runs.len() as f64 * protocol.steps as f64 * atoms as f64;
         polycore::say!(

@@ -14,7 +14,7 @@ polycore::quantities! {
     LOAD_AT = "load_at_{displacement}mm", "N", "with `output.load_at`: load at this displacement, where the run comes so far";
     WORK_OF_LOADS = "work_of_loads", "J", "work of the loads up to the end";
     STORED_ENERGY = "stored_energy", "J", "energy in bonds and contact at the end";
-    DAMPED_ENERGY = "damped_energy", "J", "work less stored and released energy; of a quasi-static run the work is summed by the trapezoidal rule, and the value may be as small as this error, about 1e-3 of the work, and negative";
+    DAMPED_ENERGY = "damped_energy", "J", "work less stored and released energy and that of friction; of a quasi-static run the work is summed by the trapezoidal rule, and the value may be as small as this error, about 1e-3 of the work, and negative";
     RELEASED_ENERGY = "released_energy", "J", "with `material.critical`: energy that broken bonds held when they broke";
     CRITICAL_STRETCH = "critical_stretch", "", "with `material.critical`: least stretch at which a bond of the body breaks";
     CRITICAL_ENERGY = "critical_energy", "J/m³", "with `fracture_energy` of a `solid`: energy, over a bond's share of a family, beyond which it breaks";
@@ -29,6 +29,11 @@ polycore::quantities! {
     CONTACT_ENERGY = "contact_energy", "J", "with `[contact]`: energy of these pairs, a part of `stored_energy`";
     CONTACTS = "contacts", "", "with `[contact]`: pairs of particles that touch at the end";
     DEEPEST_OVERLAP = "deepest_overlap", "", "with `[contact]`: largest overlap 1 − r/d of a touching pair at the end of any step";
+    FRICTION_WORK = "friction_work", "J", "with `friction`: energy that friction has taken up to the end";
+    SLIP_VELOCITY = "slip_velocity", "m/s", "with `friction` and `[dynamics]`: largest v_ε in use, which the time step may raise";
+    PLANE_FORCE = "{plane}_force_{axis}", "N", "force of a rigid plane on the body along an axis at the end";
+    PLANE_AREA = "{plane}_area", "m²", "area of the particles that touch a rigid plane at the end";
+    PLANE_SPREAD = "{plane}_spread", "m", "root of the mean square distance from the centre of pressure on a rigid plane at the end, weighted with the pressure; half the half-width of a Hertzian strip";
     CRITICAL_TIME_STEP = "critical_time_step", "s", "critical time step 2/ω of the body at the start";
     TIME_STEP = "time_step", "s", "time step at the end";
     KINETIC_ENERGY = "kinetic_energy", "J", "kinetic energy at the end";
@@ -59,6 +64,15 @@ polycore::quantities! {
     MEASURE_PEAK = "{measure}_peak", "", "largest σ₁₁/σ∞ above the hole";
     MEASURE_PEAK_ERROR = "{measure}_peak_error", "", "this over the exact value at the particles nearest to the hole, less 1";
     MEASURE_ERROR = "{measure}_{error}", "", "error (2.84) of σ₁₁/σ∞: `rmse` over all particles, `rmse_inner` without those on which a load or support acts; of `plate-with-hole` also `rmse_ring` up to 2δ from the hole, `rmse_bulk` beyond, to five radii, and `rmse_kirsch`, `rmse_inner_kirsch` against Kirsch's solution";
+}
+
+polycore::quantities! {
+    /// Scalars of a variant for each parameter that follows a field of another scene (`[[material.fields]]`).
+    pub OF_A_FIELD:
+    FIELD_MEAN = "{parameter}_field_mean", "*", "mean over the particles, by their volumes, of the field that the parameter follows";
+    FIELD_MESH_MEAN = "{parameter}_field_mesh_mean", "*", "mean of that field over its mesh, where it has values";
+    FIELD_LEAST = "{parameter}_field_least", "*", "its least value in a particle";
+    FIELD_LARGEST = "{parameter}_field_largest", "*", "its largest value in a particle";
 }
 
 polycore::quantities! {
@@ -103,4 +117,4 @@ pub fn load_at(displacement: f64) -> Named {
 }
 
 /// All of them.
-pub const ALL: &[&[Quantity]] = &[OF_A_VARIANT, OF_A_SCENE];
+pub const ALL: &[&[Quantity]] = &[OF_A_VARIANT, OF_A_FIELD, OF_A_SCENE];

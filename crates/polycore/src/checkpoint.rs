@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::output::atomic_write;
-use crate::scene::Source;
+use crate::scene::{Source, Stamp};
 
 /// File name inside an output directory.
 pub const FILE_NAME: &str = "checkpoint.bin";
@@ -16,8 +16,8 @@ pub const FILE_NAME: &str = "checkpoint.bin";
 /// First bytes of a file: program and version of what it holds.
 pub type Magic = [u8; 8];
 
-/// How the magics of the command lines begin, before a hyphen.
-const PROGRAMS: [(&str, &str); 4] =
+/// How the magics of the command lines begin, before a hyphen, and the programs.
+pub const PROGRAMS: [(&str, &str); 4] =
     [("mdsg", "mdsurrogate"), ("part", "crystfem"), ("peri", "peri"), ("poly", "polycore")];
 
 /// The part of a run's checkpoint that names its scene.
@@ -31,6 +31,8 @@ pub struct Header {
     pub quick: bool,
     /// The study, of the run in the directory above.
     pub study: Option<String>,
+    /// What else the run is computed from.
+    pub stamp: Stamp,
 }
 
 impl Header {
@@ -38,7 +40,13 @@ impl Header {
     pub fn new(source: &Source, quick: bool, study: Option<&str>) -> Self {
         // files that a scene names lie beside it, from wherever the run is resumed
         let scene_path = std::path::absolute(&source.path).unwrap_or_else(|_| source.path.clone());
-        Self { scene: source.text.clone(), scene_path, quick, study: study.map(str::to_owned) }
+        Self {
+            scene: source.text.clone(),
+            scene_path,
+            quick,
+            study: study.map(str::to_owned),
+            stamp: source.stamp(quick),
+        }
     }
 
     /// Reads which scene the checkpoint of an output directory belongs to.
@@ -47,6 +55,20 @@ impl Header {
     /// As [`read`].
     pub fn read(directory: &Path, magic: &Magic) -> Result<Self, Error> {
         read(&directory.join(FILE_NAME), magic)
+    }
+
+    /// Refuses to go on with other files, or other results of inputs, than the run began with.
+    ///
+    /// # Errors
+    /// [`Error::Checkpoint`].
+    pub fn check(&self, directory: &Path) -> Result<(), Error> {
+        match self.stamp.changed(&self.scene_path) {
+            None => Ok(()),
+            Some(changed) => {
+                let why = format!("{changed} since this run began; run the scene again");
+                Err(refused(&directory.join(FILE_NAME), why))
+            }
+        }
     }
 }
 

@@ -27,12 +27,14 @@ pub mod error;
 pub mod langevin;
 pub mod memory;
 pub mod output;
+pub mod posterior;
 pub mod random;
 #[cfg(feature = "case")]
 pub mod report;
 #[cfg(feature = "case")]
 pub mod scene;
 pub mod tensor;
+pub mod transfer;
 pub mod units;
 
 pub use error::Error;

@@ -13,8 +13,8 @@
 //! assert!(error.message().contains("did you mean `spacing`?"));
 //! ```
 //!
-//! Every scene begins with `version = 1`; [`Source::parse`] checks and removes that key, so scene types do not
-//! declare it. Alternatives are best written as a struct of options that is checked afterwards: serde buffers untagged
+//! Every scene begins with `version = 1`; [`Source::parse`] checks and removes that key, and `[inputs]`, so scene types do not
+//! declare them. Alternatives are best written as a struct of options that is checked afterwards: serde buffers untagged
 //! enums, after which it knows neither the place nor what would have been allowed. Cross-field checks are the program's: it reports them with [`Source::error`].
 
 use std::fs::File;
@@ -28,6 +28,7 @@ use toml::de::{DeTable, DeValue, Deserializer};
 mod constitutive;
 mod error;
 mod failure;
+mod files;
 mod line;
 mod locate;
 mod overlay;
@@ -37,6 +38,7 @@ mod solid;
 pub use constitutive::{Constant, ConstitutiveSpec};
 pub use error::SceneError;
 pub use failure::Failure;
+pub use files::{Changed, InputStamp, Stamp};
 pub use line::{LineSpec, check_name};
 pub use schema::schema;
 pub use solid::{CutSpec, SolidSpec};
@@ -48,6 +50,9 @@ pub use crate::error::EXIT_BAD_INPUT;
 
 /// The table that a sweep writes behind a scene: what it sets, in `set`, holds over all else.
 pub const SWEEP: &str = "sweep";
+
+/// The table of a scene that names the scenes whose results it reads; the harness reads it, programs do not.
+pub const INPUTS: &str = "inputs";
 
 /// A larger file is not a scene; numbers in bulk belong into CSV files beside it.
 pub const LARGEST_FILE: u64 = 16 << 20;
@@ -61,12 +66,22 @@ pub struct Source {
     pub text: String,
     /// What stands in for other parts, see [`Source::with_replaced`].
     overlays: Vec<overlay::Overlay>,
+    /// Files that have been read for it.
+    files: files::Notes,
+    /// Results of the scenes that it names in `[inputs]`.
+    inputs: files::Inputs,
 }
 
 impl Source {
     /// A scene that does not lie in a file; `path` only names it in messages.
     pub fn new(path: impl Into<PathBuf>, text: impl Into<String>) -> Self {
-        Self { path: path.into(), text: text.into(), overlays: Vec::new() }
+        Self {
+            path: path.into(),
+            text: text.into(),
+            overlays: Vec::new(),
+            files: files::Notes::default(),
+            inputs: files::Inputs::default(),
+        }
     }
 
     /// Reads a scene file.
@@ -101,7 +116,7 @@ impl Source {
             let what = format!("is not UTF-8 text (byte {valid}, line {line})");
             fail("scene::not_utf8", what, Some("save the file as UTF-8; is it a scene?".into()))
         })?;
-        Ok(Self { path: path.to_path_buf(), text, overlays: Vec::new() })
+        Ok(Self::new(path, text))
     }
 
     /// Parses the text as a scene of type `T`, which should `deny_unknown_fields`.
@@ -113,6 +128,7 @@ impl Source {
         self.check_version(&root)?;
         root.get_mut().remove("version");
         self.overlay(root.get_mut())?;
+        root.get_mut().remove(INPUTS);
         T::deserialize(Deserializer::from(root)).map_err(|error| {
             // the first tree went into the deserializer; errors are rare, so parse once more
             match DeTable::parse(&self.text) {

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 use polycore::output::atomic_write;
 use polycore::report::{FILE_NAME, Report};
+use polycore::scene::Stamp;
 use serde::{Deserialize, Serialize};
 
 use super::Case;
@@ -26,9 +27,16 @@ pub struct Settings {
     pub timeout: f64,
 }
 
+impl Settings {
+    /// Where the results of an input of a case are: as far from those of the case as the scenes are apart.
+    fn results(&self, case: &Case, input: &Path) -> PathBuf {
+        self.folder.join(case.name_of(input))
+    }
+}
+
 /// What a case was run from, beside its results: FOLDER.run.json.
 #[derive(Serialize, Deserialize)]
-struct Stamp {
+struct RunStamp {
     /// Of the case's folder, the executable and the tier.
     fingerprint: String,
     /// How long it took and how it failed; absent while it runs.
@@ -64,13 +72,16 @@ fn attempt(
 ) -> Result<()> {
     (outcome.program, outcome.title) = heading(&case.file)?;
     let executable = release(&outcome.program)?;
+    for input in case.inputs() {
+        release(&heading(&input)?.0)?;
+    }
     let path = settings.folder.join(format!("{}.run.json", case.name));
-    let fingerprint = fingerprint(case, &executable, settings.quick).into_diagnostic()?;
-    let before = fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str::<Stamp>(&text).ok());
+    let fingerprint = fingerprint(settings, case, &executable).into_diagnostic()?;
+    let before = fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str::<RunStamp>(&text).ok());
     let before = before.filter(|stamp| settings.resume && stamp.fingerprint == fingerprint);
     let (ended, unfinished) = match before {
-        Some(Stamp { ended: Some(ended), .. }) => (Some(ended), false),
-        Some(Stamp { ended: None, .. }) => (None, outcome.output.join("checkpoint.bin").is_file()),
+        Some(RunStamp { ended: Some(ended), .. }) => (Some(ended), false),
+        Some(RunStamp { ended: None, .. }) => (None, outcome.output.join("checkpoint.bin").is_file()),
         None => (None, false),
     };
     outcome.kept = ended.is_some();
@@ -81,13 +92,13 @@ fn attempt(
                 // an old report must not be judged
                 clear(&outcome.output)?;
             }
-            write(&path, &Stamp { fingerprint: fingerprint.clone(), ended: None })?;
+            write(&path, &RunStamp { fingerprint: fingerprint.clone(), ended: None })?;
             let since = Instant::now();
             let failure = start(&executable, case, settings, outcome, unfinished)?;
             let ended = Ended { seconds: since.elapsed().as_secs_f64(), failure };
             // a case that was cut off is not kept
             let keep = outcome.output.join(FILE_NAME).is_file();
-            write(&path, &Stamp { fingerprint, ended: keep.then(|| ended.clone()) })?;
+            write(&path, &RunStamp { fingerprint, ended: keep.then(|| ended.clone()) })?;
             ended
         }
     };
@@ -109,10 +120,13 @@ fn heading(file: &Path) -> Result<(String, String)> {
     Ok((program, word("title").unwrap_or_default()))
 }
 
-/// Of the case file's text, the files beside it, the executable and the tier.
-fn fingerprint(case: &Case, executable: &Path, quick: bool) -> std::io::Result<String> {
+/// Of the case file's text, the files beside it, the executable, the tier, and the results of its inputs.
+fn fingerprint(settings: &Settings, case: &Case, executable: &Path) -> std::io::Result<String> {
     let mut hasher = DefaultHasher::new();
-    (fs::read(&case.file)?, quick).hash(&mut hasher);
+    (fs::read(&case.file)?, settings.quick).hash(&mut hasher);
+    for input in case.inputs() {
+        Stamp::identity_of(&settings.results(case, &input)).hash(&mut hasher);
+    }
     let changed = |path: &Path| {
         let metadata = fs::metadata(path)?;
         std::io::Result::Ok((metadata.len(), metadata.modified()?))
@@ -128,7 +142,7 @@ fn fingerprint(case: &Case, executable: &Path, quick: bool) -> std::io::Result<S
     Ok(format!("{:016x}", hasher.finish()))
 }
 
-fn write(path: &Path, stamp: &Stamp) -> Result<()> {
+fn write(path: &Path, stamp: &RunStamp) -> Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).into_diagnostic()?;
     }
@@ -158,6 +172,15 @@ fn start(
         command.arg("run").arg(&case.file).arg("--output").arg(&outcome.output);
         if settings.quick {
             command.arg("--quick");
+        }
+        let inputs = case.named_inputs();
+        if !inputs.is_empty() {
+            command.arg("--with-inputs");
+        }
+        for (name, path) in inputs {
+            let mut placed = std::ffi::OsString::from(format!("{name}="));
+            placed.push(settings.results(case, &path));
+            command.arg("--input").arg(placed);
         }
     }
     command.stdin(Stdio::null()).stdout(log.try_clone().into_diagnostic()?).stderr(log);
@@ -217,7 +240,8 @@ mod tests {
             fs::write(&file, case).expect("a case");
             let settings =
                 Settings { folder: folder.path().join("results"), quick: true, resume: false, timeout: 60.0 };
-            Self { folder, case: Case { name: "ch9/it".to_owned(), file }, settings }
+            let root = folder.path().to_path_buf();
+            Self { folder, case: Case { name: "ch9/it".to_owned(), file, root }, settings }
         }
 
         fn program(&self, script: &str) -> PathBuf {

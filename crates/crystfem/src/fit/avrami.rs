@@ -53,6 +53,10 @@ pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<Fit, Error> {
             estimate("avrami_exponent", "", exponent, [0.0, 1.0]),
             estimate("rate_constant", "s^-n", LN_2.ln() - n * half, [-n, -n * half]),
         ],
+        draws: minimum.draws(|q| {
+            let n = q[1].exp();
+            vec![q[0].exp(), n, (LN_2.ln() - n * q[0]).exp()]
+        }),
         rms: minimum.rms(),
         measurements: times.len(),
         evaluations: minimum.evaluations,

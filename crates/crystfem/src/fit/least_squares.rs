@@ -3,6 +3,7 @@
 use crate::error::Error;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use polycore::posterior;
 use std::cell::Cell;
 
 /// Model less measurement at parameters; `None` outside the model's domain.
@@ -33,6 +34,12 @@ impl Minimum {
     /// Root mean square of the residuals.
     pub fn rms(&self) -> f64 {
         (self.residuals.iter().map(|r| r * r).sum::<f64>() / self.residuals.len() as f64).sqrt()
+    }
+
+    /// Draws of the parameters, and of each the constants that they make: [`polycore::posterior`].
+    pub fn draws(&self, constants: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
+        let drawn = posterior::draws(&self.at, &self.covariance, self.degrees, posterior::DRAWS, 0);
+        drawn.unwrap_or_default().iter().map(|q| constants(q)).collect()
     }
 
     /// Standard error of a function of the parameters, by its gradient.

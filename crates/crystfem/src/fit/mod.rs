@@ -20,6 +20,8 @@ use crate::error::Error;
 pub struct Fit {
     /// Its constants.
     pub estimates: Vec<Estimate>,
+    /// Draws of all constants from their posterior ([`polycore::posterior`]).
+    pub draws: Vec<Vec<f64>>,
     /// Root mean square of model less measurement, in α.
     pub rms: f64,
     /// Measurements.

@@ -183,6 +183,7 @@ pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
             estimate("nucleation", "K^2", q[1], [0.0, 1.0, 0.0]),
             estimate("avrami_exponent", "", q[2], [0.0, 0.0, 1.0]),
         ],
+        draws: minimum.draws(|q| vec![logarithm(q).exp(), q[1].exp(), q[2].exp()]),
         rms: minimum.rms(),
         measurements: degrees.len(),
         evaluations: minimum.evaluations,

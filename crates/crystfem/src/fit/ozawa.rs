@@ -106,6 +106,7 @@ pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
     ];
     Ok(Fit {
         estimates,
+        draws: minimum.draws(|p| vec![p[0], (p[1] + p[0] * middle).exp()]),
         rms: minimum.rms(),
         measurements: rates.len(),
         evaluations: minimum.evaluations,

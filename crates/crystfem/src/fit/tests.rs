@@ -243,3 +243,37 @@ proptest::proptest! {
         }
     }
 }
+
+/// What a fit predicts beyond its data, the temperature at α = ½ on cooling at 40 K/min, is as uncertain as its draws say: its spread over
+/// repeated measurements is that of the draws, and their 95 % bands hold the true value as often as they should.
+#[test]
+fn draws_predict_what_repeated_measurements_give() {
+    let half = |kinetics: &Kinetics| {
+        cooling_curve(kinetics, 40.0 / 60.0, 466.35, 380.0, 0.0, 2).temperature_at(0.5).unwrap()
+    };
+    let of = |constants: &[f64]| {
+        let known = Constants::TABLE_4_1_COLUMN_1;
+        let [growth_rate, nucleation, avrami_exponent] = [constants[0], constants[1], constants[2]];
+        half(&Kinetics::new(Constants { growth_rate, nucleation, avrami_exponent, ..known }).unwrap())
+    };
+    let truth = half(&pa12());
+    let mut noise = Noise(5);
+    let (mut predicted, mut deviations, mut within) = (Vec::new(), Vec::new(), 0);
+    let repeats = 80;
+    let deviation = |all: &[f64]| {
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        (all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (all.len() - 1) as f64).sqrt()
+    };
+    for _ in 0..repeats {
+        let fit = nakamura(&runs(Some((&mut noise, 0.02))), &KNOWN).unwrap();
+        predicted.push(of(&fit.estimates.iter().map(|one| one.value).collect::<Vec<_>>()));
+        let mut band: Vec<f64> = fit.draws.iter().take(200).map(|draw| of(draw)).collect();
+        deviations.push(deviation(&band));
+        band.sort_by(f64::total_cmp);
+        within += usize::from((band[4]..=band[195]).contains(&truth));
+    }
+    let mean = deviations.iter().sum::<f64>() / repeats as f64;
+    // a standard deviation from 80 numbers is good to 8 %
+    evidence::near("posterior_spread_over_repeated", mean / deviation(&predicted), 1.0, 0.2);
+    evidence::near("posterior_coverage", within as f64 / repeats as f64, 0.95, 0.06);
+}

@@ -4,12 +4,14 @@
 mod as_published;
 mod conductor;
 mod crystallization;
+mod filled;
 mod property;
 mod semicrystalline;
 
 pub use as_published::{AsPublished, Sign};
 pub use conductor::Conductor;
 pub use crystallization::{Crystallization, Grown};
+pub use filled::Filled;
 pub use property::{Property, REFERENCE_TEMPERATURE, Table};
 pub use semicrystalline::{LARGEST_CHANGE, Polymer, Semicrystalline};
 

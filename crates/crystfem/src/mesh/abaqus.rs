@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
+use crate::mesh::Shape;
 use crate::mesh::labelled::{Content, Element, Kind, Node, ReadMesh, line_error};
 
 mod cards;
@@ -81,10 +82,17 @@ const CHANGING: [&str; 11] = [
     "MODEL CHANGE",
 ];
 
-/// First-order elements by the stems of their names.
-const STEMS: [(Kind, &[&str]); 6] = [
-    (Kind::Hexahedron, &["C3D8", "DC3D8", "DCC3D8"]),
-    (Kind::Tetrahedron, &["C3D4", "DC3D4"]),
+/// Elements by the stems of their names.
+const STEMS: [(Kind, &[&str]); 13] = [
+    (Kind::Solid(Shape::Hexahedron), &["C3D8", "DC3D8", "DCC3D8"]),
+    (Kind::Solid(Shape::Tetrahedron), &["C3D4", "DC3D4"]),
+    (Kind::Solid(Shape::Wedge), &["C3D6", "DC3D6"]),
+    (Kind::Solid(Shape::Hexahedron20), &["C3D20", "DC3D20"]),
+    (Kind::Solid(Shape::Tetrahedron10), &["C3D10", "DC3D10"]),
+    (Kind::Solid(Shape::Wedge15), &["C3D15", "DC3D15"]),
+    (Kind::Quadrangle8, &["S8", "M3D8", "SFM3D8", "DS8", "CPS8", "CPE8", "CAX8", "DC2D8"]),
+    (Kind::Triangle6, &["STRI65", "M3D6", "SFM3D6", "DS6", "CPS6", "CPE6", "CAX6", "DC2D6"]),
+    (Kind::Line3, &["T3D3", "T2D3", "B32", "B22", "DC1D3"]),
     (Kind::Quadrangle, &["S4", "M3D4", "SFM3D4", "R3D4", "DS4", "CPS4", "CPE4", "CAX4", "DC2D4"]),
     (Kind::Triangle, &["S3", "STRI3", "M3D3", "SFM3D3", "R3D3", "DS3", "CPS3", "CPE3", "CAX3", "DC2D3"]),
     (Kind::Line, &["T3D2", "T2D2", "B31", "B21", "DC1D2"]),
@@ -135,14 +143,14 @@ impl Reader<'_> {
     fn elements(&mut self, card: &Card, cards: &mut Cards) -> Result<(), Error> {
         let name = card.parameter("TYPE").unwrap_or("").to_uppercase();
         let Some(kind) = kind_of(&name) else {
-            let allowed = "C3D8, DC3D8, C3D4, DC3D4, with letters after them or not (C3D8R, C3D4H, …); shells, membranes and \
-                           trusses of 3, 4 and 2 nodes only name surfaces";
+            let allowed = "C3D8, C3D4, C3D6, C3D20, C3D10, C3D15, with D before or letters after them or not (DC3D8, C3D20R, \
+                           …); shells, membranes and trusses only name surfaces";
             return Err(line_error(self.path, card.line, "element type", name, allowed));
         };
         let count = kind.node_count();
         let first = self.content.elements.len();
         while let Some(row) = cards.row() {
-            let (line, mut labels) = (row.line, [0u64; 9]);
+            let (line, mut labels) = (row.line, [0u64; 21]);
             let mut filled = 0;
             let mut row = row;
             loop {
@@ -168,9 +176,9 @@ impl Reader<'_> {
                 let found = filled.saturating_sub(1);
                 return Err(row.error("nodes of an element", found, format!("{count} for {name}")));
             }
-            let mut nodes = [0; 8];
-            nodes[..count].copy_from_slice(&labels[1..=count]);
-            self.content.elements.push(Element { label: labels[0], line: line as u32, kind, nodes });
+            let first = self.content.element_nodes.len();
+            self.content.element_nodes.extend_from_slice(&labels[1..=count]);
+            self.content.elements.push(Element { label: labels[0], line: line as u32, kind, first });
         }
         if let Some(name) = card.parameter("ELSET") {
             let labels = self.content.elements[first..].iter();
@@ -242,7 +250,7 @@ impl Reader<'_> {
                     return Err(row.error(
                         "side",
                         side,
-                        "S1 … S6 of hexahedra, S1 … S4 of tetrahedra, or none",
+                        "S1 … S6 of hexahedra, S1 … S4 of tetrahedra, S1 … S5 of wedges, or none",
                     ));
                 }
             };

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
+use crate::mesh::Shape;
 use crate::mesh::labelled::{Content, Element, Kind, Labels, Node, ReadMesh};
 
 mod numbers;
@@ -16,7 +17,7 @@ use numbers::Numbers;
 
 /// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm). Physical groups of volumes become element
 /// sets, those of surfaces become surfaces and node sets, those of curves and points node sets; a group without a name
-/// is called `physical-TAG`. First-order hexahedra and tetrahedra are computed on.
+/// is called `physical-TAG`. Hexahedra (8 or 20 nodes), tetrahedra (4 or 10) and prisms (6 or 15) are computed on.
 ///
 /// # Errors
 /// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line (in binary files the section's line
@@ -76,14 +77,21 @@ struct Reader {
     members: usize,
 }
 
-/// First-order elements by their number in the format.
-const KINDS: [(i64, Kind); 6] = [
+/// Elements by their number in the format.
+const KINDS: [(i64, Kind); 13] = [
     (1, Kind::Line),
     (2, Kind::Triangle),
     (3, Kind::Quadrangle),
-    (4, Kind::Tetrahedron),
-    (5, Kind::Hexahedron),
+    (4, Kind::Solid(Shape::Tetrahedron)),
+    (5, Kind::Solid(Shape::Hexahedron)),
+    (6, Kind::Solid(Shape::Wedge)),
+    (8, Kind::Line3),
+    (9, Kind::Triangle6),
+    (11, Kind::Solid(Shape::Tetrahedron10)),
     (15, Kind::Point),
+    (16, Kind::Quadrangle8),
+    (17, Kind::Solid(Shape::Hexahedron20)),
+    (18, Kind::Solid(Shape::Wedge15)),
 ];
 
 impl Reader {
@@ -190,18 +198,25 @@ impl Reader {
             let tag = numbers.int("tag of an entity")?;
             let code = numbers.int("type of elements")?;
             let Some((_, kind)) = KINDS.into_iter().find(|kind| kind.0 == code) else {
-                let allowed = "1 (line), 2 (triangle), 3 (quadrangle), 4 (tetrahedron), 5 (hexahedron), 15 (point); \
-                               first order, in Gmsh: Mesh.ElementOrder = 1";
+                let allowed = "1, 8 (lines), 2, 9 (triangles), 3, 16 (quadrangles), 4, 11 (tetrahedra), 5, 17 (hexahedra), \
+                               6, 18 (prisms), 15 (point); in Gmsh: Mesh.ElementOrder = 1, or 2 with \
+                               Mesh.SecondOrderIncomplete = 1";
                 return Err(numbers.error("type of elements", code, allowed));
             };
             let first = self.content.elements.len();
             for _ in 0..numbers.size("number of elements")? {
                 let label = numbers.size("number of an element")?;
-                let mut nodes = [0; 8];
+                let mut nodes = [0; 20];
                 for node in &mut nodes[..kind.node_count()] {
                     *node = numbers.size("node of an element")?;
                 }
-                self.content.elements.push(Element { label, line: numbers.line(), kind, nodes });
+                let first = self.content.element_nodes.len();
+                let all = &mut self.content.element_nodes;
+                match kind.solid() {
+                    Some(shape) => all.extend(shape.gmsh().iter().map(|&place| nodes[place])),
+                    None => all.extend(&nodes[..kind.node_count()]),
+                }
+                self.content.elements.push(Element { label, line: numbers.line(), kind, first });
             }
             let places = first as u32..self.content.elements.len() as u32;
             let groups = self.groups.get(&(dimension, tag)).map_or(&[][..], Vec::as_slice);
@@ -229,21 +244,21 @@ impl Reader {
 
     /// Node sets of the groups of points, curves and surfaces.
     fn name_nodes(&mut self, nodes: &Labels) {
-        let Content { elements, element_sets, node_sets, .. } = &mut self.content;
+        let Content { elements, element_nodes, element_sets, node_sets, .. } = &mut self.content;
         element_sets.retain(|name, places| {
-            let low = |kind| !matches!(kind, Kind::Hexahedron | Kind::Tetrahedron);
+            let low = |kind: Kind| kind.solid().is_none();
             let members = places.iter().map(|place| &elements[*place as usize]);
             let set: Vec<u32> = members
                 .clone()
                 .filter(|element| low(element.kind))
-                .flat_map(Element::nodes)
+                .flat_map(|element| &element_nodes[element.first..element.first + element.kind.node_count()])
                 .filter_map(|label| nodes.get(*label))
                 .collect();
             if !set.is_empty() {
                 node_sets.entry(name.clone()).or_default().extend(set);
             }
             // of curves and points nothing else remains
-            members.into_iter().any(|element| !matches!(element.kind, Kind::Line | Kind::Point))
+            members.into_iter().any(|element| !matches!(element.kind, Kind::Line | Kind::Line3 | Kind::Point))
         });
     }
 }

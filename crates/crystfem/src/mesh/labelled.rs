@@ -5,12 +5,13 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::mesh::quality::{self, Quality};
-use crate::mesh::{Face, Mesh};
+use crate::mesh::{Cell, Face, Mesh, Shape};
 
 /// A mesh as read from a file, checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadMesh {
-    /// The mesh; nodes and elements in the order of the file, hexahedra before tetrahedra, nodes of no element left out.
+    /// The mesh; nodes and elements in the order of the file, 8-node hexahedra before 4-node tetrahedra before others,
+    /// nodes of no element left out.
     pub mesh: Mesh,
     /// The file's number of each node.
     pub node_labels: Vec<u64>,
@@ -25,22 +26,41 @@ pub struct ReadMesh {
 /// Kinds of elements in files: those computed on, and those that only name faces and nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    Hexahedron,
-    Tetrahedron,
+    Solid(Shape),
     Quadrangle,
     Triangle,
+    /// With nodes on the middles of its edges.
+    Quadrangle8,
+    Triangle6,
     Line,
+    Line3,
     Point,
 }
 
 impl Kind {
     pub fn node_count(self) -> usize {
         match self {
-            Self::Hexahedron => 8,
-            Self::Tetrahedron | Self::Quadrangle => 4,
-            Self::Triangle => 3,
+            Self::Solid(shape) => shape.nodes(),
+            Self::Quadrangle8 => 8,
+            Self::Triangle6 => 6,
+            Self::Quadrangle => 4,
+            Self::Triangle | Self::Line3 => 3,
             Self::Line => 2,
             Self::Point => 1,
+        }
+    }
+
+    /// The shape of what is computed on.
+    pub fn solid(self) -> Option<Shape> {
+        if let Self::Solid(shape) = self { Some(shape) } else { None }
+    }
+
+    /// Corners of a triangle or quadrangle.
+    fn facet(self) -> Option<usize> {
+        match self {
+            Self::Quadrangle | Self::Quadrangle8 => Some(4),
+            Self::Triangle | Self::Triangle6 => Some(3),
+            _ => None,
         }
     }
 }
@@ -51,14 +71,8 @@ pub(super) struct Element {
     pub label: u64,
     pub line: u32,
     pub kind: Kind,
-    /// Numbers of nodes; as many count as the kind has.
-    pub nodes: [u64; 8],
-}
-
-impl Element {
-    pub fn nodes(&self) -> &[u64] {
-        &self.nodes[..self.kind.node_count()]
-    }
+    /// Where its nodes begin in [`Content::element_nodes`]; as many count as the kind has.
+    pub first: usize,
 }
 
 /// A node of a file.
@@ -74,8 +88,10 @@ pub(super) struct Node {
 pub(super) struct Content {
     pub nodes: Vec<Node>,
     pub elements: Vec<Element>,
+    /// Numbers of the nodes of all elements, in the order of [`Shape`] of each.
+    pub element_nodes: Vec<u64>,
     pub node_sets: BTreeMap<String, Vec<u32>>,
-    /// Hexahedra and tetrahedra become an element set, triangles and quadrangles a surface of the same name.
+    /// Hexahedra, tetrahedra and wedges become an element set, triangles and quadrangles a surface of the same name.
     pub element_sets: BTreeMap<String, Vec<u32>>,
     pub surfaces: BTreeMap<String, Vec<Face>>,
     pub notes: Vec<String>,
@@ -138,6 +154,11 @@ pub(super) fn line_error(
 }
 
 impl Content {
+    /// Numbers of an element's nodes.
+    pub fn nodes_of(&self, element: &Element) -> &[u64] {
+        &self.element_nodes[element.first..element.first + element.kind.node_count()]
+    }
+
     /// Numbers of nodes and of elements.
     ///
     /// # Errors
@@ -168,51 +189,53 @@ impl Content {
         let mut mesh = Mesh::default();
         mesh.points.extend(self.nodes.iter().map(|node| node.point.map(|x| scale * x)));
         mesh.node_sets = std::mem::take(&mut self.node_sets);
-        let mut element_labels = Vec::new();
-        let mut tetrahedra_labels = Vec::new();
-        // number in the mesh, of tetrahedra among themselves at first
+        // of hexahedra, tetrahedra and others
+        let mut labels = [const { Vec::new() }; 3];
+        // number in the mesh, of each of the three among themselves at first
         let mut number = vec![u32::MAX; self.elements.len()];
         let mut facets: Vec<([u32; 4], u32)> = Vec::new();
+        let list = |shape| match shape {
+            Shape::Hexahedron => 0,
+            Shape::Tetrahedron => 1,
+            _ => 2,
+        };
         for (place, element) in self.elements.iter().enumerate() {
-            let mut own = [u32::MAX; 8];
-            for (own, label) in own.iter_mut().zip(element.nodes()) {
+            let mut own = [u32::MAX; 20];
+            for (own, label) in own.iter_mut().zip(self.nodes_of(element)) {
                 *own = nodes.get(*label).ok_or_else(|| {
                     let what = format!("node of element {}", element.label);
                     line_error(path, element.line as usize, what, label, "nodes of this file")
                 })?;
             }
-            match element.kind {
-                Kind::Hexahedron => {
-                    number[place] = mesh.hexahedra.len() as u32;
-                    mesh.hexahedra.push(own);
-                    element_labels.push(element.label);
+            if let Some(shape) = element.kind.solid() {
+                let labels = &mut labels[list(shape)];
+                number[place] = labels.len() as u32;
+                labels.push(element.label);
+                match shape {
+                    Shape::Hexahedron => mesh.hexahedra.extend(own.first_chunk::<8>()),
+                    Shape::Tetrahedron => mesh.tetrahedra.extend(own.first_chunk::<4>()),
+                    _ => mesh.others.extend(Cell::new(&own[..shape.nodes()])),
                 }
-                Kind::Tetrahedron => {
-                    number[place] = mesh.tetrahedra.len() as u32;
-                    mesh.tetrahedra.push([own[0], own[1], own[2], own[3]]);
-                    tetrahedra_labels.push(element.label);
-                }
-                Kind::Quadrangle | Kind::Triangle => {
-                    let mut key = [own[0], own[1], own[2], own[3]];
-                    key.sort_unstable();
-                    facets.push((key, place as u32));
-                }
-                Kind::Line | Kind::Point => {}
+            } else if let Some(corners) = element.kind.facet() {
+                let mut key = [u32::MAX; 4];
+                key[..corners].copy_from_slice(&own[..corners]);
+                key.sort_unstable();
+                facets.push((key, place as u32));
             }
         }
+        let starts = [0, labels[0].len(), labels[0].len() + labels[1].len()];
         for (number, element) in number.iter_mut().zip(&self.elements) {
-            if element.kind == Kind::Tetrahedron {
-                *number += mesh.hexahedra.len() as u32;
-            }
+            *number += element.kind.solid().map_or(0, |shape| starts[list(shape)] as u32);
         }
-        element_labels.append(&mut tetrahedra_labels);
+        let element_labels = labels.concat();
         let face_of = self.match_facets(&mesh, facets);
         self.name_sets(&mut mesh, &number, &face_of);
         let kept = quality::drop_unused_nodes(&mut mesh);
         if kept.len() < self.nodes.len() {
             let unused = self.nodes.len() - kept.len();
-            self.notes
-                .push(format!("{unused} nodes that belong to no hexahedron or tetrahedron are left out"));
+            self.notes.push(format!(
+                "{unused} nodes that belong to no hexahedron, tetrahedron or wedge are left out"
+            ));
         }
         let notes = &mut self.notes;
         mesh.node_sets.retain(|name, set| {
@@ -230,7 +253,7 @@ impl Content {
         Ok(ReadMesh { mesh, node_labels, element_labels, quality, notes: self.notes })
     }
 
-    /// The face of a hexahedron or tetrahedron that each triangle and quadrangle is; the first of two.
+    /// The face of a solid element that each triangle and quadrangle is; the first of two.
     fn match_facets(&mut self, mesh: &Mesh, mut facets: Vec<([u32; 4], u32)>) -> BTreeMap<u32, Face> {
         facets.sort_unstable();
         let mut face_of = BTreeMap::new();
@@ -240,10 +263,7 @@ impl Content {
         for element in 0..mesh.element_count() as u32 {
             for side in 0..mesh.side_count(element) {
                 let face = Face { element, side };
-                let nodes = mesh.face_nodes(face);
-                let mut key = [u32::MAX; 4];
-                key[..nodes.len()].copy_from_slice(&nodes);
-                key.sort_unstable();
+                let key = mesh.face_nodes(face).key();
                 let first = facets.partition_point(|facet| facet.0 < key);
                 for facet in facets[first..].iter().take_while(|facet| facet.0 == key) {
                     face_of.entry(facet.1).or_insert(face);
@@ -255,7 +275,7 @@ impl Content {
             let first = facets.iter().find(|facet| !face_of.contains_key(&facet.1));
             let label = first.map_or(0, |facet| self.elements[facet.1 as usize].label);
             self.notes.push(format!(
-                "{missed} triangles or quadrangles are not sides of a hexahedron or tetrahedron, element {label} first: left out"
+                "{missed} triangles or quadrangles are not sides of a hexahedron, tetrahedron or wedge, element {label} first: left out"
             ));
         }
         face_of
@@ -273,7 +293,7 @@ impl Content {
             let faces: Vec<Face> = places.iter().filter_map(|place| face_of.get(place).copied()).collect();
             if set.is_empty() && faces.is_empty() {
                 self.notes.push(format!(
-                    "element set `{name}` contains no hexahedra, tetrahedra or sides of them: left out"
+                    "element set `{name}` contains no hexahedra, tetrahedra, wedges or sides of them: left out"
                 ));
             }
             if !faces.is_empty() {

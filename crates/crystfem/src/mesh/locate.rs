@@ -1,7 +1,9 @@
 //! Where a place lies in a mesh, for values between nodes.
 
 use super::Mesh;
-use crate::element::{self, CORNERS, MOST};
+use crate::element::natural::{self, Natural};
+use crate::element::{self, CORNERS, WIDE};
+use crate::mesh::Shape;
 use nalgebra::{Matrix3, Vector3};
 
 /// Natural coordinates, and distances over an element's diagonal, that count as none: a place on a node has its value.
@@ -48,8 +50,8 @@ impl Mesh {
     }
 
     /// Shape functions of an element's nodes at a place, m, in it or on its faces; `None` outside.
-    pub fn shapes_at(&self, element: u32, at: [f64; 3]) -> Option<[f64; MOST]> {
-        let (corners, nodes) = element::corners(self, element);
+    pub fn shapes_at(&self, element: u32, at: [f64; 3]) -> Option<[f64; WIDE]> {
+        let (corners, nodes) = element::positions::<WIDE>(self, element);
         let (weights, distance, rounding) = near(corners.get(..nodes).filter(|list| !list.is_empty())?, at)?;
         (distance <= rounding).then_some(weights)
     }
@@ -100,9 +102,9 @@ impl Mesh {
     }
 
     fn locate_in(&self, elements: impl Iterator<Item = u32>, at: [f64; 3]) -> Option<Place> {
-        let mut found: Vec<(u32, [f64; MOST], f64, f64)> = Vec::new();
+        let mut found: Vec<(u32, [f64; WIDE], f64, f64)> = Vec::new();
         for number in elements {
-            let (corners, nodes) = element::corners(self, number);
+            let (corners, nodes) = element::positions::<WIDE>(self, number);
             let corners = &corners[..nodes];
             if let Some((weights, distance, rounding)) = near(corners, at) {
                 found.push((number, weights, distance, rounding));
@@ -126,7 +128,7 @@ impl Mesh {
 
 /// Shape functions at the nearest place in an element, how far that is, and what of it is rounding, m; `None` of a place
 /// further outside than half of its box.
-fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; MOST], f64, f64)> {
+fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; WIDE], f64, f64)> {
     let near = (0..3).all(|d| {
         let ends = corners.iter().map(|corner| corner[d]);
         let (low, high) = (ends.clone().fold(f64::MAX, f64::min), ends.fold(f64::MIN, f64::max));
@@ -136,7 +138,11 @@ fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; MOST], f64, f64)> {
     if !near {
         return None;
     }
-    let weights = if corners.len() == 8 { in_hexahedron(corners, at) } else { in_tetrahedron(corners, at) };
+    let weights = match (corners.len(), Shape::of(corners.len())) {
+        (8, _) => in_hexahedron(corners, at),
+        (4, _) => in_tetrahedron(corners, at),
+        (_, shape) => in_other(shape?, corners, at),
+    };
     let origin = Vector3::from(corners[0]);
     let offset = |corner: &[f64; 3]| Vector3::from(*corner) - origin;
     let reached: Vector3<f64> = corners.iter().zip(weights).map(|(c, weight)| weight * offset(c)).sum();
@@ -145,14 +151,60 @@ fn near(corners: &[[f64; 3]], at: [f64; 3]) -> Option<([f64; MOST], f64, f64)> {
 }
 
 /// Shape functions at natural coordinates, which are taken to the nearest in the element.
-fn of_hexahedron(natural: Vector3<f64>) -> [f64; MOST] {
+fn of_hexahedron(natural: Vector3<f64>) -> [f64; WIDE] {
     // exact at the ends: a node has the weight 1, and those across a face have 0
     let natural = natural.map(|x| if x.abs() > 1.0 - NEAR { x.signum() } else { x });
-    CORNERS.map(|corner| (0..3).map(|d| 0.5 * (1.0 + natural[d] * corner[d])).product())
+    let mut weights = [0.0; WIDE];
+    for (weight, corner) in weights.iter_mut().zip(CORNERS) {
+        *weight = (0..3).map(|d| 0.5 * (1.0 + natural[d] * corner[d])).product();
+    }
+    weights
+}
+
+/// Of wedges and second-order elements, by Newton's method from the middle; natural coordinates are taken to the nearest in
+/// the element. Close to a curved face, the nearest place is that of the nearest natural coordinates.
+fn in_other(shape: Shape, corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
+    let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
+    let mut place = Vector3::from(natural::middle(shape));
+    for _ in 0..MOST_ITERATIONS {
+        let natural = Natural::at(shape, place.into());
+        let (mut left, mut jacobian) = (offset(at), Matrix3::<f64>::zeros());
+        for (a, corner) in corners.iter().enumerate() {
+            left -= natural.shapes[a] * offset(*corner);
+            jacobian += offset(*corner) * Vector3::from(natural.gradients[a]).transpose();
+        }
+        let Some(step) = jacobian.try_inverse().map(|inverse| inverse * left) else { break };
+        place = (place + step).map(|x| x.clamp(-3.0, 3.0));
+        if step.amax() <= 1e-14 {
+            break;
+        }
+    }
+    // exact at the ends, so that a node has the weight 1
+    let ends = |x: f64| if x.abs() > 1.0 - NEAR { x.signum() } else { x };
+    // so many barycentric coordinates, those below 0 taken to 0
+    let simplex = |count: usize, place: Vector3<f64>| {
+        let mut own = [1.0 - place.iter().take(count).sum::<f64>(), place[0], place[1], place[2]];
+        own[count + 1..].fill(0.0);
+        let own = own.map(|x| if x > NEAR { x } else { 0.0 });
+        let sum: f64 = own.iter().sum();
+        own.map(|x| x / sum)
+    };
+    let place = match shape.corners() {
+        8 => place.map(ends),
+        4 => {
+            let [_, r, s, t] = simplex(3, place);
+            Vector3::new(r, s, t)
+        }
+        _ => {
+            let [_, r, s, _] = simplex(2, place);
+            Vector3::new(r, s, ends(place[2]))
+        }
+    };
+    Natural::at(shape, place.into()).shapes
 }
 
 /// By Newton's method from the middle: x(ξ) = Σ N_a(ξ) x_a.
-fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MOST] {
+fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let mut natural = Vector3::<f64>::zeros();
     for _ in 0..MOST_ITERATIONS {
@@ -178,11 +230,11 @@ fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MOST] {
 }
 
 /// Barycentric coordinates, those below 0 taken to 0.
-fn in_tetrahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; MOST] {
+fn in_tetrahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
     let offset = |place: [f64; 3]| Vector3::from(place) - Vector3::from(corners[0]);
     let edges = Matrix3::from_columns(&[offset(corners[1]), offset(corners[2]), offset(corners[3])]);
     let natural = edges.try_inverse().unwrap_or_default() * offset(at);
-    let mut weights = [0.0; MOST];
+    let mut weights = [0.0; WIDE];
     weights[0] = 1.0 - natural.sum();
     weights[1..4].copy_from_slice(natural.as_slice());
     let weights = weights.map(|weight| if weight > NEAR { weight } else { 0.0 });
@@ -195,12 +247,17 @@ mod tests {
     use super::*;
     use crate::mesh::{Block, Grid, Split};
 
-    fn meshes() -> [Mesh; 3] {
+    fn meshes() -> [Mesh; 7] {
         let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 1.0], [5, 3, 2]).unwrap();
         let block = Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 1.0] };
         let hexahedra = grid.mesh("brick").unwrap();
         let distorted = hexahedra.distorted(0.05).unwrap();
-        [hexahedra, distorted, grid.blocks(&[block], Split::FiveTetrahedra).unwrap()]
+        let blocks = [block];
+        let [tetrahedra, wedges] =
+            [Split::FiveTetrahedra, Split::Wedges].map(|split| grid.blocks(&blocks, split).unwrap());
+        let others = [hexahedra.clone(), tetrahedra.clone(), wedges.distorted(0.02).unwrap()];
+        let [h20, t10, w15] = others.map(Mesh::second_order);
+        [hexahedra, distorted, tetrahedra, wedges, h20, t10, w15]
     }
 
     fn linear([x, y, z]: [f64; 3]) -> f64 {
@@ -221,7 +278,15 @@ mod tests {
             }
             for (node, point) in mesh.points.iter().enumerate() {
                 let place = mesh.locate(*point).unwrap();
-                assert_eq!(place.weights, [(node as u32, 1.0)]);
+                let corner = mesh
+                    .others
+                    .iter()
+                    .all(|cell| !cell.nodes()[cell.shape.corners()..].contains(&(node as u32)));
+                if corner {
+                    assert_eq!(place.weights, [(node as u32, 1.0)]);
+                }
+                let found = place.value(|other| Some(f64::from(u8::from(other == node as u32)))).unwrap();
+                assert!((found - 1.0).abs() < 1e-12);
                 let around = (0..mesh.element_count() as u32)
                     .filter(|element| mesh.nodes(*element).contains(&(node as u32)));
                 assert_eq!(place.elements(), around.collect::<Vec<_>>());

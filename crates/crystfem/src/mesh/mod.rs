@@ -1,4 +1,4 @@
-//! Meshes of hexahedra and tetrahedra: structured ones, files, quality, outer surfaces, layers.
+//! Meshes of hexahedra, tetrahedra and wedges: structured ones, files, quality, outer surfaces, layers.
 
 pub mod abaqus;
 mod bar;
@@ -6,12 +6,16 @@ pub mod gmsh;
 mod labelled;
 pub mod layers;
 mod locate;
+mod order;
 pub mod path;
 pub mod quality;
+mod shape;
 mod split;
+pub mod stl;
 mod structured;
 pub mod surface;
 mod tube;
+mod voxels;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -23,21 +27,24 @@ use crate::error::Error;
 pub use bar::{Bar, Substrate};
 pub use labelled::ReadMesh;
 pub use locate::Place;
+pub use shape::{Cell, Shape};
 pub use split::Split;
 pub use structured::{Block, Grid, graded};
 pub use tube::Tube;
+pub use voxels::{RATIOS, Voxels};
 
-/// A face of an element: the element's number and the side, 0–5 of a hexahedron or 0–3 of a tetrahedron, numbered as in
-/// Abaqus (S1 is side 0).
+/// A face of an element: the element's number and the side, 0–5 of a hexahedron, 0–3 of a tetrahedron or 0–4 of a wedge,
+/// numbered as in Abaqus (S1 is side 0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Face {
-    /// Element: hexahedra first, tetrahedra after them.
+    /// Element: 8-node hexahedra first, 4-node tetrahedra after them, then all others.
     pub element: u32,
     /// Side.
     pub side: u8,
 }
 
-/// A mesh. Elements are numbered hexahedra first, then tetrahedra; nodes of an element in the order of Abaqus and VTK.
+/// A mesh. Elements are numbered 8-node hexahedra first, then 4-node tetrahedra, then the others; nodes of an element are in
+/// the order of Abaqus ([`Shape`]).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Positions of the nodes, m.
@@ -46,6 +53,8 @@ pub struct Mesh {
     pub hexahedra: Vec<[u32; 8]>,
     /// Nodes of 4-node tetrahedra.
     pub tetrahedra: Vec<[u32; 4]>,
+    /// Wedges and second-order elements.
+    pub others: Vec<Cell>,
     /// Named sets of nodes, each sorted.
     pub node_sets: BTreeMap<String, Vec<u32>>,
     /// Named sets of elements, each sorted.
@@ -64,11 +73,29 @@ pub const TETRAHEDRON_SIDES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3],
 /// Sides of a box that bounds a mesh and the names of the surfaces on them: x−, x+, y−, y+, z−, z+.
 pub const BOX_SIDES: [&str; 6] = ["left", "right", "front", "back", "bottom", "top"];
 
-/// Nodes of a face: three or four, anticlockwise seen from outside. Dereferences to a slice.
+/// Nodes of a face: three or four corners, anticlockwise seen from outside, then the nodes on the middles of the edges of a
+/// second-order element, each after its first corner. Dereferences to a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaceNodes {
-    nodes: [u32; 4],
+    nodes: [u32; 8],
     count: u8,
+}
+
+impl FaceNodes {
+    /// Its corners.
+    pub fn corners(&self) -> &[u32] {
+        let count = if self.count > 4 { self.count / 2 } else { self.count };
+        &self.nodes[..usize::from(count)]
+    }
+
+    /// Its corners, sorted, the rest [`u32::MAX`]: the same from either side.
+    pub(crate) fn key(&self) -> [u32; 4] {
+        let corners = self.corners();
+        let mut key = [u32::MAX; 4];
+        key[..corners.len()].copy_from_slice(corners);
+        key.sort_unstable();
+        key
+    }
 }
 
 impl std::ops::Deref for FaceNodes {
@@ -91,7 +118,26 @@ pub struct Bricks {
 impl Mesh {
     /// Number of elements.
     pub fn element_count(&self) -> usize {
-        self.hexahedra.len() + self.tetrahedra.len()
+        self.hexahedra.len() + self.tetrahedra.len() + self.others.len()
+    }
+
+    /// An element that is neither an 8-node hexahedron nor a 4-node tetrahedron.
+    fn other(&self, element: usize) -> Option<&Cell> {
+        self.others.get(element.checked_sub(self.hexahedra.len() + self.tetrahedra.len())?)
+    }
+
+    /// The type of an element; that of a tetrahedron where there is no such element.
+    pub fn shape(&self, element: u32) -> Shape {
+        let element = element as usize;
+        match element < self.hexahedra.len() {
+            true => Shape::Hexahedron,
+            false => self.other(element).map_or(Shape::Tetrahedron, |cell| cell.shape),
+        }
+    }
+
+    /// Whether some element is of second order.
+    pub fn is_second_order(&self) -> bool {
+        self.others.iter().any(|cell| cell.shape.is_second_order())
     }
 
     /// Nodes of an element; empty where there is no such element.
@@ -99,13 +145,22 @@ impl Mesh {
         let element = element as usize;
         match self.hexahedra.get(element) {
             Some(nodes) => nodes,
-            None => self.tetrahedra.get(element - self.hexahedra.len()).map_or(&[], |nodes| nodes.as_slice()),
+            None => match self.tetrahedra.get(element - self.hexahedra.len()) {
+                Some(nodes) => nodes,
+                None => self.other(element).map_or(&[], Cell::nodes),
+            },
         }
     }
 
-    /// Number of sides of an element: 6 or 4.
+    /// Corners of an element; empty where there is no such element.
+    pub fn corners(&self, element: u32) -> &[u32] {
+        let nodes = self.nodes(element);
+        if nodes.len() > 8 { &nodes[..self.shape(element).corners()] } else { nodes }
+    }
+
+    /// Number of sides of an element: 6, 4 or 5.
     pub fn side_count(&self, element: u32) -> u8 {
-        if (element as usize) < self.hexahedra.len() { 6 } else { 4 }
+        self.shape(element).side_count()
     }
 
     /// Faces of an element.
@@ -116,20 +171,30 @@ impl Mesh {
     /// Nodes of a face, anticlockwise seen from outside; empty where there is no such face.
     pub fn face_nodes(&self, face: Face) -> FaceNodes {
         let (element, side) = (face.element as usize, usize::from(face.side));
-        let mut nodes = [0; 4];
+        let mut nodes = [0; 8];
         let mut count = 0;
         if let Some(all) = self.hexahedra.get(element) {
             if let Some(side) = HEXAHEDRON_SIDES.get(side) {
-                nodes = side.map(|n| all[n]);
+                for (node, local) in nodes.iter_mut().zip(side) {
+                    *node = all[*local];
+                }
                 count = 4;
             }
-        } else if let Some(all) = self.tetrahedra.get(element - self.hexahedra.len())
-            && let Some(side) = TETRAHEDRON_SIDES.get(side)
-        {
-            for (node, local) in nodes.iter_mut().zip(side) {
-                *node = all[*local];
+        } else if let Some(all) = self.tetrahedra.get(element - self.hexahedra.len()) {
+            if let Some(side) = TETRAHEDRON_SIDES.get(side) {
+                for (node, local) in nodes.iter_mut().zip(side) {
+                    *node = all[*local];
+                }
+                count = 3;
             }
-            count = 3;
+        } else if let Some(cell) = self.other(element) {
+            let (all, ring) = (cell.nodes(), cell.shape.side(face.side));
+            let next = (0..ring.len()).map(|k| (ring[k], ring[(k + 1) % ring.len()]));
+            let middles = next.filter_map(|(a, b)| cell.shape.middle(a, b));
+            for (node, local) in nodes.iter_mut().zip(ring.iter().copied().chain(middles)) {
+                *node = all[local];
+                count += 1;
+            }
         }
         FaceNodes { nodes, count }
     }
@@ -177,7 +242,7 @@ impl Mesh {
     /// `None` otherwise. Edges count as parallel, and shapes as one, within 1e-9 of the shortest edge: element matrices
     /// then agree to that, far below a discretisation error.
     pub fn bricks(&self) -> Option<Bricks> {
-        if !self.tetrahedra.is_empty() {
+        if !(self.tetrahedra.is_empty() && self.others.is_empty()) {
             return None;
         }
         let mut sizes: Vec<[f64; 3]> = Vec::new();
@@ -280,13 +345,23 @@ mod tests {
         let mesh = Grid::uniform([0.0; 3], [1.0, 2.0, 3.0], [1, 1, 1]).unwrap().mesh("brick").unwrap();
         let mut tetrahedron = Mesh { points: mesh.points.clone(), ..Mesh::default() };
         tetrahedron.tetrahedra.push([0, 1, 3, 4]);
-        for mesh in [mesh, tetrahedron] {
+        let mut others = Mesh { points: mesh.points.clone(), ..Mesh::default() };
+        others.others.push(Cell::new(&[0, 1, 3, 4, 5, 7]).unwrap());
+        let second = others.clone().second_order();
+        assert_eq!(second.points.len(), 8 + 9);
+        for mesh in [mesh, tetrahedron, others, second] {
             let centre = Vector3::from(mesh.centre(0));
             for side in 0..mesh.side_count(0) {
                 let nodes = mesh.face_nodes(Face { element: 0, side });
                 let corner = mesh.point(nodes[0]);
                 let normal = (mesh.point(nodes[1]) - corner).cross(&(mesh.point(nodes[2]) - corner));
                 assert!(normal.dot(&(corner - centre)) > 0.0, "side {side}");
+                // each node on an edge lies between the corner before it and the next
+                let corners = nodes.corners();
+                for (k, middle) in nodes[corners.len()..].iter().enumerate() {
+                    let ends = mesh.point(corners[k]) + mesh.point(corners[(k + 1) % corners.len()]);
+                    assert!((0.5 * ends - mesh.point(*middle)).norm() < 1e-15);
+                }
             }
         }
     }

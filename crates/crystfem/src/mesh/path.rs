@@ -8,16 +8,22 @@ use crate::mesh::Mesh;
 mod cover;
 #[cfg(feature = "case")]
 mod csv;
+mod deposit;
+mod flow;
 mod gcode;
 mod place;
+mod plan;
+mod printer;
 
 pub use cover::{Activation, Bead};
 #[cfg(feature = "case")]
 pub use csv::read_csv;
+pub use deposit::{Cells, Deposit};
+pub use flow::stadium_width;
 pub use gcode::{parse, read_gcode};
 
 /// A straight move of the nozzle at constant velocity.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Move {
     /// Where it begins, m.
     pub from: [f64; 3],
@@ -29,6 +35,37 @@ pub struct Move {
     pub end: f64,
     /// Whether material is laid down.
     pub prints: bool,
+    /// Length of filament that is fed along it, m; 0 where that is not known.
+    pub fed: f64,
+}
+
+impl Move {
+    /// Its length, m.
+    pub fn length(&self) -> f64 {
+        (0..3).map(|d| (self.to[d] - self.from[d]).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+/// What a file sets besides places.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Setting {
+    /// Temperature of the nozzle, K.
+    Nozzle,
+    /// Temperature of the bed, K.
+    Bed,
+    /// Speed of the fan, 0 to 1.
+    Fan,
+}
+
+/// A setting from a time on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Command {
+    /// Time, s.
+    pub time: f64,
+    /// What is set.
+    pub setting: Setting,
+    /// To what.
+    pub value: f64,
 }
 
 /// Moves in the order of time.
@@ -36,6 +73,10 @@ pub struct Move {
 pub struct ToolPath {
     /// The moves.
     pub moves: Vec<Move>,
+    /// Temperatures and the fan, in the order of time.
+    pub commands: Vec<Command>,
+    /// Waits and filament alone after the last move, s.
+    pub rest: f64,
     /// What was passed over.
     pub notes: Vec<String>,
 }
@@ -102,20 +143,20 @@ impl ToolPath {
                         to: from,
                         start: time,
                         end: start.max(time),
-                        prints: false,
+                        ..Move::default()
                     });
                 }
                 time = start.max(time) + line;
                 place = to;
-                moves.push(Move { from, to, start: time - line, end: time, prints: true });
+                moves.push(Move { from, to, start: time - line, end: time, prints: true, fed: 0.0 });
             }
         }
-        Ok(Self { moves, notes: Vec::new() })
+        Ok(Self { moves, ..Self::default() })
     }
 
-    /// When the last move ends, s; 0 without moves.
+    /// When everything ends, s: the last move and what comes after it.
     pub fn duration(&self) -> f64 {
-        self.moves.last().map_or(0.0, |last| last.end)
+        self.moves.last().map_or(0.0, |last| last.end) + self.rest
     }
 
     /// When each of the elements is covered by the bead, see [`Activation`].

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use crate::element::natural::{Natural, Rule, corner};
 use crate::error::Error;
 use crate::mesh::surface::Surface;
 use crate::mesh::{Face, Mesh};
@@ -43,12 +44,12 @@ pub struct Quality {
 /// # Errors
 /// [`Error::Mesh`] with the element, its centre, the value found and what is allowed: no elements, a node number out of
 /// range or twice in an element, coordinates that are not finite, an inverted element or one without volume (Jacobian at
-/// a corner or at a 2×2×2 Gauss point not positive), a scaled Jacobian below [`LEAST_SCALED_JACOBIAN`], edges over
+/// a corner or at a Gauss point not positive), a scaled Jacobian below [`LEAST_SCALED_JACOBIAN`], edges over
 /// [`GREATEST_ASPECT`], an element twice, a face of three elements, a set that is empty or names what does not exist.
 pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     let elements = mesh.element_count();
     if elements == 0 {
-        return Err(Error::Mesh("no hexahedra or tetrahedra; allowed: 1 or more".into()));
+        return Err(Error::Mesh("no hexahedra, tetrahedra or wedges; allowed: 1 or more".into()));
     }
     check_numbers(mesh, labels)?;
     // worst of each work item, then of all in order: the same on any number of threads
@@ -96,7 +97,7 @@ pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
     }
     if let Some((hexahedron, tetrahedron)) = half_faces(mesh, &surface) {
         let [a, b] = [hexahedron, tetrahedron].map(|element| place(mesh, labels, element));
-        notes.push(format!("a side of {a} is two sides of tetrahedra, {b} one of them: no heat flows there"));
+        notes.push(format!("a side of {a} is two triangles, {b} has one of them: no heat flows there"));
     }
     Ok(Quality { volume: worst.volume, scaled_jacobian: worst.scaled, aspect: worst.aspect, parts, notes })
 }
@@ -104,7 +105,8 @@ pub fn check(mesh: &Mesh, labels: Option<&[u64]>) -> Result<Quality, Error> {
 /// Removes nodes that belong to no element; returns the old numbers of those kept. Node sets lose them too.
 pub fn drop_unused_nodes(mesh: &mut Mesh) -> Vec<u32> {
     let mut number = vec![u32::MAX; mesh.points.len()];
-    for node in mesh.hexahedra.iter().flatten().chain(mesh.tetrahedra.iter().flatten()) {
+    let others = mesh.others.iter().flat_map(|cell| cell.nodes());
+    for node in mesh.hexahedra.iter().flatten().chain(mesh.tetrahedra.iter().flatten()).chain(others) {
         if let Some(number) = number.get_mut(*node as usize) {
             *number = 0;
         }
@@ -116,6 +118,7 @@ pub fn drop_unused_nodes(mesh: &mut Mesh) -> Vec<u32> {
     let renumber = |node: &mut u32| *node = number.get(*node as usize).copied().unwrap_or(u32::MAX);
     mesh.hexahedra.iter_mut().flatten().for_each(renumber);
     mesh.tetrahedra.iter_mut().flatten().for_each(renumber);
+    mesh.others.iter_mut().flat_map(|cell| cell.nodes_mut()).for_each(renumber);
     for set in mesh.node_sets.values_mut() {
         set.iter_mut().for_each(renumber);
         set.retain(|node| *node != u32::MAX);
@@ -207,8 +210,44 @@ fn measures(mesh: &Mesh, element: u32) -> [f64; 4] {
             }
             volume
         }
-        _ => 0.0,
+        _ => return of_other(mesh, element),
     };
+    [volume, least[0], least[1], edges[1] / edges[0]]
+}
+
+/// [`measures`] of a wedge or a second-order element: its Jacobian at corners and integration points, and between its corners
+/// the edges.
+fn of_other(mesh: &Mesh, element: u32) -> [f64; 4] {
+    let shape = mesh.shape(element);
+    let x: Vec<Vector3<f64>> = mesh.nodes(element).iter().map(|&node| mesh.point(node)).collect();
+    let determinant = |natural: &Natural| {
+        let mut columns = [Vector3::zeros(); 3];
+        for (place, slope) in x.iter().zip(&natural.gradients) {
+            for (column, slope) in columns.iter_mut().zip(slope) {
+                *column += (place - x[0]) * *slope;
+            }
+        }
+        columns[0].cross(&columns[1]).dot(&columns[2])
+    };
+    let rule = Rule::of(shape);
+    let own: Vec<f64> = rule.at.iter().map(determinant).collect();
+    let volume = own.iter().zip(&rule.weights).map(|(own, weight)| own * weight).sum();
+    let mut least = [f64::INFINITY; 2];
+    let mut edges = [f64::INFINITY, 0.0f64];
+    let corners = (0..shape.corners()).map(|k| determinant(&Natural::at(shape, corner(shape, k))));
+    for found in own.iter().copied().chain(corners) {
+        least[0] = if found.is_nan() || least[0].is_nan() { f64::NAN } else { least[0].min(found) };
+    }
+    for k in 0..shape.corners() {
+        let to = |&[p, q]: &[usize; 2]| (p == k).then_some(q).or((q == k).then_some(p));
+        let at: Vec<Vector3<f64>> =
+            shape.edges().iter().filter_map(to).map(|other| x[other] - x[k]).collect();
+        let lengths = [at[0].norm(), at[1].norm(), at[2].norm()];
+        // the determinants have told its sign
+        let scaled = at[0].cross(&at[1]).dot(&at[2]).abs() / (lengths[0] * lengths[1] * lengths[2]);
+        least[1] = if scaled.is_nan() { 0.0 } else { least[1].min(scaled) };
+        edges = lengths.iter().fold(edges, |[low, high], length| [low.min(*length), high.max(*length)]);
+    }
     [volume, least[0], least[1], edges[1] / edges[0]]
 }
 
@@ -229,7 +268,7 @@ fn gradient(x: &[Vector3<f64>; 8], [s, t, u]: [f64; 3]) -> [Vector3<f64>; 3] {
 /// An element for a message: its number and centre.
 fn place(mesh: &Mesh, labels: Option<&[u64]>, element: u32) -> String {
     let [x, y, z] = mesh.centre(element);
-    let kind = if mesh.side_count(element) == 6 { "hexahedron" } else { "tetrahedron" };
+    let kind = mesh.shape(element).name();
     let number = labels.and_then(|labels| labels.get(element as usize)).copied();
     format!("{kind} {} at ({x:.6e}, {y:.6e}, {z:.6e}) m", number.unwrap_or(element.into()))
 }
@@ -262,8 +301,9 @@ fn check_numbers(mesh: &Mesh, labels: Option<&[u64]>) -> Result<(), Error> {
 fn check_twice(mesh: &Mesh, labels: Option<&[u64]>) -> Result<(), Error> {
     let mut keys: Vec<([u32; 8], u32)> = (0..mesh.element_count() as u32)
         .map(|element| {
+            // corners tell elements apart
             let mut key = [u32::MAX; 8];
-            let nodes = mesh.nodes(element);
+            let nodes = mesh.corners(element);
             key[..nodes.len()].copy_from_slice(nodes);
             key.sort_unstable();
             (key, element)
@@ -374,12 +414,15 @@ fn doubles(mesh: &Mesh, surface: &Surface) -> Option<(usize, [u32; 2])> {
 
 /// A hexahedron and a tetrahedron that meet at half a side.
 fn half_faces(mesh: &Mesh, surface: &Surface) -> Option<(u32, u32)> {
-    if mesh.hexahedra.is_empty() || mesh.tetrahedra.is_empty() {
+    let has = |corners: usize| mesh.others.iter().any(|cell| cell.shape.corners() == corners);
+    let squares = !mesh.hexahedra.is_empty() || has(8) || has(6);
+    let split = !mesh.tetrahedra.is_empty() || has(4) || has(6);
+    if !(squares && split) {
         return None;
     }
     let mut triangles: Vec<([u32; 3], u32)> = Vec::new();
     for face in surface.faces() {
-        if let [a, b, c] = *mesh.face_nodes(face) {
+        if let [a, b, c] = *mesh.face_nodes(face).corners() {
             let mut key = [a, b, c];
             key.sort_unstable();
             triangles.push((key, face.element));
@@ -387,7 +430,7 @@ fn half_faces(mesh: &Mesh, surface: &Surface) -> Option<(u32, u32)> {
     }
     triangles.sort_unstable();
     surface.faces().find_map(|face| {
-        let [a, b, c, d] = *mesh.face_nodes(face) else { return None };
+        let [a, b, c, d] = *mesh.face_nodes(face).corners() else { return None };
         [[a, b, c], [b, c, d], [c, d, a], [d, a, b]].into_iter().find_map(|mut key| {
             key.sort_unstable();
             let place = triangles.binary_search_by_key(&key, |entry| entry.0).ok()?;

@@ -1,6 +1,6 @@
-//! Hexahedra of a structured mesh split into tetrahedra.
+//! Hexahedra of a structured mesh split into tetrahedra and wedges.
 
-use crate::mesh::{Face, HEXAHEDRON_SIDES, Mesh, TETRAHEDRON_SIDES};
+use crate::mesh::{Cell, Face, HEXAHEDRON_SIDES, Mesh, Shape};
 
 /// What fills the cells of a grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
@@ -14,6 +14,8 @@ pub enum Split {
     FiveTetrahedra,
     /// Six tetrahedra around the diagonal from the first corner to the opposite one (Kuhn's division).
     SixTetrahedra,
+    /// Two wedges with triangles below and above.
+    Wedges,
 }
 
 impl Split {
@@ -23,12 +25,14 @@ impl Split {
             Self::Hexahedra => 1,
             Self::FiveTetrahedra => FIVE[0].len(),
             Self::SixTetrahedra => SIX.len(),
+            Self::Wedges => WEDGES.len(),
         }
     }
 }
 
 const SIX: [[usize; 4]; 6] =
     [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]];
+const WEDGES: [[usize; 6]; 2] = [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]];
 /// One in the middle, four at corners; the second list is for cells of odd parity.
 const FIVE: [[[usize; 4]; 5]; 2] = [
     [[0, 1, 2, 5], [0, 2, 3, 7], [0, 5, 7, 4], [2, 7, 5, 6], [0, 2, 7, 5]],
@@ -41,23 +45,33 @@ pub(super) fn split(mesh: Mesh, odd: &[bool], into: Split) -> Mesh {
         return mesh;
     }
     let count = into.count() as u32;
-    let parts = |element: usize| match into {
-        Split::SixTetrahedra => &SIX[..],
-        _ => &FIVE[usize::from(odd[element])][..],
+    let part = |element: usize, k: usize| -> &[usize] {
+        match into {
+            Split::Wedges => &WEDGES[k],
+            Split::SixTetrahedra => &SIX[k],
+            _ => &FIVE[usize::from(odd[element])][k],
+        }
     };
-    let tetrahedra = (mesh.hexahedra.iter().enumerate())
-        .flat_map(|(element, nodes)| parts(element).iter().map(|part| part.map(|n| nodes[n])))
-        .collect();
+    let (mut tetrahedra, mut others) = (Vec::new(), Vec::new());
+    for (element, nodes) in mesh.hexahedra.iter().enumerate() {
+        for part in (0..count as usize).map(|k| part(element, k)) {
+            match *part {
+                [a, b, c, d] => tetrahedra.push([nodes[a], nodes[b], nodes[c], nodes[d]]),
+                _ => others.extend(Cell::new(&part.iter().map(|&n| nodes[n]).collect::<Vec<_>>())),
+            }
+        }
+    }
+    let shape = if into == Split::Wedges { Shape::Wedge } else { Shape::Tetrahedron };
     let of_set = |set: &Vec<u32>| set.iter().flat_map(|e| e * count..(e + 1) * count).collect();
     let of_surface = |faces: &Vec<Face>| {
         let mut split: Vec<Face> = Vec::with_capacity(2 * faces.len());
         for face in faces {
             let whole = HEXAHEDRON_SIDES[usize::from(face.side)];
-            for (k, part) in parts(face.element as usize).iter().enumerate() {
-                let on = (0..4u8).filter(|side| {
-                    TETRAHEDRON_SIDES[usize::from(*side)].iter().all(|n| whole.contains(&part[*n]))
-                });
-                split.extend(on.map(|side| Face { element: face.element * count + k as u32, side }));
+            for k in 0..count {
+                let part = part(face.element as usize, k as usize);
+                let on = (0..shape.side_count())
+                    .filter(|&side| shape.side(side).iter().all(|&n| whole.contains(&part[n])));
+                split.extend(on.map(|side| Face { element: face.element * count + k, side }));
             }
         }
         split.sort_unstable();
@@ -65,6 +79,7 @@ pub(super) fn split(mesh: Mesh, odd: &[bool], into: Split) -> Mesh {
     };
     Mesh {
         tetrahedra,
+        others,
         hexahedra: Vec::new(),
         element_sets: mesh.element_sets.iter().map(|(name, set)| (name.clone(), of_set(set))).collect(),
         surfaces: mesh.surfaces.iter().map(|(name, faces)| (name.clone(), of_surface(faces))).collect(),
@@ -78,6 +93,22 @@ mod tests {
     use super::*;
     use crate::mesh::surface::Surface;
     use crate::mesh::{Block, Grid, quality};
+
+    #[test]
+    fn wedges_fill_the_brick_and_meet() {
+        let grid = Grid::uniform([0.0; 3], [3.0, 2.0, 2.0], [3, 2, 2]).unwrap();
+        let blocks = [Block { name: "brick".into(), lower: [0.0; 3], upper: [3.0, 2.0, 2.0] }];
+        let mesh = grid.blocks(&blocks, Split::Wedges).unwrap();
+        assert_eq!((mesh.others.len(), mesh.element_sets["brick"].len()), (24, 24));
+        let quality = quality::check(&mesh, None).unwrap();
+        assert!((quality.volume - 12.0).abs() < 1e-13 && quality.notes.is_empty(), "{:?}", quality.notes);
+        // two triangles for each of six squares below and above, quadrilaterals around
+        let surface = Surface::of_all(&mesh).unwrap();
+        assert_eq!(surface.faces().count(), 2 * 2 * 6 + 2 * (6 + 4));
+        let mut named: Vec<Face> = mesh.surfaces.values().flatten().copied().collect();
+        named.sort_unstable();
+        assert_eq!(named, surface.faces().collect::<Vec<_>>());
+    }
 
     #[test]
     fn tetrahedra_fill_the_brick_and_meet() {

@@ -148,6 +148,32 @@ impl Grid {
         Ok(split(mesh, &odd, cells))
     }
 
+    /// A hexahedron in each filled cell, x fastest: element sets `name` and, of each layer of cells with an element,
+    /// `layer-1`, … upwards, surfaces and node sets on the sides of the box around all, [`BOX_SIDES`].
+    ///
+    /// # Errors
+    /// Lines that do not ascend, more nodes than 2²⁸, another number of cells, or none that is filled.
+    pub(crate) fn cells(&self, name: &str, filled: &[bool]) -> Result<Mesh, Error> {
+        self.check()?;
+        let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);
+        if filled.len() != nx * ny * nz || !filled.contains(&true) {
+            return Err(Error::Mesh(format!("no filled cell of {}", nx * ny * nz)));
+        }
+        let mut element_of: Vec<u32> =
+            filled.iter().map(|&filled| if filled { 0 } else { u32::MAX }).collect();
+        let mut mesh = Mesh::default();
+        self.number(&mut element_of, &mut mesh, &mut Vec::new());
+        let layers = element_of
+            .chunks(nx * ny)
+            .map(|layer| layer.iter().copied().filter(|&element| element != u32::MAX).collect::<Vec<u32>>());
+        for (number, layer) in (1..).zip(layers.filter(|layer| !layer.is_empty())) {
+            mesh.element_sets.insert(format!("layer-{number}"), layer);
+        }
+        mesh.element_sets.insert(name.to_owned(), (0..mesh.hexahedra.len() as u32).collect());
+        self.sides(&element_of, &mut mesh);
+        Ok(mesh)
+    }
+
     /// Numbers filled cells and their nodes, x fastest; `odd` tells the parity of i + j + k of each element.
     fn number(&self, element_of: &mut [u32], mesh: &mut Mesh, odd: &mut Vec<bool>) {
         let [nx, ny, nz] = self.lines.each_ref().map(|line| line.len() - 1);

@@ -1,5 +1,6 @@
 //! Who borders on whom, and the outer surface of the elements that exist so far.
 
+use crate::element::FaceGeometry;
 use crate::error::Error;
 use crate::mesh::{BOX_SIDES, Face, Mesh};
 
@@ -13,7 +14,10 @@ pub struct Surface {
     /// Number of hexahedra and of elements.
     hexahedra: usize,
     elements: usize,
-    /// The face on the other side of each face, or [`NONE`]; faces numbered 6·element + side, then 4·… for tetrahedra.
+    /// First face of each of the other elements, and where the last ends.
+    firsts: Vec<u32>,
+    /// The face on the other side of each face, or [`NONE`]; faces numbered 6·element + side, then 4·… for tetrahedra, then
+    /// those of the others.
     opposite: Vec<u32>,
     active: Vec<bool>,
     outer: Vec<bool>,
@@ -39,10 +43,16 @@ impl Surface {
     /// Neighbours of a mesh; no element is active.
     ///
     /// # Errors
-    /// A node that is none, a face of three elements (named), or more than 2³² − 1 faces.
+    /// A node that is none, a face of three elements (named), two elements with the corners of one face and different nodes on
+    /// its edges, or more than 2³² − 1 faces.
     pub fn new(mesh: &Mesh) -> Result<Self, Error> {
         let (hexahedra, elements) = (mesh.hexahedra.len(), mesh.element_count());
-        let count = 6 * hexahedra + 4 * mesh.tetrahedra.len();
+        let mut count = 6 * hexahedra + 4 * mesh.tetrahedra.len();
+        let mut firsts = Vec::new();
+        for cell in &mesh.others {
+            firsts.push(count as u32);
+            count += usize::from(cell.shape.side_count());
+        }
         if count >= NONE as usize {
             let allowed = format!("below {NONE}");
             return Err(Error::Parameter { name: "faces of a mesh", found: count as f64, allowed });
@@ -50,6 +60,7 @@ impl Surface {
         let mut surface = Self {
             hexahedra,
             elements,
+            firsts,
             opposite: Vec::new(),
             active: vec![false; elements],
             outer: vec![false; count],
@@ -186,12 +197,17 @@ impl Surface {
     }
 
     fn number(&self, face: Face) -> Option<u32> {
-        let sides = if (face.element as usize) < self.hexahedra { 6 } else { 4 };
-        ((face.element as usize) < self.elements && face.side < sides)
-            .then(|| self.faces_of(face.element).start as u32 + u32::from(face.side))
+        ((face.element as usize) < self.elements
+            && usize::from(face.side) < self.faces_of(face.element).len())
+        .then(|| self.faces_of(face.element).start as u32 + u32::from(face.side))
     }
 
     fn face(&self, number: u32) -> Face {
+        if self.firsts.first().is_some_and(|&first| number >= first) {
+            let other = self.firsts.partition_point(|&first| first <= number) - 1;
+            let element = self.elements - self.firsts.len() + other;
+            return Face { element: element as u32, side: (number - self.firsts[other]) as u8 };
+        }
         let (number, first) = (number as usize, 6 * self.hexahedra);
         if number < first {
             Face { element: (number / 6) as u32, side: (number % 6) as u8 }
@@ -205,6 +221,9 @@ impl Surface {
         let element = element as usize;
         if element < self.hexahedra {
             6 * element..6 * element + 6
+        } else if let Some(other) = element.checked_sub(self.elements - self.firsts.len()) {
+            let end = self.firsts.get(other + 1).map_or(self.outer.len(), |&next| next as usize);
+            self.firsts[other] as usize..end
         } else {
             let first = 6 * self.hexahedra + 4 * (element - self.hexahedra);
             first..first + 4
@@ -214,12 +233,11 @@ impl Surface {
     /// Sorts faces into buckets by their least node and pairs those of equal nodes: linear in the mesh, and the same
     /// whatever the order of anything else.
     fn neighbours(&self, mesh: &Mesh) -> Result<Vec<u32>, Error> {
-        let key = |number: u32| {
-            let nodes = mesh.face_nodes(self.face(number));
-            let mut key = [u32::MAX; 4];
-            key[..nodes.len()].copy_from_slice(&nodes);
-            key.sort_unstable();
-            key
+        let key = |number: u32| mesh.face_nodes(self.face(number)).key();
+        let all = |number: u32| {
+            let mut nodes = mesh.face_nodes(self.face(number)).to_vec();
+            nodes.sort_unstable();
+            nodes
         };
         let count = self.outer.len() as u32;
         // starts of the buckets, shifted by one so that filling them leaves their ends
@@ -254,6 +272,13 @@ impl Surface {
             for same in bucket.chunk_by(|a, b| a.0 == b.0) {
                 match same {
                     [_] => {}
+                    [a, b] if !self.firsts.is_empty() && all(a.1) != all(b.1) => {
+                        let [a, b] = [a.1, b.1].map(|number| self.face(number).element);
+                        return Err(Error::Mesh(format!(
+                            "elements {a} and {b} have the corners of one face and different nodes on its edges; \
+                             allowed: elements of one order side by side, with the same nodes"
+                        )));
+                    }
                     [a, b] => {
                         opposite[a.1 as usize] = b.1;
                         opposite[b.1 as usize] = a.1;
@@ -273,7 +298,7 @@ impl Surface {
     }
 }
 
-/// Area of a face, m²: exact for plane faces, by 2×2 Gauss points for warped ones.
+/// Area of a face, m²: exact for plane faces, by Gauss points for warped and curved ones.
 pub fn area(mesh: &Mesh, face: Face) -> f64 {
     let nodes = mesh.face_nodes(face);
     match nodes[..] {
@@ -294,7 +319,10 @@ pub fn area(mesh: &Mesh, face: Face) -> f64 {
                 .map(|(s, t)| jacobian(s * point, t * point))
                 .sum()
         }
-        _ => 0.0,
+        _ => {
+            let places: Vec<[f64; 3]> = nodes.iter().map(|&node| mesh.points[node as usize]).collect();
+            FaceGeometry::<8, 9>::new(&places).weights.iter().sum()
+        }
     }
 }
 

@@ -20,7 +20,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
         format!("builds     a mesh that reaches from {low} to {high}"),
     ];
     lines.extend(built.notes.iter().map(|note| format!("note       {note}")));
-    let task = scene.task(source, built.mesh)?;
+    let task = scene.task(source, built)?;
     lines.extend(task.notes.iter().map(|note| format!("note       {note}")));
     let quantities = scene.quantities(&task);
     let mut problem = task.problem;
@@ -31,7 +31,12 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
             task.printed.len()
         ));
     }
-    let names: Vec<&str> = problem.materials.iter().flat_map(|m| m.field_names().iter().copied()).collect();
+    let mut names: Vec<&str> = Vec::new();
+    for name in problem.materials.iter().flat_map(|m| m.field_names()) {
+        if !names.contains(name) {
+            names.push(name);
+        }
+    }
     if !names.is_empty() {
         lines.push(format!("builds     states: {}", names.join(", ")));
     }

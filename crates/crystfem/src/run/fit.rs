@@ -49,6 +49,7 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> 
     for one in &done {
         record(&mut report, one);
         write(output, one)?;
+        write_draws(output, one)?;
         if scene.output.pictures {
             draw(output, one)?;
         }
@@ -165,6 +166,23 @@ fn write(output: &Path, done: &Done) -> Result<(), polycore::Error> {
     let columns: [csv::Column; 4] =
         [("run", "", run), (name, unit, x), ("alpha", "", data), ("alpha_model", "", &done.fit.model)];
     csv::write(output.join(format!("{}.csv", done.name)), &columns)
+}
+
+/// NAME_posterior.csv: draws of the constants, for `sweep --sample`.
+fn write_draws(output: &Path, done: &Done) -> Result<(), polycore::Error> {
+    let fit = &done.fit;
+    if fit.draws.is_empty() {
+        return Ok(());
+    }
+    let lists: Vec<Vec<f64>> =
+        (0..fit.estimates.len()).map(|i| fit.draws.iter().map(|draw| draw[i]).collect()).collect();
+    let columns: Vec<csv::Column> = fit
+        .estimates
+        .iter()
+        .zip(&lists)
+        .map(|(one, list)| (one.name, one.unit.as_str(), &list[..]))
+        .collect();
+    csv::write(output.join(format!("{}_posterior.csv", done.name)), &columns)
 }
 
 /// NAME.png: measurements as markers, the model dashed.

@@ -7,6 +7,7 @@ mod explain;
 mod fit;
 mod heat_flow;
 mod line;
+mod mechanics;
 mod outside;
 mod part;
 mod point;

@@ -53,11 +53,19 @@ impl<'a> Outside<'a> {
         for &element in self.elements.iter().filter(|element| there(**element)) {
             for face in self.mesh.faces_of(element) {
                 if self.surface.opposite(face).is_none_or(|other| !there(other.element)) {
-                    skin.face(&corners(&self.mesh.face_nodes(face)));
+                    skin.face(&corners(self.mesh.face_nodes(face).corners()));
                 }
             }
             if self.cut.is_some() {
-                skin.section(&corners(self.mesh.nodes(element)));
+                match self.mesh.corners(element) {
+                    // a wedge is three tetrahedra
+                    &[a, b, c, d, e, f] => {
+                        for part in [[a, b, c, f], [a, b, f, e], [a, e, f, d]] {
+                            skin.section(&corners(&part));
+                        }
+                    }
+                    cell => skin.section(&corners(cell)),
+                }
             }
         }
         (frame.title, skin)

@@ -1,6 +1,7 @@
 //! A body in time: solved, recorded, drawn and judged.
 
 use super::celsius::{CELSIUS, TEMPERATURE};
+use super::mechanics::{self, Follower};
 use super::probe::{self, Probe};
 use super::{Failure, animation, line};
 use crate::error::Error;
@@ -37,18 +38,18 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
     let mut phases = Phases::new();
     phases.start("mesh");
     let built = scene.mesh.build(source)?;
-    let task = scene.task(source, built.mesh)?;
+    let task = scene.task(source, built)?;
     if !is_study && !run.options.resume {
         scene.check_expectations(source, &scene.quantities(&task), &[])?;
     }
     phases.start("solve");
-    let (mut simulation, frames, probes);
+    let (mut simulation, frames, probes, stressed);
     if run.options.resume {
         run.begin()?;
     }
-    if let Some((written, state, rows)) = run.reached::<Reached>()? {
+    if let Some((written, state, rows, body)) = run.reached::<Reached>()? {
         simulation = Simulation::resume(task.problem.clone(), task.settings, state)?;
-        (frames, probes) = (written, rows);
+        (frames, probes, stressed) = (written, rows, body.unwrap_or_default());
     } else {
         simulation = Simulation::new(task.problem.clone(), task.settings)?;
         scene.refuse_too_large(source, &simulation, task.end)?;
@@ -56,7 +57,7 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
             run.begin()?;
         }
         let fields = simulation.field_names().len();
-        frames = 0;
+        (frames, stressed) = (0, mechanics::Reached::default());
         probes = scene
             .probe
             .iter()
@@ -66,7 +67,9 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
     }
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let names = simulation.field_names();
-    let mut recorder = Recorder { scene, task: &task, probes, names, frames };
+    let follow = |spec| Follower::new(spec, &task.problem.mesh, stressed);
+    let follower = task.mechanics.as_ref().map(follow).transpose()?;
+    let mut recorder = Recorder { scene, task: &task, probes, names, frames, follower };
     let series = recorder.solve(&mut simulation, &mut phases, run)?;
     phases.start("write");
     recorder.record(&simulation, &mut report);
@@ -99,8 +102,8 @@ pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failur
     Ok(lines)
 }
 
-/// How far a run is, as its checkpoint holds it: frames of the fields that are written, state, rows of the probes.
-type Reached = (usize, State, Vec<Probe>);
+/// How far a run is, as its checkpoint holds it: frames of the fields that are written, state, rows of the probes, stress.
+type Reached = (usize, State, Vec<Probe>, Option<mechanics::Reached>);
 
 /// What is seen of a body on its way.
 struct Recorder<'a> {
@@ -111,6 +114,8 @@ struct Recorder<'a> {
     names: Vec<&'static str>,
     /// Frames of the fields that are written.
     frames: usize,
+    /// Stress, where the scene asks for it.
+    follower: Option<Follower<'a>>,
 }
 
 impl Recorder<'_> {
@@ -133,25 +138,35 @@ impl Recorder<'_> {
         if self.frames == 0 {
             simulation.finite()?;
             probe::record(&mut self.probes, simulation, &self.names)?;
+            self.follower.as_mut().map_or(Ok(()), |follower| follower.see(simulation, false))?;
         }
         while self.frames <= last {
             let until = (self.frames as f64 * every).min(end);
             let (probes, names, frames) = (&mut self.probes, &self.names, self.frames);
+            let follower = &mut self.follower;
             let mut result = Ok(());
             let mut observe = |simulation: &Simulation, step: &Record| -> ControlFlow<()> {
                 result = simulation.finite().and_then(|()| probe::record(probes, simulation, names));
+                if let (Ok(()), Some(follower)) = (&result, follower.as_mut()) {
+                    result = follower.see(simulation, false);
+                }
                 let state = simulation.state();
                 run.show(state.time / end, &|| {
                     let (time, dt, equations) = (state.time, step.dt, state.temperature.len());
                     format!("t = {time:.4} of {end:.4} s  step {dt:.3e} s  {equations} equations")
                 });
                 if result.is_ok() {
-                    result = run.pause(|| Some((frames, state, &*probes))).map_err(Error::from);
+                    let stressed = || follower.as_ref().map(Follower::reached);
+                    result = run.pause(|| Some((frames, state, &*probes, stressed()))).map_err(Error::from);
                 }
                 if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
             let _ = simulation.advance(until, &mut observe)?;
             result?;
+            if let Some(follower) = self.follower.as_mut().filter(|_| self.frames == last) {
+                follower.see(simulation, true)?;
+                follower.release()?;
+            }
             phases.start("write");
             if let Some(series) = &mut series {
                 self.frame(simulation, series)?;
@@ -173,7 +188,25 @@ impl Recorder<'_> {
         let elements = self.task.problem.mesh.element_count() as u32;
         let exists: Vec<f64> =
             (0..elements).map(|element| f64::from(u8::from(simulation.is_born(element)))).collect();
-        Ok(series.step(simulation.time(), &arrays, &[("exists", 1, &exists)])?)
+        let (displacement, mises) = match &self.follower {
+            Some(follower) => (follower.displacement(), follower.mises()),
+            None => Default::default(),
+        };
+        let mut of_cells: Vec<Data> = vec![("exists", 1, &exists)];
+        if self.follower.is_some() {
+            arrays.push(("displacement_m", 3, &displacement));
+            of_cells.push(("mises_Pa", 1, &mises));
+        }
+        Ok(series.step(simulation.time(), &arrays, &of_cells)?)
+    }
+
+    /// Volume of what exists, m³, as the materials have it: of each element the part that is filled.
+    fn printed_volume(&self, simulation: &Simulation) -> f64 {
+        let mesh = &self.task.problem.mesh;
+        let parts = self.task.filling.as_ref().and_then(|filling| filling.parts.as_ref());
+        let of = |element: u32| parts.map_or(1.0, |(values, of)| values[of[element as usize]]);
+        let born = (0..mesh.element_count() as u32).filter(|&element| simulation.is_born(element));
+        born.map(|element| of(element) * crate::element::volume(mesh, element)).sum()
     }
 
     /// The scalars of the end.
@@ -187,6 +220,17 @@ impl Recorder<'_> {
         report.value(q::HEAT_GIVEN_OFF, -(exchange.total() + reaction));
         report.value(q::MISSING_ENERGY, missing);
         report.value(q::WORST_BALANCE, worst);
+        if let Some(filling) = &self.task.filling {
+            report.value(q::PRINTED_VOLUME, self.printed_volume(simulation));
+            report.value(q::CELLS_OVER_BODY, filling.ratio);
+            if let Some((path, _)) = &filling.path {
+                report.value(q::PATH_TIME, path.duration());
+                report.value(q::FILAMENT, path.fed());
+            }
+        }
+        if let Some(follower) = &self.follower {
+            follower.record(report);
+        }
         let nodes = 0..self.task.problem.mesh.points.len() as u32;
         let temperature: Vec<Option<f64>> =
             nodes.map(|node| simulation.temperature(node).map(|kelvin| kelvin - CELSIUS)).collect();
@@ -261,5 +305,11 @@ fn cells(mesh: &Mesh) -> Cells {
     let mut cells = Cells::default();
     mesh.hexahedra.iter().for_each(|nodes| cells.push(12, nodes));
     mesh.tetrahedra.iter().for_each(|nodes| cells.push(10, nodes));
+    for cell in &mesh.others {
+        match cell.shape.vtk() {
+            (kind, Some(order)) => cells.push(kind, &order.map(|k| cell.nodes()[k])),
+            (kind, None) => cells.push(kind, cell.nodes()),
+        }
+    }
     cells
 }

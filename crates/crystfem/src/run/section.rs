@@ -1,6 +1,5 @@
 //! A section through a mesh, sampled on a regular raster for pictures.
 
-use crate::element::MOST;
 use crate::mesh::Mesh;
 
 /// Samples along the longer side.
@@ -14,8 +13,10 @@ pub struct Section {
     pub low: [f64; 2],
     /// Distance of neighbouring samples, m.
     pub spacing: f64,
-    /// Sample, element, and the shape functions of its nodes there.
-    inside: Vec<(usize, u32, [f64; MOST])>,
+    /// Sample and element; `shapes` has the shape functions of its nodes there.
+    inside: Vec<(usize, u32)>,
+    /// Those of one sample after those of another.
+    shapes: Vec<f64>,
 }
 
 impl Section {
@@ -37,7 +38,7 @@ impl Section {
             let last = ((to - low[d]) / spacing - 0.5).ceil().max(0.0) as usize;
             first.min(most)..last.min(most)
         };
-        let mut inside = Vec::new();
+        let (mut inside, mut all) = (Vec::new(), Vec::new());
         for &element in elements {
             let Some([lower, upper]) = mesh.bounds_of(&[element]) else { continue };
             if !(lower[1] <= middle && middle < upper[1]) {
@@ -48,18 +49,25 @@ impl Section {
                     let x = low[0] + (i as f64 + 0.5) * spacing;
                     let z = low[2] + (k as f64 + 0.5) * spacing;
                     if let Some(shapes) = mesh.shapes_at(element, [x, middle, z]) {
-                        inside.push((k * samples[0] + i, element, shapes));
+                        inside.push((k * samples[0] + i, element));
+                        all.extend_from_slice(&shapes[..mesh.nodes(element).len()]);
                     }
                 }
             }
         }
-        Some(Self { samples, low: [low[0], low[2]], spacing, inside })
+        Some(Self { samples, low: [low[0], low[2]], spacing, inside, shapes: all })
     }
 
     /// Values of a field over nodes at the samples of elements that exist, NaN elsewhere.
     pub fn values(&self, mesh: &Mesh, field: &[f64], exists: &dyn Fn(u32) -> bool) -> Vec<f64> {
         let mut values = vec![f64::NAN; self.samples[0] * self.samples[1]];
-        for (sample, element, shapes) in self.inside.iter().filter(|(_, element, _)| exists(*element)) {
+        let mut rest = self.shapes.as_slice();
+        for (sample, element) in &self.inside {
+            let (shapes, others) = rest.split_at(mesh.nodes(*element).len());
+            rest = others;
+            if !exists(*element) {
+                continue;
+            }
             // a node that does not exist is NaN, and has no part in a sample on the far side
             let parts = mesh.nodes(*element).iter().zip(shapes).filter(|(_, shape)| **shape != 0.0);
             let at = |node: u32| field.get(node as usize).copied().unwrap_or(f64::NAN);

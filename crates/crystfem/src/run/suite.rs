@@ -29,7 +29,7 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
             let study = &scene.study[index];
             if study.expect_error.is_none() {
                 let (source, scene) = scene.of_study(source, index)?;
-                let task = scene.task(&source, scene.mesh.build(&source)?.mesh)?;
+                let task = scene.task(&source, scene.mesh.build(&source)?)?;
                 names.extend(of_study(&study.name, scene.quantities(&task)));
             }
         }

@@ -22,6 +22,15 @@ impl PartScene {
             q::WORST_BALANCE,
         ];
         let mut all: Vec<Named> = energies.map(Named::from).to_vec();
+        if let Some(filling) = &task.filling {
+            all.extend([q::PRINTED_VOLUME, q::CELLS_OVER_BODY].map(Named::from));
+            if filling.path.is_some() {
+                all.extend([q::PATH_TIME, q::FILAMENT].map(Named::from));
+            }
+        }
+        if task.mechanics.is_some() {
+            all.extend([q::WARPAGE, q::LARGEST_DISPLACEMENT, q::MISES_ON_BED, q::MISES].map(Named::from));
+        }
         let unit = |field: &str| if field == "temperature" { "degC" } else { "" };
         let with_temperature = || std::iter::once("temperature").chain(fields.iter().copied());
         let layers = (1..=task.layers.len()).map(|layer| format!("layer-{layer}."));

@@ -242,6 +242,5 @@ fn table<const N: usize>(
     file: &Path,
     columns: [Column; N],
 ) -> Result<[Vec<f64>; N], SceneError> {
-    let folder = source.path.parent().unwrap_or(Path::new(""));
-    read(&folder.join(file), columns).map_err(|error| located(source, key, &error))
+    read(&source.file(file), columns).map_err(|error| located(source, key, &error))
 }

@@ -72,7 +72,7 @@ impl FitSpec {
     ) -> Result<Measured, SceneError> {
         let data = &self.data[i];
         let at_key = |field: &str| key(&format!("data[{i}].{field}"));
-        let path = source.path.parent().unwrap_or(Path::new("")).join(&data.file);
+        let path = source.file(&data.file);
         let table = self.read_flow(source, &path, data, &at_key)?;
         if let Some(row) = (1..table.times.len()).find(|&row| table.times[row] < table.times[row - 1]) {
             let error = Error::File {

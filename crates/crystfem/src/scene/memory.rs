@@ -20,6 +20,8 @@ const NODE: f64 = 350.0;
 const ELEMENT: f64 = 150.0;
 /// An element that is printed: births, layers, equations that are rebuilt.
 const PRINTED: f64 = 300.0;
+/// Six branches and the stress at eight Gauss points, twice while a checkpoint is written; the state of the last solution.
+const STRESSED: f64 = 2.0 * 7.0 * 8.0 * 48.0 + 200.0;
 /// A stored entry of the conduction matrix, while it is sorted.
 const ENTRY: f64 = 40.0;
 /// A material point, and each of its numbers: old, new, of each stage, rejected, in a checkpoint.
@@ -90,6 +92,9 @@ impl PartScene {
         }
         if self.print.is_some() {
             bytes += elements * PRINTED;
+        }
+        if self.mechanics.is_some() {
+            bytes += elements * STRESSED;
         }
         bytes += system.rows.stored()[2] as f64 * ENTRY;
         let states = simulation.behaviours.iter().map(|behaviour| behaviour.states).max().unwrap_or(0) as f64;

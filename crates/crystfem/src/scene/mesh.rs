@@ -2,6 +2,7 @@
 
 use super::fault::{located, located_in};
 use super::memory;
+use super::voxels::{Filling, PathSpec, StlSpec};
 use crate::error::Error;
 use crate::mesh::{Bar, Block, Grid, Mesh, Split, Substrate, Tube, quality, read};
 use polycore::scene::{SceneError, Source};
@@ -35,7 +36,7 @@ const TUBE_KEYS: [(&str, &str); 6] = [
     ("elements along an axis", "elements"),
 ];
 
-/// One of a printed bar, a brick, a sector of a tube, and a file.
+/// One of a printed bar, a brick, a sector of a tube, what a G-code file prints, the inside of an STL surface, and a file.
 ///
 /// ```toml
 /// [mesh.bar]
@@ -55,10 +56,16 @@ pub struct MeshSpec {
     pub brick: Option<BrickSpec>,
     /// A sector of a hollow cylinder.
     pub tube: Option<TubeSpec>,
+    /// The cells that a G-code file fills, printed along it.
+    pub path: Option<PathSpec>,
+    /// The cells inside an STL surface.
+    pub stl: Option<StlSpec>,
     /// A Gmsh `.msh` (4.1) or an Abaqus or CalculiX `.inp`.
     pub file: Option<PathBuf>,
     /// Length of one unit of the file; default 1 m.
     pub unit: Option<Length>,
+    /// Order of the shape functions: 2 puts a node on the middle of each edge; default: as the mesh is.
+    pub order: Option<u8>,
 }
 
 /// See [`Bar`].
@@ -100,7 +107,7 @@ pub struct SubstrateSpec {
 pub struct BrickSpec {
     /// Extents.
     pub size: [Length; 3],
-    /// Elements along each axis; tetrahedra fill each of these cells.
+    /// Elements along each axis; tetrahedra or wedges fill each of these cells.
     pub elements: [usize; 3],
     /// Element type; default hexahedra.
     #[serde(default)]
@@ -129,6 +136,8 @@ pub struct Built {
     pub notes: Vec<String>,
     /// Volume of all elements, m³.
     pub volume: f64,
+    /// How full the elements of a path or an STL surface are.
+    pub filling: Option<Filling>,
 }
 
 impl MeshSpec {
@@ -137,14 +146,34 @@ impl MeshSpec {
     /// # Errors
     /// A [`SceneError`] for none or several of the alternatives, and for what the mesh refuses.
     pub fn build(&self, source: &Source) -> Result<Built, SceneError> {
-        let kinds = [self.bar.is_some(), self.brick.is_some(), self.tube.is_some(), self.file.is_some()];
-        let given = kinds.into_iter().filter(|&x| x).count();
+        let mut built = self.first_order(source)?;
+        match self.order {
+            None | Some(1) => {}
+            Some(2) if built.filling.is_none() => built.mesh = built.mesh.second_order(),
+            Some(order) => {
+                return Err(source.error("mesh.order", order, "1, or 2 of a bar, brick, tube or file"));
+            }
+        }
+        Ok(built)
+    }
+
+    fn first_order(&self, source: &Source) -> Result<Built, SceneError> {
+        let structured = [self.bar.is_some(), self.brick.is_some(), self.tube.is_some()];
+        let from_files = [self.file.is_some(), self.path.is_some(), self.stl.is_some()];
+        let kinds = structured.into_iter().chain(from_files);
+        let given = kinds.filter(|&x| x).count();
         if given != 1 {
             let found = if given == 0 { "nothing".to_owned() } else { format!("{given} meshes") };
-            return Err(source.error("mesh", found, "one of `bar`, `brick`, `tube`, `file`"));
+            return Err(source.error("mesh", found, "one of `bar`, `brick`, `tube`, `path`, `stl`, `file`"));
         }
         if self.unit.is_some() && self.file.is_none() {
             return Err(source.error("mesh.unit", "a unit without a file", "nothing"));
+        }
+        if let Some(path) = &self.path {
+            return path.build(source);
+        }
+        if let Some(stl) = &self.stl {
+            return stl.build(source);
         }
         let at = |key: &str, error: Error| located(source, key, &error);
         let mut notes = Vec::new();
@@ -165,7 +194,7 @@ impl MeshSpec {
             tube.build().mesh().map_err(|error| located_in(source, "mesh.tube", &TUBE_KEYS, &error))?
         } else {
             let file = self.file.clone().unwrap_or_default();
-            let path = source.path.parent().map_or_else(|| file.clone(), |folder| folder.join(&file));
+            let path = source.file(&file);
             let unit = self.unit.map_or(1.0, |unit| unit.si());
             let found = read(&path, unit).map_err(|error| at("mesh.file", error))?;
             notes = found.notes;
@@ -173,11 +202,11 @@ impl MeshSpec {
                 notes.push(suspicion.message().to_owned());
             }
             notes.extend(found.quality.notes.clone());
-            return Ok(Built { volume: found.quality.volume, mesh: found.mesh, notes });
+            return Ok(Built { volume: found.quality.volume, mesh: found.mesh, notes, filling: None });
         };
         let found = quality::check(&mesh, None).map_err(|error| at("mesh", error))?;
         notes.extend(found.notes);
-        Ok(Built { mesh, notes, volume: found.volume })
+        Ok(Built { mesh, notes, volume: found.volume, filling: None })
     }
 }
 

@@ -9,6 +9,7 @@ mod fit;
 mod fit_spec;
 mod heat_flow;
 mod material;
+mod mechanics;
 mod memory;
 mod mesh;
 mod part;
@@ -18,6 +19,7 @@ mod print;
 mod problem;
 mod schedule;
 mod study;
+mod voxels;
 
 pub use convergence::ConvergenceSpec;
 pub use curve::CurveSpec;
@@ -25,6 +27,7 @@ pub use fit::{FitScene, Job};
 pub use fit_spec::{DataSpec, Direction, FitLaw, FitSpec, HeatFlowSpec, Limit};
 pub use heat_flow::Measured;
 pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
+pub use mechanics::{Mechanics, MechanicsLaw, MechanicsSpec};
 pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec, TubeSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
 pub(crate) use places::millimetres;
@@ -32,6 +35,7 @@ pub use point::{CompareSpec, ExchangeSpec, LegSpec, PointScene, PointSpec};
 pub use problem::Task;
 pub use schedule::{ScheduleSpec, TimesSpec};
 pub use study::StudySpec;
+pub use voxels::{Filling, PathSpec, StlSpec};
 
 pub(crate) use polycore::scene::check_name;
 

@@ -1,7 +1,8 @@
 //! The scene of a body in time: mesh, materials, layers, what acts on it.
 
 use super::{
-    ConvergenceSpec, CurveSpec, MaterialSpec, MeshSpec, Program, ScheduleSpec, StudySpec, check_name,
+    ConvergenceSpec, CurveSpec, MaterialSpec, MechanicsSpec, MeshSpec, Program, ScheduleSpec, StudySpec,
+    check_name,
 };
 use crate::problem::Capacity;
 use crate::simulation::LinearSolver;
@@ -11,7 +12,7 @@ use polycore::scene::{LineSpec, SceneError, SolidSpec, Source};
 use polycore::units::dimension::{
     HeatFluxDimension, HeatTransferDimension, PowerDensityDimension, TemperatureDimension,
 };
-use polycore::units::{Length, Temperature, TemperatureDifference, Time};
+use polycore::units::{Acceleration, Length, Speed, Temperature, TemperatureDifference, Time};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -39,6 +40,8 @@ pub struct PartScene {
     /// Heat released in a volume.
     #[serde(default)]
     pub source: Vec<SourceSpec>,
+    /// Stress and warpage.
+    pub mechanics: Option<MechanicsSpec>,
     /// Times and steps.
     #[serde(default)]
     pub time: TimeSpec,
@@ -78,8 +81,8 @@ pub struct RegionSpec {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PrintSpec {
-    /// Temperature of new material at its birth.
-    pub temperature: ScheduleSpec<TemperatureDimension>,
+    /// Temperature of new material at its birth; default: that of the nozzle in the G-code file.
+    pub temperature: Option<ScheduleSpec<TemperatureDimension>>,
     /// Element sets `PREFIX1`, `PREFIX2`, …; default `layer-`.
     pub layers: Option<String>,
     /// Or an element set cut into layers of `layer_height`, or printed along a `path`.
@@ -105,6 +108,12 @@ pub struct PrintSpec {
     /// is not printed.
     #[serde(default)]
     pub fill: bool,
+    /// Diameter of the filament, for the volume that G-code extrudes; default 1.75 mm.
+    pub filament: Option<Length>,
+    /// Limit of acceleration along G-code, for times; default: none, velocity is F.
+    pub acceleration: Option<Acceleration>,
+    /// Step of velocity at corners, with `acceleration`.
+    pub jerk: Option<Speed>,
     /// Elements that the nozzle passes within one window appear together; default: a hundredth of the path's duration.
     pub window: Option<Time>,
 }
@@ -234,7 +243,7 @@ impl PartScene {
             }
         }
         if let Some(print) = &self.print {
-            print.check(source)?;
+            print.check(source, self.mesh.path.is_some())?;
         } else if self.time.end.is_none() {
             return Err(source.error("time.end", "nothing", "a time, or a [print] that ends by itself"));
         }
@@ -307,10 +316,42 @@ impl BoundarySpec {
 }
 
 impl PrintSpec {
-    fn check(&self, source: &Source) -> Result<(), SceneError> {
-        let path = self.path.is_some();
+    /// `of_mesh`: the mesh is that of a path.
+    fn check(&self, source: &Source, of_mesh: bool) -> Result<(), SceneError> {
+        let along = self.path.is_some();
+        if along && of_mesh {
+            return Err(source.error(
+                "print.path",
+                "a path beside that of the mesh",
+                "nothing: `mesh.path` is printed",
+            ));
+        }
+        let layers = self.layers.is_some() || self.elements.is_some() || self.layer_height.is_some();
+        if of_mesh && !layers && self.layer_time.is_none() {
+            for (name, given) in [
+                ("bead_width", self.bead_width.is_some()),
+                ("bead_height", self.bead_height.is_some()),
+                ("centre", self.centre),
+                ("offset", self.offset.is_some()),
+                ("fill", self.fill),
+                ("filament", self.filament.is_some()),
+                ("acceleration", self.acceleration.is_some()),
+                ("jerk", self.jerk.is_some()),
+            ] {
+                if given {
+                    let key = format!("print.{name}");
+                    return Err(source.error(&key, format!("`{name}` of a mesh of a path"), "nothing"));
+                }
+            }
+            return self.check_numbers(source);
+        }
+        let path = along;
         let needed = [
+            ("temperature", self.temperature.is_some(), !path, true),
             ("layer_time", self.layer_time.is_some(), !path, !path),
+            ("filament", self.filament.is_some(), false, path),
+            ("acceleration", self.acceleration.is_some(), false, path),
+            ("jerk", self.jerk.is_some(), false, path),
             ("layer_height", self.layer_height.is_some(), false, !path && self.elements.is_some()),
             ("layers", self.layers.is_some(), false, !path && self.elements.is_none()),
             ("bead_width", self.bead_width.is_some(), path, path),
@@ -331,6 +372,10 @@ impl PrintSpec {
                 return Err(source.error(&key, format!("`{name}` of {of}"), "nothing"));
             }
         }
+        self.check_numbers(source)
+    }
+
+    fn check_numbers(&self, source: &Source) -> Result<(), SceneError> {
         for (name, value) in [
             ("layer_time", self.layer_time.map(|t| t.si())),
             ("layer_height", self.layer_height.map(|t| t.si())),

@@ -10,7 +10,7 @@ use polycore::scene::{SceneError, Source};
 use polycore::units::{Ratio, Temperature, TemperatureDifference, TemperatureRate, Time};
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A whole scene.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -238,8 +238,7 @@ impl PointSpec {
             return Ok(Drive::Lumped { start, exchange, duration });
         }
         if let Some(file) = &self.history {
-            let folder = source.path.parent().unwrap_or(Path::new(""));
-            let history = History::read(&folder.join(file));
+            let history = History::read(&source.file(file));
             return history.map(Drive::Prescribed).map_err(|error| located(source, &key("history"), &error));
         }
         let cycles = self.cycles.unwrap_or(1);

@@ -3,11 +3,13 @@
 use super::fault::located;
 use super::part::PrintSpec;
 use super::places::{elements, millimetres};
-use crate::element::{self, Geometry};
+use super::voxels::{FILAMENT, Filling, limited};
+use crate::element;
 use crate::error::Error;
 use crate::mesh::Mesh;
+use crate::mesh::RATIOS;
 use crate::mesh::layers::{Layers, groups};
-use crate::mesh::path::{Bead, read_csv, read_gcode};
+use crate::mesh::path::{Bead, Setting, ToolPath, read_csv, read_gcode};
 use crate::problem::Birth;
 use polycore::scene::{SceneError, Source};
 use std::path::Path;
@@ -24,14 +26,21 @@ pub(super) struct Laid {
 }
 
 impl PrintSpec {
+    /// `filling`: of a mesh of a path, which is printed along it unless layers are asked for.
     pub(super) fn laid(
         &self,
         source: &Source,
         mesh: &Mesh,
+        filling: Option<&Filling>,
         notes: &mut Vec<String>,
     ) -> Result<Laid, SceneError> {
         if let Some(file) = &self.path {
             return self.along(source, mesh, file, notes);
+        }
+        if let (Some((tool, times)), None) =
+            (filling.and_then(|filling| filling.path.as_ref()), self.layer_time)
+        {
+            return self.timed(source, tool, times, Vec::new());
         }
         let at = |key: &str, error: Error| located(source, key, &error);
         let layers = match (&self.elements, self.layer_height) {
@@ -48,15 +57,58 @@ impl PrintSpec {
         let interval = self.layer_time.map_or(0.0, |time| time.si());
         let groups = (0..).zip(&layers.elements);
         let groups = groups.map(|(layer, elements)| (start + f64::from(layer) * interval, elements.clone()));
-        let births = self.births(source, groups.collect())?;
+        let births = self.births(source, None, &[], groups.collect())?;
         let end = start + births.len() as f64 * interval;
         Ok(Laid { births, layers: layers.elements, end, absent: Vec::new() })
     }
 
-    fn births(&self, source: &Source, groups: Vec<(f64, Vec<u32>)>) -> Result<Vec<Birth>, SceneError> {
-        let schedule = self.temperature.build(source, "print.temperature")?;
-        let birth = |(time, elements)| Birth { time, elements, temperature: schedule.at(time) };
-        Ok(groups.into_iter().map(birth).collect())
+    /// `tool`, `times`: the path whose nozzle gives the temperature where the scene does not, and the time of each element on it.
+    fn births(
+        &self,
+        source: &Source,
+        tool: Option<&ToolPath>,
+        times: &[f64],
+        groups: Vec<(f64, Vec<u32>)>,
+    ) -> Result<Vec<Birth>, SceneError> {
+        let start = self.start.map_or(0.0, |start| start.si());
+        let schedule = match &self.temperature {
+            Some(given) => Some(given.build(source, "print.temperature")?),
+            None => None,
+        };
+        let nozzle = tool.map_or_else(Vec::new, |tool| tool.setting(Setting::Nozzle));
+        let birth = |(time, elements): (f64, Vec<u32>)| {
+            // as the last of them is laid down, not when all appear
+            let laid =
+                elements.iter().map(|&element| times.get(element as usize).copied().unwrap_or(time - start));
+            let laid = laid.fold(f64::NEG_INFINITY, f64::max);
+            let set = || nozzle.iter().rev().find(|(from, _)| *from <= laid).map(|pair| pair.1);
+            match schedule.as_ref().map(|schedule| schedule.at(time)).or_else(set) {
+                Some(temperature) => Ok(Birth { time, elements, temperature }),
+                None => {
+                    let found = format!("nothing, and no M104 or M109 in the file before {time} s");
+                    Err(source.error("print.temperature", found, "a temperature"))
+                }
+            }
+        };
+        groups.into_iter().map(birth).collect()
+    }
+
+    /// Elements at their times along a path.
+    fn timed(
+        &self,
+        source: &Source,
+        tool: &ToolPath,
+        times: &[f64],
+        absent: Vec<u32>,
+    ) -> Result<Laid, SceneError> {
+        let start = self.start.map_or(0.0, |start| start.si());
+        let window = self.window.map_or(0.01 * tool.duration(), |window| window.si());
+        let groups = groups(times, window).map_err(|error| located(source, "print.window", &error))?;
+        let groups = groups.into_iter().map(|(time, list)| (start + time, list)).collect();
+        let births = self.births(source, Some(tool), times, groups)?;
+        let last = births.last().map_or(start, |birth| birth.time);
+        let end = (start + tool.duration()).max(last + window);
+        Ok(Laid { births, absent, layers: Vec::new(), end })
     }
 
     /// Along a path; what its beads do not cover is never printed.
@@ -68,11 +120,12 @@ impl PrintSpec {
         notes: &mut Vec<String>,
     ) -> Result<Laid, SceneError> {
         let at = |key: &str, error: Error| located(source, key, &error);
-        let path = source.path.parent().map_or_else(|| file.to_path_buf(), |folder| folder.join(file));
+        let path = source.file(file);
         let table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
         let tool = if table { read_csv(&path) } else { read_gcode(&path) };
         let mut tool = tool.map_err(|error| at("print.path", error))?;
         notes.append(&mut tool.notes);
+        tool = limited(source, "print", tool, self.acceleration, self.jerk)?;
         let elements = elements(source, mesh, "print.elements", self.elements.as_deref())?;
         let bead = Bead {
             width: self.bead_width.map_or(0.0, |width| width.si()),
@@ -86,7 +139,7 @@ impl PrintSpec {
         }
         let mut activation =
             tool.activation(mesh, &elements, bead).map_err(|error| at("print.path", error))?;
-        let volume = |list: &[u32]| list.iter().map(|&element| volume(mesh, element)).sum::<f64>();
+        let volume = |list: &[u32]| list.iter().map(|&element| element::volume(mesh, element)).sum::<f64>();
         let whole = volume(&elements);
         let share = |list: &[u32]| 100.0 * (1.0 - volume(list) / whole);
         let covered = share(&activation.missed);
@@ -116,19 +169,16 @@ impl PrintSpec {
             told += "; what they do not cover is not printed (`fill = true` fills gaps)";
         }
         notes.push(told);
-        let start = self.start.map_or(0.0, |start| start.si());
-        let window = self.window.map_or(0.01 * tool.duration(), |window| window.si());
-        let groups = groups(&activation.times, window).map_err(|error| at("print.window", error))?;
-        let births =
-            self.births(source, groups.into_iter().map(|(time, list)| (start + time, list)).collect())?;
-        let last = births.last().map_or(start, |birth| birth.time);
-        let end = (start + tool.duration()).max(last + window);
-        Ok(Laid { births, absent: activation.missed, layers: Vec::new(), end })
+        let fed = self.filament.map_or(FILAMENT, |filament| filament.si());
+        let extruded: f64 = tool.printing().map(|one| one.volume(fed)).sum();
+        if extruded > 0.0 {
+            let ratio = (whole - volume(&activation.missed)) / extruded;
+            if !(RATIOS[0]..=RATIOS[1]).contains(&ratio) {
+                notes.push(format!(
+                    "what is printed has {ratio:.3} times the volume that the file extrudes: `[mesh.path]` prints what it extrudes"
+                ));
+            }
+        }
+        self.timed(source, &tool, &activation.times, activation.missed)
     }
-}
-
-/// Of an element, m³.
-fn volume(mesh: &Mesh, element: u32) -> f64 {
-    let (corners, nodes) = element::corners(mesh, element);
-    Geometry::new(&corners[..nodes]).map_or(0.0, |geometry| geometry.corner_volumes.iter().sum())
 }

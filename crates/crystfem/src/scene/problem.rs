@@ -1,11 +1,16 @@
 //! From a scene to a problem of heat conduction.
 
 use super::fault::{located, located_in};
+use super::mechanics::Mechanics;
 use super::memory;
+use super::mesh::Built;
 use super::part::{BoundarySpec, PartScene};
 use super::places::{elements, millimetres};
 use super::print::Laid;
+use super::voxels::Filling;
 use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
+use crate::error::Error;
+use crate::material::{Filled, ThermalMaterial};
 use crate::mesh::surface::Surface;
 use crate::mesh::{Face, Mesh, Place};
 use crate::problem::Problem;
@@ -49,8 +54,41 @@ pub struct Task {
     pub probes: Vec<Place>,
     /// Where the points of each line are; none outside of the mesh.
     pub lines: Vec<Vec<Option<Place>>>,
+    /// How full elements are, of a mesh of a path or an STL surface.
+    pub filling: Option<Filling>,
+    /// Stress, where the scene asks for it.
+    pub mechanics: Option<Mechanics>,
     /// What should be looked at.
     pub notes: Vec<String>,
+}
+
+/// Materials by material and filled part, as far as elements have them.
+fn fill(
+    materials: &mut Vec<Arc<dyn ThermalMaterial>>,
+    material_of: &mut [u16],
+    parts: &[f64],
+    part_of: &[usize],
+) -> Result<(), Error> {
+    let mut all: Vec<Arc<dyn ThermalMaterial>> = Vec::new();
+    let mut known: HashMap<(u16, usize), u16> = HashMap::new();
+    for (material, &part) in material_of.iter_mut().zip(part_of) {
+        let key = (*material, part);
+        *material = match known.get(&key) {
+            Some(&found) => found,
+            None => {
+                let number = u16::try_from(all.len()).map_err(|_| Error::Parameter {
+                    name: "filled parts of all materials",
+                    found: all.len() as f64,
+                    allowed: "at most 65536".into(),
+                })?;
+                all.push(Arc::new(Filled::new(materials[usize::from(key.0)].clone(), parts[part])?));
+                known.insert(key, number);
+                number
+            }
+        };
+    }
+    *materials = all;
+    Ok(())
 }
 
 impl PartScene {
@@ -59,10 +97,12 @@ impl PartScene {
     /// # Errors
     /// A [`SceneError`] for sets and surfaces that the mesh lacks, elements without a material, and for what
     /// [`Problem::check`] refuses.
-    pub fn task(&self, source: &Source, mesh: Mesh) -> Result<Task, SceneError> {
+    pub fn task(&self, source: &Source, built: Built) -> Result<Task, SceneError> {
+        let Built { mesh, filling, .. } = built;
         let mut notes = Vec::new();
         let probes = self.places(source, &mesh, &mut notes)?;
-        let (materials, material_of, temperature_of) = self.regions(source, &mesh)?;
+        let (mut materials, mut material_of, temperature_of) = self.regions(source, &mesh)?;
+        let mechanics = self.mechanics(source, &mesh, &material_of)?;
         let shown = materials.iter().flat_map(|material| material.field_names().iter().copied());
         let shown: Vec<String> = ["temperature"].into_iter().chain(shown).map(str::to_owned).collect();
         let lines = self.lines(source, &mesh, &shown)?;
@@ -76,7 +116,7 @@ impl PartScene {
             heats.push(Heat { elements, power });
         }
         let Laid { births, absent, layers, end: by_itself } = match &self.print {
-            Some(print) => print.laid(source, &mesh, &mut notes).map_err(|fault| {
+            Some(print) => print.laid(source, &mesh, filling.as_ref(), &mut notes).map_err(|fault| {
                 // a file in millimetres that is read in metres has few layers, or lies far away
                 self.mesh.without_unit(source, &mesh).unwrap_or(fault)
             })?,
@@ -103,6 +143,10 @@ impl PartScene {
         let later: HashSet<u32> = later.collect();
         let initial = initial(&mesh, &temperature_of, &later);
         let capacity = self.time.capacity;
+        if let Some((parts, part_of)) = filling.as_ref().and_then(|filling| filling.parts.as_ref()) {
+            fill(&mut materials, &mut material_of, parts, part_of)
+                .map_err(|error| located(source, "mesh", &error))?;
+        }
         let problem = Problem {
             mesh,
             materials,
@@ -116,7 +160,7 @@ impl PartScene {
         };
         problem.check().map_err(|error| located(source, "mesh", &error))?;
         let settings = self.settings(end, problem.shortest_period());
-        Ok(Task { problem, settings, end, printed, layers, probes, lines, notes })
+        Ok(Task { problem, settings, end, printed, layers, probes, lines, filling, mechanics, notes })
     }
 
     /// Notes temperatures at which no part is made: numbers in °C that were written as K.
@@ -133,9 +177,9 @@ impl PartScene {
                 }
             }
         }
-        if let Some(print) = &self.print {
+        if let Some(temperature) = self.print.as_ref().and_then(|print| print.temperature.as_ref()) {
             let key = "print.temperature".to_owned();
-            let lowest = print.temperature.build(source, &key)?.lowest();
+            let lowest = temperature.build(source, &key)?.lowest();
             written.push((key, lowest));
         }
         for (key, kelvin) in written.into_iter().filter(|(_, kelvin)| *kelvin < COLD) {
@@ -195,8 +239,8 @@ impl PartScene {
         &self,
         source: &Source,
         mesh: &Mesh,
-    ) -> Result<(Vec<Arc<dyn crate::material::ThermalMaterial>>, Vec<u16>, Vec<f64>), SceneError> {
-        let mut materials: Vec<Arc<dyn crate::material::ThermalMaterial>> = Vec::new();
+    ) -> Result<(Vec<Arc<dyn ThermalMaterial>>, Vec<u16>, Vec<f64>), SceneError> {
+        let mut materials: Vec<Arc<dyn ThermalMaterial>> = Vec::new();
         for (name, spec) in &self.materials {
             materials.push(spec.build(source, &format!("materials.{name}"))?.into());
         }

@@ -3,9 +3,10 @@
 use super::either::{self, TextOrTable};
 use super::fault::{located, located_in};
 use crate::boundary::Schedule;
+use crate::mesh::path::{Setting, read_gcode};
 use crate::table::{Column, read};
 use polycore::scene::{SceneError, Source};
-use polycore::units::dimension::TimeDimension;
+use polycore::units::dimension::{TemperatureDimension, TimeDimension};
 use polycore::units::{Dimension, Quantity, Time};
 use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
@@ -38,7 +39,24 @@ pub struct TimesSpec<D> {
     pub high: Option<Quantity<D>>,
     /// Of the sine.
     pub period: Option<Time>,
+    /// Of `file`, where that is G-code: the temperature of its nozzle or bed, or its fan from `low` (off) to `high`.
+    pub of: Option<FileSetting>,
 }
+
+/// What a G-code file sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FileSetting {
+    /// M104 and M109.
+    Nozzle,
+    /// M140 and M190.
+    Bed,
+    /// M106 and M107.
+    Fan,
+}
+
+/// How long a setting of a file takes to be reached, s.
+const CHANGE: f64 = 1.0;
 
 /// Where parameters of a swing stand in its block.
 const SWING_KEYS: [(&str, &str); 3] = [("low value", "low"), ("high value", "high"), ("period, s", "period")];
@@ -54,6 +72,9 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
             Self::Over(over) => over,
         };
         let table = !(over.time.is_empty() && over.value.is_empty());
+        if let Some(of) = over.of {
+            return over.of_file(source, key, of, table);
+        }
         if let Some(swing) = over.swing(source, key, table)? {
             return Ok(swing);
         }
@@ -62,7 +83,7 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
                 return Err(source.error(key, "a file beside a table", "one of them"));
             }
             Some(file) => {
-                let path = source.path.parent().map_or_else(|| file.clone(), |folder| folder.join(file));
+                let path = source.file(file);
                 let columns = [Column::of::<TimeDimension>("time"), Column::of::<D>("value")];
                 let [times, values] =
                     read(&path, columns).map_err(|error| located(source, &format!("{key}.file"), &error))?;
@@ -81,6 +102,57 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
 }
 
 impl<D: Dimension + Copy> TimesSpec<D> {
+    /// A setting of a G-code file over its time, at F without limits of acceleration; each command changes it within a
+    /// second. Before the first one it has that one's value, and the fan is off.
+    fn of_file(
+        &self,
+        source: &Source,
+        key: &str,
+        of: FileSetting,
+        table: bool,
+    ) -> Result<Schedule, SceneError> {
+        let fault =
+            |name: &str, found: &str, allowed: &str| source.error(&format!("{key}.{name}"), found, allowed);
+        let Some(file) = &self.file else { return Err(fault("file", "nothing", "a G-code file")) };
+        if table || self.period.is_some() {
+            return Err(source.error(key, "a table or a sine beside `of`", "`file` and `of`"));
+        }
+        let setting = match of {
+            FileSetting::Nozzle => Setting::Nozzle,
+            FileSetting::Bed => Setting::Bed,
+            FileSetting::Fan => Setting::Fan,
+        };
+        let place = format!("{key}.file");
+        let path = read_gcode(&source.file(file)).map_err(|error| located(source, &place, &error))?;
+        let mut pairs = path.setting(setting);
+        match (setting, self.low, self.high) {
+            (Setting::Fan, Some(low), Some(high)) => {
+                for (_, value) in &mut pairs {
+                    *value = low.si() + (high.si() - low.si()) * *value;
+                }
+                pairs.insert(0, (f64::NEG_INFINITY, low.si()));
+            }
+            (Setting::Fan, ..) => {
+                return Err(fault("low", "nothing", "`low` and `high`: values with the fan off and on"));
+            }
+            (_, None, None) if D::NAME == TemperatureDimension::NAME => {}
+            (_, None, None) => return Err(fault("of", "a temperature", "`fan` with `low` and `high`")),
+            _ => return Err(fault("low", "`low` or `high` of a temperature", "nothing")),
+        }
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for (time, value) in pairs {
+            match points.last().copied() {
+                None => points.push((time.max(-CHANGE), value)),
+                // commands within a second of one another: the last holds
+                Some((last, before)) => {
+                    let from = time.max(last + 1e-6 * CHANGE);
+                    points.extend([(from, before), (from + CHANGE, value)]);
+                }
+            }
+        }
+        Schedule::linear(&points).map_err(|error| located(source, &place, &error))
+    }
+
     /// The swing, where it is one; `table`: there is a table beside it.
     fn swing(&self, source: &Source, key: &str, table: bool) -> Result<Option<Schedule>, SceneError> {
         if self.low.is_none() && self.high.is_none() && self.period.is_none() {
@@ -103,7 +175,7 @@ impl<D: Dimension> TextOrTable for ScheduleSpec<D> {
     type Table = TimesSpec<D>;
 
     fn expected() -> String {
-        let others = "{ time = […], value = […] }, { file = … } or { low = …, high = …, period = … }";
+        let others = "{ time = […], value = […] }, { file = … }, { file = …, of = \"bed\" } or { low = …, high = …, period = … }";
         format!("{}, e.g. \"{}\", {others}", D::NAME, D::EXAMPLE)
     }
 
@@ -138,6 +210,11 @@ impl<D: Dimension> schemars::JsonSchema for ScheduleSpec<D> {
                     "low": { "anyOf": [constant], "description": "Or a sine from here to `high`, its middle upwards at t = 0." },
                     "high": { "anyOf": [constant], "description": "Other end of the sine." },
                     "period": { "anyOf": [time], "description": "Of the sine." },
+                    "of": {
+                        "type": "string",
+                        "enum": ["nozzle", "bed", "fan"],
+                        "description": "Of a G-code `file`: a temperature that it sets, or its fan from `low` (off) to `high`.",
+                    },
                 },
                 "additionalProperties": false,
             }],

@@ -85,7 +85,7 @@ impl BiconjugateGradients {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::Rows;
+    use crate::system::{FaceMatrices, Rows};
 
     /// A line of 300 whose columns are scaled by 1 or 10: x known.
     #[test]
@@ -103,7 +103,12 @@ mod tests {
             }
         });
         let capacity = vec![1e-2; size];
-        let operator = Operator { rows: &rows, diagonal: Some(&capacity), weights: [0.0, 1.0], faces: &[] };
+        let operator = Operator {
+            rows: &rows,
+            diagonal: Some(&capacity),
+            weights: [0.0, 1.0],
+            faces: FaceMatrices::NONE,
+        };
         let exact: Vec<f64> = (0..size).map(|k| 300.0 + (0.1 * k as f64).sin()).collect();
         let inverse: Vec<f64> = (0..size).map(|k| 1.0 / (2.0 * scale(k) + 1e-2)).collect();
         let mut residual = vec![0.0; size];

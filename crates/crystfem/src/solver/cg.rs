@@ -79,7 +79,7 @@ impl ConjugateGradients {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::Rows;
+    use crate::system::{FaceMatrices, Rows};
 
     /// A line of 500 with diagonal 2 + 1e-3: x known; the estimate bounds the true error.
     #[test]
@@ -96,7 +96,12 @@ mod tests {
             }
         });
         let capacity = vec![1e-3; size];
-        let operator = Operator { rows: &rows, diagonal: Some(&capacity), weights: [0.0, 1.0], faces: &[] };
+        let operator = Operator {
+            rows: &rows,
+            diagonal: Some(&capacity),
+            weights: [0.0, 1.0],
+            faces: FaceMatrices::NONE,
+        };
         let exact: Vec<f64> = (0..size).map(|k| 300.0 + (0.1 * k as f64).sin()).collect();
         let mut residual = vec![0.0; size];
         operator.product(&exact, &mut residual);
@@ -124,7 +129,8 @@ mod tests {
             out.begin(std::iter::empty());
             out.add(0, -1.0, 0.0);
         });
-        let operator = Operator { rows: &rows, diagonal: None, weights: [0.0, 1.0], faces: &[] };
+        let operator =
+            Operator { rows: &rows, diagonal: None, weights: [0.0, 1.0], faces: FaceMatrices::NONE };
         let mut solution = [0.0; 2];
         let mut solve = |limit| {
             let (mut residual, mut cg) = ([1.0, 2.0], ConjugateGradients::default());

@@ -89,14 +89,15 @@ impl Direct {
                 entries[last] += diagonal[equation as usize];
             }
         }
-        for face in operator.faces {
-            for a in 0..face.nodes {
-                for b in 0..face.nodes {
+        for face in operator.faces.iter() {
+            let nodes = face.equations.len();
+            for a in 0..nodes {
+                for b in 0..nodes {
                     let [row, column] = [a, b].map(|k| self.unknown[face.equations[k] as usize]);
                     if row <= column && column != NONE {
                         let range = self.starts[column as usize]..self.starts[column as usize + 1];
                         if let Ok(at) = self.rows[range.clone()].binary_search(&(row as usize)) {
-                            entries[range.start + at] += operator.weights[1] * face.values[4 * a + b];
+                            entries[range.start + at] += operator.weights[1] * face.values[nodes * a + b];
                         }
                     }
                 }
@@ -149,7 +150,7 @@ impl Direct {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::Rows;
+    use crate::system::{FaceMatrices, Rows};
 
     /// The five-point Laplacian of a grid plus a shift, one equation fixed: solves what its product gives.
     #[test]
@@ -174,8 +175,12 @@ mod tests {
         let mut free = vec![1.0; size];
         free[40] = 0.0;
         for weight in [1.0, 3.0] {
-            let operator =
-                Operator { rows: &rows, diagonal: Some(&diagonal), weights: [0.0, weight], faces: &[] };
+            let operator = Operator {
+                rows: &rows,
+                diagonal: Some(&diagonal),
+                weights: [0.0, weight],
+                faces: FaceMatrices::NONE,
+            };
             let exact: Vec<f64> = (0..size).map(|k| free[k] * (k as f64).sin()).collect();
             let mut right = vec![0.0; size];
             operator.product(&exact, &mut right);
@@ -187,7 +192,8 @@ mod tests {
             // condition below 250
             assert!(found.iter().zip(&exact).all(|(f, e)| (f - e).abs() < 1e-13), "{found:?}");
         }
-        let negative = Operator { rows: &rows, diagonal: None, weights: [0.0, -1.0], faces: &[] };
+        let negative =
+            Operator { rows: &rows, diagonal: None, weights: [0.0, -1.0], faces: FaceMatrices::NONE };
         let mut direct = Direct::analyse(&negative, &free, |e| [f64::from(e), 0.0, 0.0]).unwrap();
         assert!(!direct.factor(&negative));
     }

@@ -12,7 +12,7 @@ pub use choice::{Choice, LinearSolver, Task};
 pub use direct::Direct;
 
 use crate::system::vector::{sum, weighted_square};
-use crate::system::{FaceMatrix, Rows};
+use crate::system::{FaceMatrices, Rows};
 
 /// A = D + `weights[0]`·M + `weights[1]`·(K + faces).
 #[derive(Clone, Copy)]
@@ -24,7 +24,7 @@ pub struct Operator<'a> {
     /// Factors of M and K.
     pub weights: [f64; 2],
     /// Surfaces with consistent capacity.
-    pub faces: &'a [FaceMatrix],
+    pub faces: &'a FaceMatrices,
 }
 
 impl Operator<'_> {
@@ -34,7 +34,7 @@ impl Operator<'_> {
         if self.faces.is_empty() {
             return product;
         }
-        for face in self.faces {
+        for face in self.faces.iter() {
             face.add_product(self.weights[1], x, y);
         }
         sum(x.len(), |k| x[k] * y[k])

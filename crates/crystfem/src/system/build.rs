@@ -7,7 +7,7 @@ use super::rows::{Row, Rows};
 use super::surfaces::Surfaces;
 use super::{Behaviour, NONE, System};
 use crate::boundary::{Condition, Where};
-use crate::element::{self, Geometry, MOST};
+use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::mesh::{Face, Mesh};
 use crate::problem::{Capacity, Problem};
@@ -17,19 +17,28 @@ use std::collections::HashSet;
 /// Elements whose matrices are made before they are added.
 const BATCH: usize = 4096;
 
-/// The elements around each node, as 8 × (position in the list of active elements) + corner.
+/// The elements around each node, as `stride` × (position in the list of active elements) + number of the node in it.
 struct Around {
     starts: Vec<u32>,
     corners: Vec<u32>,
+    /// 8, or 32 of a mesh with second-order elements.
+    stride: u32,
+}
+
+/// Matrices of an element of its own.
+enum Own {
+    Narrow(Box<Geometry>),
+    Wide(Box<Geometry<WIDE, WIDE_POINTS>>),
 }
 
 impl Around {
     fn new(mesh: &Mesh, active: &[u32], equation: &[u32], size: usize) -> Self {
         let mut starts = vec![0_u32; size + 1];
+        let stride = if mesh.is_second_order() { 32 } else { 8 };
         let each = |visit: &mut dyn FnMut(usize, u32)| {
             for (position, &number) in active.iter().enumerate() {
                 for (corner, &node) in mesh.nodes(number).iter().enumerate() {
-                    visit(equation[node as usize] as usize, (8 * position + corner) as u32);
+                    visit(equation[node as usize] as usize, stride * position as u32 + corner as u32);
                 }
             }
         };
@@ -43,7 +52,7 @@ impl Around {
             corners[next[node] as usize] = corner;
             next[node] += 1;
         });
-        Self { starts, corners }
+        Self { starts, corners, stride }
     }
 
     fn of(&self, node: usize) -> &[u32] {
@@ -63,7 +72,7 @@ fn outer(mesh: &Mesh, active: &[u32], equation: &[u32], around: &Around) -> Vec<
                 for side in 0..mesh.side_count(number) {
                     let corners = mesh.face_nodes(Face { element: number, side });
                     let covered = around.of(equation[corners[0] as usize] as usize).iter().any(|&other| {
-                        let other = (other / 8) as usize;
+                        let other = (other / around.stride) as usize;
                         other != position && {
                             let others = mesh.nodes(active[other]);
                             corners[1..].iter().all(|corner| others.contains(corner))
@@ -80,14 +89,9 @@ fn outer(mesh: &Mesh, active: &[u32], equation: &[u32], around: &Around) -> Vec<
     faces.concat()
 }
 
-/// Nodes of a face, sorted.
+/// Corners of a face, sorted.
 fn nodes_of(mesh: &Mesh, face: Face) -> [u32; 4] {
-    let mut nodes = [NONE; 4];
-    for (node, &corner) in nodes.iter_mut().zip(mesh.face_nodes(face).iter()) {
-        *node = corner;
-    }
-    nodes.sort_unstable();
-    nodes
+    mesh.face_nodes(face).key()
 }
 
 fn by_nodes(mesh: &Mesh, faces: &[Face]) -> HashSet<[u32; 4]> {
@@ -128,8 +132,8 @@ impl System {
         let rows = Rows::build(size, consistent, |index, row: &mut Row| {
             // corners, classes and relative nodes of the elements around say all, but for elements of no class
             let repeated = row.begin(around.of(index).iter().flat_map(|&corner| {
-                let position = (corner / 8) as usize;
-                let here = [corner % 8, u32::from(kinds[position])];
+                let position = (corner / around.stride) as usize;
+                let here = [corner % around.stride, u32::from(kinds[position])];
                 let others = mesh.nodes(elements[position]).iter();
                 here.into_iter().chain(others.map(|&n| equation[n as usize].wrapping_sub(index as u32)))
             }));
@@ -137,15 +141,13 @@ impl System {
                 return;
             }
             for &corner in around.of(index) {
-                let (position, a) = ((corner / 8) as usize, (corner % 8) as usize);
+                let (position, a) = ((corner / around.stride) as usize, (corner % around.stride) as usize);
                 let class = classes.get(usize::from(kinds[position]));
                 row.own |= class.is_none();
                 for (b, &node) in mesh.nodes(elements[position]).iter().enumerate() {
                     let offset = equation[node as usize].wrapping_sub(index as u32) as i32;
                     match class {
-                        Some(class) => {
-                            row.add(offset, class.conduction[8 * a + b], class.capacity[8 * a + b])
-                        }
+                        Some(class) => row.add(offset, class.conduction[a][b], class.capacity[a][b]),
                         None => row.add(offset, 0.0, 0.0),
                     }
                 }
@@ -197,7 +199,7 @@ impl System {
             for node in 0..self.size() {
                 keys.clear();
                 for &corner in around.of(node) {
-                    let number = self.elements[(corner / 8) as usize];
+                    let number = self.elements[(corner / around.stride) as usize];
                     let key = (born[number as usize], problem.material_of[number as usize]);
                     if nodal(number) && !keys.contains(&key) {
                         keys.push(key);
@@ -218,21 +220,18 @@ impl System {
         self.general.starts.push(0);
         for (&number, _) in self.elements.iter().zip(kinds).filter(|(_, kind)| **kind == VARYING) {
             let nodes = problem.mesh.nodes(number);
-            let mut equations = [NONE; MOST];
-            for (equation, &node) in equations.iter_mut().zip(nodes) {
-                *equation = self.equation[node as usize];
-            }
+            self.general.equations.extend(nodes.iter().map(|&node| self.equation[node as usize]));
+            self.general.ends.push(self.general.equations.len() as u32);
             let material = problem.material_of[number as usize];
             self.general.potential |= behaviours[usize::from(material)].potential;
             let first = self.general.points();
             self.general.elements.push(number);
-            self.general.equations.push(equations);
-            self.general.starts.push((first + nodes.len()) as u32);
+            self.general.starts.push((first + element::points(nodes.len())) as u32);
         }
     }
 
-    /// Adds what elements of no class have of their own, and the capacity of all; returns ∫ N dV of each element with
-    /// a source.
+    /// Adds what elements of no class have of their own, and the capacity of all; returns ∫ N dV of each first-order element
+    /// with a source.
     fn add_elements(
         &mut self,
         problem: &Problem,
@@ -249,7 +248,7 @@ impl System {
         for first in (0..self.elements.len()).step_by(BATCH) {
             let range = first..(first + BATCH).min(self.elements.len());
             // boxed: most elements have none, and a geometry has thousands of bytes
-            let own: Vec<Option<Box<Geometry>>> = range
+            let own: Vec<Option<Own>> = range
                 .clone()
                 .into_par_iter()
                 .map(|position| {
@@ -257,11 +256,13 @@ impl System {
                         return Ok(None);
                     }
                     let number = self.elements[position];
-                    let (corners, nodes) = element::corners(mesh, number);
-                    let geometry = Geometry::new(&corners[..nodes]);
-                    geometry
-                        .map(|g| Some(Box::new(g)))
-                        .ok_or_else(|| Error::Mesh(format!("element {number}: inverted")))
+                    let geometry = if mesh.nodes(number).len() > MOST {
+                        element::wide(mesh, number).map(|geometry| Own::Wide(Box::new(geometry)))
+                    } else {
+                        let (corners, nodes) = element::corners(mesh, number);
+                        Geometry::new(&corners[..nodes]).map(|geometry| Own::Narrow(Box::new(geometry)))
+                    };
+                    geometry.map(Some).ok_or_else(|| Error::Mesh(format!("element {number}: inverted")))
                 })
                 .collect::<Result<_, _>>()?;
             for (position, geometry) in range.zip(own) {
@@ -269,24 +270,23 @@ impl System {
                 let material = problem.material_of[number as usize];
                 let behaviour = &behaviours[usize::from(material)];
                 let nodes = mesh.nodes(number);
-                let corner_volumes = match &geometry {
-                    Some(geometry) => geometry.corner_volumes,
-                    None => classes[usize::from(kinds[position])].volumes,
+                let corner_volumes = match geometry.as_ref() {
+                    Some(Own::Narrow(geometry)) => &geometry.corner_volumes[..],
+                    Some(Own::Wide(geometry)) => &geometry.corner_volumes[..],
+                    None => &classes[usize::from(kinds[position])].volumes[..],
                 };
-                if let Some(geometry) = geometry.as_deref().filter(|_| kinds[position] == OWN) {
-                    let (conduction, capacity) = matrices(geometry, behaviour);
-                    for (a, &row) in nodes.iter().enumerate() {
-                        for (b, &column) in nodes.iter().enumerate() {
-                            let [row, column] =
-                                [row, column].map(|node| self.equation[node as usize] as usize);
-                            self.rows.add(row, column, conduction[8 * a + b], capacity[8 * a + b]);
-                        }
-                    }
+                match geometry.as_ref().filter(|_| kinds[position] == OWN) {
+                    Some(Own::Narrow(geometry)) => self.add_own(nodes, &matrices(geometry, behaviour)),
+                    Some(Own::Wide(geometry)) => self.add_own(nodes, &matrices(geometry, behaviour)),
+                    None => {}
                 }
-                if heated.binary_search(&number).is_ok() {
-                    volumes.push((number, corner_volumes));
+                if let (Some(volume), Ok(_)) =
+                    (corner_volumes.first_chunk::<MOST>(), heated.binary_search(&number))
+                    && nodes.len() <= MOST
+                {
+                    volumes.push((number, *volume));
                 }
-                for (&node, volume) in nodes.iter().zip(corner_volumes) {
+                for (&node, &volume) in nodes.iter().zip(corner_volumes) {
                     let node = self.equation[node as usize] as usize;
                     if let Some(capacity) = behaviour.capacity {
                         self.capacity[node] += capacity * volume;
@@ -304,6 +304,20 @@ impl System {
             }
         }
         Ok(volumes)
+    }
+
+    /// Conduction and capacity of one element.
+    fn add_own<const N: usize>(
+        &mut self,
+        nodes: &[u32],
+        (conduction, capacity): &([[f64; N]; N], [[f64; N]; N]),
+    ) {
+        for (a, &row) in nodes.iter().enumerate() {
+            for (b, &column) in nodes.iter().enumerate() {
+                let [row, column] = [row, column].map(|node| self.equation[node as usize] as usize);
+                self.rows.add(row, column, conduction[a][b], capacity[a][b]);
+            }
+        }
     }
 
     /// Conditions on the outer surface, prescribed temperatures, sources.
@@ -348,15 +362,24 @@ impl System {
             }
         }
         for (index, source) in problem.sources.iter().enumerate() {
-            let mut list = Vec::new();
+            let (mut list, mut pairs) = (Vec::new(), Vec::new());
             for &number in &source.elements {
+                let nodes = mesh.nodes(number);
+                if nodes.len() > MOST && self.elements.binary_search(&number).is_ok() {
+                    let Some(geometry) = element::wide(mesh, number) else { continue };
+                    let equation = |a: usize| self.equation[nodes[a] as usize];
+                    let mass = geometry.mass();
+                    for (a, b) in (0..nodes.len()).flat_map(|a| (0..nodes.len()).map(move |b| (a, b))) {
+                        pairs.push((equation(a), equation(b), mass[a][b]));
+                    }
+                }
                 if let Ok(at) = volumes.binary_search_by_key(&number, |entry| entry.0) {
                     for (&node, volume) in mesh.nodes(number).iter().zip(volumes[at].1) {
                         list.push((self.equation[node as usize], volume));
                     }
                 }
             }
-            self.surfaces.release(index, list);
+            self.surfaces.release(index, list, pairs);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Elements of equal shape and material, whose matrices are made once.
+//! First-order elements of equal shape and material, whose matrices are made once.
 
 use super::Behaviour;
 use crate::element::{self, Geometry, MOST};
@@ -18,10 +18,10 @@ pub struct Class {
     nodes: usize,
     shape: [[f64; 3]; MOST],
     tolerance: f64,
-    /// ∫ ∇N·k∇N dV, W/K, row a at 8a.
-    pub conduction: [f64; 64],
+    /// ∫ ∇N·k∇N dV, W/K.
+    pub conduction: [[f64; MOST]; MOST],
     /// ∫ ρ c N N dV, J/K; zero where the material is not linear.
-    pub capacity: [f64; 64],
+    pub capacity: [[f64; MOST]; MOST],
     /// ∫ N dV, m³.
     pub volumes: [f64; MOST],
 }
@@ -42,6 +42,9 @@ pub fn classify(
             let behaviour = &behaviours[usize::from(material)];
             if behaviour.conductivity.is_none() {
                 return VARYING;
+            }
+            if mesh.nodes(element).len() > MOST {
+                return OWN;
             }
             let (corners, nodes) = element::corners(mesh, element);
             let mut shape = [[0.0; 3]; MOST];
@@ -93,8 +96,12 @@ impl Class {
 }
 
 /// Conduction (W/K) and capacity (J/K) of an element; zero what is not constant.
-pub fn matrices(geometry: &Geometry, behaviour: &Behaviour) -> ([f64; 64], [f64; 64]) {
-    let conduction = behaviour.conductivity.map_or([0.0; 64], |k| geometry.conduction(&k));
-    let capacity = behaviour.capacity.map_or([0.0; 64], |c| geometry.mass().map(|m| c * m));
+pub fn matrices<const N: usize, const P: usize>(
+    geometry: &Geometry<N, P>,
+    behaviour: &Behaviour,
+) -> ([[f64; N]; N], [[f64; N]; N]) {
+    let conduction = behaviour.conductivity.map_or([[0.0; N]; N], |k| geometry.conduction(&k));
+    let capacity =
+        behaviour.capacity.map_or([[0.0; N]; N], |c| geometry.mass().map(|row| row.map(|m| c * m)));
     (conduction, capacity)
 }

@@ -12,7 +12,7 @@
 
 use super::rows::Rows;
 use super::{At, Evaluation, Points};
-use crate::element::{self, Geometry, MOST};
+use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::material::Point;
 use crate::problem::Problem;
@@ -30,8 +30,10 @@ pub struct General {
     pub elements: Vec<u32>,
     /// First point of each element, and the number of points.
     pub starts: Vec<u32>,
-    /// Equations of each element's nodes.
-    pub equations: Vec<[u32; MOST]>,
+    /// Equations of all elements' nodes.
+    pub equations: Vec<u32>,
+    /// Where those of each element end.
+    pub ends: Vec<u32>,
     /// State variables stored for each point.
     pub stride: usize,
     /// Whether a flux follows Kirchhoff's potential: the tangent is then not symmetric.
@@ -39,11 +41,12 @@ pub struct General {
 }
 
 /// What an element adds.
-struct Part {
-    change: [f64; MOST],
-    rate: [f64; MOST],
-    capacity: [f64; MOST],
-    matrices: Option<Box<[[f64; 64]; 2]>>,
+struct Part<const N: usize> {
+    change: [f64; N],
+    rate: [f64; N],
+    capacity: [f64; N],
+    /// Conduction and capacity.
+    matrices: Option<Box<[[[f64; N]; N]; 2]>>,
     ratio: Option<f64>,
 }
 
@@ -58,8 +61,29 @@ impl General {
         self.starts.last().map_or(0, |&points| points as usize)
     }
 
+    /// Equations of an element's nodes.
+    pub fn equations_of(&self, index: usize) -> &[u32] {
+        let first = index.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.equations[first as usize..self.ends[index] as usize]
+    }
+
     /// Adds to `change`, `rate`, `capacity` and, for tangents, to the rows; sets the new points.
     pub fn evaluate(
+        &self,
+        problem: &Problem,
+        consistent: bool,
+        at: &At,
+        old: &Points,
+        rows: &mut Rows,
+        out: &mut Evaluation,
+    ) -> Result<(), Error> {
+        if problem.mesh.is_second_order() {
+            return self.evaluate_all::<WIDE, WIDE_POINTS>(problem, consistent, at, old, rows, out);
+        }
+        self.evaluate_all::<MOST, MOST>(problem, consistent, at, old, rows, out)
+    }
+
+    fn evaluate_all<const N: usize, const P: usize>(
         &self,
         problem: &Problem,
         consistent: bool,
@@ -84,7 +108,7 @@ impl General {
                 work.push((start..end, here, energies));
                 (state, energy) = (rest, others);
             }
-            let parts: Vec<Vec<Part>> = work
+            let parts: Vec<Vec<Part<N>>> = work
                 .into_par_iter()
                 .map(|(range, state, energy)| {
                     let offset = self.starts[range.start] as usize;
@@ -93,14 +117,15 @@ impl General {
                             let points = self.starts[element] as usize - offset
                                 ..self.starts[element + 1] as usize - offset;
                             let state = &mut state[points.start * self.stride..points.end * self.stride];
-                            self.element(problem, consistent, at, old, element, state, &mut energy[points])
+                            let energy = &mut energy[points];
+                            self.element::<N, P>(problem, consistent, at, old, element, state, energy)
                         })
                         .collect::<Result<Vec<_>, _>>()
                 })
                 .collect::<Result<_, _>>()?;
             for (element, part) in (first..).zip(parts.iter().flatten()) {
-                let equations = &self.equations[element];
-                let nodes = (self.starts[element + 1] - self.starts[element]) as usize;
+                let equations = self.equations_of(element);
+                let nodes = equations.len();
                 for a in 0..nodes {
                     let row = equations[a] as usize;
                     out.change[row] += part.change[a];
@@ -108,8 +133,7 @@ impl General {
                     out.capacity[row] += part.capacity[a];
                     if let Some(matrices) = &part.matrices {
                         for b in 0..nodes {
-                            let at = 8 * a + b;
-                            rows.add(row, equations[b] as usize, matrices[0][at], matrices[1][at]);
+                            rows.add(row, equations[b] as usize, matrices[0][a][b], matrices[1][a][b]);
                         }
                     }
                 }
@@ -123,7 +147,7 @@ impl General {
     }
 
     #[allow(clippy::too_many_arguments)]
-    fn element(
+    fn element<const N: usize, const P: usize>(
         &self,
         problem: &Problem,
         consistent: bool,
@@ -132,29 +156,30 @@ impl General {
         index: usize,
         state: &mut [f64],
         energy: &mut [f64],
-    ) -> Result<Part, Error> {
+    ) -> Result<Part<N>, Error> {
         let number = self.elements[index];
-        let (corners, nodes) = element::corners(&problem.mesh, number);
+        let (corners, nodes) = element::positions::<N>(&problem.mesh, number);
         let material = &*problem.materials[usize::from(problem.material_of[number as usize])];
-        let Some(geometry) = Geometry::new(&corners[..nodes]) else {
+        let Some(geometry) = Geometry::<N, P>::new(&corners[..nodes]) else {
             return Err(Error::Mesh(format!("element {number}: inverted, flat or folded")));
         };
         let (density, count) = (material.density(), material.state_names().len());
-        let shapes = element::shapes(nodes);
-        let (mut start, mut end) = ([0.0; MOST], [0.0; MOST]);
+        let shapes = element::shapes::<N, P>(nodes);
+        let equations = self.equations_of(index);
+        let (mut start, mut end) = ([0.0; N], [0.0; N]);
         for a in 0..nodes {
-            let equation = self.equations[index][a] as usize;
+            let equation = equations[a] as usize;
             (start[a], end[a]) = (at.start[equation], at.temperature[equation]);
         }
         let mut part = Part {
-            change: [0.0; MOST],
-            rate: [0.0; MOST],
-            capacity: [0.0; MOST],
-            matrices: at.tangent.then(|| Box::new([[0.0; 64]; 2])),
+            change: [0.0; N],
+            rate: [0.0; N],
+            capacity: [0.0; N],
+            matrices: at.tangent.then(|| Box::new([[[0.0; N]; N]; 2])),
             ratio: None,
         };
         // Kirchhoff's potential and k at the nodes, where the flux follows it
-        let mut potential = [[0.0; 2]; MOST];
+        let mut potential = [[0.0; 2]; N];
         let mut kirchhoff = false;
         for a in 0..nodes {
             if let Some(found) = material.potential(end[a]) {
@@ -162,18 +187,19 @@ impl General {
             }
         }
         let first = self.starts[index] as usize;
-        for g in 0..nodes {
+        for g in 0..geometry.points {
             let gradients = &geometry.gradients[g];
             let mut gradient = Vector3::zeros();
             for a in 0..nodes {
                 let difference = if kirchhoff { potential[a][0] - potential[0][0] } else { end[a] - end[0] };
                 gradient += Vector3::from(gradients[a]) * difference;
             }
-            let (mut from, mut to) = (start[g], end[g]);
-            if consistent {
-                from = (0..nodes).map(|a| shapes[g][a] * start[a]).sum();
-                to = (0..nodes).map(|a| shapes[g][a] * end[a]).sum();
-            }
+            let (from, to) = if consistent {
+                let at = |values: &[f64; N]| (0..nodes).map(|a| shapes[g][a] * values[a]).sum();
+                (at(&start), at(&end))
+            } else {
+                (start[g], end[g])
+            };
             // k ∇T = ∇θ
             let own = match material.potential(to) {
                 Some([_, conductivity]) => conductivity,
@@ -203,7 +229,7 @@ impl General {
             if let Some(matrices) = &mut part.matrices {
                 let tangent = -0.5 * (response.d_flux_d_gradient + response.d_flux_d_gradient.transpose());
                 if kirchhoff {
-                    let scale: [f64; MOST] = std::array::from_fn(|b| potential[b][1] / own);
+                    let scale: [f64; N] = std::array::from_fn(|b| potential[b][1] / own);
                     geometry.add_scaled_conduction(g, &tangent, &scale, &mut matrices[0]);
                 } else {
                     geometry.add_conduction(g, &tangent, &mut matrices[0]);
@@ -211,7 +237,7 @@ impl General {
                 if consistent {
                     for a in 0..nodes {
                         for b in 0..nodes {
-                            matrices[1][8 * a + b] += weight * capacity * shapes[g][a] * shapes[g][b];
+                            matrices[1][a][b] += weight * capacity * shapes[g][a] * shapes[g][b];
                         }
                     }
                 }

@@ -19,7 +19,7 @@ pub mod vector;
 pub use general::General;
 pub use nodal::Nodal;
 pub use rows::Rows;
-pub use surfaces::{Exchange, FaceMatrix, Surfaces};
+pub use surfaces::{Exchange, FaceMatrices, Surfaces};
 
 use crate::error::Error;
 use crate::material::{Point, ThermalMaterial};
@@ -137,7 +137,7 @@ pub struct Evaluation {
     /// ∂Q_i/∂T_i of surfaces, W/K; with consistent capacity see `faces`.
     pub conductance: Vec<f64>,
     /// ∂Q/∂T of surfaces with consistent capacity.
-    pub faces: Vec<FaceMatrix>,
+    pub faces: FaceMatrices,
     /// Heat that goes through surfaces and sources, W.
     pub exchange: Exchange,
     /// The smallest wish of a material for the next increment over this one.

@@ -42,34 +42,85 @@ impl Exchange {
     }
 }
 
-/// ∂Q/∂T of one face, W/K.
-#[derive(Clone, Debug)]
-pub struct FaceMatrix {
-    /// Equations of its nodes.
-    pub equations: [u32; 4],
-    /// Row a at 4a.
-    pub values: [f64; 16],
-    /// Nodes: 4 or 3.
-    pub nodes: usize,
+/// ∂Q/∂T of faces, W/K, face after face.
+#[derive(Clone, Debug, Default)]
+pub struct FaceMatrices {
+    /// Nodes of each face.
+    nodes: Vec<u8>,
+    equations: Vec<u32>,
+    values: Vec<f64>,
 }
 
-impl FaceMatrix {
+/// ∂Q/∂T of one face, W/K.
+#[derive(Clone, Copy, Debug)]
+pub struct FaceMatrix<'a> {
+    /// Equations of its nodes.
+    pub equations: &'a [u32],
+    /// Row after row.
+    pub values: &'a [f64],
+}
+
+impl FaceMatrices {
+    /// None.
+    pub const NONE: &'static Self = &Self { nodes: Vec::new(), equations: Vec::new(), values: Vec::new() };
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Each face.
+    pub fn iter(&self) -> impl Iterator<Item = FaceMatrix<'_>> {
+        let (mut equations, mut values) = (self.equations.as_slice(), self.values.as_slice());
+        self.nodes.iter().map(move |&nodes| {
+            let nodes = usize::from(nodes);
+            let (own, rest) = equations.split_at(nodes);
+            let (matrix, others) = values.split_at(nodes * nodes);
+            (equations, values) = (rest, others);
+            FaceMatrix { equations: own, values: matrix }
+        })
+    }
+
+    fn clear(&mut self) {
+        self.nodes.clear();
+        self.equations.clear();
+        self.values.clear();
+    }
+}
+
+impl FaceMatrix<'_> {
     /// y += factor · matrix · x.
     pub fn add_product(&self, factor: f64, x: &[f64], y: &mut [f64]) {
-        for a in 0..self.nodes {
+        let nodes = self.equations.len();
+        for (a, &row) in self.equations.iter().enumerate() {
             let sum: f64 =
-                (0..self.nodes).map(|b| self.values[4 * a + b] * x[self.equations[b] as usize]).sum();
-            y[self.equations[a] as usize] += factor * sum;
+                (0..nodes).map(|b| self.values[nodes * a + b] * x[self.equations[b] as usize]).sum();
+            y[row as usize] += factor * sum;
         }
     }
 }
 
 /// A face with its quadrature.
 #[derive(Clone, Debug)]
-struct Acting {
-    equations: [u32; 4],
-    geometry: FaceGeometry,
+struct Acting<const N: usize, const P: usize> {
+    equations: [u32; N],
+    geometry: FaceGeometry<N, P>,
 }
+
+impl<const N: usize, const P: usize> Acting<N, P> {
+    fn new(problem: &Problem, face: Face, equation: &[u32]) -> Self {
+        let nodes = problem.mesh.face_nodes(face);
+        let (mut corners, mut equations) = ([[0.0; 3]; N], [0; N]);
+        for (k, &node) in nodes.iter().enumerate() {
+            corners[k] = problem.mesh.points[node as usize];
+            equations[k] = equation[node as usize];
+        }
+        Self { equations, geometry: FaceGeometry::new(&corners[..nodes.len()]) }
+    }
+}
+
+/// Equations that take heat, those at which it is known, and ∮ N N dA, m², or ∫ N N dV, m³.
+type Pairs = Vec<(u32, u32, f64)>;
 
 /// One condition on what exists.
 #[derive(Clone, Debug)]
@@ -77,8 +128,13 @@ struct Part {
     condition: usize,
     /// Equations with ∮ N dA, m², ascending.
     nodes: Vec<(u32, f64)>,
+    /// Equations that take a flux, those at which it is known, and ∮ N N dA, m²: of second-order faces, whose ∮ N dA is
+    /// negative at corners.
+    pairs: Pairs,
     /// Faces, for film and radiation with consistent capacity.
-    faces: Vec<Acting>,
+    faces: Vec<Acting<4, 4>>,
+    /// Those of second order.
+    wide: Vec<Acting<8, 9>>,
 }
 
 /// Conditions on the current outer surface, and sources in existing elements.
@@ -87,6 +143,8 @@ pub struct Surfaces {
     parts: Vec<Part>,
     /// Source, and equations with ∫ N dV, m³, ascending.
     sources: Vec<(usize, Vec<(u32, f64)>)>,
+    /// Source, equations that take its heat, those at which it is known, and ∫ N N dV, m³, of second-order elements.
+    wide_sources: Vec<(usize, Pairs)>,
     radiates: bool,
 }
 
@@ -103,6 +161,19 @@ fn gather(mut list: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
     list
 }
 
+/// The same of pairs.
+fn gather_pairs(mut list: Pairs) -> Pairs {
+    list.sort_by_key(|entry| (entry.0, entry.1));
+    list.dedup_by(|next, kept| {
+        let same = (next.0, next.1) == (kept.0, kept.1);
+        if same {
+            kept.2 += next.2;
+        }
+        same
+    });
+    list
+}
+
 impl Surfaces {
     /// Adds a condition on faces that exist and are not covered.
     pub fn act(
@@ -113,31 +184,47 @@ impl Surfaces {
         equation: &[u32],
         consistent: bool,
     ) {
-        let mut part = Part { condition, nodes: Vec::new(), faces: Vec::new() };
+        let (nodes, pairs, faces_of, wide) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut part = Part { condition, nodes, pairs, faces: faces_of, wide };
         let kind = &problem.conditions[condition];
         let by_nodes = !consistent || matches!(kind, Condition::Flux { .. });
         for &face in faces {
-            let nodes = problem.mesh.face_nodes(face);
-            let (mut corners, mut equations) = ([[0.0; 3]; 4], [0; 4]);
-            for (k, &node) in nodes.iter().enumerate() {
-                corners[k] = problem.mesh.points[node as usize];
-                equations[k] = equation[node as usize];
+            let nodes = problem.mesh.face_nodes(face).len();
+            if nodes > 4 {
+                let acting = Acting::<8, 9>::new(problem, face, equation);
+                if !by_nodes {
+                    part.wide.push(acting);
+                    continue;
+                }
+                let Acting { equations, geometry } = acting;
+                for (a, b) in (0..nodes).flat_map(|a| (0..nodes).map(move |b| (a, b))) {
+                    let of = |g: usize| geometry.weights[g] * geometry.shapes[g][a] * geometry.shapes[g][b];
+                    part.pairs.push((equations[a], equations[b], (0..geometry.points).map(of).sum()));
+                }
+                continue;
             }
-            let geometry = FaceGeometry::new(&corners[..nodes.len()]);
+            let acting = Acting::<4, 4>::new(problem, face, equation);
             if by_nodes {
-                part.nodes.extend((0..nodes.len()).map(|k| (equations[k], geometry.corner_areas[k])));
+                let Acting { equations, geometry } = acting;
+                part.nodes.extend((0..nodes).map(|k| (equations[k], geometry.corner_areas[k])));
             } else {
-                part.faces.push(Acting { equations, geometry });
+                part.faces.push(acting);
             }
         }
         part.nodes = gather(part.nodes);
+        part.pairs = gather_pairs(part.pairs);
         self.radiates |= matches!(kind, Condition::Radiation { .. }) && !faces.is_empty();
         self.parts.push(part);
     }
 
-    /// Adds a source, with ∫ N dV of its elements' nodes.
-    pub fn release(&mut self, source: usize, volumes: Vec<(u32, f64)>) {
-        self.sources.push((source, gather(volumes)));
+    /// Adds a source, with ∫ N dV of its first-order elements' nodes and ∫ N N dV of the others'.
+    pub fn release(&mut self, source: usize, volumes: Vec<(u32, f64)>, pairs: Pairs) {
+        if !volumes.is_empty() || pairs.is_empty() {
+            self.sources.push((source, gather(volumes)));
+        }
+        if !pairs.is_empty() {
+            self.wide_sources.push((source, gather_pairs(pairs)));
+        }
     }
 
     /// Whether something radiates.
@@ -167,6 +254,11 @@ impl Surfaces {
                         out.rate[equation as usize] -= heat;
                         exchange.flux += heat;
                     }
+                    for &(equation, at_equation, area) in &part.pairs {
+                        let heat = area * inward.at(place(at_equation), at.time);
+                        out.rate[equation as usize] -= heat;
+                        exchange.flux += heat;
+                    }
                 }
                 Condition::Film { coefficient, ambient, .. } => {
                     let (film, ambient) = (coefficient.at(at.time), ambient.at(at.time));
@@ -191,6 +283,14 @@ impl Surfaces {
                 exchange.source += heat;
             }
         }
+        for (source, pairs) in &self.wide_sources {
+            let power = &problem.sources[*source].power;
+            for &(equation, at_equation, volume) in pairs {
+                let heat = volume * power.at(place(at_equation), at.time);
+                out.rate[equation as usize] -= heat;
+                exchange.source += heat;
+            }
+        }
         out.exchange = exchange;
     }
 }
@@ -205,24 +305,34 @@ impl Part {
             out.conductance[equation as usize] += area * slope;
             total += area * q;
         }
-        for face in &self.faces {
-            let nodes = face.geometry.nodes;
-            let mut matrix = FaceMatrix { equations: face.equations, values: [0.0; 16], nodes };
-            for g in 0..nodes {
-                let shapes = &face.geometry.shapes[g];
-                let t = (0..nodes).map(|a| shapes[a] * at.temperature[face.equations[a] as usize]).sum();
-                let (q, slope) = loss(t);
-                let weight = face.geometry.weights[g];
-                total += weight * q;
-                for a in 0..nodes {
-                    out.rate[face.equations[a] as usize] += weight * shapes[a] * q;
+        total = self.faces.iter().fold(total, |total, face| face.lose(at, out, &loss, total));
+        self.wide.iter().fold(total, |total, face| face.lose(at, out, &loss, total))
+    }
+}
+
+impl<const N: usize, const P: usize> Acting<N, P> {
+    /// Adds to `rate` and `faces`; `total` with what it loses, W.
+    fn lose(&self, at: &At, out: &mut Evaluation, loss: &impl Fn(f64) -> (f64, f64), mut total: f64) -> f64 {
+        let nodes = self.geometry.nodes;
+        let matrix = out.faces.values.len();
+        if at.tangent {
+            out.faces.nodes.push(nodes as u8);
+            out.faces.equations.extend_from_slice(&self.equations[..nodes]);
+            out.faces.values.resize(matrix + nodes * nodes, 0.0);
+        }
+        for g in 0..self.geometry.points {
+            let shapes = &self.geometry.shapes[g];
+            let t = (0..nodes).map(|a| shapes[a] * at.temperature[self.equations[a] as usize]).sum();
+            let (q, slope) = loss(t);
+            let weight = self.geometry.weights[g];
+            total += weight * q;
+            for a in 0..nodes {
+                out.rate[self.equations[a] as usize] += weight * shapes[a] * q;
+                if at.tangent {
                     for b in 0..nodes {
-                        matrix.values[4 * a + b] += weight * slope * shapes[a] * shapes[b];
+                        out.faces.values[matrix + nodes * a + b] += weight * slope * shapes[a] * shapes[b];
                     }
                 }
-            }
-            if at.tangent {
-                out.faces.push(matrix);
             }
         }
         total

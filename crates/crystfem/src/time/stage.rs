@@ -6,7 +6,7 @@ use crate::ledger::NOTHING;
 use crate::problem::Problem;
 use crate::solver::{BiconjugateGradients, ConjugateGradients, Direct, Ended, Operator, norm_squared};
 use crate::system::vector::{largest, set, sum};
-use crate::system::{At, Evaluation, Memory, System};
+use crate::system::{At, Evaluation, FaceMatrices, Memory, System};
 
 /// Newton iterations at most.
 const MOST_ITERATIONS: usize = 60;
@@ -240,10 +240,11 @@ impl Stages {
         let [conduction, consistent] = &self.free_sums;
         if system.consistent {
             set(&mut self.row_sums, |k| consistent[k] + weight * conduction[k]);
-            for face in faces {
+            for face in faces.iter() {
                 face.add_product(weight, &system.free, &mut self.row_sums);
-                for a in 0..face.nodes {
-                    whole[face.equations[a] as usize] += weight * face.values[5 * a];
+                let diagonal = face.values.iter().step_by(face.equations.len() + 1);
+                for (&equation, value) in face.equations.iter().zip(diagonal) {
+                    whole[equation as usize] += weight * value;
                 }
             }
         } else {
@@ -371,7 +372,12 @@ fn operator<'a>(
     if system.consistent {
         Operator { rows: &system.rows, diagonal: None, weights: [1.0, weight], faces: &evaluation.faces }
     } else {
-        Operator { rows: &system.rows, diagonal: Some(diagonal), weights: [0.0, weight], faces: &[] }
+        Operator {
+            rows: &system.rows,
+            diagonal: Some(diagonal),
+            weights: [0.0, weight],
+            faces: FaceMatrices::NONE,
+        }
     }
 }
 

@@ -52,6 +52,7 @@ fn order_two_in_space() {
         (Split::Hexahedra, 0.1),
         (Split::SixTetrahedra, 0.0),
         (Split::SixTetrahedra, 0.1),
+        (Split::Wedges, 0.1),
     ] {
         for capacity in [Capacity::Lumped, Capacity::Consistent] {
             let errors = [4, 8, 16].map(|elements| {
@@ -68,6 +69,33 @@ fn order_two_in_space() {
                 "{split:?} {capacity:?}: {errors:?}, orders {orders:?}"
             );
         }
+    }
+}
+
+/// Second-order elements: three in L2 (Strang & Fix, 1973), here at the nodes, of any shape.
+#[test]
+fn order_three_in_space_of_second_order_elements() {
+    for (split, distortion) in
+        [(Split::Hexahedra, 0.0), (Split::Hexahedra, 0.1), (Split::SixTetrahedra, 0.1), (Split::Wedges, 0.1)]
+    {
+        let errors = [6, 8].map(|elements| {
+            let mesh = mesh(elements, split, distortion).second_order();
+            let mut simulation = simulation(mesh, Capacity::Consistent, Scheme::TrBdf2, 0.05);
+            run(&mut simulation, 1.0);
+            let simulation = &simulation;
+            let points = &simulation.problem().mesh.points;
+            let exact = |k: usize| EXACT.temperature(points[k], simulation.time());
+            // L2 over the elements, by their volumes at nodes and middles
+            let found = simulation.temperatures(f64::NAN);
+            let volumes = simulation
+                .volumes(&(0..simulation.problem().mesh.element_count() as u32).collect::<Vec<_>>());
+            let square: f64 = (0..points.len()).map(|k| volumes[k] * (found[k] - exact(k)).powi(2)).sum();
+            (square / volumes.iter().sum::<f64>()).sqrt()
+        });
+        let order = (errors[0] / errors[1]).ln() / (8.0f64 / 6.0).ln();
+        println!("{split:?} {distortion} second order: {errors:?}, order {order}");
+        // 3 in the limit; nodes of regular meshes have more
+        assert!(order > 2.9 && order < 4.0, "{split:?} {distortion}: {errors:?}, order {order}");
     }
 }
 

@@ -12,11 +12,18 @@ fn linear([x, y, z]: [f64; 3]) -> f64 {
 
 #[test]
 fn a_linear_field_is_exact_on_distorted_meshes() {
-    for split in [Split::Hexahedra, Split::FiveTetrahedra, Split::SixTetrahedra] {
+    let splits = [Split::Hexahedra, Split::FiveTetrahedra, Split::SixTetrahedra, Split::Wedges];
+    for (split, second) in splits.into_iter().flat_map(|split| [(split, false), (split, true)]) {
         for capacity in [Capacity::Lumped, Capacity::Consistent] {
+            if second && capacity == Capacity::Lumped {
+                continue;
+            }
             let block = Block { name: "all".into(), lower: [0.0; 3], upper: [0.01, 0.02, 0.03] };
             let grid = Grid::uniform([0.0; 3], [0.01, 0.02, 0.03], [4, 5, 6]).unwrap();
-            let mesh = grid.blocks(&[block], split).unwrap().distorted(0.15).unwrap();
+            let mut mesh = grid.blocks(&[block], split).unwrap().distorted(0.15).unwrap();
+            if second {
+                mesh = mesh.second_order();
+            }
             let mut nodes: Vec<u32> =
                 BOX_SIDES.iter().flat_map(|side| mesh.node_sets[*side].clone()).collect();
             nodes.sort_unstable();
@@ -29,14 +36,16 @@ fn a_linear_field_is_exact_on_distorted_meshes() {
                 capacity,
                 ..Problem::new(mesh, conductor(PA12), 293.15)
             };
-            let settings = Settings { tolerance: 1e-10, ..Settings::backward_euler(1e9) };
+            let tolerance = if second { 1e-11 } else { 1e-10 };
+            let settings = Settings { tolerance, ..Settings::backward_euler(1e9) };
             let mut simulation = Simulation::new(problem, settings).unwrap();
             // each step leaves τ/Δt ≈ 1e-7 of what was there
             run(&mut simulation, 4e9);
             let points = &simulation.problem().mesh.points;
             for (found, &place) in simulation.temperatures(0.0).iter().zip(points) {
                 // rounding of a solve with 350 K
-                assert!((found - linear(place)).abs() < 1e-9, "{split:?} {capacity:?}: {found} at {place:?}");
+                let error = (found - linear(place)).abs();
+                assert!(error < 1e-9, "{split:?} {second} {capacity:?}: {found} at {place:?}");
             }
         }
     }
@@ -45,10 +54,20 @@ fn a_linear_field_is_exact_on_distorted_meshes() {
 /// The same with the gradient driven by a flux: 1000 W/m² through a bar with one end held.
 #[test]
 fn a_flux_makes_its_gradient() {
-    for split in [Split::Hexahedra, Split::SixTetrahedra] {
+    for (split, second) in [
+        (Split::Hexahedra, false),
+        (Split::SixTetrahedra, false),
+        (Split::Wedges, false),
+        (Split::Hexahedra, true),
+        (Split::SixTetrahedra, true),
+        (Split::Wedges, true),
+    ] {
         let block = Block { name: "all".into(), lower: [0.0; 3], upper: [0.02, 0.01, 0.01] };
         let grid = Grid::uniform([0.0; 3], [0.02, 0.01, 0.01], [6, 3, 4]).unwrap();
-        let mesh = grid.blocks(&[block], split).unwrap().distorted(0.1).unwrap();
+        let mut mesh = grid.blocks(&[block], split).unwrap().distorted(0.1).unwrap();
+        if second {
+            mesh = mesh.second_order();
+        }
         let nodes = mesh.node_sets["left"].clone();
         let surface = Where::Faces(mesh.surfaces["right"].clone());
         let problem = Problem {
@@ -56,6 +75,7 @@ fn a_flux_makes_its_gradient() {
                 Condition::Temperature { nodes, value: Field::constant(300.0) },
                 Condition::Flux { surface, inward: Field::constant(1e3) },
             ],
+            capacity: if second { Capacity::Consistent } else { Capacity::Lumped },
             ..Problem::new(mesh, conductor(PA12), 300.0)
         };
         let settings = Settings { tolerance: 1e-10, ..Settings::backward_euler(1e9) };
@@ -64,7 +84,7 @@ fn a_flux_makes_its_gradient() {
         let points = &simulation.problem().mesh.points;
         for (found, place) in simulation.temperatures(0.0).iter().zip(points) {
             let exact = 300.0 + 1e3 / PA12[0] * place[0];
-            assert!((found - exact).abs() < 1e-9, "{split:?}: {found}, {exact} at {place:?}");
+            assert!((found - exact).abs() < 1e-9, "{split:?} {second}: {found}, {exact} at {place:?}");
         }
         // all heat that goes in is taken by the support: 1e3 W/m² × 1e-4 m²
         assert!(simulation.state().ledger.worst < 1e-10, "{:?}", simulation.state().ledger);

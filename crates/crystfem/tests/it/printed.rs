@@ -26,8 +26,8 @@ fn equals_the_scene() {
 
     let source = Source::new("case.toml", SCENE);
     let scene: PartScene = source.parse().unwrap();
-    let mesh = scene.mesh.build(&source).unwrap().mesh;
-    let whole = scene.task(&source, mesh).unwrap().problem;
+    let built = scene.mesh.build(&source).unwrap();
+    let whole = scene.task(&source, built).unwrap().problem;
     assert_eq!(part.births, whole.births);
     assert_eq!(part.mesh.element_count(), whole.mesh.element_count());
 

@@ -28,6 +28,9 @@ impl Folder {
         if plan.runs.is_empty() {
             return Err(Error::parameter("runs", 0, "at least one: levels or paths"));
         }
+        if plan.protocol.stepwise.is_some() && plan.runs.iter().any(|run| run.unload.is_some()) {
+            return Err(Error::parameter("runs", "`unload` together with steps", "one of them"));
+        }
         let mut names: Vec<&str> = plan.runs.iter().map(|run| run.id.as_str()).collect();
         names.sort_unstable();
         if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {

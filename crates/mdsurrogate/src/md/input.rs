@@ -159,6 +159,17 @@ pub fn deform(protocol: &Protocol, run: &Run, data: &str, out: &str) -> String {
         .map(|name| format!("variable        {name} equal {name}\n"))
         .collect();
     let averaged = protocol.stepwise.map_or(*every, |step| every - step.pull - step.relax);
+    let redrawn = run.seed.map_or_else(String::new, |seed| {
+        format!(
+            "velocity        all create {t} {seed} dist gaussian
+velocity        all zero linear
+fix             bath all nvt temp {t} {t} {thermostat}
+run             {}
+unfix           bath
+",
+            protocol.warm_up
+        )
+    });
     let samples = format!(
         "fix             now all ave/time 1 1 {every} {values} file {out}.inst format \" %.10g\"
 fix             mean all ave/time 1 {averaged} {every} {values} file {out}.mean format \" %.10g\"
@@ -172,10 +183,14 @@ fix             mean all ave/time 1 {averaged} {every} {values} file {out}.mean 
             for (axis, rate) in &pulled {
                 let _ = write!(pull, " {} erate {rate:e}", AXES[*axis]);
             }
+            let (turn, back) = unloading(protocol, run, &pulled);
             format!(
-                "fix             pull all deform 1{pull} remap x units box{flip}
-{bath}{samples}run             {steps}
-"
+                "{turn}fix             pull all deform 1{pull} remap x units box{flip}
+{bath}{samples}run             {loading}
+{back}",
+                loading = loading_steps(protocol, run),
+                turn = turn,
+                back = back.replace("FLIP", flip),
             )
         }
         Some(step) => {
@@ -220,9 +235,39 @@ jump            SELF again
         + &field("5")
         + &format!(
             "timestep        {time_step}
-reset_timestep  0
+{redrawn}reset_timestep  0
 {variables}thermo          {every}
 thermo_style    custom step temp pe press pxx pyy pzz pxy pxz pyz lx ly lz xy xz yz
 {loading}"
         )
+}
+
+/// Steps before the rates turn round, in whole intervals of samples.
+fn loading_steps(protocol: &Protocol, run: &Run) -> u64 {
+    let intervals = protocol.steps / protocol.every;
+    let share = run.unload.unwrap_or(1.0);
+    protocol.every * ((share * intervals as f64).round() as u64).clamp(1, intervals)
+}
+
+/// Lines before the first pull and after it that take the box back at the rates of the initial lengths: `erate` would refer to those at
+/// the turn.
+fn unloading(protocol: &Protocol, run: &Run, pulled: &[(usize, f64)]) -> (String, String) {
+    let left = protocol.steps - loading_steps(protocol, run);
+    if run.unload.is_none() || left == 0 {
+        return Default::default();
+    }
+    // the edge of a tilt is that of its second letter
+    let edges = ["lx", "ly", "lz", "ly", "lz", "lz"];
+    let (mut first, mut back) = (String::new(), String::new());
+    for &(axis, rate) in pulled {
+        let name = AXES[axis];
+        let _ = writeln!(first, "variable        v{name} equal $({})*{:e}", edges[axis], -rate);
+        let _ = write!(back, " {name} vel ${{v{name}}}");
+    }
+    (
+        first,
+        format!(
+            "unfix           pull\nfix             pull all deform 1{back} remap x units boxFLIP\nrun             {left}\n"
+        ),
+    )
 }

@@ -143,6 +143,12 @@ pub struct Run {
     pub rates: [Option<f64>; 6],
     /// Which start configuration, from 0.
     pub snapshot: usize,
+    /// Share of the run at which all rates turn round: loading, then unloading.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unload: Option<f64>,
+    /// Seed of new velocities for a replica of another run, which then has [`Protocol::warm_up`] steps of NVT before its first sample.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u32>,
 }
 
 /// A whole set: protocol and runs.
@@ -240,10 +246,21 @@ impl Run {
             (0, _) => format!("g{sheared}"),
             _ => format!("m{pulled}{sheared}"),
         };
-        Self { id, kind, rates, snapshot }
+        Self { id, kind, rates, snapshot, unload: None, seed: None }
     }
 
-    /// A general path from text: `x=1e-5,xy=-2e-5`, rates in 1/fs. Any C can be reached so: F of a box is an upper
+    /// Itself and `count` − 1 replicas, `ID_r1`, …, from other start configurations with other velocities: the mean over them has less noise.
+    pub fn replicas(self, count: usize, protocol: &Protocol) -> Vec<Self> {
+        let replica = |k: usize| Self {
+            id: if k == 0 { self.id.clone() } else { format!("{}_r{k}", self.id) },
+            snapshot: (self.snapshot + k) % protocol.snapshots,
+            seed: (k > 0).then(|| protocol.seed.wrapping_add(k as u32).max(1)),
+            ..self.clone()
+        };
+        (0..count.max(1)).map(replica).collect()
+    }
+
+    /// A general path from text: `x=1e-5,xy=-2e-5`, rates in 1/fs; `unload=0.6` turns all rates round after that share of the run. Any C can be reached so: F of a box is an upper
     /// triangle, as is the Cholesky factor of C.
     ///
     /// # Errors
@@ -253,12 +270,20 @@ impl Run {
             Error::parameter(
                 "path",
                 found,
-                "x, y, z, xy, xz, yz with a rate in 1/fs each, as `x=1e-5,xy=2e-5`",
+                "x, y, z, xy, xz, yz with a rate in 1/fs each, as `x=1e-5,xy=2e-5`, and `unload` with a share above 0, below 1",
             )
         };
-        let mut rates = [None; 6];
+        let (mut rates, mut unload) = ([None; 6], None);
         for part in text.split(',') {
             let (axis, rate) = part.split_once('=').ok_or_else(|| bad(format!("`{part}`")))?;
+            if axis.trim() == "unload" {
+                let share = rate.trim().parse().ok().filter(|share| *share > 0.0 && *share < 1.0);
+                if share.is_none() || unload.is_some() {
+                    return Err(bad(format!("`{part}`")));
+                }
+                unload = share;
+                continue;
+            }
             let index = AXES.iter().position(|name| *name == axis.trim());
             let index = index.ok_or_else(|| bad(format!("the axis `{}`", axis.trim())))?;
             let rate: f64 = rate.trim().parse().map_err(|_| bad(format!("the rate `{}`", rate.trim())))?;
@@ -267,7 +292,10 @@ impl Run {
             }
             rates[index] = Some(rate);
         }
-        Ok(Self::new(id, rates, snapshot))
+        if rates == [None; 6] {
+            return Err(bad(format!("`{text}`")));
+        }
+        Ok(Self { unload, ..Self::new(id, rates, snapshot) })
     }
 }
 

@@ -55,6 +55,35 @@ fn general_paths() {
     assert!(input::deform(&Protocol::default(), &all, "d", "o").contains("all nvt temp"));
 }
 
+/// Loading and unloading at the same rate of the initial lengths, so that the box comes back; replicas have velocities of their own.
+#[test]
+fn unloading_and_replicas() {
+    let protocol = Protocol { steps: 5000, every: 50, ..Protocol::default() };
+    let run = Run::parse("z=1e-5,xz=2e-5,unload=0.6", "p0".into(), 5).unwrap();
+    assert_eq!((run.unload, run.kind.as_str()), (Some(0.6), "mzxz"));
+    let text = input::deform(&protocol, &run, "d", "o");
+    for line in [
+        "variable        vz equal $(lz)*-1e-5\nvariable        vxz equal $(lz)*-2e-5\nfix             pull all deform 1 z erate 1e-5 xz erate 2e-5 remap x units box flip no\n",
+        "run             3000\nunfix           pull\nfix             pull all deform 1 z vel ${vz} xz vel ${vxz} remap x units box flip no\nrun             2000\n",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    assert!(!text.contains("velocity"));
+    let all = run.replicas(3, &protocol);
+    assert_eq!(all.iter().map(|run| run.id.as_str()).collect::<Vec<_>>(), ["p0", "p0_r1", "p0_r2"]);
+    assert_eq!(all.iter().map(|run| run.snapshot).collect::<Vec<_>>(), [5, 0, 1]);
+    let text = input::deform(&protocol, &all[2], "d", "o");
+    assert!(
+        text.contains("velocity        all create 300 1203 dist gaussian\n")
+            && text.contains("run             400\nunfix           bath\n")
+    );
+    let plan = serde_json::to_string(&all[0]).unwrap();
+    assert!(!plan.contains("seed") && serde_json::from_str::<Run>(&plan).unwrap() == all[0]);
+    for bad in ["unload=0.5", "x=1e-5,unload=1", "x=1e-5,unload=0", "x=1e-5,unload=0.5,unload=0.5"] {
+        assert!(Run::parse(bad, "p".into(), 0).is_err(), "{bad}");
+    }
+}
+
 /// §3.2: a hundred parts of the final strain, each relaxed, then 5 ps of averages; lengths as at a constant rate at the end
 /// of each interval.
 #[test]

@@ -37,10 +37,9 @@ pub fn load(source: &Source, data: &Data, files: &[PathBuf], key: &str) -> Resul
     if files.is_empty() {
         return Err(source.error(key, "no file", "at least one").into());
     }
-    let folder = source.path.parent().unwrap_or(Path::new(""));
     let mut set = Dataset::default();
     for (index, file) in files.iter().enumerate() {
-        let path = folder.join(file);
+        let path = source.file(file);
         let part = read(&path, &options).map_err(|error| match error {
             Error::Shared(polycore::Error::Io { source: reason, .. }) => {
                 let allowed = format!("a file that can be read ({reason})");

@@ -2,6 +2,7 @@
 
 use super::cells::CellGrid;
 use super::cloud_kernel::{CloudData, GROUP};
+use super::cloud_linear::CloudPlaces;
 use super::rows::{CloudKernel, cloud_kernel};
 use super::softening::{Softened, Softening, integrity};
 use super::{
@@ -38,6 +39,36 @@ pub struct CloudBonds<const D: usize> {
     table: Option<(KernelFit, f64)>,
     directed_bonds: u64,
     softening: Softening,
+    /// Sites whose family a cut has parted, ascending.
+    parted: Vec<u32>,
+    /// θ of [`Bonds::relief`].
+    relief: Option<Field<D>>,
+}
+
+/// The compressed rows, and what makes a weight of a volume.
+pub(super) struct Lists<'a> {
+    pub(super) starts: &'a [usize],
+    pub(super) neighbours: &'a [u32],
+    /// 1/|ξ|; 0 where broken.
+    pub(super) inverse_length: &'a [f64],
+    /// δ and Δx of the linear volume correction.
+    partial: Option<[f64; 2]>,
+}
+
+impl Lists<'_> {
+    /// V_J/|ξ|², V_J with its correction.
+    #[inline(always)]
+    pub(super) fn share(&self, inverse: f64, volume: f64) -> f64 {
+        let share = inverse * inverse * volume;
+        match self.partial {
+            None => share,
+            // without a call, which would not inherit the instruction set
+            Some([horizon, spacing]) => {
+                let part = (horizon + 0.5 * spacing - 1.0 / inverse) / spacing;
+                share * part.clamp(0.0, 1.0)
+            }
+        }
+    }
 }
 
 impl<const D: usize> CloudBonds<D> {
@@ -77,19 +108,23 @@ impl<const D: usize> CloudBonds<D> {
         let order = CellGrid::new(points, horizon).order().to_vec();
         let sorted: Vec<[f64; D]> = order.iter().map(|&i| points[i as usize]).collect();
         let grid = CellGrid::new(&sorted, reach);
-        let lists: Vec<Result<Vec<u32>, Error>> = sorted
+        let lists: Vec<Result<(Vec<u32>, bool), Error>> = sorted
             .par_iter()
             .enumerate()
             .map(|(own, &here)| {
                 let mut list = Vec::new();
-                let mut twin = None;
+                let (mut twin, mut parted) = (None, false);
                 grid.near(here, reach, |other| {
                     let square: f64 = (0..D).map(|d| (sorted[other][d] - here[d]).powi(2)).sum();
                     if other != own && square == 0.0 {
                         twin = Some(other);
                     }
-                    if other != own && square <= reach * reach && !severed(cuts, here, sorted[other]) {
-                        list.push(other as u32);
+                    if other != own && square <= reach * reach {
+                        if severed(cuts, here, sorted[other]) {
+                            parted = true;
+                        } else {
+                            list.push(other as u32);
+                        }
                     }
                 });
                 if let Some(twin) = twin {
@@ -97,14 +132,15 @@ impl<const D: usize> CloudBonds<D> {
                     return Err(Error::geometry(format!("points {a} and {b} are both at {here:?} m")));
                 }
                 list.sort_unstable();
-                Ok(list)
+                Ok((list, parted))
             })
             .collect();
         let mut starts = vec![0];
         let mut neighbours = Vec::new();
-        let mut directed_bonds = 0;
+        let (mut directed_bonds, mut parted) = (0, Vec::new());
         for (own, list) in lists.into_iter().enumerate() {
-            let list = list?;
+            let (list, is_parted) = list?;
+            parted.extend(is_parted.then_some(own as u32));
             directed_bonds += list.len() as u64;
             let padded = list.len().next_multiple_of(GROUP) - list.len();
             neighbours.extend(list);
@@ -143,6 +179,8 @@ impl<const D: usize> CloudBonds<D> {
             table: None,
             directed_bonds,
             softening: Softening::default(),
+            parted,
+            relief: None,
         };
         refuse_one_sided(&bonds)?;
         Ok(bonds)
@@ -158,6 +196,34 @@ impl<const D: usize> CloudBonds<D> {
         &self.input_order
     }
 
+    /// Sites whose family a cut has parted, ascending.
+    pub fn parted(&self) -> &[u32] {
+        &self.parted
+    }
+
+    pub(super) fn lists(&self) -> Lists<'_> {
+        let partial =
+            (self.volume_correction == VolumeCorrection::Linear).then_some([self.horizon, self.spacing]);
+        let Self { starts, neighbours, inverse_length, .. } = self;
+        Lists { starts, neighbours, inverse_length, partial }
+    }
+
+    /// The particles for both passes, without θ.
+    pub fn bare_places(&self) -> CloudPlaces<D> {
+        CloudPlaces::new(&self.position, &self.volumes)
+    }
+
+    /// Number of intact bonds of a site.
+    pub fn bonded(&self, site: usize) -> u32 {
+        let row = &self.inverse_length[self.starts[site]..self.starts[site + 1]];
+        row.iter().map(|&inverse| u32::from(inverse > 0.0)).sum()
+    }
+
+    /// A bond of a site by its [`Neighbour::index`], as if it were not softened.
+    pub fn whole_bond(&self, site: usize, index: u32) -> Neighbour<D> {
+        self.bond(site, self.starts[site] + index as usize)
+    }
+
     fn bond(&self, site: usize, k: usize) -> Neighbour<D> {
         let other = self.neighbours[k] as usize;
         let (here, there) = (self.position.get(site), self.position.get(other));
@@ -167,7 +233,11 @@ impl<const D: usize> CloudBonds<D> {
         let surface =
             self.factors.as_ref().map_or(1.0, |g| surface_weight(bond, length, g.get(site), g.get(other)));
         let index = (k - self.starts[site]) as u32;
-        Neighbour { site: other, index, bond, length, volume, weight: volume * surface }
+        let relief = self.relief.as_ref().map_or([0.0; D], |theta| {
+            let (here, there) = (theta.get(site), theta.get(other));
+            std::array::from_fn(|d| there[d] - here[d])
+        });
+        Neighbour { site: other, index, bond, length, volume, weight: volume * surface, relief }
     }
 }
 
@@ -268,6 +338,14 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         self.directed_bonds -= bonds.len() as u64;
     }
 
+    fn set_relief(&mut self, relief: Field<D>) {
+        self.relief = Some(relief);
+    }
+
+    fn relief(&self) -> Option<&Field<D>> {
+        self.relief.as_ref()
+    }
+
     fn softening(&self) -> &Softening {
         &self.softening
     }
@@ -307,7 +385,8 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         let bonds = self.neighbours.len() * (4 + 8) + self.weights.len() * 8;
         bonds
             + self.volumes.len() * (8 * D + 8 + 4 + 4 + 8)
-            + self.factors.as_ref().map_or(0, |f| 8 * D * f.sites())
+            + self.parted.len() * 4
+            + [&self.factors, &self.relief].into_iter().flatten().map(|f| 8 * D * f.sites()).sum::<usize>()
     }
 
     fn kind(&self) -> Kind<'_, D> {

@@ -354,14 +354,14 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
             if self.is_intact(site, k) {
                 let length = self.stencil.length(k) * spacing;
                 let whole = integrity(soft, k as u32) * self.lattice.volume;
-                let factor = self.volume_correction.factor(length, self.horizon(), spacing);
                 visit(Neighbour {
                     index: k as u32,
                     site: site.wrapping_add_signed(self.shift(offset)),
                     bond: offset.map(|o| f64::from(o) * spacing),
                     length,
-                    volume: whole * factor,
+                    volume: whole * self.volume_correction.factor(length, self.horizon(), spacing),
                     weight: whole * self.weight(site, k),
+                    relief: [0.0; D],
                 });
             }
         }
@@ -385,8 +385,8 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.particles.par_iter().find_map_first(|&site| {
             let site = site as usize;
             let there = |k: usize| site.wrapping_add_signed(shifts[k]);
-            let lone = (0..=opposite)
-                .find(|&k| self.is_intact(site, k) && !self.is_intact(there(k), opposite - k))?;
+            let lone = |k: &usize| self.is_intact(site, *k) && !self.is_intact(there(*k), opposite - k);
+            let lone = (0..=opposite).find(lone)?;
             Some([site, there(lone)])
         })
     }
@@ -396,8 +396,8 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         let stencil: Vec<StencilBond<D>> = (0..self.stencil.offsets.len())
             .map(|k| {
                 let length = self.stencil.length(k) * spacing;
-                let weight =
-                    self.interior_factor * self.volume_correction.factor(length, self.horizon(), spacing);
+                let share = self.volume_correction.factor(length, self.horizon(), spacing);
+                let weight = self.interior_factor * share;
                 let offset = self.stencil.offsets[k];
                 StencilBond {
                     shift: self.shift(offset),
@@ -476,9 +476,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
             return false;
         }
         for (own, saved) in self.intact.iter_mut().zip(words.chunks(self.sites)) {
-            for (own, saved) in own.iter_mut().zip(saved) {
-                *own &= saved;
-            }
+            own.iter_mut().zip(saved).for_each(|(own, saved)| *own &= saved);
         }
         self.directed_bonds = self.intact.iter().flatten().map(|word| u64::from(word.count_ones())).sum();
         self.classify();

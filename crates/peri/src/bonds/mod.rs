@@ -4,6 +4,7 @@ mod breaking;
 mod cells;
 mod cloud;
 mod cloud_kernel;
+mod cloud_linear;
 mod kernel;
 mod lattice;
 mod lattice_kernel;
@@ -19,6 +20,7 @@ pub use breaking::{Overstretched, fingerprint, fragments, overstretched};
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
+pub use cloud_linear::{CloudMoments, CloudPlaces, Columns};
 pub use lattice::{LatticeBonds, Stencil, storage};
 pub use lattice_kernel::TILE;
 pub use linear_kernel::{LinearRow, Moments};
@@ -45,6 +47,8 @@ pub struct Neighbour<const D: usize> {
     pub volume: f64,
     /// All corrections: volume × surface factor.
     pub weight: f64,
+    /// θ_J − θ_I of [`Bonds::relief`], m; zero where there is none.
+    pub relief: [f64; D],
 }
 
 /// The two representations, for what only one of them has.
@@ -110,6 +114,14 @@ pub trait Bonds<const D: usize>: Send + Sync {
     );
     /// Severs bonds, each named from both of its ends.
     fn sever(&mut self, bonds: &[Overstretched]);
+    /// Sets θ of solids of the mean deformation of a family, see [`crate::material::relief`]: before any bond breaks. Lattices have none.
+    fn set_relief(&mut self, relief: Field<D>) {
+        let _ = relief;
+    }
+    /// θ, m, where it is set.
+    fn relief(&self) -> Option<&Field<D>> {
+        None
+    }
     /// The bonds that bear a part of what they bore.
     fn softening(&self) -> &Softening;
     /// Takes these to be the softened bonds, each named from both of its ends: [`Bonds::neighbours`] weighs them by their integrity,

@@ -2,6 +2,7 @@
 
 use crate::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
 use crate::field::Field;
+use crate::material::relief;
 use crate::potential::Law;
 use crate::run::Failure;
 use kernel::RATIO;
@@ -13,6 +14,9 @@ mod block;
 mod kernel;
 mod laws;
 mod solvers;
+
+/// Stretches of a bond law that times are compared with.
+const WIDE: [f64; 2] = [0.5, 3.0];
 
 /// Repetitions, of which the median counts.
 const REPEATS: usize = 7;
@@ -125,26 +129,34 @@ fn measure_dimension<const D: usize>(
     let total: usize = cells.iter().product();
     let mut bonds = kernel::bonds(lattice)?;
     // the DENT specimen's stretches, and those of a stiff plate
-    for (law, range) in
-        [(Law::ChainOffset, [0.95, 1.05]), (Law::ChainOffset, [0.5, 3.0]), (Law::Linear, [0.95, 1.05])]
-    {
-        measure_bonds(&mut bonds, "lattice", law, range, threads, rows)?;
-    }
-    measure_solids(&mut bonds, "lattice", threads, rows)?;
+    measure_bonds(&mut bonds, "lattice", Law::ChainOffset, [0.95, 1.05], threads, rows)?;
+    let seconds = measure_bonds(&mut bonds, "lattice", Law::ChainOffset, WIDE, threads, rows)?;
+    measure_bonds(&mut bonds, "lattice", Law::Linear, [0.95, 1.05], threads, rows)?;
+    measure_solids(&mut bonds, "lattice", seconds, threads, rows)?;
     // a neighbour list of 3D bonds takes 2.5 kB a particle
     if size <= 1e6 {
         let points: Vec<[f64; D]> = (0..total).map(points).collect();
         let mut cloud = CloudBonds::new(&points, &vec![1.0; total], 1.0, RATIO, VolumeCorrection::None, &[])?;
         measure_bonds(&mut cloud, "list", Law::ChainOffset, [0.95, 1.05], threads, rows)?;
-        measure_solids(&mut cloud, "list", threads, rows)?;
+        let seconds = measure_bonds(&mut cloud, "list", Law::ChainOffset, WIDE, threads, rows)?;
+        measure_solids(&mut cloud, "list", seconds, threads, rows)?;
+        // that of scenes, which takes as long where it is zero
+        let start = Instant::now();
+        let theta = relief(&cloud).unwrap_or_else(|| Field::zeros(cloud.sites()));
+        cloud.set_relief(theta);
+        let what = format!("{D}D list, its relief");
+        let value = start.elapsed().as_secs_f64();
+        rows.push(Measurement { what, size: total as u64, threads, value, unit: "s" });
+        measure_solids(&mut cloud, "relieved list", seconds, threads, rows)?;
     }
     Ok(())
 }
 
-/// Both passes of solids with any Poisson ratio.
+/// Both passes of solids with any Poisson ratio, and their time over that of a bond law.
 fn measure_solids<const D: usize>(
     bonds: &mut dyn Bonds<D>,
     path: &str,
+    bond_law: f64,
     threads: usize,
     rows: &mut Vec<Measurement>,
 ) -> Result<(), Failure> {
@@ -157,7 +169,9 @@ fn measure_solids<const D: usize>(
         });
         let (size, rate) = (bonds.particles().len() as u64, bonds.directed_bonds() as f64 / seconds);
         let what = format!("{D}D {path} {name}, both passes");
-        rows.push(Measurement { what, size, threads, value: rate, unit: "directed bonds/s" });
+        rows.push(Measurement { what: what.clone(), size, threads, value: rate, unit: "directed bonds/s" });
+        let what = format!("{what}, over {} {}–{}", Law::ChainOffset.name(), WIDE[0], WIDE[1]);
+        rows.push(Measurement { what, size, threads, value: seconds / bond_law, unit: "" });
     }
     Ok(())
 }
@@ -187,7 +201,7 @@ fn measure_bonds<const D: usize>(
     range: [f64; 2],
     threads: usize,
     rows: &mut Vec<Measurement>,
-) -> Result<(), Failure> {
+) -> Result<f64, Failure> {
     let (fit, displacement) = kernel::loaded(bonds, law, range)?;
     let mut out = Field::zeros(bonds.sites());
     let seconds = median(|| {
@@ -198,7 +212,7 @@ fn measure_bonds<const D: usize>(
     let what = format!("{D}D {path} {} {}–{} ({})", law.name(), range[0], range[1], fit.kind());
     let rate = bonds.directed_bonds() as f64 / seconds;
     rows.push(Measurement { what: what.clone(), size, threads, value: rate, unit: "directed bonds/s" });
-    if law == Law::Linear || path == "list" {
+    if law == Law::Linear || path == "list" && range != WIDE {
         // bonds and particles; displacement, velocity, force and mass of the solver
         let solver = bonds.sites() * 8 * (3 * D + 1);
         let bytes = (bonds.bytes() + solver) as f64 / size as f64;
@@ -210,5 +224,5 @@ fn measure_bonds<const D: usize>(
             unit: "B/particle",
         });
     }
-    Ok(())
+    Ok(seconds)
 }

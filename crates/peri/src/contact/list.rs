@@ -166,7 +166,8 @@ impl<const D: usize> List<D> {
         self.rebuilds += 1;
     }
 
-    fn radius(&self, site: usize) -> f64 {
+    /// Radius of a particle, m.
+    pub fn radius(&self, site: usize) -> f64 {
         self.radii.get(site).copied().unwrap_or(self.largest)
     }
 

@@ -1,4 +1,4 @@
-//! Contact: short-range repulsion between particles that no intact bond joins.
+//! Contact: short-range repulsion between particles that no intact bond joins, rigid planes, friction.
 //!
 //! Two particles at the distance r = |ζ| < d repel each other along ζ = ξ + η with the force density pair
 //! κ (c/δ)(d − r), c = 6kθ: the bond constant of the linear bond as a dual force, f = 2t = c(l − 1). κ = 15 and
@@ -15,14 +15,26 @@
 //!
 //! Limits. Contact knows distances only: a particle that leaps past another in one step stays there. Force and energy
 //! are finite in full overlap (r = 0: κcd/δ along the reference ξ, the direction it came from; energy ½κcd²/δ V_I V_J),
-//! so that loads beyond that press particles through each other. No friction.
+//! so that loads beyond that press particles through each other.
+//!
+//! Friction acts across the pair, −μN f₁(|v_t|/v_ε) v_t/|v_t| with the repulsion N and the relative velocity v_t, see
+//! [`Contact::friction`]. It is equal and opposite, but not along the pair: particles have no spin, so that it does not
+//! conserve angular momentum.
 
+mod friction;
+mod lagged;
 mod list;
+mod plane;
 
 use crate::bonds::Bonds;
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
+use friction::tangential;
+pub use friction::{Rubbed, Rubbing};
+use lagged::{Grip, Lagged, Other};
 use list::{Candidate, List, Listed};
+use plane::{Placed, Planes};
+pub use plane::{Plane, Resting};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -40,17 +52,33 @@ pub struct Contact<const D: usize> {
     /// Largest gap of particles about to touch, m.
     near: f64,
     list: List<D>,
+    /// c/δ, N/m⁷.
+    unit: f64,
+    planes: Planes<D>,
+    /// μ of pairs of particles; v_ε, m/s, or ε, m.
+    friction: f64,
+    slip: f64,
+    /// Friction between equilibria.
+    lagged: Option<Lagged<D>>,
 }
 
 /// How particles touch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Touching {
-    /// Pairs with r < d.
+    /// Pairs with r < d, and particles that touch a plane.
     pub pairs: u64,
-    /// Greatest 1 − r/d: 0 where nothing touches, 1 for two particles in one place.
+    /// Greatest 1 − r/d: 0 where nothing touches, 1 for two particles in one place, or for one whose middle is on a plane.
     pub overlap: f64,
-    /// Energy Σ ½κ(c/δ)(d − r)² V_I V_J over pairs, J.
+    /// Energy Σ ½κ(c/δ)(d − r)² V_I V_J over pairs, and that of planes, J.
     pub energy: f64,
+}
+
+/// Checks that a factor of contact is finite and not negative.
+fn push_is_valid(name: &'static str, found: f64) -> Result<(), Error> {
+    if found >= 0.0 && found.is_finite() {
+        return Ok(());
+    }
+    Err(Error::Parameter { name, found, allowed: "0 or above, finite".into() })
 }
 
 impl<const D: usize> Contact<D> {
@@ -60,13 +88,10 @@ impl<const D: usize> Contact<D> {
     /// # Errors
     /// [`Error::Parameter`] where κ is negative, kθ is not positive, or either is not finite.
     pub fn new(bonds: &dyn Bonds<D>, modulus: f64, stiffness: f64) -> Result<Self, Error> {
-        let kappa = ("contact.stiffness", stiffness, stiffness >= 0.0, "0 or above, finite");
-        for (name, found, good, allowed) in
-            [kappa, ("modulus of contact", modulus, modulus > 0.0, "above 0, finite")]
-        {
-            if !good || !found.is_finite() {
-                return Err(Error::Parameter { name, found, allowed: allowed.into() });
-            }
+        push_is_valid("contact.stiffness", stiffness)?;
+        if !(modulus > 0.0 && modulus.is_finite()) {
+            let allowed = "above 0, finite".to_owned();
+            return Err(Error::Parameter { name: "modulus of contact", found: modulus, allowed });
         }
         let volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize));
         let near = NEAR * bonds.spacing();
@@ -75,7 +100,40 @@ impl<const D: usize> Contact<D> {
             largest_volume: volumes.fold(0.0, f64::max),
             near,
             list: List::new(bonds, near),
+            unit: 6.0 * modulus / bonds.horizon(),
+            planes: Planes::default(),
+            friction: 0.0,
+            slip: 0.0,
+            lagged: None,
         })
+    }
+
+    /// With one more rigid plane.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a normal without direction, and for what is not finite or negative.
+    pub fn with_plane(mut self, bonds: &dyn Bonds<D>, plane: Plane<D>) -> Result<Self, Error> {
+        let placed = Placed::new(bonds, plane, self.unit, |site| self.list.radius(site))?;
+        if self.planes.each.is_empty() {
+            self.planes.volumes = vec![0.0; bonds.sites()];
+            let particles = bonds.particles().iter().map(|&site| site as usize);
+            particles.for_each(|site| self.planes.volumes[site] = bonds.volume(site));
+        }
+        self.planes.each.push(placed);
+        Ok(self)
+    }
+
+    /// With friction of the coefficient `friction` between particles, and the slip from which on pairs and planes resist in full: in
+    /// explicit dynamics a velocity v_ε, m/s, where 0 is Coulomb's law without regularisation; for quasi-static methods the length ε > 0, m,
+    /// of the slip in a load step.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where either is negative or not finite.
+    pub fn with_friction(mut self, friction: f64, slip: f64) -> Result<Self, Error> {
+        push_is_valid("contact.friction", friction)?;
+        push_is_valid("slip of friction", slip)?;
+        (self.friction, self.slip) = (friction, slip);
+        Ok(self)
     }
 
     /// With another skin, in m: a thin one is filled often, a thick one holds many pairs in vain. The list is made at the
@@ -85,9 +143,113 @@ impl<const D: usize> Contact<D> {
         self
     }
 
-    /// Whether it repels: κ > 0.
+    /// Whether it repels: κ > 0, or planes.
     pub fn repels(&self) -> bool {
+        self.has_pairs() || !self.planes.each.is_empty()
+    }
+
+    /// Whether particles repel each other: κ > 0.
+    pub fn has_pairs(&self) -> bool {
         self.stiffness > 0.0
+    }
+
+    /// Whether anything rubs: a coefficient of friction above 0.
+    pub fn rubs(&self) -> bool {
+        (self.has_pairs() && self.friction > 0.0)
+            || self.planes.each.iter().any(|plane| plane.plane.friction > 0.0)
+    }
+
+    /// Moves planes to where they are at a load factor and a time, s.
+    pub fn place(&mut self, factor: f64, time: f64) {
+        self.planes.each.iter_mut().for_each(|plane| plane.place(factor, time));
+    }
+
+    /// The planes, in their order.
+    pub fn planes(&self) -> impl Iterator<Item = &Plane<D>> {
+        self.planes.each.iter().map(|plane| &plane.plane)
+    }
+
+    /// The last move of every plane, m.
+    pub fn moved(&self) -> impl Iterator<Item = [f64; D]> {
+        self.planes.each.iter().map(Placed::moved)
+    }
+
+    /// How the body rests on each plane, without friction.
+    pub fn resting(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Vec<Resting> {
+        let each = self.planes.each.iter();
+        each.map(|plane| plane.resting(&self.planes.volumes, displacement, bonds)).collect()
+    }
+
+    /// Σ of the squares of the planes' force densities, (N/m³)².
+    pub fn square_of_planes(&self, displacement: &Field<D>) -> f64 {
+        if self.planes.each.is_empty() { 0.0 } else { self.planes.square(displacement) }
+    }
+
+    /// Force densities of the planes, N/m³; `None` without any.
+    pub fn of_planes(&self, displacement: &Field<D>) -> Option<Field<D>> {
+        if self.planes.each.is_empty() {
+            return None;
+        }
+        let mut field = Field::zeros(displacement.sites());
+        let moved = self.moves();
+        field.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut force)| {
+            self.planes.force(displacement, chunk, &mut force);
+            if let Some(lagged) = &self.lagged {
+                lagged.force(displacement, &moved, chunk, true, &mut force);
+            }
+        });
+        Some(field)
+    }
+
+    fn moves(&self) -> Vec<[f64; D]> {
+        self.moved().collect()
+    }
+
+    /// Begins a load step of friction: the normal forces μN are those at the displacement `start`, with planes where they were last
+    /// placed.
+    pub fn lag(&mut self, bonds: &dyn Bonds<D>, start: &Field<D>) {
+        if self.has_pairs() {
+            self.list.rebuild(bonds, start);
+        }
+        let of = |chunk: usize| {
+            let mut grips = Vec::new();
+            for (number, plane) in self.planes.each.iter().enumerate() {
+                let mu = plane.plane.friction;
+                plane.visit(start, chunk, 0.0, &mut |site, overlap| {
+                    let volume = self.planes.volumes[site];
+                    let bound = mu * plane.push(volume) * overlap;
+                    let (site, other) = (site as u32, Other::Plane(number));
+                    grips.push(Grip { site, other, bound, normal: plane.plane.normal, volume });
+                });
+            }
+            for (own, candidates) in self.pairs_in(chunk).filter(|_| self.friction > 0.0) {
+                for candidate in candidates {
+                    let Some(touch) = candidate.touch(start, own.site as usize) else { continue };
+                    let bound = self.friction * self.stiffness * touch.overlap * touch.volume;
+                    let (site, other) = (own.site, Other::Site(candidate.site));
+                    grips.push(Grip { site, other, bound, normal: touch.direction, volume: own.volume });
+                }
+            }
+            grips.retain(|grip| grip.bound > 0.0);
+            grips
+        };
+        let grips = (0..start.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        self.lagged = Some(Lagged { start: start.clone(), grips, slip: self.slip });
+    }
+
+    /// Ends friction between equilibria.
+    pub fn unlag(&mut self) {
+        self.lagged = None;
+    }
+
+    /// The slip from which on it resists in full, see [`Contact::with_friction`].
+    pub fn slip(&self) -> f64 {
+        self.slip
+    }
+
+    /// Energy that friction has taken since [`Contact::lag`], J, and its force of each plane, N.
+    pub fn taken(&self, displacement: &Field<D>) -> (f64, Vec<[f64; 3]>) {
+        self.lagged.as_ref().map_or((0.0, Vec::new()), |lagged| lagged.taken(displacement, &self.moves()))
     }
 
     /// How often the list was made.
@@ -97,7 +259,9 @@ impl<const D: usize> Contact<D> {
 
     /// Rebuilds the list where a particle has moved by half of the skin since it was made.
     pub fn update(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
-        self.list.update(bonds, displacement);
+        if self.has_pairs() {
+            self.list.update(bonds, displacement);
+        }
     }
 
     /// Makes the list for a displacement; to be called where bonds have changed.
@@ -105,9 +269,18 @@ impl<const D: usize> Contact<D> {
         self.list.rebuild(bonds, displacement);
     }
 
+    /// The particles of a work item with what they may touch; none where particles do not repel each other.
+    fn pairs_in(&self, chunk: usize) -> impl Iterator<Item = (&Listed, &[Candidate<D>])> {
+        self.has_pairs().then(|| self.list.in_chunk(chunk)).into_iter().flatten()
+    }
+
     /// Adds the force densities −Σ_J κ(c/δ)(d − r) V_J ζ/r, N/m³, on the particles of work item `chunk`.
     pub fn force(&self, displacement: &Field<D>, chunk: usize, force: &mut [&mut [f64]; D]) {
-        for (own, candidates) in self.list.in_chunk(chunk) {
+        self.planes.force(displacement, chunk, force);
+        if let Some(lagged) = &self.lagged {
+            lagged.force(displacement, &self.moves(), chunk, false, force);
+        }
+        for (own, candidates) in self.pairs_in(chunk) {
             let mut sum = None;
             for touch in candidates.iter().filter_map(|c| c.touch(displacement, own.site as usize)) {
                 let push = self.stiffness * touch.overlap * touch.volume;
@@ -143,30 +316,81 @@ impl<const D: usize> Contact<D> {
         };
         let parts: Vec<Touching> =
             (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
-        parts.into_iter().fold(none, |a, b| Touching {
+        let mut all = parts.into_iter().fold(none, |a, b| Touching {
             pairs: a.pairs + b.pairs,
             overlap: a.overlap.max(b.overlap),
             energy: a.energy + b.energy,
-        })
+        });
+        if !self.planes.each.is_empty() {
+            let [count, energy] = self.planes.energy(displacement);
+            all.pairs += count as u64;
+            all.energy += energy;
+            all.overlap = all.overlap.max(self.planes.deepest(displacement, |site| self.list.radius(site)));
+        }
+        all
+    }
+
+    /// Adds the force densities of friction, N/m³, on the particles of work item `chunk`, in explicit dynamics:
+    /// −Σ_J μ κ(c/δ)(d − r) V_J f₁(|v_t|/v_ε) v_t/|v_t| with the relative velocity v_t across the pair at the half step, and
+    /// likewise of planes. A pair's v_ε is no less than 2μN nΔt/m_eff with the reduced mass m_eff = ρV_I V_J/(V_I + V_J) and n = 3^(D−1), about the
+    /// number of particles of a facing row in reach; a plane's with m_eff = ρV and n = 1.
+    pub fn friction(
+        &self,
+        displacement: &Field<D>,
+        velocity: &Field<D>,
+        rubbing: &Rubbing,
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+    ) -> Rubbed {
+        let mut rubbed = Rubbed::new(self.planes.each.len());
+        let fields = [displacement, velocity];
+        self.planes.friction(fields, self.slip, rubbing, chunk, force, &mut rubbed);
+        if self.friction == 0.0 {
+            return rubbed;
+        }
+        let touches = if D == 2 { 3.0 } else { 9.0 };
+        for (own, candidates) in self.pairs_in(chunk) {
+            let site = own.site as usize;
+            for candidate in candidates {
+                let Some(touch) = candidate.touch(displacement, site) else { continue };
+                let bound = self.friction * self.stiffness * touch.overlap;
+                let slip = rubbing.slip(self.slip, bound * (own.volume + touch.volume), touches);
+                rubbed.slip = rubbed.slip.max(slip);
+                let (here, there) = (velocity.get(site), velocity.get(candidate.site as usize));
+                let relative = std::array::from_fn(|d| here[d] - there[d]);
+                let rub = tangential(bound * touch.volume, slip, &touch.direction, relative);
+                for d in 0..D {
+                    force[d][site - chunk * CHUNK] += rub[d];
+                }
+            }
+        }
+        rubbed
     }
 
     /// max_I Σ_J κ(c/δ) V_J over what touches, N/m⁴: twice that over the density bounds what contact adds to the squared
     /// greatest frequency.
     pub fn greatest_stiffness(&self, displacement: &Field<D>) -> f64 {
         let of = |chunk: usize| {
-            let sums = self.list.in_chunk(chunk).map(|(own, candidates)| {
+            let sums = self.pairs_in(chunk).map(|(own, candidates)| {
                 let touches = candidates.iter().filter_map(|c| c.touch(displacement, own.site as usize));
                 touches.map(|touch| self.stiffness * touch.volume).sum::<f64>()
             });
             sums.fold(0.0, f64::max)
         };
-        (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max)
+        let pairs =
+            (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max);
+        pairs + self.of_plane_stiffness()
+    }
+
+    /// Half of the planes' stiffness on a particle, whose other side does not give way.
+    fn of_plane_stiffness(&self) -> f64 {
+        if self.planes.each.is_empty() { 0.0 } else { self.planes.stiffness(self.largest_volume) }
     }
 
     /// κ(c/δ) V of the largest particle: the least that [`Contact::greatest_stiffness`] is where anything touches, if all
     /// are alike.
     pub fn pair_stiffness(&self) -> f64 {
-        self.stiffness * self.largest_volume
+        self.stiffness * self.largest_volume + self.of_plane_stiffness()
     }
 
     /// Adds to the Gershgorin sums of dynamic relaxation, in units of `tangent`, those of what touches or is about to:
@@ -192,7 +416,7 @@ impl<const D: usize> Contact<D> {
         };
         let chunks = masses.len().div_ceil(CHUNK);
         let sums = (0..chunks).into_par_iter().map(|chunk| {
-            let all = self.list.in_chunk(chunk).map(|(own, candidates)| (own, of(own, candidates)));
+            let all = self.pairs_in(chunk).map(|(own, candidates)| (own, of(own, candidates)));
             all.filter(|(_, sum)| *sum > 0.0).collect()
         });
         let sums: Vec<Vec<(&Listed, f64)>> = sums.collect();
@@ -200,11 +424,19 @@ impl<const D: usize> Contact<D> {
             let mass = &mut masses[own.site as usize];
             *mass = if own.alone { 2.0 * sum } else { *mass + sum };
         }
+        self.planes.add_stiffness(displacement, tangent, self.near, masses);
+        if let Some(lagged) = &self.lagged {
+            lagged.add_stiffness(tangent, masses);
+        }
     }
 
     /// How far a step along a direction may go so that none leaps past another: by a quarter of a spacing against each
     /// other where they touch or are about to, by half of one at all. ∞ along a direction of zeros.
     pub fn longest_step(&self, displacement: &Field<D>, direction: &Field<D>) -> f64 {
+        if !self.has_pairs() {
+            // nothing leaps past a plane
+            return f64::INFINITY;
+        }
         let sites = displacement.sites();
         let of = |chunk: usize| {
             let (mut farthest, mut closing) = (0.0_f64, 0.0_f64);
@@ -212,7 +444,7 @@ impl<const D: usize> Contact<D> {
             for k in 0..parts[0].len() {
                 farthest = farthest.max((0..D).map(|d| parts[d][k] * parts[d][k]).sum());
             }
-            for (own, candidates) in self.list.in_chunk(chunk) {
+            for (own, candidates) in self.pairs_in(chunk) {
                 let site = own.site as usize;
                 let here = direction.get(site);
                 for candidate in candidates {

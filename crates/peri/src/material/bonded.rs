@@ -39,7 +39,7 @@ impl<'a> BondMaterial<'a> {
     }
 
     /// 2kθ times the factors of a bond.
-    fn scale<const D: usize>(&self, bond: &Bond<D>) -> f64 {
+    pub(super) fn scale<const D: usize>(&self, bond: &Bond<D>) -> f64 {
         2.0 * self.modulus * bond.weight / bond.volume
     }
 }
@@ -82,7 +82,7 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
 }
 
 /// max_{d≠e} |n_d n_e|.
-fn mixed<const D: usize>(n: [f64; D]) -> f64 {
+pub(super) fn mixed<const D: usize>(n: [f64; D]) -> f64 {
     let pairs = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
     pairs.map(|(d, e)| (n[d] * n[e]).abs()).fold(0.0, f64::max)
 }

@@ -1,10 +1,11 @@
 //! Solids of the mean deformation of a family, with any Poisson ratio: correspondence and its stabilisation as one energy.
 
+use super::cloud_passes::CloudPasses;
 use super::solid_passes::SolidPasses;
 use super::{Bond, Family, Material, Passes};
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, Columns, Kind};
 use crate::calibrate::modulus_in;
-use nalgebra::{Matrix3, SMatrix};
+use nalgebra::{Matrix3, SMatrix, SVector};
 use polycore::constitutive::Flags;
 use std::sync::Arc;
 
@@ -24,9 +25,9 @@ pub(super) fn embed<const D: usize>(tensor: &Tensor<D>, third: f64) -> Matrix3<f
 /// bonds, M = Σ_J ω ξ⊗ξ/I and η = u_J − u_I.
 #[derive(Clone, Copy, Debug)]
 pub struct Deformation<const D: usize> {
-    /// H = F − 1 = (Σ_J ω η⊗ξ/I) M⁻¹.
+    /// H = F − 1 = (Σ_J ω η⊗ξ/I) M⁻¹, and of a cloud the part of [`super::relief`].
     pub displacement_gradient: Tensor<D>,
-    /// D Σ_J ω|ζ − Fξ|²/I: the part of the deformation that no gradient describes. 0 where it is homogeneous.
+    /// D Σ_J ω|ζ − Fξ|²/I, F without that part: the part of the deformation that no gradient describes. 0 where it is homogeneous.
     pub residual: f64,
 }
 
@@ -122,6 +123,9 @@ impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
 /// Where too few bonds are left (D λ_min(M) ≤ 0.1) a particle has springs of the same shear modulus instead,
 /// W_I = ½D(D + 2)μ Σ_J ω(|ζ| − |ξ|)². The guide (*Solids with any Poisson ratio*) has more; the stabilisation is that of
 /// Silling 2017, doi:10.1016/j.cma.2017.03.043.
+///
+/// On an irregular cloud with [`super::relief`] F has one more term, Σ_J ω ζ⊗z(θ)/I with z(θ) = θ_J − θ_I − G ξ, G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹/I,
+/// and T_IJ gains ω P z(θ): uniform stress is in equilibrium.
 #[derive(Clone, Debug)]
 pub struct NonlocalSolid<L>(pub L);
 
@@ -148,6 +152,19 @@ pub struct Point<const D: usize> {
     spring: f64,
     /// The particle's own part in the bound of the stiffness, N/m⁴.
     own: f64,
+    /// Where bonds have θ.
+    relief: Option<Box<Relieved<D>>>,
+}
+
+/// What θ adds to a particle.
+#[derive(Clone, Debug)]
+struct Relieved<const D: usize> {
+    /// G = Σ_J ω (θ_J − θ_I)⊗ξ M⁻¹/I.
+    gradient: Tensor<D>,
+    /// Σ_J ω ζ⊗z(θ)/I, a part of the displacement gradient.
+    part: Tensor<D>,
+    /// P over Σ_J V_J, Pa/m³.
+    piola: Tensor<D>,
 }
 
 impl<const D: usize> Default for Point<D> {
@@ -163,6 +180,7 @@ impl<const D: usize> Default for Point<D> {
             stress: zero,
             spring: 0.0,
             own: 0.0,
+            relief: None,
         }
     }
 }
@@ -170,15 +188,22 @@ impl<const D: usize> Default for Point<D> {
 impl<const D: usize> Point<D> {
     /// Σ_J V_J, M⁻¹ and D λ_min(M) of the intact bonds.
     pub(super) fn reshape(&mut self, family: &Family<D>) {
-        let (mut shape, mut intact) = (Tensor::<D>::zeros(), 0.0);
+        let (mut shape, mut shifted, mut intact) = (Tensor::<D>::zeros(), Tensor::<D>::zeros(), 0.0);
+        let relieved = self.relief.is_some();
         family.each(|bond| {
             let share = bond.volume / (bond.length * bond.length);
             intact += bond.volume;
             shape += Tensor::from_fn(|a, b| share * bond.reference[a] * bond.reference[b]);
+            if relieved {
+                shifted += Tensor::from_fn(|a, b| share * bond.relief[a] * bond.reference[b]);
+            }
         });
         self.intact = intact;
         let (inverse, least) = if intact > 0.0 { invert(&(shape / intact)) } else { (shape, 0.0) };
         (self.inverse, self.shape) = (inverse, D as f64 * least);
+        if let Some(relief) = &mut self.relief {
+            relief.gradient = if intact > 0.0 { shifted / intact * inverse } else { shifted };
+        }
     }
 
     /// Whether the intact bonds span space.
@@ -190,6 +215,28 @@ impl<const D: usize> Point<D> {
     pub(super) fn terms(&self) -> impl Iterator<Item = f64> + '_ {
         let stress = (0..D * D).map(|k| self.stress[(k / D, k % D)]);
         std::iter::once(self.slope).chain(stress)
+    }
+
+    /// The same for the kernels of clouds; of a particle with θ, P/Σ_K V_K as well.
+    pub(super) fn fill(&self, terms: &mut [Columns<D>]) {
+        let tensors = std::iter::once(&self.stress).chain(self.relief.as_ref().map(|relief| &relief.piola));
+        for (columns, tensor) in terms.iter_mut().zip(tensors) {
+            (0..D).for_each(|b| (0..D).for_each(|a| columns[b][a] = tensor[(a, b)]));
+        }
+        terms[0][0][3] = self.slope;
+    }
+
+    /// A η + (Q + A 1) ξ + P (θ_J − θ_I), over Σ_K V_K, of both ends, Pa/m²: |ξ|² times the force density without springs.
+    pub(super) fn linear(&self, other: &Self, bond: &Bond<D>) -> [f64; D] {
+        let slope = self.slope + other.slope;
+        let relief =
+            self.relief.as_ref().zip(other.relief.as_ref()).map_or([0.0; D], |(own, other)| {
+                ((own.piola + other.piola) * SVector::from(bond.relief)).into()
+            });
+        std::array::from_fn(|a| {
+            let stress = (0..D).map(|b| (self.stress[(a, b)] + other.stress[(a, b)]) * bond.reference[b]);
+            slope * bond.change[a] + stress.sum::<f64>() + relief[a]
+        })
     }
 
     /// Force density of the springs of both ends, N/m⁶.
@@ -224,11 +271,15 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     type Point = Point<D>;
 
     fn begin(&self, family: &Family<D>) -> Point<D> {
-        Point { whole: family.sum(|bond| bond.volume), ..Point::default() }
+        let zero = Tensor::zeros();
+        let relief = || Box::new(Relieved { gradient: zero, part: zero, piola: zero });
+        let relief = family.is_relieved().then(relief);
+        Point { whole: family.sum(|bond| bond.volume), relief, ..Point::default() }
     }
 
     fn prepare(&self, family: &Family<D>, point: &mut Point<D>) {
         let (mut moment, mut intact, mut square) = (Tensor::<D>::zeros(), 0.0, 0.0);
+        let (relieved, mut shifted) = (point.relief.is_some(), Tensor::<D>::zeros());
         family.each(|bond| {
             let share = bond.volume / (bond.length * bond.length);
             intact += bond.volume;
@@ -238,12 +289,19 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
                 for b in 0..D {
                     moment[(a, b)] += weighted * bond.reference[b];
                 }
+                if relieved {
+                    (0..D).for_each(|b| shifted[(a, b)] += weighted * bond.relief[b]);
+                }
             }
         });
         if intact != point.intact {
             point.reshape(family);
         }
-        if point.has_gradient() { self.update(point, moment, square) } else { self.spring(point) }
+        if point.has_gradient() {
+            self.update(point, moment, shifted, square);
+        } else {
+            self.spring(point);
+        }
     }
 
     fn stiffen(&self, family: &Family<D>, point: &mut Point<D>) {
@@ -261,34 +319,42 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         };
     }
 
-    /// T_IJ/V_J = (A ζ + Q ξ)/(|ξ|² Σ_K V_K) of both ends, with ζ = ξ + η.
+    /// T_IJ/V_J = (A ζ + Q ξ + P (θ_J − θ_I))/(|ξ|² Σ_K V_K) of both ends, with ζ = ξ + η.
     fn force(&self, bond: &Bond<D>, own: &Point<D>, other: &Point<D>) -> [f64; D] {
-        let (slope, unit) = (own.slope + other.slope, 1.0 / (bond.length * bond.length));
-        let pull = own.pull(other, bond);
-        std::array::from_fn(|a| {
-            let stress = (0..D).map(|b| (own.stress[(a, b)] + other.stress[(a, b)]) * bond.reference[b]);
-            unit * (slope * bond.change[a] + stress.sum::<f64>()) + pull[a]
-        })
+        let (linear, pull) = (own.linear(other, bond), own.pull(other, bond));
+        let unit = 1.0 / (bond.length * bond.length);
+        std::array::from_fn(|a| unit * linear[a] + pull[a])
     }
 
-    /// W − ½Gr + [z·PM⁻¹ξ + ½ D G|z|²]/|ξ|² with z = ζ − Fξ; of springs their energy per share.
+    /// W − ½Gr + [z·PM⁻¹ξ + ½ D G|z|²]/|ξ|² with z = ζ − Fξ; of springs their energy per share. With θ, C = Σ_J ω ζ⊗z(θ)/I:
+    /// z = ζ − (F − C)ξ, and z·Pz(θ)/|ξ|² − P:C in addition.
     fn released_energy(&self, bond: &Bond<D>, own: &Point<D>, weighed: f64) -> Option<f64> {
         let square = bond.length * bond.length;
         let Some(deformation) = own.deformation() else {
             return Some(0.5 * own.spring * own.whole * bond.strain().powi(2));
         };
-        let reference = nalgebra::SVector::<f64, D>::from(bond.reference);
-        let gradient = &deformation.displacement_gradient;
-        let z = nalgebra::SVector::<f64, D>::from(bond.change) - gradient * reference;
-        // A = D G and P M⁻¹
+        let reference = SVector::<f64, D>::from(bond.reference);
+        let relief = own.relief.as_ref();
+        let gradient = relief.map_or(deformation.displacement_gradient, |relief| {
+            deformation.displacement_gradient - relief.part
+        });
+        let z = SVector::<f64, D>::from(bond.change) - gradient * reference;
+        // A = D G, and P (M⁻¹ − G_θ) with G_θ the gradient of θ
         let slope = own.slope * own.whole;
         let piola = own.stress * own.whole + gradient * slope;
-        let own_part = z.dot(&(piola * reference)) + 0.5 * slope * z.norm_squared();
-        let energy = weighed / own.integrity() - 0.5 * slope / D as f64 * deformation.residual;
+        let mut own_part = z.dot(&(piola * reference)) + 0.5 * slope * z.norm_squared();
+        let mut energy = weighed / own.integrity() - 0.5 * slope / D as f64 * deformation.residual;
+        if let Some(relief) = relief {
+            own_part += z.dot(&(relief.piola * SVector::from(bond.relief))) * own.whole;
+            energy -= relief.piola.dot(&relief.part) * own.whole;
+        }
         Some(energy + own_part / square)
     }
 
     fn passes(&self, bonds: &dyn Bonds<D>) -> Option<Box<dyn Passes<Self, D>>> {
+        if let Kind::Cloud(cloud) = bonds.kind() {
+            return Some(Box::new(CloudPasses::new(cloud)));
+        }
         // 1 + D², which a type cannot compute
         if D == 2 {
             SolidPasses::<D, 5>::new(bonds).map(|passes| Box::new(passes) as _)
@@ -324,9 +390,14 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
 }
 
 impl<L> NonlocalSolid<L> {
-    /// Brings a state to Σ_J (V_J/|ξ|²) η⊗ξ and Σ_J (V_J/|ξ|²)|η|² over the intact bonds.
-    pub(super) fn update<const D: usize>(&self, point: &mut Point<D>, moment: Tensor<D>, square: f64)
-    where
+    /// Brings a state to Σ_J (V_J/|ξ|²) η⊗ξ, Σ_J (V_J/|ξ|²) η⊗(θ_J − θ_I) and Σ_J (V_J/|ξ|²)|η|² over the intact bonds.
+    pub(super) fn update<const D: usize>(
+        &self,
+        point: &mut Point<D>,
+        moment: Tensor<D>,
+        shifted: Tensor<D>,
+        square: f64,
+    ) where
         L: PointLaw<D>,
     {
         let (dimension, moment) = (D as f64, moment / point.intact);
@@ -335,9 +406,17 @@ impl<L> NonlocalSolid<L> {
         // NaN stays: a state that is not finite is reported
         let residual = if residual < 0.0 { 0.0 } else { residual };
         point.deformation = Deformation { displacement_gradient: gradient, residual };
+        if let Some(relief) = &mut point.relief {
+            relief.part = shifted / point.intact - moment * relief.gradient.transpose();
+            point.deformation.displacement_gradient += relief.part;
+        }
         let found = self.0.respond(&point.deformation);
         point.slope = dimension * found.stabilisation / point.whole;
         point.stress = found.piola * point.inverse / point.whole - gradient * point.slope;
+        if let Some(relief) = &mut point.relief {
+            relief.piola = found.piola / point.whole;
+            point.stress -= relief.piola * relief.gradient;
+        }
         point.spring = 0.0;
     }
 
@@ -349,6 +428,9 @@ impl<L> NonlocalSolid<L> {
         let dimension = D as f64;
         let stiffness = dimension * (dimension + 2.0) * self.0.shear_modulus();
         (point.slope, point.stress) = (0.0, Tensor::zeros());
+        if let Some(relief) = &mut point.relief {
+            relief.piola = Tensor::zeros();
+        }
         if point.whole > 0.0 {
             point.spring = stiffness / point.whole;
         }

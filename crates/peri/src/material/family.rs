@@ -27,6 +27,8 @@ pub struct Bond<const D: usize> {
     pub volume: f64,
     /// `volume` times the factors of surface correction and micromodulus, m³.
     pub weight: f64,
+    /// θ_J − θ_I of [`super::relief`], m; zero where there is none.
+    pub relief: [f64; D],
 }
 
 impl<const D: usize> Bond<D> {
@@ -41,6 +43,7 @@ impl<const D: usize> Bond<D> {
             change: std::array::from_fn(|d| other[d] - own[d]),
             volume: neighbour.volume,
             weight: neighbour.weight,
+            relief: neighbour.relief,
         }
     }
 
@@ -97,6 +100,11 @@ impl<'a, const D: usize> Family<'a, D> {
     /// Horizon δ, m.
     pub fn horizon(&self) -> f64 {
         self.bonds.horizon()
+    }
+
+    /// Whether bonds have a [`Bond::relief`].
+    pub fn is_relieved(&self) -> bool {
+        self.bonds.relief().is_some()
     }
 
     /// Visits the intact bonds.

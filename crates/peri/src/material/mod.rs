@@ -11,14 +11,19 @@
 
 mod affine;
 mod bonded;
+mod cloud_passes;
 mod constitutive;
 mod deformation;
 mod eight_chain;
 mod family;
+mod levels;
 mod pointwise;
+mod prestrained;
+mod relief;
 mod response;
 mod solid_passes;
 mod strength;
+mod traction;
 
 pub use affine::{Affine, AffinePoint};
 pub use bonded::BondMaterial;
@@ -27,8 +32,11 @@ pub use deformation::{Deformation, NonlocalSolid, Point, PointLaw, PointStress, 
 pub use eight_chain::EightChain;
 pub use family::{Bond, Family};
 pub use pointwise::{Passes, Pointwise};
+pub use prestrained::Prestrained;
+pub use relief::relief;
 pub use response::{Cover, LawRange, Response};
 pub use strength::energy_at_strength;
+pub use traction::surface_load;
 
 pub use crate::bonds::Property;
 

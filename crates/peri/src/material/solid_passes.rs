@@ -1,4 +1,4 @@
-//! Both passes of a solid on a lattice, by the kernels of [`crate::bonds`].
+//! Both passes of a solid on a lattice, by the kernels of [`crate::bonds`], and what they share with clouds.
 
 use super::deformation::{NonlocalSolid, Point, PointLaw, Tensor};
 use super::family::Family;
@@ -11,8 +11,13 @@ use rayon::prelude::*;
 pub struct SolidPasses<const D: usize, const N: usize> {
     rows: Vec<LinearRow<D>>,
     terms: Field<N>,
+    families: Families,
+}
+
+/// Families whose bonds change.
+pub(super) struct Families {
     /// Intact bonds of each site when its shape tensor was last computed.
-    bonded: Vec<u32>,
+    pub(super) bonded: Vec<u32>,
     /// Intact directed bonds of the body then; none before the first pass.
     known: Option<u64>,
     /// Revision of its softened bonds then.
@@ -21,12 +26,60 @@ pub struct SolidPasses<const D: usize, const N: usize> {
     sprung: Vec<bool>,
 }
 
+impl Families {
+    pub(super) fn new(sites: usize) -> Self {
+        Self { bonded: vec![0; sites], known: None, revision: 0, sprung: Vec::new() }
+    }
+
+    /// Whether bonds, or the softened ones among them, are others than in the last pass.
+    pub(super) fn changes<const D: usize>(&mut self, bonds: &dyn Bonds<D>) -> (bool, bool) {
+        let revision = bonds.softening().revision();
+        let softer = self.revision != revision;
+        let changed = softer || self.known != Some(bonds.directed_bonds());
+        (self.known, self.revision) = (Some(bonds.directed_bonds()), revision);
+        (changed, softer)
+    }
+
+    /// Finds the particles with springs and their neighbours, where there are `springs`.
+    pub(super) fn mark<const D: usize>(&mut self, bonds: &dyn Bonds<D>, points: &[Point<D>], springs: bool) {
+        self.sprung.clear();
+        if springs {
+            self.sprung.resize(bonds.sites(), false);
+            for site in bonds.particles().iter().map(|&site| site as usize) {
+                if !points[site].has_gradient() {
+                    self.sprung[site] = true;
+                    bonds.neighbours(site, &mut |bond| self.sprung[bond.site] = true);
+                }
+            }
+        }
+    }
+
+    /// Adds what springs pull to the forces from site `first` on.
+    pub(super) fn pull<const D: usize>(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        points: &[Point<D>],
+        first: usize,
+        force: &mut [&mut [f64]; D],
+    ) {
+        let here = self.sprung.iter().enumerate().skip(first).take(force[0].len());
+        for (site, _) in here.filter(|(_, sprung)| **sprung) {
+            Family::new(bonds, displacement, site).each(|bond| {
+                let pull = points[site].pull(&points[bond.to], &bond);
+                for d in 0..D {
+                    force[d][site - first] += bond.volume * pull[d];
+                }
+            });
+        }
+    }
+}
+
 impl<const D: usize, const N: usize> SolidPasses<D, N> {
     /// On a lattice; `None` elsewhere.
     pub fn new(bonds: &dyn Bonds<D>) -> Option<Self> {
         let rows = bonds.as_lattice()?.linear_rows();
-        let (terms, bonded) = (Field::zeros(bonds.sites()), vec![0; bonds.sites()]);
-        Some(Self { rows, terms, bonded, known: None, revision: 0, sprung: Vec::new() })
+        Some(Self { rows, terms: Field::zeros(bonds.sites()), families: Families::new(bonds.sites()) })
     }
 }
 
@@ -53,11 +106,9 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
     ) {
         let Some(lattice) = bonds.as_lattice() else { return };
         let softening = lattice.softening();
-        let softer = self.revision != softening.revision();
-        let changed = softer || self.known != Some(bonds.directed_bonds());
-        (self.known, self.revision) = (Some(bonds.directed_bonds()), softening.revision());
+        let (changed, softer) = self.families.changes(bonds);
         let rows = &self.rows;
-        let items = self.terms.chunks_mut().into_par_iter().zip(self.bonded.par_chunks_mut(CHUNK));
+        let items = self.terms.chunks_mut().into_par_iter().zip(self.families.bonded.par_chunks_mut(CHUNK));
         let items = items.zip(points.par_chunks_mut(CHUNK)).enumerate();
         let springs = items.map(|(chunk, ((mut terms, bonded), points))| {
             let mut springs = false;
@@ -86,7 +137,7 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
                             square += change.iter().map(|x| lack * x * x).sum::<f64>();
                             moment += Tensor::from_fn(|a, b| lack * change[a] * reference[b]);
                         }
-                        solid.update(point, moment, square);
+                        solid.update(point, moment, Tensor::zeros(), square);
                     } else if bonded[at] > 0 {
                         solid.spring(point);
                         springs = true;
@@ -99,16 +150,7 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
             springs
         });
         let springs = springs.reduce(|| false, |one, other| one | other);
-        self.sprung.clear();
-        if springs {
-            self.sprung.resize(bonds.sites(), false);
-            for site in bonds.particles().iter().map(|&site| site as usize) {
-                if !points[site].has_gradient() {
-                    self.sprung[site] = true;
-                    bonds.neighbours(site, &mut |bond| self.sprung[bond.site] = true);
-                }
-            }
-        }
+        self.families.mark(bonds, points, springs);
     }
 
     fn force(
@@ -133,14 +175,6 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
                 force[a][bond.site as usize - first] += lack * (at(0) * change[a] + stress);
             }
         }
-        let here = self.sprung.iter().enumerate().skip(first).take(force[0].len());
-        for (site, _) in here.filter(|(_, sprung)| **sprung) {
-            Family::new(bonds, displacement, site).each(|bond| {
-                let pull = points[site].pull(&points[bond.to], &bond);
-                for d in 0..D {
-                    force[d][site - first] += bond.volume * pull[d];
-                }
-            });
-        }
+        self.families.pull(bonds, displacement, points, first, force);
     }
 }

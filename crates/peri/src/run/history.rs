@@ -2,8 +2,8 @@
 
 use super::outcome::Outcome;
 use crate::quantities as q;
-use crate::scene::Scene;
-use crate::solver::{Balance, Event, Record};
+use crate::scene::{ContactSpec, Scene, of_plane};
+use crate::solver::{Balance, Event, Record, State};
 use polycore::Error;
 use polycore::output::csv;
 use polycore::output::picture::{LegendPlace, LinePlot, Series};
@@ -20,7 +20,11 @@ impl Outcome {
 
     /// Energy that damping has taken, J: in quasi-static runs all that is neither stored nor released.
     fn damped(&self, record: &Record) -> f64 {
-        if self.is_dynamic() { record.damped } else { record.work - record.stored - record.released }
+        if self.is_dynamic() {
+            record.damped
+        } else {
+            record.work - record.stored - record.released - record.rubbed
+        }
     }
 
     /// The steps as columns.
@@ -56,6 +60,20 @@ impl Outcome {
             ("released".to_owned(), "J".to_owned(), each(&|r| r.released)),
             ("damped".to_owned(), "J".to_owned(), each(&|r| self.damped(r))),
         ]);
+        if self.history.iter().any(|r| r.rubbed != 0.0) {
+            columns.push(("friction_work".to_owned(), "J".to_owned(), each(&|r| r.rubbed)));
+        }
+        for (index, plane) in self.planes.iter().enumerate() {
+            let resting = |r: &Record| r.resting.get(index).copied().unwrap_or_default();
+            for (d, axis) in ["x", "y", "z"].iter().enumerate() {
+                let values = each(&|r| resting(r).force[d]);
+                if values.iter().any(|&v| v != 0.0) {
+                    columns.push((format!("force_{axis} {plane}"), "N".to_owned(), values));
+                }
+            }
+            columns.push((format!("area {plane}"), "m²".to_owned(), each(&|r| resting(r).area)));
+            columns.push((format!("spread {plane}"), "m".to_owned(), each(&|r| resting(r).spread)));
+        }
         let touching: Vec<_> = self.history.iter().filter_map(|r| r.contact).collect();
         if !touching.is_empty() {
             columns.extend([
@@ -109,15 +127,9 @@ impl Outcome {
             self.value(q::RELEASED_ENERGY, last.released);
         }
         self.value(q::DAMPED_ENERGY, self.damped(&last));
-        if let Some(touching) = last.contact {
-            self.value(q::CONTACT_ENERGY, touching.energy);
-            self.value(q::CONTACTS, touching.pairs as f64);
-            let deepest = self.history.iter().filter_map(|r| Some(r.contact?.overlap)).fold(0.0, f64::max);
-            self.value(q::DEEPEST_OVERLAP, deepest);
-        }
         if self.is_dynamic() {
             // largest difference of what came in and what is there, over what was turned over
-            let off = |r: &Record| (r.work - r.stored - r.released - r.damped - r.kinetic).abs();
+            let off = |r: &Record| (r.work - r.stored - r.released - r.damped - r.rubbed - r.kinetic).abs();
             let most =
                 self.history.iter().map(|r| r.work.abs().max(r.kinetic)).fold(f64::MIN_POSITIVE, f64::max);
             let error = self.history.iter().map(off).fold(0.0, f64::max) / most;
@@ -135,6 +147,27 @@ impl Outcome {
         }
         let residual = self.history.iter().map(|r| r.residual).fold(0.0, f64::max);
         self.value(q::LARGEST_RESIDUAL, residual);
+    }
+
+    /// What touches and rubs at the end, and how the body rests on planes.
+    pub fn values_of_contact<const D: usize>(&mut self, scene: &Scene, state: &State<D>) {
+        let Some(last) = self.history.last().cloned() else { return };
+        if let Some(touching) = last.contact {
+            self.value(q::CONTACT_ENERGY, touching.energy);
+            self.value(q::CONTACTS, touching.pairs as f64);
+            let deepest = self.history.iter().filter_map(|r| Some(r.contact?.overlap)).fold(0.0, f64::max);
+            self.value(q::DEEPEST_OVERLAP, deepest);
+        }
+        if scene.contact.as_ref().is_some_and(ContactSpec::rubs) {
+            self.value(q::FRICTION_WORK, last.rubbed);
+            if self.is_dynamic() {
+                self.value(q::SLIP_VELOCITY, state.motion.slip);
+            }
+        }
+        for (name, resting) in self.planes.clone().iter().zip(&last.resting) {
+            let values = resting.force[..D].iter().copied().chain([resting.area, resting.spread]);
+            of_plane(name, D).into_iter().zip(values).for_each(|(named, value)| self.value(named, value));
+        }
     }
 
     /// By how much of it the load rises to its peak, or falls from it, in one step.
@@ -296,7 +329,7 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
             .axes(label, "energy (J)")
             .legend(LegendPlace::TopLeft);
         // stored is with that of contact
-        for name in ["work", "stored", "contact_energy", "kinetic", "released", "damped"] {
+        for name in ["work", "stored", "contact_energy", "kinetic", "released", "damped", "friction_work"] {
             if let Some(column) = columns.iter().find(|c| c.0 == name) {
                 plot = plot.series(Series::line(name, &x, &from_rest(&column.2, 1.0)));
             }

@@ -6,11 +6,11 @@ use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, Critical, bilinear, energy_limit};
 use crate::error::Error;
 use crate::material::{
-    BondMaterial, Material, NonlocalSolid, PointLaw, Pointwise, Response, energy_at_strength,
+    BondMaterial, Material, NonlocalSolid, PointLaw, Pointwise, Prestrained, Response, energy_at_strength,
 };
 use crate::potential::{BondPotential, KernelFit};
 use crate::run::Failure;
-use crate::scene::{self, Body, Inclusions, Scene, SurfaceCorrection, Variant};
+use crate::scene::{self, Body, Followed, Inclusions, Scene, SurfaceCorrection, Variant};
 use crate::solver::{Criterion, State};
 use crate::stress::{Tensor, force_over_length};
 use polycore::constitutive::Flags;
@@ -25,6 +25,8 @@ pub type Solid<const D: usize> = NonlocalSolid<Arc<dyn PointLaw<D>>>;
 pub enum Acting<const D: usize> {
     /// A bond law.
     Bonds(BondMaterial<'static>),
+    /// A bond law with prestrains.
+    Prestrained(Prestrained<D>),
     /// A solid of the mean deformation of a family.
     Solid(Solid<D>),
 }
@@ -34,6 +36,7 @@ impl<const D: usize> Acting<D> {
     pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn Response<D>> {
         match self {
             Self::Bonds(bonded) => bonded.clone().respond(bonds),
+            Self::Prestrained(prestrained) => prestrained.clone().respond(bonds),
             Self::Solid(solid) => solid.clone().respond(bonds),
         }
     }
@@ -42,6 +45,7 @@ impl<const D: usize> Acting<D> {
     pub fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
         match self {
             Self::Bonds(bonded) => bonded.modulus(),
+            Self::Prestrained(prestrained) => prestrained.micromodulus(bonds),
             Self::Solid(solid) => solid.micromodulus(bonds),
         }
     }
@@ -55,6 +59,8 @@ pub struct Bonded<const D: usize> {
     pub material: Acting<D>,
     /// When bonds break, where the scene says so.
     pub criterion: Option<Criterion>,
+    /// The parameters that follow fields.
+    pub followed: Vec<Followed>,
 }
 
 impl<const D: usize> Bonded<D> {
@@ -97,7 +103,7 @@ impl<const D: usize> Bonded<D> {
                 _ => None,
             };
             let material = Acting::Solid(NonlocalSolid(law));
-            return Ok(Self { body, material, criterion });
+            return Ok(Self { body, material, criterion, followed: Vec::new() });
         }
         let law: Arc<dyn BondPotential> = Arc::from(spec.bond_law()?);
         let youngs_modulus = spec.youngs_modulus.map_or(f64::NAN, |modulus| modulus.si());
@@ -108,7 +114,8 @@ impl<const D: usize> Bonded<D> {
         let surface = (variant.surface == SurfaceCorrection::Energy).then(|| {
             surface_factors(&*body.bonds, modulus, calibrate::stiffness_1111(space, youngs_modulus))
         });
-        let inclusions = Inclusions::new(source, scene, &body)?;
+        let followed = scene::followed(source, scene, &body)?;
+        let inclusions = Inclusions::new(source, scene, &body, &followed)?;
         if let Some(factors) = bond_factors(&*body.bonds, surface, &inclusions.micromodulus) {
             body.bonds.set_factors(factors);
         }
@@ -132,7 +139,12 @@ impl<const D: usize> Bonded<D> {
             }
             None => None,
         };
-        Ok(Self { body, material: Acting::Bonds(BondMaterial::new(law, modulus)), criterion })
+        let bonded = BondMaterial::new(law, modulus);
+        let material = match &inclusions.prestrain {
+            Some(strain) => Acting::Prestrained(Prestrained::isotropic(bonded, &*body.bonds, strain)),
+            None => Acting::Bonds(bonded),
+        };
+        Ok(Self { body, material, criterion, followed })
     }
 }
 
@@ -172,6 +184,7 @@ impl<'a, const D: usize> Observed<'a, D> {
                 clamped: scene.material.critical.is_some(),
                 last: Mutex::new(None),
             },
+            Acting::Prestrained(_) => Self::Nothing,
             Acting::Solid(_) if !scene.observes_forces() => Self::Nothing,
             Acting::Solid(solid) => {
                 let (learnt, states) = (scene.is_learnt(), Mutex::new(Pointwise::new(solid.clone(), bonds)));

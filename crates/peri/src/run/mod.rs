@@ -25,8 +25,8 @@ use sections::Sections;
 
 use crate::bonds::{Bonds, covered_stretches, fragments};
 use crate::calibrate::Space;
-use crate::contact::Contact;
 use crate::error::Error;
+use crate::material::relief;
 use crate::potential::KernelFit;
 use crate::quantities as q;
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
@@ -139,7 +139,7 @@ fn run_variant<const D: usize>(
     let mut phases = Phases::new();
     phases.start("build");
     let Built { bonded, loads, loaded, probes, sections } = Built::<D>::new(source, scene, variant)?;
-    let Bonded { mut body, material, criterion } = bonded;
+    let Bonded { mut body, material, criterion, followed } = bonded;
     let plate = scene::exact_plate(source, scene, &body)?;
     phases.stop();
     let warnings = scene::warnings(scene, &body);
@@ -156,6 +156,11 @@ fn run_variant<const D: usize>(
     }
     let mut outcome = Outcome::new(variant.name(), variant);
     outcome.warnings = warnings;
+    for scene::Followed { parameter, field: [mean, least, largest], mesh_mean, unit, .. } in &followed {
+        for (quantity, value) in q::OF_A_FIELD.iter().zip([mean, mesh_mean, least, largest]) {
+            outcome.value(quantity.of(&[parameter.value_name()]).in_unit(unit), *value);
+        }
+    }
     let path = output.join(format!("{}.vtkhdf", outcome.file_name()));
     // where forces act, and where the surface correction has already made up for missing bonds
     let corrected = variant.surface == scene::SurfaceCorrection::Energy;
@@ -172,7 +177,7 @@ fn run_variant<const D: usize>(
         sections: &sections,
         criterion: criterion.as_ref(),
     };
-    solve(scene, &solution, run, &mut body, &mut state, &mut phases, &mut frames)?;
+    solve((source, scene), &solution, run, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
     if let Acting::Bonds(bonded) = &material {
         let stretches = covered_stretches(&*body.bonds, &state.displacement);
@@ -199,9 +204,12 @@ fn run_variant<const D: usize>(
     outcome.history.clone_from(&state.history);
     outcome.events.clone_from(&state.events);
     outcome.regions = scene::region_names(scene);
+    let planes = scene.contact.iter().flat_map(|contact| contact.plane.iter().enumerate());
+    outcome.planes = planes.map(|(index, plane)| plane.name(index)).collect();
     phases.time("compare", || {
         outcome.responses(&*body.bonds, &loads, &state);
         outcome.values_of_history(scene);
+        outcome.values_of_contact(scene, &state);
         outcome.values_of_probes(scene);
         if let Some(exact) = &scene.exact {
             compare::hole(&*body.bonds, exact, plate.as_ref(), &stresses.cauchy, &loaded, &mut outcome);
@@ -257,7 +265,13 @@ struct Built<const D: usize> {
 
 impl<const D: usize> Built<D> {
     fn new(source: &Source, scene: &Scene, variant: &Variant) -> Result<Self, Failure> {
-        let body = body_of::<D>(source, scene, variant)?;
+        let mut body = body_of::<D>(source, scene, variant)?;
+        // before the loads: tractions act on the areas that it leaves
+        if scene.material.solid.is_some()
+            && let Some(theta) = relief(&*body.bonds)
+        {
+            body.bonds.set_relief(theta);
+        }
         let (loads, loaded) = loads_of(source, scene, &body)?;
         scene::check_placement(source, scene, &body, &loads)?;
         let probes = Probes::new(source, scene, &body)?;
@@ -281,7 +295,7 @@ struct Solution<'a, const D: usize> {
 }
 
 fn solve<const D: usize>(
-    scene: &Scene,
+    (source, scene): (&Source, &Scene),
     solution: &Solution<D>,
     run: &mut Run,
     body: &mut scene::Body<D>,
@@ -301,8 +315,12 @@ fn solve<const D: usize>(
         Ok(run.pause(|| status.restartable.then(reached))?)
     };
     let modulus = material.micromodulus(&*body.bonds);
-    let contact =
-        scene.contact.map(|contact| Contact::new(&*body.bonds, modulus, contact.stiffness)).transpose()?;
+    let contact = match &scene.contact {
+        Some(contact) => {
+            Some(contact.contact(contact.planes(source).map_err(Failure::from)?, &*body.bonds, modulus)?)
+        }
+        None => None,
+    };
     let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
     let course = course.map(|formula| |time: f64| formula.in_time(time));
     let observer = |bonds: &dyn Bonds<D>, state: &State<D>| {
@@ -375,8 +393,9 @@ fn explanation_in<const D: usize>(
         }
         let (source, scene) = variant.resolve(source, scene)?;
         let built = Built::<D>::new(&source, &scene, &variant)?;
-        let Bonded { body, criterion, .. } = &built.bonded;
+        let Bonded { body, criterion, followed, .. } = &built.bonded;
         lines.extend(scene::explain(&source, &scene, &variant, body, criterion.as_ref())?);
+        lines.extend(followed.iter().map(|one| format!("  follows    {one}")));
     }
     Ok(lines)
 }

@@ -28,6 +28,8 @@ pub struct Outcome {
     pub events: Vec<Event>,
     /// Names of the regions of prescribed displacement.
     pub regions: Vec<String>,
+    /// Names of rigid planes.
+    pub planes: Vec<String>,
     /// Columns of what the probes saw, with their units.
     pub probes: Vec<(String, String)>,
     /// What is allowed and most likely not meant.
@@ -66,6 +68,7 @@ impl Outcome {
             history: Vec::new(),
             events: Vec::new(),
             regions: Vec::new(),
+            planes: Vec::new(),
             probes: Vec::new(),
             warnings: Vec::new(),
             description: None,

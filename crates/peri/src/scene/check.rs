@@ -2,17 +2,13 @@
 
 use super::values::{plain, positive};
 use super::variant::{Variant, variants};
-use super::{Method, Scene};
+use super::{Method, Parameter, Probe, Scene, Track};
 use crate::calibrate::{Calibration, Space};
 use crate::stress::Measure;
 use polycore::scene::{SceneError, Source};
 
 /// Rows of history of a run in time.
 const MOST_RECORDS: usize = 1_000_000;
-
-/// Stiffest contact, beyond which no method would get anywhere, and stiffest one that L-BFGS can follow.
-const STIFFEST_CONTACT: f64 = 1e4;
-const STIFFEST_OF_LBFGS: f64 = 100.0;
 
 /// Checks a scene and lists its variants; `quick` leaves out those that a `--quick` run leaves out.
 ///
@@ -91,7 +87,7 @@ pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
     }
     dynamics(source, scene)?;
-    contact(source, scene)?;
+    super::contact::check(source, scene)?;
     super::probe::check(source, scene)?;
     super::line::check(source, scene)?;
     output(source, scene)
@@ -162,21 +158,6 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         }
         None => Ok(()),
     }
-}
-
-fn contact(source: &Source, scene: &Scene) -> Result<(), SceneError> {
-    let Some(contact) = &scene.contact else { return Ok(()) };
-    let fault = |most: f64, why: &str| {
-        let allowed = format!("0 to {}{why}", plain(most));
-        Err(source.error("contact.stiffness", plain(contact.stiffness), allowed))
-    };
-    if !(0.0..=STIFFEST_CONTACT).contains(&contact.stiffness) {
-        return fault(STIFFEST_CONTACT, "");
-    }
-    if scene.method() == Method::Lbfgs && contact.stiffness > STIFFEST_OF_LBFGS {
-        return fault(STIFFEST_OF_LBFGS, " with `lbfgs`, more with `adr`");
-    }
-    Ok(())
 }
 
 fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
@@ -325,6 +306,32 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             let found = given.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
             let found = if found.is_empty() { "none of them".to_owned() } else { found };
             return Err(source.error("material.critical", found, crate::critical::ONE_OF));
+        }
+    }
+    for (index, field) in material.fields.iter().enumerate() {
+        let key = format!("material.fields[{index}].of");
+        if material.fields[..index].iter().any(|other| other.of == field.of) {
+            return Err(source.error(&key, format!("`{}` a second time", field.of.name()), "each once"));
+        }
+        let energy = material.critical.is_some_and(|critical| critical.fracture_energy.is_some());
+        if field.of == Parameter::FractureEnergy && !energy {
+            let allowed = "`material.critical.fracture_energy` beside it";
+            return Err(source.error(&key, "a fracture energy of a material without one", allowed));
+        }
+    }
+    if material.is_prestrained() {
+        // forces of prestrained bonds are not those of the fitted law, from which stresses are taken
+        let j_integral = |probe: &Probe| probe.track == Track::JIntegral;
+        for (key, given) in [
+            ("material.critical", material.critical.is_some()),
+            ("stress", scene.stress.is_some()),
+            ("output.section", !scene.output.section.is_empty()),
+            ("probe", scene.probe.iter().any(j_integral)),
+        ] {
+            if given {
+                let found = "together with a prestrain in `material`";
+                return Err(source.error(key, found, "displacements of prestrained bodies only, so far"));
+            }
         }
     }
     for (index, inclusion) in material.inclusions.iter().enumerate() {

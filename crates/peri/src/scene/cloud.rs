@@ -31,7 +31,7 @@ pub fn cloud<const D: usize>(
     positive(source, "body.horizon", horizon, "m")?;
     let (positions, volumes, key) = match (&scene.body.points, &scene.body.grid) {
         (Some(points), _) => {
-            let path = source.path.parent().unwrap_or(Path::new("")).join(points);
+            let path = source.file(points);
             let (positions, volumes) = read::<D>(source, &path)?;
             (positions, volumes, "body.points")
         }

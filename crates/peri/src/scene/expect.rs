@@ -13,7 +13,7 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     let mut add =
         |given: bool, more: &[Quantity]| all.extend(more.iter().filter(|_| given).map(|&q| Named::from(q)));
     add(true, &[q::SMALLEST_STRETCH, q::LARGEST_STRETCH, q::LARGEST_DISPLACEMENT]);
-    add(scene.material.solid.is_none(), &[q::FIT_ERROR]);
+    add(scene.material.solid.is_none() && !scene.material.is_prestrained(), &[q::FIT_ERROR]);
     add(true, &[q::WORK_OF_LOADS, q::STORED_ENERGY, q::DAMPED_ENERGY, q::LARGEST_RESIDUAL]);
     let records = scene.dynamics.as_ref().map_or(scene.solver.steps, |dynamics| dynamics.method().records);
     add(records > 1, &[q::PEAK_LOAD, q::DISPLACEMENT_AT_PEAK]);
@@ -27,6 +27,9 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     add(critical && scene.dynamics.is_none(), &[q::BREAKING_EVENTS]);
     add(critical, &[q::DETACHED_PARTICLES, q::LAST_LOAD, q::LAST_DISPLACEMENT, q::RELEASED_ENERGY]);
     add(scene.contact.is_some(), &[q::CONTACT_ENERGY, q::CONTACTS, q::DEEPEST_OVERLAP]);
+    let rubs = scene.contact.as_ref().is_some_and(super::ContactSpec::rubs);
+    add(rubs, &[q::FRICTION_WORK]);
+    add(rubs && scene.dynamics.is_some(), &[q::SLIP_VELOCITY]);
     let motion = [q::CRITICAL_TIME_STEP, q::TIME_STEP, q::KINETIC_ENERGY, q::ENERGY_ERROR];
     add(scene.dynamics.is_some(), &motion);
     let axes = if scene.body.space == Space::Solid { &["x", "y", "z"][..] } else { &["x", "y"] };
@@ -35,8 +38,12 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     };
     along(scene.boundary.iter().any(|b| b.holds()), q::REACTION);
     along(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), q::APPLIED);
+    for field in &scene.material.fields {
+        all.extend(q::OF_A_FIELD.iter().map(|quantity| quantity.of(&[field.of.value_name()])));
+    }
     all.extend(scene.probe.iter().flat_map(super::Probe::values));
     all.extend(super::line::values(scene));
+    all.extend(super::contact::values(scene));
     all.extend(scene.output.load_at.iter().map(|at| q::load_at(at.si())));
     if let (Some(exact), Some(stress)) = (&scene.exact, &scene.stress) {
         all.push(q::KIRSCH_FIRST.into());

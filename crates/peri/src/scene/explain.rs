@@ -79,6 +79,12 @@ pub fn explain<const D: usize>(
         } else {
             "detection of overlaps in each step, no repulsion".to_owned()
         });
+        if !contact.plane.is_empty() {
+            builds(format!("{} rigid planes, heights above them", contact.plane.len()));
+        }
+        if contact.rubs() {
+            builds("friction: its forces, a pass of its own in each step".to_owned());
+        }
     }
     if let Some(stress) = &scene.stress {
         let names: Vec<&str> = stress.measures.iter().map(|m| m.name()).collect();

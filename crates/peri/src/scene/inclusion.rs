@@ -1,23 +1,48 @@
-//! Parts of a body that are stiffer or softer than the rest, or break earlier or later.
+//! Where a body is stiffer or softer, or breaks earlier or later: its inclusions, and fields of other scenes.
 
 use super::build::shape;
 use super::values::Body;
-use super::{Inclusion, Scene, plain};
+use super::{Followed, Parameter, Scene, ShapeSpec, plain};
 use crate::bonds::{Bonds, Property};
 use crate::critical::Critical;
 use crate::error::Error;
 use polycore::scene::{SceneError, Source};
+use polycore::units::{EnergyPerArea, Ratio};
+use serde::Deserialize;
 
-/// The inclusions of a scene as fields.
+/// A part of the body whose bonds are stiffer or softer; a bond across its border has the mean of both.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Inclusion {
+    /// Where: a shape to `add`.
+    pub shape: ShapeSpec,
+    /// Its stiffness over that of the rest; default: 1.
+    #[serde(default = "whole")]
+    pub stiffness: f64,
+    /// When its bonds break, instead of `material.critical`; a bond across its border breaks as the weaker side does.
+    pub critical: Option<Critical>,
+    /// ε*: the strain that it would have if it were free, the same in all directions; those of several parts add up.
+    pub prestrain: Option<Ratio>,
+}
+
+fn whole() -> f64 {
+    1.0
+}
+
+/// The inclusions of a scene, and the parameters that follow fields, as fields.
 pub struct Inclusions<'a> {
-    /// Micromodulus over that of the rest: the product of those that hold a particle.
+    /// Micromodulus over that of the scene's Young's modulus: the product of all that hold for a particle.
     pub micromodulus: Property,
+    /// Fracture energy, J/m², where it follows a field.
+    fracture_energy: Option<Property>,
+    /// ε*, where there is any.
+    pub prestrain: Option<Property>,
     /// The inclusions, and their particles' sites.
     each: Vec<(&'a Inclusion, Vec<u32>)>,
 }
 
 impl<'a> Inclusions<'a> {
-    /// Finds the particles of all inclusions.
+    /// Finds the particles of all inclusions; `followed` are the parameters that follow fields.
     ///
     /// # Errors
     /// A fault of an inclusion's shape, or one that contains no particle.
@@ -25,10 +50,25 @@ impl<'a> Inclusions<'a> {
         source: &Source,
         scene: &'a Scene,
         body: &Body<D>,
+        followed: &[Followed],
     ) -> Result<Self, SceneError> {
         let bonds = &*body.bonds;
         let mut each = Vec::new();
-        let mut stiffness = vec![1.0; if scene.material.inclusions.is_empty() { 0 } else { bonds.sites() }];
+        let following =
+            |parameter| followed.iter().find(|one| one.parameter == parameter).map(|one| &one.values);
+        let modulus = following(Parameter::YoungsModulus).zip(scene.material.youngs_modulus);
+        let varies = modulus.is_some() || !scene.material.inclusions.is_empty();
+        let mut stiffness = vec![1.0; if varies { bonds.sites() } else { 0 }];
+        if let Some((values, whole)) = modulus {
+            bonds.particles().iter().for_each(|&site| {
+                stiffness[site as usize] = values.at(site as usize) / whole.si();
+            });
+        }
+        let shrinks = scene.material.is_prestrained();
+        let mut prestrain = vec![0.0; if shrinks { bonds.sites() } else { 0 }];
+        if let Some(values) = following(Parameter::Prestrain) {
+            bonds.particles().iter().for_each(|&site| prestrain[site as usize] = values.at(site as usize));
+        }
         for (index, inclusion) in scene.material.inclusions.iter().enumerate() {
             let key = format!("material.inclusions[{index}].shape");
             let Some(kind) = inclusion.shape.add.filter(|_| inclusion.shape.cut.is_none()) else {
@@ -41,13 +81,21 @@ impl<'a> Inclusions<'a> {
                 return Err(source.error(&key, "a shape without particles", "a shape with at least one"));
             }
             members.iter().for_each(|&site| stiffness[site as usize] *= inclusion.stiffness);
+            if let Some(strain) = inclusion.prestrain {
+                members.iter().for_each(|&site| prestrain[site as usize] += strain.si());
+            }
             each.push((inclusion, members));
         }
         let at = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
-        Ok(Self { micromodulus: Property::new(bonds, at), each })
+        let fracture_energy = following(Parameter::FractureEnergy).cloned();
+        let prestrain = shrinks.then(|| Property::new(bonds, |site, _| prestrain[site]));
+        if let Some(found) = prestrain.as_ref().map(Property::least).filter(|&least| least <= -1.0) {
+            return Err(source.error("material", format!("a prestrain of {}", plain(found)), "above -1"));
+        }
+        Ok(Self { micromodulus: Property::new(bonds, at), fracture_energy, prestrain, each })
     }
 
-    /// The critical stretch: `rest`, and of inclusions with a critical stretch of their own what `resolve` makes of it with
+    /// The critical stretch: `rest`, or that of the fracture energy that follows a field, and of inclusions with a critical stretch of their own what `resolve` makes of it with
     /// their micromodulus over that of the rest; of several the last.
     ///
     /// # Errors
@@ -59,7 +107,17 @@ impl<'a> Inclusions<'a> {
         rest: f64,
         resolve: &dyn Fn(Critical, f64) -> Result<f64, Error>,
     ) -> Result<Property, SceneError> {
-        let mut stretch = vec![rest; if self.each.is_empty() { 0 } else { bonds.sites() }];
+        let varies = self.fracture_energy.is_some() || !self.each.is_empty();
+        let mut stretch = vec![rest; if varies { bonds.sites() } else { 0 }];
+        if let Some(energies) = &self.fracture_energy {
+            for site in bonds.particles().iter().map(|&site| site as usize) {
+                let energy = Some(EnergyPerArea::from_si(energies.at(site)));
+                let critical = Critical { fracture_energy: energy, ..Critical::default() };
+                stretch[site] = resolve(critical, self.micromodulus.at(site)).map_err(|error| {
+                    source.error("material.fields", error, "a fracture energy that bonds can have")
+                })?;
+            }
+        }
         for (index, (inclusion, members)) in self.each.iter().enumerate() {
             let Some(critical) = inclusion.critical else { continue };
             let key = format!("material.inclusions[{index}].critical");

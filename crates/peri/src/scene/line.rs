@@ -84,21 +84,34 @@ impl SectionSpec {
         source: &Source,
         key: &str,
     ) -> Result<([f64; D], [f64; D]), SceneError> {
-        let point = vector(source, &format!("{key}.point"), &self.point)?;
-        let key = format!("{key}.normal");
-        let Ok(normal) = <[f64; D]>::try_from(self.normal.as_slice()) else {
-            let found = format!("{} components", self.normal.len());
-            return Err(source.error(&key, found, format!("{D} components")));
-        };
-        let largest = normal.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
-        if largest == 0.0 || !normal.iter().all(|x| x.is_finite()) {
-            return Err(source.error(&key, format!("{normal:?}"), "finite numbers, not all of them 0"));
-        }
-        // squares of what is very small or large are 0 or infinite
-        let normal = normal.map(|x| x / largest);
-        let size = length(normal);
-        Ok((point, normal.map(|x| x / size)))
+        plane_of(source, key, &self.point, &self.normal)
     }
+}
+
+/// A point, m, and a unit normal, of the keys `point` and `normal` under `key`.
+///
+/// # Errors
+/// As [`super::check`].
+pub(super) fn plane_of<const D: usize>(
+    source: &Source,
+    key: &str,
+    point: &[Length],
+    normal: &[f64],
+) -> Result<([f64; D], [f64; D]), SceneError> {
+    let point = vector(source, &format!("{key}.point"), point)?;
+    let key = format!("{key}.normal");
+    let Ok(normal) = <[f64; D]>::try_from(normal) else {
+        let found = format!("{} components", normal.len());
+        return Err(source.error(&key, found, format!("{D} components")));
+    };
+    let largest = normal.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    if largest == 0.0 || !normal.iter().all(|x| x.is_finite()) {
+        return Err(source.error(&key, format!("{normal:?}"), "finite numbers, not all of them 0"));
+    }
+    // squares of what is very small or large are 0 or infinite
+    let normal = normal.map(|x| x / largest);
+    let size = length(normal);
+    Ok((point, normal.map(|x| x / size)))
 }
 
 /// Values of all sections of a scene.

@@ -3,9 +3,10 @@
 use super::build::operations;
 use super::formula::Formula;
 use super::values::{Body, ordered, vector};
-use super::{Boundary, Method, Prescribed, PrescribedField, Scene};
+use super::{Boundary, Method, Prescribed, PrescribedField, Scene, Side};
 use crate::field::Field;
 use crate::geometry::inside;
+use crate::material::{Tensor, surface_load};
 use crate::solver::{Loads, Support};
 use polycore::scene::{SceneError, Source};
 
@@ -18,7 +19,7 @@ pub fn loads_of<const D: usize>(
     scene: &Scene,
     body: &Body<D>,
 ) -> Result<(Loads<D>, Vec<bool>), SceneError> {
-    let mut regions = Vec::new();
+    let (mut regions, mut tractions) = (Vec::new(), Vec::new());
     let mut loaded = vec![false; body.bonds.sites()];
     for (index, boundary) in scene.boundary.iter().enumerate() {
         let key = format!("boundary[{index}]");
@@ -31,10 +32,17 @@ pub fn loads_of<const D: usize>(
         for &site in members.iter().filter(|_| forced) {
             loaded[site as usize] = true;
         }
-        let support = support(source, &key, boundary, body, &members, depth)?;
+        let by_area = scene.material.solid.is_some() && boundary.layers.is_none();
+        let support = support(source, &key, boundary, body, &members, depth.filter(|_| !by_area))?;
+        if let (Some(side), Some(traction), true) = (boundary.side, &boundary.traction, by_area) {
+            tractions.push((side, std::array::from_fn(|d| traction[d].si())));
+        }
         regions.push((members, support));
     }
     let mut loads = Loads::new(body.bonds.sites(), &regions);
+    for (side, traction) in tractions {
+        add_traction(body, side, traction, &mut loads, &mut loaded);
+    }
     follow_formulas(source, scene, body, &regions, &mut loads)?;
     if scene.method() == Method::Verlet {
         // a body in motion needs neither balance nor hold
@@ -50,6 +58,33 @@ pub fn loads_of<const D: usize>(
         ));
     }
     Ok((loads, loaded))
+}
+
+/// Adds a traction on a side of a solid: t (n·h_I)/V_I of the area vectors h, which balances a uniform stress in every particle
+/// ([`surface_load`]). It acts in two horizons below the side, in a thin body in the half next to it.
+fn add_traction<const D: usize>(
+    body: &Body<D>,
+    side: Side,
+    traction: [f64; D],
+    loads: &mut Loads<D>,
+    loaded: &mut [bool],
+) {
+    let (axis, upper) = side.axis();
+    let bounds = [body.bounds.0[axis], body.bounds.1[axis]];
+    let reach = (2.0 * body.bonds.horizon()).min(0.5 * (bounds[1] - bounds[0]));
+    let sign = if upper { 1.0 } else { -1.0 };
+    let stress = Tensor::from_fn(|a, b| if b == axis { sign * traction[a] } else { 0.0 });
+    let surface = surface_load(&*body.bonds, stress);
+    let field = loads.body_force.get_or_insert_with(|| Field::zeros(body.bonds.sites()));
+    for &site in body.bonds.particles() {
+        let site = site as usize;
+        let below = sign * (bounds[usize::from(upper)] - body.bonds.position(site)[axis]);
+        let (old, new) = (field.get(site), surface.get(site));
+        if below <= reach && new != [0.0; D] {
+            field.set(site, std::array::from_fn(|d| old[d] + new[d]));
+            loaded[site] = true;
+        }
+    }
 }
 
 /// Velocities at the start, m/s; the last region applies.
@@ -136,8 +171,11 @@ fn balanced<const D: usize>(
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
     let Some(field) = &loads.body_force else { return Ok(()) };
+    let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source))?;
     for d in 0..D {
-        let (mut sum, mut size, mut constrained) = (0.0, 0.0, false);
+        let (mut sum, mut size) = (0.0, 0.0);
+        // what a plane may hold
+        let mut constrained = planes.iter().any(|plane| plane.normal[d] != 0.0);
         for &site in body.bonds.particles() {
             let force = field.get(site as usize)[d] * body.bonds.volume(site as usize);
             sum += force;
@@ -342,10 +380,13 @@ fn support<const D: usize>(
     let mut support = Support { displacement: [None; D], body_force: [0.0; D] };
     if let Some(traction) = &boundary.traction {
         count("traction", traction.len())?;
-        let depth = depth.ok_or_else(|| {
-            source.error(&format!("{key}.traction"), "a traction on a box", "`side`, or `force` on the box")
-        })?;
-        support.body_force = std::array::from_fn(|d| traction[d].si() / depth);
+        if boundary.side.is_none() {
+            let allowed = "`side`, or `force` on the box";
+            return Err(source.error(&format!("{key}.traction"), "a traction on a box", allowed));
+        }
+        if let Some(depth) = depth {
+            support.body_force = std::array::from_fn(|d| traction[d].si() / depth);
+        }
     }
     if let Some(force) = &boundary.force {
         count("force", force.len())?;

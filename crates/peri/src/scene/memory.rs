@@ -49,8 +49,9 @@ fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
     if scene.method() == Method::Lbfgs {
         each += (FIELDS_OF_LBFGS + 2.0 * Lbfgs::default().memory as f64) * vector + COARSE;
     }
-    if scene.contact.is_some() {
-        each += CONTACT;
+    if let Some(contact) = &scene.contact {
+        each += CONTACT + 8.0 * (2 * contact.plane.len()) as f64;
+        each += if contact.rubs() { 3.0 * vector } else { 0.0 };
     }
     if scene.material.solid.is_some() {
         // states of particles, while they are made, and another set for outputs
@@ -104,7 +105,10 @@ pub fn needed<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> f64 {
             let directed = bonds.directed_bonds() as f64;
             // the weights by which bonds are shared out, in lists that grow
             let shared = if scene.stress.is_some() { 16.0 * directed + 24.0 * particles } else { 0.0 };
-            of_sites::<D>(scene, sites, 0) + of_cloud::<D>(particles, directed) + shared
+            of_sites::<D>(scene, sites, 0)
+                + of_cloud::<D>(particles, directed)
+                + of_relief::<D>(scene, particles)
+                + shared
         }
     };
     ALWAYS + body + of_results::<D>(scene, particles)
@@ -114,6 +118,17 @@ pub fn needed<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> f64 {
 pub(super) fn of_cloud<const D: usize>(particles: f64, bonds: f64) -> f64 {
     let padded = bonds + 8.0 * particles;
     particles * (6.0 * 8.0 * D as f64 + 96.0) + padded * (4.0 + 8.0 + 8.0 + BOND_LISTS)
+}
+
+/// Bytes of a solid in a cloud beside those of one on a lattice: θ, what it adds to states, and what the kernels read of a particle.
+fn of_relief<const D: usize>(scene: &Scene, particles: f64) -> f64 {
+    if scene.material.solid.is_none() {
+        return 0.0;
+    }
+    let (vector, tensor) = (8.0 * D as f64, 8.0 * (D * D) as f64);
+    let (state, passes) = (3.0 * tensor + 24.0, 96.0 + 64.0 * D as f64 - tensor);
+    let each = if scene.observes_forces() { 3.0 * state + 2.0 * passes } else { 2.0 * state + passes };
+    particles * (vector + each)
 }
 
 /// What a run takes at least, whose lattice has these cells: before any of it is allocated.

@@ -4,9 +4,12 @@ mod boundary;
 mod build;
 mod check;
 mod cloud;
+mod contact;
 mod crack;
 mod expect;
 mod explain;
+mod field;
+mod followed;
 mod formula;
 mod inclusion;
 mod line;
@@ -23,11 +26,14 @@ mod warn;
 pub use boundary::{Boundary, Prescribed, PrescribedField, Side};
 pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
+pub use contact::{ContactSpec, PlaneSpec, of_plane};
 pub use crack::cuts_of;
 pub use expect::{quantities, quantities_of};
 pub use explain::explain;
+pub use field::{FieldSpec, Parameter};
+pub use followed::{Followed, followed};
 pub use formula::Formula;
-pub use inclusion::Inclusions;
+pub use inclusion::{Inclusion, Inclusions};
 pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, region_names, velocities_of};
 pub use memory::needed as memory_needed;
@@ -73,7 +79,7 @@ pub struct Scene {
     pub solver: Solver,
     /// Density and times of explicit dynamics.
     pub dynamics: Option<Dynamics>,
-    /// Repulsion of particles without a bond; default: none.
+    /// Repulsion of particles without a bond, friction, rigid planes; default: none.
     pub contact: Option<ContactSpec>,
     /// Quantities recorded in every row of the history.
     #[serde(default)]
@@ -244,18 +250,9 @@ pub struct Material {
     /// Parts of the body that are stiffer or softer.
     #[serde(default)]
     pub inclusions: Vec<Inclusion>,
-}
-
-/// A part of the body whose bonds are stiffer or softer; a bond across its border has the mean of both.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Inclusion {
-    /// Where: a shape to `add`.
-    pub shape: ShapeSpec,
-    /// Its stiffness over that of the rest.
-    pub stiffness: f64,
-    /// When its bonds break, instead of `material.critical`; a bond across its border breaks as the weaker side does.
-    pub critical: Option<Critical>,
+    /// Parameters that follow fields of other scenes.
+    #[serde(default)]
+    pub fields: Vec<FieldSpec>,
 }
 
 /// Whether bonds near a free surface are stiffened.
@@ -267,20 +264,6 @@ pub enum SurfaceCorrection {
     None,
     /// Until a homogeneous strain stores the continuum's energy (Madenci & Oterkus).
     Energy,
-}
-
-/// Contact between particles that no intact bond joins.
-#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct ContactSpec {
-    /// κ: stiffness of a contact over that of a bond as long as the horizon; 0 only shows how particles overlap.
-    pub stiffness: f64,
-}
-
-impl Default for ContactSpec {
-    fn default() -> Self {
-        Self { stiffness: crate::contact::STIFFNESS }
-    }
 }
 
 /// Stress output.
@@ -481,6 +464,12 @@ impl Scene {
 }
 
 impl Material {
+    /// Whether some bonds are at rest at another stretch than 1.
+    pub fn is_prestrained(&self) -> bool {
+        let follows = self.fields.iter().any(|field| field.of == Parameter::Prestrain);
+        follows || self.inclusions.iter().any(|inclusion| inclusion.prestrain.is_some())
+    }
+
     /// The bond law of this material.
     ///
     /// # Errors

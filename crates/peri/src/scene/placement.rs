@@ -21,7 +21,9 @@ pub fn check_placement<const D: usize>(
         hole(source, body, exact.hole().0)?;
     }
     plate_frame(source, scene, body)?;
-    let reach = loads.reach(&*body.bonds);
+    let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes(source))?;
+    let rigid: Vec<[f64; D]> = planes.iter().map(|plane| plane.displacement).collect();
+    let reach = loads.reach(&*body.bonds, &rigid);
     // under forces alone nobody knows before the run how far they get
     let beyond = |at: f64| reach > 0.0 && at > reach * (1.0 + 1e-9);
     match scene.output.load_at.iter().position(|at| beyond(at.si())) {

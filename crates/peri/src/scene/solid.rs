@@ -145,6 +145,7 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         ("volume_correction", material.volume_correction != VolumeCorrection::default()),
         ("surface_correction", material.surface_correction != SurfaceCorrection::default()),
         ("inclusions", !material.inclusions.is_empty()),
+        ("fields", !material.fields.is_empty()),
     ] {
         if given {
             let found = format!("`{key}` of bond laws together with `solid`");

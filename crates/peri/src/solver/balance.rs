@@ -101,6 +101,7 @@ impl Balance {
             }
             _ => [0.0; D],
         };
+        let rigid = system.repulsion().and_then(|contact| contact.of_planes(&state.displacement));
         // force, external force, moment (yz, zx, xy), size
         let of = |sites: &[u32]| {
             let mut sums = [0.0; 10];
@@ -110,12 +111,14 @@ impl Balance {
                 let body = system.loads.body_force.as_ref().map_or([0.0; D], |b| b.get(site));
                 let (total, position, moved) =
                     (state.force.get(site), bonds.position(site), state.displacement.get(site));
-                let internal: [f64; D] = std::array::from_fn(|d| volume * (total[d] - factor * body[d]));
+                let plane = rigid.as_ref().map_or([0.0; D], |field| field.get(site));
+                let internal: [f64; D] =
+                    std::array::from_fn(|d| volume * (total[d] - factor * body[d] - plane[d]));
                 let arm: [f64; D] = std::array::from_fn(|d| position[d] + moved[d] - middle[d]);
                 for d in 0..D {
                     sums[d] += internal[d];
                     let reaction = if constrained >> d & 1 == 1 { total[d] } else { 0.0 };
-                    sums[3 + d] += volume * (factor * body[d] - reaction);
+                    sums[3 + d] += volume * (factor * body[d] + plane[d] - reaction);
                     for e in 0..d {
                         sums[5 + d + e] += arm[e] * internal[d] - arm[d] * internal[e];
                     }

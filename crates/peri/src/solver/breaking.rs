@@ -72,7 +72,7 @@ impl<const D: usize> System<'_, D> {
         let bonds = list.len() as u64 / 2;
         state.broken += bonds;
         let [factor, pull, push] = state.balanced;
-        let load = self.loads.response(&*self.bonds, factor, (pull, push)).0;
+        let load = self.response(factor, (pull, push)).0;
         if bonds > 0 {
             state.events.push(Event { step: state.step, bonds, fingerprint: fingerprint(&list), load });
             self.bonds.sever(&list);
@@ -87,6 +87,10 @@ impl<const D: usize> System<'_, D> {
         }
         state.released +=
             released.unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.observed));
+        if state.started.is_some() {
+            // what rubs depends on bonds, too
+            self.lag(state);
+        }
         self.rebuild_contact(&state.displacement);
         if bonds > 0 {
             state.intact = Some(self.bonds.intact());

@@ -89,14 +89,15 @@ impl<const D: usize> Loads<D> {
         (pull, push)
     }
 
-    /// How far apart the prescribed displacements are at factor 1, m: √Σ_d (max − min)².
-    pub fn reach(&self, bonds: &dyn Bonds<D>) -> f64 {
-        let Some(prescribed) = &self.displacement else { return 0.0 };
+    /// How far apart the prescribed displacements are at factor 1, m: √Σ_d (max − min)²; `rigid` are those of rigid planes.
+    pub fn reach(&self, bonds: &dyn Bonds<D>, rigid: &[[f64; D]]) -> f64 {
         let span = |d: usize| {
             let constrained =
                 bonds.particles().iter().map(|&s| s as usize).filter(|&s| self.constrained(s) >> d & 1 == 1);
+            let prescribed = self.displacement.as_ref();
             let (low, high) = constrained
-                .map(|s| prescribed.get(s)[d])
+                .filter_map(|s| Some(prescribed?.get(s)[d]))
+                .chain(rigid.iter().map(|plane| plane[d]))
                 .fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
             high - low
         };
@@ -119,8 +120,15 @@ impl<const D: usize> Loads<D> {
     /// The load, N, and the displacement, m, on which it works, from [`Loads::conjugates`]: the force conjugate to the
     /// grips' distance `factor` · [`Loads::reach`]; where only forces are prescribed, these, and the mean displacement
     /// of where they act along them (of both ends together where they pull at both).
-    pub fn response(&self, bonds: &dyn Bonds<D>, factor: f64, (pull, push): (f64, f64)) -> (f64, f64) {
-        let reach = self.reach(bonds);
+    /// `rigid` as [`Loads::reach`].
+    pub fn response(
+        &self,
+        bonds: &dyn Bonds<D>,
+        factor: f64,
+        (pull, push): (f64, f64),
+        rigid: &[[f64; D]],
+    ) -> (f64, f64) {
+        let reach = self.reach(bonds, rigid);
         if reach > 0.0 {
             return (pull / reach, factor * reach);
         }

@@ -5,6 +5,7 @@ use super::scale::{Balance, Scale};
 use super::state::{Record, State, Watch};
 use super::system::System;
 
+use crate::contact::Contact;
 use crate::error::Error;
 
 /// A method that finds the equilibrium of a state at the load factor of its step.
@@ -29,7 +30,7 @@ pub trait Equilibrium<const D: usize> {
 /// every equilibrium in which bonds have just broken.
 ///
 /// # Errors
-/// As [`Equilibrium::equilibrate`], and whatever `finished` returns.
+/// As [`Equilibrium::equilibrate`], and whatever `finished` returns; [`Error::Parameter`] for friction without a slip length.
 pub fn load_stepping<const D: usize>(
     method: &mut dyn Equilibrium<D>,
     system: &mut System<D>,
@@ -37,12 +38,20 @@ pub fn load_stepping<const D: usize>(
     watch: &mut Watch<D>,
     finished: &mut Finished<D>,
 ) -> Result<(), Error> {
+    if let Some(found) = system.friction().map(Contact::slip).filter(|&slip| slip == 0.0) {
+        let allowed = "above 0 m: the slip in a load step from which on friction resists in full".to_owned();
+        return Err(Error::Parameter { name: "slip of friction", found, allowed });
+    }
     let stiffness = system.stiffness_at_rest();
     // of the body as it was built: an interrupted run must guess as if it had not been
     let predictor = system.loads.affine_predictor(&*system.bonds, stiffness);
     system.scale = Scale::new(&*system.bonds, &system.loads, stiffness);
     system.restore(state)?;
     while state.step < system.factors.len() {
+        if !state.predicted && system.friction().is_some() {
+            state.started = Some(state.displacement.clone());
+        }
+        system.lag(state);
         if !state.predicted {
             predict(system, state, &predictor);
             state.predicted = true;
@@ -134,7 +143,10 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
 /// Adds the work of the loads since the last equilibrium, by the trapezoidal rule.
 fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
     let factor = system.factors[state.step];
-    let (pull, push) = system.loads.conjugates(&*system.bonds, &state.displacement, &state.force);
+    if let Some(contact) = system.friction() {
+        state.rubbing = contact.taken(&state.displacement).1;
+    }
+    let (pull, push) = system.conjugates(state);
     let [old_factor, old_pull, old_push] = state.balanced;
     state.work += 0.5 * (pull + old_pull) * (factor - old_factor);
     state.work += 0.5 * (factor + old_factor) * (push - old_push);
@@ -144,10 +156,13 @@ fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
 fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     let [factor, pull, push] = state.balanced;
     let observed = state.balanced_stretches;
-    let (load, displacement) = system.loads.response(&*system.bonds, factor, (pull, push));
+    let (load, displacement) = system.response(factor, (pull, push));
     // softening takes rounds of its own
     if state.round > 1 || state.history.last().map_or(0, |r| r.broken) != state.broken {
         state.past.clear();
+    }
+    if let Some(contact) = system.friction() {
+        state.motion.rubbed += contact.taken(&state.displacement).0;
     }
     let balance = Balance::new(system, state);
     let record = Record {
@@ -169,6 +184,8 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
         time: 0.0,
         kinetic: 0.0,
         damped: 0.0,
+        rubbed: state.motion.rubbed,
+        resting: system.resting(state),
         seen: system.seen(state),
     };
     state.history.push(record);

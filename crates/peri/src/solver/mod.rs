@@ -20,6 +20,7 @@ mod state;
 mod system;
 mod time_step;
 mod verlet;
+mod verlet_friction;
 mod verlet_step;
 
 pub use adr::{DynamicRelaxation, RelaxationSolver};

@@ -20,6 +20,10 @@ pub struct Motion {
     pub kinetic: f64,
     /// Energy that the damping has taken, J.
     pub damped: f64,
+    /// Energy that friction has taken, J.
+    pub rubbed: f64,
+    /// Largest v_ε of friction in use so far, m/s.
+    pub slip: f64,
     pub(super) begun: bool,
     /// Longest step in use, s.
     pub(super) longest: f64,

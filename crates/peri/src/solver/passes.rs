@@ -90,9 +90,13 @@ pub fn force_pass<const D: usize>(
             },
         )
         .collect();
-    results.into_iter().fold((Sums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
+    let all = results.into_iter().fold((Sums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
         (sums.add(s), observed.join(m))
-    })
+    });
+    let (mut sums, observed) = all;
+    // planes hold a body, too
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes(displacement));
+    (sums, observed)
 }
 
 /// The sums over components that are all free, in eight interleaved parts so that they vectorise.

@@ -3,7 +3,7 @@
 use super::motion::Motion;
 use super::scale::Balance;
 use crate::bonds::Softened;
-use crate::contact::Touching;
+use crate::contact::{Resting, Touching};
 use crate::error::Error;
 use crate::field::Field;
 use crate::potential::StretchRange;
@@ -48,6 +48,10 @@ pub struct Record {
     pub kinetic: f64,
     /// Energy that mass-proportional damping has taken so far, J.
     pub damped: f64,
+    /// Energy that friction has taken so far, J.
+    pub rubbed: f64,
+    /// How the body rests on each rigid plane.
+    pub resting: Vec<Resting>,
     /// What [`System::observer`](super::System::observer) sees.
     pub seen: Vec<f64>,
 }
@@ -126,6 +130,14 @@ pub struct State<const D: usize> {
     pub(super) intact: Option<Vec<u64>>,
     /// Bonds that bear a part of what they bore.
     pub softened: Vec<Softened>,
+    /// Force densities of friction, a part of `force`, where anything rubs in dynamics …
+    pub(super) friction: Option<Field<D>>,
+    /// … and of it the force of each plane, N.
+    pub(super) rubbing: Vec<[f64; 3]>,
+    /// Displacement at the start of the load step, where anything rubs between equilibria.
+    pub(super) started: Option<Field<D>>,
+    /// Force of each plane, N, where one moves.
+    pub(super) pushing: Vec<[f64; 3]>,
     /// Time and energies of explicit dynamics.
     pub motion: Motion,
     /// The finished steps.
@@ -165,6 +177,10 @@ impl<const D: usize> State<D> {
             balanced: [0.0; 3],
             intact: None,
             softened: Vec::new(),
+            friction: None,
+            rubbing: Vec::new(),
+            started: None,
+            pushing: Vec::new(),
             motion: Motion::default(),
             history: Vec::new(),
         }

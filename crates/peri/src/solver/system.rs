@@ -5,7 +5,7 @@ use super::load::Loads;
 use super::scale::Scale;
 use super::state::State;
 use crate::bonds::Bonds;
-use crate::contact::{Contact, Touching};
+use crate::contact::{Contact, Plane, Resting, Touching};
 use crate::error::Error;
 use crate::field::Field;
 use crate::material::{Material, Response};
@@ -88,9 +88,62 @@ impl<'a, const D: usize> System<'a, D> {
         self.material.prepare(&*self.bonds, displacement);
     }
 
+    /// Moves rigid planes to where they are at a load factor and a time, s.
+    pub(super) fn place(&mut self, factor: f64, time: f64) {
+        if let Some(contact) = &mut self.contact {
+            contact.place(factor, time);
+        }
+    }
+
+    /// Begins friction of a load step where that did, and places rigid planes at its end.
+    pub(super) fn lag(&mut self, state: &State<D>) {
+        let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
+        let after = self.factors[state.step];
+        if let Some(start) = &state.started
+            && let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs())
+        {
+            contact.place(before, 0.0);
+            contact.lag(&*self.bonds, start);
+        }
+        self.place(after, 0.0);
+    }
+
+    /// Contact, where it rubs.
+    pub(super) fn friction(&self) -> Option<&Contact<D>> {
+        self.contact.as_ref().filter(|contact| contact.rubs())
+    }
+
+    /// What loads and rigid planes pull, see [`Loads::conjugates`].
+    pub(super) fn conjugates(&self, state: &State<D>) -> (f64, f64) {
+        let (pull, push) = self.loads.conjugates(&*self.bonds, &state.displacement, &state.force);
+        let work = |(plane, resting): (&Plane<D>, &Resting)| {
+            (0..D).map(|d| plane.displacement[d] * resting.force[d]).sum::<f64>()
+        };
+        let Some(contact) = self.repulsion() else { return (pull, push) };
+        let resting = self.resting(state);
+        (pull + contact.planes().zip(&resting).map(work).sum::<f64>(), push)
+    }
+
+    /// Load and displacement, see [`Loads::response`].
+    pub(super) fn response(&self, factor: f64, conjugates: (f64, f64)) -> (f64, f64) {
+        let planes = self.contact.iter().flat_map(Contact::planes);
+        let rigid: Vec<[f64; D]> = planes.map(|plane| plane.displacement).collect();
+        self.loads.response(&*self.bonds, factor, conjugates, &rigid)
+    }
+
+    /// How the body rests on rigid planes, with friction.
+    pub(super) fn resting(&self, state: &State<D>) -> Vec<Resting> {
+        let Some(contact) = self.repulsion() else { return Vec::new() };
+        let mut resting = contact.resting(&*self.bonds, &state.displacement);
+        for (resting, rub) in resting.iter_mut().zip(&state.rubbing) {
+            (0..3).for_each(|d| resting.force[d] += rub[d]);
+        }
+        resting
+    }
+
     /// Has contact look for pairs, as it must where bonds have changed.
     pub(super) fn rebuild_contact(&mut self, displacement: &Field<D>) {
-        if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
+        if let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_pairs()) {
             contact.rebuild(&*self.bonds, displacement);
         }
     }
@@ -103,7 +156,7 @@ impl<'a, const D: usize> System<'a, D> {
     /// What touches in a state, where that is looked at.
     pub(super) fn touching(&mut self, state: &State<D>) -> Option<Touching> {
         let contact = self.contact.as_mut()?;
-        if !contact.repels() {
+        if !contact.has_pairs() {
             contact.rebuild(&*self.bonds, &state.displacement);
         }
         Some(contact.touching(&state.displacement))

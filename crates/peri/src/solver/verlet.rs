@@ -11,10 +11,12 @@ use super::scale::Balance;
 use super::state::{Record, State, Status, Watch};
 use super::system::System;
 use super::time_step::{BondSums, critical, largest_frequency_squared};
+use super::verlet_friction::{friction_pass, plane_pass};
 use super::verlet_step::{
     Sums, VerletStep, chunks_of, force_pass, kick_pass, leap_pass, refresh, stored, volumes,
 };
 use crate::bonds::{StretchRange, stretch_range};
+use crate::contact::Contact;
 use crate::error::Error;
 
 /// Part of the energy turned over by which the kinetic energy may exceed what is available before the run is given up:
@@ -66,8 +68,8 @@ impl<const D: usize> Method<D> for VelocityVerlet {
     /// [`System::stop_below`] are not used.
     ///
     /// A state that has not moved yet, or the equilibrium that another method found (its velocities reset), is where
-    /// time begins: [`State::work`] is set to the energy that is there, so that kinetic + stored + released + damped = work
-    /// in every row but for O(Δt²).
+    /// time begins: [`State::work`] is set to the energy that is there, so that kinetic + stored + released + damped + rubbed = work
+    /// in every row but for O(Δt²). With friction, automatic steps are 1/√2 of those without.
     ///
     /// # Errors
     /// [`Error::Parameter`] for settings out of their domain; [`Error::TimeStep`] for a time step beyond the critical one;
@@ -82,7 +84,9 @@ impl<const D: usize> Method<D> for VelocityVerlet {
     ) -> Result<(), Error> {
         self.check()?;
         let volumes = volumes(system);
+        system.contact.iter_mut().for_each(Contact::unlag);
         if state.motion.begun {
+            system.place(self.factor(system, state.motion.time).0, state.motion.time);
             system.restore(state)?;
         } else {
             self.begin(system, state, &volumes)?;
@@ -146,6 +150,9 @@ impl VelocityVerlet {
         volumes: &[f64],
     ) -> Result<(), Error> {
         let (factor, rate) = self.factor(system, 0.0);
+        system.place(factor, 0.0);
+        (state.friction, state.started) = (None, None);
+        (state.rubbing, state.pushing) = (Vec::new(), Vec::new());
         for &site in system.bonds.particles() {
             let site = site as usize;
             let constrained = system.loads.constrained(site);
@@ -199,6 +206,9 @@ impl VelocityVerlet {
         state.motion.see(observed);
         self.know(system, state, frequency);
         self.cover(system, state);
+        let rest = VerletStep { step: 0.0, density: self.density, damping: 0.0, factors: [factor; 2], rate };
+        friction_pass(system, state, volumes, &rest, None);
+        plane_pass(system, state, &[]);
         self.sever(system, state, observed, factor);
         Ok(())
     }
@@ -231,7 +241,9 @@ impl VelocityVerlet {
         // nothing free, or a tangent without a positive frequency: the bound alone
         motion.covered_step = critical(if estimate > 0.0 { estimate.min(bound) } else { bound });
         motion.floor = law.least_energy * modulus * motion.extent;
-        motion.longest = self.time_step.unwrap_or(self.safety * motion.covered_step);
+        // a damper of m/Δt, which friction may be, halves the stable ω²Δt²
+        let part = if system.friction().is_some() { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 };
+        motion.longest = self.time_step.unwrap_or(part * self.safety * motion.covered_step);
     }
 
     /// Allows for more contact where more particles touch than so far.
@@ -259,11 +271,14 @@ impl VelocityVerlet {
         let first = leap_pass(&system.loads, state, volumes, &leap);
         // two ends, √D components
         state.motion.slack += 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
+        system.place(factor, after);
+        let (friction, rubbing, rubs) =
+            (state.friction.take(), state.rubbing.clone(), system.friction().is_some());
         system.prepare(&state.displacement);
         let look = state
             .motion
             .must_look(state.fitted, system.breaking.as_ref().map(|b| b.criterion.least_stretch()));
-        let (mut second, observed) = force_pass(system, state, volumes, &leap, look);
+        let (mut second, observed) = force_pass(system, state, volumes, &leap, look, !look && !rubs);
         system.count_evaluation(state);
         if look {
             state.observed = state.observed.join(observed);
@@ -281,8 +296,12 @@ impl VelocityVerlet {
                 system.count_evaluation(state);
                 self.cover(system, state);
             }
+        }
+        if look || rubs {
+            friction_pass(system, state, volumes, &leap, friction);
             second = kick_pass(&system.loads, state, volumes, &leap);
         }
+        plane_pass(system, state, &rubbing);
         let motion = &mut state.motion;
         motion.time = after;
         motion.taken += 1;
@@ -307,7 +326,7 @@ impl VelocityVerlet {
         motion.kinetic = second.kinetic;
         motion.damped += first.damped + second.damped;
         state.work += first.work + second.work;
-        let gone = state.released + motion.damped;
+        let gone = state.released + motion.damped + motion.rubbed;
         let available = state.work - gone - motion.floor;
         motion.turnover = motion.turnover.max(available).max(gone);
         let most = available.max(0.0) + EXCESS * motion.turnover;
@@ -359,8 +378,8 @@ impl VelocityVerlet {
         system.count_evaluation(state);
         let stored = stored(system, state, observed);
         let (factor, _) = self.factor(system, state.motion.time);
-        let conjugates = system.loads.conjugates(&*system.bonds, &state.displacement, &state.force);
-        let (load, displacement) = system.loads.response(&*system.bonds, factor, conjugates);
+        let conjugates = system.conjugates(state);
+        let (load, displacement) = system.response(factor, conjugates);
         let record = Record {
             factor,
             load,
@@ -380,6 +399,8 @@ impl VelocityVerlet {
             time: state.motion.time,
             kinetic: state.motion.kinetic,
             damped: state.motion.damped,
+            rubbed: state.motion.rubbed,
+            resting: system.resting(state),
             seen: system.seen(state),
         };
         state.history.push(record);

@@ -48,7 +48,7 @@ impl Sums {
 }
 
 /// A work item of two fields.
-type Two<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
+pub type Two<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
 
 /// v ← v + ½Δt a and u ← u + Δt v; constrained components go to F d.
 pub fn leap_pass<const D: usize>(
@@ -95,13 +95,15 @@ pub fn leap_pass<const D: usize>(
     parts.into_iter().fold(Sums::default(), Sums::add)
 }
 
-/// New forces and, unless stretches are looked at first, the second half of the kick in the same pass.
+/// New forces and, where it `kicks`, the second half of the kick in the same pass: unless stretches are looked at first, or
+/// friction follows.
 pub fn force_pass<const D: usize>(
     system: &System<D>,
     state: &mut State<D>,
     volumes: &[f64],
     leap: &VerletStep,
     look: bool,
+    kicks: bool,
 ) -> (Sums, StretchRange) {
     let loads = &*system.loads;
     let displacement = &state.displacement;
@@ -111,7 +113,7 @@ pub fn force_pass<const D: usize>(
         system.internal_force(displacement, chunk, &mut f, look.then_some(&mut observed));
         load(loads, chunk, volumes.len(), leap.factors[1], &mut f);
         let f = f.map(|f| &*f);
-        (if look { Sums::default() } else { kick(loads, volumes, leap, chunk, f, &mut v) }, observed)
+        (if kicks { kick(loads, volumes, leap, chunk, f, &mut v) } else { Sums::default() }, observed)
     };
     let parts: Vec<_> = force.into_par_iter().zip(velocity).enumerate().map(of).collect();
     parts.into_iter().fold((Sums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
@@ -136,7 +138,7 @@ pub fn kick_pass<const D: usize>(
     parts.into_iter().fold(Sums::default(), Sums::add)
 }
 
-/// Forces with loads of some work items, or of all; bonds outside of these have not changed.
+/// Forces with loads, and the friction there is, of some work items, or of all; bonds outside of these have not changed.
 pub fn refresh<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
@@ -147,12 +149,17 @@ pub fn refresh<const D: usize>(
     // states of particles carry what has changed beyond their bonds
     let chunks = chunks.filter(|_| !system.material.has_points());
     let system = &*system;
-    let (loads, displacement) = (&*system.loads, &state.displacement);
+    let (loads, displacement, friction) = (&*system.loads, &state.displacement, state.friction.as_ref());
     let sites = displacement.sites();
     state.force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut f)| {
         if chunks.is_none_or(|list| list.binary_search(&chunk).is_ok()) {
             system.internal_force(displacement, chunk, &mut f, None);
             load(loads, chunk, sites, factor, &mut f);
+            if let Some(friction) = friction {
+                for (f, rub) in f.iter_mut().zip(friction.components()) {
+                    f.iter_mut().zip(&rub[chunk_range(chunk, sites)]).for_each(|(f, rub)| *f += rub);
+                }
+            }
         }
     });
 }

@@ -4,11 +4,13 @@
 mod affine;
 mod balance;
 mod bodies;
+mod clouds;
 mod contact;
 mod cracks;
 mod dynamics;
 mod fields;
 mod forces;
+mod friction;
 mod hardy;
 mod homogeneous;
 mod impact;
@@ -21,6 +23,7 @@ mod looks;
 mod materials;
 mod model;
 mod pressed;
+mod prestrain;
 mod relaxation;
 mod rigid;
 #[path = "../../examples/rubber_bearing.rs"]
@@ -31,5 +34,6 @@ mod spectra;
 mod stress;
 mod surface;
 mod time_step;
+mod tractions;
 mod waves;
 mod work;

@@ -224,13 +224,24 @@ pub fn battery<const D: usize>(name: &str, cells: [usize; D], make: Make<D>) -> 
     ];
     let mut greatest = 0.0_f64;
     for (path, bonds, displacement) in cases {
-        let mut case = Case::new(format!("{name}, {D}D {path}"), bonds, make, displacement);
-        case.forces_are_slopes_of_the_energy();
-        case.momentum_is_conserved();
-        case.is_objective();
-        greatest = greatest.max(case.stiffness_is_bounded());
-        case.broken_bonds_carry_nothing();
+        greatest = greatest.max(checks(format!("{name}, {D}D {path}"), bonds, make, displacement));
     }
+    greatest
+}
+
+/// The checks of the battery, on one body.
+pub fn checks<const D: usize>(
+    name: String,
+    bonds: &mut dyn Bonds<D>,
+    make: Make<D>,
+    displacement: Field<D>,
+) -> f64 {
+    let mut case = Case::new(name, bonds, make, displacement);
+    case.forces_are_slopes_of_the_energy();
+    case.momentum_is_conserved();
+    case.is_objective();
+    let greatest = case.stiffness_is_bounded();
+    case.broken_bonds_carry_nothing();
     greatest
 }
 

@@ -276,3 +276,52 @@ fn a_softening_strip_tears() {
         }
     }
 }
+
+/// In a uniform state every bond of every particle releases Y = W: under several stresses the strength of softening bonds is the surface
+/// W = Y₀. Small strains at ν = 0.4995: an equibiaxial strength of σ_ts/√(2(1 − ν)), and a hydrostatic one of σ_ts/√(3(1 − 2ν)) = 18.3 σ_ts.
+#[test]
+fn the_strength_surface_is_one_of_equal_energy() {
+    let poisson = 0.4995_f64;
+    let bulk = 2.0 * (1.0 + poisson) / (3.0 * (1.0 - 2.0 * poisson));
+    let solid = neo_hooke::<3>(Space::Solid, bulk);
+    let bonds = Body::<3>::solid([7, 7, 4], 1.0, 3.015).build().lattice;
+    // strains, the greatest principal stress over E
+    let young = 2.0 * (1.0 + poisson);
+    let lateral = -2.0 * poisson / (1.0 - poisson);
+    let states = [
+        ("uniaxial", [1.0, -poisson, -poisson], 1.0),
+        ("equibiaxial", [1.0, 1.0, lateral], 1.0 / (1.0 - poisson)),
+        ("hydrostatic", [1.0; 3], 1.0 / (1.0 - 2.0 * poisson)),
+    ];
+    let mut strengths = Vec::new();
+    for (name, strains, stress) in states {
+        let size = 1e-6 / stress;
+        let mut displacement = Field::zeros(bonds.sites());
+        for &site in bonds.particles() {
+            let place = bonds.position(site as usize);
+            displacement.set(site as usize, std::array::from_fn(|d| size * strains[d] * place[d]));
+        }
+        let mut material = peri::material::Pointwise::new(solid.clone(), &bonds);
+        material.prepare(&bonds, &displacement);
+        let mut spread = [f64::INFINITY, 0.0];
+        for &site in bonds.particles() {
+            let family = peri::material::Family::new(&bonds, &displacement, site as usize);
+            let point = &material.points()[site as usize];
+            let energy = solid.energy(&family, point);
+            family.each(|bond| {
+                let released = solid.released_energy(&bond, point, energy).unwrap();
+                spread = [spread[0].min(released), spread[1].max(released)];
+            });
+        }
+        at_most(&format!("strength_surface_{name}_spread"), spread[1] / spread[0] - 1.0, 1e-5);
+        // the principal stress 1e-6 E at W; the strength where W = Y₀ goes with the root
+        strengths.push(1e-6 * young / spread[1].sqrt());
+    }
+    near(
+        "strength_equibiaxial_over_uniaxial",
+        strengths[1] / strengths[0],
+        1.0 / (2.0 * (1.0 - poisson)).sqrt(),
+        1e-4,
+    );
+    near("strength_hydrostatic_over_uniaxial", strengths[2] / strengths[0], 18.257, 1e-3);
+}

@@ -1,9 +1,10 @@
 //! The command line that all programs have: run, resume, check, sweep, schema, completions, and a program's own commands.
 
+use super::inputs::{InputArguments, attach, describe};
 use super::terminal::{
     self, Progress, Threads, default_output, exit, interrupted, seconds, with_negative_numbers,
 };
-use super::{Case, Options, Search, SweepOptions, Vary};
+use super::{Case, Options, Sample, Search, SweepOptions, Vary};
 use crate::checkpoint::Header;
 use crate::scene::{Failure, Source};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -37,6 +38,8 @@ enum Command<V: Subcommand> {
         /// As `run --quick` would.
         #[arg(long)]
         quick: bool,
+        #[command(flatten)]
+        inputs: InputArguments,
     },
     /// Run a scene for every combination of values of some keys, in parallel; finished runs are kept.
     Sweep {
@@ -44,8 +47,15 @@ enum Command<V: Subcommand> {
         scene: PathBuf,
         /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid, and keys joined with
         /// `;` change together.
-        #[arg(long, value_name = "KEY=VALUE,…", required_unless_present = "search")]
+        #[arg(long, value_name = "KEY=VALUE,…", required_unless_present_any = ["search", "sample"])]
         vary: Vec<Vary>,
+        /// A table of the scene and a CSV file with draws of its keys, such as a fit writes, e.g.
+        /// materials.pa12.kinetics=out/fit/nakamura_posterior.csv: gives the band of every value; may be repeated.
+        #[arg(long, value_name = "KEY=FILE", conflicts_with = "search")]
+        sample: Vec<Sample>,
+        /// Draws of the samples to run.
+        #[arg(long, default_value_t = 20, requires = "sample")]
+        count: usize,
         /// Find the least value of a key that satisfies all expectations instead, e.g. print.layer_time=5s..40s.
         #[arg(long, value_name = "KEY=LOW..HIGH", conflicts_with = "vary")]
         search: Option<Search>,
@@ -60,6 +70,8 @@ enum Command<V: Subcommand> {
         quick: bool,
         #[command(flatten)]
         checkpoints: Checkpoints,
+        #[command(flatten)]
+        inputs: InputArguments,
     },
     #[command(flatten)]
     Own(V),
@@ -88,6 +100,11 @@ pub struct RunArguments {
     explain: bool,
     #[command(flatten)]
     checkpoints: Checkpoints,
+    /// First run the scenes of `[inputs]` whose results are missing or stale.
+    #[arg(long)]
+    with_inputs: bool,
+    #[command(flatten)]
+    inputs: InputArguments,
 }
 
 #[derive(clap::Args)]
@@ -126,14 +143,31 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
             .map_err(Failure::from)
             .and_then(|source| solve::<C>(&source, &arguments)),
         Command::Resume { output, checkpoints } => resume::<C>(&output, checkpoints.every()),
-        Command::Check { scene, quick } => check::<C>(&scene, quick),
-        Command::Sweep { scene, vary, search, column, output, quick, checkpoints } => {
+        Command::Check { scene, quick, inputs } => check::<C>(&scene, quick, &inputs),
+        Command::Sweep {
+            scene,
+            mut vary,
+            sample,
+            count,
+            search,
+            column,
+            output,
+            quick,
+            checkpoints,
+            inputs,
+        } => {
             let output = output.unwrap_or_else(|| {
                 let mut name = default_output(&scene).into_os_string();
                 name.push("-sweep");
                 name.into()
             });
-            sweep::<C>(&scene, &vary, search.as_ref(), &column, &output, quick, checkpoints.every())
+            let source = Source::read(&scene).map_err(Failure::from);
+            let source = source.and_then(|source| attach::<C>(source, &output, quick, &inputs, false));
+            source.and_then(|source| {
+                vary.extend(super::drawn(&sample, count)?);
+                let every = checkpoints.every();
+                sweep::<C>(&source, &vary, search.as_ref(), &column, &output, quick, every)
+            })
         }
         Command::Own(command) => own(command),
         Command::Schema => {
@@ -154,11 +188,12 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
 /// # Errors
 /// [`Failure`].
 pub fn solve<C: Case>(source: &Source, arguments: &RunArguments) -> Result<bool, Failure<C::Error>> {
-    let RunArguments { scene, output, quick, explain, checkpoints } = arguments;
-    if *explain {
-        explanation::<C>(source, *quick)?;
-    }
+    let RunArguments { scene, output, quick, explain, checkpoints, with_inputs, inputs } = arguments;
     let output = output.clone().unwrap_or_else(|| default_output(scene));
+    let source = &attach::<C>(source.clone(), &output, *quick, inputs, *with_inputs)?;
+    if *explain {
+        explain_all::<C>(source, &output, *quick, inputs)?;
+    }
     finish::<C>(source, &output, *quick, checkpoints.every(), false)
 }
 
@@ -173,7 +208,9 @@ fn resume<C: Case>(output: &Path, every: Duration) -> Result<bool, Failure<C::Er
         crate::say!("{} is a study of the run in {}", output.display(), whole.display());
         return resume::<C>(&whole, every);
     }
-    finish::<C>(&Source::new(header.scene_path, header.scene), output, header.quick, every, true)
+    header.check(output)?;
+    let source = Source::new(header.scene_path, header.scene).with_inputs(header.stamp.inputs);
+    finish::<C>(&source, output, header.quick, every, true)
 }
 
 fn finish<C: Case>(
@@ -194,21 +231,28 @@ fn finish<C: Case>(
     Ok(finished.report.passed())
 }
 
-fn check<C: Case>(path: &Path, quick: bool) -> Result<bool, Failure<C::Error>> {
-    explanation::<C>(&Source::read(path)?, quick)?;
+fn check<C: Case>(path: &Path, quick: bool, inputs: &InputArguments) -> Result<bool, Failure<C::Error>> {
+    let (source, output) = (Source::read(path)?, default_output(path));
+    let source = attach::<C>(source, &output, quick, inputs, false)?;
+    explain_all::<C>(&source, &output, quick, inputs)?;
     crate::say!("{}: the scene is valid", path.display());
     Ok(true)
 }
 
-fn explanation<C: Case>(source: &Source, quick: bool) -> Result<(), Failure<C::Error>> {
-    for line in C::explain(source, quick)? {
-        crate::say!("{line}");
-    }
+fn explain_all<C: Case>(
+    source: &Source,
+    output: &Path,
+    quick: bool,
+    inputs: &InputArguments,
+) -> Result<(), Failure<C::Error>> {
+    let lines = C::explain(source, quick)?;
+    describe(source, output, quick, inputs)?;
+    lines.into_iter().for_each(|line| crate::say!("{line}"));
     Ok(())
 }
 
 fn sweep<C: Case>(
-    scene: &Path,
+    source: &Source,
     vary: &[Vary],
     search: Option<&Search>,
     columns: &[String],
@@ -216,7 +260,6 @@ fn sweep<C: Case>(
     quick: bool,
     checkpoint_every: Duration,
 ) -> Result<bool, Failure<C::Error>> {
-    let source = Source::read(scene)?;
     let mut bar = Progress::start();
     let mut progress = |done: usize, all: usize, last: &str| {
         bar.show(done as f64 / all as f64, || format!("{done} of {all} runs are done, last {last}"));
@@ -225,8 +268,8 @@ fn sweep<C: Case>(
     let mut options =
         SweepOptions { output, columns, quick, checkpoint_every, interrupted, progress: &mut progress };
     let finished = match search {
-        Some(search) => super::search::<C>(&source, search, &mut options)?,
-        None => super::sweep::<C>(&source, vary, &mut options)?,
+        Some(search) => super::search::<C>(source, search, &mut options)?,
+        None => super::sweep::<C>(source, vary, &mut options)?,
     };
     bar.finish();
     terminal::print(format_args!("{}results in {}\n", finished.text, output.display()));

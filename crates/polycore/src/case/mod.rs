@@ -5,15 +5,17 @@
 
 mod cli;
 mod folder;
+mod inputs;
 mod rows;
 mod sweep;
 pub mod terminal;
 
 pub use cli::{RunArguments, main, solve};
 pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run};
+pub use inputs::{Input, InputState, input_state, inputs};
 use rows::fits;
 pub use rows::{Row, Rows, STATISTICS};
-pub use sweep::{OF_SWEEPS, Search, SweepOptions, Vary, search, sweep};
+pub use sweep::{OF_SAMPLES, OF_SWEEPS, Sample, Search, SweepOptions, Vary, drawn, search, sweep};
 
 use crate::Error;
 use crate::checkpoint::{self, Header, Magic};
@@ -162,6 +164,7 @@ pub struct Run<'a> {
     /// How it behaves.
     pub options: Options<'a>,
     program: &'static Program,
+    source: Source,
     header: Header,
     lock: Option<RunLock>,
     saved: Instant,
@@ -177,7 +180,15 @@ impl<'a> Run<'a> {
         options: Options<'a>,
     ) -> Self {
         let header = Header::new(source, options.quick, study);
-        Self { options, program, header, lock: None, saved: Instant::now(), asked: None }
+        Self {
+            options,
+            program,
+            source: source.clone(),
+            header,
+            lock: None,
+            saved: Instant::now(),
+            asked: None,
+        }
     }
 
     /// Takes the output directory. From here on a new run can be resumed.
@@ -188,9 +199,10 @@ impl<'a> Run<'a> {
         let directory = self.options.output;
         if self.options.resume {
             self.lock = Some(resume_run(directory)?);
-            return Ok(());
+            return Header::read(directory, self.program.magic)?.check(directory);
         }
         self.lock = Some(prepare_run(directory)?);
+        self.header.stamp = self.source.stamp(self.options.quick);
         checkpoint::save(directory, self.program.magic, &self.header, None::<&()>)
     }
 
@@ -211,6 +223,7 @@ impl<'a> Run<'a> {
     /// It cannot be written.
     pub fn save<T: Serialize>(&mut self, state: &T) -> Result<(), Error> {
         self.saved = Instant::now();
+        self.header.stamp = self.source.stamp(self.options.quick);
         checkpoint::save(self.options.output, self.program.magic, &self.header, Some(state))
     }
 
@@ -248,11 +261,14 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Writes the report, the last file of a run: a directory with a checkpoint holds an unfinished one.
+    /// Writes the report, the last file of a run, with the stamp of what it was computed from: a directory with a checkpoint
+    /// holds an unfinished one.
     ///
     /// # Errors
     /// It cannot be written.
     pub fn finish(&mut self, report: &Report) -> Result<(), Error> {
+        let mut report = report.clone();
+        report.provenance.stamp = Some(self.source.stamp(self.options.quick));
         report.write(self.options.output)?;
         let _ = std::fs::remove_file(self.options.output.join(checkpoint::FILE_NAME));
         self.lock = None;

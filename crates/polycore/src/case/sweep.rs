@@ -4,7 +4,7 @@ use super::rows::{Row, Rows};
 use super::{Case, Fault, Finished, Options};
 use crate::Error;
 use crate::checkpoint::Header;
-use crate::report::{Phases, Report};
+use crate::report::{Phases, Provenance, Report};
 use crate::scene::{Failure, SWEEP, SceneError, Source};
 use rayon::prelude::*;
 use std::path::Path;
@@ -13,6 +13,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+mod sample;
 mod search;
 mod table;
 
@@ -23,6 +24,7 @@ crate::quantities! {
     LEAST_VALUE = "least_value", "*", "least value that a search found to meet all expectations";
 }
 
+pub use sample::{OF_SAMPLES, Sample, drawn};
 pub use search::{Search, search};
 use table::{draw, together};
 
@@ -38,6 +40,8 @@ pub struct Vary {
     pub key: String,
     /// The values as the user wrote them.
     pub values: Vec<String>,
+    /// Whether they are draws from a [`Sample`], over which the sweep gives bands.
+    pub drawn: bool,
 }
 
 impl FromStr for Vary {
@@ -47,7 +51,7 @@ impl FromStr for Vary {
     /// behind one another, `KEY=A,B;OTHER=C,D`, with as many values each: the values are then `A;C` and `B;D`.
     fn from_str(text: &str) -> Result<Self, String> {
         let usage = "KEY=VALUE,VALUE,…, e.g. print.layer_time=10s,20s,40s";
-        let mut linked = Self { key: String::new(), values: Vec::new() };
+        let mut linked = Self { key: String::new(), values: Vec::new(), drawn: false };
         for part in divided(text, ';') {
             let (key, list) =
                 part.split_once('=').ok_or_else(|| format!("found `{part}`; allowed: {usage}"))?;
@@ -57,7 +61,7 @@ impl FromStr for Vary {
                 return Err(format!("found `{part}`; allowed: {usage}"));
             }
             if linked.key.is_empty() {
-                linked = Self { key: key.to_owned(), values };
+                linked = Self { key: key.to_owned(), values, drawn: false };
             } else if linked.values.len() == values.len() {
                 linked.key += &format!(";{key}");
                 linked.values.iter_mut().zip(values).for_each(|(all, value)| *all += &format!(";{value}"));
@@ -136,16 +140,16 @@ pub fn sweep<C: Case>(
     vary: &[Vary],
     options: &mut SweepOptions,
 ) -> Result<Finished, Failure<C::Error>> {
-    let (rows, report) = rows::<C>(source, vary, options)?;
-    Ok(Finished { text: rows.text(), report })
+    let (rows, bands, report) = rows::<C>(source, vary, options)?;
+    Ok(Finished { text: rows.text() + &bands, report })
 }
 
-/// [`sweep`], and its rows: those requested first, in their order.
+/// [`sweep`], and its rows: those requested first, in their order. And the bands of what was sampled.
 fn rows<C: Case>(
     source: &Source,
     vary: &[Vary],
     options: &mut SweepOptions,
-) -> Result<(Rows, Report), Failure<C::Error>> {
+) -> Result<(Rows, String, Report), Failure<C::Error>> {
     let mut runs = runs::<C>(source, vary, options.quick)?;
     let former = former(vary, options.output)?;
     crate::output::prepare_directory(options.output)?;
@@ -189,11 +193,12 @@ fn rows<C: Case>(
     rows.write(&options.output.join(TABLE))?;
     draw(vary, &rows, options.output)?;
     let mut report = together(&C::PROGRAM, source, vary, &rows);
+    let bands = sample::bands(vary, &rows, options.output, &mut report)?;
     phases.stop();
     report.phases(&phases).threads(rayon::current_num_threads());
     report.passed &= rows.rows.iter().all(|row| row.outcome.is_ok());
     report.write(options.output)?;
-    Ok((rows, report))
+    Ok((rows, bands, report))
 }
 
 /// Values of the runs that the table of an earlier sweep has; one over other keys would be lost.
@@ -280,13 +285,16 @@ impl Run {
         let quick = if quick { "quick = true\n" } else { "" };
         let (text, set) = (source.text.trim_end(), set.join(", "));
         let text = format!("{text}\n\n[{SWEEP}]\n{quick}set = {{ {set} }}\n");
-        Self { name, values, source: Source::new(&source.path, text) }
+        Self { name, values, source: source.with_text(text) }
     }
 
     /// Its report, where it is finished in the folder of a sweep.
     fn finished(&self, sweep: &Path) -> Option<Report> {
         let report = Report::read(sweep.join(&self.name).join(crate::report::FILE_NAME)).ok()?;
-        report.provenance.scene.starts_with(self.source.text.trim_end()).then_some(report)
+        let Provenance { scene, stamp, .. } = &report.provenance;
+        let same = scene.starts_with(self.source.text.trim_end());
+        let holds = stamp.as_ref().is_none_or(|stamp| stamp.changed(&self.source.path).is_none());
+        (same && holds).then_some(report)
     }
 
     /// Kept where it is finished, gone on with where it is begun.
@@ -294,7 +302,7 @@ impl Run {
         if let Some(report) = self.finished(sweep) {
             return Ok(report);
         }
-        let begun = |header: Header| header.scene == self.source.text;
+        let begun = |header: Header| header.scene == self.source.text && header.check(options.output).is_ok();
         let resume = Header::read(options.output, C::PROGRAM.magic).is_ok_and(begun);
         Ok(super::run::<C>(&self.source, Options { resume, ..options })?.report)
     }

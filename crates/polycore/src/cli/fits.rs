@@ -38,6 +38,7 @@ pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {
             }
         }
         write_states(directory, name, table, &fits)?;
+        fits.iter().try_for_each(|fit| write_draws(directory, name, fit))?;
         all.push((name, table, fits));
     }
     if !all.is_empty() {
@@ -129,6 +130,21 @@ fn write_fits(directory: &Path, all: &[(&str, &Table, Vec<Fit>)]) -> Result<(), 
         }
     }
     output::atomic_write(directory.join("fits.csv"), |file| std::io::Write::write_all(file, text.as_bytes()))
+}
+
+/// `<data>_<law>_posterior.csv`: draws of the parameters, for `sweep --sample`.
+fn write_draws(directory: &Path, name: &str, fit: &Fit) -> Result<(), Error> {
+    if fit.draws.is_empty() {
+        return Ok(());
+    }
+    let unit = |parameter: &Fitted| scaled(0.0, parameter.unit).1;
+    let column = |(i, parameter): (usize, &Fitted)| {
+        fit.draws.iter().map(|draw| scaled(draw[i], parameter.unit).0).collect()
+    };
+    let lists: Vec<Vec<f64>> = fit.parameters.iter().enumerate().map(column).collect();
+    let columns: Vec<output::csv::Column> =
+        fit.parameters.iter().zip(&lists).map(|(one, list)| (one.name, unit(one), &list[..])).collect();
+    output::csv::write(directory.join(format!("{name}_{}_posterior.csv", fit.model.key)), &columns)
 }
 
 /// `<data>_states.csv`: the measured states, and beside them what every law makes of them.

@@ -1,7 +1,7 @@
 //! The scene of fits and trials: which laws, which data, trials, expectations.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use polycore::constitutive::hyperelastic::data::{Mode, Table};
 use polycore::constitutive::hyperelastic::{self, MODELS, ModelDescriptor};
@@ -90,7 +90,6 @@ impl Case {
             None => MODELS.iter().collect(),
             Some(names) => selected(source, names)?,
         };
-        let folder = source.path.parent().unwrap_or(Path::new(""));
         let mut data: Vec<(String, Table)> = Vec::new();
         for (i, entry) in fit.data.into_iter().enumerate() {
             let key = |field: &str| format!("fit.data[{i}].{field}");
@@ -106,7 +105,7 @@ impl Case {
                     "another name",
                 ));
             }
-            let mut table = Table::read(folder.join(&entry.file)).map_err(|error| {
+            let mut table = Table::read(source.file(&entry.file)).map_err(|error| {
                 source.error(&key("file"), error, "a CSV table of stretches and nominal stresses")
             })?;
             if let Some(mode) = entry.mode {

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use crate::scene::Stamp;
 use serde::{Deserialize, Serialize};
 
 /// Where a report comes from.
@@ -18,6 +19,9 @@ pub struct Provenance {
     pub git: Option<Git>,
     /// The scene as it was run.
     pub scene: String,
+    /// What else the results were computed from, once the run is finished.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stamp: Option<Stamp>,
     /// The machine.
     pub host: Host,
     /// When the report was begun, UTC, ISO 8601.
@@ -55,6 +59,7 @@ impl Provenance {
             version: version.to_owned(),
             git: Git::find(),
             scene: scene.to_owned(),
+            stamp: None,
             host: Host::find(),
             date: date(SystemTime::now()),
         }

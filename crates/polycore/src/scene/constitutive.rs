@@ -1,8 +1,6 @@
 //! A constitutive law, of Chapter 1 or learnt from data, as a scene names it.
 
 use std::collections::BTreeMap;
-#[cfg(feature = "surrogate")]
-use std::path::Path;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Deserializer};
@@ -89,7 +87,7 @@ impl ConstitutiveSpec {
                 return Err(source.error(&format!("{key}.{other}"), found, "one of them"));
             }
         }
-        let (path, key) = (source.path.parent().unwrap_or(Path::new("")).join(file), format!("{key}.learnt"));
+        let (path, key) = (source.file(file), format!("{key}.learnt"));
         // the file, its numbers, and these by rows and in panels
         let needed = 4.0 * std::fs::metadata(&path).map_or(0.0, |file| file.len() as f64);
         let available = crate::memory::available();

@@ -4,7 +4,7 @@ use schemars::generate::SchemaSettings;
 use schemars::{Schema, SchemaGenerator};
 use serde_json::{Value, json};
 
-use super::VERSION;
+use super::{INPUTS, VERSION};
 use crate::report::Quantity;
 
 /// The schema (draft 7, which editors of TOML read) of the scenes of a program: one of the types that `alternatives`
@@ -76,10 +76,15 @@ fn regex(name: &str) -> String {
     format!("^{}$", pieces.iter().enumerate().map(piece).collect::<String>())
 }
 
-/// The key that [`super::Source::parse`] checks and removes.
+/// The keys that [`super::Source::parse`] checks and removes.
 fn add_version(scene: &mut Value) {
     let version = json!({ "const": VERSION, "description": "The version of the scene format." });
     scene["properties"]["version"] = version;
+    scene["properties"][INPUTS] = json!({
+        "type": "object",
+        "additionalProperties": { "type": "string" },
+        "description": "Scenes whose results this one reads: NAME = \"PATH of the scene, relative to this one\".",
+    });
     match scene["required"].as_array_mut() {
         Some(required) => required.insert(0, json!("version")),
         None => scene["required"] = json!(["version"]),

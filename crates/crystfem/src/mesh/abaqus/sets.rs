@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::mesh::labelled::{Content, Element, Kind, Labels, line_error};
+use crate::mesh::labelled::{Content, Labels, line_error};
 use crate::mesh::surface::Surface;
-use crate::mesh::{Face, Mesh};
+use crate::mesh::{Cell, Face, Mesh, Shape};
 
 /// What a set is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,8 +89,10 @@ impl Resolver<'_> {
                     }
                     self.spend(set.entries.first().map_or(0, |entry| entry.0), 8 * members.len())?;
                     let of = members.iter().map(|place| &content.elements[*place as usize]);
-                    let nodes =
-                        of.flat_map(Element::nodes).filter_map(|label| self.nodes.get(*label)).collect();
+                    let nodes = of
+                        .flat_map(|element| content.nodes_of(element))
+                        .filter_map(|label| self.nodes.get(*label))
+                        .collect();
                     node_sets.entry(key).or_insert((set.name, Vec::new())).1.append(&mut { nodes });
                 }
                 Of::Faces => {
@@ -177,17 +179,13 @@ impl Resolver<'_> {
         self.spend(line, 6 * members.len())?;
         for place in members {
             let element = &content.elements[*place as usize];
-            let sides = match element.kind {
-                Kind::Hexahedron => 6,
-                Kind::Tetrahedron => 4,
-                // shells and lines have no sides of their own
-                _ => 0,
-            };
+            // shells and lines have no sides of their own
+            let sides = element.kind.solid().map_or(0, Shape::side_count);
             match side {
                 Some(side) if side < sides => found.push(Face { element: *place, side }),
                 Some(side) => {
                     let allowed = match sides {
-                        0 => "sides of hexahedra and tetrahedra".to_owned(),
+                        0 => "sides of hexahedra, tetrahedra and wedges".to_owned(),
                         sides => format!("S1 … S{sides}"),
                     };
                     let what = format!("side of element {}", element.label);
@@ -207,31 +205,33 @@ impl Resolver<'_> {
     }
 }
 
-/// Sides of hexahedra and tetrahedra that no other shares, by the element's position.
+/// Sides of solid elements that no other shares, by the element's position.
 fn outer_sides(content: &Content, nodes: &Labels) -> Result<BTreeMap<u32, Vec<u8>>, Error> {
     let mut mesh = Mesh { points: vec![[0.0; 3]; content.nodes.len()], ..Mesh::default() };
-    let mut places = [Vec::new(), Vec::new()];
+    let mut places = [const { Vec::new() }; 3];
     for (place, element) in (0u32..).zip(&content.elements) {
+        let Some(shape) = element.kind.solid() else { continue };
         // nodes that do not exist are named when the mesh is made
-        let own: Vec<u32> = element.nodes().iter().filter_map(|label| nodes.get(*label)).collect();
-        match element.kind {
-            Kind::Hexahedron => {
-                if let Ok(own) = own.try_into() {
-                    mesh.hexahedra.push(own);
-                    places[0].push(place);
-                }
+        let own: Vec<u32> = content.nodes_of(element).iter().filter_map(|label| nodes.get(*label)).collect();
+        if own.len() < shape.nodes() {
+            continue;
+        }
+        match shape {
+            Shape::Hexahedron => {
+                mesh.hexahedra.extend(own.first_chunk::<8>());
+                places[0].push(place);
             }
-            Kind::Tetrahedron => {
-                if let Ok(own) = own.try_into() {
-                    mesh.tetrahedra.push(own);
-                    places[1].push(place);
-                }
+            Shape::Tetrahedron => {
+                mesh.tetrahedra.extend(own.first_chunk::<4>());
+                places[1].push(place);
             }
-            _ => {}
+            _ => {
+                mesh.others.extend(Cell::new(&own));
+                places[2].push(place);
+            }
         }
     }
-    let [mut places, tetrahedra] = places;
-    places.extend(tetrahedra);
+    let places = places.concat();
     let mut outer: BTreeMap<u32, Vec<u8>> = BTreeMap::new();
     for face in Surface::of_all(&mesh)?.faces() {
         outer.entry(places[face.element as usize]).or_default().push(face.side);

@@ -110,9 +110,10 @@ fn what_is_wrong_is_named_with_its_line() {
         assert!(BRICK.contains(from), "{from}");
         BRICK.replace(from, to)
     };
-    refused("", &["no hexahedra or tetrahedra"]);
-    refused(&with("dc3d8", "C3D20R"), &["a.inp:15: element type: found \"C3D20R\"; allowed: C3D8, DC3D8"]);
-    for name in ["", "C3D", "C3D6", "C3D10", "C3D4-", "C3D8R5", "S8R"] {
+    refused("", &["no hexahedra, tetrahedra or wedges"]);
+    refused(&with("dc3d8", "C3D27R"), &["a.inp:15: element type: found \"C3D27R\"; allowed: C3D8, C3D4"]);
+    refused(&with("dc3d8", "C3D20R"), &["nodes of an element: found \"8\"; allowed: 20 for C3D20R"]);
+    for name in ["", "C3D", "C3D5", "C3D27", "C3D4-", "C3D8R5", "S9R"] {
         refused(&with("dc3d8", name), &["a.inp:15: element type"]);
     }
     refused(
@@ -157,4 +158,87 @@ fn sets_cannot_multiply_beyond_the_file() {
     // each set twice the one before: 2⁶⁰ members without a bound
     let doubling: String = (0..60).map(|k| format!("*NSET,NSET=s{}\ns{k},s{k}\n", k + 1)).collect();
     refused(&format!("{BRICK}*NSET,NSET=s0\n1\n{doubling}"), &["members of sets"]);
+}
+
+/// One element of each type in the order of nodes and sides of the Abaqus manual (28.1.4, three-dimensional solids), with
+/// nodes on edges where that order has them: a wrong one would fold the element.
+#[test]
+fn elements_of_all_types() {
+    let places: [[f64; 3]; 8] = [
+        [0., 0., 0.],
+        [2., 0., 0.],
+        [2., 2., 0.],
+        [0., 2., 0.],
+        [0., 0., 2.],
+        [2., 0., 2.],
+        [2., 2., 2.],
+        [0., 2., 2.],
+    ];
+    // of 20 nodes: 9 between 1 and 2, 10: 2-3, 11: 3-4, 12: 4-1, 13: 5-6, …, 17: 1-5, …, 20: 4-8
+    let hexahedron = "12 23 34 41 56 67 78 85 15 26 37 48";
+    let wedge = "12 23 31 45 56 64 14 25 36";
+    let tetrahedron = "12 23 31 14 24 34";
+    // sides of the manual: 1-2-3-4 of a hexahedron is S1, 3-6-4-1 of a wedge S5, 1-2-3 of a tetrahedron S1
+    let cases = [
+        ("DC3D20", vec![0, 1, 2, 3, 4, 5, 6, 7], hexahedron, 8.0, [("S1", 4.0, 2, 0.0), ("S4", 4.0, 0, 2.0)]),
+        ("C3D20R", vec![0, 1, 2, 3, 4, 5, 6, 7], hexahedron, 8.0, [("S3", 4.0, 1, 0.0), ("S2", 4.0, 2, 2.0)]),
+        ("DC3D6", vec![0, 1, 3, 4, 5, 7], "", 4.0, [("S3", 4.0, 1, 0.0), ("S5", 4.0, 0, 0.0)]),
+        ("C3D15", vec![0, 1, 3, 4, 5, 7], wedge, 4.0, [("S2", 2.0, 2, 2.0), ("S5", 4.0, 0, 0.0)]),
+        ("C3D10", vec![0, 1, 3, 4], tetrahedron, 4.0 / 3.0, [("S1", 2.0, 2, 0.0), ("S4", 2.0, 0, 0.0)]),
+        ("DC3D10", vec![0, 1, 3, 4], tetrahedron, 4.0 / 3.0, [("S2", 2.0, 1, 0.0), ("S1", 2.0, 2, 0.0)]),
+    ];
+    for (kind, corners, edges, volume, sides) in cases {
+        let mut points: Vec<[f64; 3]> = corners.iter().map(|&k| places[k]).collect();
+        for edge in edges.split_whitespace() {
+            let [p, q] = [0, 1].map(|k| edge.as_bytes()[k] as usize - usize::from(b'1'));
+            points.push([0, 1, 2].map(|d| 0.5 * (points[p][d] + points[q][d])));
+        }
+        let mut text = "*NODE\n".to_owned();
+        for (number, [x, y, z]) in (1..).zip(&points) {
+            text += &format!("{number}, {x}, {y}, {z}\n");
+        }
+        text += &format!("*ELEMENT, TYPE={kind}, ELSET=ALL\n7");
+        for number in 1..=points.len() {
+            // sixteen numbers to a line
+            text += if number % 16 == 0 { ",\n" } else { ", " };
+            text += &number.to_string();
+        }
+        text += "\n";
+        for (side, ..) in sides {
+            text += &format!("*SURFACE, NAME={side}\nALL, {side}\n");
+        }
+        text += "*SURFACE, NAME=skin\nALL,\n";
+        let read = parsed(&text);
+        assert!((read.quality.volume - volume).abs() < 1e-13, "{kind}");
+        assert_eq!(read.mesh.others[0].nodes(), (0..points.len() as u32).collect::<Vec<_>>());
+        for (side, exact, axis, at) in sides {
+            let faces = &read.mesh.surfaces[side];
+            assert!((area(&read.mesh, faces[0]) - exact).abs() < 1e-13, "{kind} {side}");
+            let nodes = read.mesh.face_nodes(faces[0]);
+            assert!(nodes.iter().all(|node| read.mesh.points[*node as usize][axis] == at), "{kind} {side}");
+        }
+        assert_eq!(read.mesh.surfaces["skin"].len(), usize::from(read.mesh.side_count(0)));
+        // two nodes of an edge exchanged: folded, and named
+        if !edges.is_empty() {
+            let folded =
+                text.replace("*ELEMENT", "*NODE\n900, -9., 0., 0.\n*ELEMENT").replace("\n7, 1,", "\n7, 900,");
+            let error = parse(Path::new("a.inp"), folded.as_bytes(), 1.0).unwrap_err().to_string();
+            assert!(error.contains("inverted or without volume"), "{error}");
+        }
+    }
+}
+
+#[test]
+fn orders_do_not_mix() {
+    let nodes: String = (1..=16).map(|n| format!("{n},{},{},{}\n", n % 3, n % 5, n % 7)).collect();
+    let text = format!("*NODE\n{nodes}*ELEMENT,TYPE=C3D7\n1,1,2,3,4\n");
+    refused(&text, &["element type: found \"C3D7\"", "C3D20"]);
+    let mut mesh = Grid::uniform([0.0; 3], [2.0, 1.0, 1.0], [2, 1, 1]).unwrap().mesh("all").unwrap();
+    let second = mesh.clone().second_order();
+    let cell = second.others[1];
+    mesh.points = second.points;
+    mesh.hexahedra.pop();
+    mesh.others.push(cell);
+    let error = crate::mesh::quality::check(&mesh, None).unwrap_err().to_string();
+    assert!(error.contains("elements 0 and 1 have the corners of one face and different nodes"), "{error}");
 }

@@ -8,8 +8,8 @@ use crate::mesh::Mesh;
 const WIDTH: usize = 20;
 
 /// Writes nodes, elements, sets and surfaces, numbers counted from 1, coordinates to the last bit where twenty letters
-/// hold it and to 1e-12 elsewhere. `diffusive` elements are DC3D8 and DC3D4 (Abaqus), otherwise C3D8 and C3D4 (CalculiX takes both, structural ones
-/// for `*HEAT TRANSFER` too). Names with spaces or commas are written with underscores.
+/// hold it and to 1e-12 elsewhere. `diffusive` elements are DC3D8, DC3D4, … (Abaqus), otherwise C3D8, C3D4, … (CalculiX takes both,
+/// structural ones for `*HEAT TRANSFER` too). Names with spaces or commas are written with underscores.
 ///
 /// # Errors
 /// Of the writer.
@@ -32,6 +32,17 @@ pub fn write(mesh: &Mesh, diffusive: bool, to: &mut impl Write) -> io::Result<()
         writeln!(to, "*ELEMENT,TYPE={prefix}C3D4")?;
         for [a, b, c, d] in mesh.tetrahedra.iter().map(|nodes| nodes.map(|node| node + 1)) {
             writeln!(to, "{number},{a},{b},{c},{d}")?;
+            number += 1;
+        }
+    }
+    for same in mesh.others.chunk_by(|a, b| a.shape == b.shape) {
+        let kind = same.first().map_or("", |cell| cell.shape.abaqus());
+        writeln!(to, "*ELEMENT,TYPE={prefix}{kind}")?;
+        for cell in same {
+            let words: Vec<String> = cell.nodes().iter().map(|node| (node + 1).to_string()).collect();
+            // at most sixteen numbers to a line
+            let lines: Vec<String> = words.chunks(15).map(|line| line.join(",")).collect();
+            writeln!(to, "{number},{}", lines.join(",\n"))?;
             number += 1;
         }
     }

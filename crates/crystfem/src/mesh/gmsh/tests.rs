@@ -140,8 +140,8 @@ fn what_is_wrong_is_named_with_its_line() {
     refused("", &["a.msh:1: first line", "$MeshFormat"]);
     refused(&with("4.1 0 8", "2.2 0 8"), &["a.msh:2:", "found \"2.2 0 8\"", "Mesh.MshFileVersion = 4.1"]);
     refused(
-        &with("3 7 4 1\n11", "3 7 11 1\n11"),
-        &["a.msh:27: type of elements: found \"11\"", "4 (tetrahedron)"],
+        &with("3 7 4 1\n11", "3 7 12 1\n11"),
+        &["a.msh:27: type of elements: found \"12\"", "4, 11 (tetrahedra)", "SecondOrderIncomplete"],
     );
     refused(&with("11 1 2 3 4", "11 1 2 3 9"), &["a.msh:28: node of element 11: found \"9\""]);
     refused(&with("0 1 0\n0 0", "0 x 0\n0 0"), &["a.msh:21: coordinate: found \"x\"; allowed: a number"]);
@@ -171,4 +171,47 @@ fn groups_cannot_multiply_beyond_the_file() {
         .replace("1 9 0\n", &format!("3000 {groups}0\n"))
         .replace("1 1 1 1\n3 7 4 1\n11 1 2 3 4\n", &format!("3000 3000 0 2999\n{blocks}"));
     refused(&text, &["members of physical groups"]);
+}
+
+/// A quarter of a ring, radii 1 and 2, height 1, one element high, of second order on curved edges; written by Gmsh 4.15 in
+/// both formats, whose orders of nodes differ.
+#[test]
+fn second_order_meshes_written_by_gmsh() {
+    for (name, count) in [("second_hexes", 3), ("second_wedges", 6), ("second_tets", 18)] {
+        let [msh, inp] = ["msh", "inp"]
+            .map(|ending| crate::mesh::read(&fixture(&format!("{name}.{ending}")).0, 1.0).unwrap());
+        let exact = 0.75 * std::f64::consts::PI;
+        for read in [&msh, &inp] {
+            let mesh = &read.mesh;
+            assert_eq!((mesh.others.len(), mesh.element_sets["ring"].len()), (count, count), "{name}");
+            // arcs of 30° as parabolas: 1e-4 of the area between arc and chord and its square
+            assert!((read.quality.volume / exact - 1.0).abs() < 1e-3, "{name}: {}", read.quality.volume);
+            for (surface, exact) in [("below", exact), ("outside", std::f64::consts::PI)] {
+                let total: f64 = mesh.surfaces[surface].iter().map(|face| area(mesh, *face)).sum();
+                assert!((total / exact - 1.0).abs() < 1e-3, "{name} {surface} {total}");
+            }
+            // nodes on the middles of edges lie near them
+            for cell in &mesh.others {
+                let nodes = cell.nodes();
+                for (&[p, q], middle) in cell.shape.edges().iter().zip(&nodes[cell.shape.corners()..]) {
+                    let ends = [mesh.point(nodes[p]), mesh.point(nodes[q])];
+                    let away = (0.5 * (ends[0] + ends[1]) - mesh.point(*middle)).norm();
+                    assert!(away < 0.1 * (ends[0] - ends[1]).norm(), "{name}");
+                }
+            }
+        }
+        assert!((msh.quality.volume / inp.quality.volume - 1.0).abs() < 1e-12);
+        // the same nodes at the same places in each element
+        for (a, b) in msh.mesh.others.iter().zip(&inp.mesh.others) {
+            for (a, b) in a.nodes().iter().zip(b.nodes()) {
+                assert!((msh.mesh.point(*a) - inp.mesh.point(*b)).norm() < 1e-12, "{name}");
+            }
+        }
+        // written and read back
+        let mut text = Vec::new();
+        crate::mesh::abaqus::write(&msh.mesh, true, &mut text).unwrap();
+        let again = crate::mesh::abaqus::parse(Path::new("again.inp"), &text, 1.0).unwrap();
+        assert_eq!(again.mesh.others, msh.mesh.others);
+        assert_eq!(again.mesh.surfaces, msh.mesh.surfaces);
+    }
 }

@@ -28,7 +28,14 @@ pub fn read_csv(path: &Path) -> Result<ToolPath, Error> {
             return Err(error(path, lines[row], "time", end, format!("{start} s or later")));
         }
         let place = |row: usize| [x[row], y[row], z[row]];
-        moves.push(Move { from: place(row - 1), to: place(row), start, end, prints: print[row] != 0.0 });
+        moves.push(Move {
+            from: place(row - 1),
+            to: place(row),
+            start,
+            end,
+            prints: print[row] != 0.0,
+            fed: 0.0,
+        });
     }
-    Ok(ToolPath { moves, notes: Vec::new() })
+    Ok(ToolPath { moves, ..ToolPath::default() })
 }

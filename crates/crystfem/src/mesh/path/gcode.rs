@@ -1,18 +1,25 @@
-//! A small reader of G-code.
+//! A reader of G-code.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{Move, ToolPath, error};
+use super::printer::Printer;
+use super::{Command, Setting, ToolPath, error};
 use crate::error::Error;
 
-/// Reads the moves of a G-code file: G0 and G1 with X, Y, Z, E, F; G4 (wait), G20 and G21 (inch, mm), G28 (home),
-/// G90 and G91, M82 and M83 (absolute, relative), G92 (here is …). A move lays material down if E grows along it and it goes across.
-/// Velocity is F all along a move, without acceleration. Other commands are passed over and noted.
+/// 0 °C, K.
+const CELSIUS: f64 = 273.15;
+
+/// Reads a G-code file: G0 and G1 with X, Y, Z, E, F; arcs G2 and G3 in the XY plane with I and J or R, in chords that
+/// are 0.01 mm from the arc at most; G4 (wait), G20 and G21 (inch, mm), G28 (home), G90 and G91, M82 and M83 (absolute, relative),
+/// G92 (here is …), M104 and M109, M140 and M190 (temperatures; how long it is waited for them is not known, and S0, off, leaves the last one), M106 and M107
+/// (fan). A move lays material down if E grows along it and it goes across. Velocity is F all along a move;
+/// [`ToolPath::accelerated`] limits acceleration. Other commands are passed over and noted.
 ///
 /// # Errors
 /// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line for words that are no numbers, a move
-/// before any F, an F that is not positive, and moves that are not straight (G2, G3, G5).
+/// before any F, an F that is not positive, arcs without a centre or radius that fits, other curves (G5), other planes (G18,
+/// G19), and temperatures below absolute zero.
 pub fn read_gcode(path: &Path) -> Result<ToolPath, Error> {
     parse(path, &crate::mesh::read_bytes(path)?)
 }
@@ -22,8 +29,8 @@ pub fn read_gcode(path: &Path) -> Result<ToolPath, Error> {
 /// # Errors
 /// See [`read_gcode`].
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<ToolPath, Error> {
-    let mut printer = Printer { unit: 1e-3, ..Printer::default() };
-    let mut moves = Vec::new();
+    let mut printer = Printer::new();
+    let mut path_of = ToolPath::default();
     let mut skipped: BTreeMap<String, usize> = BTreeMap::new();
     for (line, text) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
         let text = String::from_utf8_lossy(text);
@@ -33,21 +40,40 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<ToolPath, Error> {
         let code = format!("{letter}{number}");
         let value = |letter: char| words.iter().rev().find(|word| word.0 == letter).map(|word| word.1);
         match code.as_str() {
-            "G0" | "G1" => {
-                if let Some(one) = printer.go(value).map_err(|found| {
-                    error(path, line, "velocity F", found, "positive and finite, before or in the first move")
-                })? {
-                    moves.push(one);
+            "G0" | "G1" | "G2" | "G3" => {
+                let arc = match code.as_str() {
+                    "G2" => Some(-1.0),
+                    "G3" => Some(1.0),
+                    _ => None,
+                };
+                printer
+                    .go(value, arc, &mut path_of.moves)
+                    .map_err(|wrong| error(path, line, wrong.what, wrong.found_in(&text), wrong.allowed))?;
+            }
+            "G5" => {
+                return Err(error(path, line, "command", code, "straight moves and arcs, G0 to G3"));
+            }
+            "G18" | "G19" => return Err(error(path, line, "command", code, "G17, arcs in the XY plane")),
+            "G17" => {}
+            "M104" | "M109" | "M140" | "M190" => {
+                let setting =
+                    if matches!(code.as_str(), "M104" | "M109") { Setting::Nozzle } else { Setting::Bed };
+                // S, or R that waits for cooling too; a command without either waits
+                if let Some(celsius) = value('S').or(value('R')) {
+                    if celsius < -CELSIUS {
+                        return Err(error(path, line, "temperature", celsius, "-273.15 °C or above"));
+                    }
+                    // 0 switches the heater off; how it cools is not known
+                    if celsius != 0.0 {
+                        let value = celsius + CELSIUS;
+                        path_of.commands.push(Command { time: printer.time, setting, value });
+                    }
                 }
             }
-            "G2" | "G3" | "G5" => {
-                return Err(error(
-                    path,
-                    line,
-                    "command",
-                    code,
-                    "straight moves, G0 and G1 (arc fitting off)",
-                ));
+            "M106" | "M107" => {
+                let speed = if code == "M107" { 0.0 } else { value('S').unwrap_or(255.0) / 255.0 };
+                let value = speed.clamp(0.0, 1.0);
+                path_of.commands.push(Command { time: printer.time, setting: Setting::Fan, value });
             }
             // P is in ms, S in s
             "G4" => printer.time += value('S').unwrap_or(value('P').unwrap_or(0.0) * 1e-3).max(0.0),
@@ -62,7 +88,6 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<ToolPath, Error> {
             _ => *skipped.entry(code).or_default() += 1,
         }
     }
-    let mut notes = Vec::new();
     if !skipped.is_empty() {
         let more = skipped.len().saturating_sub(20);
         let mut names: Vec<String> =
@@ -70,93 +95,13 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<ToolPath, Error> {
         if more > 0 {
             names.push(format!("{more} more"));
         }
-        notes.push(format!("commands not used: {}", names.join(", ")));
+        path_of.notes.push(format!("commands not used: {}", names.join(", ")));
     }
+    path_of.rest = printer.time - path_of.moves.last().map_or(0.0, |last| last.end);
     if printer.time.is_finite() {
-        Ok(ToolPath { moves, notes })
+        Ok(path_of)
     } else {
         Err(error(path, 1, "duration", printer.time, "a finite time, s"))
-    }
-}
-
-/// State of the printer; places in m as the printer counts them, with what G92 has added.
-#[derive(Debug, Default)]
-struct Printer {
-    /// Metres per unit.
-    unit: f64,
-    place: [f64; 3],
-    /// Names of places minus places.
-    offset: [f64; 3],
-    /// Filament fed, as named, in units of the file.
-    feed: f64,
-    relative: bool,
-    relative_feed: bool,
-    /// m/s; 0 before the first F.
-    velocity: f64,
-    time: f64,
-}
-
-impl Printer {
-    /// A move; `None` where the nozzle stays. A velocity that cannot be is the error.
-    fn go(&mut self, value: impl Fn(char) -> Option<f64>) -> Result<Option<Move>, f64> {
-        if let Some(feed) = value('F') {
-            // per minute
-            self.velocity = feed * self.unit / 60.0;
-            if !(self.velocity > 0.0 && self.velocity.is_finite()) {
-                return Err(feed);
-            }
-        }
-        let from = self.place;
-        for (d, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
-            if let Some(number) = value(letter) {
-                let to = number * self.unit;
-                self.place[d] = if self.relative { from[d] + to } else { to - self.offset[d] };
-            }
-        }
-        let fed = match value('E') {
-            None => 0.0,
-            Some(number) if self.relative_feed => number,
-            Some(number) => number - self.feed,
-        };
-        self.feed += fed;
-        let length = (0..3).map(|d| (self.place[d] - from[d]).powi(2)).sum::<f64>().sqrt();
-        // filament alone takes its time too
-        let way = if length > 0.0 { length } else { fed.abs() * self.unit };
-        if way == 0.0 {
-            return Ok(None);
-        }
-        if self.velocity == 0.0 {
-            return Err(0.0);
-        }
-        let start = self.time;
-        self.time += way / self.velocity;
-        // filament that comes while the nozzle goes up or down alone fills it again after a retraction
-        let across = self.place[0] != from[0] || self.place[1] != from[1];
-        let one = Move { from, to: self.place, start, end: self.time, prints: fed > 0.0 && across };
-        Ok((length > 0.0).then_some(one))
-    }
-
-    /// To zero along the axes named, or along all.
-    fn home(&mut self, value: impl Fn(char) -> Option<f64>) {
-        let named = ['X', 'Y', 'Z'].map(|letter| value(letter).is_some());
-        for d in 0..3 {
-            if named[d] || named == [false; 3] {
-                self.place[d] = 0.0;
-                self.offset[d] = 0.0;
-            }
-        }
-    }
-
-    /// G92: the place keeps, its name changes.
-    fn rename(&mut self, value: impl Fn(char) -> Option<f64>) {
-        for (d, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
-            if let Some(number) = value(letter) {
-                self.offset[d] = number * self.unit - self.place[d];
-            }
-        }
-        if let Some(number) = value('E') {
-            self.feed = number;
-        }
     }
 }
 

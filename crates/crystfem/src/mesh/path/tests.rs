@@ -58,8 +58,14 @@ fn elements_appear_as_the_nozzle_passes() {
 fn every_centre_is_found_that_a_search_of_all_finds() {
     // slanted, rising, standing and far moves, beside a double loop over moves and elements
     let mesh = Grid::uniform([0.0; 3], [0.01, 0.007, 0.002], [23, 17, 5]).unwrap().mesh("plate").unwrap();
-    let line =
-        |from: [f64; 3], to: [f64; 3], start: f64| Move { from, to, start, end: start + 1.0, prints: true };
+    let line = |from: [f64; 3], to: [f64; 3], start: f64| Move {
+        from,
+        to,
+        start,
+        end: start + 1.0,
+        prints: true,
+        fed: 0.0,
+    };
     let moves = vec![
         line([-0.5, -0.4, 4e-4], [0.9, 0.6, 4e-4], 3.0),
         line([0.002, 0.001, 1e-3], [0.009, 0.006, 2e-3], 1.0),
@@ -67,7 +73,7 @@ fn every_centre_is_found_that_a_search_of_all_finds() {
         line([1e9, 0.003, 2e-3], [-1e9, 0.004, 2e-3], 5.0),
         line([0.0, 0.1, 4e-4], [0.01, 0.1, 4e-4], 0.0),
     ];
-    let path = ToolPath { moves, notes: Vec::new() };
+    let path = ToolPath { moves, ..ToolPath::default() };
     let bead = Bead { width: 1.3e-3, height: 5e-4 };
     let all: Vec<u32> = (0..mesh.element_count() as u32).collect();
     let activation = path.activation(&mesh, &all, bead).unwrap();
@@ -123,7 +129,7 @@ fn gaps_can_be_filled() {
     let moves: Vec<Move> = (path.moves.iter().copied())
         .map(|one| Move { prints: one.prints && one.to[0] > one.from[0] && one.to[2] < 3e-4, ..one })
         .collect();
-    let path = ToolPath { moves, notes: Vec::new() };
+    let path = ToolPath { moves, ..ToolPath::default() };
     let mut activation = path.activation(&mesh, &all, Bead { width: 5e-4, height: 2e-4 }).unwrap();
     assert_eq!(activation.missed.len(), 300);
     // the second layer was never printed
@@ -155,7 +161,8 @@ fn codes_and_their_forms() {
     for (one, start) in path.moves.iter().zip(starts) {
         assert!((one.start - start).abs() < 1e-12, "{one:?} {start}");
     }
-    assert_eq!(path.notes, ["commands not used: M104 (1), M117 (1)"]);
+    assert_eq!(path.notes, ["commands not used: M117 (1)"]);
+    assert_eq!(path.commands, [Command { time: 0.0, setting: Setting::Nozzle, value: 220.0 + 273.15 }]);
     let moved = path.clone().shifted([1.0, 0.0, 0.0]);
     assert_eq!(moved.moves[0].from, [1.0, 0.0, 0.0]);
     assert_eq!(moved.duration(), path.duration());
@@ -165,7 +172,16 @@ fn codes_and_their_forms() {
 fn what_is_wrong_is_named_with_its_line() {
     refused("G21\nG1 X1\n", &["a.gcode:2: velocity F: found \"0\""]);
     refused("G1 X1 F-5\n", &["a.gcode:1: velocity F: found \"-5\""]);
-    refused("G1 F100\nG2 X1 Y1 I1\n", &["a.gcode:2: command: found \"G2\"; allowed: straight moves"]);
+    refused(
+        "G1 F100\nG5 X1 Y1 I1\n",
+        &["a.gcode:2: command: found \"G5\"; allowed: straight moves and arcs"],
+    );
+    refused("G18\n", &["a.gcode:1: command: found \"G18\"", "G17"]);
+    refused("G1 F100\nG2 X1 Y1\n", &["a.gcode:2: arc: found \"G2 X1 Y1\"; allowed: I and J, or R"]);
+    refused("G1 F100\nG3 X4 R1\n", &["a.gcode:2: radius of an arc: found \"1\"; allowed: 2 or more in size"]);
+    refused("G1 F100\nG3 R1\n", &["a.gcode:2: arc: found \"G3 R1\"", "full circle"]);
+    refused("G1 F100\nG2 X5 Y5 I1\n", &["a.gcode:2: end of an arc", "1 from its centre"]);
+    refused("M104 S-300\n", &["a.gcode:1: temperature", "-273.15"]);
     refused("G1 X1.2.3 F100\n", &["a.gcode:1: word: found \"X1.2.3 F100\""]);
     refused("G1 X?\n", &["a.gcode:1: word: found \"?\""]);
     let (mesh, path) = plate();
@@ -218,16 +234,124 @@ fn where_a_path_lies() {
         start,
         end: start + 1.0,
         prints: true,
+        fed: 0.0,
     };
     let path =
-        ToolPath { moves: vec![line([0.005, 0.0025], 0.0), line([0.1, 0.0025], 1.0)], notes: Vec::new() };
+        ToolPath { moves: vec![line([0.005, 0.0025], 0.0), line([0.1, 0.0025], 1.0)], ..ToolPath::default() };
     assert!((path.outside(&mesh, &all, bead) - 0.75).abs() < 1e-12);
     assert_eq!(path.bounds(bead), Some([[0.005, 0.0025, 0.0], [0.11, 0.0025, 2e-4]]));
     // over the whole bed and one more: nothing above the brick, nothing below it
     for z in [-1e-3, 1e-2] {
         assert_eq!(path.clone().shifted([0.0, 0.0, z]).outside(&mesh, &all, bead), 1.0);
     }
-    let one = ToolPath { moves: vec![line([0.1, 0.3], 0.0)], notes: Vec::new() }.centred(&mesh, &all, bead);
+    let one =
+        ToolPath { moves: vec![line([0.1, 0.3], 0.0)], ..ToolPath::default() }.centred(&mesh, &all, bead);
     assert!(one.outside(&mesh, &all, bead) == 0.0 && (one.moves[0].from[1] - 0.0025).abs() < 1e-15);
     assert_eq!(ToolPath::default().bounds(bead), None);
+}
+
+/// The arcs of tinyg's test: 270° clockwise and 90° anticlockwise of radius 10, a full circle of 20, a half one by R; exact
+/// lengths, chords within 0.01 mm, and filament along them.
+#[test]
+fn arcs_have_their_lengths() {
+    let path = parsed(
+        "G21\nG90\nM83\nG0 X0 Y0 Z0.25 F1200\nG2 X10 Y-10 I10 E1\nG0 X0 Y0\nG3 X10 Y-10 I10 E1\nG0 X0 Y0\n\
+         G2 X0 Y0 I20 E1\nG0 X0 Y5\nG0 X0 Y0\nG3 X20 Y0 R10 E1\nG0 X0 Y0\nG2 X0 Y20 R-10.5 E1\n",
+    );
+    let centres =
+        [[10.0, 0.0], [10.0, 0.0], [20.0, 0.0], [10.0, 0.0], [-(10.5f64.powi(2) - 100.0).sqrt(), 10.0]];
+    let half = (10.0f64 / 10.5).asin();
+    let exact = [47.12389, 15.70796, 125.66371, 31.41593, 10.5 * 2.0 * (std::f64::consts::PI - half)];
+    let mut arcs = path.moves.split(|one| !one.prints).filter(|arc| !arc.is_empty());
+    for (centre, exact) in centres.into_iter().zip(exact) {
+        let arc = arcs.next().unwrap();
+        // at 20 mm/s
+        let found = 20.0 * (arc[arc.len() - 1].end - arc[0].start);
+        assert!((found - exact).abs() < 6e-6, "{found} {exact}");
+        assert!((arc.iter().map(|one| one.fed).sum::<f64>() - 1e-3).abs() < 1e-15);
+        let radius = |x: [f64; 2]| 1e-3 * (1e3 * x[0] - centre[0]).hypot(1e3 * x[1] - centre[1]);
+        let own = radius([arc[0].from[0], arc[0].from[1]]);
+        for one in arc {
+            assert!((radius([one.to[0], one.to[1]]) - own).abs() < 1e-12);
+            let away = own - radius([0, 1].map(|d| 0.5 * (one.from[d] + one.to[d])));
+            assert!(away > 0.0 && away < 1.0001e-5, "{away}");
+        }
+    }
+    assert!(arcs.next().is_none());
+    // a helix, relative, in inches: half a turn of radius 1 in, 1 in up
+    let helix = parsed("G20\nG91\nG1 F60\nG3 X2 Y0 Z1 R1 E0.1\n");
+    let last = helix.moves[helix.moves.len() - 1];
+    assert!((last.to[0] - 0.0508).abs() < 1e-12 && (last.to[2] - 0.0254).abs() < 1e-15);
+    assert!((last.end - std::f64::consts::PI.hypot(1.0)).abs() < 1e-9);
+    let middle = helix.moves[helix.moves.len() / 2].from;
+    assert!((middle[1] + 0.0254).abs() < 1e-4 && (middle[2] - 0.0127).abs() < 4e-4, "{middle:?}");
+}
+
+/// From rest to rest: L/v + v/a where the velocity is reached, 2√(L/a) where not; through a corner of 90° at jerk speed.
+#[test]
+fn accelerations_take_their_time() {
+    let time = |text: &str| parsed(text).accelerated(0.5, 0.008).unwrap().duration();
+    assert!((time("G1 X100 F3000\n") - (2.0 + 0.1)).abs() < 1e-12);
+    assert!((time("G1 X2 F6000\n") - 2.0 * (0.002f64 / 0.5).sqrt()).abs() < 1e-12);
+    // straight on as one move
+    assert!((time("G1 X60 F3000\nG1 X100\n") - 2.1).abs() < 1e-12);
+    // from 50 mm/s down to 8 at the corner: twice (50 + 42)/500 s and what is left at 50 mm/s
+    let ramp = (2.5e-3 - 0.64e-4 / 1.0 + 2.5e-3) / (2.0 * 0.5);
+    let exact = 2.0 * ((0.05 + 0.042) / 0.5 + (0.1 - ramp) / 0.05);
+    let found = time("G1 X100 F3000\nG1 Y100\n");
+    assert!((found - exact).abs() < 1e-12, "{found} {exact}");
+    // a wait keeps its time, and the command after it moves with it
+    let path = parsed("G1 X100 F3000\nG4 S3\nM104 S200\nG1 Y100\n").accelerated(0.5, 0.008).unwrap();
+    assert!((path.duration() - exact - 3.0).abs() < 1e-12);
+    assert!((path.commands[0].time - path.moves[1].start).abs() < 1e-12);
+    assert!(parsed("G1 X1 F60\n").accelerated(0.0, 1.0).is_err());
+}
+
+/// cube.gcode of the formulation: the first line's bead is 0.449985 mm wide; widths of a bead from its filament.
+#[test]
+fn beads_come_from_filament() {
+    let path = parsed("M83\nG1 F600 Z0.25\nG1 X10 E0.4\nG1 Z0.5\nG1 X0 E0.4\nM106 S127.5\nG1 E-1\n");
+    let area = 0.4 * std::f64::consts::PI * 1.75f64.powi(2) / 4.0 / 10.0;
+    let printed: Vec<&Move> = path.printing().collect();
+    assert!((1e6 * printed[0].area(1.75e-3) - area).abs() < 1e-12);
+    assert!((path.fed() - 0.8e-3).abs() < 1e-15);
+    let levels = path.levels();
+    assert!(levels.len() == 2 && (levels[1] - 5e-4).abs() < 1e-15);
+    assert!(path.heights(None).iter().all(|height| (height - 2.5e-4).abs() < 1e-15));
+    let width = stadium_width(1e-6 * area, 2.5e-4);
+    // its area back: rectangle and circle
+    let (h, w) = (2.5e-4, width);
+    assert!((h * (w - h) + 0.25 * std::f64::consts::PI * h * h - 1e-6 * area).abs() < 1e-18);
+    assert_eq!(path.setting(Setting::Fan), [(path.moves[3].end, 0.5)]);
+    let bed =
+        parsed("M140 S60\nM190 S60\nG1 X10 F600\nM140 S55\nM140 S50\nG1 X0\nM140 S0\n").setting(Setting::Bed);
+    assert_eq!(bed, [(0.0, 333.15), (1.0, 323.15)]);
+    // filament alone is time without a move: 1 mm at 10 mm/s
+    assert!((path.rest - 0.1).abs() < 1e-12);
+}
+
+/// Files as slicers write them, with figures of a reader of our own in Python (formulation-print.md, part E):
+/// filament of printing moves, time at F with waits, and with 500 mm/s² and a jerk of 8 mm/s.
+#[test]
+fn files_of_slicers() {
+    // Zugstab_small.gcode is a file of PeriLab (BSD-3-Clause, see its head); the others are not ours to copy
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
+    let other = std::env::var_os("CRYSTFEM_GCODE").map_or_else(|| own.clone(), std::path::PathBuf::from);
+    for (file, folder, fed, even, limited, wait, bed) in [
+        ("Zugstab_small.gcode", &own, 320.1546, 443.32, 457.45, 0.0, 85.0),
+        ("20x20x20_1wall_1bottom.gcode", &other, 736.5961, 965.29, 1010.68, 10.0, 60.0),
+        ("GuideCurve.gcode", &other, 46.79, 94.50, 95.12, 5.0, 230.0),
+    ] {
+        let path = folder.join(file);
+        if !path.exists() {
+            evidence::skipped(&format!("{file} (CRYSTFEM_GCODE names its folder)"));
+            continue;
+        }
+        let path = read_gcode(&path).unwrap();
+        assert!((1e3 * path.fed() - fed).abs() < 5e-5, "{file}: {}", path.fed());
+        assert!((path.duration() - wait - even).abs() < 5.1e-3, "{file}: {}", path.duration());
+        let planned = path.clone().accelerated(0.5, 8e-3).unwrap();
+        assert!((planned.duration() - wait - limited).abs() < 5.1e-3, "{file}: {}", planned.duration());
+        assert!((path.setting(Setting::Bed)[0].1 - 273.15 - bed).abs() < 1e-9, "{file}");
+    }
 }

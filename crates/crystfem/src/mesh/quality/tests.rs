@@ -68,7 +68,7 @@ fn inverted_elements_and_slivers_are_named_with_their_place() {
 
 #[test]
 fn numbers_that_are_wrong_are_named() {
-    refused(&Mesh::default(), &["no hexahedra or tetrahedra"]);
+    refused(&Mesh::default(), &["no hexahedra, tetrahedra or wedges"]);
     let mut mesh = brick();
     mesh.points[3][1] = f64::INFINITY;
     refused(&mesh, &["node 3 at [", "inf", "finite"]);

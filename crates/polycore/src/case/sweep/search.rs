@@ -52,8 +52,9 @@ pub fn search<C: Case>(
     let Search { key, ends: [low, high], unit } = search;
     let told = |value: f64| format!("{value}{unit}");
     let mut try_out = |values: &[f64]| -> Result<(Vec<bool>, Finished), Failure<C::Error>> {
-        let vary = Vary { key: key.clone(), values: values.iter().map(|&value| told(value)).collect() };
-        let (rows, report) = rows::<C>(source, &[vary], options)?;
+        let tried = values.iter().map(|&value| told(value)).collect();
+        let vary = Vary { key: key.clone(), values: tried, drawn: false };
+        let (rows, _, report) = rows::<C>(source, &[vary], options)?;
         let met = |row: &Row| row.outcome.as_ref().is_ok_and(|own| own.passed());
         if rows.rows.iter().any(|row| row.outcome.as_ref().is_ok_and(|own| own.expect.is_empty())) {
             let reason = "found a scene without [[expect]]; allowed: one with expectations".to_owned();

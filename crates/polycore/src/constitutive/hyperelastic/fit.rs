@@ -24,6 +24,9 @@ pub struct Fit {
     pub parameters: Vec<Fitted>,
     /// Root mean square of the residuals over the measured stresses, Pa.
     pub rms: f64,
+    /// Draws of all parameters from their posterior ([`crate::posterior`]); those that the data do not determine stay at their
+    /// values. Empty where the data determine none.
+    pub draws: Vec<Vec<f64>>,
     /// Measured stresses.
     pub measurements: usize,
     /// Evaluations of all residuals, over all starts (without those for derivatives).
@@ -136,7 +139,7 @@ pub fn fit(model: &'static ModelDescriptor, table: &Table) -> Result<Fit, Error>
     // objective = ½Σr², so 1e-4 in rms is 2e-4 in the objective
     let least = 0.5 * measurements as f64 * (rms / modulus).powi(2);
     let agreeing = ends.iter().filter(|(objective, _)| *objective <= least * (1.0 + 2e-4)).count();
-    let errors = map.standard_errors(best, table);
+    let (errors, draws) = map.uncertainty(best, table);
     let parameters = model
         .parameters
         .iter()
@@ -149,7 +152,7 @@ pub fn fit(model: &'static ModelDescriptor, table: &Table) -> Result<Fit, Error>
             standard_error: errors[i],
         })
         .collect();
-    Ok(Fit { law, model, parameters, rms, measurements, iterations, starts: (starts.len(), agreeing) })
+    Ok(Fit { law, model, parameters, rms, draws, measurements, iterations, starts: (starts.len(), agreeing) })
 }
 
 /// The modulus of the best neo-Hookean law, in closed form: P is linear in μ. Scale and start of every fit.
@@ -254,33 +257,48 @@ impl<'a> Map<'a> {
         Some(DMatrix::from_columns(&columns))
     }
 
-    /// One for each parameter; `None` for those the residuals do not depend on, and for all if the rest are collinear.
-    fn standard_errors(&self, q: &DVector<f64>, table: &Table) -> Vec<Option<f64>> {
+    /// Standard errors, one for each parameter; `None` for those the residuals do not depend on, and for all if the rest are collinear. And
+    /// draws of the parameters.
+    fn uncertainty(&self, q: &DVector<f64>, table: &Table) -> (Vec<Option<f64>>, Vec<Vec<f64>>) {
         let mut errors = vec![None; q.len()];
-        let (Some(residuals), Some(jacobian)) = (self.residuals(q, table), self.jacobian(q, table)) else {
-            return errors;
+        let Some((live, covariance, degrees)) = self.covariance(q, table) else {
+            return (errors, Vec::new());
         };
+        for (k, &i) in live.iter().enumerate() {
+            errors[i] = Some(covariance[(k, k)].sqrt() * self.value(i, q[i]).1.abs());
+        }
+        let at: Vec<f64> = live.iter().map(|&i| q[i]).collect();
+        let drawn = crate::posterior::draws(&at, &covariance, degrees, crate::posterior::DRAWS, 0);
+        let parameters = |drawn: Vec<f64>| {
+            let mut q = q.clone();
+            live.iter().zip(drawn).for_each(|(&i, value)| q[i] = value);
+            self.parameters(&q)
+        };
+        (errors, drawn.unwrap_or_default().into_iter().map(parameters).collect())
+    }
+
+    /// The q that the residuals determine, their covariance s²(JᵀJ)⁻¹ and the degrees of freedom.
+    fn covariance(&self, q: &DVector<f64>, table: &Table) -> Option<(Vec<usize>, DMatrix<f64>, usize)> {
+        let (residuals, jacobian) = (self.residuals(q, table)?, self.jacobian(q, table)?);
         let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
         // the differences carry 1e-10, and an effect below 1e-6 of the stresses tells nothing
         let live: Vec<usize> = (0..q.len()).filter(|&i| norms[i] > 1e-6).collect();
         let columns: Vec<_> = live.iter().map(|&i| jacobian.column(i) / norms[i]).collect();
         if columns.is_empty() || residuals.len() <= live.len() {
-            return errors;
+            return None;
         }
         let scaled = DMatrix::from_columns(&columns);
         let normal = scaled.tr_mul(&scaled);
         if normal.clone().symmetric_eigenvalues().min() < 1e-9 {
-            return errors;
+            return None;
         }
-        if let Some(factor) = normal.cholesky() {
-            let variance = residuals.norm_squared() / (residuals.len() - live.len()) as f64;
-            let covariance = factor.inverse();
-            for (k, &i) in live.iter().enumerate() {
-                let in_q = (variance * covariance[(k, k)]).sqrt() / norms[i];
-                errors[i] = Some(in_q * self.value(i, q[i]).1.abs());
-            }
-        }
-        errors
+        let degrees = residuals.len() - live.len();
+        let variance = residuals.norm_squared() / degrees as f64;
+        let inverse = normal.cholesky()?.inverse();
+        let covariance = DMatrix::from_fn(live.len(), live.len(), |a, b| {
+            variance * inverse[(a, b)] / (norms[live[a]] * norms[live[b]])
+        });
+        Some((live, covariance, degrees))
     }
 }
 

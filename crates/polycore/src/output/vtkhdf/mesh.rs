@@ -35,7 +35,7 @@ impl Cells {
         self.types.is_empty()
     }
 
-    fn check(&self, points: usize) -> Result<(), Error> {
+    pub(super) fn check(&self, points: usize) -> Result<(), Error> {
         let fail = |reason: String| Err(Error::Data { what: "cells".into(), reason });
         if self.is_empty() {
             return fail("there are no cells".into());

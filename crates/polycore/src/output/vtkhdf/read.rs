@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rust_hdf5::{H5Dataset, H5File};
 
-use super::{Layout, OF_THE_FORMAT, format_error};
+use super::{Cells, Layout, OF_THE_FORMAT, format_error};
 use crate::Error;
 use crate::output::hdf5::dataset as checked;
 
@@ -123,6 +123,33 @@ impl Series {
     /// Names and numbers of components of the cell arrays; none of particles.
     pub fn cell_arrays(&self) -> &[(String, usize)] {
         &self.layout.cell_arrays
+    }
+
+    /// The cells of a mesh; none of particles.
+    ///
+    /// # Errors
+    /// [`Error::Format`] for damaged data.
+    pub fn cells(&self) -> Result<Cells, Error> {
+        if self.moves {
+            return Ok(Cells::default());
+        }
+        let fail = |error: String| format_error(&self.path, error);
+        let size = std::fs::metadata(&self.path).map_or(0, |file| file.len());
+        let dataset = |name: &str| {
+            checked(&self.file, &format!("VTKHDF/{name}"), size).map_err(|error| fail(error.to_string()))
+        };
+        let integers = |name: &str| dataset(name)?.read_raw::<i64>().map_err(|error| fail(error.to_string()));
+        let number =
+            |value: &i64| u32::try_from(*value).map_err(|_| fail(format!("a cell has point {value}")));
+        let connectivity = integers("Connectivity")?.iter().map(number).collect::<Result<_, _>>()?;
+        let ends = integers("Offsets")?.iter().skip(1).map(|&end| end.max(0) as usize).collect();
+        let types = dataset("Types")?.read_raw::<u8>().map_err(|error| fail(error.to_string()))?;
+        let cells = Cells { connectivity, ends, types };
+        cells.check(self.layout.points).map_err(|error| fail(error.to_string()))?;
+        match cells.len() == self.layout.cells {
+            true => Ok(cells),
+            false => Err(fail(format!("{} types of {} cells", cells.len(), self.layout.cells))),
+        }
     }
 
     /// Whether points have a position for each step.

@@ -207,12 +207,14 @@ fn fields_on_a_mesh_come_back() {
     assert!(read.cell_data(4, "exists").unwrap_err().to_string().contains("no step 4"));
     assert!(read.cell_data(0, "temperature").unwrap_err().to_string().contains("there are exists"));
     let whole = fs::read(&path).unwrap();
+    let written = read.cells().unwrap();
     let (points, cells) = (read.points(0).unwrap(), {
         let mut cells = Cells::default();
         cells.push(12, &[0, 1, 3, 2, 4, 5, 7, 6]);
         cells.push(10, &[4, 5, 6, 8]);
         cells
     });
+    assert_eq!(written, cells);
     drop(read);
     let mut series = MeshSeries::resume(&path, points, cells, 2).unwrap();
     (2..STEPS).for_each(|step| grid_step(&mut series, step));

@@ -1,0 +1,80 @@
+//! A material that fills a part of its elements.
+
+use super::{Point, Response, ThermalMaterial};
+use crate::error::Error;
+use std::sync::Arc;
+
+/// A material of which an element holds only a part, spread evenly over it: ρ and k are that part of the material's, and
+/// energies and states per mass are the material's own (rule of mixtures with air that neither stores nor conducts).
+#[derive(Clone)]
+pub struct Filled {
+    /// The material.
+    of: Arc<dyn ThermalMaterial>,
+    /// The part that is filled; above 1 where more was pressed in.
+    fill: f64,
+}
+
+impl Filled {
+    /// A material and the part of the elements' volume that it fills.
+    ///
+    /// # Errors
+    /// A part that is not positive.
+    pub fn new(of: Arc<dyn ThermalMaterial>, fill: f64) -> Result<Self, Error> {
+        if fill > 0.0 && fill.is_finite() {
+            return Ok(Self { of, fill });
+        }
+        Err(Error::Parameter { name: "filled part", found: fill, allowed: "above 0, finite".into() })
+    }
+}
+
+impl ThermalMaterial for Filled {
+    fn density(&self) -> f64 {
+        self.fill * self.of.density()
+    }
+
+    fn state_names(&self) -> &'static [&'static str] {
+        self.of.state_names()
+    }
+
+    fn initial_state(&self, temperature: f64, state: &mut [f64]) {
+        self.of.initial_state(temperature, state);
+    }
+
+    fn field_names(&self) -> &'static [&'static str] {
+        self.of.field_names()
+    }
+
+    fn fields(&self, state: &[f64], fields: &mut [f64]) {
+        self.of.fields(state, fields);
+    }
+
+    fn crystallization_rate(&self, temperature: f64, state: &[f64]) -> f64 {
+        self.of.crystallization_rate(temperature, state)
+    }
+
+    fn energy(&self, temperature: f64, state: &[f64]) -> f64 {
+        self.of.energy(temperature, state)
+    }
+
+    fn is_linear(&self) -> bool {
+        self.of.is_linear()
+    }
+
+    fn constant_conductivity(&self) -> bool {
+        self.of.constant_conductivity()
+    }
+
+    fn potential(&self, temperature: f64) -> Option<[f64; 2]> {
+        self.of.potential(temperature).map(|pair| pair.map(|x| self.fill * x))
+    }
+
+    fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
+        let own = self.of.respond(at, old, new)?;
+        Ok(Response {
+            flux: self.fill * own.flux,
+            d_flux_d_temperature: self.fill * own.d_flux_d_temperature,
+            d_flux_d_gradient: self.fill * own.d_flux_d_gradient,
+            ..own
+        })
+    }
+}

@@ -1,0 +1,197 @@
+//! One branch of a solidifying Maxwell body over a step, in closed form, with its energies.
+
+/// State of what carries a branch over a step: s is the share of the network that exists (1 for the amorphous phase), b softens it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Change {
+    /// Reduced time over relaxation time, y = Δξ/τ ≥ 0; 0 is elastic.
+    pub relaxation: f64,
+    /// s at the beginning and the end, 0 to 1.
+    pub share: [f64; 2],
+    /// b at the beginning and the end.
+    pub softening: [f64; 2],
+}
+
+/// What a step does to a branch of modulus 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// e₂ = `carried` e₁ + `gained` Δε for the elastic strain e and the mechanical strain increment Δε.
+    pub carried: f64,
+    /// See [`Self::carried`].
+    pub gained: f64,
+    /// b₂ s₂ or its mean over a growing network: the stiffness of the step is this times h = (1 − e^{−y})/y, and the stress at the end
+    /// b₂ s₂ e₂.
+    pub stiffness: f64,
+    change: Change,
+    forms: Forms,
+}
+
+/// Energies of a step over the modulus, with e:Ĉ:e for squares: what was put in, what is left, and where the rest went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energies {
+    /// Work of the stress of this branch on Δε.
+    pub work: f64,
+    /// Increase of the stored energy.
+    pub stored: f64,
+    /// Dissipated by relaxation, ≥ 0.
+    pub viscous: f64,
+    /// Lost because new crystals are born without stress, ≥ 0.
+    pub growth: f64,
+    /// Lost with crystals that melt, ≥ 0.
+    pub melting: f64,
+    /// Change of the stored energy by softening alone.
+    pub softening: f64,
+}
+
+impl Energies {
+    /// work + softening − stored − viscous − growth − melting: 0 but for rounding.
+    pub fn closure(&self) -> f64 {
+        self.work + self.softening - self.stored - self.viscous - self.growth - self.melting
+    }
+}
+
+/// h, g of the work h e·Δε + g Δε² and A, B, C of the loss A e² + 2B e·Δε + C Δε².
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Forms {
+    h: f64,
+    g: f64,
+    loss: [f64; 3],
+}
+
+impl Forms {
+    fn new(y: f64) -> Self {
+        let p = -(-y).exp_m1();
+        let h = if y > 0.0 { p / y } else { 1.0 };
+        let (a, b) = (-0.5 * (-2.0 * y).exp_m1(), 0.5 * p * h);
+        // closed forms cancel at small y: g = (1 − h)/y = Σ (−y)^k/(k + 2)!, C = Σ (−1)^{m+1} (2^{m−1} − 2) y^{m−2}/m!
+        let (g, c) = if y < 0.5 {
+            let (mut g, mut c, mut power, mut factorial) = (0.0, 0.0, 1.0, 2.0);
+            for m in 2..22_i32 {
+                // power = (−y)^{m−2}, factorial = m!
+                g += power / factorial;
+                c -= (2.0_f64.powi(m - 1) - 2.0) * power / factorial;
+                power *= -y;
+                factorial *= f64::from(m + 1);
+            }
+            (g, c)
+        } else {
+            ((1.0 - h) / y, (y - 2.0 * p + a) / (y * y))
+        };
+        Self { h, g, loss: [a, b, c] }
+    }
+}
+
+impl Step {
+    /// Growth e ← (s₁ e^{−y} e + s̄ h Δε)/s₂, melting e ← e^{−y} e + h Δε, s̄ = ½(s₁ + s₂): new crystals are born without stress (Bažant's
+    /// solidification), those that melt take theirs along. Linear in Δε, unconditionally stable.
+    pub fn new(change: Change) -> Self {
+        let Change { relaxation, share: [before, after], softening } = change;
+        let forms = Forms::new(relaxation);
+        let (decay, mean) = ((-relaxation).exp(), 0.5 * (before + after));
+        let (carried, gained) = if after < before {
+            (decay, forms.h)
+        } else if after > 0.0 {
+            (before * decay / after, mean * forms.h / after)
+        } else {
+            (0.0, 0.0)
+        };
+        let share = if after < before { after } else { mean };
+        Self { carried, gained, stiffness: softening[1] * share * forms.h, change, forms }
+    }
+
+    /// Energies from e:Ĉ:e, e:Ĉ:Δε and Δε:Ĉ:Δε of the elastic strain e at the beginning: growth or melting to s̄, relaxation there, and the
+    /// rest of growth or melting (Strang's order).
+    pub fn energies(&self, ee: f64, ed: f64, dd: f64) -> Energies {
+        let Change { share: [before, after], softening: [soft, hard], .. } = self.change;
+        let (mean, growing) = (0.5 * (before + after), after >= before);
+        let [a, b, c] = self.forms.loss;
+        // elastic strain of the first half: e times `first`
+        let first = match growing {
+            true if mean > 0.0 => before / mean,
+            true => 0.0,
+            false => 1.0,
+        };
+        let (fee, fed) = (first * first * ee, first * ed);
+        let decay = (-self.change.relaxation).exp();
+        let after_relaxation =
+            decay * decay * fee + 2.0 * decay * self.forms.h * fed + self.forms.h.powi(2) * dd;
+        let last = self.carried * self.carried * ee
+            + 2.0 * self.carried * self.gained * ed
+            + self.gained * self.gained * dd;
+        let (growth, melting) = if growing {
+            (0.5 * hard * (before * ee - mean * fee + mean * after_relaxation - after * last), 0.0)
+        } else {
+            (0.0, 0.5 * hard * ((before - mean) * ee + (mean - after) * after_relaxation))
+        };
+        Energies {
+            work: hard * mean * (self.forms.h * fed + self.forms.g * dd),
+            stored: 0.5 * hard * after * last - 0.5 * soft * before * ee,
+            viscous: hard * mean * (a * fee + 2.0 * b * fed + c * dd),
+            growth,
+            melting,
+            softening: 0.5 * (hard - soft) * before * ee,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use evidence::{at_most, near};
+    use polycore::random::SplitMix64;
+
+    fn step(relaxation: f64, share: [f64; 2]) -> Step {
+        Step::new(Change { relaxation, share, softening: [1.0; 2] })
+    }
+
+    /// `docs/reference/print/branch.py`: 20,000 random steps, each of which closes its energies; no loss is negative.
+    #[test]
+    fn energies_close_over_any_history() {
+        let mut random = SplitMix64::new(1);
+        let (mut strain, mut share, mut softening) = (0.0, 0.3, 1.0);
+        let (mut worst, mut least) = (0.0_f64, 0.0_f64);
+        for _ in 0..20_000 {
+            let mut next = random.uniform();
+            if random.uniform() < 0.05 {
+                next = 0.0;
+            }
+            let soft = 0.2 + 0.8 * random.uniform();
+            let relaxation = 10.0_f64.powf(8.0 * random.uniform() - 6.0);
+            let increment = 1e-2 * random.normal();
+            let step = Step::new(Change { relaxation, share: [share, next], softening: [softening, soft] });
+            let found = step.energies(strain * strain, strain * increment, increment * increment);
+            worst = worst.max(found.closure().abs() / 1e-4);
+            least = least.min(found.viscous).min(found.growth).min(found.melting);
+            strain = step.carried * strain + step.gained * increment;
+            (share, softening) = (next, soft);
+        }
+        at_most("print_energy_closure", worst, 1e-14);
+        at_most("print_negative_loss", -least / 1e-4, 1e-15);
+    }
+
+    /// One branch: e = 1e-3, Δε = 2e-3, y = 0.5.
+    #[test]
+    fn one_step_of_a_branch() {
+        let step = step(0.5, [1.0; 2]);
+        let (e, d) = (1e-3, 2e-3);
+        near("print_branch_strain", step.carried * e + step.gained * d, 2.180_408_021e-3, 1e-12);
+        let found = step.energies(e * e, e * d, d * d);
+        near("print_branch_work", found.work, 3.278_367_917e-6, 1e-15);
+        near("print_branch_viscous", found.viscous, 1.401_278_348e-6, 1e-15);
+        near("print_branch_stored", found.stored, 1.877_089_569e-6, 1e-15);
+        // series and closed forms meet
+        let (below, above) = (Forms::new(0.5 - 1e-12), Forms::new(0.5));
+        assert!((below.g - above.g).abs() < 1e-11 && (below.loss[2] - above.loss[2]).abs() < 1e-11);
+    }
+
+    /// Crystals that melt take their stress along, new ones carry none: 1 GPa at a strain of 1e-3, s 1 → ½ → 1 and 1 → 0 → 1.
+    #[test]
+    fn cycles_of_melting() {
+        let after = |shares: &[f64]| {
+            let strain = shares.windows(2).fold(1e-3, |e, pair| step(0.0, [pair[0], pair[1]]).carried * e);
+            1e9 * shares.last().unwrap() * strain
+        };
+        assert_eq!(after(&[1.0, 0.5]), 0.5e6);
+        assert_eq!(after(&[1.0, 0.5, 1.0]), 0.5e6);
+        assert_eq!(after(&[1.0, 0.0, 1.0]), 0.0);
+    }
+}

@@ -1,0 +1,161 @@
+//! Hexahedra with incompatible modes, of modulus 1: bending without locking, free strains at Gauss points.
+
+use nalgebra::{SMatrix, SVector};
+
+/// Strains and stresses, xx, yy, zz, xy, yz, zx, shear strains as angles.
+pub type Six = SVector<f64, 6>;
+type Nodal = SVector<f64, 24>;
+
+/// Gauss points.
+pub const POINTS: usize = 8;
+
+/// Signs of the local coordinates of nodes and Gauss points, in Abaqus' and VTK's order.
+const SIGNS: [[f64; 3]; 8] = [
+    [-1.0, -1.0, -1.0],
+    [1.0, -1.0, -1.0],
+    [1.0, 1.0, -1.0],
+    [-1.0, 1.0, -1.0],
+    [-1.0, -1.0, 1.0],
+    [1.0, -1.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [-1.0, 1.0, 1.0],
+];
+
+/// Local coordinates of a Gauss point.
+pub fn gauss(point: usize) -> [f64; 3] {
+    SIGNS[point].map(|sign| sign / 3.0_f64.sqrt())
+}
+
+/// Ĉ: the stiffness of an isotropic body of Young's modulus 1.
+pub fn stiffness(poisson: f64) -> SMatrix<f64, 6, 6> {
+    let lame = poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
+    let shear = 0.5 / (1.0 + poisson);
+    SMatrix::from_fn(|i, j| match (i < 3 && j < 3, i == j) {
+        (true, true) => lame + 2.0 * shear,
+        (true, false) => lame,
+        (false, true) => shear,
+        (false, false) => 0.0,
+    })
+}
+
+/// The strain of one function of gradient g times unit displacements along x, y, z.
+fn strain_of(gradient: [f64; 3]) -> SMatrix<f64, 6, 3> {
+    let [x, y, z] = gradient;
+    SMatrix::from_row_slice(&[x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z, y, x, 0.0, 0.0, z, y, z, 0.0, x])
+}
+
+/// An eight-node hexahedron with the modes 1 − ξ², 1 − η², 1 − ζ² in each displacement (Wilson and Taylor 1973), whose gradients are taken with
+/// the Jacobian of the centre (Taylor, Beresford and Wilson 1976, doi:10.1002/nme.1620100602), so that the patch test holds. The modes are condensed.
+#[derive(Clone, Debug)]
+pub struct Hexahedron {
+    /// Volumes of the Gauss points, m³.
+    pub weights: [f64; POINTS],
+    /// Strain of nodal displacements, and of the modes.
+    nodes: [SMatrix<f64, 6, 24>; POINTS],
+    modes: [SMatrix<f64, 6, 9>; POINTS],
+    /// K̂ after condensation, over the modulus.
+    pub condensed: SMatrix<f64, 24, 24>,
+    /// Coupling and the inverse of the modes' own block.
+    coupling: SMatrix<f64, 24, 9>,
+    inverse: SMatrix<f64, 9, 9>,
+    elastic: SMatrix<f64, 6, 6>,
+}
+
+impl Hexahedron {
+    /// Of eight corners, m; `None` where it is turned inside out.
+    pub fn new(corners: &[[f64; 3]; 8], poisson: f64) -> Option<Self> {
+        let elastic = stiffness(poisson);
+        let centre = jacobian(corners, [0.0; 3]);
+        let (centre_inverse, centre_volume) = (centre.try_inverse()?, centre.determinant());
+        let mut weights = [0.0; POINTS];
+        let mut nodes = [SMatrix::<f64, 6, 24>::zeros(); POINTS];
+        let mut modes = [SMatrix::<f64, 6, 9>::zeros(); POINTS];
+        for point in 0..POINTS {
+            let at = gauss(point);
+            let jacobian = jacobian(corners, at);
+            let volume = jacobian.determinant();
+            if volume.is_nan() || volume <= 0.0 {
+                return None;
+            }
+            let inverse = jacobian.try_inverse()?;
+            weights[point] = volume;
+            for (node, local) in derivatives(at).into_iter().enumerate() {
+                let gradient = inverse.transpose() * SVector::<f64, 3>::from(local);
+                nodes[point].fixed_columns_mut::<3>(3 * node).copy_from(&strain_of(gradient.into()));
+            }
+            for mode in 0..3 {
+                let mut local = SVector::<f64, 3>::zeros();
+                local[mode] = -2.0 * at[mode];
+                let gradient = centre_inverse.transpose() * local * (centre_volume / volume);
+                modes[point].fixed_columns_mut::<3>(3 * mode).copy_from(&strain_of(gradient.into()));
+            }
+        }
+        let mut full = SMatrix::<f64, 24, 24>::zeros();
+        let mut coupling = SMatrix::<f64, 24, 9>::zeros();
+        let mut own = SMatrix::<f64, 9, 9>::zeros();
+        for point in 0..POINTS {
+            let weighed = elastic * weights[point];
+            full += nodes[point].transpose() * weighed * nodes[point];
+            coupling += nodes[point].transpose() * weighed * modes[point];
+            own += modes[point].transpose() * weighed * modes[point];
+        }
+        let inverse = own.try_inverse()?;
+        let condensed = full - coupling * inverse * coupling.transpose();
+        Some(Self { weights, nodes, modes, condensed, coupling, inverse, elastic })
+    }
+
+    /// σ over the modulus of an elastic strain.
+    pub fn stress(&self, strain: &Six) -> Six {
+        self.elastic * strain
+    }
+
+    /// Nodal forces of stresses at the Gauss points, with the modes condensed, and the forces of the modes: [`Self::strains`] takes them.
+    pub fn forces(&self, stresses: &[Six; POINTS]) -> (Nodal, SVector<f64, 9>) {
+        let (mut nodal, mut modal) = (Nodal::zeros(), SVector::<f64, 9>::zeros());
+        for point in 0..POINTS {
+            let weighed = stresses[point] * self.weights[point];
+            nodal += self.nodes[point].transpose() * weighed;
+            modal += self.modes[point].transpose() * weighed;
+        }
+        (nodal - self.coupling * (self.inverse * modal), modal)
+    }
+
+    /// Strain increments at the Gauss points of nodal displacements, where the modes balance the forces `modal` of the stresses at the start of the
+    /// step over a stiffness `modulus` Ĉ.
+    pub fn strains(&self, displacement: &Nodal, modal: &SVector<f64, 9>, modulus: f64) -> [Six; POINTS] {
+        let modes = -(self.inverse * (modal / modulus + self.coupling.transpose() * displacement));
+        std::array::from_fn(|point| self.nodes[point] * displacement + self.modes[point] * modes)
+    }
+
+    /// Shares of the corners at a Gauss point.
+    pub fn shapes(point: usize) -> [f64; 8] {
+        let at = gauss(point);
+        SIGNS.map(|sign| (0..3).map(|d| 0.5 * (1.0 + sign[d] * at[d])).product())
+    }
+
+    /// Position of a Gauss point.
+    pub fn place(corners: &[[f64; 3]; 8], point: usize) -> [f64; 3] {
+        let mut place = [0.0; 3];
+        for (corner, share) in corners.iter().zip(Self::shapes(point)) {
+            (0..3).for_each(|d| place[d] += share * corner[d]);
+        }
+        place
+    }
+}
+
+/// ∂N/∂ξ of the corners.
+fn derivatives(at: [f64; 3]) -> [[f64; 3]; 8] {
+    SIGNS.map(|sign| {
+        let factor = [0, 1, 2].map(|d| 0.5 * (1.0 + sign[d] * at[d]));
+        [0, 1, 2].map(|d| 0.5 * sign[d] * (0..3).filter(|&e| e != d).map(|e| factor[e]).product::<f64>())
+    })
+}
+
+/// ∂x/∂ξ.
+fn jacobian(corners: &[[f64; 3]; 8], at: [f64; 3]) -> SMatrix<f64, 3, 3> {
+    let mut jacobian = SMatrix::zeros();
+    for (corner, local) in corners.iter().zip(derivatives(at)) {
+        jacobian += SVector::<f64, 3>::from(*corner) * SVector::<f64, 3>::from(local).transpose();
+    }
+    jacobian
+}

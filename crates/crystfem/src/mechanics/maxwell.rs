@@ -1,0 +1,371 @@
+//! A solidifying Maxwell body: amorphous branches that are always there, and a network of crystals.
+
+use super::branch::{Change, Energies, Step};
+use super::eigenstrain::SpecificVolume;
+
+/// A modulus that relaxes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Branch {
+    /// Modulus, Pa.
+    pub modulus: f64,
+    /// Relaxation time at the reference of the shift, s; infinite: elastic.
+    pub time: f64,
+}
+
+/// ln a_T of the relaxation times of a phase.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shift {
+    /// 0 at all temperatures.
+    None,
+    /// −ln 10 · c₁(T − T_r)/(c₂ + T − T_r) above T_r (Williams, Landel and Ferry 1955), its slope there below, at most a = 1e12.
+    Wlf {
+        /// T_r, K.
+        reference: f64,
+        /// c₁ and c₂ (K).
+        constants: [f64; 2],
+    },
+    /// (H/R)(1/T − 1/T_r).
+    Arrhenius {
+        /// T_r, K.
+        reference: f64,
+        /// H, J/mol.
+        energy: f64,
+    },
+}
+
+impl Shift {
+    /// ln a_T.
+    pub fn logarithm(&self, temperature: f64) -> f64 {
+        match *self {
+            Self::None => 0.0,
+            Self::Wlf { reference, constants: [first, second] } => {
+                let above = temperature - reference;
+                let slope = -first * std::f64::consts::LN_10;
+                if above >= 0.0 {
+                    slope * above / (second + above)
+                } else {
+                    (slope / second * above).min(1e12_f64.ln())
+                }
+            }
+            Self::Arrhenius { reference, energy } => {
+                energy / crate::kinetics::GAS_CONSTANT * (1.0 / temperature - 1.0 / reference)
+            }
+        }
+    }
+
+    /// ∫dt/a_T of a linear temperature history, by two points of Gauss: fourth order in the step.
+    pub fn reduced_time(&self, temperatures: [f64; 2], duration: f64) -> f64 {
+        let middle = 0.5 * (temperatures[0] + temperatures[1]);
+        let reach = 0.5 * (temperatures[1] - temperatures[0]) / 3.0_f64.sqrt();
+        0.5 * duration * [-reach, reach].map(|at| (-self.logarithm(middle + at)).exp()).iter().sum::<f64>()
+    }
+}
+
+/// σ = Ĉ(ν):[Σ_A E_i e_i + b(T) s(α) Σ_N E_i e_i], with the elastic strain e_i of each branch, the stiffness Ĉ of modulus 1, one Poisson ratio and
+/// s = α. New crystals are born without stress and melting ones take theirs along: no stress-free temperature is needed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolidifyingMaxwell {
+    /// Free strain.
+    pub volume: SpecificVolume,
+    /// Branches of the amorphous phase, and their shift.
+    pub amorphous: (Vec<Branch>, Shift),
+    /// Branches of the network of crystals, and their shift.
+    pub network: (Vec<Branch>, Shift),
+    /// b(T) falls linearly from 1 at the first temperature to 0 at the second, K; `None`: 1.
+    pub softening: Option<[f64; 2]>,
+    /// ν.
+    pub poisson: f64,
+    /// Modulus of the melt over the sum of all others: bears Δε − Δε* within a step and forgets it.
+    pub floor: f64,
+}
+
+/// What a material point does over a step, linear in the strain increment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Increment {
+    /// Linear free strain Δε*.
+    pub free_strain: f64,
+    /// Stiffness of the step over Ĉ, Pa: Δσ = stiffness Ĉ:(Δε − Δε* 1) beside what relaxes, the floor included.
+    pub stiffness: f64,
+    /// The part of the floor in it, whose stress is not kept, Pa.
+    pub floor: f64,
+    /// For each branch: its step, and its modulus times b₂ s₂ at the end.
+    branches: Vec<(Step, f64, f64)>,
+}
+
+impl SolidifyingMaxwell {
+    /// PA12: moduli whose sum at 23 °C is that of sheets of PA 2200 (EOS), their split and times assumed; T_g of chapter 4. Placeholders until
+    /// someone measures them.
+    pub fn pa12() -> Self {
+        let third = |time: f64| Branch { modulus: 300e6, time };
+        let network = [(420e6, f64::INFINITY), (140e6, 10.0), (140e6, 1000.0)];
+        Self {
+            volume: SpecificVolume::PA12,
+            amorphous: (
+                [1.0, 10.0, 100.0].map(third).to_vec(),
+                Shift::Wlf { reference: 324.0, constants: [17.44, 51.6] },
+            ),
+            network: (
+                network.map(|(modulus, time)| Branch { modulus, time }).to_vec(),
+                Shift::Arrhenius { reference: 433.15, energy: 150e3 },
+            ),
+            softening: Some([296.15, 451.0]),
+            poisson: 0.4,
+            floor: 1e-4,
+        }
+    }
+
+    /// Branches of both phases: as many elastic strains has the state of a point, all 0 at birth.
+    pub fn branches(&self) -> usize {
+        self.amorphous.0.len() + self.network.0.len()
+    }
+
+    /// b(T).
+    pub fn softness(&self, temperature: f64) -> f64 {
+        self.softening.map_or(1.0, |[hard, soft]| ((soft - temperature) / (soft - hard)).max(0.0))
+    }
+
+    /// The step from one (T, α) to another in a time, s; 0 is elastic.
+    pub fn increment(&self, from: [f64; 2], to: [f64; 2], duration: f64) -> Increment {
+        let temperatures = [from[0], to[0]];
+        let mut branches = Vec::with_capacity(self.branches());
+        let (mut stiffness, mut whole) = (0.0, 0.0);
+        let mut add = |(list, shift): &(Vec<Branch>, Shift), share: [f64; 2], softening: [f64; 2]| {
+            let reduced = shift.reduced_time(temperatures, duration);
+            for branch in list {
+                let step = Step::new(Change { relaxation: reduced / branch.time, share, softening });
+                stiffness += branch.modulus * step.stiffness;
+                whole += branch.modulus;
+                branches.push((step, branch.modulus, branch.modulus * softening[1] * share[1]));
+            }
+        };
+        add(&self.amorphous, [1.0; 2], [1.0; 2]);
+        add(&self.network, [from[1], to[1]], temperatures.map(|t| self.softness(t)));
+        let free_strain = self.volume.strain(from, to);
+        let floor = self.floor * whole;
+        Increment { free_strain, stiffness: stiffness + floor, floor, branches }
+    }
+
+    /// The stress over Ĉ after a hold: Σ E_i e_i, Pa, for a strain measure such as one component under a uniaxial stress.
+    pub fn relaxation_modulus(&self, temperature: f64, degree: f64, time: f64) -> f64 {
+        let sum = |(list, shift): &(Vec<Branch>, Shift)| -> f64 {
+            let reduced = shift.reduced_time([temperature; 2], time);
+            list.iter().map(|branch| branch.modulus * (-reduced / branch.time).exp()).sum()
+        };
+        sum(&self.amorphous) + self.softness(temperature) * degree * sum(&self.network)
+    }
+}
+
+impl Increment {
+    /// Elastic strains at the end, in place, of any components, for Δε of the same: mechanical is Δε − Δε* where a component has a free strain.
+    pub fn advance<const N: usize>(&self, strains: &mut [[f64; N]], mechanical: &[f64; N]) {
+        for ((step, _, _), strain) in self.branches.iter().zip(strains) {
+            for (e, d) in strain.iter_mut().zip(mechanical) {
+                *e = step.carried * *e + step.gained * d;
+            }
+        }
+    }
+
+    /// Σ E b₂ s₂ e over the branches, Pa: the stress over Ĉ of elastic strains at the end of the step.
+    pub fn stress<const N: usize>(&self, strains: &[[f64; N]]) -> [f64; N] {
+        let mut sum = [0.0; N];
+        for ((_, _, modulus), strain) in self.branches.iter().zip(strains) {
+            sum.iter_mut().zip(strain).for_each(|(sum, e)| *sum += modulus * e);
+        }
+        sum
+    }
+
+    /// Energies of all branches, J/m³, with the product a:Ĉ:b; to be called before [`Self::advance`].
+    pub fn energies<const N: usize>(
+        &self,
+        strains: &[[f64; N]],
+        mechanical: &[f64; N],
+        product: impl Fn(&[f64; N], &[f64; N]) -> f64,
+    ) -> Energies {
+        let mut sum = Energies::default();
+        for ((step, modulus, _), strain) in self.branches.iter().zip(strains) {
+            let one = step.energies(
+                product(strain, strain),
+                product(strain, mechanical),
+                product(mechanical, mechanical),
+            );
+            sum.work += modulus * one.work;
+            sum.stored += modulus * one.stored;
+            sum.viscous += modulus * one.viscous;
+            sum.growth += modulus * one.growth;
+            sum.melting += modulus * one.melting;
+            sum.softening += modulus * one.softening;
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::exact::Wall;
+    use crate::kinetics::{Constants, Kinetics};
+    use evidence::near;
+
+    /// α 1e-4/K, E∞ 0.4 and E₁ 0.6 GPa, τ 30 s, −1 K/s for 100 s, held. Without crystals the amorphous phase of one density is linear in T.
+    fn held_bar(shift: Shift) -> SolidifyingMaxwell {
+        let branch = |modulus, time| Branch { modulus, time };
+        let volume = SpecificVolume {
+            densities: [1000.0; 2],
+            glass_transition: 0.0,
+            reference: 0.0,
+            expansions: [3e-4; 3],
+            crystallinity: 0.0,
+        };
+        SolidifyingMaxwell {
+            volume,
+            amorphous: (vec![branch(0.4e9, f64::INFINITY), branch(0.6e9, 30.0)], shift),
+            network: (Vec::new(), Shift::None),
+            softening: None,
+            poisson: 0.3,
+            floor: 0.0,
+        }
+    }
+
+    /// Stress of a bar whose length is held, after a history of (T, α, duration) from (T, α).
+    fn held(body: &SolidifyingMaxwell, start: [f64; 2], legs: &[([f64; 2], f64)]) -> f64 {
+        let (mut strains, mut stress, mut at) = (vec![[0.0]; body.branches()], 0.0, start);
+        for &(to, duration) in legs {
+            let increment = body.increment(at, to, duration);
+            increment.advance(&mut strains, &[-increment.free_strain]);
+            [stress] = increment.stress(&strains);
+            at = to;
+        }
+        stress
+    }
+
+    /// Steps of one size down from 433.15 K.
+    fn cooling(step: f64) -> Vec<([f64; 2], f64)> {
+        (1..=(100.0 / step).round() as usize).map(|k| ([433.15 - step * k as f64, 0.0], step)).collect()
+    }
+
+    /// 4e5·10 Pa·s… of E∞, and E₁ α q τ(1 − e^{−t/τ}): exact at any step; then e^{−t/τ} at rest.
+    #[test]
+    fn a_held_bar_cools() {
+        let body = held_bar(Shift::None);
+        for step in [100.0, 10.0, 1.0] {
+            let mut legs = cooling(step);
+            near("print_held_bar", held(&body, [433.15, 0.0], &legs), 5.735_786_812e6, 6.0);
+            legs.push(([333.15, 0.0], 100.0));
+            near("print_held_bar_at_rest", held(&body, [433.15, 0.0], &legs), 4.061_922_447e6, 5.0);
+        }
+        let body = held_bar(Shift::Arrhenius { reference: 433.15, energy: 150e3 });
+        for (step, error) in [(10.0, -1.43e-3), (5.0, -3.61e-4), (2.5, -9.05e-5)] {
+            let found = held(&body, [433.15, 0.0], &cooling(step)) / 9.825_863_382e6 - 1.0;
+            near(&format!("print_held_bar_shifted_{step}"), found / error, 1.0, 0.02);
+        }
+    }
+
+    /// A cube at 160 °C, α 0 → 1, held one way, network of 1 GPa: E(1 − ln(1 + c)/c)/3, c = X∞(v_c − v_a)/v_a.
+    #[test]
+    fn a_held_cube_crystallizes() {
+        let body = SolidifyingMaxwell {
+            amorphous: (Vec::new(), Shift::None),
+            network: (vec![Branch { modulus: 1e9, time: f64::INFINITY }], Shift::None),
+            softening: None,
+            floor: 0.0,
+            ..SolidifyingMaxwell::pa12()
+        };
+        let of = |steps: usize| {
+            let legs: Vec<_> = (1..=steps).map(|k| ([433.15, k as f64 / steps as f64], 1.0)).collect();
+            held(&body, [433.15, 0.0], &legs)
+        };
+        near("print_held_cube_20", of(20), 3.650_395_167e6, 3.0);
+        let (coarse, fine) = (3.650_428_241e6 - of(20), 3.650_428_241e6 - of(40));
+        near("print_held_cube_order", (coarse / fine).log2(), 2.0, 0.02);
+    }
+
+    /// E(1 s) of PA12 at 100, 140 and 160 °C and the sum at rest: pa12.py.
+    #[test]
+    fn moduli_of_pa12() {
+        let body = SolidifyingMaxwell::pa12();
+        for (celsius, modulus) in [(100.0, 352e6), (140.0, 171e6), (160.0, 79e6)] {
+            near(
+                &format!("print_modulus_{celsius}"),
+                body.relaxation_modulus(celsius + 273.15, 1.0, 1.0),
+                modulus,
+                1e6,
+            );
+        }
+        near("print_modulus_at_rest", body.relaxation_modulus(296.15, 1.0, 0.0), 1600e6, 1.0);
+    }
+
+    /// Temperatures of the plate at times that begin fine: at two points of Gauss in each of 24 cells, then in its centre and on its
+    /// surface.
+    fn cooled(steps: usize) -> Vec<(f64, Vec<f64>)> {
+        let (wall, diffusivity, cells) = (Wall { biot: 1.0 }, 0.25 / 1010.0 / 2200.0, 24);
+        let offset = 0.5 / 3.0_f64.sqrt();
+        let mut places: Vec<f64> = (0..cells)
+            .flat_map(|k| [-offset, offset].map(|at| (f64::from(k) + 0.5 + at) / f64::from(cells)))
+            .collect();
+        places.extend([0.0, 1.0]);
+        let at = |time: f64, place: f64| 298.15 + 195.0 * wall.share(place, diffusivity * time / 4e-6);
+        let time = |step: usize| 600.0 * (step as f64 / steps as f64).powi(2);
+        (1..=steps)
+            .map(|step| (time(step), places.iter().map(|&place| at(time(step), place)).collect()))
+            .collect()
+    }
+
+    /// Stress in the plane of a plate of 4 mm of PA12, 220 °C to 25 °C, Bi = 1 on both faces, without latent heat, after 600 s: centre and
+    /// surface, free or held at its edges. σ = Σ E e/(1 − ν) with one elastic strain in the plane for each branch.
+    fn plate(body: &SolidifyingMaxwell, held: bool, history: &[(f64, Vec<f64>)]) -> [f64; 2] {
+        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+        let count = history[0].1.len();
+        let mut temperatures = vec![493.15; count];
+        let mut grown = vec![0.0; count];
+        let mut strains = vec![vec![[0.0]; body.branches()]; count];
+        let mut found = vec![0.0; count];
+        let mut time = 0.0;
+        for (next, reached) in history {
+            let mut increments = Vec::with_capacity(count);
+            let (mut load, mut stiffness) = (0.0, 0.0);
+            for (k, &temperature) in reached.iter().enumerate() {
+                let before = [temperatures[k], kinetics.degree(grown[k])];
+                grown[k] += kinetics.growth(temperatures[k], temperature, next - time).z;
+                let increment =
+                    body.increment(before, [temperature, kinetics.degree(grown[k])], *next - time);
+                temperatures[k] = temperature;
+                if k < count - 2 {
+                    let mut predicted = strains[k].clone();
+                    increment.advance(&mut predicted, &[-increment.free_strain]);
+                    load += increment.stress(&predicted)[0] - increment.floor * increment.free_strain;
+                    stiffness += increment.stiffness;
+                }
+                increments.push(increment);
+            }
+            let common = if held { 0.0 } else { -load / stiffness };
+            for (k, increment) in increments.iter().enumerate() {
+                increment.advance(&mut strains[k], &[common - increment.free_strain]);
+                found[k] = increment.stress(&strains[k])[0] / (1.0 - body.poisson);
+            }
+            time = *next;
+        }
+        [found[count - 2] / 1e6, found[count - 1] / 1e6]
+    }
+
+    /// `docs/reference/print/plate.py`, MPa: one network of 1 GPa, and all of PA12.
+    #[test]
+    fn a_plate_cools_with_residual_stress() {
+        let elastic = SolidifyingMaxwell {
+            amorphous: (Vec::new(), Shift::None),
+            network: (vec![Branch { modulus: 1e9, time: f64::INFINITY }], Shift::None),
+            softening: None,
+            ..SolidifyingMaxwell::pa12()
+        };
+        let (pa12, history) = (SolidifyingMaxwell::pa12(), cooled(400));
+        for (name, body, held, [centre, surface]) in [
+            ("elastic", &elastic, false, [7.188_340, -18.060_895]),
+            ("elastic_held", &elastic, true, [33.493_515, 32.759_579]),
+            ("pa12", &pa12, false, [5.5791, -14.4911]),
+            ("pa12_held", &pa12, true, [27.5719, 27.0687]),
+        ] {
+            let found = plate(body, held, &history);
+            near(&format!("print_plate_{name}_centre"), found[0] / centre, 1.0, 2e-3);
+            near(&format!("print_plate_{name}_surface"), found[1] / surface, 1.0, 2e-3);
+        }
+    }
+}

@@ -1,0 +1,14 @@
+//! Stress of printed parts: a solidifying Maxwell body at small strains, whose free strain is a function of temperature and degree of
+//! crystallization. The guide's page *Stress of prints* has the model; here it is at a material point.
+
+mod body;
+mod branch;
+mod eigenstrain;
+mod element;
+mod maxwell;
+
+pub use body::{Body, BodyState, Support};
+pub use branch::{Change, Energies, Step};
+pub use eigenstrain::SpecificVolume;
+pub use element::{Hexahedron, POINTS, stiffness};
+pub use maxwell::{Branch, Shift, SolidifyingMaxwell};

@@ -1,0 +1,170 @@
+use super::*;
+use crate::mechanics::{Branch, Shift, SolidifyingMaxwell, SpecificVolume};
+use evidence::{at_most, near};
+
+/// An elastic body that does not expand by itself.
+fn elastic(modulus: f64) -> SolidifyingMaxwell {
+    SolidifyingMaxwell {
+        volume: SpecificVolume { crystallinity: 0.0, ..SpecificVolume::PA12 },
+        amorphous: (vec![Branch { modulus, time: f64::INFINITY }], Shift::None),
+        network: (Vec::new(), Shift::None),
+        softening: None,
+        poisson: 0.0,
+        floor: 0.0,
+    }
+}
+
+fn hold(modulus: f64) -> Increment {
+    elastic(modulus).increment([300.0, 0.0], [300.0, 0.0], 0.0)
+}
+
+/// A block of elements from the origin on, with its layers along z.
+fn block(count: [usize; 3], size: [f64; 3]) -> Mesh {
+    let [nx, ny, nz] = count;
+    let node = |i: usize, j: usize, k: usize| ((k * (ny + 1) + j) * (nx + 1) + i) as u32;
+    let mut mesh = Mesh::default();
+    for k in 0..=nz {
+        for j in 0..=ny {
+            for i in 0..=nx {
+                let at = |index: usize, d: usize| size[d] * index as f64 / count[d] as f64;
+                mesh.points.push([at(i, 0), at(j, 1), at(k, 2)]);
+            }
+        }
+    }
+    for k in 0..nz {
+        for j in 0..ny {
+            for i in 0..nx {
+                let lower = [node(i, j, k), node(i + 1, j, k), node(i + 1, j + 1, k), node(i, j + 1, k)];
+                let upper = [
+                    node(i, j, k + 1),
+                    node(i + 1, j, k + 1),
+                    node(i + 1, j + 1, k + 1),
+                    node(i, j + 1, k + 1),
+                ];
+                mesh.hexahedra.push(std::array::from_fn(|n| if n < 4 { lower[n] } else { upper[n - 4] }));
+            }
+        }
+    }
+    mesh
+}
+
+/// 3-2-1: the corner at the origin, two components of that along x, one of that along y.
+fn resting(mesh: &Mesh) -> Vec<Support> {
+    let far = |d: usize| {
+        let most = mesh.points.iter().map(|p| p[d]).fold(0.0, f64::max);
+        mesh.points.iter().position(|p| p[d] == most && (0..3).all(|e| e == d || p[e] == 0.0)).unwrap() as u32
+    };
+    vec![(0, 0), (0, 1), (0, 2), (far(0), 1), (far(0), 2), (far(1), 2)]
+}
+
+/// Curvature of the lower edge by least squares over the middle quarter of the length.
+fn curvature(mesh: &Mesh, body: &Body) -> f64 {
+    let length = mesh.points.iter().map(|p| p[0]).fold(0.0, f64::max);
+    let edge: Vec<[f64; 2]> = (0..mesh.points.len())
+        .filter(|&n| mesh.points[n][1] == 0.0 && mesh.points[n][2] == 0.0)
+        .map(|n| [mesh.points[n][0] / length - 0.5, body.state.displacement[n][2]])
+        .filter(|p| p[0].abs() < 0.1251)
+        .collect();
+    let matrix = nalgebra::DMatrix::from_fn(edge.len(), 3, |row, power| edge[row][0].powi(power as i32));
+    let right = nalgebra::DVector::from_fn(edge.len(), |row, _| edge[row][1]);
+    2.0 * matrix.svd(true, true).solve(&right, 1e-14).unwrap()[2] / (length * length)
+}
+
+/// A block with one distorted element inside under displacements of a linear field: strains of every Gauss point are exact.
+#[test]
+fn the_patch_test_holds() {
+    let mut mesh = block([3, 3, 3], [3.0, 3.0, 3.0]);
+    for (n, point) in mesh.points.iter_mut().enumerate() {
+        if point.iter().all(|x| *x > 0.5 && *x < 2.5) {
+            (0..3).for_each(|d| point[d] += 0.2 * ((7 * n + 3 * d) as f64).sin());
+        }
+    }
+    for nodes in &mesh.hexahedra {
+        let corners = nodes.map(|node| mesh.points[node as usize]);
+        let element = Hexahedron::new(&corners, 0.3).unwrap();
+        let linear = |p: [f64; 3]| [1e-3 * p[0] + 2e-3 * p[1], -1e-3 * p[2], 3e-3 * p[0] - 2e-3 * p[2]];
+        let local = SVector::from_fn(|k, _| linear(corners[k / 3])[k % 3]);
+        for strain in element.strains(&local, &SVector::zeros(), 1.0) {
+            let exact = Six::from_row_slice(&[1e-3, 0.0, -2e-3, 2e-3, -1e-3, 3e-3]);
+            at_most("stress_patch_strain", (strain - exact).amax(), 1e-16);
+        }
+    }
+}
+
+/// A free cube whose free strain is linear in z bends without stress.
+#[test]
+fn a_free_cube_has_no_stress() {
+    let mesh = block([3, 3, 3], [3e-3; 3]);
+    let mut body = Body::new(&mesh, 0.4).unwrap();
+    body.born(0..27, 1);
+    body.step(|_| hold(1e9), |_, _, place| 1e-2 * place[2] / 3e-3, &resting(&mesh)).unwrap();
+    let most = (0..27).flat_map(|e| (0..POINTS).map(move |p| (e, p)));
+    let most = most.flat_map(|(e, p)| body.stress(e, p)).fold(0.0_f64, |most, s| most.max(s.abs()));
+    at_most("stress_free_cube", most / 1e7, 1e-10);
+}
+
+/// Timoshenko's bimetal, 1 mm of 3 GPa and 2 mm of 1.5 GPa, free strains of −1 and −2 %: κ = 4.864864865 /m; the element of
+/// `docs/reference/print/fem.py` gives 4.8644041.
+#[test]
+fn a_bimetal_bends() {
+    let mesh = block([16, 1, 3], [0.04, 2e-3, 3e-3]);
+    let mut body = Body::new(&mesh, 0.0).unwrap();
+    body.born(0..48, 1);
+    let low = |element: usize| element < 16;
+    body.step(
+        |e| hold(if low(e) { 3e9 } else { 1.5e9 }),
+        |e, _, _| if low(e) { -0.01 } else { -0.02 },
+        &resting(&mesh),
+    )
+    .unwrap();
+    let found = curvature(&mesh, &body);
+    near("stress_bimetal", found.abs() / 4.864_864_865, 1.0, 2e-4);
+    near("stress_bimetal_peer", found.abs() / 4.864_404_083, 1.0, 1e-6);
+    eprintln!("{} iterations", body.state.iterations);
+}
+
+/// Layers of 1 mm that shrink by 1 % one after the other: κ = (6ε/h) Σ (i − 1)/i³.
+#[test]
+fn layers_in_sequence_bend() {
+    for (layers, along, length, exact) in [(2, 24, 0.024, 7.5), (8, 32, 0.064, 19.935_708_52)] {
+        let mesh = block([along, 1, layers], [length, 2e-3, 1e-3 * layers as f64]);
+        let mut body = Body::new(&mesh, 0.0).unwrap();
+        for layer in 0..layers {
+            body.born(layer * along..(layer + 1) * along, 1);
+            let shrinks = |e: usize| if e / along == layer { -0.01 } else { 0.0 };
+            body.step(|_| hold(1e9), |e, _, _| shrinks(e), &resting(&mesh)).unwrap();
+        }
+        near(&format!("stress_layers_{layers}"), curvature(&mesh, &body).abs() / exact, 1.0, 2e-6);
+    }
+}
+
+/// Eight layers on a bed, ε = 0.010 + 0.004(i − ½)/8, then released: beam 0.4921875 /m, `fem.py` 0.50156.
+#[test]
+fn a_part_is_released_from_its_bed() {
+    let mesh = block([32, 1, 8], [0.064, 2e-3, 8e-3]);
+    let mut body = Body::new(&mesh, 0.0).unwrap();
+    let bed: Vec<Support> = (0..mesh.points.len() as u32)
+        .filter(|&n| mesh.points[n as usize][2] == 0.0)
+        .flat_map(|n| (0..3).map(move |d| (n, d)))
+        .collect();
+    for layer in 0..8 {
+        body.born(32 * layer..32 * (layer + 1), 1);
+        let strain = -(0.010 + 0.004 * (layer as f64 + 0.5) / 8.0);
+        body.step(|_| hold(1e9), |e, _, _| if e / 32 == layer { strain } else { 0.0 }, &bed).unwrap();
+    }
+    let middle = (0..POINTS).map(|p| body.stress(16, p)[0]).sum::<f64>() / 8.0;
+    near("stress_on_the_bed", middle / 1.022_749_135e7, 1.0, 1e-6);
+    body.step(|_| hold(1e9), |_, _, _| 0.0, &resting(&mesh)).unwrap();
+    near("stress_released", curvature(&mesh, &body).abs() / 0.501_560_187, 1.0, 1e-5);
+}
+
+#[test]
+fn what_has_no_stress_is_refused() {
+    let mesh = block([1, 1, 1], [1.0; 3]);
+    assert!(Body::new(&mesh, 0.5).is_err() && Body::new(&mesh, f64::NAN).is_err());
+    let mut twisted = mesh.clone();
+    twisted.points.swap(0, 6);
+    assert!(Body::new(&twisted, 0.3).is_err());
+    let pyramids = Mesh { tetrahedra: vec![[0, 1, 3, 4]], ..mesh };
+    assert!(Body::new(&pyramids, 0.3).is_err());
+}

@@ -1,0 +1,65 @@
+//! What the filament of a G-code file becomes: volumes, cross-sections, widths.
+
+use super::{Move, Setting, ToolPath};
+use std::f64::consts::PI;
+
+/// Levels closer than this are one, m.
+const SAME: f64 = 5e-8;
+
+/// Width of a bead of cross-section `area` and height `height`, m: a rectangle between two half circles, A/h + h(1 − π/4).
+pub fn stadium_width(area: f64, height: f64) -> f64 {
+    area / height + height * (1.0 - 0.25 * PI)
+}
+
+impl Move {
+    /// Volume of the filament fed, m³, of diameter `filament`, m.
+    pub fn volume(&self, filament: f64) -> f64 {
+        0.25 * PI * filament * filament * self.fed
+    }
+
+    /// Cross-section of its bead, A = ΔE π d²/4 / L over its length across, m².
+    pub fn area(&self, filament: f64) -> f64 {
+        self.volume(filament) / (self.to[0] - self.from[0]).hypot(self.to[1] - self.from[1])
+    }
+}
+
+impl ToolPath {
+    /// Whether the file tells what is fed.
+    pub fn is_fed(&self) -> bool {
+        self.printing().any(|one| one.fed > 0.0)
+    }
+
+    /// Filament that printing moves feed, m.
+    pub fn fed(&self) -> f64 {
+        self.printing().map(|one| one.fed).sum()
+    }
+
+    /// Heights at which printing moves end, m, ascending; those that differ by rounding once.
+    pub fn levels(&self) -> Vec<f64> {
+        let mut levels: Vec<f64> = self.printing().map(|one| one.to[2]).collect();
+        levels.sort_unstable_by(f64::total_cmp);
+        levels.dedup_by(|next, kept| *next - *kept < SAME);
+        levels
+    }
+
+    /// Height of each printing move's bead, m: down to the level below it, the first down to z = 0, or `height` of all.
+    pub(super) fn heights(&self, height: Option<f64>) -> Vec<f64> {
+        let levels = self.levels();
+        let below = |z: f64| {
+            let at = levels.partition_point(|level| *level < z - SAME);
+            at.checked_sub(1).map_or(0.0, |at| levels[at])
+        };
+        self.printing().map(|one| height.unwrap_or_else(|| one.to[2] - below(one.to[2]))).collect()
+    }
+
+    /// A setting over time: pairs of time, s, and value, each from its time on. Of commands at one time the last holds.
+    pub fn setting(&self, of: Setting) -> Vec<(f64, f64)> {
+        let mut pairs: Vec<(f64, f64)> = Vec::new();
+        for command in self.commands.iter().filter(|command| command.setting == of) {
+            pairs.retain(|pair| pair.0 < command.time);
+            pairs.push((command.time, command.value));
+        }
+        pairs.dedup_by(|next, kept| next.1 == kept.1);
+        pairs
+    }
+}

@@ -1,0 +1,210 @@
+//! The state of a printer, and what its moves and arcs do to it.
+
+use super::Move;
+use std::f64::consts::TAU;
+
+/// Distance of chords from their arc at most, m.
+const CHORD: f64 = 1e-5;
+/// Chords of an arc at most.
+const MOST_CHORDS: f64 = 1e6;
+/// By how much the end of an arc may miss its circle: part of the radius, and m (digits of files).
+const MISS: (f64, f64) = (1e-2, 2e-5);
+
+/// What of a move cannot be.
+pub(super) struct Wrong {
+    pub what: &'static str,
+    /// `None`: the whole line.
+    found: Option<f64>,
+    pub allowed: String,
+}
+
+impl Wrong {
+    pub fn found_in(&self, text: &str) -> String {
+        self.found.map_or_else(|| text.trim().to_owned(), |found| found.to_string())
+    }
+}
+
+/// State of the printer; places in m as the printer counts them, with what G92 has added.
+#[derive(Debug, Default)]
+pub(super) struct Printer {
+    /// Metres per unit.
+    pub unit: f64,
+    place: [f64; 3],
+    /// Names of places minus places.
+    offset: [f64; 3],
+    /// Filament fed, as named, in units of the file.
+    feed: f64,
+    pub relative: bool,
+    pub relative_feed: bool,
+    /// m/s; 0 before the first F.
+    velocity: f64,
+    pub time: f64,
+}
+
+impl Printer {
+    /// At the origin, in millimetres.
+    pub fn new() -> Self {
+        Self { unit: 1e-3, ..Self::default() }
+    }
+
+    /// Adds a move, or the chords of an arc that turns by the sign of `arc`; none where the nozzle stays.
+    pub fn go(
+        &mut self,
+        value: impl Fn(char) -> Option<f64>,
+        arc: Option<f64>,
+        moves: &mut Vec<Move>,
+    ) -> Result<(), Wrong> {
+        let velocity = |found| Wrong {
+            what: "velocity F",
+            found: Some(found),
+            allowed: "positive and finite, before or in the first move".into(),
+        };
+        if let Some(feed) = value('F') {
+            // per minute
+            self.velocity = feed * self.unit / 60.0;
+            if !(self.velocity > 0.0 && self.velocity.is_finite()) {
+                return Err(velocity(feed));
+            }
+        }
+        let from = self.place;
+        for (d, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
+            if let Some(number) = value(letter) {
+                let to = number * self.unit;
+                self.place[d] = if self.relative { from[d] + to } else { to - self.offset[d] };
+            }
+        }
+        let fed = match value('E') {
+            None => 0.0,
+            Some(number) if self.relative_feed => number,
+            Some(number) => number - self.feed,
+        };
+        self.feed += fed;
+        let (length, places) = match arc {
+            Some(turn) => self.arc(from, turn, value)?,
+            None => {
+                let length = (0..3).map(|d| (self.place[d] - from[d]).powi(2)).sum::<f64>().sqrt();
+                (length, vec![self.place])
+            }
+        };
+        // filament alone takes its time too
+        let way = if length > 0.0 { length } else { fed.abs() * self.unit };
+        if way == 0.0 {
+            return Ok(());
+        }
+        if self.velocity == 0.0 {
+            return Err(velocity(0.0));
+        }
+        let start = self.time;
+        self.time += way / self.velocity;
+        if length == 0.0 {
+            return Ok(());
+        }
+        // filament that comes while the nozzle goes up or down alone fills it again after a retraction
+        let across = arc.is_some() || self.place[0] != from[0] || self.place[1] != from[1];
+        let count = places.len() as f64;
+        let mut before = (from, start);
+        for (k, to) in (1..).zip(places) {
+            let end = if k as f64 == count {
+                self.time
+            } else {
+                start + (self.time - start) * (f64::from(k) / count)
+            };
+            let (prints, fed) = (fed > 0.0 && across, fed * self.unit / count);
+            moves.push(Move { from: before.0, to, start: before.1, end, prints, fed });
+            before = (to, end);
+        }
+        Ok(())
+    }
+
+    /// Length of an arc in the XY plane from a place to the present one, and the ends of its chords, of equal angles: the same
+    /// XY is a full circle; z rises evenly.
+    fn arc(
+        &self,
+        from: [f64; 3],
+        turn: f64,
+        value: impl Fn(char) -> Option<f64>,
+    ) -> Result<(f64, Vec<[f64; 3]>), Wrong> {
+        let to = self.place;
+        let (across, up) = ([to[0] - from[0], to[1] - from[1]], to[2] - from[2]);
+        let way = across[0].hypot(across[1]);
+        let centre = match (value('I'), value('J'), value('R')) {
+            (None, None, None) => {
+                return Err(Wrong { what: "arc", found: None, allowed: "I and J, or R".into() });
+            }
+            (None, None, Some(_)) if way == 0.0 => {
+                return Err(Wrong { what: "arc", found: None, allowed: "I and J for a full circle".into() });
+            }
+            (None, None, Some(radius)) => {
+                let own = radius.abs() * self.unit;
+                // half a digit of the file
+                if own < 0.5 * way - MISS.1 {
+                    let allowed = format!("{} or more in size", 0.5 * way / self.unit);
+                    return Err(Wrong { what: "radius of an arc", found: Some(radius), allowed });
+                }
+                let height = (own * own - 0.25 * way * way).max(0.0).sqrt() / way;
+                // a negative radius is the longer way round
+                let side = turn * radius.signum();
+                [
+                    from[0] + 0.5 * across[0] - side * height * across[1],
+                    from[1] + 0.5 * across[1] + side * height * across[0],
+                ]
+            }
+            (i, j, _) => [from[0] + i.unwrap_or(0.0) * self.unit, from[1] + j.unwrap_or(0.0) * self.unit],
+        };
+        let radius = |place: [f64; 3]| (place[0] - centre[0]).hypot(place[1] - centre[1]);
+        let angle = |place: [f64; 3]| (place[1] - centre[1]).atan2(place[0] - centre[0]);
+        let (first, last) = (radius(from), radius(to));
+        if (first - last).abs() > MISS.0 * first + MISS.1 {
+            let [first, last] = [first, last].map(|radius| (1e9 * radius).round() / 1e9 / self.unit);
+            let allowed = format!("as far as its start, {first} from its centre");
+            return Err(Wrong {
+                what: "end of an arc, distance from its centre",
+                found: Some(last),
+                allowed,
+            });
+        }
+        if first == 0.0 {
+            return Err(Wrong { what: "radius of an arc", found: Some(0.0), allowed: "above 0".into() });
+        }
+        let mut sweep = (turn * (angle(to) - angle(from))).rem_euclid(TAU);
+        if way <= 1e-9 * first {
+            sweep = TAU;
+        }
+        // sagitta r (1 − cos(φ/2))
+        let most = 2.0 * (1.0 - CHORD / first).clamp(-1.0, 1.0).acos();
+        let count = (sweep / most).ceil().clamp(1.0, MOST_CHORDS) as u32;
+        let begin = angle(from);
+        let places = (1..=count).map(|k| {
+            if k == count {
+                return to;
+            }
+            let part = f64::from(k) / f64::from(count);
+            let (at, radius) = (begin + turn * sweep * part, first + (last - first) * part);
+            [centre[0] + radius * at.cos(), centre[1] + radius * at.sin(), from[2] + up * part]
+        });
+        Ok(((0.5 * (first + last) * sweep).hypot(up), places.collect()))
+    }
+
+    /// To zero along the axes named, or along all.
+    pub fn home(&mut self, value: impl Fn(char) -> Option<f64>) {
+        let named = ['X', 'Y', 'Z'].map(|letter| value(letter).is_some());
+        for d in 0..3 {
+            if named[d] || named == [false; 3] {
+                self.place[d] = 0.0;
+                self.offset[d] = 0.0;
+            }
+        }
+    }
+
+    /// G92: the place keeps, its name changes.
+    pub fn rename(&mut self, value: impl Fn(char) -> Option<f64>) {
+        for (d, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
+            if let Some(number) = value(letter) {
+                self.offset[d] = number * self.unit - self.place[d];
+            }
+        }
+        if let Some(number) = value('E') {
+            self.feed = number;
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Bodies as cells of a grid, each with the part of it that is filled.
+
+use crate::error::Error;
+use crate::mesh::structured::few_enough;
+use crate::mesh::{Grid, Mesh};
+
+/// Volume of full cells over that of the body between which they may stand for it.
+pub const RATIOS: [f64; 2] = [0.9, 1.1];
+
+/// Filled parts are told apart to this.
+const BIN: f64 = 0.05;
+
+/// A body as cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Voxels {
+    /// Cells in which something is: element sets `part`, `layer-1`, … (layers of cells), and the sides of the box around them.
+    pub mesh: Mesh,
+    /// Filled part of each element; above 1 where beads overlap. Their volumes add up to `volume`.
+    pub fill: Vec<f64>,
+    /// Volume of the body, m³.
+    pub volume: f64,
+    /// Volume of the elements over it.
+    pub ratio: f64,
+    /// The part of the volume that was in cells that are left out.
+    pub left_out: f64,
+}
+
+/// Cells around a box, from multiples of their size on.
+pub(super) struct Frame {
+    first: [f64; 3],
+    count: [usize; 3],
+    size: [f64; 3],
+}
+
+impl Frame {
+    /// Around a box; faces that fall on a line to a millionth of a cell lie on it.
+    pub fn around(low: [f64; 3], high: [f64; 3], size: [f64; 3]) -> Result<Self, Error> {
+        if let Some(found) = size.into_iter().find(|size| !(*size > 0.0 && size.is_finite())) {
+            let (name, allowed) = ("size of a cell", "positive and finite, m".into());
+            return Err(Error::Parameter { name, found, allowed });
+        }
+        let ends = [0, 1, 2].map(|d| [(low[d] / size[d] + 1e-6).floor(), (high[d] / size[d] - 1e-6).ceil()]);
+        few_enough(ends.map(|[first, last]| last - first))?;
+        let count = ends.map(|[first, last]| ((last - first) as usize).max(1));
+        Ok(Self { first: [0, 1, 2].map(|d| ends[d][0] * size[d]), count, size })
+    }
+
+    /// Cells along each axis.
+    pub fn counts(&self) -> [usize; 3] {
+        self.count
+    }
+
+    /// A place in units of cells from the grid's corner.
+    pub fn units(&self, at: f64, d: usize) -> f64 {
+        (at - self.first[d]) / self.size[d]
+    }
+
+    /// The cell at a place; rounding at the border stays inside.
+    pub fn cell(&self, at: [f64; 3]) -> usize {
+        let [i, j, k] =
+            [0, 1, 2].map(|d| self.units(at[d], d).floor().clamp(0.0, (self.count[d] - 1) as f64) as usize);
+        i + self.count[0] * (j + self.count[1] * k)
+    }
+
+    /// Cells whose filled volume, m³, is at least `least` of the whole, of a body of `volume`; what is in others goes to
+    /// these in equal proportion. Beside them which cells they are.
+    ///
+    /// # Errors
+    /// A least part that is not from 0 to 1, or that no cell reaches.
+    pub fn voxels(&self, filled: &[f64], least: f64, volume: f64) -> Result<(Voxels, Vec<bool>), Error> {
+        let name = "least filled part of a cell";
+        if !(0.0..=1.0).contains(&least) {
+            return Err(Error::Parameter { name, found: least, allowed: "0 to 1".into() });
+        }
+        let whole: f64 = self.size.iter().product();
+        let taken: Vec<bool> = filled.iter().map(|own| *own >= least * whole && *own > 0.0).collect();
+        let kept: f64 = filled.iter().zip(&taken).filter(|(_, taken)| **taken).map(|(own, _)| own).sum();
+        if kept <= 0.0 {
+            return Err(Error::Parameter {
+                name,
+                found: least,
+                allowed: "one that some cell reaches".into(),
+            });
+        }
+        let line = |d: usize| (0..=self.count[d]).map(|k| self.first[d] + k as f64 * self.size[d]).collect();
+        let mesh = Grid { lines: [line(0), line(1), line(2)] }.cells("part", &taken)?;
+        let all: f64 = filled.iter().sum();
+        let own = filled.iter().zip(&taken).filter(|(_, taken)| **taken).map(|(own, _)| own);
+        let fill: Vec<f64> = own.map(|own| own / whole * (volume / kept)).collect();
+        let ratio = whole * fill.len() as f64 / volume;
+        Ok((Voxels { mesh, fill, volume, ratio, left_out: 1.0 - kept / all }, taken))
+    }
+}
+
+impl Voxels {
+    /// Filled parts that differ by less than a twentieth made one, their mean, so that the volume stays: the values, and which
+    /// of them each element has.
+    pub fn bins(&self) -> (Vec<f64>, Vec<usize>) {
+        let key = |fill: f64| (fill / BIN).round() as u64;
+        let mut sums = std::collections::BTreeMap::new();
+        for &fill in &self.fill {
+            let (sum, count) = sums.entry(key(fill)).or_insert((0.0, 0.0));
+            *sum += fill;
+            *count += 1.0;
+        }
+        let keys: Vec<u64> = sums.keys().copied().collect();
+        let of = self.fill.iter().map(|&fill| keys.partition_point(|other| *other < key(fill))).collect();
+        (sums.into_values().map(|(sum, count)| sum / count).collect(), of)
+    }
+
+    /// Whether full cells may stand for the body.
+    pub fn may_be_full(&self) -> bool {
+        (RATIOS[0]..=RATIOS[1]).contains(&self.ratio)
+    }
+}

@@ -1,0 +1,249 @@
+//! Stress of a part on its way through the temperatures of a simulation.
+
+use crate::error::Error;
+use crate::mechanics::{Body, BodyState, Hexahedron, POINTS, Support};
+use crate::mesh::Mesh;
+use crate::quantities as q;
+use crate::scene::Mechanics;
+use crate::simulation::Simulation;
+use polycore::report::Report;
+
+/// Residual over the load at which a solution ends: its error is far below that of the model.
+const TOLERANCE: f64 = 1e-8;
+
+/// The state of an element at the last solution.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+struct Last {
+    /// Temperatures of the nodes, K.
+    nodes: [f64; 8],
+    /// α.
+    degree: f64,
+    /// s.
+    time: f64,
+}
+
+/// What a resumed run needs.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Reached {
+    body: BodyState,
+    last: Vec<Option<Last>>,
+    /// Solutions.
+    steps: u64,
+    /// Largest Mises stress before the release, Pa.
+    printed: f64,
+}
+
+/// A part with stress.
+pub struct Follower<'a> {
+    spec: &'a Mechanics,
+    mesh: &'a Mesh,
+    body: Body<'a>,
+    reached: Reached,
+}
+
+impl<'a> Follower<'a> {
+    /// Of a part of which nothing exists, or as far as a run was.
+    ///
+    /// # Errors
+    /// Those of [`Body::new`].
+    pub fn new(spec: &'a Mechanics, mesh: &'a Mesh, mut reached: Reached) -> Result<Self, Error> {
+        let mut body = Body::new(mesh, spec.law.poisson)?;
+        body.tolerance = TOLERANCE;
+        if reached.last.is_empty() {
+            reached.last = vec![None; spec.bears.len()];
+        } else {
+            body.state = std::mem::take(&mut reached.body);
+        }
+        Ok(Self { spec, mesh, body, reached })
+    }
+
+    /// What a checkpoint needs.
+    pub fn reached(&self) -> Reached {
+        Reached { body: self.body.state.clone(), ..self.reached.clone() }
+    }
+
+    /// Sees an accepted step: solves where elements are born, where the free strain has changed enough, or where it `must`.
+    ///
+    /// # Errors
+    /// Those of [`Body::step`].
+    pub fn see(&mut self, simulation: &Simulation, must: bool) -> Result<(), Error> {
+        let time = simulation.time();
+        let degrees = simulation.element_means("alpha");
+        let now = |element: usize| -> Option<Last> {
+            let mut nodes = [0.0; 8];
+            for (value, &node) in nodes.iter_mut().zip(&self.mesh.hexahedra[element]) {
+                *value = simulation.temperature(node)?;
+            }
+            Some(Last { nodes, degree: degrees[element].unwrap_or(0.0), time })
+        };
+        let mut born = Vec::new();
+        let mut present = vec![None; self.spec.bears.len()];
+        let mut change = 0.0_f64;
+        for element in (0..self.spec.bears.len()).filter(|&element| self.spec.bears[element]) {
+            if !simulation.is_born(element as u32) {
+                continue;
+            }
+            present[element] = now(element);
+            match (self.reached.last[element], present[element]) {
+                (Some(before), Some(after)) => {
+                    let strain = self.spec.law.volume.strain(before.state(), after.state());
+                    change = change.max(strain.abs());
+                }
+                _ => born.push(element),
+            }
+        }
+        if born.is_empty() && !must && change <= self.spec.strain_step {
+            return Ok(());
+        }
+        let has_body = self.reached.last.iter().any(Option::is_some);
+        if has_body {
+            let supports: Vec<Support> =
+                self.spec.bed.iter().flat_map(|&node| (0..3).map(move |d| (node, d))).collect();
+            self.solve(&present, &supports)?;
+        }
+        self.body.born(born, self.spec.law.branches());
+        self.reached.last = present;
+        Ok(())
+    }
+
+    /// From the last states of elements to the present ones.
+    fn solve(&mut self, present: &[Option<Last>], supports: &[Support]) -> Result<(), Error> {
+        let (law, last) = (&self.spec.law, &self.reached.last);
+        let pair = |element: usize| {
+            let after = present[element].or(last[element]);
+            let before = last[element].or(after);
+            before.zip(after)
+        };
+        self.body.step(
+            |element| match pair(element) {
+                Some((before, after)) => {
+                    law.increment(before.state(), after.state(), after.time - before.time)
+                }
+                None => law.increment([300.0, 0.0], [300.0, 0.0], 0.0),
+            },
+            |element, point, _| {
+                let Some((before, after)) = pair(element) else { return 0.0 };
+                law.volume.strain([before.at(point), before.degree], [after.at(point), after.degree])
+            },
+            supports,
+        )?;
+        self.reached.steps += 1;
+        Ok(())
+    }
+
+    /// Off the bed: a step of no duration, with six supports.
+    ///
+    /// # Errors
+    /// Those of [`Body::step`].
+    pub fn release(&mut self) -> Result<(), Error> {
+        self.reached.printed = self.largest_mises();
+        if self.spec.release && self.reached.last.iter().any(Option::is_some) {
+            let present = self.reached.last.clone();
+            self.solve(&present, &self.resting())?;
+        }
+        Ok(())
+    }
+
+    /// Three nodes of the bed, far from each other, with 3, 2 and 1 components held: no rigid motion is left and no force needed.
+    fn resting(&self) -> Vec<Support> {
+        let place = |node: u32| nalgebra::Vector3::from(self.mesh.points[node as usize]);
+        let alive: std::collections::HashSet<u32> = (0..self.reached.last.len())
+            .filter(|&element| self.reached.last[element].is_some())
+            .flat_map(|element| self.mesh.hexahedra[element])
+            .collect();
+        let bed: Vec<u32> = self.spec.bed.iter().copied().filter(|node| alive.contains(node)).collect();
+        let farthest = |of: &dyn Fn(u32) -> f64| {
+            bed.iter().copied().max_by(|&a, &b| of(a).total_cmp(&of(b)).then(b.cmp(&a))).unwrap_or(0)
+        };
+        let first = bed.first().copied().unwrap_or(0);
+        let second = farthest(&|node| (place(node) - place(first)).norm());
+        let along = (place(second) - place(first)).normalize();
+        let third = farthest(&|node| (place(node) - place(first)).cross(&along).norm());
+        let normal = along.cross(&(place(third) - place(first)));
+        let (axis, upright) = (along.iamax(), normal.iamax());
+        let mut supports: Vec<Support> = (0..3).map(|d| (first, d)).collect();
+        supports.extend((0..3).filter(|&d| d != axis).map(|d| (second, d)));
+        supports.push((third, upright));
+        supports
+    }
+
+    /// Displacements of the nodes, m, three a node; NaN where nothing bears stress.
+    pub fn displacement(&self) -> Vec<f64> {
+        let mut all = vec![f64::NAN; 3 * self.mesh.points.len()];
+        for element in (0..self.reached.last.len()).filter(|&element| self.reached.last[element].is_some()) {
+            for &node in &self.mesh.hexahedra[element] {
+                let node = node as usize;
+                all[3 * node..3 * node + 3].copy_from_slice(&self.body.state.displacement[node]);
+            }
+        }
+        all
+    }
+
+    /// Mises stress of each element, Pa: the largest of its Gauss points; NaN where nothing bears stress.
+    pub fn mises(&self) -> Vec<f64> {
+        let of = |element: usize| {
+            let alive = self.reached.last.get(element).is_some_and(Option::is_some);
+            let points = (0..POINTS).map(|point| mises(self.body.stress(element, point)));
+            if alive { points.fold(0.0, f64::max) } else { f64::NAN }
+        };
+        (0..self.mesh.element_count()).map(of).collect()
+    }
+
+    fn largest_mises(&self) -> f64 {
+        self.mises().into_iter().filter(|x| !x.is_nan()).fold(0.0, f64::max)
+    }
+
+    /// By how much the bed side is out of flat, m: largest less smallest distance from its least-squares plane.
+    fn warpage(&self) -> f64 {
+        let moved = self.displacement();
+        let bed: Vec<[f64; 3]> = self
+            .spec
+            .bed
+            .iter()
+            .map(|&node| {
+                std::array::from_fn(|d| self.mesh.points[node as usize][d] + moved[3 * node as usize + d])
+            })
+            .filter(|place: &[f64; 3]| place.iter().all(|x| x.is_finite()))
+            .collect();
+        let count = bed.len() as f64;
+        let mean: [f64; 3] = std::array::from_fn(|d| bed.iter().map(|p| p[d]).sum::<f64>() / count);
+        let rows = nalgebra::Matrix3xX::from_fn(bed.len(), |d, k| bed[k][d] - mean[d]);
+        let eigen = (&rows * rows.transpose()).symmetric_eigen();
+        let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        let distances = rows.column_iter().map(|place| place.dot(&normal));
+        let [low, high] = distances.fold([0.0_f64; 2], |[low, high], x| [low.min(x), high.max(x)]);
+        high - low
+    }
+
+    /// The scalars of the end.
+    pub fn record(&self, report: &mut Report) {
+        report.value(q::WARPAGE, self.warpage());
+        report.value(q::MISES_ON_BED, self.reached.printed);
+        report.value(q::MISES, self.largest_mises());
+        let moved = self
+            .displacement()
+            .chunks(3)
+            .map(|u| u[0].hypot(u[1]).hypot(u[2]))
+            .filter(|x| !x.is_nan())
+            .fold(0.0, f64::max);
+        report.value(q::LARGEST_DISPLACEMENT, moved);
+        report.work("stress_steps", self.reached.steps).work("stress_iterations", self.body.state.iterations);
+    }
+}
+
+impl Last {
+    /// T of the middle, K, and α.
+    fn state(&self) -> [f64; 2] {
+        [self.nodes.iter().sum::<f64>() / 8.0, self.degree]
+    }
+
+    /// T at a Gauss point, K.
+    fn at(&self, point: usize) -> f64 {
+        Hexahedron::shapes(point).iter().zip(self.nodes).map(|(share, t)| share * t).sum()
+    }
+}
+
+fn mises([x, y, z, xy, yz, zx]: [f64; 6]) -> f64 {
+    let normal = (x - y).powi(2) + (y - z).powi(2) + (z - x).powi(2);
+    (0.5 * normal + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
+}

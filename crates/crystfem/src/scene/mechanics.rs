@@ -1,0 +1,119 @@
+//! Stress of a part: which elements, which bed, how often.
+
+use super::PartScene;
+use super::fault::located;
+use crate::mechanics::SolidifyingMaxwell;
+use crate::mesh::Mesh;
+use crate::mesh::surface::Surface;
+use polycore::scene::{SceneError, Source};
+use serde::Deserialize;
+use std::collections::HashSet;
+
+/// Largest change of the free strain between two solutions, unless a scene says otherwise.
+const STRAIN_STEP: f64 = 2e-4;
+
+/// Stress and warpage beside the heat: what happens to the shape does not act back on temperatures.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MechanicsSpec {
+    /// The material whose elements bear stress; it must be semicrystalline.
+    pub material: String,
+    /// Its mechanical constants.
+    pub law: MechanicsLaw,
+    /// A surface of the mesh or a side, whose nodes are held while the part is printed; default: the nodes that the part shares with other
+    /// materials.
+    pub bed: Option<String>,
+    /// Whether the part is taken off the bed at the end; default true.
+    #[serde(default = "yes")]
+    pub release: bool,
+    /// Largest change of the linear free strain in any element between two solutions; default 2e-4.
+    pub strain_step: Option<f64>,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Mechanical constants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MechanicsLaw {
+    /// PA12, with assumed constants: see the guide, *Stress of prints*.
+    Pa12,
+}
+
+/// What is solved beside the heat.
+pub struct Mechanics {
+    /// The law.
+    pub law: SolidifyingMaxwell,
+    /// Of each element, whether it bears stress.
+    pub bears: Vec<bool>,
+    /// Nodes on the bed.
+    pub bed: Vec<u32>,
+    /// See [`MechanicsSpec`].
+    pub strain_step: f64,
+    /// See [`MechanicsSpec`].
+    pub release: bool,
+}
+
+impl PartScene {
+    /// The mechanics of a scene on a mesh, where it has any; `material_of` are the materials of elements by their place in the scene.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for unknown names, elements that are no hexahedra of first order, and a part that nothing holds.
+    pub(super) fn mechanics(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+        material_of: &[u16],
+    ) -> Result<Option<Mechanics>, SceneError> {
+        let Some(spec) = &self.mechanics else { return Ok(None) };
+        let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
+        let Some(index) = known.iter().position(|name| *name == spec.material) else {
+            return Err(source.unknown("mechanics.material", &spec.material, &known));
+        };
+        if self.materials[&spec.material].kinetics.is_none() {
+            let found = format!("`{}`, which does not crystallize", spec.material);
+            return Err(source.error("mechanics.material", found, "a semicrystalline material"));
+        }
+        let strain_step = spec.strain_step.unwrap_or(STRAIN_STEP);
+        if !(strain_step > 0.0 && strain_step.is_finite()) {
+            return Err(source.error("mechanics.strain_step", strain_step, "above 0, finite"));
+        }
+        let bears: Vec<bool> = material_of.iter().map(|&material| usize::from(material) == index).collect();
+        if bears.iter().skip(mesh.hexahedra.len()).any(|bears| *bears) {
+            let allowed = "8-node hexahedra for all elements that bear stress";
+            return Err(source.error("mechanics", "other elements", allowed));
+        }
+        let nodes_of = |own: bool| -> HashSet<u32> {
+            let chosen = (0..bears.len() as u32).filter(|&element| bears[element as usize] == own);
+            chosen.flat_map(|element| mesh.nodes(element).iter().copied()).collect()
+        };
+        let own = nodes_of(true);
+        let mut bed: Vec<u32> = match &spec.bed {
+            Some(name) => {
+                let fault = |error| located(source, "mechanics.bed", &error);
+                let surface = Surface::of_all(mesh).map_err(fault)?;
+                let region = surface.region(mesh, name).map_err(fault)?;
+                let faces = surface.all_in(&region);
+                faces
+                    .iter()
+                    .flat_map(|face| mesh.face_nodes(*face).to_vec())
+                    .filter(|node| own.contains(node))
+                    .collect()
+            }
+            None => nodes_of(false).intersection(&own).copied().collect(),
+        };
+        bed.sort_unstable();
+        bed.dedup();
+        if bed.len() < 3 {
+            let found = format!("{} nodes of the part on the bed", bed.len());
+            let allowed = "at least 3: a surface of the part, or another material below it";
+            return Err(source.error("mechanics.bed", found, allowed));
+        }
+        let law = match spec.law {
+            MechanicsLaw::Pa12 => SolidifyingMaxwell::pa12(),
+        };
+        Ok(Some(Mechanics { law, bears, bed, strain_step, release: spec.release }))
+    }
+}

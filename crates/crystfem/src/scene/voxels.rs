@@ -1,0 +1,185 @@
+//! Meshes of cells that a G-code file or an STL surface fills.
+
+use super::fault::{located, located_in};
+use super::memory;
+use super::mesh::Built;
+use crate::error::Error;
+use crate::mesh::path::{Cells, Deposit, ToolPath, read_gcode};
+use crate::mesh::{RATIOS, Voxels, quality, stl};
+use polycore::scene::{SceneError, Source};
+use polycore::units::{Acceleration, Length, Speed};
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// Diameter of a filament unless a scene says otherwise, m.
+pub(super) const FILAMENT: f64 = 1.75e-3;
+/// Cells are left out that are filled less: with the part that is filled, and where cells are full.
+const LEAST: [f64; 2] = [0.1, 0.5];
+
+/// Where parameters stand in their block.
+const KEYS: [(&str, &str); 7] = [
+    ("size of a cell", "cell"),
+    ("nodes of a structured mesh", "cell"),
+    ("least filled part of a cell", "least"),
+    ("diameter of the filament", "filament"),
+    ("height of the bead", "bead_height"),
+    ("acceleration", "acceleration"),
+    ("jerk", "jerk"),
+];
+
+/// The cells that the beads of a G-code file fill, printed in the order of its moves.
+///
+/// ```toml
+/// [mesh.path]
+/// file = "part.gcode"
+/// cell = ["0.5 mm", "0.5 mm", "0.25 mm"]
+/// ```
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PathSpec {
+    /// The file: G-code whose moves feed filament.
+    pub file: PathBuf,
+    /// Edges of a cell.
+    pub cell: [Length; 3],
+    /// Diameter of the filament; default 1.75 mm.
+    pub filament: Option<Length>,
+    /// Height of all beads; default: down to the level below in the file.
+    pub bead_height: Option<Length>,
+    /// Whether ρ and k of an element are scaled by the part of it that is filled, so that the printed mass is that of the file;
+    /// otherwise elements are full.
+    #[serde(default = "yes")]
+    pub fill: bool,
+    /// Cells filled to less are left out, their volume goes to the others; default 0.1, of full elements 0.5.
+    pub least: Option<f64>,
+    /// Limit of acceleration, for times; default: none, velocity is F.
+    pub acceleration: Option<Acceleration>,
+    /// Step of velocity at corners, with `acceleration`.
+    pub jerk: Option<Speed>,
+}
+
+/// The cells inside a closed surface.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StlSpec {
+    /// The file: STL, ASCII or binary.
+    pub file: PathBuf,
+    /// Length of one unit of the file: the format has none.
+    pub unit: Length,
+    /// Edges of a cell.
+    pub cell: [Length; 3],
+    /// As of a path.
+    #[serde(default = "yes")]
+    pub fill: bool,
+    /// As of a path.
+    pub least: Option<f64>,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// How full the elements are, and the path that laid them down.
+pub struct Filling {
+    /// Filled parts, and which of them each element has; `None`: all are full.
+    pub parts: Option<(Vec<f64>, Vec<usize>)>,
+    /// Volume of the body, m³.
+    pub volume: f64,
+    /// Volume of the elements over it.
+    pub ratio: f64,
+    /// The path, with the time of each element, s.
+    pub path: Option<(ToolPath, Vec<f64>)>,
+}
+
+impl PathSpec {
+    pub(super) fn build(&self, source: &Source) -> Result<Built, SceneError> {
+        let block = "mesh.path";
+        let at = |error: Error| located_in(source, block, &KEYS, &error);
+        let file = source.file(&self.file);
+        let mut path = read_gcode(&file).map_err(|error| located(source, "mesh.path.file", &error))?;
+        path = limited(source, block, path, self.acceleration, self.jerk)?;
+        let cells = Cells {
+            size: self.cell.map(|x| x.si()),
+            filament: self.filament.map_or(FILAMENT, |x| x.si()),
+            height: self.bead_height.map(|x| x.si()),
+            least: self.least.unwrap_or(LEAST[usize::from(!self.fill)]),
+        };
+        memory::refuse_mesh(source, "mesh.path.cell", path.cells(&cells).map_err(at)?, 1)?;
+        let Deposit { voxels, times } = path.deposit(&cells).map_err(at)?;
+        let mut notes = std::mem::take(&mut path.notes);
+        let print = 1e-9 * (1e9 * path.duration()).round();
+        notes.push(format!("the path takes {print} s, waits for temperatures left out"));
+        built(source, block, voxels, self.fill, notes, Some((path, times)))
+    }
+}
+
+impl StlSpec {
+    pub(super) fn build(&self, source: &Source) -> Result<Built, SceneError> {
+        let block = "mesh.stl";
+        let at = |error: Error| located_in(source, block, &KEYS, &error);
+        let file = source.file(&self.file);
+        let surface =
+            stl::read(&file, self.unit.si()).map_err(|error| located(source, "mesh.stl.file", &error))?;
+        let size = self.cell.map(|x| x.si());
+        memory::refuse_mesh(source, "mesh.stl.cell", surface.cells(size).map_err(at)?, 1)?;
+        let voxels =
+            surface.voxels(size, self.least.unwrap_or(LEAST[usize::from(!self.fill)])).map_err(at)?;
+        built(source, block, voxels, self.fill, surface.notes, None)
+    }
+}
+
+/// A path with limits on its acceleration, where there are some.
+pub(super) fn limited(
+    source: &Source,
+    block: &str,
+    path: ToolPath,
+    acceleration: Option<Acceleration>,
+    jerk: Option<Speed>,
+) -> Result<ToolPath, SceneError> {
+    match (acceleration, jerk) {
+        (None, None) => Ok(path),
+        (Some(acceleration), Some(jerk)) => path
+            .accelerated(acceleration.si(), jerk.si())
+            .map_err(|error| located_in(source, block, &KEYS, &error)),
+        (given, _) => {
+            let missing = if given.is_some() { "jerk" } else { "acceleration" };
+            Err(source.error(
+                &format!("{block}.{missing}"),
+                "nothing",
+                "`acceleration` and `jerk`, or neither",
+            ))
+        }
+    }
+}
+
+fn built(
+    source: &Source,
+    block: &str,
+    voxels: Voxels,
+    fill: bool,
+    mut notes: Vec<String>,
+    path: Option<(ToolPath, Vec<f64>)>,
+) -> Result<Built, SceneError> {
+    let cubic = 1e9 * voxels.volume;
+    let told = format!("cells have {:.4} times the volume of the body, {cubic:.3} mm³", voxels.ratio);
+    if !fill && !voxels.may_be_full() {
+        let [low, high] = RATIOS;
+        let allowed = format!("{low} to {high} times with full cells: smaller ones, or `fill = true`");
+        return Err(source.error(&format!("{block}.cell"), told, allowed));
+    }
+    let most = voxels.fill.iter().copied().fold(0.0, f64::max);
+    notes.push(match fill {
+        true => format!(
+            "{told}; density and conductivity are scaled by the part that is filled, at most {most:.3}"
+        ),
+        false => told,
+    });
+    if voxels.left_out > 1e-6 {
+        let share = 100.0 * voxels.left_out;
+        notes.push(format!("{share:.2} % of the volume is in cells left out, and goes to the others"));
+    }
+    let parts = fill.then(|| voxels.bins());
+    let found = quality::check(&voxels.mesh, None).map_err(|error| located(source, block, &error))?;
+    notes.extend(found.notes);
+    let filling = Filling { parts, volume: voxels.volume, ratio: voxels.ratio, path };
+    Ok(Built { mesh: voxels.mesh, notes, volume: found.volume, filling: Some(filling) })
+}

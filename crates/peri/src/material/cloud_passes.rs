@@ -1,0 +1,108 @@
+//! Both passes of a solid on a cloud, by the kernels of [`crate::bonds`].
+
+use super::deformation::{NonlocalSolid, Point, PointLaw, Tensor};
+use super::family::{Bond, Family};
+use super::pointwise::Passes;
+use super::solid_passes::Families;
+use crate::bonds::{Bonds, CloudBonds, CloudPlaces, Columns, Kind, Softened, StretchRange, among};
+use crate::field::{CHUNK, Field, chunk_range};
+use rayon::prelude::*;
+
+/// What both passes read of every particle.
+pub struct CloudPasses<const D: usize> {
+    places: CloudPlaces<D>,
+    /// A and S, and where there is θ also P, over Σ_K V_K.
+    terms: Vec<Columns<D>>,
+    families: Families,
+}
+
+impl<const D: usize> CloudPasses<D> {
+    pub fn new(cloud: &CloudBonds<D>) -> Self {
+        let places = cloud.places();
+        let terms = vec![[[0.0; 4]; D]; places.stride() * cloud.sites()];
+        Self { places, terms, families: Families::new(cloud.sites()) }
+    }
+}
+
+/// A softened bond, and what it lacks of V/|ξ|², as a negative number.
+fn lack<const D: usize>(cloud: &CloudBonds<D>, soft: &Softened, displacement: &Field<D>) -> (f64, Bond<D>) {
+    let site = soft.site as usize;
+    let bond = Bond::new(site, &cloud.whole_bond(site, soft.index), displacement);
+    ((soft.integrity - 1.0) * bond.volume / (bond.length * bond.length), bond)
+}
+
+impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses<D> {
+    fn prepare(
+        &mut self,
+        solid: &NonlocalSolid<L>,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        points: &mut [Point<D>],
+    ) {
+        let Kind::Cloud(cloud) = bonds.kind() else { return };
+        let (changed, softer) = self.families.changes(bonds);
+        let softening = cloud.softening();
+        self.places.load(displacement);
+        let (places, stride) = (&self.places, self.places.stride());
+        let items = self.terms.par_chunks_mut(stride * CHUNK).zip(self.families.bonded.par_chunks_mut(CHUNK));
+        let items = items.zip(points.par_chunks_mut(CHUNK)).enumerate();
+        let springs = items.map(|(chunk, ((terms, bonded), points))| {
+            let (mut springs, first) = (false, chunk * CHUNK);
+            let soft = softening.among(chunk_range(chunk, cloud.sites()));
+            for at in (0..bonded.len()).filter(|_| changed) {
+                let (site, now) = (first + at, cloud.bonded(first + at));
+                if bonded[at] != now || softer && !among(soft, site..site + 1).is_empty() {
+                    bonded[at] = now;
+                    points[at].reshape(&Family::new(bonds, displacement, site));
+                }
+            }
+            cloud.moments(places, chunk, &mut |site, moments| {
+                let (at, point) = (site - first, &mut points[site - first]);
+                if point.has_gradient() {
+                    let mut square = moments.square;
+                    let mut moment = Tensor::<D>::from_fn(|a, b| moments.first[b][a]);
+                    let mut shifted = Tensor::<D>::from_fn(|a, b| moments.shifted[b][a]);
+                    // the kernel takes every bond for intact
+                    for soft in among(soft, site..site + 1) {
+                        let (lack, bond) = lack(cloud, soft, displacement);
+                        square += bond.change.iter().map(|x| lack * x * x).sum::<f64>();
+                        moment += Tensor::from_fn(|a, b| lack * bond.change[a] * bond.reference[b]);
+                        shifted += Tensor::from_fn(|a, b| lack * bond.change[a] * bond.relief[b]);
+                    }
+                    solid.update(point, moment, shifted, square);
+                } else {
+                    solid.spring(point);
+                    springs |= bonded[at] > 0;
+                }
+                let terms = &mut terms[stride * at..stride * (at + 1)];
+                point.fill(terms);
+            });
+            springs
+        });
+        let springs = springs.reduce(|| false, |one, other| one | other);
+        self.families.mark(bonds, points, springs);
+    }
+
+    fn force(
+        &self,
+        _solid: &NonlocalSolid<L>,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        points: &[Point<D>],
+        chunk: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
+        let Kind::Cloud(cloud) = bonds.kind() else { return };
+        cloud.linear_force(&self.places, &self.terms, chunk, force, track);
+        let first = chunk * CHUNK;
+        for soft in cloud.softening().among(first..first + force[0].len()) {
+            let (lack, bond) = lack(cloud, soft, displacement);
+            let linear = points[bond.from].linear(&points[bond.to], &bond);
+            for d in 0..D {
+                force[d][bond.from - first] += lack * linear[d];
+            }
+        }
+        self.families.pull(bonds, displacement, points, first, force);
+    }
+}

@@ -1,0 +1,333 @@
+//! Scenes that read results of other scenes: what is missing or stale is told and computed, a changed file is noticed.
+
+use crate::program::{Ended, command, finish, peri};
+use crate::results::{assert_same, report, scalar};
+use polycore::output::vtkhdf::{Cells, MeshSeries, ParticleSeries, read};
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// A block that cools from one side: crystallinity between 0 and 0.25.
+const PRINT: &str = r#"version = 1
+program = "crystfem"
+
+[mesh.brick]
+size = ["8 mm", "4 mm", "1 mm"]
+elements = [8, 2, 1]
+
+[materials.pa12]
+law = "semicrystalline"
+density = "1010 kg/m^3"
+conductivity = "0.25 W/(m K)"
+specific_heat = "2200 J/(kg K)"
+kinetics = "table-4.1-column-1"
+melting = "pa12"
+crystallinity = 0.25
+
+[[region]]
+elements = "brick"
+material = "pa12"
+temperature = "180 degC"
+
+[[boundary]]
+surface = "left"
+film = "20 W/(m^2 K)"
+ambient = "25 degC"
+
+[time]
+end = "300 s"
+tolerance = "0.5 K"
+
+[output]
+every = "100 s"
+pictures = false
+"#;
+
+/// A strip whose stiffness follows it.
+const STRIP: &str = r#"version = 1
+program = "peri"
+
+[inputs]
+print = "../print/case.toml"
+
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "0.5 mm"
+shapes = [{ add = "box", min = ["0 mm", "0 mm"], max = ["8 mm", "4 mm"] }]
+
+[material]
+youngs_modulus = "1.6 GPa"
+law = "linear"
+
+[[material.fields]]
+of = "youngs-modulus"
+from = { input = "print", field = "crystallinity" }
+table = [[0, "0.9 GPa"], [0.25, "1.6 GPa"]]
+
+[[boundary]]
+side = "x-"
+displacement = ["0 mm", "0 mm"]
+
+[[boundary]]
+side = "x+"
+displacement = ["0.01 mm", "0 mm"]
+
+[output]
+fields = false
+pictures = false
+"#;
+
+/// Writes scenes `NAME/case.toml`.
+fn write(here: &Path, scenes: &[(&str, &str)]) {
+    for (name, text) in scenes {
+        fs::create_dir_all(here.join(name)).unwrap();
+        fs::write(here.join(name).join("case.toml"), text).unwrap();
+    }
+}
+
+fn crystfem(arguments: &str, here: &Path) -> Ended {
+    finish(command("crystfem", arguments, here).spawn().unwrap())
+}
+
+fn strip(here: &Path, options: &str) -> Ended {
+    peri(&format!("run strip/case.toml {options}"), here)
+}
+
+#[test]
+fn what_is_missing_or_stale_is_computed_first() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    write(here, &[("print", PRINT), ("strip", STRIP)]);
+    let missing = strip(here, "").with_code(2);
+    missing.tells("`inputs.print`: its results in out/print are missing");
+    missing.tells("`crystfem run strip/../print/case.toml --output out/print --with-inputs` computes them");
+    assert!(!here.join("out").exists(), "something was written");
+    // a quick run makes quick results
+    strip(here, "--quick --with-inputs").with_code(0).shows("input `print` is missing");
+    strip(here, "--quick").with_code(0);
+    strip(here, "").with_code(2).tells("are stale: of a run with --quick");
+    strip(here, "--with-inputs").with_code(0).shows("input `print` is stale");
+    let again = strip(here, "--with-inputs --explain").with_code(0);
+    assert!(!again.stdout.contains("input `print` is"), "{}", again.stdout);
+    again.shows("results in out/print: current");
+    again.shows("follows    youngs-modulus");
+    peri("check strip/case.toml", here).with_code(0).shows("results in out/print: current");
+    // another place
+    fs::create_dir(here.join("elsewhere")).unwrap();
+    fs::rename(here.join("out/print"), here.join("elsewhere/print")).unwrap();
+    strip(here, "").with_code(2).tells("are missing");
+    strip(here, "--input print=elsewhere/print").with_code(0);
+    strip(here, "--input prnt=elsewhere/print").with_code(2).tells("did you mean `print`?");
+    strip(here, "--input print").with_code(2).tells("allowed: NAME=FOLDER");
+    // another scene
+    write(here, &[("print", &PRINT.replace("300 s", "310 s"))]);
+    strip(here, "--input print=elsewhere/print").with_code(2).tells("are stale: its scene has changed");
+    strip(here, "--input print=elsewhere/print --with-inputs").with_code(0);
+    strip(here, "--input print=elsewhere/print").with_code(0);
+    // a sweep needs the results, too
+    let vary = "sweep strip/case.toml --vary material.youngs_modulus=1GPa,2GPa";
+    peri(vary, here).with_code(2).tells("are missing");
+    peri(&format!("{vary} --input print=elsewhere/print"), here).with_code(0);
+}
+
+/// A table that an input reads, and an input of an input.
+#[test]
+fn staleness_is_handed_on() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let over = PRINT.replace("ambient = \"25 degC\"", "ambient = { file = \"air.csv\" }");
+    let after = STRIP.replace("[inputs]\n", "[inputs]\nstrip = \"../strip/case.toml\"\n");
+    write(here, &[("print", &over), ("strip", STRIP), ("after", &after)]);
+    fs::write(here.join("print/air.csv"), "time [s],value [degC]\n0,25\n300,30\n").unwrap();
+    let run = |options: &str| peri(&format!("run after/case.toml {options}"), here);
+    let both = run("").with_code(2);
+    both.tells("its results in out/print are missing");
+    both.tells("input `strip`: its results in out/strip are missing");
+    run("--with-inputs").with_code(0);
+    run("").with_code(0);
+    fs::write(here.join("print/air.csv"), "time [s],value [degC]\n0,25\n300,31\n").unwrap();
+    let stale = run("").with_code(2);
+    stale.tells("are stale: the file air.csv has changed");
+    stale.tells("its input `print` is stale: the file air.csv has changed");
+    run("--with-inputs").with_code(0);
+    run("").with_code(0);
+    // computed again by itself, with other results: what was read from it is stale
+    fs::write(here.join("print/air.csv"), "time [s],value [degC]\n0,25\n300,32\n").unwrap();
+    crystfem("run print/case.toml", here).with_code(0);
+    run("").with_code(2).tells("input `strip`");
+}
+
+#[test]
+fn chains_that_cannot_be() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let back = format!("{PRINT}\n[inputs]\nstrip = \"../strip/case.toml\"\n");
+    write(here, &[("print", &back), ("strip", STRIP)]);
+    for verb in ["run strip/case.toml --with-inputs", "check strip/case.toml"] {
+        let ended = peri(verb, here).with_code(2);
+        ended.tells("a cycle: strip/case.toml → print/case.toml → strip/case.toml");
+    }
+    assert!(!here.join("out").exists(), "something was written");
+    write(here, &[("print", &PRINT.replace("\"crystfem\"", "\"sh\""))]);
+    strip(here, "--with-inputs").with_code(2).tells("program `sh`");
+    // one that fails
+    write(here, &[("print", &PRINT.replace("\"300 s\"", "\"-1 s\""))]);
+    let failed = strip(here, "--with-inputs").with_code(2);
+    failed.tells("time.end");
+    failed.tells("its results in out/print are missing");
+}
+
+/// Whatever is wrong with the fields is told with the key that names them.
+#[test]
+fn fields_that_cannot_be_used() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    write(here, &[("print", PRINT), ("strip", STRIP)]);
+    strip(here, "--with-inputs").with_code(0);
+    let path = here.join("out/print/fields.vtkhdf");
+    let whole = fs::read(&path).unwrap();
+    let refused = |told: &str| {
+        let ended = strip(here, "").with_code(2);
+        ended.tells("`material.fields[0].");
+        ended.tells(told);
+    };
+    let (points, cells, values) = {
+        let series = read(&path).unwrap();
+        (series.points(0).unwrap(), series.cells().unwrap(), series.data(0, "crystallinity").unwrap())
+    };
+    let replaced = |points: &[[f64; 3]], cells: &Cells, name: &str, values: &[f64]| {
+        let mut series = MeshSeries::create(&path, points.to_vec(), cells.clone()).unwrap();
+        series.step(0.0, &[(name, 1, values)], &[]).unwrap();
+        series.finish().unwrap();
+    };
+    let mut holed = values.clone();
+    holed[4] = f64::NAN;
+    replaced(&points, &cells, "crystallinity", &holed);
+    refused("`crystallinity` is NaN at [4.0, 0.0, 0.0] mm of the mesh");
+    replaced(&points, &cells, "crystallinity_degC", &values);
+    refused("a temperature, such as \"160 degC\": the field is `crystallinity_degC`");
+    replaced(&points, &cells, "chi", &values);
+    refused("found `chi`");
+    replaced(&points, &cells, "crystallinity", &vec![0.3; values.len()]);
+    refused("values of the table, 0 to 0.25");
+    let far: Vec<[f64; 3]> = points.iter().map(|&[x, y, z]| [x + 1.0, y, z]).collect();
+    replaced(&far, &cells, "crystallinity", &values);
+    refused("lies outside of the mesh of `print`; is it another mesh?");
+    let mut tetrahedra = Cells::default();
+    tetrahedra.push(10, &[0, 1, 9, 27]);
+    replaced(&points, &tetrahedra, "crystallinity", &values);
+    refused("cells of VTK's type 10");
+    fs::remove_file(&path).unwrap();
+    refused("fields.vtkhdf");
+    let mut particles = ParticleSeries::create(&path).unwrap();
+    particles.step(0.0, &points, &[("crystallinity", 1, &values)]).unwrap();
+    particles.finish().unwrap();
+    refused("particles and no cells");
+    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    refused("not a valid VTKHDF file");
+    fs::write(&path, &whole).unwrap();
+    strip(here, "").with_code(0);
+    let at = |key: &str, value: &str| {
+        write(
+            here,
+            &[(
+                "strip",
+                &STRIP.replace(
+                    "field = \"crystallinity\"",
+                    &format!("field = \"crystallinity\", {key} = {value}"),
+                ),
+            )],
+        );
+    };
+    at("time", "\"100 s\"");
+    strip(here, "").with_code(0);
+    at("time", "\"110 s\"");
+    refused("one of 4 times, the nearest 100 s");
+    at("file", "\"none.vtkhdf\"");
+    refused("none.vtkhdf");
+}
+
+/// An input that is killed is resumed by `--with-inputs`, with the same bits.
+#[test]
+fn a_killed_input_is_resumed() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let slow = PRINT.replace("0.5 K", "0.002 K").replace("[8, 2, 1]", "[32, 8, 2]");
+    write(here, &[("print", &slow), ("strip", STRIP)]);
+    crystfem("run print/case.toml --output undisturbed --threads 1", here).with_code(0);
+    let line = "run print/case.toml --output out/print --checkpoint-every 0 --threads 1";
+    let mut child = command("crystfem", line, here).spawn().unwrap();
+    let frame = here.join("out/print/fields.frames/0001.vtkhdf");
+    let begun = Instant::now();
+    while !frame.is_file() && child.try_wait().unwrap().is_none() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "no frame");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let _ = child.kill();
+    assert_eq!(finish(child).code, None, "it had ended");
+    strip(here, "").with_code(2).tells("its results in out/print are not finished");
+    // of another scene it is not resumed, but run again
+    let copy = here.join("copy");
+    fs::create_dir(&copy).unwrap();
+    fs::copy(here.join("out/print/checkpoint.bin"), copy.join("checkpoint.bin")).unwrap();
+    write(here, &[("print", PRINT)]);
+    strip(here, "--with-inputs --input print=copy").with_code(0);
+    write(here, &[("print", &slow)]);
+    strip(here, "--with-inputs").with_code(0).shows("input `print` is not finished");
+    assert_same(&here.join("undisturbed"), &here.join("out/print"));
+    assert!(scalar(&report(&here.join("out/strip")), "youngs_modulus_field_mean") > 0.0);
+}
+
+/// A run does not go on with another input or another table than it began with.
+#[test]
+fn what_changes_before_a_resume_is_noticed() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let slow =
+        STRIP.replace("[output]", "[solver]\nmethod = \"adr\"\ntolerance = 1e-9\nsteps = 50\n\n[output]");
+    write(here, &[("print", PRINT), ("strip", &slow)]);
+    crystfem("run print/case.toml", here).with_code(0);
+    let mut child =
+        command("peri", "run strip/case.toml --checkpoint-every 0 --threads 1", here).spawn().unwrap();
+    let checkpoint = here.join("out/strip/checkpoint.bin");
+    let begun = Instant::now();
+    while fs::metadata(&checkpoint).map_or(0, |file| file.len()) < 2 * slow.len() as u64 + 2000 {
+        assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    finish(child);
+    let saved = fs::read(&checkpoint).unwrap();
+    let fields = here.join("out/print/fields.vtkhdf");
+    let whole = fs::read(&fields).unwrap();
+    fs::write(&fields, [&whole[..], b"x"].concat()).unwrap();
+    let ended = peri("resume out/strip", here).with_code(2);
+    ended.tells("fields.vtkhdf has changed since this run began; run the scene again");
+    fs::write(&fields, &whole).unwrap();
+    write(here, &[("print", &PRINT.replace("300 s", "310 s"))]);
+    crystfem("run print/case.toml", here).with_code(0);
+    fs::write(&fields, &whole).unwrap();
+    peri("resume out/strip", here).with_code(2).tells("the results of its input `print` have changed");
+    write(here, &[("print", PRINT)]);
+    crystfem("run print/case.toml", here).with_code(0);
+    fs::write(&fields, &whole).unwrap();
+    assert_eq!(fs::read(&checkpoint).unwrap(), saved, "it stays as it is");
+    peri("resume out/strip", here).with_code(0);
+    strip(here, "--output out/undisturbed --threads 2").with_code(0);
+    assert_same(&here.join("out/undisturbed"), &here.join("out/strip"));
+}
+
+/// So it is for the tables of a part, and for all programs: the harness sees to it.
+#[test]
+fn a_report_tells_what_was_read() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    write(here, &[("print", &PRINT.replace("ambient = \"25 degC\"", "ambient = { file = \"air.csv\" }"))]);
+    fs::write(here.join("print/air.csv"), "time [s],value [degC]\n0,25\n300,30\n").unwrap();
+    crystfem("run print/case.toml", here).with_code(0);
+    let report = report(&here.join("out/print"));
+    let files = report["provenance"]["stamp"]["files"].as_object().unwrap();
+    assert_eq!(files.keys().collect::<Vec<_>>(), ["air.csv"]);
+    assert_eq!(files["air.csv"].as_str().unwrap().len(), 64);
+}
