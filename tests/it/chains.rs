@@ -155,7 +155,9 @@ fn staleness_is_handed_on() {
     // computed again by itself, with other results: what was read from it is stale
     fs::write(here.join("print/air.csv"), "time [s],value [degC]\n0,25\n300,32\n").unwrap();
     crystfem("run print/case.toml", here).with_code(0);
-    run("").with_code(2).tells("input `strip`");
+    let stale = run("").with_code(2);
+    stale.tells("`inputs.strip`: its results in out/strip are stale");
+    stale.tells("fields.vtkhdf has changed");
 }
 
 #[test]
@@ -208,7 +210,7 @@ fn fields_that_cannot_be_used() {
     replaced(&points, &cells, "crystallinity_degC", &values);
     refused("a temperature, such as \"160 degC\": the field is `crystallinity_degC`");
     replaced(&points, &cells, "chi", &values);
-    refused("found `chi`");
+    refused("found `crystallinity`; allowed: `chi`");
     replaced(&points, &cells, "crystallinity", &vec![0.3; values.len()]);
     refused("values of the table, 0 to 0.25");
     let far: Vec<[f64; 3]> = points.iter().map(|&[x, y, z]| [x + 1.0, y, z]).collect();

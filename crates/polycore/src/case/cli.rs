@@ -53,9 +53,9 @@ enum Command<V: Subcommand> {
         /// materials.pa12.kinetics=out/fit/nakamura_posterior.csv: gives the band of every value; may be repeated.
         #[arg(long, value_name = "KEY=FILE", conflicts_with = "search")]
         sample: Vec<Sample>,
-        /// Draws of the samples to run.
-        #[arg(long, default_value_t = 20, requires = "sample")]
-        count: usize,
+        /// Draws of the samples to run; default: 20, or all of a shorter file.
+        #[arg(long, requires = "sample")]
+        count: Option<usize>,
         /// Find the least value of a key that satisfies all expectations instead, e.g. print.layer_time=5s..40s.
         #[arg(long, value_name = "KEY=LOW..HIGH", conflicts_with = "vary")]
         search: Option<Search>,

@@ -99,7 +99,8 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 #[derive(clap::Args)]
 pub struct Threads {
     /// Number of threads; default: all. The results are bit-identical.
-    #[arg(long, global = true, value_parser = clap::value_parser!(u16).range(1..=4096))]
+    // the same place in the help of every program
+    #[arg(long, global = true, display_order = 100, value_parser = clap::value_parser!(u16).range(1..=4096))]
     threads: Option<u16>,
 }
 

@@ -9,6 +9,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+/// Draws to run, unless a user says how many.
+const DRAWS: usize = 20;
+
 crate::quantities! {
     /// What sweeps over samples report of each value.
     pub OF_SAMPLES:
@@ -40,16 +43,19 @@ impl FromStr for Sample {
     }
 }
 
-/// The first `count` rows of all samples as values of keys that change together: samples are independent of each other.
+/// The first `count` rows of all samples as values of keys that change together: samples are independent of each other. Without a `count` they are
+/// [`DRAWS`], or the rows of the shortest file.
 ///
 /// # Errors
 /// A file that is not a table of numbers, or has fewer rows.
-pub fn drawn(samples: &[Sample], count: usize) -> Result<Option<Vary>, Error> {
+pub fn drawn(samples: &[Sample], count: Option<usize>) -> Result<Option<Vary>, Error> {
+    let tables = samples.iter().map(|sample| csv::read(&sample.file)).collect::<Result<Vec<_>, _>>()?;
+    let shortest = tables.iter().flatten().map(|(_, list)| list.len()).min().unwrap_or(0);
+    let count = count.unwrap_or(shortest.clamp(1, DRAWS));
     let (mut keys, mut values) = (Vec::new(), vec![Vec::new(); count]);
-    for sample in samples {
+    for (sample, columns) in samples.iter().zip(tables) {
         let fault =
             |reason: String| Error::Option { option: format!("--sample {}", sample.file.display()), reason };
-        let columns = csv::read(&sample.file)?;
         for (heading, list) in columns {
             let (name, unit) = match heading.split_once('[') {
                 Some((name, unit)) => (name.trim(), unit.trim_end_matches(']').trim()),
