@@ -69,7 +69,8 @@ impl<L: PointLaw<D>, const D: usize> Passes<NonlocalSolid<L>, D> for CloudPasses
                         moment += Tensor::from_fn(|a, b| lack * bond.change[a] * bond.reference[b]);
                         shifted += Tensor::from_fn(|a, b| lack * bond.change[a] * bond.relief[b]);
                     }
-                    solid.update(point, moment, shifted, square);
+                    solid.deform(point, moment, shifted, square);
+                    solid.answer(point);
                 } else {
                     solid.spring(point);
                     springs |= bonded[at] > 0;

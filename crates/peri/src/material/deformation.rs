@@ -2,6 +2,7 @@
 
 use super::cloud_passes::CloudPasses;
 use super::solid_passes::SolidPasses;
+use super::eight_chain::cofactor;
 use super::{Bond, Family, Material, Passes};
 use crate::bonds::{Bonds, Columns, Kind};
 use crate::calibrate::modulus_in;
@@ -90,6 +91,13 @@ pub trait PointLaw<const D: usize>: Send + Sync {
         let _ = deformation;
         Flags::default()
     }
+
+    /// U and U′ at J = 1 + `change` of the part U(J) of W that is to depend on J averaged over nearest neighbours instead, on a lattice;
+    /// `None`: no part.
+    fn filtered(&self, change: f64) -> Option<[f64; 2]> {
+        let _ = change;
+        None
+    }
 }
 
 impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
@@ -113,6 +121,9 @@ impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
     }
     fn flags(&self, deformation: &Deformation<D>) -> Flags {
         (**self).flags(deformation)
+    }
+    fn filtered(&self, change: f64) -> Option<[f64; 2]> {
+        (**self).filtered(change)
     }
 }
 
@@ -146,6 +157,8 @@ pub struct Point<const D: usize> {
     /// D λ_min(M).
     shape: f64,
     deformation: Deformation<D>,
+    /// What [`super::filter`] adds to W and ∂W/∂J; 0 without.
+    pub(super) filtered: [f64; 2],
     /// A, Q + A 1, both over Σ_J V_J, and the stiffness of the springs over it, Pa/m³.
     slope: f64,
     stress: Tensor<D>,
@@ -176,6 +189,7 @@ impl<const D: usize> Default for Point<D> {
             inverse: zero,
             shape: 0.0,
             deformation: Deformation { displacement_gradient: zero, residual: 0.0 },
+            filtered: [0.0; 2],
             slope: 0.0,
             stress: zero,
             spring: 0.0,
@@ -254,6 +268,20 @@ impl<const D: usize> Point<D> {
         self.has_gradient().then_some(&self.deformation)
     }
 
+    /// Stress of a law at the mean deformation.
+    pub fn respond(&self, law: &(impl PointLaw<D> + ?Sized)) -> PointStress<D> {
+        let mut found = law.respond(&self.deformation);
+        if self.filtered[1] != 0.0 {
+            found.piola += cofactor(&self.deformation.gradient()) * self.filtered[1];
+        }
+        found
+    }
+
+    /// Energy density of a law at the mean deformation, J/m³; `None` where too few bonds are left.
+    pub fn energy(&self, law: &(impl PointLaw<D> + ?Sized)) -> Option<f64> {
+        Some(law.energy(self.deformation()?) + self.filtered[0])
+    }
+
     /// I: the part of the family that is intact, 0 to 1.
     pub fn integrity(&self) -> f64 {
         if self.whole > 0.0 { self.intact / self.whole } else { 0.0 }
@@ -298,7 +326,8 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
             point.reshape(family);
         }
         if point.has_gradient() {
-            self.update(point, moment, shifted, square);
+            self.deform(point, moment, shifted, square);
+            self.answer(point);
         } else {
             self.spring(point);
         }
@@ -365,7 +394,7 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
 
     fn energy(&self, family: &Family<D>, point: &Point<D>) -> f64 {
         match point.deformation() {
-            Some(deformation) => point.integrity() * self.0.energy(deformation),
+            Some(_) => point.integrity() * point.energy(&self.0).unwrap_or(0.0),
             None => 0.5 * point.spring * family.sum(|bond| bond.volume * bond.strain().powi(2)),
         }
     }
@@ -390,16 +419,14 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
 }
 
 impl<L> NonlocalSolid<L> {
-    /// Brings a state to Σ_J (V_J/|ξ|²) η⊗ξ, Σ_J (V_J/|ξ|²) η⊗(θ_J − θ_I) and Σ_J (V_J/|ξ|²)|η|² over the intact bonds.
-    pub(super) fn update<const D: usize>(
+    /// Brings the deformation to Σ_J (V_J/|ξ|²) η⊗ξ, Σ_J (V_J/|ξ|²) η⊗(θ_J − θ_I) and Σ_J (V_J/|ξ|²)|η|² over the intact bonds.
+    pub(super) fn deform<const D: usize>(
         &self,
         point: &mut Point<D>,
         moment: Tensor<D>,
         shifted: Tensor<D>,
         square: f64,
-    ) where
-        L: PointLaw<D>,
-    {
+    ) {
         let (dimension, moment) = (D as f64, moment / point.intact);
         let gradient = moment * point.inverse;
         let residual = dimension * (square / point.intact - gradient.dot(&moment));
@@ -410,8 +437,17 @@ impl<L> NonlocalSolid<L> {
             relief.part = shifted / point.intact - moment * relief.gradient.transpose();
             point.deformation.displacement_gradient += relief.part;
         }
-        let found = self.0.respond(&point.deformation);
-        point.slope = dimension * found.stabilisation / point.whole;
+    }
+
+    /// What the law says of the deformation.
+    pub(super) fn answer<const D: usize>(&self, point: &mut Point<D>)
+    where
+        L: PointLaw<D>,
+    {
+        let found = point.respond(&self.0);
+        let relieved = point.relief.as_ref().map_or_else(Tensor::zeros, |relief| relief.part);
+        let gradient = point.deformation.displacement_gradient - relieved;
+        point.slope = D as f64 * found.stabilisation / point.whole;
         point.stress = found.piola * point.inverse / point.whole - gradient * point.slope;
         if let Some(relief) = &mut point.relief {
             relief.piola = found.piola / point.whole;

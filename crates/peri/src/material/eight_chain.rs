@@ -22,6 +22,7 @@ pub struct EightChain<const D: usize> {
     volumetric: f64,
     /// β₁.
     rest: f64,
+    filter: bool,
 }
 
 /// Relative extension beyond which β grows linearly: a chain that a load step stretches too far has a force nevertheless.
@@ -52,7 +53,7 @@ impl<const D: usize> EightChain<D> {
         }
         let start = 1.0 / links.sqrt();
         let rest = langevin::inverse(start);
-        let mut law = Self { space, modulus, links, bulk, volumetric: bulk, rest };
+        let mut law = Self { space, modulus, links, bulk, volumetric: bulk, rest, filter: false };
         let least = 2.0 / 3.0 * modulus + 2.0 * law.chains(0.0)[1];
         if bulk.is_infinite() && space != Space::PlaneStress {
             return wrong("bulk modulus", bulk, "finite, except in plane stress");
@@ -63,6 +64,19 @@ impl<const D: usize> EightChain<D> {
         }
         law.volumetric = bulk - least;
         Ok(law)
+    }
+
+    /// The same with U(bJ), b the average over nearest neighbours of a lattice: pressures of large bulk moduli become smoother at corners.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] in plane stress, whose thickness gives way.
+    pub fn filtered(mut self) -> Result<Self, Error> {
+        if self.space == Space::PlaneStress {
+            let allowed = "solids and plane strain".into();
+            return Err(Error::Parameter { name: "pressure filter", found: self.bulk, allowed });
+        }
+        self.filter = true;
+        Ok(self)
     }
 
     /// κ, Pa: the factor of the volumetric energy.
@@ -291,5 +305,9 @@ impl<const D: usize> PointLaw<D> for EightChain<D> {
             return 1.0;
         }
         (1.0 + self.thickness(deformation.excess_trace(), deformation.volume_change()).third).sqrt()
+    }
+
+    fn filtered(&self, change: f64) -> Option<[f64; 2]> {
+        self.filter.then(|| [self.volume_energy(change), self.volume(change)[0]])
     }
 }

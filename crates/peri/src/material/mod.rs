@@ -16,6 +16,7 @@ mod constitutive;
 mod deformation;
 mod eight_chain;
 mod family;
+mod filter;
 mod levels;
 mod pointwise;
 mod prestrained;

@@ -2,6 +2,7 @@
 
 use super::deformation::{NonlocalSolid, Point, PointLaw, Tensor};
 use super::family::Family;
+use super::filter::Filter;
 use super::pointwise::Passes;
 use crate::bonds::{Bonds, LinearRow, Softened, StretchRange, among};
 use crate::field::{CHUNK, Field, chunk_range};
@@ -12,6 +13,7 @@ pub struct SolidPasses<const D: usize, const N: usize> {
     rows: Vec<LinearRow<D>>,
     terms: Field<N>,
     families: Families,
+    filter: Filter,
 }
 
 /// Families whose bonds change.
@@ -79,7 +81,8 @@ impl<const D: usize, const N: usize> SolidPasses<D, N> {
     /// On a lattice; `None` elsewhere.
     pub fn new(bonds: &dyn Bonds<D>) -> Option<Self> {
         let rows = bonds.as_lattice()?.linear_rows();
-        Some(Self { rows, terms: Field::zeros(bonds.sites()), families: Families::new(bonds.sites()) })
+        let families = Families::new(bonds.sites());
+        Some(Self { rows, terms: Field::zeros(bonds.sites()), families, filter: Filter::default() })
     }
 }
 
@@ -108,6 +111,7 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
         let softening = lattice.softening();
         let (changed, softer) = self.families.changes(bonds);
         let rows = &self.rows;
+        let filters = solid.0.filtered(0.0).is_some();
         let items = self.terms.chunks_mut().into_par_iter().zip(self.families.bonded.par_chunks_mut(CHUNK));
         let items = items.zip(points.par_chunks_mut(CHUNK)).enumerate();
         let springs = items.map(|(chunk, ((mut terms, bonded), points))| {
@@ -137,7 +141,11 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
                             square += change.iter().map(|x| lack * x * x).sum::<f64>();
                             moment += Tensor::from_fn(|a, b| lack * change[a] * reference[b]);
                         }
-                        solid.update(point, moment, Tensor::zeros(), square);
+                        solid.deform(point, moment, Tensor::zeros(), square);
+                        if filters {
+                            continue;
+                        }
+                        solid.answer(point);
                     } else if bonded[at] > 0 {
                         solid.spring(point);
                         springs = true;
@@ -150,6 +158,19 @@ impl<L: PointLaw<D>, const D: usize, const N: usize> Passes<NonlocalSolid<L>, D>
             springs
         });
         let springs = springs.reduce(|| false, |one, other| one | other);
+        if filters {
+            if changed {
+                self.filter.link(bonds, points, lattice.spacing());
+            }
+            self.filter.apply(&solid.0, points);
+            let items = self.terms.chunks_mut().into_par_iter().zip(points.par_chunks_mut(CHUNK));
+            items.for_each(|(mut terms, points)| {
+                for (at, point) in points.iter_mut().enumerate().filter(|(_, point)| point.has_gradient()) {
+                    solid.answer(point);
+                    point.terms().enumerate().for_each(|(n, value)| terms[n][at] = value);
+                }
+            });
+        }
         self.families.mark(bonds, points, springs);
     }
 

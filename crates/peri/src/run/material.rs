@@ -263,7 +263,7 @@ impl<'a, const D: usize> Observed<'a, D> {
             let point = &states.points()[site as usize];
             let Some(deformation) = point.deformation() else { return ([[0.0; D]; D], [[0.0; D]; D]) };
             let gradient = deformation.gradient();
-            let piola = law.respond(deformation).piola * point.integrity();
+            let piola = point.respond(*law).piola * point.integrity();
             let volume = (1.0 + deformation.volume_change()) * law.thickness_stretch(deformation);
             let cauchy = piola * gradient.transpose() / volume;
             let rows =
@@ -289,9 +289,9 @@ impl<'a, const D: usize> Observed<'a, D> {
         for (at, &site) in sites.iter().enumerate() {
             let point = &states.points()[site as usize];
             let Some(deformation) = point.deformation() else { continue };
-            let piola = law.respond(deformation).piola;
+            let piola = point.respond(*law).piola;
             let tensor = (deformation.displacement_gradient.transpose() * piola
-                - crate::material::Tensor::<D>::identity() * law.energy(deformation))
+                - crate::material::Tensor::<D>::identity() * point.energy(*law).unwrap_or(0.0))
                 * point.integrity();
             visit(at, std::array::from_fn(|a| std::array::from_fn(|b| tensor[(a, b)])));
         }

@@ -26,6 +26,10 @@ pub struct SolidLaw {
     pub bulk_modulus: Option<Stress>,
     /// Links of a chain, of `eight-chain`.
     pub links: Option<f64>,
+    /// Whether the volumetric energy depends on J averaged over nearest neighbours, of `eight-chain` on a lattice, solid or plane strain;
+    /// default false.
+    #[serde(default)]
+    pub pressure_filter: bool,
     /// The constitutive law of `correspondence`.
     pub constitutive: Option<ConstitutiveSpec>,
     /// Factor on the stabilisation of `correspondence`; default 1.
@@ -76,6 +80,7 @@ impl SolidLaw {
             ("shear_modulus", self.shear_modulus.is_some(), true),
             ("bulk_modulus", self.bulk_modulus.is_some(), true),
             ("links", self.links.is_some(), true),
+            ("pressure_filter", self.pressure_filter, true),
             ("constitutive", self.constitutive.is_some(), false),
             ("stabilisation", self.stabilisation.is_some(), false),
         ] {
@@ -111,7 +116,15 @@ impl SolidLaw {
                     ));
                 }
             };
-            return Ok(Arc::new(EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?));
+            let network = EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?;
+            if !self.pressure_filter {
+                return Ok(Arc::new(network));
+            }
+            if space == Space::PlaneStress {
+                let allowed = "false: the thickness of plane stress gives way";
+                return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
+            }
+            return Ok(Arc::new(network.filtered().map_err(wrong)?));
         }
         let spec = self.constitutive.as_ref().ok_or_else(|| {
             missing("constitutive", "a block with `model`, `parameters`, `bulk_modulus`, or `learnt`")
@@ -171,6 +184,10 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         if let Some(found) = found {
             return Err(source.error("material.critical", found, allowed));
         }
+    }
+    if solid.pressure_filter && scene.body.points.is_some() {
+        let allowed = "false: points of a cloud have no nearest neighbours";
+        return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
     }
     let other =
         scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m != Measure::Constitutive);

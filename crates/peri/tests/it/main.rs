@@ -9,6 +9,7 @@ mod contact;
 mod cracks;
 mod dynamics;
 mod fields;
+mod filter;
 mod forces;
 mod friction;
 mod hardy;

@@ -1,0 +1,79 @@
+//! Pressures averaged over nearest neighbours: at a bulk modulus of a thousand shear moduli those of single particles are rough
+//! at corners of grips.
+
+use super::deformation::{Point, PointLaw};
+use crate::bonds::Bonds;
+use rayon::prelude::*;
+
+/// The symmetric average b = 1 + (A − D)/(2·dimension + 1) of the particles of a lattice, with A = 1 between nearest neighbours whose bond is
+/// intact and D its sums over rows: rows of b sum to 1, none of its entries is negative.
+#[derive(Default)]
+pub(super) struct Filter {
+    /// Neighbours of each site; `u32::MAX`: none.
+    neighbours: Vec<[u32; 6]>,
+    /// What is averaged, site by site, and its average.
+    values: Vec<f64>,
+    means: Vec<f64>,
+}
+
+impl Filter {
+    /// Finds the neighbours, where bonds have changed.
+    pub(super) fn link<const D: usize>(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        points: &[Point<D>],
+        spacing: f64,
+    ) {
+        let of = |site: usize| {
+            let mut found = [u32::MAX; 6];
+            if points[site].has_gradient() {
+                let mut places = found.iter_mut();
+                bonds.neighbours(site, &mut |bond| {
+                    if bond.length < 1.1 * spacing
+                        && points[bond.site].has_gradient()
+                        && let Some(place) = places.next()
+                    {
+                        *place = bond.site as u32;
+                    }
+                });
+            }
+            found
+        };
+        (0..points.len()).into_par_iter().map(of).collect_into_vec(&mut self.neighbours);
+    }
+
+    /// Brings the energy to Σ_I V_I I_I U((bJ)_I) by the part of each particle in it: with p_I = Σ_J b_IJ I_J U′((bJ)_J)/I_I in place of U′(J_I),
+    /// forces are its exact variation.
+    pub(super) fn apply<L: PointLaw<D>, const D: usize>(&mut self, law: &L, points: &mut [Point<D>]) {
+        let change = |point: &Point<D>| point.deformation().map_or(0.0, |found| found.volume_change());
+        points.par_iter().map(change).collect_into_vec(&mut self.values);
+        self.average::<D>();
+        let own = |change: f64| law.filtered(change).unwrap_or_default();
+        let parts = points.par_iter_mut().zip(&self.means).zip(&self.values);
+        let slopes = parts.map(|((point, &mean), &change)| {
+            if !point.has_gradient() {
+                return 0.0;
+            }
+            let ([before, slope], [after, smooth]) = (own(change), own(mean));
+            point.filtered = [after - before, -slope];
+            point.integrity() * smooth
+        });
+        let slopes: Vec<f64> = slopes.collect();
+        self.values = slopes;
+        self.average::<D>();
+        points.par_iter_mut().zip(&self.means).filter(|(point, _)| point.has_gradient()).for_each(
+            |(point, mean)| {
+                point.filtered[1] += mean / point.integrity();
+            },
+        );
+    }
+
+    fn average<const D: usize>(&mut self) {
+        let (values, share) = (&self.values, 1.0 / (2 * D + 1) as f64);
+        let of = |(neighbours, &own): (&[u32; 6], &f64)| {
+            let others = neighbours.iter().take_while(|&&site| site != u32::MAX);
+            own + share * others.map(|&site| values[site as usize] - own).sum::<f64>()
+        };
+        self.neighbours.par_iter().zip(values).map(of).collect_into_vec(&mut self.means);
+    }
+}
