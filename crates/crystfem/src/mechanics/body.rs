@@ -111,6 +111,14 @@ impl<'a> Body<'a> {
             .into()
     }
 
+    /// Mean of an element's stress by volume, Pa: of its Gauss points.
+    pub fn mean_stress(&self, element: usize) -> [f64; 6] {
+        let weights = &self.shapes[self.shape[element] as usize].weights;
+        let volume: f64 = weights.iter().sum();
+        let points = (0..POINTS).map(|point| (self.stress(element, point), weights[point] / volume));
+        points.fold([0.0; 6], |sum, (stress, share)| std::array::from_fn(|k| sum[k] + share * stress[k]))
+    }
+
     /// The corners of an element at rest.
     fn corners(&self, element: usize) -> [[f64; 3]; 8] {
         self.mesh.hexahedra[element].map(|node| self.mesh.points[node as usize])

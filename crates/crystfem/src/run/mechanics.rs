@@ -189,6 +189,15 @@ impl<'a> Follower<'a> {
         (0..self.mesh.element_count()).map(of).collect()
     }
 
+    /// Mean stress of each element, Pa, six each in VTK's order of symmetric tensors, xx, yy, zz, xy, yz, zx; NaN where nothing bears stress.
+    pub fn stresses(&self) -> Vec<f64> {
+        let of = |element: usize| match self.reached.last.get(element).is_some_and(Option::is_some) {
+            true => self.body.mean_stress(element),
+            false => [f64::NAN; 6],
+        };
+        (0..self.mesh.element_count()).flat_map(of).collect()
+    }
+
     fn largest_mises(&self) -> f64 {
         self.mises().into_iter().filter(|x| !x.is_nan()).fold(0.0, f64::max)
     }

@@ -188,14 +188,15 @@ impl Recorder<'_> {
         let elements = self.task.problem.mesh.element_count() as u32;
         let exists: Vec<f64> =
             (0..elements).map(|element| f64::from(u8::from(simulation.is_born(element)))).collect();
-        let (displacement, mises) = match &self.follower {
-            Some(follower) => (follower.displacement(), follower.mises()),
+        let (displacement, mises, stresses) = match &self.follower {
+            Some(follower) => (follower.displacement(), follower.mises(), follower.stresses()),
             None => Default::default(),
         };
         let mut of_cells: Vec<Data> = vec![("exists", 1, &exists)];
         if self.follower.is_some() {
             arrays.push(("displacement_m", 3, &displacement));
             of_cells.push(("mises_Pa", 1, &mises));
+            of_cells.push(("residual_stress_Pa", 6, &stresses));
         }
         Ok(series.step(simulation.time(), &arrays, &of_cells)?)
     }
