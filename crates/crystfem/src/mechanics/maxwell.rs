@@ -77,6 +77,8 @@ pub struct SolidifyingMaxwell {
     pub poisson: f64,
     /// Modulus of the melt over the sum of all others: bears Δε − Δε* within a step and forgets it.
     pub floor: f64,
+    /// Tensile strength, Pa: stresses above it would flow, which is not computed.
+    pub strength: f64,
 }
 
 /// What a material point does over a step, linear in the strain increment.
@@ -111,7 +113,17 @@ impl SolidifyingMaxwell {
             softening: Some([296.15, 451.0]),
             poisson: 0.4,
             floor: 1e-4,
+            strength: 48e6,
         }
+    }
+
+    /// With another crystallinity X∞ at α = 1: its share in the volume, and a network in proportion to it; without crystals there is none.
+    pub fn with_crystallinity(mut self, crystallinity: f64) -> Self {
+        let factor = crystallinity / self.volume.crystallinity;
+        self.network.0.iter_mut().for_each(|branch| branch.modulus *= factor);
+        self.network.0.retain(|branch| branch.modulus > 0.0);
+        self.volume.crystallinity = crystallinity;
+        self
     }
 
     /// Branches of both phases: as many elastic strains has the state of a point, all 0 at birth.
@@ -188,12 +200,7 @@ impl Increment {
                 product(strain, mechanical),
                 product(mechanical, mechanical),
             );
-            sum.work += modulus * one.work;
-            sum.stored += modulus * one.stored;
-            sum.viscous += modulus * one.viscous;
-            sum.growth += modulus * one.growth;
-            sum.melting += modulus * one.melting;
-            sum.softening += modulus * one.softening;
+            sum.add(&one, *modulus);
         }
         sum
     }
@@ -223,6 +230,7 @@ mod tests {
             softening: None,
             poisson: 0.3,
             floor: 0.0,
+            strength: f64::INFINITY,
         }
     }
 
