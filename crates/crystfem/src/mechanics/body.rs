@@ -1,7 +1,7 @@
 //! A body of solidifying Maxwell elements on a mesh of hexahedra: births, steps, supports.
 
-use super::element::{Hexahedron, POINTS, Six};
 use super::branch::Energies;
+use super::element::{Hexahedron, POINTS, Six};
 use super::maxwell::Increment;
 use super::solve::{Load, gather};
 use crate::error::Error;
@@ -37,7 +37,7 @@ pub struct BodyState {
     pub displacement: Vec<[f64; 3]>,
     /// Iterations of conjugate gradients so far.
     pub iterations: u64,
-    /// Rotation of each element since its birth, rad: half the curl of the displacement in its middle.
+    /// Rotation of each element since it was melt, rad: half the curl of the displacement in its middle.
     rotations: Vec<[f64; 3]>,
     /// Energies of all steps so far.
     pub audit: Audit,
@@ -75,13 +75,7 @@ impl<'a> Body<'a> {
         let (mut shapes, mut shape, mut known) = (Vec::new(), Vec::new(), std::collections::HashMap::new());
         for nodes in &mesh.hexahedra {
             let corners = nodes.map(|node| mesh.points[node as usize]);
-            // edges to 1e-12 of the element's size tell shapes apart
-            let size = (0..3).map(|d| (corners[6][d] - corners[0][d]).abs()).fold(0.0, f64::max);
-            let key: Vec<i64> = corners
-                .iter()
-                .flat_map(|corner| (0..3).map(|d| ((corner[d] - corners[0][d]) / size * 1e12).round() as i64))
-                .chain([(size * 1e15).round() as i64])
-                .collect();
+            let key = Hexahedron::key(&corners);
             let index = match known.get(&key) {
                 Some(&index) => index,
                 None => {
@@ -125,7 +119,7 @@ impl<'a> Body<'a> {
         &self.shapes[self.shape[element] as usize]
     }
 
-    /// Largest rotation of an element since its birth, rad. Strains are small: a rotation θ looks like a strain ½θ².
+    /// Largest rotation of an element since it was melt, rad. Strains are small: a rotation θ looks like a strain ½θ².
     pub fn largest_rotation(&self) -> f64 {
         self.state.rotations.iter().map(|r| r[0].hypot(r[1]).hypot(r[2])).fold(0.0, f64::max)
     }
@@ -215,8 +209,12 @@ impl<'a> Body<'a> {
                     .zip(branches)
                     .for_each(|(branch, strain)| branch[point] = strain);
             }
-            let turned = shape.rotation(&local);
-            self.state.rotations[element].iter_mut().zip(turned).for_each(|(sum, turned)| *sum += turned);
+            let turned = &mut self.state.rotations[element];
+            if increment.melt {
+                *turned = [0.0; 3];
+            } else {
+                turned.iter_mut().zip(shape.rotation(&local)).for_each(|(sum, more)| *sum += more);
+            }
         }
         let audit = &mut self.state.audit;
         audit.energies.add(&energies, 1.0);

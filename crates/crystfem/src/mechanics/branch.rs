@@ -54,9 +54,9 @@ impl Energies {
         [work, stored, viscous, growth, melting, softening].map(f64::abs).iter().sum()
     }
 
-    /// What is gone: relaxation, growth, melting and softening.
+    /// What is gone: relaxation, growth and melting, ≥ 0.
     pub fn lost(&self) -> f64 {
-        self.viscous + self.growth + self.melting - self.softening
+        self.viscous + self.growth + self.melting
     }
 
     /// Adds others times a factor.

@@ -108,6 +108,15 @@ impl Hexahedron {
         Some(Self { weights, nodes, modes, condensed, coupling, inverse, elastic, middle })
     }
 
+    /// Elements of one shape have one key: their edges to 1e-12 of their size.
+    pub fn key(corners: &[[f64; 3]; 8]) -> Vec<i64> {
+        let size = (0..3).map(|d| (corners[6][d] - corners[0][d]).abs()).fold(0.0, f64::max);
+        let edges = corners
+            .iter()
+            .flat_map(|corner| (0..3).map(|d| ((corner[d] - corners[0][d]) / size * 1e12).round() as i64));
+        edges.chain([(size * 1e15).round() as i64]).collect()
+    }
+
     /// σ over the modulus of an elastic strain.
     pub fn stress(&self, strain: &Six) -> Six {
         self.elastic * strain

@@ -3,6 +3,9 @@
 use super::branch::{Change, Energies, Step};
 use super::eigenstrain::SpecificVolume;
 
+/// What is softer than this part of its moduli flows rather than bears stress.
+const MELT: f64 = 0.01;
+
 /// A modulus that relaxes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Branch {
@@ -90,6 +93,8 @@ pub struct Increment {
     pub stiffness: f64,
     /// The part of the floor in it, whose stress is not kept, Pa.
     pub floor: f64,
+    /// Whether its stiffness is less than 1 % of the sum of all moduli.
+    pub melt: bool,
     /// For each branch: its step, and its modulus times b₂ s₂ at the end.
     branches: Vec<(Step, f64, f64)>,
 }
@@ -154,7 +159,8 @@ impl SolidifyingMaxwell {
         add(&self.network, [from[1], to[1]], temperatures.map(|t| self.softness(t)));
         let free_strain = self.volume.strain(from, to);
         let floor = self.floor * whole;
-        Increment { free_strain, stiffness: stiffness + floor, floor, branches }
+        let melt = stiffness < MELT * whole;
+        Increment { free_strain, stiffness: stiffness + floor, floor, melt, branches }
     }
 
     /// The stress over Ĉ after a hold: Σ E_i e_i, Pa, for a strain measure such as one component under a uniaxial stress.

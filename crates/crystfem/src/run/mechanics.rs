@@ -250,6 +250,7 @@ impl<'a> Follower<'a> {
         report.value(q::STRESS_WORK, audit.energies.work);
         report.value(q::STRESS_STORED, audit.energies.stored);
         report.value(q::STRESS_LOST, audit.energies.lost());
+        report.value(q::STRESS_HARDENING, audit.energies.softening);
         report.value(q::WORST_STRESS_BALANCE, audit.worst);
         let moved = self
             .displacement()

@@ -2,12 +2,12 @@
 
 use super::PartScene;
 use super::fault::located;
-use crate::mechanics::SolidifyingMaxwell;
+use crate::mechanics::{Hexahedron, SolidifyingMaxwell};
 use crate::mesh::Mesh;
 use crate::mesh::surface::Surface;
 use polycore::scene::{SceneError, Source};
-use serde::Deserialize;
 use polycore::units::Ratio;
+use serde::Deserialize;
 use std::collections::{HashMap, HashSet};
 
 /// Largest change of the free strain between two solutions, unless a scene says otherwise.
@@ -51,6 +51,8 @@ pub struct Mechanics {
     pub fresh: f64,
     /// Of each element, whether it bears stress.
     pub bears: Vec<bool>,
+    /// How many do, and of how many shapes all hexahedra are.
+    pub counts: [usize; 2],
     /// Nodes on the bed.
     pub bed: Vec<u32>,
     /// See [`MechanicsSpec`].
@@ -92,7 +94,11 @@ impl PartScene {
         let others = mesh.element_count() - mesh.hexahedra.len();
         if others > 0 {
             let found = format!("a mesh with {others} other elements");
-            return Err(source.error("mechanics", found, "8-node hexahedra: layers, bricks, cells of a path"));
+            return Err(source.error(
+                "mechanics",
+                found,
+                "8-node hexahedra: layers, bricks, cells of a path",
+            ));
         }
         let nodes_of = |own: bool| -> HashSet<u32> {
             let chosen = (0..bears.len() as u32).filter(|&element| bears[element as usize] == own);
@@ -123,16 +129,27 @@ impl PartScene {
         let loose = loose(mesh, &bears, &bed);
         if loose > 0 {
             let found = format!("{loose} elements that nothing connects with the bed");
-            return Err(source.error("mechanics.bed", found, "a part that hangs together and touches the bed"));
+            return Err(source.error(
+                "mechanics.bed",
+                found,
+                "a part that hangs together and touches the bed",
+            ));
         }
+        let shapes: HashSet<_> =
+            mesh.hexahedra.iter().map(|nodes| Hexahedron::key(&corners(mesh, nodes))).collect();
+        let counts = [bears.iter().filter(|bears| **bears).count(), shapes.len()];
         let share = |given: Option<Ratio>| given.map_or(0.0, |ratio| ratio.si());
         let law = match spec.law {
             MechanicsLaw::Pa12 => SolidifyingMaxwell::pa12(),
         };
         let law = law.with_crystallinity(share(material.crystallinity));
         let fresh = share(material.initial_alpha);
-        Ok(Some(Mechanics { law, fresh, bears, bed, strain_step, release: spec.release }))
+        Ok(Some(Mechanics { law, fresh, bears, counts, bed, strain_step, release: spec.release }))
     }
+}
+
+fn corners(mesh: &Mesh, nodes: &[u32; 8]) -> [[f64; 3]; 8] {
+    nodes.map(|node| mesh.points[node as usize])
 }
 
 /// How many of the elements that bear stress have no way to a node of the bed, through nodes they share.
