@@ -18,6 +18,13 @@ polycore::quantities! {
     LARGEST_DISPLACEMENT = "largest_displacement", "m", "with `[mechanics]`: at the end";
     MISES_ON_BED = "largest_mises_on_bed", "Pa", "with `[mechanics]`: largest Mises stress at the end, before the release";
     MISES = "largest_mises", "Pa", "with `[mechanics]`: largest Mises stress after the release";
+    MISES_OVER_STRENGTH = "largest_mises_over_strength", "", "with `[mechanics]`: largest Mises stress, before or after the release, over the strength of sheets; there is no plasticity";
+    LARGEST_ROTATION = "largest_rotation", "rad", "with `[mechanics]`: largest rotation of an element since it was melt; θ looks like a strain of θ²/2";
+    STRESS_WORK = "stress_work", "J", "with `[mechanics]`: work of the stress on the strain without the free strain, over all steps";
+    STRESS_STORED = "stress_stored", "J", "with `[mechanics]`: elastic energy at the end";
+    STRESS_LOST = "stress_lost", "J", "with `[mechanics]`: what relaxed, was lost with crystals that melt, or because new ones are born without stress";
+    STRESS_HARDENING = "stress_hardening", "J", "with `[mechanics]`: by how much the stored energy grew because the network hardens when it cools, less what softening took";
+    WORST_STRESS_BALANCE = "worst_stress_balance", "", "with `[mechanics]`: largest |work + hardening − stored − lost| of a step over the energies it moved and those stored";
     MEAN = "{layer}mean_{field}", "*", "mean by volume at the end, of the part or of a layer";
     LEAST = "{layer}least_{field}", "*", "smallest value at a node";
     LARGEST = "{layer}largest_{field}", "*", "largest value at a node";

@@ -1,23 +1,22 @@
 //! A body of solidifying Maxwell elements on a mesh of hexahedra: births, steps, supports.
 
+use super::branch::Energies;
 use super::element::{Hexahedron, POINTS, Six};
 use super::maxwell::Increment;
+use super::solve::{Load, gather};
 use crate::error::Error;
 use crate::mesh::Mesh;
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::Vector3;
 
 /// Residual over the load at which a solution ends, unless told otherwise.
 const TOLERANCE: f64 = 1e-12;
-
-/// Iterations at most, over the equations.
-const ITERATIONS: usize = 20;
 
 /// Elements, their state and displacements.
 ///
 /// Strains of an element count from its birth: only increments of displacement enter, so that where shared nodes were
 /// before does not matter.
 pub struct Body<'a> {
-    mesh: &'a Mesh,
+    pub(super) mesh: &'a Mesh,
     /// Elements of one shape share their matrices.
     shapes: Vec<Hexahedron>,
     shape: Vec<u32>,
@@ -38,6 +37,21 @@ pub struct BodyState {
     pub displacement: Vec<[f64; 3]>,
     /// Iterations of conjugate gradients so far.
     pub iterations: u64,
+    /// Rotation of each element since it was melt, rad: half the curl of the displacement in its middle.
+    rotations: Vec<[f64; 3]>,
+    /// Energies of all steps so far.
+    pub audit: Audit,
+}
+
+/// Energies of the steps of a body, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Audit {
+    /// Of all branches of all elements.
+    pub energies: Energies,
+    /// What the melt's floor took, which forgets it.
+    pub floor: f64,
+    /// Largest |[`Energies::closure`]| of a step over the energies that it moved and those stored.
+    pub worst: f64,
 }
 
 /// A prescribed displacement increment of 0: node and component.
@@ -61,13 +75,7 @@ impl<'a> Body<'a> {
         let (mut shapes, mut shape, mut known) = (Vec::new(), Vec::new(), std::collections::HashMap::new());
         for nodes in &mesh.hexahedra {
             let corners = nodes.map(|node| mesh.points[node as usize]);
-            // edges to 1e-12 of the element's size tell shapes apart
-            let size = (0..3).map(|d| (corners[6][d] - corners[0][d]).abs()).fold(0.0, f64::max);
-            let key: Vec<i64> = corners
-                .iter()
-                .flat_map(|corner| (0..3).map(|d| ((corner[d] - corners[0][d]) / size * 1e12).round() as i64))
-                .chain([(size * 1e15).round() as i64])
-                .collect();
+            let key = Hexahedron::key(&corners);
             let index = match known.get(&key) {
                 Some(&index) => index,
                 None => {
@@ -92,6 +100,8 @@ impl<'a> Body<'a> {
                 stresses: vec![[[0.0; 6]; POINTS]; count],
                 displacement: vec![[0.0; 3]; mesh.points.len()],
                 iterations: 0,
+                rotations: vec![[0.0; 3]; count],
+                audit: Audit::default(),
             },
         })
     }
@@ -101,7 +111,17 @@ impl<'a> Body<'a> {
         for element in elements {
             self.state.strains[element] = vec![[[0.0; 6]; POINTS]; branches];
             self.state.stresses[element] = [[0.0; 6]; POINTS];
+            self.state.rotations[element] = [0.0; 3];
         }
+    }
+
+    pub(super) fn shape_of(&self, element: usize) -> &Hexahedron {
+        &self.shapes[self.shape[element] as usize]
+    }
+
+    /// Largest rotation of an element since it was melt, rad. Strains are small: a rotation θ looks like a strain ½θ².
+    pub fn largest_rotation(&self) -> f64 {
+        self.state.rotations.iter().map(|r| r[0].hypot(r[1]).hypot(r[2])).fold(0.0, f64::max)
     }
 
     /// Cauchy stress at a Gauss point, Pa: xx, yy, zz, xy, yz, zx.
@@ -109,6 +129,14 @@ impl<'a> Body<'a> {
         self.shapes[self.shape[element] as usize]
             .stress(&Six::from(self.state.stresses[element][point]))
             .into()
+    }
+
+    /// Mean of an element's stress by volume, Pa: of its Gauss points.
+    pub fn mean_stress(&self, element: usize) -> [f64; 6] {
+        let weights = &self.shapes[self.shape[element] as usize].weights;
+        let volume: f64 = weights.iter().sum();
+        let points = (0..POINTS).map(|point| (self.stress(element, point), weights[point] / volume));
+        points.fold([0.0; 6], |sum, (stress, share)| std::array::from_fn(|k| sum[k] + share * stress[k]))
     }
 
     /// The corners of an element at rest.
@@ -135,7 +163,7 @@ impl<'a> Body<'a> {
             self.mesh.hexahedra[element].iter().for_each(|&node| free[node as usize] = [true; 3]);
         }
         supports.iter().for_each(|&(node, component)| free[node as usize][component] = false);
-        let mut load = vec![Vector3::zeros(); self.state.displacement.len()];
+        let mut load = Load { sum: vec![Vector3::zeros(); self.state.displacement.len()], parts: 0.0 };
         let mut steps = Vec::with_capacity(alive.len());
         for &element in &alive {
             let (shape, increment) = (&self.shapes[self.shape[element] as usize], increment(element));
@@ -153,13 +181,15 @@ impl<'a> Body<'a> {
             });
             let (forces, modal) = shape.forces(&predicted);
             for (k, &node) in self.mesh.hexahedra[element].iter().enumerate() {
-                load[node as usize] -= Vector3::from(forces.fixed_rows::<3>(3 * k));
+                load.sum[node as usize] -= Vector3::from(forces.fixed_rows::<3>(3 * k));
             }
+            load.parts += forces.norm_squared();
             steps.push((element, increment, free, modal));
         }
         let moduli: Vec<(usize, f64)> =
             steps.iter().map(|(element, increment, ..)| (*element, increment.stiffness)).collect();
         let moved = self.solve(&moduli, &free, load)?;
+        let (mut energies, mut floor) = (Energies::default(), 0.0);
         for (element, increment, free, modal) in steps {
             let shape = &self.shapes[self.shape[element] as usize];
             let local = gather(&self.mesh.hexahedra[element], &moved);
@@ -168,6 +198,10 @@ impl<'a> Body<'a> {
                 let mechanical = mechanical(&strains[point], free[point]);
                 let mut branches: Vec<[f64; 6]> =
                     self.state.strains[element].iter().map(|branch| branch[point]).collect();
+                let product = |a: &[f64; 6], b: &[f64; 6]| Six::from(*a).dot(&shape.stress(&Six::from(*b)));
+                let volume = shape.weights[point];
+                energies.add(&increment.energies(&branches, &mechanical, product), volume);
+                floor += 0.5 * volume * increment.floor * product(&mechanical, &mechanical);
                 increment.advance(&mut branches, &mechanical);
                 self.state.stresses[element][point] = increment.stress(&branches);
                 self.state.strains[element]
@@ -175,92 +209,24 @@ impl<'a> Body<'a> {
                     .zip(branches)
                     .for_each(|(branch, strain)| branch[point] = strain);
             }
+            let turned = &mut self.state.rotations[element];
+            if increment.melt {
+                *turned = [0.0; 3];
+            } else {
+                turned.iter_mut().zip(shape.rotation(&local)).for_each(|(sum, more)| *sum += more);
+            }
+        }
+        let audit = &mut self.state.audit;
+        audit.energies.add(&energies, 1.0);
+        audit.floor += floor;
+        let moved_energy = energies.size() + audit.energies.stored.abs();
+        if moved_energy > 0.0 {
+            audit.worst = audit.worst.max(energies.closure().abs() / moved_energy);
         }
         for (place, moved) in self.state.displacement.iter_mut().zip(&moved) {
             (0..3).for_each(|d| place[d] += moved[d]);
         }
         Ok(())
-    }
-
-    /// Σ E K̂ u of elements with moduli E, on free components.
-    fn product(&self, moduli: &[(usize, f64)], free: &[[bool; 3]], u: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-        let mut result = vec![Vector3::zeros(); u.len()];
-        for &(element, modulus) in moduli {
-            let nodes = &self.mesh.hexahedra[element];
-            let forces = self.shapes[self.shape[element] as usize].condensed * gather(nodes, u) * modulus;
-            for (k, &node) in nodes.iter().enumerate() {
-                result[node as usize] += Vector3::from(forces.fixed_rows::<3>(3 * k));
-            }
-        }
-        keep(&mut result, free);
-        result
-    }
-
-    /// Conjugate gradients with the inverse 3 × 3 blocks of the nodes.
-    fn solve(
-        &mut self,
-        moduli: &[(usize, f64)],
-        free: &[[bool; 3]],
-        mut residual: Vec<Vector3<f64>>,
-    ) -> Result<Vec<Vector3<f64>>, Error> {
-        let mut blocks = vec![Matrix3::zeros(); residual.len()];
-        for &(element, modulus) in moduli {
-            let condensed = &self.shapes[self.shape[element] as usize].condensed;
-            for (k, &node) in self.mesh.hexahedra[element].iter().enumerate() {
-                blocks[node as usize] += condensed.fixed_view::<3, 3>(3 * k, 3 * k) * modulus;
-            }
-        }
-        for (block, free) in blocks.iter_mut().zip(free) {
-            for d in (0..3).filter(|&d| !free[d]) {
-                block.row_mut(d).fill(0.0);
-                block.column_mut(d).fill(0.0);
-                block[(d, d)] = 1.0;
-            }
-            *block = block.try_inverse().unwrap_or_else(Matrix3::identity);
-        }
-        keep(&mut residual, free);
-        let dot =
-            |a: &[Vector3<f64>], b: &[Vector3<f64>]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
-        let goal = self.tolerance * dot(&residual, &residual).sqrt();
-        let mut moved = vec![Vector3::zeros(); residual.len()];
-        let precondition = |residual: &[Vector3<f64>]| -> Vec<Vector3<f64>> {
-            blocks.iter().zip(residual).map(|(block, r)| block * r).collect()
-        };
-        let mut direction = precondition(&residual);
-        let mut product = dot(&residual, &direction);
-        for _ in 0..(ITERATIONS * 3 * residual.len()).max(100) {
-            if dot(&residual, &residual).sqrt() <= goal {
-                return Ok(moved);
-            }
-            self.state.iterations += 1;
-            let image = self.product(moduli, free, &direction);
-            let length = product / dot(&direction, &image);
-            for k in 0..moved.len() {
-                moved[k] += direction[k] * length;
-                residual[k] -= image[k] * length;
-            }
-            let conditioned = precondition(&residual);
-            let next = dot(&residual, &conditioned);
-            direction.iter_mut().zip(&conditioned).for_each(|(d, c)| *d = c + *d * (next / product));
-            product = next;
-        }
-        let found = dot(&residual, &residual).sqrt();
-        Err(Error::Parameter {
-            name: "residual of the stresses",
-            found,
-            allowed: format!("at most {goal:e}: are all rigid motions held?"),
-        })
-    }
-}
-
-fn gather(nodes: &[u32; 8], u: &[Vector3<f64>]) -> SVector<f64, 24> {
-    SVector::from_fn(|k, _| u[nodes[k / 3] as usize][k % 3])
-}
-
-/// 0 where a component is not free.
-fn keep(field: &mut [Vector3<f64>], free: &[[bool; 3]]) {
-    for (value, free) in field.iter_mut().zip(free) {
-        (0..3).filter(|&d| !free[d]).for_each(|d| value[d] = 0.0);
     }
 }
 

@@ -26,7 +26,7 @@ pub struct Step {
 }
 
 /// Energies of a step over the modulus, with e:Ĉ:e for squares: what was put in, what is left, and where the rest went.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Energies {
     /// Work of the stress of this branch on Δε.
     pub work: f64,
@@ -46,6 +46,27 @@ impl Energies {
     /// work + softening − stored − viscous − growth − melting: 0 but for rounding.
     pub fn closure(&self) -> f64 {
         self.work + self.softening - self.stored - self.viscous - self.growth - self.melting
+    }
+
+    /// Sum of the magnitudes of all parts.
+    pub fn size(&self) -> f64 {
+        let Self { work, stored, viscous, growth, melting, softening } = *self;
+        [work, stored, viscous, growth, melting, softening].map(f64::abs).iter().sum()
+    }
+
+    /// What is gone: relaxation, growth and melting, ≥ 0.
+    pub fn lost(&self) -> f64 {
+        self.viscous + self.growth + self.melting
+    }
+
+    /// Adds others times a factor.
+    pub fn add(&mut self, other: &Self, factor: f64) {
+        self.work += factor * other.work;
+        self.stored += factor * other.stored;
+        self.viscous += factor * other.viscous;
+        self.growth += factor * other.growth;
+        self.melting += factor * other.melting;
+        self.softening += factor * other.softening;
     }
 }
 

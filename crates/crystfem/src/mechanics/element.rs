@@ -59,6 +59,8 @@ pub struct Hexahedron {
     coupling: SMatrix<f64, 24, 9>,
     inverse: SMatrix<f64, 9, 9>,
     elastic: SMatrix<f64, 6, 6>,
+    /// Gradients of the corners' functions in the middle, 1/m.
+    middle: [SVector<f64, 3>; 8],
 }
 
 impl Hexahedron {
@@ -101,7 +103,18 @@ impl Hexahedron {
         }
         let inverse = own.try_inverse()?;
         let condensed = full - coupling * inverse * coupling.transpose();
-        Some(Self { weights, nodes, modes, condensed, coupling, inverse, elastic })
+        let middle =
+            derivatives([0.0; 3]).map(|local| centre_inverse.transpose() * SVector::<f64, 3>::from(local));
+        Some(Self { weights, nodes, modes, condensed, coupling, inverse, elastic, middle })
+    }
+
+    /// Elements of one shape have one key: their edges to 1e-12 of their size.
+    pub fn key(corners: &[[f64; 3]; 8]) -> Vec<i64> {
+        let size = (0..3).map(|d| (corners[6][d] - corners[0][d]).abs()).fold(0.0, f64::max);
+        let edges = corners
+            .iter()
+            .flat_map(|corner| (0..3).map(|d| ((corner[d] - corners[0][d]) / size * 1e12).round() as i64));
+        edges.chain([(size * 1e15).round() as i64]).collect()
     }
 
     /// σ over the modulus of an elastic strain.
@@ -125,6 +138,16 @@ impl Hexahedron {
     pub fn strains(&self, displacement: &Nodal, modal: &SVector<f64, 9>, modulus: f64) -> [Six; POINTS] {
         let modes = -(self.inverse * (modal / modulus + self.coupling.transpose() * displacement));
         std::array::from_fn(|point| self.nodes[point] * displacement + self.modes[point] * modes)
+    }
+
+    /// Half the curl of nodal displacements in the middle, rad.
+    pub fn rotation(&self, displacement: &Nodal) -> [f64; 3] {
+        let parts = self.middle.iter().enumerate();
+        parts
+            .fold(SVector::<f64, 3>::zeros(), |sum, (k, gradient)| {
+                sum + gradient.cross(&displacement.fixed_rows::<3>(3 * k)) * 0.5
+            })
+            .into()
     }
 
     /// Shares of the corners at a Gauss point.

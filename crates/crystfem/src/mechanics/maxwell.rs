@@ -3,6 +3,9 @@
 use super::branch::{Change, Energies, Step};
 use super::eigenstrain::SpecificVolume;
 
+/// What is softer than this part of its moduli flows rather than bears stress.
+const MELT: f64 = 0.01;
+
 /// A modulus that relaxes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Branch {
@@ -77,6 +80,8 @@ pub struct SolidifyingMaxwell {
     pub poisson: f64,
     /// Modulus of the melt over the sum of all others: bears Δε − Δε* within a step and forgets it.
     pub floor: f64,
+    /// Tensile strength, Pa: stresses above it would flow, which is not computed.
+    pub strength: f64,
 }
 
 /// What a material point does over a step, linear in the strain increment.
@@ -88,6 +93,8 @@ pub struct Increment {
     pub stiffness: f64,
     /// The part of the floor in it, whose stress is not kept, Pa.
     pub floor: f64,
+    /// Whether its stiffness is less than 1 % of the sum of all moduli.
+    pub melt: bool,
     /// For each branch: its step, and its modulus times b₂ s₂ at the end.
     branches: Vec<(Step, f64, f64)>,
 }
@@ -111,7 +118,17 @@ impl SolidifyingMaxwell {
             softening: Some([296.15, 451.0]),
             poisson: 0.4,
             floor: 1e-4,
+            strength: 48e6,
         }
+    }
+
+    /// With another crystallinity X∞ at α = 1: its share in the volume, and a network in proportion to it; without crystals there is none.
+    pub fn with_crystallinity(mut self, crystallinity: f64) -> Self {
+        let factor = crystallinity / self.volume.crystallinity;
+        self.network.0.iter_mut().for_each(|branch| branch.modulus *= factor);
+        self.network.0.retain(|branch| branch.modulus > 0.0);
+        self.volume.crystallinity = crystallinity;
+        self
     }
 
     /// Branches of both phases: as many elastic strains has the state of a point, all 0 at birth.
@@ -142,7 +159,8 @@ impl SolidifyingMaxwell {
         add(&self.network, [from[1], to[1]], temperatures.map(|t| self.softness(t)));
         let free_strain = self.volume.strain(from, to);
         let floor = self.floor * whole;
-        Increment { free_strain, stiffness: stiffness + floor, floor, branches }
+        let melt = stiffness < MELT * whole;
+        Increment { free_strain, stiffness: stiffness + floor, floor, melt, branches }
     }
 
     /// The stress over Ĉ after a hold: Σ E_i e_i, Pa, for a strain measure such as one component under a uniaxial stress.
@@ -188,12 +206,7 @@ impl Increment {
                 product(strain, mechanical),
                 product(mechanical, mechanical),
             );
-            sum.work += modulus * one.work;
-            sum.stored += modulus * one.stored;
-            sum.viscous += modulus * one.viscous;
-            sum.growth += modulus * one.growth;
-            sum.melting += modulus * one.melting;
-            sum.softening += modulus * one.softening;
+            sum.add(&one, *modulus);
         }
         sum
     }
@@ -223,6 +236,7 @@ mod tests {
             softening: None,
             poisson: 0.3,
             floor: 0.0,
+            strength: f64::INFINITY,
         }
     }
 

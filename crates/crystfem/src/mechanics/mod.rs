@@ -3,11 +3,13 @@
 
 mod body;
 mod branch;
+mod coarse;
 mod eigenstrain;
 mod element;
 mod maxwell;
+mod solve;
 
-pub use body::{Body, BodyState, Support};
+pub use body::{Audit, Body, BodyState, Support};
 pub use branch::{Change, Energies, Step};
 pub use eigenstrain::SpecificVolume;
 pub use element::{Hexahedron, POINTS, stiffness};

@@ -43,6 +43,16 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     for (condition, number) in problem.conditions.iter().zip(1..) {
         lines.push(format!("builds     condition {number}: {}", told(condition)));
     }
+    if let Some(mechanics) = &task.mechanics {
+        let [bearing, shapes] = mechanics.counts;
+        lines.push(format!(
+            "builds     stress of {bearing} elements of {shapes} shapes, {} nodes on the bed{}; about 45 products of 24 × 24 numbers for each element whenever the free strain \
+             changes by {:e}",
+            mechanics.bed.len(),
+            if mechanics.release { ", released at the end" } else { "" },
+            mechanics.strain_step
+        ));
+    }
     let radiates = problem.conditions.iter().any(|c| matches!(c, Condition::Radiation { .. }));
     let changes = problem.conditions.iter().any(|c| !c.breaks().is_empty())
         || problem.sources.iter().any(|source| !source.power.breaks().is_empty());
@@ -54,6 +64,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
         (radiates, "radiation"),
         (!problem.sources.is_empty(), "heat sources"),
         (changes, "conditions that change over time"),
+        (task.mechanics.is_some(), "stress and warpage"),
         (!scene.probe.is_empty(), "probes"),
         (scene.output.fields, "fields (VTKHDF)"),
         (scene.output.pictures, "pictures and the animation"),
@@ -67,9 +78,10 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     problem.births.clear();
     let simulation = Simulation::new(problem, task.settings)?;
     lines.extend(simulation.explain(task.end).into_iter().map(|line| format!("{when}{line}")));
-    scene.refuse_too_large(source, &simulation, task.end)?;
+    scene.refuse_too_large(source, &simulation, task.mechanics.as_ref(), task.end)?;
     lines.push(format!("ends at    {} s", task.end));
-    lines.push(format!("needs      {}", polycore::memory::needs(scene.memory(&simulation, task.end))));
+    let needed = scene.memory(&simulation, task.mechanics.as_ref(), task.end);
+    lines.push(format!("needs      {}", polycore::memory::needs(needed)));
     // those of layers and births are many
     let few = quantities.iter().filter(|q| !q.name.starts_with("layer-") && !q.name.contains("_at_birth_"));
     lines.push(format!("reports    {}", Named::list(few)));

@@ -62,13 +62,15 @@ impl<'a> Follower<'a> {
         Reached { body: self.body.state.clone(), ..self.reached.clone() }
     }
 
-    /// Sees an accepted step: solves where elements are born, where the free strain has changed enough, or where it `must`.
+    /// Sees an accepted step: lets appear what was born before it, and solves where the free strain has changed enough, where elements are about
+    /// to be born, or where it `must`.
     ///
     /// # Errors
     /// Those of [`Body::step`].
     pub fn see(&mut self, simulation: &Simulation, must: bool) -> Result<(), Error> {
         let time = simulation.time();
         let degrees = simulation.element_means("alpha");
+        let births = &simulation.problem().births;
         let now = |element: usize| -> Option<Last> {
             let mut nodes = [0.0; 8];
             for (value, &node) in nodes.iter_mut().zip(&self.mesh.hexahedra[element]) {
@@ -76,39 +78,52 @@ impl<'a> Follower<'a> {
             }
             Some(Last { nodes, degree: degrees[element].unwrap_or(0.0), time })
         };
-        let mut born = Vec::new();
         let mut present = vec![None; self.spec.bears.len()];
-        let mut change = 0.0_f64;
+        let (mut born, mut change) = (Vec::new(), 0.0_f64);
         for element in (0..self.spec.bears.len()).filter(|&element| self.spec.bears[element]) {
             if !simulation.is_born(element as u32) {
                 continue;
             }
             present[element] = now(element);
-            match (self.reached.last[element], present[element]) {
-                (Some(before), Some(after)) => {
-                    let strain = self.spec.law.volume.strain(before.state(), after.state());
-                    change = change.max(strain.abs());
-                }
-                _ => born.push(element),
+            if self.reached.last[element].is_none() {
+                // its own temperature at birth: what it shares with neighbours at once is a part of its strain
+                let birth = (simulation.state().born[element] as usize).checked_sub(1);
+                self.reached.last[element] = match birth.and_then(|birth| births.get(birth)) {
+                    Some(birth) => Some(Last {
+                        nodes: [birth.temperature; 8],
+                        degree: self.spec.fresh,
+                        time: birth.time,
+                    }),
+                    None => present[element],
+                };
+                born.push(element);
+            }
+            if let (Some(before), Some(after)) = (self.reached.last[element], present[element]) {
+                let strain = |[from, to]: [f64; 2]| {
+                    self.spec.law.volume.strain([from, before.degree], [to, after.degree])
+                };
+                let pairs = before.nodes.into_iter().zip(after.nodes);
+                change = pairs.map(|(from, to)| strain([from, to]).abs()).fold(change, f64::max);
             }
         }
-        if born.is_empty() && !must && change <= self.spec.strain_step {
-            return Ok(());
-        }
-        let has_body = self.reached.last.iter().any(Option::is_some);
-        if has_body {
+        self.body.born(born, self.spec.law.branches());
+        // who is born now must not take part in what happened before
+        let about = births.get(simulation.state().births).is_some_and(|birth| birth.time <= time);
+        if must || about || change > self.spec.strain_step {
             let supports: Vec<Support> =
                 self.spec.bed.iter().flat_map(|&node| (0..3).map(move |d| (node, d))).collect();
             self.solve(&present, &supports)?;
+            self.reached.last = present;
         }
-        self.body.born(born, self.spec.law.branches());
-        self.reached.last = present;
         Ok(())
     }
 
     /// From the last states of elements to the present ones.
     fn solve(&mut self, present: &[Option<Last>], supports: &[Support]) -> Result<(), Error> {
         let (law, last) = (&self.spec.law, &self.reached.last);
+        if last.iter().all(Option::is_none) {
+            return Ok(());
+        }
         let pair = |element: usize| {
             let after = present[element].or(last[element]);
             let before = last[element].or(after);
@@ -137,7 +152,7 @@ impl<'a> Follower<'a> {
     /// Those of [`Body::step`].
     pub fn release(&mut self) -> Result<(), Error> {
         self.reached.printed = self.largest_mises();
-        if self.spec.release && self.reached.last.iter().any(Option::is_some) {
+        if self.spec.release {
             let present = self.reached.last.clone();
             self.solve(&present, &self.resting())?;
         }
@@ -189,6 +204,15 @@ impl<'a> Follower<'a> {
         (0..self.mesh.element_count()).map(of).collect()
     }
 
+    /// Mean stress of each element, Pa, six each in VTK's order of symmetric tensors, xx, yy, zz, xy, yz, zx; NaN where nothing bears stress.
+    pub fn stresses(&self) -> Vec<f64> {
+        let of = |element: usize| match self.reached.last.get(element).is_some_and(Option::is_some) {
+            true => self.body.mean_stress(element),
+            false => [f64::NAN; 6],
+        };
+        (0..self.mesh.element_count()).flat_map(of).collect()
+    }
+
     fn largest_mises(&self) -> f64 {
         self.mises().into_iter().filter(|x| !x.is_nan()).fold(0.0, f64::max)
     }
@@ -217,9 +241,17 @@ impl<'a> Follower<'a> {
 
     /// The scalars of the end.
     pub fn record(&self, report: &mut Report) {
+        let (largest, audit) = (self.largest_mises(), &self.body.state.audit);
         report.value(q::WARPAGE, self.warpage());
         report.value(q::MISES_ON_BED, self.reached.printed);
-        report.value(q::MISES, self.largest_mises());
+        report.value(q::MISES, largest);
+        report.value(q::MISES_OVER_STRENGTH, self.reached.printed.max(largest) / self.spec.law.strength);
+        report.value(q::LARGEST_ROTATION, self.body.largest_rotation());
+        report.value(q::STRESS_WORK, audit.energies.work);
+        report.value(q::STRESS_STORED, audit.energies.stored);
+        report.value(q::STRESS_LOST, audit.energies.lost());
+        report.value(q::STRESS_HARDENING, audit.energies.softening);
+        report.value(q::WORST_STRESS_BALANCE, audit.worst);
         let moved = self
             .displacement()
             .chunks(3)

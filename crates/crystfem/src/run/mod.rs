@@ -15,6 +15,7 @@ mod probe;
 mod program;
 mod section;
 mod suite;
+mod warped;
 
 pub use program::Crystfem;
 

@@ -15,6 +15,8 @@ pub(super) struct Frame {
 /// Elements that may be seen, and who borders on whom.
 pub struct Outside<'a> {
     mesh: &'a Mesh,
+    /// Where its nodes are shown.
+    points: std::borrow::Cow<'a, [[f64; 3]]>,
     elements: &'a [u32],
     /// Whether each element of the mesh is one of them.
     is_one: Vec<bool>,
@@ -30,7 +32,14 @@ impl<'a> Outside<'a> {
     pub fn new(mesh: &'a Mesh, elements: &'a [u32], cut: Option<Plane>) -> Result<Self, Error> {
         let mut is_one = vec![false; mesh.element_count()];
         elements.iter().for_each(|&element| is_one[element as usize] = true);
-        Ok(Self { mesh, elements, is_one, surface: Surface::new(mesh)?, cut })
+        let points = mesh.points.as_slice().into();
+        Ok(Self { mesh, points, elements, is_one, surface: Surface::new(mesh)?, cut })
+    }
+
+    /// With the nodes somewhere else, m.
+    pub fn at(mut self, points: Vec<[f64; 3]>) -> Self {
+        self.points = points.into();
+        self
     }
 
     /// The outer surface of those that exist, and where the plane cuts them.
@@ -44,7 +53,7 @@ impl<'a> Outside<'a> {
         };
         let corners = |nodes: &[u32]| -> Vec<Corner> {
             let corner = |&node: &u32| Corner {
-                at: self.mesh.points[node as usize],
+                at: self.points[node as usize],
                 values: [value(0, node), value(1, node)],
             };
             nodes.iter().map(corner).collect()

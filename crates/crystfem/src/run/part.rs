@@ -3,7 +3,7 @@
 use super::celsius::{CELSIUS, TEMPERATURE};
 use super::mechanics::{self, Follower};
 use super::probe::{self, Probe};
-use super::{Failure, animation, line};
+use super::{Failure, animation, line, warped};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
@@ -52,7 +52,7 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
         (frames, probes, stressed) = (written, rows, body.unwrap_or_default());
     } else {
         simulation = Simulation::new(task.problem.clone(), task.settings)?;
-        scene.refuse_too_large(source, &simulation, task.end)?;
+        scene.refuse_too_large(source, &simulation, task.mechanics.as_ref(), task.end)?;
         if !run.options.resume {
             run.begin()?;
         }
@@ -84,6 +84,9 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
         phases.start("draw");
         probe::draw(&recorder.probes, &recorder.names, scene, output)?;
         animation::draw(scene, &task, &simulation, path.as_deref(), output)?;
+        if let Some(follower) = &recorder.follower {
+            warped::draw(scene, &task, follower, output)?;
+        }
     }
     phases.stop();
     let expect = if is_study { &[] } else { &scene.expect[..] };
@@ -188,14 +191,15 @@ impl Recorder<'_> {
         let elements = self.task.problem.mesh.element_count() as u32;
         let exists: Vec<f64> =
             (0..elements).map(|element| f64::from(u8::from(simulation.is_born(element)))).collect();
-        let (displacement, mises) = match &self.follower {
-            Some(follower) => (follower.displacement(), follower.mises()),
+        let (displacement, mises, stresses) = match &self.follower {
+            Some(follower) => (follower.displacement(), follower.mises(), follower.stresses()),
             None => Default::default(),
         };
         let mut of_cells: Vec<Data> = vec![("exists", 1, &exists)];
         if self.follower.is_some() {
             arrays.push(("displacement_m", 3, &displacement));
             of_cells.push(("mises_Pa", 1, &mises));
+            of_cells.push(("residual_stress_Pa", 6, &stresses));
         }
         Ok(series.step(simulation.time(), &arrays, &of_cells)?)
     }

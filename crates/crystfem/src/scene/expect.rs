@@ -29,7 +29,20 @@ impl PartScene {
             }
         }
         if task.mechanics.is_some() {
-            all.extend([q::WARPAGE, q::LARGEST_DISPLACEMENT, q::MISES_ON_BED, q::MISES].map(Named::from));
+            let stresses = [
+                q::WARPAGE,
+                q::LARGEST_DISPLACEMENT,
+                q::MISES_ON_BED,
+                q::MISES,
+                q::MISES_OVER_STRENGTH,
+                q::LARGEST_ROTATION,
+                q::STRESS_WORK,
+                q::STRESS_STORED,
+                q::STRESS_LOST,
+                q::STRESS_HARDENING,
+                q::WORST_STRESS_BALANCE,
+            ];
+            all.extend(stresses.map(Named::from));
         }
         let unit = |field: &str| if field == "temperature" { "degC" } else { "" };
         let with_temperature = || std::iter::once("temperature").chain(fields.iter().copied());

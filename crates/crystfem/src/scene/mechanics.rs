@@ -2,12 +2,13 @@
 
 use super::PartScene;
 use super::fault::located;
-use crate::mechanics::SolidifyingMaxwell;
+use crate::mechanics::{Hexahedron, SolidifyingMaxwell};
 use crate::mesh::Mesh;
 use crate::mesh::surface::Surface;
 use polycore::scene::{SceneError, Source};
+use polycore::units::Ratio;
 use serde::Deserialize;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// Largest change of the free strain between two solutions, unless a scene says otherwise.
 const STRAIN_STEP: f64 = 2e-4;
@@ -46,8 +47,12 @@ pub enum MechanicsLaw {
 pub struct Mechanics {
     /// The law.
     pub law: SolidifyingMaxwell,
+    /// Relative crystallinity α of fresh material.
+    pub fresh: f64,
     /// Of each element, whether it bears stress.
     pub bears: Vec<bool>,
+    /// How many do, and of how many shapes all hexahedra are.
+    pub counts: [usize; 2],
     /// Nodes on the bed.
     pub bed: Vec<u32>,
     /// See [`MechanicsSpec`].
@@ -57,7 +62,8 @@ pub struct Mechanics {
 }
 
 impl PartScene {
-    /// The mechanics of a scene on a mesh, where it has any; `material_of` are the materials of elements by their place in the scene.
+    /// The mechanics of a scene on a mesh, where it has any; `material_of` are the materials of elements by their place in the scene, and `absent`
+    /// elements are never printed.
     ///
     /// # Errors
     /// A [`SceneError`] for unknown names, elements that are no hexahedra of first order, and a part that nothing holds.
@@ -66,13 +72,15 @@ impl PartScene {
         source: &Source,
         mesh: &Mesh,
         material_of: &[u16],
+        absent: &[u32],
     ) -> Result<Option<Mechanics>, SceneError> {
         let Some(spec) = &self.mechanics else { return Ok(None) };
         let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
         let Some(index) = known.iter().position(|name| *name == spec.material) else {
             return Err(source.unknown("mechanics.material", &spec.material, &known));
         };
-        if self.materials[&spec.material].kinetics.is_none() {
+        let material = &self.materials[&spec.material];
+        if material.kinetics.is_none() {
             let found = format!("`{}`, which does not crystallize", spec.material);
             return Err(source.error("mechanics.material", found, "a semicrystalline material"));
         }
@@ -80,10 +88,17 @@ impl PartScene {
         if !(strain_step > 0.0 && strain_step.is_finite()) {
             return Err(source.error("mechanics.strain_step", strain_step, "above 0, finite"));
         }
-        let bears: Vec<bool> = material_of.iter().map(|&material| usize::from(material) == index).collect();
-        if bears.iter().skip(mesh.hexahedra.len()).any(|bears| *bears) {
-            let allowed = "8-node hexahedra for all elements that bear stress";
-            return Err(source.error("mechanics", "other elements", allowed));
+        let mut bears: Vec<bool> =
+            material_of.iter().map(|&material| usize::from(material) == index).collect();
+        absent.iter().for_each(|&element| bears[element as usize] = false);
+        let others = mesh.element_count() - mesh.hexahedra.len();
+        if others > 0 {
+            let found = format!("a mesh with {others} other elements");
+            return Err(source.error(
+                "mechanics",
+                found,
+                "8-node hexahedra: layers, bricks, cells of a path",
+            ));
         }
         let nodes_of = |own: bool| -> HashSet<u32> {
             let chosen = (0..bears.len() as u32).filter(|&element| bears[element as usize] == own);
@@ -111,9 +126,47 @@ impl PartScene {
             let allowed = "at least 3: a surface of the part, or another material below it";
             return Err(source.error("mechanics.bed", found, allowed));
         }
+        let loose = loose(mesh, &bears, &bed);
+        if loose > 0 {
+            let found = format!("{loose} elements that nothing connects with the bed");
+            return Err(source.error(
+                "mechanics.bed",
+                found,
+                "a part that hangs together and touches the bed",
+            ));
+        }
+        let shapes: HashSet<_> =
+            mesh.hexahedra.iter().map(|nodes| Hexahedron::key(&corners(mesh, nodes))).collect();
+        let counts = [bears.iter().filter(|bears| **bears).count(), shapes.len()];
+        let share = |given: Option<Ratio>| given.map_or(0.0, |ratio| ratio.si());
         let law = match spec.law {
             MechanicsLaw::Pa12 => SolidifyingMaxwell::pa12(),
         };
-        Ok(Some(Mechanics { law, bears, bed, strain_step, release: spec.release }))
+        let law = law.with_crystallinity(share(material.crystallinity));
+        let fresh = share(material.initial_alpha);
+        Ok(Some(Mechanics { law, fresh, bears, counts, bed, strain_step, release: spec.release }))
     }
+}
+
+fn corners(mesh: &Mesh, nodes: &[u32; 8]) -> [[f64; 3]; 8] {
+    nodes.map(|node| mesh.points[node as usize])
+}
+
+/// How many of the elements that bear stress have no way to a node of the bed, through nodes they share.
+fn loose(mesh: &Mesh, bears: &[bool], bed: &[u32]) -> usize {
+    let mut around: HashMap<u32, Vec<u32>> = HashMap::new();
+    let own = || (0..bears.len() as u32).filter(|&element| bears[element as usize]);
+    for element in own() {
+        mesh.nodes(element).iter().for_each(|&node| around.entry(node).or_default().push(element));
+    }
+    let mut reached = vec![false; bears.len()];
+    let mut next: Vec<u32> = bed.to_vec();
+    while let Some(node) = next.pop() {
+        for element in around.remove(&node).unwrap_or_default() {
+            if !std::mem::replace(&mut reached[element as usize], true) {
+                next.extend(mesh.nodes(element));
+            }
+        }
+    }
+    own().filter(|&element| !reached[element as usize]).count()
 }

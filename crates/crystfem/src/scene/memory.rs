@@ -3,7 +3,7 @@
 //! Counted are the arrays that live at once, in bytes; the test `memory` of the workspace compares the sum with what whole
 //! runs take.
 
-use super::PartScene;
+use super::{Mechanics, PartScene};
 use crate::simulation::Simulation;
 use crate::time::Steps;
 use polycore::memory::{available, gib};
@@ -20,8 +20,13 @@ const NODE: f64 = 350.0;
 const ELEMENT: f64 = 150.0;
 /// An element that is printed: births, layers, equations that are rebuilt.
 const PRINTED: f64 = 300.0;
-/// Six branches and the stress at eight Gauss points, twice while a checkpoint is written; the state of the last solution.
-const STRESSED: f64 = 2.0 * 7.0 * 8.0 * 48.0 + 200.0;
+/// An element that bears stress: six branches and the stress at eight Gauss points, a copy of them and its bytes while a checkpoint is written; what it does
+/// in a step. Matrices of a shape of element. Motions, blocks and vectors of the solver at a node.
+const STRESSED: f64 = 3.0 * 7.0 * 8.0 * 48.0 + 1800.0;
+const SHAPE: f64 = 26e3;
+const STRESSED_NODE: f64 = 450.0;
+/// Nodes of a group of the coarse level, six unknowns each.
+const GROUP: f64 = 64.0;
 /// A stored entry of the conduction matrix, while it is sorted.
 const ENTRY: f64 = 40.0;
 /// A material point, and each of its numbers: old, new, of each stage, rejected, in a checkpoint.
@@ -82,7 +87,7 @@ pub(super) fn refuse_times(source: &Source, scene: &PartScene, end: f64) -> Resu
 
 impl PartScene {
     /// Bytes that a run up to `end` needs at most, of all that is printed.
-    pub fn memory(&self, simulation: &Simulation, end: f64) -> f64 {
+    pub fn memory(&self, simulation: &Simulation, mechanics: Option<&Mechanics>, end: f64) -> f64 {
         let (mesh, system) = (&simulation.problem().mesh, &simulation.system);
         let (nodes, elements) = (mesh.points.len() as f64, mesh.element_count() as f64);
         let fields = 1.0 + simulation.field_names().len() as f64;
@@ -93,8 +98,15 @@ impl PartScene {
         if self.print.is_some() {
             bytes += elements * PRINTED;
         }
-        if self.mechanics.is_some() {
-            bytes += elements * STRESSED;
+        if let Some(mechanics) = mechanics {
+            let [bearing, shapes] = mechanics.counts.map(|count| count as f64);
+            bytes += bearing * STRESSED + shapes * SHAPE + nodes * STRESSED_NODE;
+            // a band as wide as the section of a compact body
+            let groups = nodes / GROUP + 1.0;
+            bytes += 36.0 * groups * (groups.powf(2.0 / 3.0) + 2.0 * groups.cbrt() + 2.0) * 8.0;
+            if self.output.fields {
+                bytes += nodes * 3.0 * FIELD + elements * 7.0 * FIELD;
+            }
         }
         bytes += system.rows.stored()[2] as f64 * ENTRY;
         let states = simulation.behaviours.iter().map(|behaviour| behaviour.states).max().unwrap_or(0) as f64;
@@ -121,10 +133,11 @@ impl PartScene {
         &self,
         source: &Source,
         simulation: &Simulation,
+        mechanics: Option<&Mechanics>,
         end: f64,
     ) -> Result<(), SceneError> {
         let nodes = simulation.problem().mesh.points.len();
-        refuse(source, "mesh", &format!("{nodes} nodes"), self.memory(simulation, end))
+        refuse(source, "mesh", &format!("{nodes} nodes"), self.memory(simulation, mechanics, end))
     }
 }
 

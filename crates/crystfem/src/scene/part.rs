@@ -202,6 +202,8 @@ pub struct PartOutput {
     pub stages: usize,
     /// How pictures show the body from outside.
     pub solid: SolidSpec,
+    /// Factor on the displacements of `warped.png`, with `[mechanics]`; default: one that makes them well seen.
+    pub magnify: Option<f64>,
     /// Lines along which temperature and fields are written at the end.
     pub line: Vec<LineSpec>,
 }
@@ -209,7 +211,7 @@ pub struct PartOutput {
 impl Default for PartOutput {
     fn default() -> Self {
         let (solid, line) = (SolidSpec::default(), Vec::new());
-        Self { pictures: true, fields: true, every: None, stages: 5, solid, line }
+        Self { pictures: true, fields: true, every: None, stages: 5, solid, magnify: None, line }
     }
 }
 
@@ -275,6 +277,7 @@ impl PartScene {
         if !(1..=12).contains(&self.output.stages) {
             return Err(source.error("output.stages", self.output.stages, "1 to 12"));
         }
+        positive("output.magnify", self.output.magnify)?;
         self.output.solid.check(source, "output.solid")
     }
 }

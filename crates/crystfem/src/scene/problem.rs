@@ -102,7 +102,6 @@ impl PartScene {
         let mut notes = Vec::new();
         let probes = self.places(source, &mesh, &mut notes)?;
         let (mut materials, mut material_of, temperature_of) = self.regions(source, &mesh)?;
-        let mechanics = self.mechanics(source, &mesh, &material_of)?;
         let shown = materials.iter().flat_map(|material| material.field_names().iter().copied());
         let shown: Vec<String> = ["temperature"].into_iter().chain(shown).map(str::to_owned).collect();
         let lines = self.lines(source, &mesh, &shown)?;
@@ -122,6 +121,7 @@ impl PartScene {
             })?,
             None => Laid::default(),
         };
+        let mechanics = self.mechanics(source, &mesh, &material_of, &absent)?;
         let end = self.time.end.map_or(by_itself, |end| end.si());
         memory::refuse_times(source, self, end)?;
         if let Some(last) = births.iter().map(|birth| birth.time).reduce(f64::max).filter(|last| *last >= end)

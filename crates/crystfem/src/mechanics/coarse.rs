@@ -1,0 +1,227 @@
+//! A coarse level of rigid motions: six for each group of about 4³ nodes.
+//!
+//! Conjugate gradients with 3 × 3 blocks alone need as many iterations as a part is slender; blocks plus P (Pᵀ K P)⁻¹ Pᵀ need about
+//! 45 whatever its shape (`docs/guide/src/theory/print-stress.md`).
+
+use nalgebra::{Matrix3, Matrix3x6, SMatrix, Vector3, Vector6};
+use std::collections::BTreeMap;
+
+/// Nodes of a group along each axis.
+const SIDE: f64 = 4.0;
+/// A pivot below this part of its diagonal is a motion that nothing resists or that is there twice.
+const DEAD: f64 = 1e-10;
+const NONE: u32 = u32::MAX;
+
+/// An element as the coarse level sees it: its nodes, K̂ and its modulus.
+pub type Stiff<'a> = (&'a [u32; 8], &'a SMatrix<f64, 24, 24>, f64);
+
+/// Groups of nodes and the Cholesky factor of Pᵀ K P.
+pub struct Coarse {
+    /// Group of each node, or [`NONE`].
+    group: Vec<u32>,
+    /// Displacement at each node of the motions of its group, 0 where a component is held.
+    motions: Vec<Matrix3x6<f64>>,
+    factor: Skyline,
+}
+
+impl Coarse {
+    /// Of elements on nodes at `points`, of which `free` components move.
+    pub fn new<'a>(
+        elements: impl Iterator<Item = Stiff<'a>> + Clone,
+        points: &[[f64; 3]],
+        free: &[[bool; 3]],
+    ) -> Self {
+        let mut exists = vec![false; points.len()];
+        let (mut edges, mut count) = (Vector3::zeros(), 0.0);
+        for (nodes, ..) in elements.clone() {
+            nodes.iter().for_each(|&node| exists[node as usize] = true);
+            let at = |k: usize| Vector3::from(points[nodes[k] as usize]);
+            // of an upright brick: its edges
+            edges += (at(6) - at(0)).abs();
+            count += 1.0;
+        }
+        let side = edges * (SIDE / count);
+        let there = || points.iter().enumerate().filter(|(node, _)| exists[*node]);
+        let low = there().fold([f64::INFINITY; 3], |low, (_, at)| std::array::from_fn(|d| low[d].min(at[d])));
+        let high =
+            there().fold([f64::NEG_INFINITY; 3], |high, (_, at)| std::array::from_fn(|d| high[d].max(at[d])));
+        // the longest axis last: the factor has the narrowest band
+        let mut axes = [0, 1, 2];
+        axes.sort_by(|&a, &b| ((high[b] - low[b]) / side[b]).total_cmp(&((high[a] - low[a]) / side[a])));
+        let place = |at: &[f64; 3]| axes.map(|d| ((at[d] - low[d]) / side[d] + 1e-6).floor() as i64);
+        let mut numbers: BTreeMap<[i64; 3], (u32, Vector3<f64>, f64)> = BTreeMap::new();
+        for (_, at) in there() {
+            let (_, sum, many) = numbers.entry(place(at)).or_insert((0, Vector3::zeros(), 0.0));
+            *sum += Vector3::from(*at);
+            *many += 1.0;
+        }
+        numbers.values_mut().zip(0..).for_each(|(entry, number)| entry.0 = number);
+        let mut group = vec![NONE; points.len()];
+        let mut motions = vec![Matrix3x6::zeros(); points.len()];
+        for (node, at) in there() {
+            let (number, sum, many) = numbers[&place(at)];
+            group[node] = number;
+            // lengths of the size of a group: translations and rotations are of one size
+            let arm = (Vector3::from(*at) - sum / many) / side.max();
+            let turns = -arm.cross_matrix();
+            for d in (0..3).filter(|&d| free[node][d]) {
+                motions[node][(d, d)] = 1.0;
+                motions[node].fixed_view_mut::<1, 3>(d, 3).copy_from(&turns.row(d));
+            }
+        }
+        let mut first: Vec<u32> = (0..numbers.len() as u32).collect();
+        for (nodes, ..) in elements.clone() {
+            let least = nodes.iter().map(|&node| group[node as usize]).min().unwrap_or(0);
+            nodes.iter().for_each(|&node| {
+                let first = &mut first[group[node as usize] as usize];
+                *first = least.min(*first);
+            });
+        }
+        let mut matrix = Skyline::new(&first);
+        for (nodes, stiffness, modulus) in elements {
+            let groups = nodes.map(|node| group[node as usize]);
+            let held = nodes.iter().any(|&node| free[node as usize] != [true; 3]);
+            // rigid motions of one group do not strain an element inside of it
+            if !held && groups.iter().all(|other| *other == groups[0]) {
+                continue;
+            }
+            for (column, &other) in nodes.iter().enumerate() {
+                for (row, &node) in nodes.iter().enumerate().filter(|(row, _)| groups[*row] >= groups[column])
+                {
+                    let block: Matrix3<f64> = stiffness.fixed_view::<3, 3>(3 * row, 3 * column) * modulus;
+                    let own = motions[node as usize].transpose() * (block * motions[other as usize]);
+                    matrix.add(groups[row], groups[column], &own);
+                }
+            }
+        }
+        matrix.factor();
+        Self { group, motions, factor: matrix }
+    }
+
+    /// Adds P (Pᵀ K P)⁻¹ Pᵀ r.
+    pub fn add(&self, residual: &[Vector3<f64>], to: &mut [Vector3<f64>]) {
+        let mut coarse = vec![0.0; self.factor.size()];
+        for ((&group, motions), residual) in self.group.iter().zip(&self.motions).zip(residual) {
+            if group != NONE {
+                let own: Vector6<f64> = motions.tr_mul(residual);
+                let at = 6 * group as usize;
+                coarse[at..at + 6].iter_mut().zip(own.iter()).for_each(|(sum, own)| *sum += own);
+            }
+        }
+        self.factor.solve(&mut coarse);
+        for ((&group, motions), to) in self.group.iter().zip(&self.motions).zip(to) {
+            if group != NONE {
+                let at = 6 * group as usize;
+                *to += motions * Vector6::from_column_slice(&coarse[at..at + 6]);
+            }
+        }
+    }
+}
+
+/// The lower triangle of a symmetric matrix of 6 × 6 blocks, row by row from the first entry that may not be 0.
+struct Skyline {
+    /// Where each row begins in `values`, and its first column.
+    starts: Vec<usize>,
+    first: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Skyline {
+    fn new(first: &[u32]) -> Self {
+        let first: Vec<usize> = first.iter().flat_map(|&block| [6 * block as usize; 6]).collect();
+        let mut starts = vec![0];
+        first.iter().enumerate().for_each(|(row, first)| starts.push(starts[row] + row + 1 - first));
+        let values = vec![0.0; starts[first.len()]];
+        Self { starts, first, values }
+    }
+
+    fn size(&self) -> usize {
+        self.first.len()
+    }
+
+    fn row(&self, row: usize) -> &[f64] {
+        &self.values[self.starts[row]..self.starts[row + 1]]
+    }
+
+    fn add(&mut self, row: u32, column: u32, block: &SMatrix<f64, 6, 6>) {
+        for i in 0..6 {
+            let at = 6 * row as usize + i;
+            let columns = if row == column { i + 1 } else { 6 };
+            let begin = self.starts[at] + 6 * column as usize - self.first[at];
+            self.values[begin..begin + columns].iter_mut().zip(0..).for_each(|(x, j)| *x += block[(i, j)]);
+        }
+    }
+
+    /// Cholesky in place; a pivot that vanishes leaves its unknown out.
+    fn factor(&mut self) {
+        for row in 0..self.size() {
+            let (above, own) = self.values.split_at_mut(self.starts[row]);
+            let (first, length) = (self.first[row], row - self.first[row]);
+            for column in first..row {
+                let other = &above[self.starts[column]..self.starts[column + 1]];
+                let from = first.max(self.first[column]);
+                let sum: f64 = own[from - first..column - first]
+                    .iter()
+                    .zip(&other[from - self.first[column]..])
+                    .map(|(a, b)| a * b)
+                    .sum();
+                let pivot = other[column - self.first[column]];
+                let at = column - first;
+                own[at] = if pivot > 0.0 { (own[at] - sum) / pivot } else { 0.0 };
+            }
+            let square: f64 = own[..length].iter().map(|x| x * x).sum();
+            let left = own[length] - square;
+            own[length] = if left > DEAD * own[length] { left.sqrt() } else { 0.0 };
+        }
+    }
+
+    fn solve(&self, right: &mut [f64]) {
+        for row in 0..self.size() {
+            let (first, own) = (self.first[row], self.row(row));
+            let length = row - first;
+            let sum: f64 = own[..length].iter().zip(&right[first..row]).map(|(a, b)| a * b).sum();
+            right[row] = if own[length] > 0.0 { (right[row] - sum) / own[length] } else { 0.0 };
+        }
+        for row in (0..self.size()).rev() {
+            let (first, own) = (self.first[row], self.row(row));
+            let length = row - first;
+            let value = if own[length] > 0.0 { right[row] / own[length] } else { 0.0 };
+            right[row] = value;
+            right[first..row].iter_mut().zip(own).for_each(|(x, factor)| *x -= factor * value);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two blocks that are coupled, with a motion that nothing resists.
+    #[test]
+    fn factors_solve() {
+        let mut matrix = Skyline::new(&[0, 0]);
+        let full = SMatrix::<f64, 6, 6>::from_fn(|i, j| if i == j { 8.0 } else { 0.3 / (1 + i + j) as f64 });
+        let mut low = full;
+        low.row_mut(4).fill(0.0);
+        low.column_mut(4).fill(0.0);
+        let coupling =
+            SMatrix::<f64, 6, 6>::from_fn(|i, j| if i == 4 { 0.0 } else { 0.1 * (i + 2 * j) as f64 });
+        matrix.add(0, 0, &full);
+        matrix.add(1, 0, &coupling);
+        matrix.add(1, 1, &low);
+        let exact: Vec<f64> = (0..12).map(|k| if k == 10 { 0.0 } else { 1.0 + k as f64 }).collect();
+        let symmetric = |i: usize, j: usize| match (i / 6, j / 6) {
+            (0, 0) => full[(i, j)],
+            (1, 0) => coupling[(i - 6, j)],
+            (0, 1) => coupling[(j - 6, i)],
+            _ => low[(i - 6, j - 6)],
+        };
+        let mut right: Vec<f64> =
+            (0..12).map(|i| (0..12).map(|j| symmetric(i, j) * exact[j]).sum()).collect();
+        matrix.factor();
+        matrix.solve(&mut right);
+        for (found, exact) in right.iter().zip(exact) {
+            assert!((found - exact).abs() < 1e-12, "{found} {exact}");
+        }
+    }
+}
