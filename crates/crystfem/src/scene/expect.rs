@@ -89,8 +89,8 @@ impl PartScene {
         names: &[Named],
         absent: &[&str],
     ) -> Result<(), SceneError> {
-        for (index, expect) in self.expect.iter().enumerate() {
-            let quantity = expect.quantity.as_str();
+        let asked = || self.expect.iter().enumerate();
+        for (index, quantity) in asked().flat_map(|(at, expect)| expect.names().map(move |name| (at, name))) {
             let first = quantity.split_once('.').map(|(first, _)| first);
             // what compares studies has names of its own
             let of_several =
