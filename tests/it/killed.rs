@@ -86,6 +86,7 @@ fn killed_while_it_prints() {
         "crystfem",
         &crate::parts::BAR.replace("tolerance = \"1 K\"", "tolerance = \"0.02 K\""),
     );
+    survives_kills_of("crystfem", &crate::parts::warped());
 }
 
 fn survives_kills(scene: &str) {

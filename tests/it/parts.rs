@@ -134,6 +134,47 @@ fn a_printed_bar() {
     }
 }
 
+/// The bar with its stress.
+pub fn warped() -> String {
+    BAR.replace("[time]", "[mechanics]\nmaterial = \"pa12\"\nlaw = \"pa12\"\n\n[time]")
+        .replace("latent_heat = \"209 J/g\"\n", "")
+}
+
+/// A released body bears no force: the stress of each slice across it adds up to nothing, slice by slice.
+#[test]
+fn a_released_bar_is_in_equilibrium() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    fs::write(here.join("bar.toml"), warped()).unwrap();
+    let crystfem = |arguments: &str| finish(command("crystfem", arguments, here).spawn().unwrap());
+    crystfem("check bar.toml").with_code(0).shows("released at the end");
+    for threads in 1..=2 {
+        crystfem(&format!("run bar.toml --output out{threads} --threads {threads}")).with_code(0);
+    }
+    let out = here.join("out1");
+    assert_same(&out, &here.join("out2"));
+    let found = report(&out);
+    assert!(scalar(&found, "worst_stress_balance") < 1e-12 && scalar(&found, "warpage") > 1e-6);
+    assert!(out.join("warped.png").is_file());
+    let series = vtkhdf::read(out.join("fields.vtkhdf")).unwrap();
+    let last = series.len() - 1;
+    let stress = series.cell_data(last, "residual_stress_Pa").unwrap();
+    let mut slices = std::collections::BTreeMap::<i64, [f64; 2]>::new();
+    let (points, cells) = (series.points(last).unwrap(), series.cells().unwrap());
+    for (corners, stress) in cells.connectivity.chunks(8).zip(stress.chunks(6)) {
+        if stress[0].is_finite() {
+            let x = corners.iter().map(|&node| points[node as usize][0]).sum::<f64>() / 8.0;
+            let slice = slices.entry((1e4 * x).round() as i64).or_default();
+            *slice = [slice[0] + stress[0], slice[1] + stress[0].abs()];
+        }
+    }
+    assert_eq!(slices.len(), 16);
+    for (place, [sum, parts]) in slices {
+        // but for the floor: it bears 1e-4 of the modulus in the step of the release, and forgets it
+        assert!(parts > 1e5 && sum.abs() < 5e-3 * parts, "{place}: {sum} of {parts} Pa");
+    }
+}
+
 /// The bar with and without latent heat, colder, and one that is no bar; small, to be fast.
 pub fn studies() -> String {
     let bar =

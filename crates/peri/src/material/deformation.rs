@@ -1,8 +1,8 @@
 //! Solids of the mean deformation of a family, with any Poisson ratio: correspondence and its stabilisation as one energy.
 
 use super::cloud_passes::CloudPasses;
-use super::solid_passes::SolidPasses;
 use super::eight_chain::cofactor;
+use super::solid_passes::SolidPasses;
 use super::{Bond, Family, Material, Passes};
 use crate::bonds::{Bonds, Columns, Kind};
 use crate::calibrate::modulus_in;

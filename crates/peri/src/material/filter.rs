@@ -18,12 +18,7 @@ pub(super) struct Filter {
 
 impl Filter {
     /// Finds the neighbours, where bonds have changed.
-    pub(super) fn link<const D: usize>(
-        &mut self,
-        bonds: &dyn Bonds<D>,
-        points: &[Point<D>],
-        spacing: f64,
-    ) {
+    pub(super) fn link<const D: usize>(&mut self, bonds: &dyn Bonds<D>, points: &[Point<D>], spacing: f64) {
         let of = |site: usize| {
             let mut found = [u32::MAX; 6];
             if points[site].has_gradient() {
