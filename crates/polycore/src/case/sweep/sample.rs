@@ -44,7 +44,7 @@ impl FromStr for Sample {
 }
 
 /// The first `count` rows of all samples as values of keys that change together: samples are independent of each other. Without a `count` they are
-/// [`DRAWS`], or the rows of the shortest file.
+/// 20, or the rows of the shortest file.
 ///
 /// # Errors
 /// A file that is not a table of numbers, or has fewer rows.
@@ -186,11 +186,12 @@ mod tests {
         let file = folder.path().join("sample.csv");
         std::fs::write(&file, "growth_rate [1/s],n\n1.5,2\n2.5,3\n").unwrap();
         let sample = |key: &str| format!("{key}={}", file.display()).parse::<Sample>().unwrap();
-        let vary = drawn(&[sample("a.b"), sample("")], 2).unwrap().unwrap();
+        let vary = drawn(&[sample("a.b"), sample("")], Some(2)).unwrap().unwrap();
         assert_eq!(vary.key, "a.b.growth_rate;a.b.n;growth_rate;n");
         assert_eq!(vary.values[1], "2.500000e0 1/s;3.000000e0;2.500000e0 1/s;3.000000e0");
-        assert_eq!(drawn(&[], 2).unwrap(), None);
-        assert!(drawn(&[sample("a")], 3).unwrap_err().to_string().contains("1 to 2"));
+        assert_eq!(drawn(&[sample("a")], None).unwrap().unwrap().values.len(), 2);
+        assert_eq!(drawn(&[], Some(2)).unwrap(), None);
+        assert!(drawn(&[sample("a")], Some(3)).unwrap_err().to_string().contains("1 to 2"));
         assert!("a.csv".parse::<Sample>().unwrap_err().contains("allowed"));
     }
 
