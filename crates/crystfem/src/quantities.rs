@@ -31,6 +31,7 @@ polycore::quantities! {
     DEVIATION = "{layer}deviation_of_{field}", "*", "standard deviation by volume";
     DISTANCE = "{probe}.distance", "m", "distance of a probe from the mesh; 0 inside";
     AT_PROBE = "{probe}.{field}", "*", "value at a probe at the end";
+    DISPLACEMENT = "{probe}.displacement_{axis}", "m", "with `[mechanics]`: displacement of a probe at the end; `{axis}` is x, y or z";
     LOWEST_TEMPERATURE = "{probe}.lowest_temperature", "degC", "lowest temperature at a probe";
     HIGHEST_TEMPERATURE = "{probe}.highest_temperature", "degC", "highest temperature at a probe";
     JUMP = "{probe}.jump_at_birth_{number}", "K", "rise of the temperature after a birth, before the next one";
@@ -39,7 +40,7 @@ polycore::quantities! {
     FAILED_AS_EXPECTED = "{study}.failed_as_expected", "", "1 if a study with `expect_error` ended with this error, else 0";
     LIMIT = "{convergence}.limit", "*", "value that three studies tend to, after Richardson";
     ORDER = "{convergence}.order", "", "observed order of these studies";
-    ERROR_OF = "{curve}.error_of_{study}", "", "relative error of a study in an error-against-time curve";
+    ERROR_OF = "{curve}.error_of_{study}", "", "root mean square of the errors of a study, in the unit of its quantities, in an error-against-time curve";
 }
 
 polycore::quantities! {

@@ -122,6 +122,27 @@ impl SolidifyingMaxwell {
         }
     }
 
+    /// An elastic body of modulus E, Pa, ν, linear thermal expansion, 1/K, and strength, Pa: one branch that does not relax.
+    pub fn elastic(modulus: f64, poisson: f64, expansion: f64, strength: f64) -> Self {
+        // two phases of one density and expansion: ln v is linear in T
+        let volume = SpecificVolume {
+            densities: [1.0; 2],
+            glass_transition: 0.0,
+            reference: 0.0,
+            expansions: [3.0 * expansion; 3],
+            crystallinity: 0.0,
+        };
+        Self {
+            volume,
+            amorphous: (vec![Branch { modulus, time: f64::INFINITY }], Shift::None),
+            network: (Vec::new(), Shift::None),
+            softening: None,
+            poisson,
+            floor: 0.0,
+            strength,
+        }
+    }
+
     /// With another crystallinity X∞ at α = 1: its share in the volume, and a network in proportion to it; without crystals there is none.
     pub fn with_crystallinity(mut self, crystallinity: f64) -> Self {
         let factor = crystallinity / self.volume.crystallinity;

@@ -5,15 +5,7 @@ use nalgebra::SVector;
 
 /// An elastic body that does not expand by itself.
 fn elastic(modulus: f64) -> SolidifyingMaxwell {
-    SolidifyingMaxwell {
-        volume: SpecificVolume { crystallinity: 0.0, ..SpecificVolume::PA12 },
-        amorphous: (vec![Branch { modulus, time: f64::INFINITY }], Shift::None),
-        network: (Vec::new(), Shift::None),
-        softening: None,
-        poisson: 0.0,
-        floor: 0.0,
-        strength: f64::INFINITY,
-    }
+    SolidifyingMaxwell::elastic(modulus, 0.0, 0.0, f64::INFINITY)
 }
 
 fn hold(modulus: f64) -> Increment {

@@ -1,11 +1,13 @@
 //! Stress of a part on its way through the temperatures of a simulation.
 
+use super::probe::Probe;
 use crate::error::Error;
 use crate::mechanics::{Body, BodyState, Hexahedron, POINTS, Support};
 use crate::mesh::Mesh;
 use crate::quantities as q;
 use crate::scene::Mechanics;
 use crate::simulation::Simulation;
+use nalgebra::{Matrix3, Vector3};
 use polycore::report::Report;
 
 /// Residual over the load at which a solution ends: its error is far below that of the model.
@@ -155,13 +157,36 @@ impl<'a> Follower<'a> {
         if self.spec.release {
             let present = self.reached.last.clone();
             self.solve(&present, &self.resting())?;
+            self.lay();
         }
         Ok(())
     }
 
+    /// Takes away the small rigid motion t + ω × (x − x̄) that is nearest to the displacements of the bed side.
+    fn lay(&mut self) {
+        let moved = self.displacement();
+        let alive = |&node: &u32| !moved[3 * node as usize].is_nan();
+        let bed: Vec<u32> = self.spec.bed.iter().copied().filter(alive).collect();
+        let place = |node: u32| Vector3::from(self.mesh.points[node as usize]);
+        let centre = bed.iter().map(|&node| place(node)).sum::<Vector3<f64>>() / bed.len() as f64;
+        let (mut matrix, mut turn, mut shift) = (Matrix3::zeros(), Vector3::zeros(), Vector3::zeros());
+        for &node in &bed {
+            let arm = place(node) - centre;
+            let u = Vector3::from(self.body.state.displacement[node as usize]);
+            matrix += Matrix3::identity() * arm.norm_squared() - arm * arm.transpose();
+            turn += arm.cross(&u);
+            shift += u / bed.len() as f64;
+        }
+        let turn = matrix.try_inverse().unwrap_or_default() * turn;
+        for (u, at) in self.body.state.displacement.iter_mut().zip(&self.mesh.points) {
+            let rigid = shift + turn.cross(&(Vector3::from(*at) - centre));
+            (0..3).for_each(|d| u[d] -= rigid[d]);
+        }
+    }
+
     /// Three nodes of the bed, far from each other, with 3, 2 and 1 components held: no rigid motion is left and no force needed.
     fn resting(&self) -> Vec<Support> {
-        let place = |node: u32| nalgebra::Vector3::from(self.mesh.points[node as usize]);
+        let place = |node: u32| Vector3::from(self.mesh.points[node as usize]);
         let alive: std::collections::HashSet<u32> = (0..self.reached.last.len())
             .filter(|&element| self.reached.last[element].is_some())
             .flat_map(|element| self.mesh.hexahedra[element])
@@ -239,25 +264,32 @@ impl<'a> Follower<'a> {
         high - low
     }
 
-    /// The scalars of the end.
-    pub fn record(&self, report: &mut Report) {
+    /// The scalars of the end, with the displacements of the probes that are in the part.
+    pub fn record(&self, probes: &[Probe], report: &mut Report) {
         let (largest, audit) = (self.largest_mises(), &self.body.state.audit);
         report.value(q::WARPAGE, self.warpage());
         report.value(q::MISES_ON_BED, self.reached.printed);
         report.value(q::MISES, largest);
-        report.value(q::MISES_OVER_STRENGTH, self.reached.printed.max(largest) / self.spec.law.strength);
+        if self.spec.law.strength.is_finite() {
+            report.value(q::MISES_OVER_STRENGTH, self.reached.printed.max(largest) / self.spec.law.strength);
+        }
         report.value(q::LARGEST_ROTATION, self.body.largest_rotation());
         report.value(q::STRESS_WORK, audit.energies.work);
         report.value(q::STRESS_STORED, audit.energies.stored);
         report.value(q::STRESS_LOST, audit.energies.lost());
         report.value(q::STRESS_HARDENING, audit.energies.softening);
         report.value(q::WORST_STRESS_BALANCE, audit.worst);
-        let moved = self
-            .displacement()
-            .chunks(3)
-            .map(|u| u[0].hypot(u[1]).hypot(u[2]))
-            .filter(|x| !x.is_nan())
-            .fold(0.0, f64::max);
+        let moved = self.displacement();
+        for probe in probes {
+            for (d, axis) in ["x", "y", "z"].into_iter().enumerate() {
+                let at = |node: u32| Some(moved[3 * node as usize + d]).filter(|x| !x.is_nan());
+                if let Some(value) = probe.place().value(at) {
+                    report.value(q::DISPLACEMENT.of(&[probe.name(), axis]), value);
+                }
+            }
+        }
+        let moved =
+            moved.chunks(3).map(|u| u[0].hypot(u[1]).hypot(u[2])).filter(|x| !x.is_nan()).fold(0.0, f64::max);
         report.value(q::LARGEST_DISPLACEMENT, moved);
         report.work("stress_steps", self.reached.steps).work("stress_iterations", self.body.state.iterations);
     }

@@ -233,7 +233,7 @@ impl Recorder<'_> {
             }
         }
         if let Some(follower) = &self.follower {
-            follower.record(report);
+            follower.record(&self.probes, report);
         }
         let nodes = 0..self.task.problem.mesh.points.len() as u32;
         let temperature: Vec<Option<f64>> =

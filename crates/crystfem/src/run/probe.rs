@@ -39,6 +39,14 @@ impl Probe {
         }
     }
 
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn place(&self) -> &Place {
+        &self.place
+    }
+
     fn last(&self) -> Option<f64> {
         self.time.last().copied()
     }

@@ -28,13 +28,12 @@ impl PartScene {
                 all.extend([q::PATH_TIME, q::FILAMENT].map(Named::from));
             }
         }
-        if task.mechanics.is_some() {
+        if let Some(mechanics) = &task.mechanics {
             let stresses = [
                 q::WARPAGE,
                 q::LARGEST_DISPLACEMENT,
                 q::MISES_ON_BED,
                 q::MISES,
-                q::MISES_OVER_STRENGTH,
                 q::LARGEST_ROTATION,
                 q::STRESS_WORK,
                 q::STRESS_STORED,
@@ -43,6 +42,7 @@ impl PartScene {
                 q::WORST_STRESS_BALANCE,
             ];
             all.extend(stresses.map(Named::from));
+            all.extend(mechanics.law.strength.is_finite().then(|| q::MISES_OVER_STRENGTH.into()));
         }
         let unit = |field: &str| if field == "temperature" { "degC" } else { "" };
         let with_temperature = || std::iter::once("temperature").chain(fields.iter().copied());
@@ -60,6 +60,9 @@ impl PartScene {
             let own = [q::DISTANCE, q::LOWEST_TEMPERATURE, q::HIGHEST_TEMPERATURE];
             all.extend(own.map(|quantity| quantity.of(&[name])));
             all.extend(with_temperature().map(|field| q::AT_PROBE.of(&[name, field]).in_unit(unit(field))));
+            if task.mechanics.is_some() {
+                all.extend(["x", "y", "z"].map(|axis| q::DISPLACEMENT.of(&[name, axis])));
+            }
             for birth in (2..=task.layers.len()).map(|birth| birth.to_string()) {
                 all.push(q::JUMP.of(&[name, &birth]));
                 for field in &fields {

@@ -6,7 +6,7 @@ use crate::mechanics::{Hexahedron, SolidifyingMaxwell};
 use crate::mesh::Mesh;
 use crate::mesh::surface::Surface;
 use polycore::scene::{SceneError, Source};
-use polycore::units::Ratio;
+use polycore::units::{PerTemperature, Ratio, Stress};
 use serde::Deserialize;
 use std::collections::{HashMap, HashSet};
 
@@ -17,7 +17,7 @@ const STRAIN_STEP: f64 = 2e-4;
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MechanicsSpec {
-    /// The material whose elements bear stress; it must be semicrystalline.
+    /// The material whose elements bear stress; with `pa12` it must be semicrystalline.
     pub material: String,
     /// Its mechanical constants.
     pub law: MechanicsLaw,
@@ -36,11 +36,54 @@ fn yes() -> bool {
 }
 
 /// Mechanical constants.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum MechanicsLaw {
     /// PA12, with assumed constants: see the guide, *Stress of prints*.
     Pa12,
+    /// Elastic, with thermal expansion; of any material.
+    Elastic(ElasticSpec),
+}
+
+/// σ = C:(ε − α ΔT 1).
+#[derive(Clone, Debug, PartialEq, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ElasticSpec {
+    /// Young's modulus.
+    pub modulus: Stress,
+    /// Poisson's ratio, above −1 and below 0.5.
+    pub poisson: f64,
+    /// Linear thermal expansion α.
+    pub expansion: PerTemperature,
+    /// Tensile strength, for `largest_mises_over_strength`.
+    pub strength: Option<Stress>,
+}
+
+impl MechanicsLaw {
+    /// The law of a material with these crystals at α = 1.
+    fn solve(&self, source: &Source, crystallinity: f64) -> Result<SolidifyingMaxwell, SceneError> {
+        let Self::Elastic(spec) = self else {
+            return Ok(SolidifyingMaxwell::pa12().with_crystallinity(crystallinity));
+        };
+        let wrong = |key: &str, found: f64, allowed: &str| {
+            Err(source.error(&format!("mechanics.law.elastic.{key}"), found, allowed))
+        };
+        let positive = |stress: f64| stress > 0.0 && stress.is_finite();
+        let strength = spec.strength.map_or(f64::INFINITY, |strength| strength.si());
+        if !positive(spec.modulus.si()) {
+            return wrong("modulus", spec.modulus.si(), "above 0, finite");
+        }
+        if !(spec.poisson > -1.0 && spec.poisson < 0.5) {
+            return wrong("poisson", spec.poisson, "above -1 and below 0.5");
+        }
+        if !(strength > 0.0) {
+            return wrong("strength", strength, "above 0");
+        }
+        if !spec.expansion.si().is_finite() {
+            return wrong("expansion", spec.expansion.si(), "finite");
+        }
+        Ok(SolidifyingMaxwell::elastic(spec.modulus.si(), spec.poisson, spec.expansion.si(), strength))
+    }
 }
 
 /// What is solved beside the heat.
@@ -80,7 +123,7 @@ impl PartScene {
             return Err(source.unknown("mechanics.material", &spec.material, &known));
         };
         let material = &self.materials[&spec.material];
-        if material.kinetics.is_none() {
+        if spec.law == MechanicsLaw::Pa12 && material.kinetics.is_none() {
             let found = format!("`{}`, which does not crystallize", spec.material);
             return Err(source.error("mechanics.material", found, "a semicrystalline material"));
         }
@@ -139,10 +182,7 @@ impl PartScene {
             mesh.hexahedra.iter().map(|nodes| Hexahedron::key(&corners(mesh, nodes))).collect();
         let counts = [bears.iter().filter(|bears| **bears).count(), shapes.len()];
         let share = |given: Option<Ratio>| given.map_or(0.0, |ratio| ratio.si());
-        let law = match spec.law {
-            MechanicsLaw::Pa12 => SolidifyingMaxwell::pa12(),
-        };
-        let law = law.with_crystallinity(share(material.crystallinity));
+        let law = spec.law.solve(source, share(material.crystallinity))?;
         let fresh = share(material.initial_alpha);
         Ok(Some(Mechanics { law, fresh, bears, counts, bed, strain_step, release: spec.release }))
     }
