@@ -83,6 +83,7 @@ struct Page {
     counts: Vec<(String, usize)>,
     kinds: Vec<(String, usize)>,
     thesis: Vec<thesis::Judged>,
+    links: Vec<thesis::Judged>,
     others: Vec<others::Other>,
     timing: Vec<timing::Measured>,
     stability: Vec<stability::Trial>,
@@ -128,6 +129,7 @@ struct Json<'a> {
     kinds: BTreeMap<String, usize>,
     cases: Vec<JsonCase<'a>>,
     thesis: Vec<thesis::Judged>,
+    links: Vec<thesis::Judged>,
     others: Vec<others::Other>,
     timing: Vec<timing::Measured>,
     stability: Vec<stability::Trial>,
@@ -207,7 +209,7 @@ fn page(
 ) -> Result<Page> {
     let mut gallery = Gallery::default();
     let found = thesis::Found { outcomes, records: &sources.records, root: workspace.root() };
-    let thesis = sources.map.judge(&found, &mut gallery);
+    let [thesis, links] = sources.map.judge(&found, &mut gallery);
     let provenance: Vec<&Provenance> =
         outcomes.iter().filter_map(|outcome| Some(&outcome.report.as_ref()?.provenance)).collect();
     let first = provenance.first();
@@ -216,7 +218,7 @@ fn page(
     versions.sort();
     versions.dedup();
     let mut counts: Vec<(String, usize)> = Vec::new();
-    for judged in &thesis {
+    for judged in thesis.iter().chain(&links) {
         match counts.iter_mut().find(|(verdict, _)| verdict == judged.verdict()) {
             Some((_, count)) => *count += 1,
             None => counts.push((judged.verdict().to_owned(), 1)),
@@ -240,6 +242,7 @@ fn page(
         counts,
         kinds: summary::kinds(outcomes).into_iter().map(|(kind, n)| (kind.to_string(), n)).collect(),
         thesis,
+        links,
         others: others::figures(outcomes),
         timing: timing::measured(workspace, folder, outcomes)?,
         stability: stability::trials(outcomes),
@@ -288,6 +291,7 @@ fn json(page: Page, outcomes: &[Outcome]) -> Json<'_> {
         cases: outcomes.iter().map(JsonCase::of).collect(),
         others: page.others,
         thesis: page.thesis.into_iter().map(thesis::Judged::without_pictures).collect(),
+        links: page.links.into_iter().map(thesis::Judged::without_pictures).collect(),
         timing: page.timing.into_iter().map(timing::Measured::without_picture).collect(),
         stability: page.stability,
         errata: page.errata,

@@ -7,7 +7,7 @@ use crate::table::Table;
 use crate::validate::outcome::Outcome;
 use crate::validate::summary;
 
-/// Sums, thesis map, cases, fronts, cross-checks.
+/// Sums, thesis map, links between scales, cases, fronts, cross-checks.
 pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
     let mut text = format!(
         "# Validation\n\nWritten by `cargo xtask validate`: {}.\nThe same with pictures, every number and its source is \
@@ -28,6 +28,10 @@ pub fn text(page: &Page, outcomes: &[Outcome]) -> String {
     text += "\n## Thesis map\n\n";
     let mut table = Table::new(["thesis", "what", "numbers", "verdict"]);
     page.thesis.iter().for_each(|judged| table.push(judged.cells()));
+    text += &table.markdown();
+    text += "\n## Across scales\n\n";
+    let mut table = Table::new(["link", "what", "numbers", "verdict"]);
+    page.links.iter().for_each(|judged| table.push(judged.cells()));
     text += &table.markdown();
     if !page.others.is_empty() {
         text += "\n## Others' figures\n\nFigures of other authors beside ours (cases below `cases/external`).\n\n";

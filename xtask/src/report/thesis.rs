@@ -57,19 +57,22 @@ pub const NUMBERED: &[&str] = &[
 pub struct Map {
     /// In the order of the thesis.
     pub row: Vec<Row>,
+    /// What one program hands to another.
+    #[serde(default)]
+    pub link: Vec<Row>,
     /// Numbers that prove the rows of docs/errata.md.
     pub erratum: Vec<super::errata::Proof>,
 }
 
-/// A figure or table.
+/// A figure or table, or a link between scales.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// `Fig. 2.7`.
+    /// `Fig. 2.7`, `Print to stress`.
     pub number: String,
     /// What it is.
     pub title: String,
-    /// What the thesis shows.
+    /// What the thesis shows, or a link does.
     pub shows: String,
     /// What we get.
     pub ours: String,
@@ -96,6 +99,8 @@ pub struct Row {
 pub enum Verdict {
     /// As the thesis shows it.
     Reproduced,
+    /// Of a link: held against something that is not ours.
+    Verified,
     /// With a difference that `because` states.
     Differs,
     /// The text does not say enough; `because` says what is missing.
@@ -155,12 +160,13 @@ impl Map {
     pub fn faults(&self, workspace: &Workspace) -> Vec<String> {
         let mut faults = Vec::new();
         let mut seen = BTreeSet::new();
-        for row in &self.row {
+        for row in self.row.iter().chain(&self.link) {
             let mut fault = |text: String| faults.push(format!("{}: {text}", row.number));
             if !seen.insert(row.number.as_str()) {
                 fault("is listed twice".to_owned());
             }
-            if row.verdict != Verdict::Reproduced && row.because.as_deref().unwrap_or_default().is_empty() {
+            let plain = matches!(row.verdict, Verdict::Reproduced | Verdict::Verified);
+            if !plain && row.because.as_deref().unwrap_or_default().is_empty() {
                 fault("does not say why (`because`)".to_owned());
             }
             let because = row.because.as_deref().unwrap_or_default();
@@ -169,7 +175,7 @@ impl Map {
             if numbers == 0 && !because.contains(|c: char| c.is_ascii_digit()) {
                 fault("has a verdict and no number".to_owned());
             }
-            if numbers == 0 && matches!(row.verdict, Verdict::Reproduced | Verdict::Differs) {
+            if numbers == 0 && (plain || row.verdict == Verdict::Differs) {
                 fault("claims a result without a quantity or a test".to_owned());
             }
             check(workspace, row.case.as_deref(), &row.numbers, &row.tests, &mut fault);
@@ -179,9 +185,9 @@ impl Map {
         faults
     }
 
-    /// Looks everything up.
-    pub fn judge(&self, found: &Found, gallery: &mut Gallery) -> Vec<Judged> {
-        self.row.iter().map(|row| row.judge(found, gallery)).collect()
+    /// Looks everything up: figures and tables, and links.
+    pub fn judge(&self, found: &Found, gallery: &mut Gallery) -> [Vec<Judged>; 2] {
+        [&self.row, &self.link].map(|rows| rows.iter().map(|row| row.judge(found, gallery)).collect())
     }
 }
 
@@ -277,6 +283,7 @@ impl Row {
             (Verdict::Open, _) => ("not yet", "open"),
             (_, Some(unbacked)) => unbacked,
             (Verdict::Reproduced, None) => ("reproduced", "good"),
+            (Verdict::Verified, None) => ("verified", "good"),
             (Verdict::Differs, None) => ("reproduced with a stated difference", "fair"),
         };
         let outcome = found.outcomes.iter().find(|outcome| Some(&outcome.case) == self.case.as_ref());

@@ -188,6 +188,15 @@ const SUBJECTS: &[Subject] = &[
         note: "The same bar on grids of 1 to 6 elements a layer; six tetrahedra fill a cell. The truth is hexahedra, 12 a layer.",
     },
     Subject {
+        title: "Warpage of a print, over the step",
+        source: Source::Case { case: "ch5/print-warpage", curves: "error_against_time_cold-" },
+        split: "\n",
+        default: "over-tolerance",
+        axes: ["s of the solution", "error of the warpage, m"],
+        command: "cargo xtask validate --case cases/ch5/print-warpage",
+        note: "A bar in a cold chamber whose warpage is 0.21 mm; a point for each temporal tolerance of the temperature. The truth is the same program at 0.02 K.",
+    },
+    Subject {
         title: "Latent heat",
         source: Source::Case { case: "ch4/freezing", curves: "error_against_time_latent-" },
         split: "\n",
