@@ -1,6 +1,6 @@
 //! Avrami's law of isothermal crystallization.
 
-use super::least_squares::minimize;
+use super::least_squares::{STEP, minimize};
 use super::{Estimate, Fit, check, check_finite};
 use crate::error::Error;
 use crate::kinetics;
@@ -40,7 +40,7 @@ pub fn avrami(times: &[f64], degrees: &[f64]) -> Result<Fit, Error> {
         times[near].ln() - power.ln() / n
     };
     let starts: Vec<Vec<f64>> = [1.0, 2.5, 4.0].iter().map(|&n: &f64| vec![half(n), n.ln()]).collect();
-    let minimum = minimize(what, &residuals, times.len(), &starts)?;
+    let minimum = minimize(what, &residuals, times.len(), &starts, STEP)?;
     let [half, exponent] = [minimum.at[0], minimum.at[1]];
     let n = exponent.exp();
     // ln k = ln ln 2 − n ln t_½

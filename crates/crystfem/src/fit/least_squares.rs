@@ -16,6 +16,9 @@ const REJECTED: f64 = 1e100;
 /// determined: differences carry 1e-10, which it squares with the condition.
 const COLLINEAR: f64 = 1e-12;
 
+/// Step of differences of a residual that is exact to rounding: ∛ε, good to 1e-10.
+pub const STEP: f64 = 6e-6;
+
 /// A minimum.
 pub struct Minimum {
     /// Parameters.
@@ -49,7 +52,7 @@ impl Minimum {
     }
 }
 
-/// The best minimum over all starts of `count` residuals.
+/// The best minimum over all starts of `count` residuals, with derivatives by central differences of a relative `step`.
 ///
 /// # Errors
 /// [`Error::Data`] if no start arrives anywhere, or if the data do not determine the parameters.
@@ -58,13 +61,14 @@ pub fn minimize(
     residuals: &Residuals,
     count: usize,
     starts: &[Vec<f64>],
+    step: f64,
 ) -> Result<Minimum, Error> {
     let refuse = |reason: &str| Error::Data { what: what.to_owned(), reason: reason.to_owned() };
     let mut best: Option<(f64, DVector<f64>)> = None;
     let evaluations = Cell::new(0);
     for start in starts {
         let at = DVector::from_row_slice(start);
-        let problem = Problem { residuals, count, at, evaluations: &evaluations };
+        let problem = Problem { residuals, count, at, step, evaluations: &evaluations };
         let (problem, report) = LevenbergMarquardt::new().with_patience(200).minimize(problem);
         let objective = report.objective_function;
         let better = best.as_ref().is_none_or(|(least, _)| objective < *least);
@@ -76,7 +80,7 @@ pub fn minimize(
         "the data do not determine all parameters (the model hardly changes along some direction)";
     let (_, at) = best.ok_or_else(|| refuse("no start converged"))?;
     let found = residuals(at.as_slice()).ok_or_else(|| refuse("no start converged"))?;
-    let jacobian = jacobian(residuals, &at).ok_or_else(|| refuse(undetermined))?;
+    let jacobian = jacobian(residuals, &at, step).ok_or_else(|| refuse(undetermined))?;
     let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
     if norms.iter().any(|norm| norm.is_nan() || *norm < 1e-9) {
         return Err(refuse(undetermined));
@@ -95,11 +99,11 @@ pub fn minimize(
     Ok(Minimum { at, residuals: found, covariance, degrees, evaluations: evaluations.get() })
 }
 
-/// By central differences of step ∛ε, good to 1e-10.
-fn jacobian(residuals: &Residuals, at: &DVector<f64>) -> Option<DMatrix<f64>> {
+/// By central differences.
+fn jacobian(residuals: &Residuals, at: &DVector<f64>, step: f64) -> Option<DMatrix<f64>> {
     let mut columns = Vec::with_capacity(at.len());
     for i in 0..at.len() {
-        let step = f64::EPSILON.cbrt() * at[i].abs().max(1.0);
+        let step = step * at[i].abs().max(1.0);
         let (mut up, mut down) = (at.clone(), at.clone());
         up[i] += step;
         down[i] -= step;
@@ -117,6 +121,7 @@ struct Problem<'a> {
     residuals: &'a Residuals<'a>,
     count: usize,
     at: DVector<f64>,
+    step: f64,
     evaluations: &'a Cell<usize>,
 }
 
@@ -141,6 +146,6 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        jacobian(self.residuals, &self.at)
+        jacobian(self.residuals, &self.at, self.step)
     }
 }

@@ -5,12 +5,14 @@ mod heat_flow;
 mod least_squares;
 mod nakamura;
 mod ozawa;
+mod part;
 mod student;
 
 pub use avrami::avrami;
 pub use heat_flow::{Baseline, Peak, at};
 pub use nakamura::{Known, Run, nakamura};
 pub use ozawa::{Cooling, ozawa, rates_at};
+pub use part::part;
 pub use student::quantile;
 
 use crate::error::Error;

@@ -1,13 +1,13 @@
 //! Nakamura's theory with the rate of Hoffman and Lauritzen, from any temperature histories.
 
-use super::least_squares::minimize;
+use super::least_squares::{STEP, minimize};
 use super::{Estimate, Fit, check, check_finite};
 use crate::error::Error;
 use crate::kinetics::{Constants, GAS_CONSTANT, Kinetics};
 use std::f64::consts::LN_2;
 
 /// Steps of temperature, K, in which K is integrated: the error in α is below 1e-7.
-const STEP: f64 = 1.0;
+const PART: f64 = 1.0;
 
 /// What is not fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +69,7 @@ impl Run {
         let mut z = 0.0;
         let mut found: Vec<f64> = if self.history.is_empty() { vec![z] } else { Vec::new() };
         let later = all.map(|[next, end]| {
-            let parts = ((end - temperature).abs() / STEP).ceil().clamp(1.0, 1000.0);
+            let parts = ((end - temperature).abs() / PART).ceil().clamp(1.0, 1000.0);
             for part in 0..parts as usize {
                 let [a, b] = [part, part + 1].map(|k| temperature + (end - temperature) * (k as f64 / parts));
                 z += kinetics.growth(a, b, (next - time) / parts).z;
@@ -171,7 +171,7 @@ pub fn nakamura(runs: &[Run], known: &Known) -> Result<Fit, Error> {
             starts.push(start);
         }
     }
-    let minimum = minimize(what, &residuals, degrees.len(), &starts)?;
+    let minimum = minimize(what, &residuals, degrees.len(), &starts, STEP)?;
     let q = &minimum.at;
     let gradient = [1.0, q[1].exp() * barrier, LN_2.ln() / q[2].exp()];
     let estimate = |name, unit: &str, value: f64, gradient: [f64; 3]| {

@@ -1,6 +1,6 @@
 //! Ozawa's law of crystallization at constant cooling rates.
 
-use super::least_squares::minimize;
+use super::least_squares::{STEP, minimize};
 use super::{Estimate, Fit, check, check_finite};
 use crate::error::Error;
 
@@ -84,7 +84,7 @@ pub fn ozawa(coolings: &[Cooling], temperature: f64) -> Result<Fit, Error> {
     }
     let slope = points.iter().map(|p| p[0] * p[1]).sum::<f64>() / squares;
     let mean = points.iter().map(|p| p[1]).sum::<f64>() / points.len() as f64;
-    let minimum = minimize(&what, &residuals, rates.len(), &[vec![-slope, mean]])?;
+    let minimum = minimize(&what, &residuals, rates.len(), &[vec![-slope, mean]], STEP)?;
     let [exponent, level] = [minimum.at[0], minimum.at[1]];
     let error = minimum.error_of(&[1.0, 0.0]);
     let reach = super::quantile(minimum.degrees) * error;

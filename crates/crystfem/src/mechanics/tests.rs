@@ -1,5 +1,5 @@
 use super::*;
-use crate::mechanics::{Branch, Shift, SolidifyingMaxwell, SpecificVolume};
+use crate::mechanics::SolidifyingMaxwell;
 use evidence::{at_most, near};
 use nalgebra::SVector;
 

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::celsius::{CELSIUS, of_kelvin};
-use super::heat_flow;
+use super::{fit_part, heat_flow};
 use crate::error::Error;
 use crate::fit::{Fit, avrami, nakamura, ozawa};
 use crate::quantities as q;
@@ -33,13 +33,13 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> 
     let mut done = Vec::new();
     for (index, (spec, (job, peaks))) in scene.fit.iter().zip(jobs).enumerate() {
         phases.start("fit");
-        let fits = solve(spec, job);
+        let fits = solve(spec, job, run);
         // data that say nothing are a fault of the scene, which names them
-        let fits = fits.map_err(|error| match error {
-            Error::Data { what, reason } => {
+        let fits = fits.map_err(|failure| match failure {
+            Failure::Run(Error::Data { what, reason }) => {
                 source.refused(&format!("fit[{index}].data"), format!("{what}: {reason}")).into()
             }
-            other => Failure::Run(other),
+            other => other,
         })?;
         done.extend(fits);
         heat_flow::record(&mut report, spec, &peaks);
@@ -80,6 +80,10 @@ pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneEr
                 let rows: usize = runs.iter().map(|run| run.degrees.len()).sum();
                 format!("K0, K_G and n from {rows} measurements in {} runs", runs.len())
             }
+            Job::Part(part) => {
+                let (rows, file) = (part.degrees().len(), part.source.path.display());
+                format!("K0 and K_G from {rows} measurements in {file}, which runs for each trial")
+            }
         };
         let heat = |found: &Measured| format!("{:.4} J/g", found.peak.enthalpy / 1e3);
         let heats: Vec<String> = peaks.iter().map(heat).collect();
@@ -89,7 +93,7 @@ pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneEr
     Ok(scene.fit.iter().zip(&jobs).map(line).collect())
 }
 
-fn solve(spec: &FitSpec, job: Job) -> Result<Vec<Done>, Error> {
+fn solve(spec: &FitSpec, job: Job, run: &mut polycore::case::Run) -> Result<Vec<Done>, Failure> {
     let name = &spec.name;
     match job {
         Job::Avrami(times, degrees) => {
@@ -105,6 +109,17 @@ fn solve(spec: &FitSpec, job: Job) -> Result<Vec<Done>, Error> {
                 .map(|(run, data)| (stem(&data.file), of_kelvin(&run.temperatures), run.degrees))
                 .collect();
             Ok(vec![Done { name: name.clone(), fit, abscissa: ("temperature", "degC"), series }])
+        }
+        Job::Part(part) => {
+            let mut show = |trial: usize| {
+                run.show(0.0, &|| format!("fit {name}  trial {trial}"));
+                if (run.options.interrupted)() { Err(run.interruption()) } else { Ok(()) }
+            };
+            let fit = fit_part::solve(&part, &mut show)?;
+            let curves = part.curves.into_iter().zip(&spec.data);
+            let series =
+                curves.map(|((_, times, degrees), data)| (stem(&data.file), times, degrees)).collect();
+            Ok(vec![Done { name: name.clone(), fit, abscissa: ("time", "s"), series }])
         }
         Job::Ozawa(coolings, temperatures) => {
             let mut all = Vec::new();

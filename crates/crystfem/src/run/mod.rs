@@ -5,6 +5,7 @@ pub(crate) mod celsius;
 mod draw;
 mod explain;
 mod fit;
+mod fit_part;
 mod heat_flow;
 mod line;
 mod mechanics;

@@ -47,6 +47,18 @@ impl Probe {
         &self.place
     }
 
+    /// Temperature, °C, and a field at a time, linear between rows; `None` where it was not there.
+    pub(super) fn at(&self, time: f64, field: usize) -> Option<[f64; 2]> {
+        let after = self.time.partition_point(|&row| row < time).max(1);
+        let (from, to) = (*self.time.get(after - 1)?, *self.time.get(after)?);
+        let share = (time - from) / (to - from);
+        if !(0.0..=1.0).contains(&share) {
+            return None;
+        }
+        let between = |values: &[f64]| values[after - 1] + share * (values[after] - values[after - 1]);
+        Some([between(&self.temperature), between(&self.fields[field])])
+    }
+
     fn last(&self) -> Option<f64> {
         self.time.last().copied()
     }

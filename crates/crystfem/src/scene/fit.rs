@@ -1,6 +1,7 @@
 //! The scene of a fit.
 
 use super::fault::{located, located_in};
+use super::fit_part::PartFit;
 use super::fit_spec::{FitLaw, FitSpec, temperature, time};
 use super::heat_flow::Measured;
 use super::material::KINETICS_KEYS;
@@ -41,6 +42,8 @@ pub enum Job {
     Ozawa(Vec<Cooling>, Vec<f64>),
     /// Runs, and what is known.
     Nakamura(Vec<Run>, Known),
+    /// A part, and what was measured in it.
+    Part(Box<PartFit>),
 }
 
 impl FitScene {
@@ -87,13 +90,15 @@ impl FitScene {
 
 impl FitSpec {
     fn check_keys(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<(), SceneError> {
-        use FitLaw::{Nakamura, Ozawa};
+        use FitLaw::{Nakamura, Ozawa, Part};
         let foreign = [
             ("temperatures", !self.temperatures.is_empty(), Ozawa),
             ("equilibrium_melting", self.equilibrium_melting.is_some(), Nakamura),
             ("frozen", self.frozen.is_some(), Nakamura),
             ("glass_transition", self.glass_transition.is_some(), Nakamura),
             ("activation_energy", self.activation_energy.is_some(), Nakamura),
+            ("part", self.part.is_some(), Part),
+            ("material", self.material.is_some(), Part),
         ];
         for (name, given, law) in foreign {
             if given && law != self.law {
@@ -114,9 +119,17 @@ impl FitSpec {
                 "one: another temperature is another [[fit]]",
             ));
         }
+        if self.law == Part && self.heat_flow.is_some() {
+            return Err(source.error(&key("heat_flow"), "`heat_flow` of a part", "nothing"));
+        }
         for (i, data) in self.data.iter().enumerate() {
+            if self.law != Part && data.probe.is_some() {
+                let at = key(&format!("data[{i}].probe"));
+                return Err(source.error(&at, "`probe` of another law", "nothing, or `law = \"part\"`"));
+            }
             let at = key(&format!("data[{i}].rate"));
             match (self.law, data.rate.map(|rate| rate.si())) {
+                (Part, Some(_)) => return Err(source.error(&at, "`rate` of a part", "nothing")),
                 (FitLaw::Avrami, Some(_)) => {
                     return Err(source.error(&at, "`rate` of an isothermal run", "nothing"));
                 }
@@ -192,6 +205,7 @@ impl FitSpec {
                 }
                 Ok(Job::Nakamura(runs, known))
             }
+            FitLaw::Part => Ok(Job::Part(Box::new(self.part(source, key)?))),
         }
     }
 
@@ -231,12 +245,12 @@ impl FitSpec {
     }
 }
 
-fn alpha() -> Column {
+pub(super) fn alpha() -> Column {
     Column::of::<RatioDimension>("alpha").within(DEGREES[0], DEGREES[1])
 }
 
 /// Reads a table beside the scene.
-fn table<const N: usize>(
+pub(super) fn table<const N: usize>(
     source: &Source,
     key: &str,
     file: &Path,

@@ -19,6 +19,8 @@ pub enum FitLaw {
     /// Eqs (4.4) to (4.7): K₀, K_G and n, from runs at constant cooling rates (`rate`; columns `temperature` and `alpha`) or
     /// along any histories that begin in the melt (columns `time`, `temperature` and `alpha`).
     Nakamura,
+    /// K₀ and K_G of a part's material, from α at its probes (columns `time` and `alpha`): each trial runs the part.
+    Part,
 }
 
 /// One fit.
@@ -44,6 +46,10 @@ pub struct FitSpec {
     pub glass_transition: Option<Temperature>,
     /// Activation energy U, of `nakamura`; default 6270 J/mol.
     pub activation_energy: Option<MolarEnergy>,
+    /// Scene of a part, relative to this scene, of `part`: its constants are the first trial.
+    pub part: Option<PathBuf>,
+    /// The material of the part whose constants are fitted, of `part`; default the only one that crystallizes.
+    pub material: Option<String>,
 }
 
 /// A table of measurements.
@@ -52,6 +58,8 @@ pub struct FitSpec {
 pub struct DataSpec {
     /// CSV file, relative to the scene.
     pub file: PathBuf,
+    /// The probe of the part where it was measured, of `part`.
+    pub probe: Option<String>,
     /// Cooling rate.
     pub rate: Option<TemperatureRate>,
     /// Mass of the sample, of heat flow in W.

@@ -245,17 +245,25 @@ impl MaterialSpec {
         ])
     }
 
+    /// The constants of the kinetics of a `semicrystalline` block.
+    ///
+    /// # Errors
+    /// A [`SceneError`] where some are missing or given twice.
+    pub(super) fn constants(&self, source: &Source, key: &str) -> Result<Constants, SceneError> {
+        match &self.kinetics {
+            Some(KineticsSpec::Named(constants)) => Ok(*constants),
+            Some(KineticsSpec::Given(given)) => given.constants(source, key),
+            None => Err(source.error(&format!("{key}.kinetics"), "nothing", "kinetics")),
+        }
+    }
+
     /// The polymer of a `semicrystalline` block.
     ///
     /// # Errors
     /// As [`MaterialSpec::build`].
     pub fn semicrystalline(&self, source: &Source, key: &str) -> Result<Semicrystalline, SceneError> {
         self.check_keys(source, key)?;
-        let constants = match &self.kinetics {
-            Some(KineticsSpec::Named(constants)) => *constants,
-            Some(KineticsSpec::Given(given)) => given.constants(source, key)?,
-            None => return Err(source.error(&format!("{key}.kinetics"), "nothing", "kinetics")),
-        };
+        let constants = self.constants(source, key)?;
         let melting = match &self.melting {
             Some(MeltingSpec::Named(melting)) => Some(*melting),
             Some(MeltingSpec::Given(given)) => {

@@ -76,7 +76,7 @@ impl MechanicsLaw {
         if !(spec.poisson > -1.0 && spec.poisson < 0.5) {
             return wrong("poisson", spec.poisson, "above -1 and below 0.5");
         }
-        if !(strength > 0.0) {
+        if strength.is_nan() || strength <= 0.0 {
             return wrong("strength", strength, "above 0");
         }
         if !spec.expansion.si().is_finite() {
