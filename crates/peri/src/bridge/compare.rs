@@ -123,5 +123,8 @@ fn libraries(python: &Path) -> Option<OsString> {
     let own = python.parent()?.parent()?.join("lib");
     own.is_dir().then_some(())?;
     let given = std::env::var_os("LD_LIBRARY_PATH").unwrap_or_default();
-    std::env::join_paths(std::iter::once(own).chain(std::env::split_paths(&given).filter(|p| !p.as_os_str().is_empty()))).ok()
+    std::env::join_paths(
+        std::iter::once(own).chain(std::env::split_paths(&given).filter(|p| !p.as_os_str().is_empty())),
+    )
+    .ok()
 }

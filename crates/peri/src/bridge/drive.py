@@ -89,7 +89,7 @@ def load(forces):
     """The force that does the loads' work on the grips' distance, N."""
     work = sum(-f[d] * clamp['displacement_mm'][d] for f, clamp in zip(forces, clamps) for d in range(D)
                if clamp['mask'] >> d & 1)
-    return work / model['reach_mm']
+    return float(work) / model['reach_mm']
 
 
 def read_dump(name):
@@ -188,7 +188,7 @@ for step in range(done + 1, last + 1):
     peak = max(peak, abs(force))
     reactions = [-sum(forces[k][d] for k, clamp in enumerate(clamps) if region in clamp['regions'] and clamp['mask'] >> d & 1)
                  for region in range(len(model['regions'])) for d in range(D)]
-    table.append([step, factor, factor * model['reach_mm'] * 1e-3, force, residual,
+    table.append([step, factor, factor * model['reach_mm'] * 1e-3, force, float(residual),
                   int(L.get_thermo('step') - first), rounds, broken] + [float(r) for r in reactions])
     dump('state.dump')
     if step % model['every'] == 0 or step == last:

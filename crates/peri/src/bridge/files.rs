@@ -9,11 +9,12 @@ use polycore::output::{atomic_write, prepare_directory};
 use std::io::Write;
 use std::path::Path;
 
-/// Fewest points of a table: with 16,000 over l = 0.005 to 80 forces keep 1e-12.
+/// Fewest points of a table: with 16,000 over l = 0 to 80 forces keep 1e-12.
 const POINTS: usize = 16_000;
 /// Points per unit of stretch, where tables are longer.
 const DENSITY: f64 = 200.0;
-const SHORTEST: f64 = 0.005;
+/// Bonds beside a crack are crushed to nearly nothing while it runs.
+const SHORTEST: f64 = 1e-6;
 const MM: f64 = 1e3;
 
 /// Writes everything.
@@ -97,7 +98,10 @@ impl<const D: usize> Model<'_, D> {
     /// `atom_style bond`: bond type = reference length, molecule = clamp.
     pub(super) fn data(&self, file: &mut impl Write) -> std::io::Result<()> {
         let (atoms, bonds, types) = (self.positions.len(), self.bonds.len(), self.types.len());
-        writeln!(file, "peri export; mm, N\n\n{atoms} atoms\n{bonds} bonds\n1 atom types\n{types} bond types\n")?;
+        writeln!(
+            file,
+            "peri export; mm, N\n\n{atoms} atoms\n{bonds} bonds\n1 atom types\n{types} bond types\n"
+        )?;
         let margin = 1.5 * self.farthest + 4.0 * self.horizon;
         for (d, axis) in ["x", "y", "z"].iter().enumerate() {
             let ends = |(low, high): (f64, f64), x: &[f64; D]| (low.min(x[d]), high.max(x[d]));
@@ -178,7 +182,8 @@ impl<const D: usize> Model<'_, D> {
             text += &format!("group clamp{number} molecule {number}\n");
             text += &format!("fix clamp{number} clamp{number} setforce {}\n", held.join(" "));
         }
-        text += "variable marks atom i_broken\ncompute cut all reduce sum v_marks\nvariable cut equal c_cut\n";
+        text +=
+            "variable marks atom i_broken\ncompute cut all reduce sum v_marks\nvariable cut equal c_cut\n";
         text += "thermo_style custom step bonds ebond fnorm v_cut\nthermo_modify norm no lost error\nthermo 100000\n";
         text += &format!("min_style fire\nmin_modify dmax {}\ntimestep 0.05\n", 0.5 * self.spacing * MM);
         text
@@ -217,7 +222,13 @@ impl<const D: usize> Model<'_, D> {
         writeln!(file, "id,x [mm],y [mm],z [mm],fx [N],fy [N],fz [N]")?;
         for (index, (x, force)) in places_now.iter().zip(self.forces(&places_now)).enumerate() {
             let force = force.map(|f| f / MM);
-            writeln!(file, "{},{},{}", index + 1, places(x).replace(' ', ","), places(&force).replace(' ', ","))?;
+            writeln!(
+                file,
+                "{},{},{}",
+                index + 1,
+                places(x).replace(' ', ","),
+                places(&force).replace(' ', ",")
+            )?;
         }
         Ok(())
     }

@@ -182,9 +182,8 @@ impl<'a, const D: usize> Model<'a, D> {
                 return 0;
             }
             let displacement = loads.displacement.as_ref().map_or([0.0; D], |field| field.get(site));
-            let same = |c: &Clamp<D>| {
-                c.mask == mask && c.regions == *regions && c.displacement == displacement
-            };
+            let same =
+                |c: &Clamp<D>| c.mask == mask && c.regions == *regions && c.displacement == displacement;
             clamps.iter().position(same).unwrap_or_else(|| {
                 clamps.push(Clamp { mask, displacement, regions: regions.clone() });
                 clamps.len() - 1

@@ -42,12 +42,7 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &Variant) -> Resul
             "parameters that follow fields, different for each pair",
             "none: LAMMPS has a table for each bond length",
         ),
-        (
-            scene.contact.is_some(),
-            "contact",
-            "contact",
-            "none: the tables act between bonded particles only",
-        ),
+        (scene.contact.is_some(), "contact", "contact", "none: the tables act between bonded particles only"),
         (
             scene.dynamics.is_some() || scene.method() == Method::Verlet,
             if scene.dynamics.is_some() { "dynamics" } else { "solver.method" },
