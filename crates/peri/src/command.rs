@@ -7,6 +7,7 @@ use crate::run::Peri;
 use std::process::ExitCode;
 
 mod bench;
+mod bridge;
 mod exact;
 
 #[derive(clap::Subcommand)]
@@ -14,6 +15,12 @@ enum Command {
     /// Print closed-form solutions and the constants of a bond law.
     #[command(subcommand)]
     Exact(exact::Exact),
+    /// Write a scene for another engine.
+    #[command(subcommand)]
+    Export(bridge::Export),
+    /// Compare an export with the engine that it is for.
+    #[command(subcommand)]
+    Compare(bridge::Compare),
     /// Measure bond evaluations per second, memory, and the machine's bandwidth.
     Bench(bench::Bench),
 }
@@ -22,6 +29,8 @@ enum Command {
 pub fn main() -> ExitCode {
     polycore::case::main::<Peri, _>(|command| match command {
         Command::Exact(exact) => exact.print(),
+        Command::Export(export) => export.print(),
+        Command::Compare(compare) => compare.print(),
         Command::Bench(bench) => bench.print(),
     })
 }

@@ -52,6 +52,8 @@ pub mod stress;
 extern crate self as peri;
 
 #[cfg(feature = "case")]
+pub mod bridge;
+#[cfg(feature = "case")]
 pub mod command;
 #[cfg(feature = "case")]
 pub mod quantities;

@@ -19,7 +19,8 @@ pub use outcome::{Outcome, Profile};
 pub use program::Peri;
 
 use frames::Frames;
-use material::{Acting, Bonded, Observed};
+use material::Observed;
+pub(crate) use material::{Acting, Bonded};
 use probes::Probes;
 use sections::Sections;
 

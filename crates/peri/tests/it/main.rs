@@ -15,6 +15,7 @@ mod friction;
 mod hardy;
 mod homogeneous;
 mod impact;
+mod lammps;
 mod lbfgs;
 mod learnt;
 mod limits;
