@@ -18,6 +18,9 @@ enum Command {
     /// Write a scene for another engine.
     #[command(subcommand)]
     Export(bridge::Export),
+    /// Read the results of another engine.
+    #[command(subcommand)]
+    Import(bridge::Import),
     /// Compare an export with the engine that it is for.
     #[command(subcommand)]
     Compare(bridge::Compare),
@@ -30,6 +33,7 @@ pub fn main() -> ExitCode {
     polycore::case::main::<Peri, _>(|command| match command {
         Command::Exact(exact) => exact.print(),
         Command::Export(export) => export.print(),
+        Command::Import(import) => import.print(),
         Command::Compare(compare) => compare.print(),
         Command::Bench(bench) => bench.print(),
     })

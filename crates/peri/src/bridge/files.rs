@@ -22,12 +22,15 @@ pub(super) fn write<const D: usize>(
     model: &Model<D>,
     scene: &Scene,
     loads: &Loads<D>,
+    [text_of_scene, variant]: [&str; 2],
     output: &Path,
 ) -> Result<(), Error> {
     prepare_directory(output)?;
     let points = model.points();
     let (text, names) = (model.input(points), region_names(scene));
-    let json = model.json(scene, &names[..loads.held_regions.len().min(names.len())]);
+    let mut json = model.json(scene, &names[..loads.held_regions.len().min(names.len())]);
+    json["variant"] = variant.into();
+    atomic_write(output.join("scene.toml"), |file| file.write_all(text_of_scene.as_bytes()))?;
     atomic_write(output.join("peri.data"), |file| model.data(file))?;
     atomic_write(output.join("peri.table"), |file| model.tables(points, file))?;
     atomic_write(output.join("in.peri"), |file| file.write_all(text.as_bytes()))?;

@@ -3,11 +3,13 @@
 
 mod compare;
 mod files;
+mod import;
 mod refuse;
 #[cfg(test)]
 mod tests;
 
 pub use compare::{BOUND, Comparison, compare};
+pub use import::import;
 
 use crate::bonds::Bonds;
 use crate::calibrate::Space;
@@ -43,12 +45,14 @@ pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<S
         },
     };
     let variant = &variants[index];
+    // values of one variant have its name behind theirs only where there are others
+    let texts = [&*source.text, if names.len() > 1 { &*names[index] } else { "" }];
     let (source, scene) = variant.resolve(source, &scene)?;
     scene::check_variant(&source, &scene)?;
     refuse::refuse(&source, &scene, variant)?;
     match scene.body.space {
-        Space::Solid => write::<3>(&source, &scene, variant, output),
-        _ => write::<2>(&source, &scene, variant, output),
+        Space::Solid => write::<3>(&source, &scene, variant, texts, output),
+        _ => write::<2>(&source, &scene, variant, texts, output),
     }
 }
 
@@ -70,6 +74,7 @@ fn write<const D: usize>(
     source: &Source,
     scene: &Scene,
     variant: &Variant,
+    texts: [&str; 2],
     output: &Path,
 ) -> Result<Summary, Failure> {
     let body = body_of::<D>(source, scene, variant)?;
@@ -94,7 +99,7 @@ fn write<const D: usize>(
         let allowed = "clamps that move against each other: the load is the force that does work on them";
         return Err(source.error("boundary", "no displacement", allowed).into());
     }
-    files::write(&model, scene, &loads, output)?;
+    files::write(&model, scene, &loads, texts, output)?;
     Ok(Summary { particles: model.labels.len(), bonds: model.bonds.len(), types: model.types.len() })
 }
 

@@ -1,4 +1,4 @@
-use super::{Model, export};
+use super::{Model, export, import};
 use crate::bonds::{self, Bonds, LatticeBonds, VolumeCorrection};
 use crate::field::Field;
 use crate::geometry::{Operation, Shape, lattice};
@@ -159,4 +159,41 @@ fn what_tables_cannot_represent_is_refused() {
     for name in ["peri.data", "peri.table", "in.peri", "check.csv", "drive.py", "README.md", "model.json"] {
         assert!(output.join(name).is_file(), "{name}");
     }
+}
+
+/// Results made by hand: every particle moved by 0.1 mm along x, one bond broken at the second step.
+#[test]
+fn results_come_back() {
+    let directory = tempfile::tempdir().unwrap();
+    let (folder, output) = (directory.path().join("out"), directory.path().join("back"));
+    export(&Source::new("scene.toml", SCENE), None, &folder).unwrap();
+    let put = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
+    let failure = import(&folder, &output).unwrap_err().to_string();
+    assert!(failure.contains("history.csv"), "{failure}");
+    let head = "step,factor,displacement [m],load [N],residual,iterations,rounds,broken";
+    put("history.csv", &format!("{head}\n1,0.5,0.0015,2.0,1e-7,10,1,0\n2,1.0,0.003,1.5,1e-7,20,2,1\n"));
+    put("broken.0.csv", "2,1,1,2\n");
+    let body = std::fs::read_to_string(folder.join("peri.data")).unwrap();
+    let (_, atoms) = body.split_once("Atoms # bond\n\n").unwrap();
+    let row = |line: &str| {
+        let fields: Vec<&str> = line.split(' ').collect();
+        let x = fields[3].parse::<f64>().unwrap() + 0.1;
+        format!("{} {} {x} {} {} 0 0 0 0\n", fields[0], fields[1], fields[4], fields[5])
+    };
+    let rows: String = atoms.lines().take_while(|line| !line.is_empty()).map(row).collect();
+    let dump = "line\n".repeat(9) + &rows;
+    put("step.2.dump", &dump);
+    let report = import(&folder, &output).unwrap();
+    let scalar = |name: &str| report.scalar(name).unwrap();
+    assert_eq!([scalar("peak_load"), scalar("displacement_at_peak")], [2.0, 0.0015]);
+    assert_eq!(report.work["iterations"], 30);
+    let fields = polycore::output::vtkhdf::read(output.join("fields.vtkhdf")).unwrap();
+    let (moved, damage) = (fields.data(0, "displacement").unwrap(), fields.data(0, "damage").unwrap());
+    assert!(moved.chunks(3).all(|u| (u[0] - 1e-4).abs() < 1e-12 && u[1] == 0.0));
+    assert!(damage[0] > 0.0 && damage[1] > 0.0 && damage[2..].iter().all(|&damage| damage == 0.0));
+    put("step.2.dump", &dump[..dump.len() - 40]);
+    let failure = import(&folder, &output).unwrap_err().to_string();
+    assert!(failure.contains("step.2.dump"), "{failure}");
+    put("step.2.dump", &dump.replacen(" 0 0 0 0", " nan 0 0 0", 1));
+    assert!(import(&folder, &output).unwrap_err().to_string().contains("no finite number"));
 }

@@ -45,6 +45,30 @@ impl Export {
     }
 }
 
+/// What to import from.
+#[derive(Subcommand)]
+pub enum Import {
+    /// Read what `drive.py` has written: report, history, curve, fields; judge the scene's expectations.
+    Lammps {
+        /// The folder that `peri export lammps` has written and `drive.py` has run in.
+        folder: PathBuf,
+        /// Folder for the results; default: FOLDER/results.
+        #[arg(long, short)]
+        output: Option<PathBuf>,
+    },
+}
+
+impl Import {
+    /// Reads and judges it.
+    pub fn print(self) -> Result<bool, Failure> {
+        let Self::Lammps { folder, output } = self;
+        let output = output.unwrap_or_else(|| folder.join("results"));
+        let report = bridge::import(&folder, &output)?;
+        polycore::say!("{}{}results in {}", report.table(), report.verdict(), output.display());
+        Ok(report.passed)
+    }
+}
+
 /// What to compare with.
 #[derive(Subcommand)]
 pub enum Compare {

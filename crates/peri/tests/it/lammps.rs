@@ -1,5 +1,7 @@
 //! Exports in LAMMPS itself, where a Python has it: `PERI_LAMMPS_PYTHON`, else `python3`.
 
+use polycore::output::vtkhdf;
+use polycore::report::Report;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -66,6 +68,23 @@ fn a_strip_tears_as_in_lammps() {
     let off = loads[..whole].iter().zip(&their_loads).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
     evidence::near("loads of a torn strip in LAMMPS", off, 0.0, 2e-5);
 
+    // what comes back is a report like ours, judged by the same scene
+    assert_eq!(peri(&["import", "lammps", "strip", "-o", "back"], here), 0);
+    let report = |folder: &str| Report::read(here.join(folder).join("report.json")).unwrap();
+    let (ours, back) = (report("own"), report("back"));
+    for name in ["peak_load", "displacement_at_peak", "first_break"] {
+        let [ours, back] = [&ours, &back].map(|report| report.scalar(name).unwrap());
+        assert!((back / ours - 1.0).abs() < 2e-5, "{name}: {back}, {ours}");
+    }
+    assert_eq!(back.expect.len(), 1);
+    let fields = vtkhdf::read(here.join("back/fields.vtkhdf")).unwrap();
+    let last = fields.len() - 1;
+    let (damage, moved) = (fields.data(last, "damage").unwrap(), fields.data(last, "displacement").unwrap());
+    let places = fields.points(last).unwrap();
+    let torn: Vec<usize> = (0..damage.len()).filter(|&k| damage[k] > 0.0).collect();
+    let near = |&k: &usize| (places[k][1] - moved[3 * k + 1]).abs() < 3.1 * 8e-3;
+    assert!(torn.len() > 12 && torn.iter().all(near), "{} particles", torn.len());
+
     // a force that is wrong is found
     let table = here.join("strip/check.csv");
     let text = std::fs::read_to_string(&table).unwrap();
@@ -109,4 +128,9 @@ stop_below = 0.02
 [output]
 pictures = false
 fields = false
+[[expect]]
+quantity = "peak_load"
+at_least = 1
+kind = "bound"
+source = "it bears a load"
 "#;
