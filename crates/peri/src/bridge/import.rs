@@ -142,7 +142,9 @@ fn numbers(path: &Path, line: &str, between: char) -> Result<Vec<f64>, Error> {
 }
 
 /// Reference places, m, and the ends of all bonds, from 0.
-fn read_body(path: &Path) -> Result<(Vec<[f64; 3]>, Vec<[usize; 2]>), Error> {
+type Body = (Vec<[f64; 3]>, Vec<[usize; 2]>);
+
+fn read_body(path: &Path) -> Result<Body, Error> {
     let text = read_to_string(path).map_err(Error::io("read", path))?;
     let section = |name: &'static str| {
         let mut lines = text.lines().skip_while(move |line| !line.starts_with(name));
