@@ -32,7 +32,7 @@ pub enum Parameter {
     Prestrain,
 }
 
-/// A field over the nodes of a mesh.
+/// A field over the nodes or the cells of a mesh.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FieldSource {

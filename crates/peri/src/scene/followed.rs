@@ -169,15 +169,14 @@ impl FieldSpec {
                 let reason = format!("{} lies outside of the mesh of `{}`", place(index), self.from.input);
                 return Err(refused("placement", format!("{reason}; is it another mesh?")));
             }
-            if let Some(node) = overlap.nodes_of(index).find(|&node| !values[node as usize].is_finite()) {
-                let at = mesh.points[node as usize].map(|x| (1e9 * x).round() / 1e6);
-                let value = values[node as usize];
+            if let Some((at, value)) = values.missing(&mesh, &overlap, index) {
+                let at = at.map(|x| (1e9 * x).round() / 1e6);
                 let reason =
                     format!("`{array}` is {value} at {at:?} mm of the mesh, where {} lies", place(index));
                 return Err(refused("from.field", reason));
             }
         }
-        let means = overlap.from_nodes(&values).map_err(|error| refused("from.field", error.to_string()))?;
+        let means = values.means(&overlap).map_err(|error| refused("from.field", error.to_string()))?;
         let (zero, scale) = kind.scale(unit);
         let mut field = Vec::with_capacity(means.len());
         let mut parameter = vec![0.0; bonds.sites()];
@@ -197,14 +196,8 @@ impl FieldSpec {
             field.push(value);
         }
         let extreme = |better: fn(f64, f64) -> f64| field.iter().copied().reduce(better).unwrap_or(f64::NAN);
-        let with_values: Vec<[u32; 8]> = mesh
-            .cells
-            .iter()
-            .filter(|cell| cell.iter().all(|&node| values[node as usize].is_finite()))
-            .copied()
-            .collect();
-        let [mesh_volume, mesh_sum] = integral(&mesh.points, &with_values, &values)
-            .map_err(|error| refused("from.field", error.to_string()))?;
+        let [mesh_volume, mesh_sum] =
+            values.integral(&mesh).map_err(|error| refused("from.field", error.to_string()))?;
         Ok(Followed {
             parameter: self.of,
             values: Property::new(bonds, |site, _| parameter[site]),
@@ -217,15 +210,16 @@ impl FieldSpec {
     }
 
     /// The array, its mesh and its values.
-    fn read(&self, source: &Source, key: &str) -> Result<(String, Mesh, Vec<f64>), SceneError> {
+    fn read(&self, source: &Source, key: &str) -> Result<(String, Mesh, Values), SceneError> {
         let from = &self.from;
         let folder = source.input(&format!("{key}.from.input"), &from.input)?;
         let path = source.file(folder.join(from.file.as_deref().unwrap_or("fields.vtkhdf".as_ref())));
         let refused =
             |at: &str, reason: &dyn fmt::Display| source.refused(&format!("{key}.from.{at}"), reason);
         let series = vtkhdf::read(&path).map_err(|error| refused("input", &error))?;
+        let (of_nodes, of_cells) = (series.arrays().iter(), series.cell_arrays().iter());
         let arrays: Vec<&str> =
-            series.arrays().iter().filter(|(_, n)| *n == 1).map(|(name, _)| &**name).collect();
+            of_nodes.chain(of_cells).filter(|(_, n)| *n == 1).map(|(name, _)| &**name).collect();
         let named = |array: &&&str| {
             let (_, unit) = Kind::of(array);
             **array == from.field
@@ -238,8 +232,12 @@ impl FieldSpec {
         let mesh = Mesh::new(&series).map_err(|reason| {
             refused("input", &format!("{}: {reason}; fields lie on hexahedra", path.display()))
         })?;
-        let values = series.data(step, &array).map_err(|error| refused("field", &error))?;
-        Ok((array, mesh, values))
+        let of_nodes = series.arrays().iter().any(|(name, _)| *name == array);
+        let values = match of_nodes {
+            true => series.data(step, &array).map(Values::Nodes),
+            false => series.cell_data(step, &array).map(Values::Cells),
+        };
+        Ok((array, mesh, values.map_err(|error| refused("field", &error))?))
     }
 
     fn step(&self, source: &Source, key: &str, series: &Series) -> Result<usize, SceneError> {
@@ -368,6 +366,57 @@ impl Mesh {
         }
         let cells = cells.connectivity.chunks_exact(8).filter_map(|cell| cell.try_into().ok()).collect();
         Ok(Self { points, cells })
+    }
+}
+
+/// A field over nodes, trilinear in each cell, or over cells.
+enum Values {
+    Nodes(Vec<f64>),
+    Cells(Vec<f64>),
+}
+
+impl Values {
+    /// The place of a node or the middle of a cell in a box where the field has no finite value.
+    fn missing(&self, mesh: &Mesh, overlap: &Overlap, index: usize) -> Option<([f64; 3], f64)> {
+        match self {
+            Self::Nodes(values) => {
+                let node = overlap.nodes_of(index).find(|&node| !values[node as usize].is_finite())?;
+                Some((mesh.points[node as usize], values[node as usize]))
+            }
+            Self::Cells(values) => {
+                let cell = overlap.cells_of(index).find(|&cell| !values[cell as usize].is_finite())?;
+                let corners = mesh.cells[cell as usize].map(|node| mesh.points[node as usize]);
+                let middle = |d: usize| corners.iter().map(|corner| corner[d]).sum::<f64>() / 8.0;
+                Some(([middle(0), middle(1), middle(2)], values[cell as usize]))
+            }
+        }
+    }
+
+    fn means(&self, overlap: &Overlap) -> Result<Vec<Option<f64>>, polycore::Error> {
+        match self {
+            Self::Nodes(values) => overlap.from_nodes(values),
+            Self::Cells(values) => overlap.from_cells(values),
+        }
+    }
+
+    /// Volume of the mesh where the field has values, and its integral.
+    fn integral(&self, mesh: &Mesh) -> Result<[f64; 2], polycore::Error> {
+        match self {
+            Self::Nodes(values) => {
+                let finite = |cell: &&[u32; 8]| cell.iter().all(|&node| values[node as usize].is_finite());
+                let cells: Vec<[u32; 8]> = mesh.cells.iter().filter(finite).copied().collect();
+                integral(&mesh.points, &cells, values)
+            }
+            Self::Cells(values) => {
+                let ones = vec![1.0; mesh.points.len()];
+                let mut sums = [0.0; 2];
+                for (cell, value) in mesh.cells.iter().zip(values).filter(|(_, value)| value.is_finite()) {
+                    let [volume, _] = integral(&mesh.points, std::slice::from_ref(cell), &ones)?;
+                    sums = [sums[0] + volume, sums[1] + volume * value];
+                }
+                Ok(sums)
+            }
+        }
     }
 }
 
