@@ -56,9 +56,12 @@ impl<'a> Healer<'a> {
         self.healed.0.iter().map(|(integral, last)| last.map(|_| Healing::degree(*integral)))
     }
 
-    /// The least D_h of the interfaces of each element; NaN of one that has none yet.
-    pub fn field(&self, elements: usize) -> Vec<f64> {
-        let mut least = vec![f64::NAN; elements];
+    /// The least D_h of the interfaces of each element; 1 inside of a layer, NaN of elements that are not printed or not there yet.
+    pub fn field(&self, simulation: &Simulation) -> Vec<f64> {
+        let within = |(element, &printed): (u32, &bool)| {
+            if printed && simulation.is_born(element) { 1.0 } else { f64::NAN }
+        };
+        let mut least: Vec<f64> = (0..).zip(&self.spec.printed).map(within).collect();
         for (interface, degree) in self.spec.list.iter().zip(self.degrees()) {
             let Some(degree) = degree else { continue };
             for &element in &interface.sides {

@@ -210,7 +210,7 @@ impl Recorder<'_> {
             of_cells.push(("mises_Pa", 1, &mises));
             of_cells.push(("residual_stress_Pa", 6, &stresses));
         }
-        let healing = self.healer.as_ref().map(|healer| healer.field(elements as usize));
+        let healing = self.healer.as_ref().map(|healer| healer.field(simulation));
         of_cells.extend(healing.iter().map(|field| ("healing", 1, field.as_slice())));
         Ok(series.step(simulation.time(), &arrays, &of_cells)?)
     }

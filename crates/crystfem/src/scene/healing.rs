@@ -46,6 +46,8 @@ pub struct Interfaces {
     pub law: Healing,
     /// Between elements that appear at different times.
     pub list: Vec<Interface>,
+    /// Elements that are printed of this material.
+    pub printed: Vec<bool>,
 }
 
 impl PartScene {
@@ -75,17 +77,18 @@ impl PartScene {
         for (number, elements) in (0..).zip(births) {
             elements.iter().for_each(|&element| birth_of[element as usize] = number);
         }
-        let printed = |element: u32| {
-            let birth = birth_of[element as usize];
-            (usize::from(material_of[element as usize]) == index && birth != u32::MAX).then_some(birth)
-        };
+        let births = birth_of.iter().zip(material_of);
+        let printed: Vec<bool> =
+            births.map(|(&birth, &of)| usize::from(of) == index && birth != u32::MAX).collect();
         let surface = Surface::of_all(mesh).map_err(|error| source.refused("mesh", error.to_string()))?;
         let mut list = Vec::new();
         for element in 0..mesh.element_count() as u32 {
-            let Some(birth) = printed(element) else { continue };
+            if !printed[element as usize] {
+                continue;
+            }
             for face in mesh.faces_of(element) {
                 let Some(other) = surface.opposite(face).map(|face| face.element) else { continue };
-                if printed(other).is_some_and(|of| of < birth) {
+                if printed[other as usize] && birth_of[other as usize] < birth_of[element as usize] {
                     let nodes = mesh.face_nodes(face).to_vec();
                     list.push(Interface { sides: [element, other], nodes, area: area(mesh, face) });
                 }
@@ -99,6 +102,6 @@ impl PartScene {
                 "the material of a [print] with several births",
             ));
         }
-        Ok(Some(Interfaces { law, list }))
+        Ok(Some(Interfaces { law, list, printed }))
     }
 }

@@ -1,18 +1,17 @@
 //! Parameters in the particles of a body, from fields of other scenes.
 
+use super::cells::{Mesh, Values};
 use super::field::Entry;
 use super::values::{Body, plain, positive};
 use super::{FieldSpec, Parameter, Scene};
 use crate::bonds::Property;
 use polycore::output::vtkhdf::{self, Series};
 use polycore::scene::{SceneError, Source};
-use polycore::transfer::{Cuboid, Overlap, integral};
+use polycore::transfer::{Cuboid, Overlap};
 use polycore::units::dimension::{EnergyPerAreaDimension, RatioDimension, StressDimension};
 use polycore::units::{Dimension, Quantity, Ratio, Stress, Temperature};
 use std::fmt;
 
-/// VTK's number of a hexahedron.
-const HEXAHEDRON: u8 = 12;
 /// Values this far beyond a table, over its range, are at its end: rounding.
 const AT_END: f64 = 1e-9;
 /// Less of a particle inside of the mesh is outside of it.
@@ -109,8 +108,10 @@ fn in_si<D: Dimension>(text: &str) -> Result<f64, String> {
 pub struct Followed {
     /// The parameter.
     pub parameter: Parameter,
-    /// Its values by site, SI.
+    /// Its values by site, SI; of a stress, that of the mean stress.
     pub values: Property,
+    /// The stress, Pa, site by site along the axes of the body, which is to be there while the body is held in its shape; empty of other fields.
+    pub stress: Vec<[[f64; 3]; 3]>,
     /// Mean, least and largest value of the field in the particles, SI.
     pub field: [f64; 3],
     /// Its mean over the mesh, where it exists.
@@ -125,7 +126,10 @@ impl fmt::Display for Followed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { parameter, values, field: [_, low, high], array, input, unit, .. } = self;
         let (least, greatest, name) = (values.least(), values.greatest(), parameter.name());
-        write!(f, "{name} {least:.4e} to {greatest:.4e} {}, from ", parameter.unit())?;
+        match self.stress.is_empty() {
+            true => write!(f, "{name} {least:.4e} to {greatest:.4e} {}, from ", parameter.unit())?,
+            false => write!(f, "{name} of stresses, from ")?,
+        }
         write!(f, "`{array}` of `{input}`, {low:.4} to {high:.4} {unit}")
     }
 }
@@ -153,7 +157,14 @@ impl FieldSpec {
     ) -> Result<Followed, SceneError> {
         let (array, mesh, values) = self.read(source, key)?;
         let (kind, unit) = Kind::of(&array);
-        let table = self.table(source, key, kind, &array)?;
+        let table = match values.components {
+            1 => self.table(source, key, kind, &array)?,
+            _ if self.table.is_empty() => Vec::new(),
+            _ => {
+                let allowed = "none: the strain that this stress belongs to follows from Young's modulus";
+                return Err(source.error(&format!("{key}.table"), "a table of a tensor", allowed));
+            }
+        };
         let boxes = self.boxes(source, &format!("{key}.placement"), body, &mesh.points)?;
         let refused = |at: &str, reason: String| source.refused(&format!("{key}.{at}"), reason);
         let overlap = Overlap::new(&mesh.points, &mesh.cells, &boxes)
@@ -176,14 +187,21 @@ impl FieldSpec {
                 return Err(refused("from.field", reason));
             }
         }
-        let means = values.means(&overlap).map_err(|error| refused("from.field", error.to_string()))?;
+        let fault = |error: polycore::Error| refused("from.field", error.to_string());
+        let means = values.means(&overlap).map_err(fault)?;
         let (zero, scale) = kind.scale(unit);
-        let mut field = Vec::with_capacity(means.len());
+        let mut field = Vec::with_capacity(boxes.len());
         let mut parameter = vec![0.0; bonds.sites()];
+        let mut stress = vec![[[0.0; 3]; 3]; if values.components == 6 { bonds.sites() } else { 0 }];
         let (mut sum, mut volume) = (0.0, 0.0);
-        for (index, mean) in means.into_iter().enumerate() {
-            let value = zero + scale * mean.unwrap_or(f64::NAN);
-            let Some(mapped) = interpolated(&table, value) else {
+        for index in 0..boxes.len() {
+            let at = |component: usize| zero + scale * means[component][index].unwrap_or(f64::NAN);
+            let value = values.mean_of(at);
+            let mapped = match values.components {
+                1 => interpolated(&table, value),
+                _ => Some(value),
+            };
+            let Some(mapped) = mapped else {
                 let (low, high) = (table[0].0, table[table.len() - 1].0);
                 let found = format!("`{array}` of {} {} in {}", plain(value), kind.unit(), place(index));
                 let allowed = format!("values of the table, {} to {}", plain(low), plain(high));
@@ -191,16 +209,19 @@ impl FieldSpec {
             };
             let site = bonds.particles()[index] as usize;
             parameter[site] = mapped;
+            if let Some(tensor) = stress.get_mut(site) {
+                *tensor = self.along_axes(Values::tensor(at));
+            }
             sum += bonds.volume(site) * value;
             volume += bonds.volume(site);
             field.push(value);
         }
         let extreme = |better: fn(f64, f64) -> f64| field.iter().copied().reduce(better).unwrap_or(f64::NAN);
-        let [mesh_volume, mesh_sum] =
-            values.integral(&mesh).map_err(|error| refused("from.field", error.to_string()))?;
+        let [mesh_volume, mesh_sum] = values.integral(&mesh).map_err(fault)?;
         Ok(Followed {
             parameter: self.of,
             values: Property::new(bonds, |site, _| parameter[site]),
+            stress,
             field: [sum / volume, extreme(f64::min), extreme(f64::max)],
             mesh_mean: zero + scale * mesh_sum / mesh_volume,
             unit: kind.unit(),
@@ -218,8 +239,12 @@ impl FieldSpec {
             |at: &str, reason: &dyn fmt::Display| source.refused(&format!("{key}.from.{at}"), reason);
         let series = vtkhdf::read(&path).map_err(|error| refused("input", &error))?;
         let (of_nodes, of_cells) = (series.arrays().iter(), series.cell_arrays().iter());
+        // of tensors, stresses that prestrains belong to
+        let fits = |name: &str, n: usize| {
+            n == 1 || (n == 6 && self.of == Parameter::Prestrain && Kind::of(name).0 == Kind::Stress)
+        };
         let arrays: Vec<&str> =
-            of_nodes.chain(of_cells).filter(|(_, n)| *n == 1).map(|(name, _)| &**name).collect();
+            of_nodes.chain(of_cells).filter(|(name, n)| fits(name, *n)).map(|(name, _)| &**name).collect();
         let named = |array: &&&str| {
             let (_, unit) = Kind::of(array);
             **array == from.field
@@ -232,12 +257,8 @@ impl FieldSpec {
         let mesh = Mesh::new(&series).map_err(|reason| {
             refused("input", &format!("{}: {reason}; fields lie on hexahedra", path.display()))
         })?;
-        let of_nodes = series.arrays().iter().any(|(name, _)| *name == array);
-        let values = match of_nodes {
-            true => series.data(step, &array).map(Values::Nodes),
-            false => series.cell_data(step, &array).map(Values::Cells),
-        };
-        Ok((array, mesh, values.map_err(|error| refused("field", &error))?))
+        let values = Values::new(&series, step, &array).map_err(|error| refused("field", &error))?;
+        Ok((array, mesh, values))
     }
 
     fn step(&self, source: &Source, key: &str, series: &Series) -> Result<usize, SceneError> {
@@ -286,6 +307,18 @@ impl FieldSpec {
             }
             _ => Ok(table),
         }
+    }
+
+    /// A tensor of the mesh along the axes of the body; those of a plane body across it are zero.
+    fn along_axes(&self, tensor: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+        let Some(axes) = &self.placement.axes else { return tensor };
+        let mut along = [[0.0; 3]; 3];
+        for (a, (from, sign)) in axes.iter().map(|axis| axis.of()).enumerate() {
+            for (b, (to, other)) in axes.iter().map(|axis| axis.of()).enumerate() {
+                along[a][b] = sign * other * tensor[from][to];
+            }
+        }
+        along
     }
 
     /// The particles as boxes in the mesh: cubes, or columns through the mesh, of their volumes.
@@ -345,78 +378,6 @@ impl FieldSpec {
             own
         };
         Ok(bonds.particles().iter().map(of).collect())
-    }
-}
-
-/// Points and hexahedra of a file.
-struct Mesh {
-    points: Vec<[f64; 3]>,
-    cells: Vec<[u32; 8]>,
-}
-
-impl Mesh {
-    fn new(series: &Series) -> Result<Self, String> {
-        let points = series.points(0).map_err(|error| error.to_string())?;
-        let cells = series.cells().map_err(|error| error.to_string())?;
-        if cells.is_empty() {
-            return Err("it has particles and no cells".to_owned());
-        }
-        if let Some(kind) = cells.types.iter().find(|&&kind| kind != HEXAHEDRON) {
-            return Err(format!("it has cells of VTK's type {kind}"));
-        }
-        let cells = cells.connectivity.chunks_exact(8).filter_map(|cell| cell.try_into().ok()).collect();
-        Ok(Self { points, cells })
-    }
-}
-
-/// A field over nodes, trilinear in each cell, or over cells.
-enum Values {
-    Nodes(Vec<f64>),
-    Cells(Vec<f64>),
-}
-
-impl Values {
-    /// The place of a node or the middle of a cell in a box where the field has no finite value.
-    fn missing(&self, mesh: &Mesh, overlap: &Overlap, index: usize) -> Option<([f64; 3], f64)> {
-        match self {
-            Self::Nodes(values) => {
-                let node = overlap.nodes_of(index).find(|&node| !values[node as usize].is_finite())?;
-                Some((mesh.points[node as usize], values[node as usize]))
-            }
-            Self::Cells(values) => {
-                let cell = overlap.cells_of(index).find(|&cell| !values[cell as usize].is_finite())?;
-                let corners = mesh.cells[cell as usize].map(|node| mesh.points[node as usize]);
-                let middle = |d: usize| corners.iter().map(|corner| corner[d]).sum::<f64>() / 8.0;
-                Some(([middle(0), middle(1), middle(2)], values[cell as usize]))
-            }
-        }
-    }
-
-    fn means(&self, overlap: &Overlap) -> Result<Vec<Option<f64>>, polycore::Error> {
-        match self {
-            Self::Nodes(values) => overlap.from_nodes(values),
-            Self::Cells(values) => overlap.from_cells(values),
-        }
-    }
-
-    /// Volume of the mesh where the field has values, and its integral.
-    fn integral(&self, mesh: &Mesh) -> Result<[f64; 2], polycore::Error> {
-        match self {
-            Self::Nodes(values) => {
-                let finite = |cell: &&[u32; 8]| cell.iter().all(|&node| values[node as usize].is_finite());
-                let cells: Vec<[u32; 8]> = mesh.cells.iter().filter(finite).copied().collect();
-                integral(&mesh.points, &cells, values)
-            }
-            Self::Cells(values) => {
-                let ones = vec![1.0; mesh.points.len()];
-                let mut sums = [0.0; 2];
-                for (cell, value) in mesh.cells.iter().zip(values).filter(|(_, value)| value.is_finite()) {
-                    let [volume, _] = integral(&mesh.points, std::slice::from_ref(cell), &ones)?;
-                    sums = [sums[0] + volume, sums[1] + volume * value];
-                }
-                Ok(sums)
-            }
-        }
     }
 }
 
