@@ -143,7 +143,9 @@ impl<const D: usize> Bonded<D> {
         let material = match &inclusions.prestrain {
             Some(strain) => {
                 let prestrained = Prestrained::new(bonded, strain.clone());
-                let breaking = criterion.as_ref().map(|criterion: &Criterion| prestrained.clone().clamped(criterion.most()));
+                let breaking = criterion
+                    .as_ref()
+                    .map(|criterion: &Criterion| prestrained.clone().clamped(criterion.most()));
                 Acting::Prestrained(breaking.unwrap_or(prestrained))
             }
             None => Acting::Bonds(bonded),

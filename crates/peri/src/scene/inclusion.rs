@@ -37,9 +37,7 @@ fn relaxed<const D: usize>(space: Space, youngs_modulus: f64, stress: &[[f64; 3]
     let trace: f64 = (0..D).map(|d| stress[d][d]).sum();
     // a strain across the plane that is zero takes ν(1 + ν) of the sum, in its plane
     let across = if space == Space::PlaneStrain { nu * (1.0 + nu) } else { nu };
-    let of = |a: usize, b: usize| {
-        across * if a == b { trace } else { 0.0 } - (1.0 + nu) * stress[a][b]
-    };
+    let of = |a: usize, b: usize| across * if a == b { trace } else { 0.0 } - (1.0 + nu) * stress[a][b];
     array::from_fn(|a| array::from_fn(|b| of(a, b) / youngs_modulus))
 }
 
@@ -110,7 +108,8 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             let own: [[f64; D]; D] =
                 array::from_fn(|a| array::from_fn(|b| if a == b { prestrain[site] } else { 0.0 }));
             let (Some(one), Some(whole)) = (stressed, scene.material.youngs_modulus) else { return own };
-            let held: [[f64; D]; D] = relaxed(scene.body.space, stiffness[site] * whole.si(), &one.stress[site]);
+            let held: [[f64; D]; D] =
+                relaxed(scene.body.space, stiffness[site] * whole.si(), &one.stress[site]);
             array::from_fn(|a| array::from_fn(|b| own[a][b] + held[a][b]))
         };
         let prestrain = shrinks.then(|| (0..bonds.sites()).map(strain).collect());
@@ -171,7 +170,8 @@ mod tests {
     #[test]
     fn strains_of_stresses() {
         let bar = [[2.0, 0.0, 0.0], [0.0; 3], [0.0; 3]];
-        let close = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-15, "{found} {expected}");
+        let close =
+            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-15, "{found} {expected}");
         let sheet: [[f64; 2]; 2] = relaxed(Space::PlaneStress, 4.0, &bar);
         close(sheet[0][0], -0.5);
         close(sheet[1][1], 0.5 / 3.0);
