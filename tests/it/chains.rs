@@ -2,6 +2,7 @@
 
 use crate::program::{Ended, command, finish, peri};
 use crate::results::{assert_same, report, scalar};
+use evidence::near;
 use polycore::output::vtkhdf::{Cells, MeshSeries, ParticleSeries, read};
 use std::fs;
 use std::path::Path;
@@ -248,6 +249,50 @@ fn fields_that_cannot_be_used() {
     refused("one of 4 times, the nearest 100 s");
     at("file", "\"none.vtkhdf\"");
     refused("none.vtkhdf");
+}
+
+/// The stress of a print, 1 MPa along its second axis, is there while a strip is held at its ends: it pulls them with stress × section.
+#[test]
+fn a_stress_is_handed_over() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    write(here, &[("print", PRINT), ("strip", STRIP)]);
+    strip(here, "--with-inputs").with_code(0);
+    let path = here.join("out/print/fields.vtkhdf");
+    let (points, cells) = {
+        let series = read(&path).unwrap();
+        (series.points(0).unwrap(), series.cells().unwrap())
+    };
+    let tensors: Vec<f64> = (0..cells.len()).flat_map(|_| [0.0, 1e3, 0.0, 0.0, 0.0, 0.0]).collect();
+    let mut series = MeshSeries::create(&path, points, cells).unwrap();
+    series.step(0.0, &[], &[("residual_stress_kPa", 6, &tensors)]).unwrap();
+    series.finish().unwrap();
+    let held = STRIP
+        .replace("of = \"youngs-modulus\"", "of = \"prestrain\"")
+        .replace("\"crystallinity\"", "\"residual_stress\"")
+        .replace("displacement = [\"0 mm\", \"0 mm\"]", "displacement = [\"0 mm\", \"free\"]")
+        .replace("[\"0.01 mm\", \"0 mm\"]", "[\"0 mm\", \"free\"]")
+        .replace("max = [\"8 mm\", \"4 mm\"]", "max = [\"4 mm\", \"2 mm\"]");
+    write(here, &[("strip", &held)]);
+    let ended = strip(here, "").with_code(2);
+    ended.tells("found a table of a tensor");
+    let table = "table = [[0, \"0.9 GPa\"], [0.25, \"1.6 GPa\"]]";
+    let turned = held
+        .replace(table, "placement = { axes = [\"-y\", \"x\"], origin = [\"0 mm\", \"4 mm\", \"0 mm\"] }");
+    write(here, &[("strip", &turned)]);
+    strip(here, "").with_code(0);
+    let report = report(&here.join("out/strip"));
+    let force = scalar(&report, "reaction_x");
+    near(
+        "force of a strip that is held with a residual stress, over stress × section",
+        0.5 * force,
+        1.0,
+        0.15,
+    );
+    let mean = scalar(&report, "prestrain_field_mean");
+    near("mean stress handed over", mean, 1e6 / 3.0, 1e-3);
+    write(here, &[("strip", &STRIP.replace("\"crystallinity\"", "\"residual_stress\""))]);
+    strip(here, "").with_code(2).tells("`material.fields[0].from.field`");
 }
 
 /// An input that is killed is resumed by `--with-inputs`, with the same bits.

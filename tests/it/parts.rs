@@ -134,10 +134,11 @@ fn a_printed_bar() {
     }
 }
 
-/// The bar with its stress.
+/// The bar with its stress and the healing of its interfaces.
 pub fn warped() -> String {
-    BAR.replace("[time]", "[mechanics]\nmaterial = \"pa12\"\nlaw = \"pa12\"\n\n[time]")
-        .replace("latent_heat = \"209 J/g\"\n", "")
+    let mechanics = "[mechanics]\nmaterial = \"pa12\"\nlaw = \"pa12\"\n\n";
+    let healing = "[healing]\nmaterial = \"pa12\"\ntime = \"2 s\"\ntemperature = \"180 degC\"\nenergy = \"60 kJ/mol\"\n\n";
+    BAR.replace("[time]", &format!("{mechanics}{healing}[time]")).replace("latent_heat = \"209 J/g\"\n", "")
 }
 
 /// A released body bears no force: the stress of each slice across it adds up to nothing, slice by slice.
@@ -158,6 +159,14 @@ fn a_released_bar_is_in_equilibrium() {
     assert!(out.join("warped.png").is_file());
     let series = vtkhdf::read(out.join("fields.vtkhdf")).unwrap();
     let last = series.len() - 1;
+    // 96 elements a layer, two interfaces between three layers
+    assert_eq!(found["work"]["interfaces"], 192);
+    let healing: Vec<f64> =
+        series.cell_data(last, "healing").unwrap().into_iter().filter(|x| x.is_finite()).collect();
+    let [least, mean] = ["least_healing", "mean_healing"].map(|name| scalar(&found, name));
+    assert_eq!(healing.len(), 288);
+    assert_eq!(healing.iter().copied().fold(1.0, f64::min), least);
+    assert!(0.0 < least && least < mean && mean < 1.0, "{least} {mean}");
     let stress = series.cell_data(last, "residual_stress_Pa").unwrap();
     let mut slices = std::collections::BTreeMap::<i64, [f64; 2]>::new();
     let (points, cells) = (series.points(last).unwrap(), series.cells().unwrap());

@@ -36,6 +36,7 @@ pub mod error;
 pub mod exact;
 mod fields;
 pub mod fit;
+pub mod healing;
 pub mod history;
 pub mod kinetics;
 mod layers;

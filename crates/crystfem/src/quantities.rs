@@ -25,6 +25,8 @@ polycore::quantities! {
     STRESS_LOST = "stress_lost", "J", "with `[mechanics]`: what relaxed, was lost with crystals that melt, or because new ones are born without stress";
     STRESS_HARDENING = "stress_hardening", "J", "with `[mechanics]`: by how much the stored energy grew because the network hardens when it cools, less what softening took";
     WORST_STRESS_BALANCE = "worst_stress_balance", "", "with `[mechanics]`: largest |work + hardening − stored − lost| of a step over the energies it moved and those stored";
+    LEAST_HEALING = "least_healing", "", "with `[healing]`: least degree of healing D_h of an interface between births";
+    MEAN_HEALING = "mean_healing", "", "with `[healing]`: its mean by area";
     MEAN = "{layer}mean_{field}", "*", "mean by volume at the end, of the part or of a layer";
     LEAST = "{layer}least_{field}", "*", "smallest value at a node";
     LARGEST = "{layer}largest_{field}", "*", "largest value at a node";

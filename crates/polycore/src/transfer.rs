@@ -164,6 +164,11 @@ impl Overlap {
         self.parts_of(index).iter().flat_map(|part| self.cells[part.cell as usize])
     }
 
+    /// Cells that have a part in a box.
+    pub fn cells_of(&self, index: usize) -> impl Iterator<Item = u32> + '_ {
+        self.parts_of(index).iter().map(|part| part.cell)
+    }
+
     /// Means over the boxes of a field over cells; `None` where the mesh does not reach.
     ///
     /// # Errors

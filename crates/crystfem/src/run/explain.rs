@@ -53,6 +53,9 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
             mechanics.strain_step
         ));
     }
+    if let Some(interfaces) = &task.interfaces {
+        lines.push(format!("builds     healing of {} interfaces", interfaces.list.len()));
+    }
     let radiates = problem.conditions.iter().any(|c| matches!(c, Condition::Radiation { .. }));
     let changes = problem.conditions.iter().any(|c| !c.breaks().is_empty())
         || problem.sources.iter().any(|source| !source.power.breaks().is_empty());
@@ -65,6 +68,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
         (!problem.sources.is_empty(), "heat sources"),
         (changes, "conditions that change over time"),
         (task.mechanics.is_some(), "stress and warpage"),
+        (task.interfaces.is_some(), "healing of interfaces"),
         (!scene.probe.is_empty(), "probes"),
         (scene.output.fields, "fields (VTKHDF)"),
         (scene.output.pictures, "pictures and the animation"),

@@ -6,6 +6,7 @@ mod draw;
 mod explain;
 mod fit;
 mod fit_part;
+mod healing;
 mod heat_flow;
 mod line;
 mod mechanics;

@@ -1,6 +1,7 @@
 //! A body in time: solved, recorded, drawn and judged.
 
 use super::celsius::{CELSIUS, TEMPERATURE};
+use super::healing::{Healed, Healer};
 use super::mechanics::{self, Follower};
 use super::probe::{self, Probe};
 use super::{Failure, animation, line, warped};
@@ -43,13 +44,14 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
         scene.check_expectations(source, &scene.quantities(&task), &[])?;
     }
     phases.start("solve");
-    let (mut simulation, frames, probes, stressed);
+    let (mut simulation, frames, probes, stressed, healed);
     if run.options.resume {
         run.begin()?;
     }
-    if let Some((written, state, rows, body)) = run.reached::<Reached>()? {
+    if let Some((written, state, rows, body, faces)) = run.reached::<Reached>()? {
         simulation = Simulation::resume(task.problem.clone(), task.settings, state)?;
-        (frames, probes, stressed) = (written, rows, body.unwrap_or_default());
+        (frames, probes) = (written, rows);
+        (stressed, healed) = (body.unwrap_or_default(), faces.unwrap_or_default());
     } else {
         simulation = Simulation::new(task.problem.clone(), task.settings)?;
         scene.refuse_too_large(source, &simulation, task.mechanics.as_ref(), task.end)?;
@@ -57,7 +59,7 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
             run.begin()?;
         }
         let fields = simulation.field_names().len();
-        (frames, stressed) = (0, mechanics::Reached::default());
+        (frames, stressed, healed) = (0, mechanics::Reached::default(), Healed::default());
         probes = scene
             .probe
             .iter()
@@ -69,7 +71,8 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
     let names = simulation.field_names();
     let follow = |spec| Follower::new(spec, &task.problem.mesh, stressed);
     let follower = task.mechanics.as_ref().map(follow).transpose()?;
-    let mut recorder = Recorder { scene, task: &task, probes, names, frames, follower };
+    let healer = task.interfaces.as_ref().map(|spec| Healer::new(spec, healed));
+    let mut recorder = Recorder { scene, task: &task, probes, names, frames, follower, healer };
     let series = recorder.solve(&mut simulation, &mut phases, run)?;
     phases.start("write");
     recorder.record(&simulation, &mut report);
@@ -105,8 +108,8 @@ pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failur
     Ok(lines)
 }
 
-/// How far a run is, as its checkpoint holds it: frames of the fields that are written, state, rows of the probes, stress.
-type Reached = (usize, State, Vec<Probe>, Option<mechanics::Reached>);
+/// How far a run is, as its checkpoint holds it: frames of the fields that are written, state, rows of the probes, stress, healing.
+type Reached = (usize, State, Vec<Probe>, Option<mechanics::Reached>, Option<Healed>);
 
 /// What is seen of a body on its way.
 struct Recorder<'a> {
@@ -119,6 +122,8 @@ struct Recorder<'a> {
     frames: usize,
     /// Stress, where the scene asks for it.
     follower: Option<Follower<'a>>,
+    /// Healing, where the scene asks for it.
+    healer: Option<Healer<'a>>,
 }
 
 impl Recorder<'_> {
@@ -142,17 +147,19 @@ impl Recorder<'_> {
             simulation.finite()?;
             probe::record(&mut self.probes, simulation, &self.names)?;
             self.follower.as_mut().map_or(Ok(()), |follower| follower.see(simulation, false))?;
+            self.healer.iter_mut().for_each(|healer| healer.see(simulation));
         }
         while self.frames <= last {
             let until = (self.frames as f64 * every).min(end);
             let (probes, names, frames) = (&mut self.probes, &self.names, self.frames);
-            let follower = &mut self.follower;
+            let (follower, healer) = (&mut self.follower, &mut self.healer);
             let mut result = Ok(());
             let mut observe = |simulation: &Simulation, step: &Record| -> ControlFlow<()> {
                 result = simulation.finite().and_then(|()| probe::record(probes, simulation, names));
                 if let (Ok(()), Some(follower)) = (&result, follower.as_mut()) {
                     result = follower.see(simulation, false);
                 }
+                healer.iter_mut().for_each(|healer| healer.see(simulation));
                 let state = simulation.state();
                 run.show(state.time / end, &|| {
                     let (time, dt, equations) = (state.time, step.dt, state.temperature.len());
@@ -160,7 +167,9 @@ impl Recorder<'_> {
                 });
                 if result.is_ok() {
                     let stressed = || follower.as_ref().map(Follower::reached);
-                    result = run.pause(|| Some((frames, state, &*probes, stressed()))).map_err(Error::from);
+                    let healed = || healer.as_ref().map(Healer::reached);
+                    let reached = || Some((frames, state, &*probes, stressed(), healed()));
+                    result = run.pause(reached).map_err(Error::from);
                 }
                 if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
@@ -201,6 +210,8 @@ impl Recorder<'_> {
             of_cells.push(("mises_Pa", 1, &mises));
             of_cells.push(("residual_stress_Pa", 6, &stresses));
         }
+        let healing = self.healer.as_ref().map(|healer| healer.field(simulation));
+        of_cells.extend(healing.iter().map(|field| ("healing", 1, field.as_slice())));
         Ok(series.step(simulation.time(), &arrays, &of_cells)?)
     }
 
@@ -234,6 +245,9 @@ impl Recorder<'_> {
         }
         if let Some(follower) = &self.follower {
             follower.record(&self.probes, report);
+        }
+        if let Some(healer) = &self.healer {
+            healer.record(report);
         }
         let nodes = 0..self.task.problem.mesh.points.len() as u32;
         let temperature: Vec<Option<f64>> =

@@ -44,6 +44,9 @@ impl PartScene {
             all.extend(stresses.map(Named::from));
             all.extend(mechanics.law.strength.is_finite().then(|| q::MISES_OVER_STRENGTH.into()));
         }
+        if task.interfaces.is_some() {
+            all.extend([q::LEAST_HEALING, q::MEAN_HEALING].map(Named::from));
+        }
         let unit = |field: &str| if field == "temperature" { "degC" } else { "" };
         let with_temperature = || std::iter::once("temperature").chain(fields.iter().copied());
         let layers = (1..=task.layers.len()).map(|layer| format!("layer-{layer}."));

@@ -85,6 +85,9 @@ pub(super) fn refuse_times(source: &Source, scene: &PartScene, end: f64) -> Resu
     Ok(())
 }
 
+/// Faces of an element, and up to three interfaces with their states and nodes.
+const HEALED: f64 = 600.0;
+
 impl PartScene {
     /// Bytes that a run up to `end` needs at most, of all that is printed.
     pub fn memory(&self, simulation: &Simulation, mechanics: Option<&Mechanics>, end: f64) -> f64 {
@@ -97,6 +100,9 @@ impl PartScene {
         }
         if self.print.is_some() {
             bytes += elements * PRINTED;
+        }
+        if self.healing.is_some() {
+            bytes += elements * HEALED;
         }
         if let Some(mechanics) = mechanics {
             let [bearing, shapes] = mechanics.counts.map(|count| count as f64);

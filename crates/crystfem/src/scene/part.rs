@@ -1,8 +1,8 @@
 //! The scene of a body in time: mesh, materials, layers, what acts on it.
 
 use super::{
-    ConvergenceSpec, CurveSpec, MaterialSpec, MechanicsSpec, MeshSpec, Program, ScheduleSpec, StudySpec,
-    check_name,
+    ConvergenceSpec, CurveSpec, HealingSpec, MaterialSpec, MechanicsSpec, MeshSpec, Program, ScheduleSpec,
+    StudySpec, check_name,
 };
 use crate::problem::Capacity;
 use crate::simulation::LinearSolver;
@@ -42,6 +42,8 @@ pub struct PartScene {
     pub source: Vec<SourceSpec>,
     /// Stress and warpage.
     pub mechanics: Option<MechanicsSpec>,
+    /// Healing of interfaces between layers and beads.
+    pub healing: Option<HealingSpec>,
     /// Times and steps.
     #[serde(default)]
     pub time: TimeSpec,

@@ -1,6 +1,7 @@
 //! From a scene to a problem of heat conduction.
 
 use super::fault::{located, located_in};
+use super::healing::Interfaces;
 use super::mechanics::Mechanics;
 use super::memory;
 use super::mesh::Built;
@@ -58,6 +59,8 @@ pub struct Task {
     pub filling: Option<Filling>,
     /// Stress, where the scene asks for it.
     pub mechanics: Option<Mechanics>,
+    /// Interfaces that heal, where the scene asks for it.
+    pub interfaces: Option<Interfaces>,
     /// What should be looked at.
     pub notes: Vec<String>,
 }
@@ -122,6 +125,8 @@ impl PartScene {
             None => Laid::default(),
         };
         let mechanics = self.mechanics(source, &mesh, &material_of, &absent)?;
+        let appearing = births.iter().map(|birth| birth.elements.as_slice());
+        let interfaces = self.interfaces(source, &mesh, &material_of, appearing)?;
         let end = self.time.end.map_or(by_itself, |end| end.si());
         memory::refuse_times(source, self, end)?;
         if let Some(last) = births.iter().map(|birth| birth.time).reduce(f64::max).filter(|last| *last >= end)
@@ -160,7 +165,19 @@ impl PartScene {
         };
         problem.check().map_err(|error| located(source, "mesh", &error))?;
         let settings = self.settings(end, problem.shortest_period());
-        Ok(Task { problem, settings, end, printed, layers, probes, lines, filling, mechanics, notes })
+        Ok(Task {
+            problem,
+            settings,
+            end,
+            printed,
+            layers,
+            probes,
+            lines,
+            filling,
+            mechanics,
+            interfaces,
+            notes,
+        })
     }
 
     /// Notes temperatures at which no part is made: numbers in °C that were written as K.

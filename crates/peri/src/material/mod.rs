@@ -105,6 +105,17 @@ pub trait Material<const D: usize>: Send + Sync {
         0.0
     }
 
+    /// The stretch λ* at which a bond is at rest; it breaks at a multiple of it.
+    fn rest(&self, bond: &Bond<D>) -> f64 {
+        let _ = bond;
+        1.0
+    }
+
+    /// The least and the greatest of [`Self::rest`].
+    fn rest_range(&self) -> [f64; 2] {
+        [1.0; 2]
+    }
+
     /// Faster passes over a body than bond by bond, where there are any.
     fn passes(&self, bonds: &dyn Bonds<D>) -> Option<Box<dyn Passes<Self, D>>> {
         let _ = bonds;

@@ -1,7 +1,7 @@
 //! Materials by plain loops over families: any [`Material`] at work, with the states of all particles.
 
 use super::{Bond, Cover, Family, LawRange, Material, Response};
-use crate::bonds::{Bonds, Overstretched};
+use crate::bonds::{Bonds, Overstretched, Property, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::{BondPotential, KernelFit, LinearBond, StretchRange};
@@ -196,6 +196,38 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
 
     fn released(&self, _bonds: &dyn Bonds<D>, _list: &[Overstretched], _most: f64) -> Option<f64> {
         None
+    }
+
+    fn least_rest(&self) -> f64 {
+        self.material.rest_range()[0]
+    }
+
+    fn overstretched(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        critical: &Property,
+    ) -> Vec<Overstretched> {
+        if self.material.rest_range() == [1.0; 2] {
+            return overstretched(bonds, displacement, critical);
+        }
+        let of = |sites: &[u32]| {
+            let mut found = Vec::new();
+            for &site in sites {
+                bonds.neighbours(site as usize, &mut |neighbour| {
+                    let bond = Bond::new(site as usize, &neighbour, displacement);
+                    let limit = self.material.rest(&bond) * critical.weaker(bond.from, bond.to);
+                    let elongation = bond.elongation();
+                    if elongation > limit * limit - 1.0 {
+                        let (index, length, weight) = (neighbour.index, bond.length, bond.weight);
+                        found.push(Overstretched { site, index, elongation, length, weight });
+                    }
+                });
+            }
+            found
+        };
+        let parts: Vec<Vec<Overstretched>> = bonds.particles().par_chunks(CHUNK).map(of).collect();
+        parts.concat()
     }
 
     fn overloaded(

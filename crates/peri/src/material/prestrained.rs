@@ -2,7 +2,7 @@
 
 use super::bonded::mixed;
 use super::{Bond, BondMaterial, Family, Material};
-use crate::bonds::{Bonds, Property};
+use crate::bonds::Bonds;
 use std::sync::Arc;
 
 /// A bond law whose bonds are at rest at the stretch λ* = |(1 + ε*)n|, with n = ξ/|ξ| and the mean ε* of the prestrains of both ends:
@@ -15,21 +15,33 @@ pub struct Prestrained<const D: usize> {
     bonded: BondMaterial<'static>,
     /// ε* site by site.
     strain: Arc<Vec<[[f64; D]; D]>>,
+    /// Bounds of λ*.
+    rest: [f64; 2],
+    /// λ/λ* beyond which tension is constant.
+    most: f64,
 }
 
 impl<const D: usize> Prestrained<D> {
     /// Of a law, and ε* of each site; symmetric, above −1.
     pub fn new(bonded: BondMaterial<'static>, strain: Vec<[[f64; D]; D]>) -> Self {
-        Self { bonded, strain: Arc::new(strain) }
+        // no eigenvalue is further from 0 than the largest sum of a row
+        let row = |row: &[f64; D]| row.iter().map(|x| x.abs()).sum::<f64>();
+        let most = strain.iter().flatten().map(row).fold(0.0, f64::max);
+        let rest = [(1.0 - most).max(0.0), 1.0 + most];
+        Self { bonded, strain: Arc::new(strain), rest, most: f64::INFINITY }
     }
 
-    /// With ε* = ε 1.
-    pub fn isotropic(bonded: BondMaterial<'static>, bonds: &dyn Bonds<D>, strain: &Property) -> Self {
-        let of = |site| {
-            let value = strain.at(site);
-            std::array::from_fn(|a| std::array::from_fn(|b| if a == b { value } else { 0.0 }))
-        };
-        Self::new(bonded, (0..bonds.sites()).map(of).collect())
+    /// With a tension that is constant beyond λ/λ* = `most`: of bonds that break before.
+    pub fn clamped(self, most: f64) -> Self {
+        Self { most, ..self }
+    }
+
+    /// λ/λ* − 1 up to the limit, and what is beyond it.
+    fn relative(&self, bond: &Bond<D>) -> [f64; 2] {
+        let rest = self.rest_strain(bond);
+        let strain = (bond.strain() - rest) / (1.0 + rest);
+        let within = strain.min(self.most - 1.0);
+        [within, strain - within]
     }
 
     /// λ* − 1 of a bond, which loses no digits at small strains.
@@ -52,8 +64,7 @@ impl<const D: usize> Material<D> for Prestrained<D> {
 
     /// 2kθ t(λ/λ*) ζ/|ζ|.
     fn force(&self, bond: &Bond<D>, (): &(), (): &()) -> [f64; D] {
-        let rest = self.rest_strain(bond);
-        let strain = (bond.strain() - rest) / (1.0 + rest);
+        let [strain, _] = self.relative(bond);
         let size = self.bonded.scale(bond) * self.bonded.law().tension_at_strain(strain);
         bond.direction().map(|x| size * x)
     }
@@ -61,8 +72,10 @@ impl<const D: usize> Material<D> for Prestrained<D> {
     /// Σ_J kθ |ξ| λ* φ(λ/λ*) w V_J.
     fn energy(&self, family: &Family<D>, (): &()) -> f64 {
         let energy = |bond: Bond<D>| {
-            let rest = 1.0 + self.rest_strain(&bond);
-            bond.weight * bond.length * rest * self.bonded.law().energy(bond.stretch() / rest)
+            let ([strain, beyond], law) = (self.relative(&bond), self.bonded.law());
+            let within = law.energy(1.0 + strain);
+            let density = if beyond > 0.0 { within + beyond * law.tension_at_strain(strain) } else { within };
+            bond.weight * bond.length * (1.0 + self.rest_strain(&bond)) * density
         };
         self.bonded.modulus() * family.sum(energy)
     }
@@ -73,8 +86,9 @@ impl<const D: usize> Material<D> for Prestrained<D> {
         let bound = |bond: Bond<D>| {
             let rest = 1.0 + self.rest_strain(&bond);
             let stretch = bond.stretch().max(f64::MIN_POSITIVE);
-            let slope = law.tension_derivative(stretch / rest).abs() / rest;
-            let tangent = slope.max(law.tension(stretch / rest).abs() / stretch);
+            let within = (stretch / rest).min(self.most);
+            let slope = law.tension_derivative(within).abs() / rest;
+            let tangent = slope.max(law.tension(within).abs() / stretch);
             2.0 * bond.weight / bond.length * tangent * (1.0 + mixed(bond.direction()))
         };
         self.bonded.modulus() * family.sum(bound)
@@ -82,5 +96,13 @@ impl<const D: usize> Material<D> for Prestrained<D> {
 
     fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
         self.bonded.micromodulus(bonds)
+    }
+
+    fn rest(&self, bond: &Bond<D>) -> f64 {
+        1.0 + self.rest_strain(bond)
+    }
+
+    fn rest_range(&self) -> [f64; 2] {
+        self.rest
     }
 }

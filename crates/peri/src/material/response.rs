@@ -1,6 +1,6 @@
 //! What solvers ask of a material at work in a body.
 
-use crate::bonds::{Bonds, Overstretched};
+use crate::bonds::{Bonds, Overstretched, Property, overstretched};
 use crate::error::Error;
 use crate::field::Field;
 use crate::potential::{BondPotential, StretchRange};
@@ -73,6 +73,21 @@ pub trait Response<const D: usize>: Send + Sync {
     /// Energy of bonds about to be severed, J, where it does not depend on others; `most` is the largest stretch of the law
     /// itself. `None`: what the body loses when they are.
     fn released(&self, bonds: &dyn Bonds<D>, list: &[Overstretched], most: f64) -> Option<f64>;
+
+    /// The least stretch λ* at which any bond is at rest; critical stretches are multiples of λ*.
+    fn least_rest(&self) -> f64 {
+        1.0
+    }
+
+    /// As [`overstretched`], with λ/λ* for λ where bonds are at rest at another stretch.
+    fn overstretched(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        critical: &Property,
+    ) -> Vec<Overstretched> {
+        overstretched(bonds, displacement, critical)
+    }
 
     /// Intact bonds of free particles that are stretched, and whose breaking would release more than `limit`, J/m³, with that
     /// energy, each from both ends, by site and index; none of materials without [`super::Material::released_energy`].

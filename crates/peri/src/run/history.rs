@@ -10,6 +10,9 @@ use polycore::output::picture::{LegendPlace, LinePlot, Series};
 use polycore::report::{Report, Trial};
 use std::path::Path;
 
+/// More curves have their legend beside the picture.
+const LEGEND: usize = 8;
+
 /// A column: name, unit, values.
 type Column = (String, String, Vec<f64>);
 
@@ -300,7 +303,7 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
     let mut plot = LinePlot::new(if scene.title.is_empty() { "Load" } else { &scene.title })
         .size(900.0, 560.0)
         .axes("displacement (mm)", "load (N)")
-        .legend(LegendPlace::TopLeft);
+        .legend(if several.len() > LEGEND { LegendPlace::Outside } else { LegendPlace::TopLeft });
     let from_rest = |values: &[f64], scale: f64| -> Vec<f64> {
         std::iter::once(0.0).chain(values.iter().map(|v| v * scale)).collect()
     };

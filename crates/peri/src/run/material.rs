@@ -141,7 +141,13 @@ impl<const D: usize> Bonded<D> {
         };
         let bonded = BondMaterial::new(law, modulus);
         let material = match &inclusions.prestrain {
-            Some(strain) => Acting::Prestrained(Prestrained::isotropic(bonded, &*body.bonds, strain)),
+            Some(strain) => {
+                let prestrained = Prestrained::new(bonded, strain.clone());
+                let breaking = criterion
+                    .as_ref()
+                    .map(|criterion: &Criterion| prestrained.clone().clamped(criterion.most()));
+                Acting::Prestrained(breaking.unwrap_or(prestrained))
+            }
             None => Acting::Bonds(bonded),
         };
         Ok(Self { body, material, criterion, followed })

@@ -323,7 +323,6 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         // forces of prestrained bonds are not those of the fitted law, from which stresses are taken
         let j_integral = |probe: &Probe| probe.track == Track::JIntegral;
         for (key, given) in [
-            ("material.critical", material.critical.is_some()),
             ("stress", scene.stress.is_some()),
             ("output.section", !scene.output.section.is_empty()),
             ("probe", scene.probe.iter().any(j_integral)),

@@ -13,7 +13,9 @@ pub struct FieldSpec {
     pub of: Parameter,
     /// The field.
     pub from: FieldSource,
-    /// Rows [value of the field, value of the parameter]; linear between them, an error outside.
+    /// Rows [value of the field, value of the parameter]; linear between them, an error outside. None of a `prestrain` from a stress tensor, which is
+    /// to be there while the body is held in its shape.
+    #[serde(default)]
     pub table: Vec<[Entry; 2]>,
     /// Where the body lies in the mesh of the field; default: as it is written.
     #[serde(default)]
@@ -32,7 +34,7 @@ pub enum Parameter {
     Prestrain,
 }
 
-/// A field over the nodes of a mesh.
+/// A field over the nodes or the cells of a mesh.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FieldSource {

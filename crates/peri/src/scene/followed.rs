@@ -1,18 +1,17 @@
 //! Parameters in the particles of a body, from fields of other scenes.
 
+use super::cells::{Mesh, Values};
 use super::field::Entry;
 use super::values::{Body, plain, positive};
 use super::{FieldSpec, Parameter, Scene};
 use crate::bonds::Property;
 use polycore::output::vtkhdf::{self, Series};
 use polycore::scene::{SceneError, Source};
-use polycore::transfer::{Cuboid, Overlap, integral};
+use polycore::transfer::{Cuboid, Overlap};
 use polycore::units::dimension::{EnergyPerAreaDimension, RatioDimension, StressDimension};
 use polycore::units::{Dimension, Quantity, Ratio, Stress, Temperature};
 use std::fmt;
 
-/// VTK's number of a hexahedron.
-const HEXAHEDRON: u8 = 12;
 /// Values this far beyond a table, over its range, are at its end: rounding.
 const AT_END: f64 = 1e-9;
 /// Less of a particle inside of the mesh is outside of it.
@@ -109,8 +108,10 @@ fn in_si<D: Dimension>(text: &str) -> Result<f64, String> {
 pub struct Followed {
     /// The parameter.
     pub parameter: Parameter,
-    /// Its values by site, SI.
+    /// Its values by site, SI; of a stress, that of the mean stress.
     pub values: Property,
+    /// The stress, Pa, site by site along the axes of the body, which is to be there while the body is held in its shape; empty of other fields.
+    pub stress: Vec<[[f64; 3]; 3]>,
     /// Mean, least and largest value of the field in the particles, SI.
     pub field: [f64; 3],
     /// Its mean over the mesh, where it exists.
@@ -125,7 +126,10 @@ impl fmt::Display for Followed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { parameter, values, field: [_, low, high], array, input, unit, .. } = self;
         let (least, greatest, name) = (values.least(), values.greatest(), parameter.name());
-        write!(f, "{name} {least:.4e} to {greatest:.4e} {}, from ", parameter.unit())?;
+        match self.stress.is_empty() {
+            true => write!(f, "{name} {least:.4e} to {greatest:.4e} {}, from ", parameter.unit())?,
+            false => write!(f, "{name} of stresses, from ")?,
+        }
         write!(f, "`{array}` of `{input}`, {low:.4} to {high:.4} {unit}")
     }
 }
@@ -153,7 +157,14 @@ impl FieldSpec {
     ) -> Result<Followed, SceneError> {
         let (array, mesh, values) = self.read(source, key)?;
         let (kind, unit) = Kind::of(&array);
-        let table = self.table(source, key, kind, &array)?;
+        let table = match values.components {
+            1 => self.table(source, key, kind, &array)?,
+            _ if self.table.is_empty() => Vec::new(),
+            _ => {
+                let allowed = "none: the strain that this stress belongs to follows from Young's modulus";
+                return Err(source.error(&format!("{key}.table"), "a table of a tensor", allowed));
+            }
+        };
         let boxes = self.boxes(source, &format!("{key}.placement"), body, &mesh.points)?;
         let refused = |at: &str, reason: String| source.refused(&format!("{key}.{at}"), reason);
         let overlap = Overlap::new(&mesh.points, &mesh.cells, &boxes)
@@ -169,22 +180,28 @@ impl FieldSpec {
                 let reason = format!("{} lies outside of the mesh of `{}`", place(index), self.from.input);
                 return Err(refused("placement", format!("{reason}; is it another mesh?")));
             }
-            if let Some(node) = overlap.nodes_of(index).find(|&node| !values[node as usize].is_finite()) {
-                let at = mesh.points[node as usize].map(|x| (1e9 * x).round() / 1e6);
-                let value = values[node as usize];
+            if let Some((at, value)) = values.missing(&mesh, &overlap, index) {
+                let at = at.map(|x| (1e9 * x).round() / 1e6);
                 let reason =
                     format!("`{array}` is {value} at {at:?} mm of the mesh, where {} lies", place(index));
                 return Err(refused("from.field", reason));
             }
         }
-        let means = overlap.from_nodes(&values).map_err(|error| refused("from.field", error.to_string()))?;
+        let fault = |error: polycore::Error| refused("from.field", error.to_string());
+        let means = values.means(&overlap).map_err(fault)?;
         let (zero, scale) = kind.scale(unit);
-        let mut field = Vec::with_capacity(means.len());
+        let mut field = Vec::with_capacity(boxes.len());
         let mut parameter = vec![0.0; bonds.sites()];
+        let mut stress = vec![[[0.0; 3]; 3]; if values.components == 6 { bonds.sites() } else { 0 }];
         let (mut sum, mut volume) = (0.0, 0.0);
-        for (index, mean) in means.into_iter().enumerate() {
-            let value = zero + scale * mean.unwrap_or(f64::NAN);
-            let Some(mapped) = interpolated(&table, value) else {
+        for index in 0..boxes.len() {
+            let at = |component: usize| zero + scale * means[component][index].unwrap_or(f64::NAN);
+            let value = values.mean_of(at);
+            let mapped = match values.components {
+                1 => interpolated(&table, value),
+                _ => Some(value),
+            };
+            let Some(mapped) = mapped else {
                 let (low, high) = (table[0].0, table[table.len() - 1].0);
                 let found = format!("`{array}` of {} {} in {}", plain(value), kind.unit(), place(index));
                 let allowed = format!("values of the table, {} to {}", plain(low), plain(high));
@@ -192,22 +209,19 @@ impl FieldSpec {
             };
             let site = bonds.particles()[index] as usize;
             parameter[site] = mapped;
+            if let Some(tensor) = stress.get_mut(site) {
+                *tensor = self.along_axes(Values::tensor(at));
+            }
             sum += bonds.volume(site) * value;
             volume += bonds.volume(site);
             field.push(value);
         }
         let extreme = |better: fn(f64, f64) -> f64| field.iter().copied().reduce(better).unwrap_or(f64::NAN);
-        let with_values: Vec<[u32; 8]> = mesh
-            .cells
-            .iter()
-            .filter(|cell| cell.iter().all(|&node| values[node as usize].is_finite()))
-            .copied()
-            .collect();
-        let [mesh_volume, mesh_sum] = integral(&mesh.points, &with_values, &values)
-            .map_err(|error| refused("from.field", error.to_string()))?;
+        let [mesh_volume, mesh_sum] = values.integral(&mesh).map_err(fault)?;
         Ok(Followed {
             parameter: self.of,
             values: Property::new(bonds, |site, _| parameter[site]),
+            stress,
             field: [sum / volume, extreme(f64::min), extreme(f64::max)],
             mesh_mean: zero + scale * mesh_sum / mesh_volume,
             unit: kind.unit(),
@@ -217,15 +231,20 @@ impl FieldSpec {
     }
 
     /// The array, its mesh and its values.
-    fn read(&self, source: &Source, key: &str) -> Result<(String, Mesh, Vec<f64>), SceneError> {
+    fn read(&self, source: &Source, key: &str) -> Result<(String, Mesh, Values), SceneError> {
         let from = &self.from;
         let folder = source.input(&format!("{key}.from.input"), &from.input)?;
         let path = source.file(folder.join(from.file.as_deref().unwrap_or("fields.vtkhdf".as_ref())));
         let refused =
             |at: &str, reason: &dyn fmt::Display| source.refused(&format!("{key}.from.{at}"), reason);
         let series = vtkhdf::read(&path).map_err(|error| refused("input", &error))?;
+        let (of_nodes, of_cells) = (series.arrays().iter(), series.cell_arrays().iter());
+        // of tensors, stresses that prestrains belong to
+        let fits = |name: &str, n: usize| {
+            n == 1 || (n == 6 && self.of == Parameter::Prestrain && Kind::of(name).0 == Kind::Stress)
+        };
         let arrays: Vec<&str> =
-            series.arrays().iter().filter(|(_, n)| *n == 1).map(|(name, _)| &**name).collect();
+            of_nodes.chain(of_cells).filter(|(name, n)| fits(name, *n)).map(|(name, _)| &**name).collect();
         let named = |array: &&&str| {
             let (_, unit) = Kind::of(array);
             **array == from.field
@@ -238,7 +257,7 @@ impl FieldSpec {
         let mesh = Mesh::new(&series).map_err(|reason| {
             refused("input", &format!("{}: {reason}; fields lie on hexahedra", path.display()))
         })?;
-        let values = series.data(step, &array).map_err(|error| refused("field", &error))?;
+        let values = Values::new(&series, step, &array).map_err(|error| refused("field", &error))?;
         Ok((array, mesh, values))
     }
 
@@ -288,6 +307,18 @@ impl FieldSpec {
             }
             _ => Ok(table),
         }
+    }
+
+    /// A tensor of the mesh along the axes of the body; those of a plane body across it are zero.
+    fn along_axes(&self, tensor: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+        let Some(axes) = &self.placement.axes else { return tensor };
+        let mut along = [[0.0; 3]; 3];
+        for (a, (from, sign)) in axes.iter().map(|axis| axis.of()).enumerate() {
+            for (b, (to, other)) in axes.iter().map(|axis| axis.of()).enumerate() {
+                along[a][b] = sign * other * tensor[from][to];
+            }
+        }
+        along
     }
 
     /// The particles as boxes in the mesh: cubes, or columns through the mesh, of their volumes.
@@ -347,27 +378,6 @@ impl FieldSpec {
             own
         };
         Ok(bonds.particles().iter().map(of).collect())
-    }
-}
-
-/// Points and hexahedra of a file.
-struct Mesh {
-    points: Vec<[f64; 3]>,
-    cells: Vec<[u32; 8]>,
-}
-
-impl Mesh {
-    fn new(series: &Series) -> Result<Self, String> {
-        let points = series.points(0).map_err(|error| error.to_string())?;
-        let cells = series.cells().map_err(|error| error.to_string())?;
-        if cells.is_empty() {
-            return Err("it has particles and no cells".to_owned());
-        }
-        if let Some(kind) = cells.types.iter().find(|&&kind| kind != HEXAHEDRON) {
-            return Err(format!("it has cells of VTK's type {kind}"));
-        }
-        let cells = cells.connectivity.chunks_exact(8).filter_map(|cell| cell.try_into().ok()).collect();
-        Ok(Self { points, cells })
     }
 }
 

@@ -4,11 +4,13 @@ use super::build::shape;
 use super::values::Body;
 use super::{Followed, Parameter, Scene, ShapeSpec, plain};
 use crate::bonds::{Bonds, Property};
+use crate::calibrate::{Space, poisson_ratio};
 use crate::critical::Critical;
 use crate::error::Error;
 use polycore::scene::{SceneError, Source};
 use polycore::units::{EnergyPerArea, Ratio};
 use serde::Deserialize;
+use std::array;
 
 /// A part of the body whose bonds are stiffer or softer; a bond across its border has the mean of both.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -29,24 +31,34 @@ fn whole() -> f64 {
     1.0
 }
 
+/// ε* = −S:σ of a body of bonds, with its Poisson ratio: held in its shape it has the stress σ.
+fn relaxed<const D: usize>(space: Space, youngs_modulus: f64, stress: &[[f64; 3]; 3]) -> [[f64; D]; D] {
+    let nu = poisson_ratio(space);
+    let trace: f64 = (0..D).map(|d| stress[d][d]).sum();
+    // a strain across the plane that is zero takes ν(1 + ν) of the sum, in its plane
+    let across = if space == Space::PlaneStrain { nu * (1.0 + nu) } else { nu };
+    let of = |a: usize, b: usize| across * if a == b { trace } else { 0.0 } - (1.0 + nu) * stress[a][b];
+    array::from_fn(|a| array::from_fn(|b| of(a, b) / youngs_modulus))
+}
+
 /// The inclusions of a scene, and the parameters that follow fields, as fields.
-pub struct Inclusions<'a> {
+pub struct Inclusions<'a, const D: usize> {
     /// Micromodulus over that of the scene's Young's modulus: the product of all that hold for a particle.
     pub micromodulus: Property,
     /// Fracture energy, J/m², where it follows a field.
     fracture_energy: Option<Property>,
-    /// ε*, where there is any.
-    pub prestrain: Option<Property>,
+    /// ε* site by site, where there is any.
+    pub prestrain: Option<Vec<[[f64; D]; D]>>,
     /// The inclusions, and their particles' sites.
     each: Vec<(&'a Inclusion, Vec<u32>)>,
 }
 
-impl<'a> Inclusions<'a> {
+impl<'a, const D: usize> Inclusions<'a, D> {
     /// Finds the particles of all inclusions; `followed` are the parameters that follow fields.
     ///
     /// # Errors
     /// A fault of an inclusion's shape, or one that contains no particle.
-    pub fn new<const D: usize>(
+    pub fn new(
         source: &Source,
         scene: &'a Scene,
         body: &Body<D>,
@@ -56,8 +68,9 @@ impl<'a> Inclusions<'a> {
         let mut each = Vec::new();
         let following =
             |parameter| followed.iter().find(|one| one.parameter == parameter).map(|one| &one.values);
+        let stressed = followed.iter().find(|one| !one.stress.is_empty());
         let modulus = following(Parameter::YoungsModulus).zip(scene.material.youngs_modulus);
-        let varies = modulus.is_some() || !scene.material.inclusions.is_empty();
+        let varies = modulus.is_some() || stressed.is_some() || !scene.material.inclusions.is_empty();
         let mut stiffness = vec![1.0; if varies { bonds.sites() } else { 0 }];
         if let Some((values, whole)) = modulus {
             bonds.particles().iter().for_each(|&site| {
@@ -66,7 +79,7 @@ impl<'a> Inclusions<'a> {
         }
         let shrinks = scene.material.is_prestrained();
         let mut prestrain = vec![0.0; if shrinks { bonds.sites() } else { 0 }];
-        if let Some(values) = following(Parameter::Prestrain) {
+        if let Some(values) = following(Parameter::Prestrain).filter(|_| stressed.is_none()) {
             bonds.particles().iter().for_each(|&site| prestrain[site as usize] = values.at(site as usize));
         }
         for (index, inclusion) in scene.material.inclusions.iter().enumerate() {
@@ -88,10 +101,18 @@ impl<'a> Inclusions<'a> {
         }
         let at = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
         let fracture_energy = following(Parameter::FractureEnergy).cloned();
-        let prestrain = shrinks.then(|| Property::new(bonds, |site, _| prestrain[site]));
-        if let Some(found) = prestrain.as_ref().map(Property::least).filter(|&least| least <= -1.0) {
+        if let Some(found) = prestrain.iter().copied().reduce(f64::min).filter(|&least| least <= -1.0) {
             return Err(source.error("material", format!("a prestrain of {}", plain(found)), "above -1"));
         }
+        let strain = |site: usize| {
+            let own: [[f64; D]; D] =
+                array::from_fn(|a| array::from_fn(|b| if a == b { prestrain[site] } else { 0.0 }));
+            let (Some(one), Some(whole)) = (stressed, scene.material.youngs_modulus) else { return own };
+            let held: [[f64; D]; D] =
+                relaxed(scene.body.space, stiffness[site] * whole.si(), &one.stress[site]);
+            array::from_fn(|a| array::from_fn(|b| own[a][b] + held[a][b]))
+        };
+        let prestrain = shrinks.then(|| (0..bonds.sites()).map(strain).collect());
         Ok(Self { micromodulus: Property::new(bonds, at), fracture_energy, prestrain, each })
     }
 
@@ -100,7 +121,7 @@ impl<'a> Inclusions<'a> {
     ///
     /// # Errors
     /// A critical stretch out of its domain.
-    pub fn critical_stretch<const D: usize>(
+    pub fn critical_stretch(
         &self,
         source: &Source,
         bonds: &dyn Bonds<D>,
@@ -138,5 +159,29 @@ impl<'a> Inclusions<'a> {
             }
         }
         Ok(Property::new(bonds, |site, _| stretch.get(site).copied().unwrap_or(rest)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ε of Hooke's law: ε_xx = σ/E and ε_yy = −νσ/E of a bar, with 1 − ν² and −ν(1 + ν) in plane strain; shear σ_xy(1 + ν)/E.
+    #[test]
+    fn strains_of_stresses() {
+        let bar = [[2.0, 0.0, 0.0], [0.0; 3], [0.0; 3]];
+        let close =
+            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-15, "{found} {expected}");
+        let sheet: [[f64; 2]; 2] = relaxed(Space::PlaneStress, 4.0, &bar);
+        close(sheet[0][0], -0.5);
+        close(sheet[1][1], 0.5 / 3.0);
+        let slab: [[f64; 2]; 2] = relaxed(Space::PlaneStrain, 4.0, &bar);
+        close(slab[0][0], -0.5 * (1.0 - 0.0625));
+        close(slab[1][1], 0.5 * 0.25 * 1.25);
+        let block: [[f64; 3]; 3] = relaxed(Space::Solid, 4.0, &bar);
+        close(block[2][2], 0.125);
+        let shear: [[f64; 3]; 3] = relaxed(Space::Solid, 4.0, &[[0.0, 2.0, 0.0], [2.0, 0.0, 0.0], [0.0; 3]]);
+        close(shear[1][0], -0.625);
+        close(shear[0][0] + shear[2][2], 0.0);
     }
 }

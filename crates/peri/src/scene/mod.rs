@@ -2,6 +2,7 @@
 
 mod boundary;
 mod build;
+mod cells;
 mod check;
 mod cloud;
 mod contact;

@@ -3,7 +3,7 @@
 use super::criterion::{Bilinear, Criterion, Policy, most};
 use super::state::{Event, State};
 use super::system::System;
-use crate::bonds::{Overstretched, Softened, fingerprint, overstretched};
+use crate::bonds::{Overstretched, Softened, fingerprint};
 use crate::potential::StretchRange;
 
 /// Softening that an equilibrium may still lack: bonds of it bear up to this part of an intact bond's force too much.
@@ -46,7 +46,9 @@ impl<const D: usize> System<'_, D> {
         let free = |site: usize| self.loads.constrained(site) == 0;
         let mut softened = None;
         let list = match &breaking.criterion {
-            Criterion::Stretch(stretch) => overstretched(&*self.bonds, &state.displacement, stretch),
+            Criterion::Stretch(stretch) => {
+                self.material.overstretched(&*self.bonds, &state.displacement, stretch)
+            }
             Criterion::Energy(limit) => {
                 let found = self.material.overloaded(&*self.bonds, &state.displacement, *limit, &free);
                 found.into_iter().map(|(bond, _)| bond).collect()
@@ -121,7 +123,12 @@ impl<const D: usize> System<'_, D> {
 
     /// Whether stretches reach the critical one.
     pub(super) fn is_overstretched(&self, observed: StretchRange) -> bool {
-        let least = self.breaking.as_ref().map(|b| b.criterion.least_stretch());
-        least.is_some_and(|least| observed.high > least * least - 1.0)
+        self.breaking_stretch().is_some_and(|least| observed.high > least * least - 1.0)
+    }
+
+    /// No bond breaks below this stretch; `None` where none breaks at all.
+    pub(super) fn breaking_stretch(&self) -> Option<f64> {
+        let breaking = self.breaking.as_ref()?;
+        Some(self.material.least_rest() * breaking.criterion.least_stretch())
     }
 }

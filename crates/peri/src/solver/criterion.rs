@@ -82,6 +82,11 @@ impl Criterion {
             Self::Energy(_) | Self::Softening(_) => f64::INFINITY,
         }
     }
+
+    /// The largest stretch at which a law is evaluated: bonds beyond it are about to break, however long they are.
+    pub fn most(&self) -> f64 {
+        1.25 * self.greatest_stretch() - 0.25
+    }
 }
 
 /// When stretches are compared with the critical one.
@@ -108,8 +113,7 @@ pub(super) fn least(breaking: Option<&Breaking>) -> f64 {
     if breaking.is_some() { CRUSHED } else { SMALLEST_STRETCH }
 }
 
-/// The largest stretch that is fitted: bonds beyond it are about to break, however long they are.
+/// The largest stretch that is fitted.
 pub(super) fn most(breaking: Option<&Breaking>) -> f64 {
-    let most = |stretch: f64| 1.25 * stretch - 0.25;
-    breaking.map_or(f64::INFINITY, |b| most(b.criterion.greatest_stretch()))
+    breaking.map_or(f64::INFINITY, |b| b.criterion.most())
 }

@@ -275,9 +275,7 @@ impl VelocityVerlet {
         let (friction, rubbing, rubs) =
             (state.friction.take(), state.rubbing.clone(), system.friction().is_some());
         system.prepare(&state.displacement);
-        let look = state
-            .motion
-            .must_look(state.fitted, system.breaking.as_ref().map(|b| b.criterion.least_stretch()));
+        let look = state.motion.must_look(state.fitted, system.breaking_stretch());
         let (mut second, observed) = force_pass(system, state, volumes, &leap, look, !look && !rubs);
         system.count_evaluation(state);
         if look {

@@ -149,3 +149,93 @@ fn a_bimetal_strip() {
     near("prestrain_bimetal_8", bimetal([60, 8]), 1.600_450_345_685_163, 2e-4);
     near("prestrain_bimetal_16", bimetal([90, 16]), 1.552_044_917_312_378, 2e-4);
 }
+
+/// σ_xx over σ₀ in the rows of the middle of a free strip with the ε* = −S:σ of a stress σ_xx = σ₀(3s² − 1)/2, s from −1 to 1 across it.
+fn handed_over([nx, ny]: [usize; 2]) -> Vec<f64> {
+    const STRESS: f64 = 1e-5;
+    let mut built = Body::<2>::solid([nx, ny], 1.0, 3.015).build();
+    let (right, top) = (nx as f64, ny as f64);
+    let loads = hold(&built.lattice, |[x, y]| match (x, y) {
+        (x, y) if x < 1.0 && y < 1.0 => Some((3, [0.0; 2])),
+        (x, y) if x > right - 1.0 && y < 1.0 => Some((2, [0.0; 2])),
+        _ => None,
+    });
+    let bonded = linear(&built.lattice as &dyn Bonds<2>);
+    let mut strain = vec![[[0.0; 2]; 2]; built.lattice.sites()];
+    // of the rows; it is 0 of a continuum
+    let mean = -0.5 / (top * top);
+    for &site in built.lattice.particles() {
+        let s = 2.0 * built.lattice.position(site as usize)[1] / top - 1.0;
+        let stress = STRESS * (0.5 * (3.0 * s * s - 1.0) - mean);
+        strain[site as usize] = [[-stress, 0.0], [0.0, stress / 3.0]];
+    }
+    let prestrained = Prestrained::new(bonded, strain);
+    let mut state = State::new(built.lattice.sites());
+    let mut system = System::new(&mut built.lattice, prestrained.clone(), &loads, &[1.0]);
+    Lbfgs { tolerance: 1e-9, ..Default::default() }
+        .solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
+        .unwrap();
+    drop(system);
+    let bonds: &dyn Bonds<2> = &built.lattice;
+    let mut body = Pointwise::new(prestrained, bonds);
+    body.prepare(bonds, &state.displacement);
+    let column = |site: &&u32| (bonds.position(**site as usize)[0] - 0.5 * right - 0.5).abs() < 0.1;
+    let row = |&site: &u32| {
+        let mut sum = 0.0;
+        body.bond_forces(bonds, &state.displacement, site as usize, |bond, density| {
+            sum += 0.5 * density[0] * bond.reference[0] * bond.volume;
+        });
+        (bonds.position(site as usize)[1], sum / STRESS)
+    };
+    let mut rows: Vec<(f64, f64)> = bonds.particles().iter().filter(column).map(row).collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    rows.into_iter().map(|(_, stress)| stress).collect()
+}
+
+/// Against a program of its own (docs/reference/print/stress_transfer.py); −0.4965 and 0.8785 of the continuum in the middle and in the outer row.
+#[test]
+fn a_stress_is_handed_over() {
+    let rows = handed_over([120, 24]);
+    for (row, expected) in [
+        (0, 0.7058976758696884),
+        (1, 0.6522549719297126),
+        (2, 0.4805729536173097),
+        (3, 0.291495047902552),
+        (6, -0.16793614551447866),
+        (12, -0.4956896579212266),
+    ] {
+        near(&format!("stress handed over, row {row}"), rows[row], expected, 1e-5);
+        assert!((rows[23 - row] - rows[row]).abs() < 1e-6, "row {row}");
+    }
+}
+
+/// A free body with a uniform ε* that is stretched beyond its rest breaks as one without: λ/λ* > λ_c, from both ends.
+#[test]
+fn prestrained_bonds_break() {
+    let built = Body::<2>::solid([8, 7], 0.1, 3.015).build();
+    let bonds: &dyn Bonds<2> = &built.lattice;
+    let critical = 1.05.into();
+    let broken = |prestrain: f64, stretch: f64| {
+        let strain = vec![[[prestrain, 0.0], [0.0, prestrain]]; bonds.sites()];
+        let body = Pointwise::new(Prestrained::new(linear(bonds), strain), bonds);
+        let moved: Vec<[f64; 2]> = built
+            .points
+            .iter()
+            .map(|x| [(stretch * (1.0 + prestrain) - 1.0) * x[0], prestrain * x[1]])
+            .collect();
+        let displacement = scatter(bonds.sites(), &built.on_lattice, &moved);
+        let found = body.overstretched(bonds, &displacement, &critical);
+        assert!(body.least_rest() <= 1.0 - prestrain.abs());
+        found.iter().map(|bond| (bond.site, bond.index)).collect::<Vec<_>>()
+    };
+    let nearly_none = 1e-13;
+    assert!(broken(nearly_none, 1.049).is_empty());
+    // along x; the others are below
+    assert_eq!(broken(nearly_none, 1.051).len(), 2 * 7 * (7 + 6 + 5));
+    for prestrain in [-0.04, -1e-9, 0.03, 0.2] {
+        assert_eq!(broken(prestrain, 1.049), [], "{prestrain}");
+        for stretch in [1.051, 1.07, 1.3] {
+            assert_eq!(broken(prestrain, stretch), broken(nearly_none, stretch), "{prestrain} {stretch}");
+        }
+    }
+}
