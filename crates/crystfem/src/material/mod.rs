@@ -5,6 +5,7 @@ mod as_published;
 mod conductor;
 mod crystallization;
 mod filled;
+mod powder;
 mod property;
 mod semicrystalline;
 
@@ -12,6 +13,7 @@ pub use as_published::{AsPublished, Sign};
 pub use conductor::Conductor;
 pub use crystallization::{Crystallization, Grown};
 pub use filled::Filled;
+pub use powder::Powder;
 pub use property::{Property, REFERENCE_TEMPERATURE, Table};
 pub use semicrystalline::{LARGEST_CHANGE, Polymer, Semicrystalline};
 

@@ -131,6 +131,32 @@ fn layers_in_sequence_bend() {
     }
 }
 
+/// The same on a substrate of 2 mm, 2 mm in all: κ = Σ 6εh(t + (i − 1)h)/(t + ih)³, towards 15 /m of infinitely many.
+#[test]
+fn layers_bend_their_substrate() {
+    for (layers, exact) in [(1, 3.75), (2, 7.256_944_444), (8, 12.447_044_67)] {
+        let height = 2e-3 / layers as f64;
+        let mesh = block([32, 1, 2 * layers], [0.064, 2e-3, 4e-3]);
+        let mut body = Body::new(&mesh, 0.0).unwrap();
+        body.born(0..32 * layers, 1);
+        for layer in layers..2 * layers {
+            body.born(32 * layer..32 * (layer + 1), 1);
+            let shrinks = |e: usize| if e / 32 == layer { -0.01 } else { 0.0 };
+            body.step(|_| hold(1e9), |e, _, _| shrinks(e), &resting(&mesh)).unwrap();
+        }
+        let beam: f64 = (1..=layers)
+            .map(|i| 0.06 * height * (2e-3 + (i as f64 - 1.0) * height) / (2e-3 + i as f64 * height).powi(3))
+            .sum();
+        near("stress_layers_on_a_substrate_beam", beam / exact, 1.0, 1e-8);
+        near(
+            &format!("stress_layers_on_a_substrate_{layers}"),
+            curvature(&mesh, &body).abs() / exact,
+            1.0,
+            1e-5,
+        );
+    }
+}
+
 /// Eight layers on a bed, ε = 0.010 + 0.004(i − ½)/8, then released: beam 0.4921875 /m, `fem.py` 0.50156.
 #[test]
 fn a_part_is_released_from_its_bed() {

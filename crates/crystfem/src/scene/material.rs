@@ -4,7 +4,9 @@ use super::either::{self, TextOrTable};
 use super::fault::{located, located_in};
 use crate::error::Error;
 use crate::kinetics::{Constants, Kinetics};
-use crate::material::{AsPublished, Conductor, Polymer, Property, Semicrystalline, Sign, ThermalMaterial};
+use crate::material::{
+    AsPublished, Conductor, Polymer, Powder, Property, Semicrystalline, Sign, ThermalMaterial,
+};
 use crate::melting::Melting;
 use polycore::scene::{SceneError, Source};
 use polycore::units::dimension::{ConductivityDimension, SpecificHeatDimension};
@@ -52,6 +54,8 @@ pub struct MaterialSpec {
     pub conductivity_factors: Option<[f64; 3]>,
     /// Specific heat c.
     pub specific_heat: PropertySpec<SpecificHeatDimension>,
+    /// Fresh material is powder, of `conductor` and `semicrystalline`.
+    pub powder: Option<PowderSpec>,
     /// Kinetics, of `semicrystalline`.
     pub kinetics: Option<KineticsSpec>,
     /// Melting, of `semicrystalline`.
@@ -66,6 +70,18 @@ pub struct MaterialSpec {
     pub sign: Option<SignSpec>,
     /// Whether K = 0 outside (T∞, T₀), of `as-published`; default no, as published.
     pub guarded: Option<bool>,
+}
+
+/// Powder of a material, see [`Powder`].
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PowderSpec {
+    /// Its conductivity over that of the solid.
+    pub conductivity: f64,
+    /// Where it begins to consolidate.
+    pub from: Temperature,
+    /// Where it is consolidated.
+    pub to: Temperature,
 }
 
 /// See [`Sign`].
@@ -163,6 +179,12 @@ pub(super) const KINETICS_KEYS: [(&str, &str); 6] = [
     ("equilibrium melting temperature, K", "equilibrium_melting"),
     ("Avrami exponent n", "avrami_exponent"),
 ];
+/// Where parameters of powder stand in their block.
+const POWDER_KEYS: [(&str, &str); 3] = [
+    ("conductivity of powder over that of the solid", "conductivity"),
+    ("temperature at which powder begins to consolidate, K", "from"),
+    ("temperature at which powder is consolidated, K", "to"),
+];
 /// Where parameters of melting stand in their block.
 const MELTING_KEYS: [(&str, &str); 3] = [
     ("sharpness of melting k_m, 1/K", "sharpness"),
@@ -178,8 +200,8 @@ impl MaterialSpec {
     pub fn build(&self, source: &Source, key: &str) -> Result<Box<dyn ThermalMaterial>, SceneError> {
         self.check_keys(source, key)?;
         Ok(match self.law {
-            Law::Conductor => Box::new(self.conductor(source, key)?),
-            Law::Semicrystalline => Box::new(self.semicrystalline(source, key)?),
+            Law::Conductor => self.powdered(source, key, self.conductor(source, key)?)?,
+            Law::Semicrystalline => self.powdered(source, key, self.semicrystalline(source, key)?)?,
             Law::AsPublished => {
                 let sign = match self.sign {
                     Some(SignSpec::Mended) => Sign::Mended,
@@ -215,6 +237,10 @@ impl MaterialSpec {
                 _ => {}
             }
         }
+        if self.powder.is_some() && self.law == Law::AsPublished {
+            let allowed = "nothing: the published subroutine has one conductivity";
+            return Err(source.error(&format!("{key}.powder"), "`powder` of `as-published`", allowed));
+        }
         for (name, given) in [("sign", self.sign.is_some()), ("guarded", self.guarded.is_some())] {
             if given && self.law != Law::AsPublished {
                 let found = format!("`{name}` of another law");
@@ -226,6 +252,20 @@ impl MaterialSpec {
             }
         }
         Ok(())
+    }
+
+    /// The material, as a powder where the block says so.
+    fn powdered<M: ThermalMaterial + 'static>(
+        &self,
+        source: &Source,
+        key: &str,
+        solid: M,
+    ) -> Result<Box<dyn ThermalMaterial>, SceneError> {
+        let Some(spec) = self.powder else { return Ok(Box::new(solid)) };
+        let powder = Powder::new(solid, spec.conductivity, [spec.from.si(), spec.to.si()]);
+        let powder =
+            powder.map_err(|error| located_in(source, &format!("{key}.powder"), &POWDER_KEYS, &error))?;
+        Ok(Box::new(powder))
     }
 
     fn conductor(&self, source: &Source, key: &str) -> Result<Conductor, SceneError> {

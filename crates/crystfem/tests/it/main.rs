@@ -15,4 +15,5 @@ mod readers;
 mod same_bits;
 mod schedules;
 mod solvers;
+mod stresses;
 mod verification;

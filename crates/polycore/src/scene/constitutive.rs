@@ -24,6 +24,8 @@ pub struct ConstitutiveSpec {
     pub bulk_modulus: Option<Stress>,
     /// In their place: a law learnt from data, a file of `mdsurrogate`, relative to the scene.
     pub learnt: Option<PathBuf>,
+    /// With `learnt`: the file lies in the results of this scene of `[inputs]`.
+    pub input: Option<String>,
 }
 
 /// A parameter in SI units, and whether it has been written as a stress.
@@ -76,7 +78,14 @@ impl ConstitutiveSpec {
     /// Another key beside it, a file that is missing, larger than the memory, or no law.
     #[cfg(feature = "surrogate")]
     pub fn learnt(&self, source: &Source, key: &str) -> Result<Option<Surrogate>, SceneError> {
-        let Some(file) = &self.learnt else { return Ok(None) };
+        let Some(file) = &self.learnt else {
+            return match &self.input {
+                Some(name) => {
+                    Err(source.error(&format!("{key}.input"), format!("`{name}`"), "only with `learnt`"))
+                }
+                None => Ok(None),
+            };
+        };
         for (other, given) in [
             ("model", self.model.is_some()),
             ("parameters", self.parameters.is_some()),
@@ -87,7 +96,11 @@ impl ConstitutiveSpec {
                 return Err(source.error(&format!("{key}.{other}"), found, "one of them"));
             }
         }
-        let (path, key) = (source.file(file), format!("{key}.learnt"));
+        let path = match &self.input {
+            Some(name) => source.file(source.input(&format!("{key}.input"), name)?.join(file)),
+            None => source.file(file),
+        };
+        let key = format!("{key}.learnt");
         // the file, its numbers, and these by rows and in panels
         let needed = 4.0 * std::fs::metadata(&path).map_or(0.0, |file| file.len() as f64);
         let available = crate::memory::available();

@@ -1,0 +1,195 @@
+//! Stress of curved bodies on distorted hexahedra: a hot spot in a plate, a ball that cools.
+
+use crystfem::mechanics::{Body, SolidifyingMaxwell, Support};
+use crystfem::mesh::Mesh;
+use evidence::{at_most, near};
+use std::collections::HashMap;
+use std::f64::consts::PI;
+
+/// Hexahedra from blocks that share sides; nodes in one place are one.
+#[derive(Default)]
+struct Blocks {
+    mesh: Mesh,
+    known: HashMap<[i64; 3], u32>,
+}
+
+impl Blocks {
+    /// A block of `count` elements, `map` from its unit cube.
+    fn add(&mut self, count: [usize; 3], map: impl Fn([f64; 3]) -> [f64; 3]) {
+        let mut node = |index: [usize; 3]| {
+            let point = map(std::array::from_fn(|d| index[d] as f64 / count[d] as f64));
+            *self.known.entry(point.map(|x| (x * 1e9).round() as i64)).or_insert_with(|| {
+                self.mesh.points.push(point);
+                self.mesh.points.len() as u32 - 1
+            })
+        };
+        for k in 0..count[2] {
+            for j in 0..count[1] {
+                for i in 0..count[0] {
+                    let corner = |[x, y, z]: [usize; 3]| [i + x, j + y, k + z];
+                    let around = [[0, 0], [1, 0], [1, 1], [0, 1]];
+                    self.mesh.hexahedra.push(std::array::from_fn(|n| {
+                        let [x, y] = around[n % 4];
+                        node(corner([x, y, n / 4]))
+                    }));
+                }
+            }
+        }
+    }
+}
+
+/// A point of [−1, 1]² or [−1, 1]³ from a cube to a ball: at `share` 1 the sides are round.
+fn rounded<const N: usize>(place: [f64; N], share: f64) -> [f64; N] {
+    let largest = place.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let norm = place.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if norm == 0.0 { place } else { place.map(|x| x * (1.0 - share + share * largest / norm)) }
+}
+
+/// One elastic step of all elements with a free strain by place, and symmetry where a coordinate is 0.
+fn heated(mesh: &Mesh, poisson: f64, strain: impl Fn([f64; 3]) -> f64) -> Body<'_> {
+    let mut body = Body::new(mesh, poisson).unwrap();
+    body.tolerance = 1e-10;
+    body.born(0..mesh.hexahedra.len(), 1);
+    let law = SolidifyingMaxwell::elastic(1.0, poisson, 0.0, f64::INFINITY);
+    let supports: Vec<Support> = (0..mesh.points.len() as u32)
+        .flat_map(|node| (0..3).map(move |d| (node, d)))
+        .filter(|&(node, d)| mesh.points[node as usize][d].abs() < 1e-12)
+        .collect();
+    let hold = |_| law.increment([300.0, 0.0], [300.0, 0.0], 0.0);
+    body.step(hold, |_, _, place| strain(place), &supports).unwrap();
+    body
+}
+
+/// The middle of an element.
+fn middle(mesh: &Mesh, element: usize) -> [f64; 3] {
+    let corners = mesh.hexahedra[element].map(|node| mesh.points[node as usize]);
+    std::array::from_fn(|d| corners.iter().map(|corner| corner[d]).sum::<f64>() / 8.0)
+}
+
+/// A quarter of a square plate of 20 mm with a hot spot of 1 mm: `n` elements along each eighth of its circle.
+fn hot_spot(n: usize) -> Mesh {
+    let mut blocks = Blocks::default();
+    let thick = 0.1 / n as f64;
+    // a core, a ring up to the circle, and one up to the square, growing outwards
+    blocks.add([n, n, 1], |[x, y, z]| {
+        let [x, y] = rounded([0.5 * x, 0.5 * y], 0.3);
+        [x, y, thick * z]
+    });
+    for turned in [false, true] {
+        let turn = |[x, y]: [f64; 2], z: f64| if turned { [y, x, thick * z] } else { [x, y, thick * z] };
+        let flip = |along: f64| if turned { 1.0 - along } else { along };
+        blocks.add([n, n, 1], |[out, along, z]| {
+            let along = flip(along);
+            let (from, to) = (rounded([0.5, 0.5 * along], 0.3), rounded([1.0, along], 1.0));
+            turn([from[0] + out * (to[0] - from[0]), from[1] + out * (to[1] - from[1])], z)
+        });
+        blocks.add([4 * n, n, 1], |[out, along, z]| {
+            let along = flip(along);
+            let (from, to) = (rounded([1.0, along], 1.0), [10.0, 10.0 * along]);
+            let share = (10.0_f64.powf(out) - 1.0) / 9.0;
+            turn([from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])], z)
+        });
+    }
+    blocks.mesh
+}
+
+/// NAFEMS T1, Eε = 100 MPa: inside −49.550398 MPa; outside 50/r² of an infinite plate, and what the square adds, 0.446005 at the circle.
+#[test]
+fn a_hot_spot_in_a_plate() {
+    let mut errors = Vec::new();
+    for n in [4, 8] {
+        let mesh = hot_spot(n);
+        let inside = |[x, y, _]: [f64; 3]| x.hypot(y) < 1.0;
+        let body = heated(&mesh, 0.3, |place| if inside(place) { 1.0 } else { 0.0 });
+        let centre = 100.0 * body.mean_stress(0)[1];
+        errors.push((centre + 49.550_398).abs());
+        near(&format!("hot_spot_centre_{n}"), centre, -49.550_398, 9.6 / (n * n) as f64);
+        let mut worst = 0.0_f64;
+        for element in 0..mesh.hexahedra.len() {
+            let [x, y, _] = middle(&mesh, element);
+            let radius = x.hypot(y);
+            if radius > 1.25 && radius < 2.0 && y < 0.3 {
+                // the hoop stress, turned from the axes
+                let [xx, yy, _, xy, ..] = body.mean_stress(element);
+                let (c, s) = (x / radius, y / radius);
+                let hoop = 100.0 * (xx * s * s + yy * c * c - 2.0 * xy * s * c);
+                worst = worst.max((hoop - (50.0 / (radius * radius) + 0.45)).abs());
+            }
+        }
+        at_most(&format!("hot_spot_outside_{n}"), worst, 16.0 / (n * n) as f64);
+    }
+    near("hot_spot_order", (errors[0] / errors[1]).log2(), 2.0, 0.1);
+}
+
+/// An eighth of a ball of radius 1: `n` elements along each edge of its core.
+fn ball(n: usize) -> Mesh {
+    let mut blocks = Blocks::default();
+    let core = |place: [f64; 3]| rounded(place.map(|x| 0.5 * x), 0.4);
+    blocks.add([n; 3], core);
+    for axis in 0..3 {
+        // cyclic, so that elements stay right-handed: outwards, then the two others
+        let place = |out: f64, a: f64, b: f64| {
+            let mut place = [0.0; 3];
+            (place[axis], place[(axis + 1) % 3], place[(axis + 2) % 3]) = (out, a, b);
+            place
+        };
+        blocks.add([n; 3], |[out, a, b]| {
+            let (from, to) = (core(place(1.0, a, b)), rounded(place(1.0, a, b), 1.0));
+            std::array::from_fn(|d| from[d] + out * (to[d] - from[d]))
+        });
+    }
+    blocks.mesh
+}
+
+/// A ball that cools from 1 to 0 on its surface, Fo = 0.1 (Carslaw and Jaeger), and its stresses (Timoshenko and Goodier, Eα = 1): σ_r =
+/// 2/(1 − ν) [I(1) − I(r)/r³], σ_θ = 1/(1 − ν) [2I(1) + I(r)/r³ − T], I = ∫Tr² dr from 0 to r; the surface moves by 3I(1).
+#[test]
+fn a_ball_cools() {
+    const POISSON: f64 = 0.4;
+    let terms = |value: &dyn Fn(f64) -> f64| -> f64 {
+        (1..40)
+            .map(|n| {
+                let k = PI * f64::from(n);
+                let sign = if n % 2 == 1 { 2.0 } else { -2.0 };
+                sign / k * (-0.1 * k * k).exp() * value(k)
+            })
+            .sum()
+    };
+    let temperature = |r: f64| terms(&|k| if r > 1e-6 { (k * r).sin() / r } else { k });
+    let heat = |r: f64| terms(&|k| (k * r).sin() / (k * k) - r * (k * r).cos() / k);
+    let mut errors = Vec::new();
+    for n in [3, 6] {
+        let mesh = ball(n);
+        let radius = |[x, y, z]: [f64; 3]| (x * x + y * y + z * z).sqrt();
+        let body = heated(&mesh, POISSON, |place| temperature(radius(place)));
+        let surface = mesh.points.iter().zip(&body.state.displacement);
+        let moved = surface
+            .filter(|(point, _)| (radius(**point) - 1.0).abs() < 1e-9)
+            .map(|(point, u)| ((0..3).map(|d| point[d] * u[d]).sum::<f64>() / (3.0 * heat(1.0)) - 1.0).abs())
+            .fold(0.0, f64::max);
+        // of the whole stress tensor, by volume
+        let (mut difference, mut whole) = (0.0, 0.0);
+        for element in 0..mesh.hexahedra.len() {
+            let place = middle(&mesh, element);
+            let r = radius(place);
+            let inner = heat(r) / r.powi(3);
+            let radial = 2.0 / (1.0 - POISSON) * (heat(1.0) - inner);
+            let hoop = (2.0 * heat(1.0) + inner - temperature(r)) / (1.0 - POISSON);
+            let found = body.mean_stress(element);
+            for (k, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)].into_iter().enumerate() {
+                let normal = place[a] * place[b] / (r * r);
+                let exact = radial * normal + hoop * (if a == b { 1.0 } else { 0.0 } - normal);
+                let twice = if a == b { 1.0 } else { 2.0 };
+                difference += twice * (found[k] - exact).powi(2);
+                whole += twice * exact * exact;
+            }
+        }
+        errors.push([moved, (difference / whole).sqrt()]);
+    }
+    for (k, name) in ["surface", "stress"].into_iter().enumerate() {
+        let order = (errors[0][k] / errors[1][k]).log2();
+        near(&format!("ball_order_{name}"), order, 2.0, 0.3);
+    }
+    at_most("ball_surface", errors[1][0], 0.015);
+    at_most("ball_stress", errors[1][1], 0.02);
+}
