@@ -28,6 +28,8 @@ const CORNERS: [[f64; 3]; 8] = [
 ];
 /// Corners this far from those of a box, over its edges, still make one.
 const ALIGNED: f64 = 1e-9;
+/// Boxes that overlap by less than this of an edge touch: rounding.
+const TOUCHING: f64 = 1e-11;
 /// Pieces of a general hexahedron along an axis, at most.
 const MOST_PIECES: f64 = 16.0;
 
@@ -298,7 +300,8 @@ fn cut(cell: &Cuboid, other: &Cuboid, number: u32) -> Option<Part> {
     let (mut volume, mut place) = (1.0, [0.0; 3]);
     for d in 0..3 {
         let (low, high) = (cell.min[d].max(other.min[d]), cell.max[d].min(other.max[d]));
-        if high <= low {
+        let edge = (cell.max[d] - cell.min[d]).min(other.max[d] - other.min[d]);
+        if high - low <= TOUCHING * edge {
             return None;
         }
         volume *= high - low;

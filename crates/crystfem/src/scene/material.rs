@@ -2,11 +2,10 @@
 
 use super::either::{self, TextOrTable};
 use super::fault::{located, located_in};
+use super::powder::PowderSpec;
 use crate::error::Error;
 use crate::kinetics::{Constants, Kinetics};
-use crate::material::{
-    AsPublished, Conductor, Polymer, Powder, Property, Semicrystalline, Sign, ThermalMaterial,
-};
+use crate::material::{AsPublished, Conductor, Polymer, Property, Semicrystalline, Sign, ThermalMaterial};
 use crate::melting::Melting;
 use polycore::scene::{SceneError, Source};
 use polycore::units::dimension::{ConductivityDimension, SpecificHeatDimension};
@@ -70,18 +69,6 @@ pub struct MaterialSpec {
     pub sign: Option<SignSpec>,
     /// Whether K = 0 outside (T∞, T₀), of `as-published`; default no, as published.
     pub guarded: Option<bool>,
-}
-
-/// Powder of a material, see [`Powder`].
-#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct PowderSpec {
-    /// Its conductivity over that of the solid.
-    pub conductivity: f64,
-    /// Where it begins to consolidate.
-    pub from: Temperature,
-    /// Where it is consolidated.
-    pub to: Temperature,
 }
 
 /// See [`Sign`].
@@ -179,12 +166,6 @@ pub(super) const KINETICS_KEYS: [(&str, &str); 6] = [
     ("equilibrium melting temperature, K", "equilibrium_melting"),
     ("Avrami exponent n", "avrami_exponent"),
 ];
-/// Where parameters of powder stand in their block.
-const POWDER_KEYS: [(&str, &str); 3] = [
-    ("conductivity of powder over that of the solid", "conductivity"),
-    ("temperature at which powder begins to consolidate, K", "from"),
-    ("temperature at which powder is consolidated, K", "to"),
-];
 /// Where parameters of melting stand in their block.
 const MELTING_KEYS: [(&str, &str); 3] = [
     ("sharpness of melting k_m, 1/K", "sharpness"),
@@ -200,8 +181,10 @@ impl MaterialSpec {
     pub fn build(&self, source: &Source, key: &str) -> Result<Box<dyn ThermalMaterial>, SceneError> {
         self.check_keys(source, key)?;
         Ok(match self.law {
-            Law::Conductor => self.powdered(source, key, self.conductor(source, key)?)?,
-            Law::Semicrystalline => self.powdered(source, key, self.semicrystalline(source, key)?)?,
+            Law::Conductor => PowderSpec::wrap(self.powder, source, key, self.conductor(source, key)?)?,
+            Law::Semicrystalline => {
+                PowderSpec::wrap(self.powder, source, key, self.semicrystalline(source, key)?)?
+            }
             Law::AsPublished => {
                 let sign = match self.sign {
                     Some(SignSpec::Mended) => Sign::Mended,
@@ -252,20 +235,6 @@ impl MaterialSpec {
             }
         }
         Ok(())
-    }
-
-    /// The material, as a powder where the block says so.
-    fn powdered<M: ThermalMaterial + 'static>(
-        &self,
-        source: &Source,
-        key: &str,
-        solid: M,
-    ) -> Result<Box<dyn ThermalMaterial>, SceneError> {
-        let Some(spec) = self.powder else { return Ok(Box::new(solid)) };
-        let powder = Powder::new(solid, spec.conductivity, [spec.from.si(), spec.to.si()]);
-        let powder =
-            powder.map_err(|error| located_in(source, &format!("{key}.powder"), &POWDER_KEYS, &error))?;
-        Ok(Box::new(powder))
     }
 
     fn conductor(&self, source: &Source, key: &str) -> Result<Conductor, SceneError> {

@@ -17,6 +17,7 @@ mod mesh;
 mod part;
 mod places;
 mod point;
+mod powder;
 mod print;
 mod problem;
 mod schedule;

@@ -57,6 +57,19 @@ fn cells_to_particles() {
     );
 }
 
+/// A box beside a cell that it touches but for rounding has no part of it.
+#[test]
+fn boxes_that_touch() {
+    let (points, cells) = brick([3, 1, 1], |[x, y, z]| [1e-4 * (0.1 + 0.2) * x, 1e-3 * y, 1e-3 * z]);
+    for (ends, expected) in
+        [([3e-5, 6e-5], vec![1]), ([2.9e-5, 6e-5], vec![0, 1]), ([5.9e-5, 6.1e-5], vec![1, 2])]
+    {
+        let one = Cuboid { min: [ends[0], 0.0, 0.0], max: [ends[1], 1e-3, 1e-3] };
+        let overlap = Overlap::new(&points, &cells, &[one]).unwrap();
+        assert_eq!(overlap.cells_of(0).collect::<Vec<_>>(), expected, "{ends:?}");
+    }
+}
+
 /// Any field over nodes keeps its integral, and a linear one its values.
 #[test]
 fn nodes_to_particles() {
