@@ -328,7 +328,12 @@ fn a_law_of_an_input() {
     let bulk = "{ model = \"neo-hookean\", parameters = { shear_modulus = \"0.4 MPa\" }, bulk_modulus = \"1.2666667 MPa\" }";
     write(here, &[("strip", &solid(bulk))]);
     strip(here, "--output out/exact").with_code(0);
-    near("force of a law that an input has learnt, over the exact one", found / force("out/exact"), 1.0, 0.05);
+    near(
+        "force of a law that an input has learnt, over the exact one",
+        found / force("out/exact"),
+        1.0,
+        0.05,
+    );
     write(here, &[("strip", &solid("{ learnt = \"law.safetensors\", input = \"prints\" }"))]);
     strip(here, "").with_code(2).tells("`material.solid.constitutive.input`");
     write(here, &[("strip", &solid(&bulk.replace("{ model", "{ input = \"print\", model")))]);

@@ -143,10 +143,10 @@ impl<const D: usize> Bonded<D> {
         let material = match &inclusions.prestrain {
             Some(strain) => {
                 let prestrained = Prestrained::new(bonded, strain.clone());
-                let breaking = criterion
-                    .as_ref()
-                    .map(|criterion: &Criterion| prestrained.clone().clamped(criterion.most()));
-                Acting::Prestrained(breaking.unwrap_or(prestrained))
+                Acting::Prestrained(match &criterion {
+                    Some(criterion) => prestrained.clamped(criterion.most()),
+                    None => prestrained,
+                })
             }
             None => Acting::Bonds(bonded),
         };

@@ -8,7 +8,7 @@ use peri::calibrate::modulus_in;
 use peri::field::Field;
 use peri::material::{BondMaterial, Material, Pointwise, Prestrained, Response};
 use peri::potential::LinearBond;
-use peri::solver::{Lbfgs, Method, State, System};
+use peri::solver::{Lbfgs, Loads, Method, State, System};
 
 /// A linear law of E = 1 Pa.
 fn linear<const D: usize>(bonds: &dyn Bonds<D>) -> BondMaterial<'static> {
@@ -107,16 +107,21 @@ fn prestrained_bonds_pass() {
     }
 }
 
+/// A strip of particles of size 1 that rests on its lower corners.
+fn resting(bonds: &dyn Bonds<2>, right: f64) -> Loads<2> {
+    hold(bonds, |[x, y]| match (x, y) {
+        (x, y) if x < 1.0 && y < 1.0 => Some((3, [0.0; 2])),
+        (x, y) if x > right - 1.0 && y < 1.0 => Some((2, [0.0; 2])),
+        _ => None,
+    })
+}
+
 /// κH/|ε*| of a strip whose upper half shrinks; 1.5 of a beam.
 fn bimetal([nx, ny]: [usize; 2]) -> f64 {
     const SHRINKAGE: f64 = -1e-5;
     let mut built = Body::<2>::solid([nx, ny], 1.0, 3.015).build();
-    let (right, top) = (nx as f64, ny as f64);
-    let loads = hold(&built.lattice, |[x, y]| match (x, y) {
-        (x, y) if x < 1.0 && y < 1.0 => Some((3, [0.0; 2])),
-        (x, y) if x > right - 1.0 && y < 1.0 => Some((2, [0.0; 2])),
-        _ => None,
-    });
+    let top = ny as f64;
+    let loads = resting(&built.lattice, nx as f64);
     let bonded = linear(&built.lattice as &dyn Bonds<2>);
     let mut strain = vec![[[0.0; 2]; 2]; built.lattice.sites()];
     for &site in built.lattice.particles() {
@@ -154,12 +159,8 @@ fn a_bimetal_strip() {
 fn handed_over([nx, ny]: [usize; 2]) -> Vec<f64> {
     const STRESS: f64 = 1e-5;
     let mut built = Body::<2>::solid([nx, ny], 1.0, 3.015).build();
-    let (right, top) = (nx as f64, ny as f64);
-    let loads = hold(&built.lattice, |[x, y]| match (x, y) {
-        (x, y) if x < 1.0 && y < 1.0 => Some((3, [0.0; 2])),
-        (x, y) if x > right - 1.0 && y < 1.0 => Some((2, [0.0; 2])),
-        _ => None,
-    });
+    let top = ny as f64;
+    let loads = resting(&built.lattice, nx as f64);
     let bonded = linear(&built.lattice as &dyn Bonds<2>);
     let mut strain = vec![[[0.0; 2]; 2]; built.lattice.sites()];
     // of the rows; it is 0 of a continuum
@@ -179,7 +180,7 @@ fn handed_over([nx, ny]: [usize; 2]) -> Vec<f64> {
     let bonds: &dyn Bonds<2> = &built.lattice;
     let mut body = Pointwise::new(prestrained, bonds);
     body.prepare(bonds, &state.displacement);
-    let column = |site: &&u32| (bonds.position(**site as usize)[0] - 0.5 * right - 0.5).abs() < 0.1;
+    let column = |site: &&u32| (bonds.position(**site as usize)[0] - 0.5 * nx as f64 - 0.5).abs() < 0.1;
     let row = |&site: &u32| {
         let mut sum = 0.0;
         body.bond_forces(bonds, &state.displacement, site as usize, |bond, density| {
