@@ -131,7 +131,7 @@ impl<const D: usize> Bonded<D> {
             }
             other => source.error("material.critical", other, "a critical stretch"),
         };
-        let criterion = match spec.critical {
+        let criterion: Option<Criterion> = match spec.critical {
             Some(critical) => {
                 let stretch = resolve(critical, 1.0).map_err(fault)?;
                 let own = |critical, stiffness| resolve(critical, stiffness);
