@@ -263,10 +263,13 @@ fn a_stress_is_handed_over() {
         let series = read(&path).unwrap();
         (series.points(0).unwrap(), series.cells().unwrap())
     };
-    let tensors: Vec<f64> = (0..cells.len()).flat_map(|_| [0.0, 1e3, 0.0, 0.0, 0.0, 0.0]).collect();
-    let mut series = MeshSeries::create(&path, points, cells).unwrap();
-    series.step(0.0, &[], &[("residual_stress_kPa", 6, &tensors)]).unwrap();
-    series.finish().unwrap();
+    let stressed = |stress: f64| {
+        let tensors: Vec<f64> = (0..cells.len()).flat_map(|_| [0.0, stress, 0.0, 0.0, 0.0, 0.0]).collect();
+        let mut series = MeshSeries::create(&path, points.clone(), cells.clone()).unwrap();
+        series.step(0.0, &[], &[("residual_stress_kPa", 6, &tensors)]).unwrap();
+        series.finish().unwrap();
+    };
+    stressed(1e3);
     let held = STRIP
         .replace("of = \"youngs-modulus\"", "of = \"prestrain\"")
         .replace("\"crystallinity\"", "\"residual_stress\"")
@@ -291,6 +294,9 @@ fn a_stress_is_handed_over() {
     );
     let mean = scalar(&report, "prestrain_field_mean");
     near("mean stress handed over", mean, 1e6 / 3.0, 1e-3);
+    // in GPa by mistake
+    stressed(1e9);
+    strip(here, "").with_code(2).tells("a prestrain of -");
     write(here, &[("strip", &STRIP.replace("\"crystallinity\"", "\"residual_stress\""))]);
     strip(here, "").with_code(2).tells("`material.fields[0].from.field`");
 }

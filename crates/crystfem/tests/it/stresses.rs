@@ -108,6 +108,7 @@ fn a_hot_spot_in_a_plate() {
         for element in 0..mesh.hexahedra.len() {
             let [x, y, _] = middle(&mesh, element);
             let radius = x.hypot(y);
+            // beside the jump, elements oscillate: 1.9 MPa at 1.11 mm with n = 8
             if radius > 1.25 && radius < 2.0 && y < 0.3 {
                 // the hoop stress, turned from the axes
                 let [xx, yy, _, xy, ..] = body.mean_stress(element);

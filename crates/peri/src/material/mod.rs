@@ -111,9 +111,9 @@ pub trait Material<const D: usize>: Send + Sync {
         1.0
     }
 
-    /// The least and the greatest of [`Self::rest`].
-    fn rest_range(&self) -> [f64; 2] {
-        [1.0; 2]
+    /// A lower bound of [`Self::rest`]; 1 where all bonds are at rest as the body was built.
+    fn least_rest(&self) -> f64 {
+        1.0
     }
 
     /// Faster passes over a body than bond by bond, where there are any.

@@ -199,7 +199,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
     }
 
     fn least_rest(&self) -> f64 {
-        self.material.rest_range()[0]
+        self.material.least_rest()
     }
 
     fn overstretched(
@@ -208,7 +208,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         displacement: &Field<D>,
         critical: &Property,
     ) -> Vec<Overstretched> {
-        if self.material.rest_range() == [1.0; 2] {
+        if self.material.least_rest() == 1.0 {
             return overstretched(bonds, displacement, critical);
         }
         let of = |sites: &[u32]| {

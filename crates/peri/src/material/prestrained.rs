@@ -15,8 +15,8 @@ pub struct Prestrained<const D: usize> {
     bonded: BondMaterial<'static>,
     /// ε* site by site.
     strain: Arc<Vec<[[f64; D]; D]>>,
-    /// Bounds of λ*.
-    rest: [f64; 2],
+    /// A lower bound of λ*; below 1 where there is any ε*.
+    least_rest: f64,
     /// λ/λ* beyond which tension is constant.
     most: f64,
 }
@@ -27,8 +27,8 @@ impl<const D: usize> Prestrained<D> {
         // no eigenvalue is further from 0 than the largest sum of a row
         let row = |row: &[f64; D]| row.iter().map(|x| x.abs()).sum::<f64>();
         let most = strain.iter().flatten().map(row).fold(0.0, f64::max);
-        let rest = [(1.0 - most).max(0.0), 1.0 + most];
-        Self { bonded, strain: Arc::new(strain), rest, most: f64::INFINITY }
+        let least_rest = (1.0 - most).max(0.0);
+        Self { bonded, strain: Arc::new(strain), least_rest, most: f64::INFINITY }
     }
 
     /// With a tension that is constant beyond λ/λ* = `most`: of bonds that break before.
@@ -102,7 +102,7 @@ impl<const D: usize> Material<D> for Prestrained<D> {
         1.0 + self.rest_strain(bond)
     }
 
-    fn rest_range(&self) -> [f64; 2] {
-        self.rest
+    fn least_rest(&self) -> f64 {
+        self.least_rest
     }
 }

@@ -140,9 +140,9 @@ impl<const D: usize> Bonded<D> {
             None => None,
         };
         let bonded = BondMaterial::new(law, modulus);
-        let material = match &inclusions.prestrain {
+        let material = match inclusions.prestrain {
             Some(strain) => {
-                let prestrained = Prestrained::new(bonded, strain.clone());
+                let prestrained = Prestrained::new(bonded, strain);
                 Acting::Prestrained(match &criterion {
                     Some(criterion) => prestrained.clamped(criterion.most()),
                     None => prestrained,

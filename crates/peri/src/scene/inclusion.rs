@@ -101,9 +101,6 @@ impl<'a, const D: usize> Inclusions<'a, D> {
         }
         let at = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
         let fracture_energy = following(Parameter::FractureEnergy).cloned();
-        if let Some(found) = prestrain.iter().copied().reduce(f64::min).filter(|&least| least <= -1.0) {
-            return Err(source.error("material", format!("a prestrain of {}", plain(found)), "above -1"));
-        }
         let strain = |site: usize| {
             let own: [[f64; D]; D] =
                 array::from_fn(|a| array::from_fn(|b| if a == b { prestrain[site] } else { 0.0 }));
@@ -112,7 +109,11 @@ impl<'a, const D: usize> Inclusions<'a, D> {
                 relaxed(scene.body.space, stiffness[site] * whole.si(), &one.stress[site]);
             array::from_fn(|a| array::from_fn(|b| own[a][b] + held[a][b]))
         };
-        let prestrain = shrinks.then(|| (0..bonds.sites()).map(strain).collect());
+        let prestrain: Option<Vec<[[f64; D]; D]>> = shrinks.then(|| (0..bonds.sites()).map(strain).collect());
+        let along = prestrain.iter().flatten().flat_map(|tensor| (0..D).map(|d| tensor[d][d]));
+        if let Some(found) = along.reduce(f64::min).filter(|&least| least <= -1.0) {
+            return Err(source.error("material", format!("a prestrain of {}", plain(found)), "above -1"));
+        }
         Ok(Self { micromodulus: Property::new(bonds, at), fracture_energy, prestrain, each })
     }
 
