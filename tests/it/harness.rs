@@ -3,6 +3,7 @@
 use crate::program::{command, finish, peri, workspace};
 use crate::scenes;
 use std::fs;
+use std::process::{Command, Stdio};
 
 const PROGRAMS: [&str; 4] = ["crystfem", "mdsurrogate", "peri", "polycore"];
 
@@ -104,4 +105,38 @@ fn a_quick_sweep_is_another_sweep() {
     assert!(whole.contains("coarse") && whole.contains("fine"), "{whole}");
     fs::write(here.join("bad.toml"), scenes::bar().to_owned() + "[sweep]\nsets = {}\n").unwrap();
     peri("check bad.toml", here).with_code(2).tells("did you mean `set`?");
+}
+
+/// Parts of a sweep at the same time, as the job script starts them, and a table of all: that of one sweep, to the byte.
+#[test]
+fn a_sweep_in_parts() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    fs::write(here.join("bar.toml"), scenes::bar()).unwrap();
+    let line = "sweep bar.toml --vary material.youngs_modulus=1MPa,2MPa,3MPa,4MPa --vary solver.steps=1,2";
+    peri(&format!("{line} -o whole"), here).with_code(0);
+    let written = peri(&format!("{line} -o it's --slurm 3"), here).with_code(0);
+    assert_eq!(written.stdout, "8 runs in 3 parts: sbatch it's/job.sh\n");
+    let merge = || peri(&format!("{line} -o it's --merge"), here);
+    merge().with_code(2).tells("found run 1 of 8");
+    let start = |part: u32| {
+        let mut job = Command::new("sh");
+        job.arg("it's/job.sh").env("SLURM_ARRAY_TASK_ID", part.to_string()).current_dir(here);
+        job.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let parts = [1, 3].map(start);
+    parts.into_iter().for_each(|part| drop(finish(part).with_code(0)));
+    merge().with_code(2).tells("found run 2 of 8");
+    assert!(!here.join("it's/sweep.csv").exists());
+    // part 2, stopped in its middle and submitted again
+    let run = here.join("it's/youngs_modulus-1MPa_steps-2/report.json");
+    finish(start(2)).with_code(0);
+    fs::remove_file(&run).unwrap();
+    finish(start(2)).with_code(0);
+    let before = fs::metadata(&run).unwrap().modified().unwrap();
+    merge().with_code(0);
+    assert_eq!(fs::metadata(&run).unwrap().modified().unwrap(), before, "nothing is computed again");
+    let table = |folder: &str| fs::read(here.join(folder).join("sweep.csv")).unwrap();
+    assert_eq!(table("it's"), table("whole"));
+    peri(&format!("{line} --shard 4/3"), here).with_code(2).tells("allowed: I/N");
 }

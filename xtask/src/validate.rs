@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
+use polycore::case::Shard;
 use polycore::scene::Source;
 
 use crate::report;
@@ -36,6 +37,10 @@ pub struct Options {
     /// Keep the results of cases that were run before and have not changed, and go on with one that was interrupted.
     #[arg(long)]
     resume: bool,
+    /// Run only part I of N of the cases, one that reads results of others in the part of those, and write no report: then
+    /// `--resume` puts together what all parts left in target/validation.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
     /// Compare with the report.json of an earlier run: what moved, and by how much.
     #[arg(long, value_name = "OLD.json")]
     baseline: Option<PathBuf>,
@@ -89,15 +94,36 @@ fn in_order(cases: Vec<Case>) -> Vec<Case> {
     }
 }
 
+/// A number of each case, counted from 0, that cases have in common that read results of each other.
+fn chains(cases: &[Case]) -> Vec<usize> {
+    let mut of: Vec<usize> = (0..cases.len()).collect();
+    for (index, case) in cases.iter().enumerate() {
+        for input in case.inputs() {
+            let Some(other) = cases.iter().position(|case| case.file == input) else { continue };
+            let [from, to] = [of[index], of[other]];
+            of.iter_mut().filter(|chain| **chain == from).for_each(|chain| *chain = to);
+        }
+    }
+    let mut known = of.clone();
+    known.sort_unstable();
+    known.dedup();
+    of.iter().map(|chain| known.partition_point(|other| other < chain)).collect()
+}
+
 /// Runs, prints, writes target/validation/{report.html, report.json}; passes if every case did.
 pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
-    let cases = find(workspace, options)?;
+    let mut cases = find(workspace, options)?;
+    if let Some(shard) = options.shard {
+        let chains = chains(&cases);
+        let mut chains = chains.iter();
+        cases.retain(|_| chains.next().is_some_and(|&chain| shard.has(chain)));
+    }
     // read before anything is run for an hour
     let map = report::Sources::read(workspace, options.baseline.as_deref())?;
     let settings = Settings {
         folder: workspace.results("validate")?,
         quick: options.quick,
-        resume: options.resume,
+        resume: options.resume || options.shard.is_some(),
         timeout: options.timeout,
     };
     let mut built = BTreeMap::new();
@@ -123,6 +149,9 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
         outcomes.push(outcome);
     }
     print(&format!("{}\n", summary::text(&outcomes)));
+    if options.shard.is_some() {
+        return Ok(outcomes.iter().all(Outcome::passed));
+    }
     let everything = options.only.is_empty() && options.case.is_empty();
     let tier = report::Tier { quick: options.quick, everything };
     for path in report::write(workspace, &map, &outcomes, tier)? {
@@ -220,6 +249,8 @@ mod tests {
             case("d", None),
             case("e", Some("e")),
         ];
+        // a → c → d, b and e
+        assert_eq!(chains(&cases), [1, 0, 1, 1, 2]);
         let names: Vec<String> = in_order(cases).into_iter().map(|case| case.name).collect();
         assert_eq!(names, ["b", "d", "c", "a", "e"]);
     }

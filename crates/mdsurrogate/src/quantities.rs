@@ -44,6 +44,7 @@ polycore::quantities! {
     PERCENTAGE_ERROR = "{model}.{set}.percentage_error", "%", "mean of |S − Ŝ|/|S|, Eq. (3.13), the error measure of the thesis; the model `zero_stress` predicts S = 0 (100 %), `noise` is the lower bound that the noise sets";
     SHARE_OUTSIDE = "{model}.{set}.share_outside_training", "", "share of rows outside the box of the training data";
     ERROR_OVER_NOISE = "{model}.{set}.error_over_noise", "", "mean square error over the variance of the noise of single rows; 1 is the minimum for any model";
+    ERROR_WITHOUT_SOFTENING = "{model}.{set}.error_without_softening", "", "mean square error of the energy alone over that with its damage variable, on held-out runs";
     SHARE_BADLY_WRONG = "{model}.{set}.share_badly_wrong", "", "share of rows with an error above a tenth of the stress and three times the noise";
     CAUGHT_BY = "{model}.{set}.caught_by_{flag}", "", "share of these rows with a flag: `any_flag`, `box`, `distance` or `spread`";
     FALSE_ALARMS = "{model}.{set}.false_alarms_of_{flag}", "", "share of the other rows with this flag";

@@ -8,7 +8,7 @@ pub use uncertainty::{FLAGS, Uncertainty};
 
 use crate::Error;
 use crate::dataset::{Dataset, Path, Row};
-use crate::surrogate::{Surrogate, Workspace};
+use crate::surrogate::{History, Prediction, Surrogate, Workspace};
 use polycore::tensor::Voigt;
 use std::time::Instant;
 
@@ -43,10 +43,23 @@ impl Errors {
 /// Those of [`Surrogate::stress`].
 pub fn errors<'a>(law: &Surrogate, rows: impl Iterator<Item = &'a Row>) -> Result<Errors, Error> {
     let mut memory = Workspace::default();
+    sum_up(rows.map(|row| Ok((row, law.stress(&row.c, &mut memory)?))))
+}
+
+/// Errors of a law along a whole run, the history of which its damage variable follows.
+///
+/// # Errors
+/// Those of [`Surrogate::stress`].
+pub fn errors_along(law: &Surrogate, run: &Path) -> Result<Errors, Error> {
+    let (mut memory, mut history) = (Workspace::default(), History::default());
+    sum_up(run.rows.iter().map(|row| Ok((row, law.follow(&row.c, false, &mut history, &mut memory)?))))
+}
+
+fn sum_up<'a>(answers: impl Iterator<Item = Result<(&'a Row, Prediction), Error>>) -> Result<Errors, Error> {
     let (mut squares, mut percentage, mut flagged) = (Voigt::zeros(), 0.0, 0);
     let (mut count, mut stressed) = (0, 0);
-    for row in rows {
-        let answer = law.stress(&row.c, &mut memory)?;
+    for answer in answers {
+        let (row, answer) = answer?;
         let [measured, predicted] = row.compared(&answer.stress);
         let error = predicted - measured;
         squares += error.component_mul(&error);

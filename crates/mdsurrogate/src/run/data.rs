@@ -2,16 +2,19 @@
 
 use super::{Failure, uniaxial};
 use crate::dataset::{
-    Dataset, Method, Noise, ReadOptions, Row, Split, Standardisation, hdf5, leak, noise, read, split,
+    Dataset, Method, Noise, Path as Path_, ReadOptions, Row, Split, Standardisation, hdf5, leak, noise, read,
+    split,
 };
 use crate::error::Error;
 use crate::kinematics::{ANGSTROM, NAMES, PeriodicBox};
 use crate::quantities as q;
 use crate::scene::{Data, Scene};
 use crate::surrogate::{Kind, Symmetry};
+use crate::train::loading;
 use polycore::report::{Named, Report};
 use polycore::scene::Source;
 use polycore::tensor::Voigt;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Reads, checks and joins the files of a scene; paths are relative to it.
@@ -125,7 +128,21 @@ impl Prepared {
                     return Err(source.error(&at("runs"), format!("`{name}`"), known.join(", ")).into());
                 }
             }
-            if self.rows_of(&self.split_of(model.split).train, &model.runs).is_empty() {
+            let split = self.split_of(model.split);
+            if model.softening.is_some() {
+                let turned = |path: &&Path_| loading(path).contains(&false);
+                if split.method == Method::Random {
+                    let allowed = "`split = \"path\"`: the history of a row is that of its run";
+                    return Err(source
+                        .error(&at("softening"), "rows of runs divided at random", allowed)
+                        .into());
+                }
+                if !self.paths_of(&split.train, &model.runs).iter().any(turned) {
+                    let allowed = "training runs that turn round (`md write --path z=6e-5,unload=0.6`)";
+                    return Err(source.error(&at("softening"), "no run that unloads", allowed).into());
+                }
+            }
+            if self.rows_of(&split.train, &model.runs).is_empty() {
                 let found = "runs without a training row";
                 return Err(source.error(&at("runs"), found, "runs that the split trains on").into());
             }
@@ -138,6 +155,14 @@ impl Prepared {
         let paths = self.set.path_of_rows();
         let of = |row: &&usize| runs.is_empty() || runs.contains(&self.set.paths[paths[**row]].id);
         self.rows(&numbers.iter().filter(of).copied().collect::<Vec<_>>())
+    }
+
+    /// The runs that rows are of, as [`Self::rows_of`].
+    pub fn paths_of(&self, numbers: &[usize], runs: &[String]) -> Vec<&Path_> {
+        let of_row = self.set.path_of_rows();
+        let used: BTreeSet<usize> = numbers.iter().map(|&row| of_row[row]).collect();
+        let named = |path: &&Path_| runs.is_empty() || runs.contains(&path.id);
+        used.into_iter().map(|path| &self.set.paths[path]).filter(named).collect()
     }
 
     /// Rows of the set by their numbers.

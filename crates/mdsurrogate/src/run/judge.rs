@@ -5,10 +5,10 @@ use super::{Failure, Prepared, draw, short};
 use crate::dataset::{Method, Row, noise};
 use crate::error::Error;
 use crate::eval::{
-    Errors, FLAGS, Physics, Uncertainty, agreement, errors, seconds_of_a_stress, within_rates,
+    Errors, FLAGS, Physics, Uncertainty, agreement, errors, errors_along, seconds_of_a_stress, within_rates,
 };
 use crate::quantities as q;
-use crate::surrogate::{Surrogate, Workspace};
+use crate::surrogate::{History, Surrogate, Workspace};
 use polycore::output::csv;
 use polycore::report::Report;
 use std::path::Path;
@@ -85,8 +85,12 @@ pub fn judge_laws(
             table.extend(by_mode(report, name, law, runs, data)?);
         }
         for run in data.heldout.iter().flat_map(|set| &set.paths) {
-            let found = errors(law, run.rows.iter())?;
+            let found = errors_along(law, run)?;
             let set = format!("heldout.{}", run.id);
+            if law.header().softening.is_some() {
+                let ratio = errors(law, run.rows.iter())?.mean_square() / found.mean_square();
+                report.value(q::ERROR_WITHOUT_SOFTENING.of(&[name, &set]), ratio);
+            }
             record(report, name, &set, &found, floor);
             uncertain(report, name, &set, law, &Uncertainty::of(law, run.rows.iter(), chance)?);
         }
@@ -271,8 +275,10 @@ fn look_at_heldout<'a>(laws: &[Named], data: &'a Prepared) -> Result<Vec<Heldout
     for run in data.heldout.iter().flat_map(|set| &set.paths) {
         let mut predicted = Vec::new();
         for Named { law, .. } in laws {
-            let stress = |row: &Row, memory: &mut _| {
-                law.stress(&row.c, memory).map(|answer| row.compared(&answer.stress)[1].into())
+            let mut history = History::default();
+            let mut stress = |row: &Row, memory: &mut _| {
+                law.follow(&row.c, false, &mut history, memory)
+                    .map(|answer| row.compared(&answer.stress)[1].into())
             };
             let rows = run.rows.iter().map(|row| stress(row, &mut memory));
             predicted.push(rows.collect::<Result<Vec<[f64; 6]>, polycore::constitutive::Error>>()?);

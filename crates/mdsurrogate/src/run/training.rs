@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::quantities as q;
 use crate::scene::{ModelSpec, Scene};
 use crate::surrogate::{Header, Surrogate};
-use crate::train::{Settings, State, Training, ensemble};
+use crate::train::{Settings, State, Training, ensemble, loading, soften};
 use polycore::case::Run;
 use polycore::output::csv;
 use polycore::report::Report;
@@ -63,7 +63,12 @@ pub fn train(
     let mut trained = Vec::new();
     for model in models {
         let split = data.split_of(model.split);
-        let rows = data.rows_of(&split.train, &model.runs);
+        let mut numbers = split.train.clone();
+        if model.softening.is_some() {
+            let loading: Vec<bool> = data.set.paths.iter().flat_map(loading).collect();
+            numbers.retain(|&row| loading[row]);
+        }
+        let rows = data.rows_of(&numbers, &model.runs);
         let validation = data.rows_of(&split.validation, &model.runs);
         let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
         let mut header = crate::fitted::header(
@@ -103,7 +108,11 @@ pub fn train(
             }
         }
         let states = queue.progress.states[first..queue.done].to_vec();
-        let law = write(&model.title(), &header, &states, &strains, output)?;
+        let mut law = write(&model.title(), &header, &states, &strains, output)?;
+        if let Some(units) = model.softening {
+            law = soften(law, &data.paths_of(&split.train, &model.runs), units)?;
+            law.write(output.join(format!("{}.safetensors", model.title())))?;
+        }
         let (name, runs, split) = (model.title(), model.runs.clone(), model.split);
         trained.push(Trained { name, runs, law, states, split });
     }

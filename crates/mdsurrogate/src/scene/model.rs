@@ -4,7 +4,7 @@ use super::memory::{MOST_PARAMETERS, parameters};
 use crate::dataset::Method;
 use crate::network::{Activation, Architecture};
 use crate::surrogate::{Header, Kind, Surrogate, Symmetry};
-use crate::train::{Loss, Schedule, Settings};
+use crate::train::{Loss, MOST_UNITS, Schedule, Settings};
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
 use std::collections::HashSet;
@@ -36,6 +36,9 @@ pub struct ModelSpec {
     /// stiff (rubber asks for √I₂).
     #[serde(default)]
     pub norms: bool,
+    /// Units of a damage variable of an energy, by which runs that turn round unload below the curve of loading; their rows of
+    /// unloading are for it alone. Default: none.
+    pub softening: Option<usize>,
     /// Names of the training runs that it learns from; default: all of them. The others are then held out of it.
     #[serde(default)]
     pub runs: Vec<String>,
@@ -209,11 +212,15 @@ pub fn check_models(source: &Source, models: &[ModelSpec], general: &TrainingSpe
             ("axes", model.axes.is_some()),
             ("polyconvex", model.polyconvex),
             ("norms", model.norms),
+            ("softening", model.softening.is_some()),
         ] {
             if written && !energy {
                 let found = format!("`{key}` of an ann, which has none");
                 return Err(source.error(&at(key), found, "`kind = \"energy\"`"));
             }
+        }
+        if let Some(units) = model.softening.filter(|units| !(1..=MOST_UNITS).contains(units)) {
+            return Err(source.error(&at("softening"), units, format!("1 to {MOST_UNITS} units")));
         }
         if energy && model.network.is_some() {
             let found = "a network of Table 3.4, which returns a stress";

@@ -38,11 +38,13 @@ mod adam;
 mod dataset;
 mod model;
 mod parameters;
+mod softening;
 mod state;
 
 #[cfg(test)]
 mod tests;
 
+pub use softening::{MOST_UNITS, loading, soften};
 pub use state::{Ending, Epoch, State};
 
 use crate::Error;

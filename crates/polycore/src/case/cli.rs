@@ -4,7 +4,7 @@ use super::inputs::{InputArguments, attach, describe};
 use super::terminal::{
     self, Progress, Threads, default_output, exit, interrupted, seconds, with_negative_numbers,
 };
-use super::{Case, Options, Sample, Search, SweepOptions, Vary};
+use super::{Case, Options, Part, Sample, Search, Shard, SweepOptions, Vary};
 use crate::checkpoint::Header;
 use crate::scene::{Failure, Source};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -42,37 +42,7 @@ enum Command<V: Subcommand> {
         inputs: InputArguments,
     },
     /// Run a scene for every combination of values of some keys, in parallel; finished runs are kept.
-    Sweep {
-        /// The scene (TOML).
-        scene: PathBuf,
-        /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid, and keys joined with
-        /// `;` change together.
-        #[arg(long, value_name = "KEY=VALUE,…", required_unless_present_any = ["search", "sample"])]
-        vary: Vec<Vary>,
-        /// A table of the scene and a CSV file with draws of its keys, such as a fit writes, e.g.
-        /// materials.pa12.kinetics=out/fit/nakamura_posterior.csv: gives the band of every value; may be repeated.
-        #[arg(long, value_name = "KEY=FILE", conflicts_with = "search")]
-        sample: Vec<Sample>,
-        /// Draws of the samples to run; default: 20, or all of a shorter file.
-        #[arg(long, requires = "sample")]
-        count: Option<usize>,
-        /// Find the least value of a key that satisfies all expectations instead, e.g. print.layer_time=5s..40s.
-        #[arg(long, value_name = "KEY=LOW..HIGH", conflicts_with = "vary")]
-        search: Option<Search>,
-        /// A further value to show for each run, e.g. layer-*.mean_crystallinity; may be repeated.
-        #[arg(long, value_name = "NAME")]
-        column: Vec<String>,
-        /// Directory for results; default: out/NAME-sweep.
-        #[arg(long, short)]
-        output: Option<PathBuf>,
-        /// Leave out what the scene marks `quick = false`.
-        #[arg(long)]
-        quick: bool,
-        #[command(flatten)]
-        checkpoints: Checkpoints,
-        #[command(flatten)]
-        inputs: InputArguments,
-    },
+    Sweep(Box<SweepArguments>),
     #[command(flatten)]
     Own(V),
     /// Print the JSON Schema of scenes for editors.
@@ -103,6 +73,48 @@ pub struct RunArguments {
     /// First run the scenes of `[inputs]` whose results are missing or stale.
     #[arg(long)]
     with_inputs: bool,
+    #[command(flatten)]
+    inputs: InputArguments,
+}
+
+#[derive(clap::Args)]
+struct SweepArguments {
+    /// The scene (TOML).
+    scene: PathBuf,
+    /// A key of the scene and its values, e.g. print.layer_time=10s,20s,40s; several make a grid, and keys joined with
+    /// `;` change together.
+    #[arg(long, value_name = "KEY=VALUE,…", required_unless_present_any = ["search", "sample"])]
+    vary: Vec<Vary>,
+    /// A table of the scene and a CSV file with draws of its keys, such as a fit writes, e.g.
+    /// materials.pa12.kinetics=out/fit/nakamura_posterior.csv: gives the band of every value; may be repeated.
+    #[arg(long, value_name = "KEY=FILE", conflicts_with = "search")]
+    sample: Vec<Sample>,
+    /// Draws of the samples to run; default: 20, or all of a shorter file.
+    #[arg(long, requires = "sample")]
+    count: Option<usize>,
+    /// Find the least value of a key that satisfies all expectations instead, e.g. print.layer_time=5s..40s.
+    #[arg(long, value_name = "KEY=LOW..HIGH", conflicts_with_all = ["vary", "shard", "merge", "slurm"])]
+    search: Option<Search>,
+    /// Compute only part I of N, every N-th run, into the folder that all parts share, and write no table.
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["merge", "slurm"])]
+    shard: Option<Shard>,
+    /// Write the table of a sweep whose parts are all finished; compute nothing.
+    #[arg(long, conflicts_with = "slurm")]
+    merge: bool,
+    /// Write job.sh, a SLURM job array of N parts, into the folder of results; compute nothing.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    slurm: Option<u16>,
+    /// A further value to show for each run, e.g. layer-*.mean_crystallinity; may be repeated.
+    #[arg(long, value_name = "NAME")]
+    column: Vec<String>,
+    /// Directory for results; default: out/NAME-sweep.
+    #[arg(long, short)]
+    output: Option<PathBuf>,
+    /// Leave out what the scene marks `quick = false`.
+    #[arg(long)]
+    quick: bool,
+    #[command(flatten)]
+    checkpoints: Checkpoints,
     #[command(flatten)]
     inputs: InputArguments,
 }
@@ -144,31 +156,7 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
             .and_then(|source| solve::<C>(&source, &arguments)),
         Command::Resume { output, checkpoints } => resume::<C>(&output, checkpoints.every()),
         Command::Check { scene, quick, inputs } => check::<C>(&scene, quick, &inputs),
-        Command::Sweep {
-            scene,
-            mut vary,
-            sample,
-            count,
-            search,
-            column,
-            output,
-            quick,
-            checkpoints,
-            inputs,
-        } => {
-            let output = output.unwrap_or_else(|| {
-                let mut name = default_output(&scene).into_os_string();
-                name.push("-sweep");
-                name.into()
-            });
-            let source = Source::read(&scene).map_err(Failure::from);
-            let source = source.and_then(|source| attach::<C>(source, &output, quick, &inputs, false));
-            source.and_then(|source| {
-                vary.extend(super::drawn(&sample, count)?);
-                let every = checkpoints.every();
-                sweep::<C>(&source, &vary, search.as_ref(), &column, &output, quick, every)
-            })
-        }
+        Command::Sweep(arguments) => sweep::<C>(*arguments),
         Command::Own(command) => own(command),
         Command::Schema => {
             crate::say!("{:#}", C::schema());
@@ -251,27 +239,53 @@ fn explain_all<C: Case>(
     Ok(())
 }
 
-fn sweep<C: Case>(
-    source: &Source,
-    vary: &[Vary],
-    search: Option<&Search>,
-    columns: &[String],
-    output: &Path,
-    quick: bool,
-    checkpoint_every: Duration,
-) -> Result<bool, Failure<C::Error>> {
+fn sweep<C: Case>(arguments: SweepArguments) -> Result<bool, Failure<C::Error>> {
+    let SweepArguments { scene, mut vary, sample, count, search, shard, merge, slurm, column, .. } =
+        arguments;
+    let output = &arguments.output.unwrap_or_else(|| {
+        let mut name = default_output(&scene).into_os_string();
+        name.push("-sweep");
+        name.into()
+    });
+    let (quick, checkpoint_every) = (arguments.quick, arguments.checkpoints.every());
+    let source = &attach::<C>(Source::read(&scene)?, output, quick, &arguments.inputs, false)?;
+    vary.extend(super::drawn(&sample, count)?);
+    let part = match shard {
+        Some(shard) => Part::Shard(shard),
+        None if merge => Part::Merge,
+        None => Part::Whole,
+    };
     let mut bar = Progress::start();
     let mut progress = |done: usize, all: usize, last: &str| {
         bar.show(done as f64 / all as f64, || format!("{done} of {all} runs are done, last {last}"));
     };
-    let interrupted = interrupted();
+    let (columns, interrupted) = (&column, interrupted());
     let mut options =
-        SweepOptions { output, columns, quick, checkpoint_every, interrupted, progress: &mut progress };
+        SweepOptions { output, columns, quick, part, checkpoint_every, interrupted, progress: &mut progress };
+    if let Some(parts) = slurm {
+        crate::say!("{}", super::job::<C>(source, &vary, &options, &without_slurm(), parts.into())?);
+        return Ok(true);
+    }
     let finished = match search {
-        Some(search) => super::search::<C>(source, search, &mut options)?,
-        None => super::sweep::<C>(source, vary, &mut options)?,
+        Some(search) => super::search::<C>(source, &search, &mut options)?,
+        None => super::sweep::<C>(source, &vary, &mut options)?,
     };
     bar.finish();
     terminal::print(format_args!("{}results in {}\n", finished.text, output.display()));
     Ok(finished.report.passed())
+}
+
+/// The command line of this process without `--slurm N` and `--threads N`, which its jobs do not take over.
+fn without_slurm() -> Vec<String> {
+    let program = std::env::current_exe().map(|path| path.display().to_string());
+    let mut words = vec![program.unwrap_or_else(|_| "sweep".into())];
+    let mut arguments = std::env::args().skip(1);
+    while let Some(word) = arguments.next() {
+        if ["--slurm", "--threads"].contains(&word.as_str()) {
+            arguments.next();
+        } else if !word.starts_with("--slurm=") && !word.starts_with("--threads=") {
+            words.push(word);
+        }
+    }
+    words
 }

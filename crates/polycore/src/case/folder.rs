@@ -44,9 +44,20 @@ pub struct RunLock {
 /// # Errors
 /// [`Error::OutputDirectory`] (exit code 2) where another run holds it.
 pub fn lock_run(directory: impl AsRef<Path>) -> Result<RunLock, Error> {
-    let directory = directory.as_ref();
+    locked(directory.as_ref(), File::try_lock)
+}
+
+/// Keeps runs that need the whole directory ([`lock_run`]) out, and lets in others that share it.
+///
+/// # Errors
+/// As [`lock_run`].
+pub fn share_run(directory: impl AsRef<Path>) -> Result<RunLock, Error> {
+    locked(directory.as_ref(), File::try_lock_shared)
+}
+
+fn locked(directory: &Path, lock: fn(&File) -> Result<(), fs::TryLockError>) -> Result<RunLock, Error> {
     let handle = File::open(directory).ok();
-    match handle.as_ref().map(File::try_lock) {
+    match handle.as_ref().map(lock) {
         Some(Err(fs::TryLockError::WouldBlock)) => Err(Error::OutputDirectory {
             path: directory.to_path_buf(),
             reason: "another run is writing into it".into(),

@@ -11,11 +11,13 @@ mod sweep;
 pub mod terminal;
 
 pub use cli::{RunArguments, main, solve};
-pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run};
+pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run, share_run};
 pub use inputs::{Input, InputState, input_state, inputs};
 use rows::fits;
 pub use rows::{Row, Rows, STATISTICS};
-pub use sweep::{OF_SAMPLES, OF_SWEEPS, Sample, Search, SweepOptions, Vary, drawn, search, sweep};
+pub use sweep::{
+    OF_SAMPLES, OF_SWEEPS, Part, Sample, Search, Shard, SweepOptions, Vary, drawn, job, search, sweep,
+};
 
 use crate::Error;
 use crate::checkpoint::{self, Header, Magic};

@@ -31,6 +31,11 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// Whether every run came to its end.
+    pub fn passed(&self) -> bool {
+        self.rows.iter().all(|row| row.outcome.is_ok())
+    }
+
     /// Fields whose statistics some run tells, the temperature first.
     pub fn fields(&self) -> Vec<String> {
         let mut fields: Vec<String> = self

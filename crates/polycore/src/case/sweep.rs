@@ -1,11 +1,10 @@
 //! Many runs of one scene over a grid of values: in parallel, one thread each; finished ones are kept.
 
 use super::rows::{Row, Rows};
-use super::{Case, Fault, Finished, Options};
+use super::{Case, Fault, Finished, Options, Program};
 use crate::Error;
-use crate::checkpoint::Header;
-use crate::report::{Phases, Provenance, Report};
-use crate::scene::{Failure, SWEEP, SceneError, Source};
+use crate::report::{Phases, Report};
+use crate::scene::{Failure, Source};
 use rayon::prelude::*;
 use std::path::Path;
 use std::str::FromStr;
@@ -13,8 +12,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+mod one;
 mod sample;
 mod search;
+mod shard;
 mod table;
 
 crate::quantities! {
@@ -24,8 +25,10 @@ crate::quantities! {
     LEAST_VALUE = "least_value", "*", "least value that a search found to meet all expectations";
 }
 
+use one::{Run, named, quoted};
 pub use sample::{OF_SAMPLES, Sample, drawn};
 pub use search::{Search, search};
+pub use shard::{Part, Shard, job};
 use table::{draw, together};
 
 /// The table of a sweep, in its folder.
@@ -115,19 +118,14 @@ pub struct SweepOptions<'a> {
     pub columns: &'a [String],
     /// Leave out what is marked `quick = false`.
     pub quick: bool,
+    /// What of the sweep is computed.
+    pub part: Part,
     /// Time between checkpoints of each run.
     pub checkpoint_every: Duration,
     /// Whether the user asked to stop.
     pub interrupted: &'a (dyn Fn() -> bool + Sync),
     /// Sees how many of how many runs are done, and the name of the last.
     pub progress: &'a mut (dyn FnMut(usize, usize, &str) + Send),
-}
-
-/// One run: its name, its values, its scene with the table that sets them.
-struct Run {
-    name: String,
-    values: Vec<String>,
-    source: Source,
 }
 
 /// Runs a scene for every combination of values; those that an earlier sweep into the same folder has finished are kept.
@@ -151,6 +149,28 @@ fn rows<C: Case>(
     options: &mut SweepOptions,
 ) -> Result<(Rows, String, Report), Failure<C::Error>> {
     let mut runs = runs::<C>(source, vary, options.quick)?;
+    if let Part::Shard(shard) = options.part {
+        let mut numbers = 0..runs.len();
+        runs.retain(|_| numbers.next().is_some_and(|number| shard.has(number)));
+        crate::output::prepare_directory(options.output)?;
+        let _lock = crate::case::share_run(options.output)?;
+        let rows = rows_of(&C::PROGRAM, &runs, solve::<C>(&runs, options)?, vary, options);
+        let mut report = together(&C::PROGRAM, source, vary, &rows);
+        report.passed &= rows.passed();
+        return Ok((rows, String::new(), report));
+    }
+    if options.part == Part::Merge
+        && let Some((number, run)) = (1..).zip(&runs).find(|(_, run)| run.finished(options.output).is_none())
+    {
+        let reason = format!(
+            "found run {number} of {}, {}, unfinished or of another scene; allowed: finished runs, of `--shard 1/N` to \
+             `--shard N/N` into {}",
+            runs.len(),
+            run.name,
+            options.output.display()
+        );
+        return Err(Error::Option { option: "--merge".into(), reason }.into());
+    }
     let former = former(vary, options.output)?;
     crate::output::prepare_directory(options.output)?;
     let _lock = crate::case::lock_run(options.output)?;
@@ -176,29 +196,33 @@ fn rows<C: Case>(
     phases.start("solve");
     let outcomes = solve::<C>(&runs, options)?;
     phases.start("write");
-    let rows = Rows {
-        settings: vary.iter().map(|vary| vary.key.clone()).collect(),
-        columns: C::PROGRAM
-            .columns
-            .iter()
-            .map(|&name| name.to_owned())
-            .chain(options.columns.to_vec())
-            .collect(),
-        rows: runs
-            .iter()
-            .zip(outcomes)
-            .map(|(run, outcome)| Row { name: run.name.clone(), settings: run.values.clone(), outcome })
-            .collect(),
-    };
+    let rows = rows_of(&C::PROGRAM, &runs, outcomes, vary, options);
     rows.write(&options.output.join(TABLE))?;
     draw(vary, &rows, options.output)?;
     let mut report = together(&C::PROGRAM, source, vary, &rows);
     let bands = sample::bands(vary, &rows, options.output, &mut report)?;
     phases.stop();
     report.phases(&phases).threads(rayon::current_num_threads());
-    report.passed &= rows.rows.iter().all(|row| row.outcome.is_ok());
+    report.passed &= rows.passed();
     report.write(options.output)?;
     Ok((rows, bands, report))
+}
+
+fn rows_of(
+    program: &Program,
+    runs: &[Run],
+    outcomes: Vec<Result<Report, String>>,
+    vary: &[Vary],
+    options: &SweepOptions,
+) -> Rows {
+    let own = program.columns.iter().map(|&name| name.to_owned());
+    let row =
+        |(run, outcome): (&Run, _)| Row { name: run.name.clone(), settings: run.values.clone(), outcome };
+    Rows {
+        settings: vary.iter().map(|vary| vary.key.clone()).collect(),
+        columns: own.chain(options.columns.to_vec()).collect(),
+        rows: runs.iter().zip(outcomes).map(row).collect(),
+    }
 }
 
 /// Values of the runs that the table of an earlier sweep has; one over other keys would be lost.
@@ -270,123 +294,6 @@ fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>
     }
 }
 
-impl Run {
-    fn new<C: Case>(source: &Source, vary: &[Vary], name: String, values: Vec<String>, quick: bool) -> Self {
-        let keys: Vec<String> = vary.iter().flat_map(Vary::keys).collect();
-        let each = keys.iter().zip(values.iter().flat_map(|value| divided(value, ';')));
-        let mut set: Vec<String> =
-            each.map(|(key, value)| format!("{} = {}", quoted(key), literal(&value))).collect();
-        for key in C::bulky(source) {
-            if !keys.iter().any(|other| other == key) {
-                set.push(format!("{} = false", quoted(key)));
-            }
-        }
-        // a quick run is another run: what it finished is not taken for a whole one
-        let quick = if quick { "quick = true\n" } else { "" };
-        let (text, set) = (source.text.trim_end(), set.join(", "));
-        let text = format!("{text}\n\n[{SWEEP}]\n{quick}set = {{ {set} }}\n");
-        Self { name, values, source: source.with_text(text) }
-    }
-
-    /// Its report, where it is finished in the folder of a sweep.
-    fn finished(&self, sweep: &Path) -> Option<Report> {
-        let report = Report::read(sweep.join(&self.name).join(crate::report::FILE_NAME)).ok()?;
-        let Provenance { scene, stamp, .. } = &report.provenance;
-        let same = scene.starts_with(self.source.text.trim_end());
-        let holds = stamp.as_ref().is_none_or(|stamp| stamp.changed(&self.source.path).is_none());
-        (same && holds).then_some(report)
-    }
-
-    /// Kept where it is finished, gone on with where it is begun.
-    fn solve<C: Case>(&self, sweep: &Path, options: Options) -> Result<Report, Failure<C::Error>> {
-        if let Some(report) = self.finished(sweep) {
-            return Ok(report);
-        }
-        let begun = |header: Header| header.scene == self.source.text && header.check(options.output).is_ok();
-        let resume = Header::read(options.output, C::PROGRAM.magic).is_ok_and(begun);
-        Ok(super::run::<C>(&self.source, Options { resume, ..options })?.report)
-    }
-
-    /// A fault of a scene that nobody wrote, as one of the options that made it: of that at whose key it is, else of all.
-    fn of_options(&self, scene: &Source, vary: &[Vary], fault: &SceneError) -> Error {
-        let set = format!("{SWEEP}.set.");
-        let key = fault.key().unwrap_or_default().trim_start_matches(set.as_str());
-        let at_key = |vary: &&Vary| {
-            let within = |rest: &str| rest.is_empty() || rest.starts_with(['.', '[']);
-            vary.keys().iter().any(|own| key.strip_prefix(own.as_str()).is_some_and(within))
-        };
-        let named: Vec<&Vary> = vary.iter().filter(at_key).collect();
-        let options = vary.iter().zip(&self.values).filter(|(v, _)| named.is_empty() || named.contains(v));
-        let option: Vec<String> =
-            options.map(|(vary, value)| format!("--vary {}={value}", vary.key)).collect();
-        let mut reason = fault.message().replace(&set, "");
-        // of a key that the scene has elsewhere
-        if let Some((before, _)) = reason.split_once(&format!(" in `{SWEEP}.set`"))
-            && let Some(name) = before.split('`').nth(1)
-            && let Ok(value) = scene.parse::<serde_json::Value>()
-        {
-            let mut paths = Vec::new();
-            paths_of(&value, name, "", &mut paths);
-            reason = format!("{before}: a key is a path from the top of the scene");
-            if let Some(path) = paths.first() {
-                reason += &format!("; did you mean `{path}`?");
-            }
-        }
-        let reason = match named[..] {
-            [vary] => reason.trim_start_matches(&format!("`{}`: ", vary.key)).to_owned(),
-            _ => reason,
-        };
-        Error::Option { option: option.join(" "), reason }
-    }
-}
-
-/// Paths of the keys of a scene that have a name, blocks of studies left out.
-fn paths_of(value: &serde_json::Value, name: &str, above: &str, paths: &mut Vec<String>) {
-    match value {
-        serde_json::Value::Object(table) => {
-            for (key, value) in table.iter().filter(|(key, _)| !(above.is_empty() && *key == "study")) {
-                let path = if above.is_empty() { key.clone() } else { format!("{above}.{key}") };
-                if key == name {
-                    paths.push(path.clone());
-                }
-                paths_of(value, name, &path, paths);
-            }
-        }
-        serde_json::Value::Array(list) => {
-            for (index, value) in list.iter().enumerate() {
-                paths_of(value, name, &format!("{above}[{index}]"), paths);
-            }
-        }
-        _ => {}
-    }
-}
-
-/// `print.layer_time`, `10 s` → `_layer_time-10s`.
-fn named(key: &str, value: &str) -> String {
-    let key = key.rsplit('.').next().unwrap_or(key);
-    let plain = |text: &str| -> String {
-        let kept = text.chars().filter(|c| !c.is_whitespace());
-        kept.map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect()
-    };
-    format!("_{}-{}", plain(key), plain(value))
-}
-
-fn quoted(text: &str) -> String {
-    serde_json::Value::from(text).to_string()
-}
-
-/// A value as TOML: numbers, truth values, arrays, tables and texts in quotes as they are, all else a text.
-fn literal(value: &str) -> String {
-    if let Ok(whole) = value.parse::<i64>() {
-        return whole.to_string();
-    }
-    if let Ok(number) = value.parse::<f64>() {
-        return format!("{number:?}").to_lowercase();
-    }
-    let as_it_is = matches!(value, "true" | "false") || value.starts_with(['[', '{', '"']);
-    if as_it_is { value.to_owned() } else { quoted(value) }
-}
-
 /// What a run gave; nothing where it was not run.
 type Outcome<C> = Option<Result<Report, Failure<<C as Case>::Error>>>;
 
@@ -446,7 +353,6 @@ fn name(vary: &[Vary], values: &[String]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::table::numeric;
     use super::*;
 
     #[test]
@@ -464,27 +370,5 @@ mod tests {
         for wrong in ["a", "a=", "=1", "a=1,,2", "a=1,1", "a=1,2;b=3", "a=1;"] {
             assert!(of(wrong).unwrap_err().contains("allowed"), "{wrong}");
         }
-    }
-
-    #[test]
-    fn values_in_toml() {
-        for (value, toml) in [
-            ("10s", "\"10s\""),
-            ("3", "3"),
-            ("007", "7"),
-            (".5", "0.5"),
-            ("1e3", "1000.0"),
-            ("nan", "nan"),
-            ("true", "true"),
-            ("[\"1 mm\"]", "[\"1 mm\"]"),
-            ("a \"b\" \\", "\"a \\\"b\\\" \\\\\""),
-        ] {
-            assert_eq!(literal(value), toml);
-        }
-        assert_eq!(named("boundary[1].ambient", "80 degC"), "_ambient-80degC");
-        let texts = |list: &[&str]| list.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
-        assert_eq!(numeric(&texts(&["10s", "20 s"])), Some((vec![10.0, 20.0], "s".into())));
-        assert_eq!(numeric(&texts(&["10s", "1 min"])), None);
-        assert_eq!(numeric(&texts(&["tr-bdf2"])), None);
     }
 }

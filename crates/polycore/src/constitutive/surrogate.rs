@@ -25,6 +25,7 @@ mod examples;
 mod file;
 mod header;
 mod invariants;
+mod softening;
 mod support;
 mod symmetry;
 
@@ -33,6 +34,7 @@ pub use evaluate::Features;
 pub use examples::examples;
 pub use header::{Header, Kind};
 pub use invariants::{Invariants, derivative};
+pub use softening::{History, Softening};
 pub use support::Support;
 pub use symmetry::{Monomial, StressAtRest, Symmetry};
 

@@ -1,7 +1,7 @@
 //! What a law is, without its weights.
 
 use super::invariants::Invariants;
-use super::{Support, Symmetry};
+use super::{Softening, Support, Symmetry};
 use crate::constitutive::Error;
 use crate::constitutive::network::{Activation, Architecture};
 use crate::tensor::voigt::NAMES;
@@ -115,6 +115,9 @@ pub struct Header {
     pub support: Option<Support>,
     /// Spread of the ensemble, Pa, beyond which a prediction is flagged ([`super::Surrogate::with_spread_limit`]).
     pub spread_limit: Option<f64>,
+    /// How the stress of an energy falls on unloading.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub softening: Option<Softening>,
     /// Where data and weights come from.
     #[serde(default)]
     pub provenance: Vec<String>,
@@ -135,6 +138,7 @@ impl Header {
             training_box: [1.0, 1.0, 1.0, 0.0, 0.0, 0.0].map(|c| [c, c]),
             support: None,
             spread_limit: None,
+            softening: None,
             provenance: Vec::new(),
         }
     }
@@ -187,6 +191,12 @@ impl Header {
         }
         if let Some(support) = &self.support {
             support.check()?;
+        }
+        if let Some(softening) = &self.softening {
+            softening.check()?;
+            if self.kind == Kind::Ann {
+                return Err(Error::invalid("softening", "a law of the kind `ann`", "an energy"));
+            }
         }
         match self.spread_limit {
             Some(limit) if !(limit.is_finite() && limit > 0.0) => {

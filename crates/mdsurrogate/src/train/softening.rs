@@ -1,0 +1,175 @@
+//! The damage variable of an energy, fitted to runs that unload.
+
+use crate::Error;
+use crate::dataset::Path;
+use crate::surrogate::{History, Softening, Surrogate, Workspace};
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::{DMatrix, DVector, Dyn, Owned};
+
+/// A row unloads where ‖C − 1‖ is below this part of the greatest of its run so far: fluctuations of a small cell are no
+/// unloading.
+const UNLOADED: f64 = 0.9;
+
+/// Units at most: twelve runs do not determine more.
+pub const MOST_UNITS: usize = 8;
+
+/// Whether each row of a run is on the curve of loading.
+pub fn loading(path: &Path) -> Vec<bool> {
+    let mut greatest = 0.0f64;
+    let identity = polycore::tensor::Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0);
+    let row = |row: &crate::dataset::Row| {
+        let strain = (row.c - identity).norm();
+        greatest = greatest.max(strain);
+        strain >= UNLOADED * greatest
+    };
+    path.rows.iter().map(row).collect()
+}
+
+/// The same energy with a damage variable of so many units, by least squares of ‖S − Ŝ‖ over the rows of these runs that
+/// unload.
+///
+/// # Errors
+/// [`Error::Data`] where no row unloads; those of [`Surrogate::stress`] and [`Surrogate::with_softening`].
+pub fn soften(law: Surrogate, paths: &[&Path], units: usize) -> Result<Surrogate, Error> {
+    let mut memory = Workspace::default();
+    let mut rows = Vec::new();
+    let mut greatest = 0.0f64;
+    for path in paths {
+        let mut history = History::default();
+        for (row, loading) in path.rows.iter().zip(loading(path)) {
+            let answer = law.stress(&row.c, &mut memory)?;
+            let energy = answer.energy.unwrap_or(0.0);
+            history.greatest = history.greatest.max(energy);
+            if !loading && energy < history.greatest {
+                rows.push((energy, history, answer.stress, row.s));
+            }
+        }
+        greatest = greatest.max(history.greatest);
+    }
+    if rows.is_empty() {
+        let (found, allowed) = ("no row that unloads".into(), "runs that turn round".into());
+        return Err(Error::Data { what: "softening", found, allowed });
+    }
+    let scale = (rows.iter().map(|row| row.3.norm_squared()).sum::<f64>() / rows.len() as f64).sqrt();
+    // ln a, ln b, ln c: different b tell the units apart
+    let start: Vec<f64> =
+        (0..units).flat_map(|k| [(0.5 / units as f64).ln(), 3f64.ln() * k as f64, 0.0]).collect();
+    let problem = Problem { rows, greatest, scale, at: DVector::from_vec(start) };
+    let (problem, _) = LevenbergMarquardt::new().minimize(problem);
+    law.with_softening(problem.softening()).map_err(Error::from)
+}
+
+struct Problem {
+    /// W, the history, S of the energy, S measured.
+    rows: Vec<(f64, History, polycore::tensor::Voigt, polycore::tensor::Voigt)>,
+    greatest: f64,
+    scale: f64,
+    at: DVector<f64>,
+}
+
+impl Problem {
+    fn softening(&self) -> Softening {
+        let unit = |unit: &[f64]| [unit[0].exp(), unit[1].exp(), unit[2].exp()];
+        Softening { units: self.at.as_slice().chunks(3).map(unit).collect(), greatest: self.greatest }
+    }
+}
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, at: &DVector<f64>) {
+        // e^±30 is a unit that is off or a jump
+        self.at = at.map(|value| value.clamp(-30.0, 30.0));
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.at.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        let softening = self.softening();
+        let row = |(energy, history, own, measured): &(f64, History, _, polycore::tensor::Voigt)| {
+            let [damage, _] = softening.damage(*energy, *history);
+            (own * (1.0 - damage) - measured) / self.scale
+        };
+        Some(DVector::from_iterator(
+            6 * self.rows.len(),
+            self.rows.iter().flat_map(|r| {
+                let residual: [f64; 6] = row(r).into();
+                residual
+            }),
+        ))
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        let softening = self.softening();
+        let mut jacobian = DMatrix::zeros(6 * self.rows.len(), self.at.len());
+        for (k, (energy, history, own, _)) in self.rows.iter().enumerate() {
+            let [damage, _] = softening.damage(*energy, *history);
+            for (unit, [a, b, c]) in softening.units.iter().enumerate() {
+                let (x, y) = (1.0 - energy / history.greatest, history.greatest / self.greatest);
+                let (fall, reached) = ((b * x).tanh(), (c * y).tanh());
+                // by ln a, ln b, ln c
+                let slopes = [
+                    a * fall * reached,
+                    a * b * x * (1.0 - fall * fall) * reached,
+                    a * fall * c * y * (1.0 - reached * reached),
+                ];
+                for (part, slope) in slopes.into_iter().enumerate() {
+                    let column = -(1.0 - damage) * slope / self.scale * own;
+                    for a in 0..6 {
+                        jacobian[(6 * k + a, 3 * unit + part)] = column[a];
+                    }
+                }
+            }
+        }
+        Some(jacobian)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dataset::Row;
+    use crate::kinematics::cauchy_of_material;
+    use crate::network::Activation::Softplus;
+    use crate::surrogate::{Header, Kind, Symmetry};
+    use polycore::tensor::{DeformationGradient, Tensor, Voigt};
+
+    /// Stretched along x to `most` and back.
+    fn there_and_back(law: &Surrogate, most: f64) -> Path {
+        let (mut memory, mut history) = (Workspace::default(), History::default());
+        let rows = (0..=100u64).map(|sample| {
+            let stretch = 1.0 + (most - 1.0) * (1.0 - (sample as f64 / 50.0 - 1.0).abs());
+            let f = DeformationGradient::new(Tensor::from_diagonal(&[stretch, 1.0, 1.0].into())).unwrap();
+            let c = Voigt::new(stretch * stretch, 1.0, 1.0, 0.0, 0.0, 0.0);
+            let s = law.follow(&c, false, &mut history, &mut memory).unwrap().stress;
+            Row::new(sample, f64::NAN, f, cauchy_of_material(&f, &s))
+        });
+        Path { id: most.to_string(), kind: "ux".into(), rates: [f64::NAN; 3], rows: rows.collect() }
+    }
+
+    /// The damage that made the data comes back, on runs between those of the fit, too.
+    #[test]
+    fn finds_the_damage_of_its_data() {
+        let header = Header::new(Kind::polyconvex_energy(Symmetry::Isotropic), &[(8, Softplus)], 1);
+        let energy = Surrogate::random(header, 3).unwrap();
+        let truth = Softening { units: vec![[0.6, 2.0, 1.5]], greatest: 4e4 };
+        let softened = energy.clone().with_softening(truth).unwrap();
+        let runs: Vec<Path> = [1.1, 1.2, 1.3].map(|most| there_and_back(&softened, most)).into();
+        let paths: Vec<&Path> = runs.iter().collect();
+        // C₁₁ − 1 is below 0.9 · 0.21 for strains of 0.09 and less
+        assert_eq!(loading(paths[0]).iter().filter(|loading| !**loading).count(), 46);
+        let found = soften(energy.clone(), &paths, 1).unwrap();
+        let between = there_and_back(&softened, 1.25);
+        let (mut memory, mut history) = (Workspace::default(), History::default());
+        for row in &between.rows {
+            let stress = found.follow(&row.c, false, &mut history, &mut memory).unwrap().stress;
+            assert!((stress - row.s).norm() <= 1e-6 * row.s.norm().max(1.0), "{} {stress}", row.s);
+        }
+        let up = Path { rows: runs[0].rows[..50].to_vec(), ..runs[0].clone() };
+        assert!(soften(energy, &[&up], 1).is_err());
+    }
+}
