@@ -88,7 +88,7 @@ fn export(law: &Path, output: &Path, form: Form) -> Result<bool, Error> {
             vec![("h", header.into_bytes()), ("c", source.into_bytes())]
         }
         Form::Fortran => vec![("f90", fortran_source(&law, &name)?.into_bytes())],
-        Form::Onnx => vec![("onnx", onnx(&law))],
+        Form::Onnx => vec![("onnx", onnx(&law)?)],
     };
     if let Some(folder) = output.parent() {
         std::fs::create_dir_all(folder).map_err(Error::io("create", folder))?;

@@ -197,6 +197,28 @@
         status = 2
         if (all(ieee_is_finite(s)) .and. all(ieee_is_finite(tangent))) status = 0
     end subroutine evaluate
+
+    ! The damage variable of unloading: S and its tangent with it; the greatest energy of the history is brought up to date.
+    subroutine soften(energy, greatest, s, tangent)
+        real(dp), intent(in) :: energy
+        real(dp), intent(inout) :: greatest, s(6), tangent(6, 6)
+        real(dp) :: total, slope, fall, reached
+        integer :: k, b
+        greatest = max(greatest, energy)
+        if (UNITS == 0 .or. energy >= greatest) return
+        total = 0
+        slope = 0
+        do k = 1, size(softening), 3
+            reached = softening(k) * (greatest / GREATEST_SEEN)**softening(k + 2)
+            fall = tanh(softening(k + 1) * (1 - energy / greatest))
+            total = total + reached * fall
+            slope = slope - reached * (1 - fall * fall) * softening(k + 1) / greatest
+        end do
+        do b = 1, 6
+            tangent(:, b) = exp(-total) * (tangent(:, b) - slope * s(b) * s)
+        end do
+        s = exp(-total) * s
+    end subroutine soften
 end module NAME_law
 
 ! c(6): C, order 11 22 33 12 13 23, C_12 counted once. s(6): second Piola-Kirchhoff stress, Pa. tangent(6, 6): 2 dS/dC, Pa.
@@ -205,7 +227,7 @@ end module NAME_law
 ! training strains than any of them was from the others.
 ! status 0; 1: C is not positive definite or not finite; 2: the result is not finite.
 recursive subroutine NAME(c, s, tangent, energy, spread, flags, status)
-    use NAME_law, only: evaluate
+    use NAME_law, only: evaluate, soften, UNITS
     implicit none
     double precision, intent(in) :: c(6)
     double precision, intent(out) :: s(6), tangent(6, 6), energy, spread
@@ -220,7 +242,7 @@ end subroutine NAME
 recursive subroutine umat(stress, statev, ddsdde, sse, spd, scd, rpl, ddsddt, drplde, drpldt, stran, dstran, time, dtime, &
     temp, dtemp, predef, dpred, cmname, ndi, nshr, ntens, nstatv, props, nprops, coords, drot, pnewdt, celent, &
     dfgrd0, dfgrd1, noel, npt, layer, kspt, jstep, kinc)
-    use NAME_law, only: evaluate
+    use NAME_law, only: evaluate, soften, UNITS
     implicit none
     integer :: ndi, nshr, ntens, nstatv, nprops, noel, npt, layer, kspt, jstep(4), kinc
     double precision :: stress(ntens), statev(nstatv), ddsdde(ntens, ntens), sse, spd, scd, rpl, ddsddt(ntens), &
@@ -229,9 +251,10 @@ recursive subroutine umat(stress, statev, ddsdde, sse, spd, scd, rpl, ddsddt, dr
     character(len=80) :: cmname
     integer, parameter :: row(6) = [1, 2, 3, 1, 1, 2], column(6) = [1, 2, 3, 2, 3, 3]
     double precision :: f(3, 3), cg(3, 3), c(6), s(6), tangent(6, 6), push(6, 6), cauchy(6), sigma(3, 3)
-    double precision :: stiffness(6, 6), jacobian, energy, spread, unit_of_stress
+    double precision :: stiffness(6, 6), jacobian, energy, spread, unit_of_stress, greatest
     integer :: flags, status, a, b, i, j, k, l
     if (ndi /= 3) error stop 'umat: plane stress and other states without three normal stresses are not supported'
+    if (UNITS > 0 .and. nstatv < 3) error stop 'umat: this law unloads by a history; it needs *DEPVAR of 3'
     unit_of_stress = 1
     if (nprops >= 1) then
         if (props(1) > 0) unit_of_stress = props(1)
@@ -250,6 +273,11 @@ recursive subroutine umat(stress, statev, ddsdde, sse, spd, scd, rpl, ddsddt, dr
         ddsdde = 0
         pnewdt = 0.25d0
         return
+    end if
+    if (nstatv >= 3) then
+        greatest = statev(3)
+        call soften(energy, greatest, s, tangent)
+        statev(3) = greatest
     end if
     do b = 1, 6
         do a = 1, 6
@@ -278,3 +306,45 @@ recursive subroutine umat(stress, statev, ddsdde, sse, spd, scd, rpl, ddsddt, dr
     stress = cauchy(1:ntens)
     ddsdde = stiffness(1:ntens, 1:ntens)
 end subroutine umat
+
+! CalculiX, materials whose name begins with USER: Green's strain (tensor shears) in, S and dS/dE out; no *ORIENTATION.
+recursive subroutine umat_user(amat, iel, iint, kode, elconloc, emec, emec0, beta, xokl, voj, xkl, vj, ithermal, t1l, dtime, &
+    time, ttime, icmd, ielas, mi, nstate_, xstateini, xstate, stre, stiff, iorien, pgauss, orab, pnewdt, ipkon)
+    use NAME_law, only: evaluate, soften, UNITS
+    implicit none
+    character(len=80) :: amat
+    integer :: iel, iint, kode, ithermal(*), icmd, ielas, mi(*), nstate_, iorien, ipkon(*)
+    double precision :: elconloc(*), emec(6), emec0(6), beta(6), xokl(3, 3), voj, xkl(3, 3), vj, t1l, dtime, time, ttime, &
+        xstateini(nstate_, mi(1), *), xstate(nstate_, mi(1), *), stre(6), stiff(21), pgauss(3), orab(7, *), pnewdt
+    double precision :: c(6), s(6), tangent(6, 6), energy, spread, unit_of_stress, greatest
+    integer :: flags, status, a, b, place
+    if (iorien /= 0) error stop 'umat_user: *ORIENTATION is not supported; give the law its axes instead'
+    if (UNITS > 0 .and. nstate_ < 3) error stop 'umat_user: this law unloads by a history; it needs *DEPVAR of 3'
+    unit_of_stress = 1
+    if (-kode - 100 >= 1) then
+        if (elconloc(1) > 0) unit_of_stress = elconloc(1)
+    end if
+    c = 2 * emec
+    c(1:3) = c(1:3) + 1
+    call evaluate(c, s, tangent, energy, spread, flags, status)
+    if (status /= 0) then
+        pnewdt = 0.25d0
+        return
+    end if
+    if (nstate_ >= 1) xstate(1, iint, iel) = flags
+    if (nstate_ >= 2) xstate(2, iint, iel) = spread / unit_of_stress
+    if (nstate_ >= 3) then
+        greatest = xstateini(3, iint, iel)
+        call soften(energy, greatest, s, tangent)
+        xstate(3, iint, iel) = greatest
+    end if
+    stre = s / unit_of_stress - beta
+    if (icmd == 3) return
+    place = 0
+    do b = 1, 6
+        do a = 1, b
+            place = place + 1
+            stiff(place) = (tangent(a, b) + tangent(b, a)) / (2 * unit_of_stress)
+        end do
+    end do
+end subroutine umat_user

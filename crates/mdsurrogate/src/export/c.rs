@@ -1,6 +1,6 @@
 //! A law as C99 source: no library but `math.h`, no allocation, no global state that changes.
 
-use super::{Description, Language, Model, check_name, numbers};
+use super::{Description, Language, Model, check_name, numbers, refuse_history};
 use crate::Error;
 use crate::surrogate::{Surrogate, UNSEEN};
 use std::fmt::Write;
@@ -25,6 +25,7 @@ pub struct CSource {
 /// need more than 1 MiB of stack.
 pub fn c_source(model: &Surrogate, name: &str) -> Result<CSource, Error> {
     check_name(name)?;
+    refuse_history(model)?;
     let description = Model::new(model).description();
     let Description { layers, widest, inputs, .. } = description;
     let stack = 8 * layers * widest * (2 * inputs + 3);

@@ -1,4 +1,5 @@
-//! A law as Fortran 2008, free form: a plain subroutine, and a UMAT for Abaqus and programs with its interface.
+//! A law as Fortran 2008, free form: a plain subroutine, a UMAT for Abaqus and programs with its interface, and the user
+//! material of CalculiX.
 
 use super::{Language, Model, check_name};
 use crate::Error;
@@ -15,7 +16,9 @@ const LINES: usize = 100;
 ///
 /// `umat` reads `PROPS(1)`, the pascals in a unit of stress (1 without it), sets `STATEV(1)` to the flags and
 /// `STATEV(2)` to the spread where there are so many, and asks for a smaller increment (`PNEWDT` = 0.25) where the
-/// model refuses C.
+/// model refuses C. With softening `STATEV(3)` holds the greatest energy of the history.
+///
+/// `umat_user` is the same for CalculiX (Green's strain → S, 21 constants of 2 ∂S/∂C, symmetrised).
 ///
 /// # Errors
 /// [`Error::Parameter`] for a name that is no identifier of 1 to 50 characters, or `umat`.
@@ -27,15 +30,18 @@ pub fn fortran_source(model: &Surrogate, name: &str) -> Result<String, Error> {
     let law = Model::new(model).description();
     let mut text =
         format!("! {name}: a constitutive law C -> S, written by mdsurrogate.\nmodule {name}_law\n");
-    text.push_str("    implicit none\n    private\n    public :: evaluate\n");
+    text.push_str("    implicit none\n    private\n    public :: evaluate, soften, UNITS\n");
     text.push_str("    integer, parameter :: dp = kind(1.0d0)\n    integer :: entry_\n");
-    for (name, value) in law.sizes() {
+    let softening = model.header().softening.as_ref();
+    let count = ("UNITS", softening.map_or(0, |softening| softening.units.len()));
+    for (name, value) in law.sizes().into_iter().chain([count]) {
         let _ = writeln!(text, "    integer, parameter :: {name} = {value}");
     }
     for (name, value) in [
         ("SPREAD_LIMIT", law.spread_limit.unwrap_or(f64::MAX)),
         ("UNSEEN", UNSEEN),
         ("FARTHEST", law.farthest),
+        ("GREATEST_SEEN", softening.map_or(1.0, |softening| softening.greatest)),
     ] {
         let _ = writeln!(text, "    real(dp), parameter :: {name} = {}", Language::Fortran.number(value));
     }
@@ -44,7 +50,9 @@ pub fn fortran_source(model: &Surrogate, name: &str) -> Result<String, Error> {
         let list: Vec<String> = values.iter().map(usize::to_string).collect();
         list_of(&mut text, name, &list);
     }
-    for (name, values) in law.lists().into_iter().chain([("weight", &law.weights[..])]) {
+    let units = softening.map_or(vec![0.0; 3], |softening| softening.units.as_flattened().to_vec());
+    for (name, values) in law.lists().into_iter().chain([("weight", &law.weights[..]), ("softening", &units)])
+    {
         let _ = writeln!(text, "    real(dp), save :: {name}({})", values.len());
         let list: Vec<String> = values.iter().map(|value| Language::Fortran.number(*value)).collect();
         list_of(&mut text, name, &list);

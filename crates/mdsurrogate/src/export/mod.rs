@@ -230,10 +230,22 @@ fn check_name(name: &str) -> Result<(), Error> {
     Err(Error::parameter("name of the function", format!("`{name}`"), allowed))
 }
 
+/// # Errors
+/// [`Error::Parameter`] for a law with softening, in a form without state.
+fn refuse_history(model: &Surrogate) -> Result<(), Error> {
+    if model.header().softening.is_none() {
+        return Ok(());
+    }
+    let found = "a law with softening, whose stress depends on its history";
+    Err(Error::parameter("export", found, "`--form fortran`, the routines of which have state variables"))
+}
+
 /// Numbers of C source, with the shortest text that reads back to the same bits.
 fn numbers(values: &[f64]) -> String {
     values.iter().map(|value| format!("{value:e}")).collect::<Vec<_>>().join(", ")
 }
 
+#[cfg(test)]
+mod history_tests;
 #[cfg(test)]
 mod tests;

@@ -1,9 +1,10 @@
 //! A law as ONNX: operators of set 17 in double precision, W's derivatives written out.
 
-use super::Model;
 use super::protobuf::{
     Attribute, Dimension, Graph, Model as File, Node, OperatorSet, Shape, Tensor, TensorType, Type, ValueInfo,
 };
+use super::{Model, refuse_history};
+use crate::Error;
 use crate::network::{Activation, Layer};
 use crate::surrogate::{Kind, Surrogate, UNSEEN, derivative};
 use prost::Message;
@@ -21,8 +22,12 @@ const BOOLEAN: i32 = 9;
 /// `spread` (points, 1) in Pa; `outside` (points, 6), whether a component leaves the training box; `far` (points, 1) of
 /// a model with a [`Support`](crate::surrogate::Support). C is not checked: the result at a C that is not positive definite
 /// means nothing.
-pub fn onnx(model: &Surrogate) -> Vec<u8> {
-    Model::new(model).onnx()
+///
+/// # Errors
+/// [`Error::Parameter`] for a law with softening.
+pub fn onnx(model: &Surrogate) -> Result<Vec<u8>, Error> {
+    refuse_history(model)?;
+    Ok(Model::new(model).onnx())
 }
 
 impl Model<'_> {

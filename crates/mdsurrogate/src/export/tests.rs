@@ -26,7 +26,7 @@ fn c_of(f: &DeformationGradient) -> Voigt {
 }
 
 /// Whether a program is there; says that the test is skipped if not.
-fn there(program: &str) -> bool {
+pub(super) fn there(program: &str) -> bool {
     let found = Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());
     if !found {
         evidence::skipped(program);
@@ -51,13 +51,13 @@ fn laws() -> Vec<(String, Surrogate<f64>)> {
     laws
 }
 
-fn run(command: &mut Command) -> String {
+pub(super) fn run(command: &mut Command) -> String {
     let output = command.output().unwrap();
     assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
-fn numbers_of(line: &str) -> Vec<f64> {
+pub(super) fn numbers_of(line: &str) -> Vec<f64> {
     line.split_whitespace().map(|word| word.parse().unwrap()).collect()
 }
 
@@ -243,7 +243,7 @@ fn exported_onnx_agrees() {
     let mut memory = Workspace::default();
     for (name, law) in laws() {
         let model = directory.path().join("law.onnx");
-        std::fs::write(&model, onnx(&law)).unwrap();
+        std::fs::write(&model, onnx(&law).unwrap()).unwrap();
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/onnx.py");
         let mut command = Command::new(&python);
         command.arg(script).arg(&model).args(points.iter().map(|c| numbers(c.as_slice())));

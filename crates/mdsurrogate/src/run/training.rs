@@ -63,13 +63,12 @@ pub fn train(
     let mut trained = Vec::new();
     for model in models {
         let split = data.split_of(model.split);
-        let mut numbers = split.train.clone();
-        if model.softening.is_some() {
-            let loading: Vec<bool> = data.set.paths.iter().flat_map(loading).collect();
-            numbers.retain(|&row| loading[row]);
-        }
-        let rows = data.rows_of(&numbers, &model.runs);
-        let validation = data.rows_of(&split.validation, &model.runs);
+        let loading: Vec<bool> = data.set.paths.iter().flat_map(loading).collect();
+        let learnt = |numbers: &[usize]| {
+            let is_learnt = |row: &&usize| model.softening.is_none() || loading[**row];
+            data.rows_of(&numbers.iter().filter(is_learnt).copied().collect::<Vec<_>>(), &model.runs)
+        };
+        let (rows, validation) = (learnt(&split.train), learnt(&split.validation));
         let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
         let mut header = crate::fitted::header(
             model.law(),

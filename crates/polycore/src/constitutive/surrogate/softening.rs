@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 /// Pseudo-elasticity (Ogden and Roxburgh 1999, <https://doi.org/10.1098/rspa.1999.0431>) with a monotone network in place of
 /// their error function: S = (1 − d) 2 ∂W/∂C with
 ///
-/// > d = 1 − exp(−Σₖ aₖ tanh(bₖ (1 − W/m)) tanh(cₖ m/m₀)), aₖ, bₖ, cₖ ≥ 0,
+/// > d = 1 − exp(−Σₖ aₖ tanh(bₖ (1 − W/m)) (m/m₀)^cₖ), aₖ, bₖ, cₖ ≥ 0,
 ///
 /// where m is the greatest W of the history. While W grows beyond it, d = 0; d grows as W falls, and with m at any W, so that
-/// no cycle gains work.
+/// no cycle gains work. A small c is damage from the first strain on, a large one that of chains which break near m₀.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Softening {
@@ -52,7 +52,7 @@ impl Softening {
         let (mut sum, mut slope) = (0.0, 0.0);
         for [a, b, c] in &self.units {
             let fall = (b * (1.0 - energy / most)).tanh();
-            let reached = a * (c * most / self.greatest).tanh();
+            let reached = a * (most / self.greatest).powf(*c);
             sum += reached * fall;
             slope -= reached * (1.0 - fall * fall) * b / most;
         }
