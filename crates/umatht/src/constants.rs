@@ -1,0 +1,141 @@
+//! Constants of the material as hosts list them.
+
+use crystfem::kinetics::{self, Kinetics};
+use crystfem::material::{Polymer, Property, Semicrystalline};
+use crystfem::melting::Melting;
+use std::cell::RefCell;
+
+/// Names of the constants, in their order.
+pub const NAMES: [&str; 12] = [
+    "conductivity",
+    "specific_heat",
+    "latent_heat",
+    "kinetics",
+    "absolute_zero",
+    "host",
+    "growth_rate",
+    "nucleation",
+    "activation_energy",
+    "equilibrium_melting",
+    "frozen",
+    "avrami_exponent",
+];
+
+/// A number that the material cannot have.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("umatht: {name}: found {found}; allowed: {allowed}")]
+pub struct Error {
+    /// What.
+    pub name: &'static str,
+    /// The number.
+    pub found: f64,
+    /// What it may be.
+    pub allowed: String,
+}
+
+impl From<crystfem::Error> for Error {
+    fn from(error: crystfem::Error) -> Self {
+        match error {
+            crystfem::Error::Parameter { name, found, allowed } => Self { name, found, allowed },
+            other => Self { name: "the material", found: f64::NAN, allowed: other.to_string() },
+        }
+    }
+}
+
+/// The material of a list of constants.
+pub struct Constants {
+    pub material: Semicrystalline,
+    /// 0 of the host's temperature, K.
+    pub absolute_zero: f64,
+    /// Whether the host is CalculiX.
+    pub calculix: bool,
+}
+
+impl Constants {
+    fn new(list: &[f64]) -> Result<Self, Error> {
+        let wrong = |place: usize, found: f64, allowed: &str| Error {
+            name: NAMES[place],
+            found,
+            allowed: allowed.to_owned(),
+        };
+        let &[conductivity, specific_heat, latent, column, ref rest @ ..] = list else {
+            let allowed = "4 to 6 constants, 12 with `kinetics` 0";
+            return Err(Error { name: "constants", found: list.len() as f64, allowed: allowed.into() });
+        };
+        for (place, number) in [(0, conductivity), (1, specific_heat)] {
+            if !(number.is_finite() && number > 0.0) {
+                return Err(wrong(place, number, "above 0"));
+            }
+        }
+        let optional = |k: usize| rest.get(k).copied().unwrap_or(0.0);
+        let absolute_zero = optional(0);
+        if absolute_zero != 0.0 && absolute_zero != 273.15 {
+            return Err(wrong(4, absolute_zero, "0 of a host in kelvin, 273.15 of one in °C"));
+        }
+        let calculix = match optional(1) {
+            0.0 => false,
+            1.0 => true,
+            other => return Err(wrong(5, other, "0 (Abaqus) or 1 (CalculiX)")),
+        };
+        let kinetics = match (column, rest) {
+            (1.0, _) => kinetics::Constants::TABLE_4_1_COLUMN_1,
+            (2.0, _) => kinetics::Constants::TABLE_4_1_COLUMN_2,
+            (
+                0.0,
+                &[
+                    _,
+                    _,
+                    growth_rate,
+                    nucleation,
+                    activation_energy,
+                    equilibrium_melting,
+                    frozen,
+                    avrami_exponent,
+                ],
+            ) => kinetics::Constants {
+                growth_rate,
+                nucleation,
+                activation_energy,
+                equilibrium_melting,
+                frozen,
+                avrami_exponent,
+            },
+            _ => return Err(wrong(3, column, "1 or 2, a column of Table 4.1, or 0 with constants 7 to 12")),
+        };
+        if latent.is_nan() || latent < 0.0 {
+            return Err(wrong(2, latent, "0 or above"));
+        }
+        let material = Semicrystalline::new(Polymer {
+            // the host has its own
+            density: 1.0,
+            conductivity: Property::Constant(conductivity),
+            specific_heat: Property::Constant(specific_heat),
+            kinetics: Kinetics::new(kinetics)?,
+            melting: Some(Melting::PA12),
+            // of α alone: the host gives ΔH·X∞
+            ultimate_crystallinity: 1.0,
+            latent_heat: (latent > 0.0).then_some(latent),
+            seed: 0.0,
+        })?;
+        Ok(Self { material, absolute_zero, calculix })
+    }
+}
+
+thread_local! {
+    /// The constants of the last call on this thread: hosts call once an integration point and iteration.
+    static LAST: RefCell<Option<(Vec<f64>, Constants)>> = const { RefCell::new(None) };
+}
+
+/// Works with the material of a list of constants.
+///
+/// # Errors
+/// A constant out of range.
+pub fn with<R>(list: &[f64], work: impl FnOnce(&Constants) -> R) -> Result<R, Error> {
+    LAST.with_borrow_mut(|last| {
+        let (_, constants) = match last.take() {
+            Some(kept) if kept.0 == list => last.insert(kept),
+            _ => last.insert((list.to_vec(), Constants::new(list)?)),
+        };
+        Ok(work(constants))
+    })
+}
