@@ -42,8 +42,8 @@ fn library() -> &'static Path {
         let text = run(build.current_dir(env!("CARGO_MANIFEST_DIR")));
         let messages = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
         let files = messages.flat_map(|message| message["filenames"].as_array().cloned().unwrap_or_default());
-        let names = files.filter_map(|file| Some(PathBuf::from(file.as_str()?)));
-        names.filter(|file| file.ends_with("libumatht.a")).next_back().unwrap()
+        let mut names = files.filter_map(|file| Some(PathBuf::from(file.as_str()?)));
+        names.rfind(|file| file.ends_with("libumatht.a")).unwrap()
     })
 }
 
