@@ -36,6 +36,8 @@ pub mod error;
 pub mod exact;
 mod fields;
 pub mod fit;
+#[cfg(feature = "case")]
+pub mod frd;
 pub mod healing;
 pub mod history;
 pub mod kinetics;

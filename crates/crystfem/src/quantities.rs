@@ -61,6 +61,12 @@ polycore::quantities! {
     TEMPERATURE_AT = "{point}.temperature_at_{event}", "degC", "temperature at which α reaches a value, or at the `peak` of its rate";
     TIME_TO = "{point}.time_to_{event}", "s", "time from the start to it";
     PEAK_RATE = "{point}.peak_rate", "1/s", "largest dα/dt";
+    NODES_LEAST = "{nodes}.least_{field}", "", "of `[[nodes]]`: smallest value of a field at the end";
+    NODES_MEAN = "{nodes}.mean_{field}", "", "mean over the nodes, not weighted";
+    NODES_LARGEST = "{nodes}.largest_{field}", "", "largest value";
+    NODES_COLDEST_AT = "{nodes}.least_temperature_at_{degree}", "degC", "of `[[nodes]]` all of which reach it: lowest temperature at which a node reaches a value of α";
+    NODES_MEAN_AT = "{nodes}.mean_temperature_at_{degree}", "degC", "mean over the nodes, not weighted";
+    NODES_HOTTEST_AT = "{nodes}.largest_temperature_at_{degree}", "degC", "highest";
     SHIFT_AT = "{point}.shift_at_{degree}", "K", "temperature at a value of α, of one material less that of another";
     LONGER_TO = "{point}.longer_to_{degree}", "", "time to a value of α, of one material over that of another, less 1";
 }

@@ -10,6 +10,7 @@ mod healing;
 mod heat_flow;
 mod line;
 mod mechanics;
+mod nodes;
 mod outside;
 mod part;
 mod point;

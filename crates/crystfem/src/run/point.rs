@@ -57,10 +57,20 @@ pub fn run(source: &Source, scene: &PointScene, run: &mut polycore::case::Run) -
             runs.push(Run { name, fields: material.field_names(), curves });
         }
     }
+    for nodes in scene.nodes.iter().filter(|nodes| !quick || nodes.quick) {
+        phases.start("integrate");
+        let own = |(name, ..): &&(&str, _, _)| nodes.material.as_deref().is_none_or(|own| own == *name);
+        if let Some((.., material)) = built.iter().find(own) {
+            let path = source.file(&nodes.file);
+            super::nodes::run(nodes, &nodes.name, &path, &**material, output, &mut report)?;
+        }
+    }
     compare(&mut report, scene);
     if scene.output.pictures {
         phases.start("draw");
-        draw::curves(&scene.title, &runs, output)?;
+        if !runs.is_empty() {
+            draw::curves(&scene.title, &runs, output)?;
+        }
         for (name, spec, key) in &materials {
             if spec.law == crate::scene::Law::Semicrystalline {
                 let material = spec.semicrystalline(source, key)?;
@@ -116,6 +126,9 @@ pub fn explain(source: &Source, scene: &PointScene, quick: bool) -> Result<Vec<S
             Stepping::Seconds(seconds) => format!("steps of {seconds} s"),
         };
         lines.push(format!("point {}: {drive}; {steps}", point.name));
+    }
+    for nodes in scene.nodes.iter().filter(|nodes| !quick || nodes.quick) {
+        lines.push(format!("nodes {}: at every node of {}", nodes.name, nodes.file.display()));
     }
     Ok(lines)
 }

@@ -36,7 +36,7 @@ pub use mechanics::{Mechanics, MechanicsLaw, MechanicsSpec};
 pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec, TubeSpec};
 pub use part::{BoundarySpec, PartOutput, PartScene, PrintSpec, ProbeSpec, RegionSpec, SourceSpec, TimeSpec};
 pub(crate) use places::millimetres;
-pub use point::{CompareSpec, ExchangeSpec, LegSpec, PointScene, PointSpec};
+pub use point::{CompareSpec, ExchangeSpec, LegSpec, NodesSpec, PointScene, PointSpec};
 pub use problem::Task;
 pub use schedule::{ScheduleSpec, TimesSpec};
 pub use study::StudySpec;
@@ -73,7 +73,7 @@ impl Default for OutputSpec {
 /// The task of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The material alone: `[[point]]`.
+    /// The material alone: `[[point]]`, `[[nodes]]`.
     Point,
     /// A body in time: `[mesh]`.
     Part,
@@ -103,12 +103,13 @@ pub fn kind(source: &Source) -> Result<Kind, SceneError> {
         #[serde(rename = "program")]
         _program: Program,
         point: Option<IgnoredAny>,
+        nodes: Option<IgnoredAny>,
         fit: Option<IgnoredAny>,
         mesh: Option<IgnoredAny>,
     }
     let outline: Outline = source.parse()?;
     let tasks = [
-        (Kind::Point, "point", outline.point.is_some()),
+        (Kind::Point, "point", outline.point.is_some() || outline.nodes.is_some()),
         (Kind::Fit, "fit", outline.fit.is_some()),
         (Kind::Part, "mesh", outline.mesh.is_some()),
     ];
@@ -120,7 +121,7 @@ pub fn kind(source: &Source) -> Result<Kind, SceneError> {
             Err(source.error(second, found, "one of them: a scene does one thing"))
         }
         (None, _) => {
-            let allowed = "a block `[[point]]`, `[[fit]]` or `[mesh]`";
+            let allowed = "a block `[[point]]`, `[[nodes]]`, `[[fit]]` or `[mesh]`";
             Err(source.error("program", "a scene without a task", allowed))
         }
     }

@@ -27,7 +27,11 @@ pub struct PointScene {
     #[serde(default)]
     pub materials: BTreeMap<String, MaterialSpec>,
     /// Temperature histories.
+    #[serde(default)]
     pub point: Vec<PointSpec>,
+    /// Temperatures of nodes that another program computed.
+    #[serde(default)]
+    pub nodes: Vec<NodesSpec>,
     /// Pairs of materials whose events are compared.
     #[serde(default)]
     pub compare: Vec<CompareSpec>,
@@ -94,6 +98,45 @@ fn yes() -> bool {
     true
 }
 
+/// The material at every node of a thermal analysis of another program.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NodesSpec {
+    /// Its name: of `NAME.vtkhdf` and of the values.
+    pub name: String,
+    /// `.frd` of CalculiX (ASCII, with `NT` of all nodes); times in s.
+    pub file: PathBuf,
+    /// Unit of its temperatures.
+    pub unit: NodesUnit,
+    /// Temperature of all nodes at t = 0; default: the history begins at the first time of the file.
+    pub start: Option<Temperature>,
+    /// Name of the material; default: the only one.
+    pub material: Option<String>,
+    /// Part of `--quick` runs.
+    #[serde(default = "yes")]
+    pub quick: bool,
+}
+
+/// Units of temperature in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+pub enum NodesUnit {
+    /// Kelvin.
+    K,
+    /// Degrees Celsius.
+    #[serde(rename = "degC")]
+    Celsius,
+}
+
+impl NodesSpec {
+    /// What is added to its temperatures, K.
+    pub fn zero(&self) -> f64 {
+        match self.unit {
+            NodesUnit::K => 0.0,
+            NodesUnit::Celsius => 273.15,
+        }
+    }
+}
+
 /// A ramp (`to` with `rate` or `duration`), a jump (`to` alone) or a hold (`hold`).
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -149,8 +192,29 @@ impl PointScene {
     /// # Errors
     /// A [`SceneError`] that names the key, the value found and what is allowed.
     pub fn courses(&self, source: &Source) -> Result<Vec<(Drive, Stepping)>, SceneError> {
-        if self.point.is_empty() {
-            return Err(source.error("point", "nothing", "at least one [[point]]"));
+        if self.point.is_empty() && self.nodes.is_empty() {
+            return Err(source.error("point", "nothing", "at least one [[point]] or [[nodes]]"));
+        }
+        for (index, nodes) in self.nodes.iter().enumerate() {
+            let key = |field: &str| format!("nodes[{index}].{field}");
+            check_name(source, &key("name"), &nodes.name)?;
+            let names = self.nodes[..index].iter().map(|other| &other.name);
+            if names.chain(self.point.iter().map(|point| &point.name)).any(|name| *name == nodes.name) {
+                let found = format!("`{}` a second time", nodes.name);
+                return Err(source.error(&key("name"), found, "another name"));
+            }
+            if !source.file(&nodes.file).is_file() {
+                let found = source.file(&nodes.file).display().to_string();
+                return Err(source.error(&key("file"), found, "a file that is there"));
+            }
+            match &nodes.material {
+                Some(name) => self.check_material(source, &key("material"), name)?,
+                None if self.materials.len() > 1 => {
+                    let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
+                    return Err(source.error(&key("material"), "nothing", known.join(", ")));
+                }
+                None => {}
+            }
         }
         for (index, pair) in self.compare.iter().enumerate() {
             for (field, name) in [("material", &pair.material), ("with", &pair.with)] {
