@@ -209,7 +209,7 @@
         total = 0
         slope = 0
         do k = 1, size(softening), 3
-            reached = softening(k) * (greatest / GREATEST_SEEN)**softening(k + 2)
+            reached = softening(k) * min(1d12, (greatest / GREATEST_SEEN)**softening(k + 2))
             fall = tanh(softening(k + 1) * (1 - energy / greatest))
             total = total + reached * fall
             slope = slope - reached * (1 - fall * fall) * softening(k + 1) / greatest

@@ -131,6 +131,10 @@ impl Prepared {
             let split = self.split_of(model.split);
             if model.softening.is_some() {
                 let turned = |path: &&Path_| loading(path).contains(&false);
+                if self.set.is_nominal() {
+                    let found = "nominal stresses";
+                    return Err(source.error(&at("softening"), found, "data of whole stresses").into());
+                }
                 if split.method == Method::Random {
                     let allowed = "`split = \"path\"`: the history of a row is that of its run";
                     return Err(source

@@ -167,6 +167,7 @@ mod tests {
         // C₁₁ − 1 is below 0.9 · 0.21 for strains of 0.09 and less
         assert_eq!(loading(paths[0]).iter().filter(|loading| !**loading).count(), 46);
         let found = soften(energy.clone(), &paths, 1).unwrap();
+        // the prior takes 1e-4 of the stress
         let between = there_and_back(&softened, 1.25);
         let (mut memory, mut history) = (Workspace::default(), History::default());
         for row in &between.rows {

@@ -138,6 +138,10 @@ impl SolidLaw {
             let allowed = "a law of the kind `energy`: forces follow from one, and it has no stress at rest";
             return Err(source.error(&format!("{key}.learnt"), "a law of the kind `ann`", allowed));
         }
+        if learnt.header().softening.is_some() {
+            let allowed = "a law without: particles keep no history of it";
+            return Err(source.error(&format!("{key}.learnt"), "a law with `softening`", allowed));
+        }
         Ok(Arc::new(Correspondence::stabilised(learnt, space, stabilisation).map_err(wrong)?))
     }
 }

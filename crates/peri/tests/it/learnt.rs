@@ -13,7 +13,7 @@ use peri::run::{Finished, Peri, run};
 use peri::scene::{self, Scene};
 use polycore::case::{Case, Options, Run};
 use polycore::constitutive::network::Activation::Softplus;
-use polycore::constitutive::surrogate::{Header, Kind, Surrogate, Symmetry};
+use polycore::constitutive::surrogate::{Header, Kind, Softening, Surrogate, Symmetry};
 use polycore::constitutive::{Error, Law, Prediction, Workspace};
 use polycore::output::vtkhdf;
 use polycore::scene::Source;
@@ -212,6 +212,9 @@ fn laws_that_no_solid_can_have_are_refused() {
     let ann = Surrogate::random(Header::new(Kind::Ann, &[(4, Softplus)], 1), 1).unwrap();
     let error = message(ann).unwrap_err();
     assert!(error.contains("`material.solid.constitutive.learnt`: found a law of the kind `ann`"), "{error}");
+    let softening = Softening { units: vec![[0.1, 1.0, 1.0]], greatest: 1e5 };
+    let error = message(orthotropic(0.0).with_softening(softening).unwrap()).unwrap_err();
+    assert!(error.contains("found a law with `softening`"), "{error}");
     let error = message(orthotropic(0.4)).unwrap_err();
     assert!(error.contains("`material.solid.constitutive`: found shear stress out of the plane"), "{error}");
     // an energy turned over: its polyconvex correction is linear in its weights, and so is its tangent

@@ -5,6 +5,9 @@ use crate::constitutive::{Error, Law};
 use crate::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 
+/// (m/m₀)^c at most.
+const BEYOND: f64 = 1e12;
+
 /// Pseudo-elasticity (Ogden and Roxburgh 1999, <https://doi.org/10.1098/rspa.1999.0431>) with a monotone network in place of
 /// their error function: S = (1 − d) 2 ∂W/∂C with
 ///
@@ -52,7 +55,8 @@ impl Softening {
         let (mut sum, mut slope) = (0.0, 0.0);
         for [a, b, c] in &self.units {
             let fall = (b * (1.0 - energy / most)).tanh();
-            let reached = a * (most / self.greatest).powf(*c);
+            // far beyond m₀ nothing is left, and no product is 0 · ∞
+            let reached = a * (most / self.greatest).powf(*c).min(BEYOND);
             sum += reached * fall;
             slope -= reached * (1.0 - fall * fall) * b / most;
         }
@@ -143,6 +147,8 @@ mod tests {
         let [before, _] = law.header().softening.as_ref().unwrap().damage(1e4, History { greatest: 2e4 });
         let [after, _] = law.header().softening.as_ref().unwrap().damage(1e4, History { greatest: 3e4 });
         assert!(0.0 < before && before < after && after < 1.0);
+        let far = Softening { units: vec![[1e3, 20.0, 80.0]], greatest: 1.0 };
+        assert_eq!(far.damage(1e5, History { greatest: 1e6 }).map(f64::abs), [1.0, 0.0]);
     }
 
     /// Against central differences of S, 2 ∂S/∂C, on unloading.
