@@ -3,8 +3,9 @@
 use crate::Error;
 use crate::dataset::Row;
 use crate::network::{Architecture, LANES};
-use crate::surrogate::{Features, Header, Kind, Support, Surrogate};
-use polycore::tensor::Voigt;
+use crate::surrogate::{Features, Header, Kind, Support, Surrogate, UNSEEN};
+use nalgebra::Vector3;
+use polycore::tensor::{Tensor, Voigt, voigt};
 
 /// Representatives of the training strains in a law ([`Support`]).
 const REPRESENTATIVES: usize = 256;
@@ -30,7 +31,8 @@ pub fn constrained(model: &Surrogate, rows: &[&Row]) -> Vec<&'static str> {
 
 /// The header of a model of these hidden layers whose inputs are standardised by `rows` (3.8) and whose outputs are
 /// scaled by them: the stress of an `ann` component by component if `standardised`, else in MPa (as in the thesis); an energy by the
-/// largest product of deviations of S and C. The training box is that of the rows.
+/// largest product of deviations of S and C. Training box and representatives are those of the rows and of what the symmetry makes
+/// the same: sheared one way, an orthotropic law knows the other.
 ///
 /// # Errors
 /// [`Error::Data`] for no row; [`Error::Parameter`] for numbers that are not finite or no network.
@@ -52,17 +54,18 @@ pub fn header(
         let column: Vec<f64> = features.iter().map(|features| features.values[k]).collect();
         [header.input_mean[k], header.input_deviation[k]] = moments("inputs", &column)?;
     }
+    let known = equivalents(&header.kind, rows);
     let (mut of_stress, mut of_strain) = ([[0.0; 2]; 6], [0.0; 6]);
     let mut largest = 0.0f64;
     for a in 0..6 {
         let stress: Vec<f64> = rows.iter().map(|row| row.s[a]).collect();
         let strain: Vec<f64> = rows.iter().map(|row| row.c[a]).collect();
+        let known = known.iter().map(|c| c[a]);
         of_stress[a] = moments("S", &stress)?;
         [_, of_strain[a]] = moments("C", &strain)?;
         largest = largest.max(of_stress[a][1] * of_strain[a]);
-        header.training_box[a] = strain
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &c| [low.min(c), high.max(c)]);
+        header.training_box[a] =
+            known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], c| [low.min(c), high.max(c)]);
     }
     if header.kind != Kind::Ann {
         for (k, deviation) in header.input_deviation.iter_mut().enumerate() {
@@ -73,8 +76,7 @@ pub fn header(
             *deviation = deviation.max(LEAST_DEVIATION * square.sqrt());
         }
     }
-    let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
-    header.support = Some(Support::of(&strains, REPRESENTATIVES)?);
+    header.support = Some(Support::of(&known, REPRESENTATIVES)?);
     match header.kind {
         Kind::Ann if standardised => {
             for (a, [mean, deviation]) in of_stress.into_iter().enumerate() {
@@ -89,6 +91,23 @@ pub fn header(
     }
     header.check()?;
     Ok(header)
+}
+
+/// The strains of rows, and those that a symmetry makes the same: turned half about its axes, where that changes any.
+fn equivalents(kind: &Kind, rows: &[&Row]) -> Vec<Voigt> {
+    let own: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
+    let mut all = own.clone();
+    if let Kind::Energy { symmetry, axes, .. } = kind {
+        for &axis in symmetry.two_fold_axes() {
+            let axis = Vector3::from(axes[axis]);
+            let turn = 2.0 * axis * axis.transpose() - Tensor::identity();
+            let turned = |c: &Voigt| voigt::from_stress(&(turn * voigt::to_stress(c) * turn.transpose()));
+            if own.iter().any(|c| (turned(c) - c).norm() > UNSEEN) {
+                all.extend(own.iter().map(turned));
+            }
+        }
+    }
+    all
 }
 
 /// Mean and standard deviation (divisor n); a deviation that rounding leaves of a constant is 0.
@@ -131,6 +150,36 @@ mod tests {
                 assert!(constrained(&law, &rows).is_empty());
             }
         }
+    }
+
+    /// Sheared to one side only: the other side is known to an orthotropic energy in its axes, not to an `ann`.
+    #[test]
+    fn symmetry_extends_what_is_known() {
+        let row = |sample: u64| {
+            let shear = 0.01 * sample as f64;
+            let f = Tensor::new(1.0, 0.0, shear, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0 + shear);
+            let f = polycore::tensor::DeformationGradient::new(f).unwrap();
+            Row::new(sample, f64::NAN, f, Voigt::new(1e6, 0.0, 2e6 + shear, 0.0, shear, 0.0))
+        };
+        let rows: Vec<Row> = (0..20).map(row).collect();
+        let rows: Vec<&Row> = rows.iter().collect();
+        let law = |kind: Kind| {
+            let architecture = Architecture::new(kind.inputs(), &[(4, Tanh)], kind.outputs());
+            Surrogate::<f64>::random(header(kind, architecture, 1, &rows, true).unwrap(), 1).unwrap()
+        };
+        let (mut c, mut other) = (rows[10].c, rows[10].c);
+        other[4] = -other[4];
+        for (kind, known) in [
+            (Kind::Ann, false),
+            (Kind::energy(Symmetry::Triclinic), false),
+            (Kind::energy(Symmetry::Monoclinic), true),
+            (Kind::energy(Symmetry::Orthotropic), true),
+        ] {
+            let law = law(kind);
+            assert!(!law.flags(&c).any() && law.flags(&other).any() != known);
+        }
+        c[3] = 0.1;
+        assert!(law(Kind::energy(Symmetry::Orthotropic)).flags(&c).unseen[3]);
     }
 
     /// Rubber: det C = 1 but for the last digit that a table has. Its W is that of the other invariants; where the volume of

@@ -49,6 +49,15 @@ impl Symmetry {
     pub const ALL: [Self; 5] =
         [Self::Triclinic, Self::Monoclinic, Self::Orthotropic, Self::Transverse, Self::Isotropic];
 
+    /// The material axes about which half a turn changes nothing.
+    pub fn two_fold_axes(self) -> &'static [usize] {
+        match self {
+            Self::Triclinic => &[],
+            Self::Monoclinic => &[2],
+            Self::Orthotropic | Self::Transverse | Self::Isotropic => &[0, 1, 2],
+        }
+    }
+
     /// The invariants: of isotropy I₁, I₂, I₃ (1.7)–(1.9), of transverse isotropy also a·Ca and a·C²a.
     pub fn invariants(self) -> &'static [&'static [Monomial<'static>]] {
         match self {
