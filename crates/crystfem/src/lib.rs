@@ -36,8 +36,6 @@ pub mod error;
 pub mod exact;
 mod fields;
 pub mod fit;
-#[cfg(feature = "case")]
-pub mod frd;
 pub mod healing;
 pub mod history;
 pub mod kinetics;
@@ -55,6 +53,8 @@ mod solver;
 mod system;
 #[cfg(feature = "case")]
 pub mod table;
+#[cfg(feature = "case")]
+pub mod thermal;
 pub mod time;
 
 // `cargo bench` compiles a file of `command`, in which this crate has its name

@@ -2,10 +2,10 @@
 
 use super::celsius::CELSIUS;
 use crate::error::Error;
-use crate::frd::Frd;
 use crate::material::{Point, ThermalMaterial};
 use crate::quantities as q;
 use crate::scene::NodesSpec;
+use crate::thermal;
 use nalgebra::Vector3;
 use polycore::output::vtkhdf::MeshSeries;
 use polycore::report::{Quantity, Report};
@@ -70,14 +70,15 @@ pub fn run(
     output: &Path,
     report: &mut Report,
 ) -> Result<(), Error> {
-    let mut origin = Frd::open(path)?;
-    let (points, cells) = (origin.points.clone(), origin.cells.clone());
+    let analysis = thermal::open(path, spec.array.as_deref())?;
     let zero = spec.zero();
-    let mut series = MeshSeries::create(output.join(format!("{name}.vtkhdf")), points, cells)?;
+    let mut series =
+        MeshSeries::create(output.join(format!("{name}.vtkhdf")), analysis.points, analysis.cells)?;
     let (mut nodes, mut time) = (Vec::<Node>::new(), 0.0);
     let mut frames = 0u64;
     let data = |reason: String| Error::Data { what: path.display().to_string(), reason };
-    while let Some(frame) = origin.frame()? {
+    for frame in analysis.frames {
+        let frame = frame?;
         let kelvin = |value: &f64| value + zero;
         if let Some(wrong) =
             frame.temperature.iter().map(kelvin).find(|kelvin| !(kelvin.is_finite() && *kelvin > 0.0))
@@ -121,7 +122,9 @@ pub fn run(
         series.step(time, &arrays, &[])?;
     }
     if frames == 0 {
-        return Err(data("no temperatures; allowed: `NDTEMP` at one time at least (*NODE FILE, NT)".into()));
+        return Err(data(
+            "no temperatures; allowed: those of one time at least (CalculiX: *NODE FILE, NT)".into(),
+        ));
     }
     series.finish()?;
     report.work(&format!("{name}.frames"), frames).work(&format!("{name}.nodes"), nodes.len() as u64);

@@ -104,8 +104,10 @@ fn yes() -> bool {
 pub struct NodesSpec {
     /// Its name: of `NAME.vtkhdf` and of the values.
     pub name: String,
-    /// `.frd` of CalculiX (ASCII, with `NT` of all nodes); times in s.
+    /// `.frd` of CalculiX (ASCII, with `NT` of all nodes), `.pvd` or `.vtu` of VTK, or Exodus II (`.e`, `.ex2`, `.exo`, `.g`); times in s.
     pub file: PathBuf,
+    /// Name of the temperature in VTK's files and Exodus II; default: the only scalar of nodes.
+    pub array: Option<String>,
     /// Unit of its temperatures.
     pub unit: NodesUnit,
     /// Temperature of all nodes at t = 0; default: the history begins at the first time of the file.

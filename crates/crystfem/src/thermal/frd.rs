@@ -3,6 +3,7 @@
 //! Fixed columns (CalculiX GraphiX manual, "Result Format"): a line of data begins with −1 in three columns, then a number in
 //! ten, then numbers in twelve each.
 
+use super::{Analysis, Frame};
 use crate::error::Error;
 use polycore::output::vtkhdf::Cells;
 use std::collections::HashMap;
@@ -14,24 +15,23 @@ use std::path::{Path, PathBuf};
 const SOLIDS: [(u32, usize, u8); 6] =
     [(1, 8, 12), (4, 8, 12), (3, 4, 10), (6, 4, 10), (2, 6, 13), (5, 6, 13)];
 
+/// Opens a file and reads its mesh.
+pub fn open(path: &Path) -> Result<Analysis, Error> {
+    let mut frd = Frd::open(path)?;
+    let (points, cells) = (std::mem::take(&mut frd.points), std::mem::take(&mut frd.cells));
+    Ok(Analysis { points, cells, frames: Box::new(std::iter::from_fn(move || frd.frame().transpose())) })
+}
+
 /// A file that is being read.
-pub struct Frd {
+struct Frd {
     path: PathBuf,
     lines: std::io::Lines<BufReader<File>>,
     line: usize,
     /// Places of the nodes, in the order of the file.
-    pub points: Vec<[f64; 3]>,
+    points: Vec<[f64; 3]>,
     /// The solids, by their corners.
-    pub cells: Cells,
+    cells: Cells,
     places: HashMap<u32, u32>,
-}
-
-/// Temperatures at a time.
-pub struct Frame {
-    /// Time.
-    pub time: f64,
-    /// Of each node, in the unit of the file.
-    pub temperature: Vec<f64>,
 }
 
 impl Frd {
@@ -39,7 +39,7 @@ impl Frd {
     ///
     /// # Errors
     /// [`Error::File`] for what is no such file; I/O errors.
-    pub fn open(path: &Path) -> Result<Self, Error> {
+    fn open(path: &Path) -> Result<Self, Error> {
         let file = File::open(path).map_err(polycore::Error::io("read", path))?;
         let mut frd = Self {
             path: path.to_path_buf(),
@@ -158,13 +158,13 @@ impl Frd {
     ///
     /// # Errors
     /// [`Error::File`] for a block that is cut off, a node without a temperature and numbers that are none.
-    pub fn frame(&mut self) -> Result<Option<Frame>, Error> {
+    fn frame(&mut self) -> Result<Option<Frame>, Error> {
         let mut time = f64::NAN;
         while let Some(line) = self.next()? {
             if line.trim_start().starts_with("100C") {
                 time = self.real(&line, 12..24, "time")?;
             } else if line.starts_with(" -4  NDTEMP") {
-                let mut temperature = vec![f64::NAN; self.points.len()];
+                let mut temperature = vec![f64::NAN; self.places.len()];
                 while let Some(line) = self.data("temperatures")? {
                     if !line.starts_with(" -1") {
                         continue;
