@@ -4,6 +4,8 @@
 //! refers to. The test fails as with `assert!`; and under `cargo xtask test`, which names a folder in [`FOLDER`], the
 //! number found is left there, met or not. [`skipped`] leaves there what a test could not find on this machine.
 
+pub mod hosts;
+
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::panic::Location;

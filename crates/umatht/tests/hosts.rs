@@ -3,6 +3,7 @@
 //! Temperatures at which α reaches 0.01, 0.5, 0.99 on cooling are those of `shared/formulation.md`, which an independent
 //! program computed.
 
+use evidence::hosts::{self, run, there};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -11,40 +12,10 @@ use std::sync::OnceLock;
 const CROSSINGS: [(f64, [f64; 3]); 2] =
     [(1.0, [166.2335, 162.0523, 159.7161]), (10.0, [159.6641, 152.7704, 148.5398])];
 
-/// Whether a compiler is there; says that the test is skipped if not.
-fn there(program: &str) -> bool {
-    let found = Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());
-    if !found {
-        evidence::skipped(program);
-    }
-    found
-}
-
-fn run(command: &mut Command) -> String {
-    let output = command.output().unwrap();
-    assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-/// `libumatht.a`: cargo tells where it is.
+/// `libumatht.a`.
 fn library() -> &'static Path {
     static BUILT: OnceLock<PathBuf> = OnceLock::new();
-    BUILT.get_or_init(|| {
-        let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
-        let mut build = Command::new(cargo);
-        build.args([
-            "build",
-            "--release",
-            "--quiet",
-            "--package=umatht",
-            "--message-format=json-render-diagnostics",
-        ]);
-        let text = run(build.current_dir(env!("CARGO_MANIFEST_DIR")));
-        let messages = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
-        let files = messages.flat_map(|message| message["filenames"].as_array().cloned().unwrap_or_default());
-        let mut names = files.filter_map(|file| Some(PathBuf::from(file.as_str()?)));
-        names.rfind(|file| file.ends_with("libumatht.a")).unwrap()
-    })
+    BUILT.get_or_init(|| hosts::static_library("umatht"))
 }
 
 /// A program of the files, linked with the library.
@@ -189,23 +160,10 @@ end program main
 /// A block that cools at 10 K/min in CalculiX 2.20: temperatures at which it crystallizes.
 #[test]
 fn crystallizes_in_calculix() {
-    let folder = std::env::var_os("CALCULIX_SOURCE").map(PathBuf::from);
-    let Some(source) = folder.filter(|folder| folder.join("ccx_2.20.a").is_file()) else {
-        return evidence::skipped(
-            "CalculiX built from source (CALCULIX_SOURCE names the folder of ccx_2.20.a)",
-        );
-    };
+    let Some(source) = hosts::calculix() else { return };
     let directory = tempfile::tempdir().unwrap();
     let program = directory.path().join("ccx");
-    let mut build = Command::new("gfortran");
-    // the material before the archive, or its empty routine stays
-    build
-        .args(["-O2", "-fopenmp", "-Wl,-u,umatht_", "-o"])
-        .arg(&program)
-        .arg(source.join("ccx_2.20.o"))
-        .arg(library());
-    build.arg(source.join("ccx_2.20.a"));
-    run(build.args(["-lspooles", "-lpthread", "-larpack", "-llapack", "-lblas", "-lm", "-ldl"]));
+    hosts::link_calculix(&source, &[library()], &["-u,umatht_"], &program);
     let mut deck = String::from("*NODE, NSET=ALL\n");
     for k in 0..=4 {
         for (j, [y, z]) in (1..).zip([[0, 0], [1, 0], [1, 1], [0, 1]]) {
@@ -222,9 +180,7 @@ fn crystallizes_in_calculix() {
              *DEPVAR\n3\n*SOLID SECTION, ELSET=BLOCK, MATERIAL=PA12\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 473.15\n\
              *AMPLITUDE, NAME=COOL\n0., 473.15, 480., 393.15\n*STEP, INC=2000\n*HEAT TRANSFER, DIRECT\n0.6, 480.\n\
              *BOUNDARY, AMPLITUDE=COOL\n1, 11, 11, 1.\n2, 11, 11, 1.\n3, 11, 11, 1.\n4, 11, 11, 1.\n*NODE PRINT, NSET=ALL, FREQUENCY=1\nNT\n*EL PRINT, ELSET=BLOCK, FREQUENCY=1\nSDV\n*END STEP\n";
-    std::fs::write(directory.path().join("block.inp"), deck).unwrap();
-    run(Command::new(&program).arg("block").current_dir(directory.path()));
-    let results = std::fs::read_to_string(directory.path().join("block.dat")).unwrap();
+    let (_, results) = hosts::run_calculix(&program, directory.path(), &deck);
     let (mut before, mut found) = ((473.15, 0.0), Vec::new());
     for block in results.split("internal state variables").skip(1) {
         let line = block.lines().find(|line| line.trim_start().starts_with("1 ")).unwrap();

@@ -4,8 +4,8 @@ use super::tests::{numbers_of, run, there};
 use super::*;
 use crate::network::Activation::Softplus;
 use crate::surrogate::{History, Kind, Softening, Workspace};
+use evidence::hosts;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// An energy in its own axes that softens.
@@ -135,32 +135,14 @@ contains
 end program main
 ";
 
-/// The folder of a CalculiX that was built from source, with its archive: `CALCULIX_SOURCE`.
-fn calculix() -> Option<PathBuf> {
-    let folder = std::env::var_os("CALCULIX_SOURCE").map(PathBuf::from);
-    let found = folder.filter(|folder| folder.join("ccx_2.20.a").is_file() && there("gfortran"));
-    if found.is_none() {
-        evidence::skipped("CalculiX built from source (CALCULIX_SOURCE names the folder of ccx_2.20.a)");
-    }
-    found
-}
-
-/// Links CalculiX with a law.
-pub fn linked(source: &Path, law: &Path, program: &Path) {
-    let mut link = Command::new("gfortran");
-    link.args(["-O2", "-fopenmp", "-J"]).arg(program.parent().unwrap()).arg("-o").arg(program).arg(law);
-    link.args([source.join("ccx_2.20.o"), source.join("ccx_2.20.a")]);
-    run(link.args(["-lspooles", "-lpthread", "-larpack", "-llapack", "-lblas", "-lm"]));
-}
-
 /// One element along the path in CalculiX.
 #[test]
 fn calculix_follows_the_history() {
-    let Some(source) = calculix() else { return };
+    let Some(source) = hosts::calculix() else { return };
     let directory = tempfile::tempdir().unwrap();
     let file = |name: &str| directory.path().join(name);
     std::fs::write(file("law.f90"), fortran_source(&law(), "law").unwrap()).unwrap();
-    linked(&source, &file("law.f90"), &file("ccx"));
+    hosts::link_calculix(&source, &[&file("law.f90")], &[], &file("ccx"));
     let mut deck = String::from(
         "*NODE, NSET=ALL\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n\
          *ELEMENT, TYPE=C3D8, ELSET=CUBE\n1,1,2,3,4,5,6,7,8\n*MATERIAL, NAME=USER_LAW\n*USER MATERIAL, CONSTANTS=1\n1.0e6\n\
@@ -178,9 +160,7 @@ fn calculix_follows_the_history() {
         }
         deck += "*EL PRINT, ELSET=CUBE\nS, SDV\n*END STEP\n";
     }
-    std::fs::write(file("cube.inp"), deck).unwrap();
-    run(Command::new(file("ccx")).arg("cube").current_dir(directory.path()));
-    let results = std::fs::read_to_string(file("cube.dat")).unwrap();
+    let (_, results) = hosts::run_calculix(&file("ccx"), directory.path(), &deck);
     // Cauchy stress in the order xx yy zz xy xz yz, of eight points a step
     let blocks: Vec<&str> = results.split("stresses").skip(1).collect();
     assert_eq!(blocks.len(), path().len());

@@ -7,6 +7,7 @@ use crate::network::{
     Architecture,
 };
 use crate::surrogate::{Flags, Header, Kind, Prediction, Support, Workspace, examples};
+pub(super) use evidence::hosts::{run, there};
 use polycore::constitutive::Law;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, Voigt6x6, voigt};
 use std::path::Path;
@@ -25,15 +26,6 @@ fn c_of(f: &DeformationGradient) -> Voigt {
     voigt::from_stress(&f.right_cauchy_green())
 }
 
-/// Whether a program is there; says that the test is skipped if not.
-pub(super) fn there(program: &str) -> bool {
-    let found = Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());
-    if !found {
-        evidence::skipped(program);
-    }
-    found
-}
-
 /// All laws, beside them one with kinks, limits and representatives, and the thesis' network.
 fn laws() -> Vec<(String, Surrogate<f64>)> {
     let mut laws = examples().unwrap();
@@ -49,12 +41,6 @@ fn laws() -> Vec<(String, Surrogate<f64>)> {
     header.architecture = Architecture::thesis(4).unwrap();
     laws.push(("ANN-4".into(), Surrogate::random(header, 2).unwrap()));
     laws
-}
-
-pub(super) fn run(command: &mut Command) -> String {
-    let output = command.output().unwrap();
-    assert!(output.status.success(), "{command:?}\n{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
 }
 
 pub(super) fn numbers_of(line: &str) -> Vec<f64> {

@@ -1,0 +1,230 @@
+//! The symbols that hosts call. `umatht_` of [`umatht`] comes along.
+
+use crate::{Error, Material, Print};
+use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
+use std::cell::RefCell;
+use std::ffi::{c_char, c_int};
+
+/// Length of a name in Fortran.
+const NAME: usize = 80;
+/// What a host may cut its increment to where there is no stress.
+const CUT: f64 = 0.25;
+
+thread_local! {
+    /// The last material on this thread, with its name and constants: hosts call once an integration point and iteration.
+    static LAST: RefCell<Option<(Vec<u8>, Vec<f64>, Material)>> = const { RefCell::new(None) };
+}
+
+fn with<R>(name: &[u8], constants: &[f64], work: impl FnOnce(&Material) -> R) -> R {
+    LAST.with_borrow_mut(|last| {
+        let (.., material) = match last.take() {
+            Some(kept) if kept.0 == name && kept.1 == constants => last.insert(kept),
+            _ => {
+                let made = Material::new(&String::from_utf8_lossy(name), constants);
+                let made = made.unwrap_or_else(|error| end(&error));
+                last.insert((name.to_vec(), constants.to_vec(), made))
+            }
+        };
+        work(material)
+    })
+}
+
+/// A host cannot go on, and no Fortran routine returns an error.
+fn end(message: &Error) -> ! {
+    eprintln!("{message}");
+    std::process::exit(2)
+}
+
+fn states(found: usize) {
+    if found < Print::STATES {
+        end(&Error::new("state variables (*DEPVAR)", found, Print::STATES));
+    }
+}
+
+/// UMAT as Abaqus declares it (*Abaqus User Subroutines Guide*, 1.1.44): three normal and three shear stresses. Rubbers take F from `DFGRD1`, prints
+/// the strains `STRAN` + `DSTRAN`. Where a law has no stress, `PNEWDT` asks for a quarter of the increment.
+///
+/// # Safety
+/// As in Fortran: every pointer is valid for the length that `NTENS`, `NSTATV` and `NPROPS` tell, and nothing else refers to what is written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn umat_(
+    stress: *mut f64,
+    statev: *mut f64,
+    ddsdde: *mut f64,
+    _sse: *mut f64,
+    _spd: *mut f64,
+    _scd: *mut f64,
+    _rpl: *mut f64,
+    _ddsddt: *mut f64,
+    _drplde: *mut f64,
+    _drpldt: *mut f64,
+    stran: *const f64,
+    dstran: *const f64,
+    _time: *const f64,
+    dtime: *const f64,
+    temp: *const f64,
+    dtemp: *const f64,
+    _predef: *const f64,
+    _dpred: *const f64,
+    cmname: *const c_char,
+    ndi: *const c_int,
+    _nshr: *const c_int,
+    ntens: *const c_int,
+    nstatv: *const c_int,
+    props: *const f64,
+    nprops: *const c_int,
+    _coords: *const f64,
+    drot: *const [f64; 9],
+    pnewdt: *mut f64,
+    _celent: *const f64,
+    _dfgrd0: *const f64,
+    dfgrd1: *const [f64; 9],
+) {
+    let length = |count: c_int| usize::try_from(count).unwrap_or(0);
+    // SAFETY: the caller's promise
+    let (normal, all) = unsafe { (*ndi, *ntens) };
+    if (normal, all) != (3, 6) {
+        let allowed = "3 and 3: solids; no plane stress, no plane strain";
+        end(&Error::new("normal and shear stresses", format!("{normal} and {}", all - normal), allowed));
+    }
+    // SAFETY: the caller's promise; `NTENS` is 6, lengths below 0 are 0
+    let (name, constants, state, change) = unsafe {
+        (
+            std::slice::from_raw_parts(cmname.cast::<u8>(), NAME),
+            std::slice::from_raw_parts(props, length(*nprops)),
+            std::slice::from_raw_parts_mut(statev, length(*nstatv)),
+            [stran, dstran].map(|six| Voigt::from_column_slice(std::slice::from_raw_parts(six, 6))),
+        )
+    };
+    let answer = with(name, constants, |material| match material {
+        // SAFETY: the caller's promise
+        Material::Rubber(rubber) => rubber.cauchy(unsafe { &*dfgrd1 }),
+        Material::Print(print) => {
+            states(state.len());
+            // SAFETY: the caller's promise
+            let (turn, time, temperature) = unsafe { (&*drot, *dtime, *temp + *dtemp) };
+            let mut old = state.to_vec();
+            turned(&mut old, turn);
+            // the host has turned its own strain
+            old[3..9].copy_from_slice(change[0].as_slice());
+            print.advance(&old, state, temperature, time, |before| before + change[1])
+        }
+    });
+    // SAFETY: the caller's promise
+    let (stress, tangent) =
+        unsafe { (std::slice::from_raw_parts_mut(stress, 6), std::slice::from_raw_parts_mut(ddsdde, 36)) };
+    match answer {
+        Ok((found, slope)) => {
+            stress.copy_from_slice(found.as_slice());
+            tangent.copy_from_slice(slope.as_slice());
+        }
+        Err(_) => {
+            tangent.fill(0.0);
+            // SAFETY: the caller's promise
+            unsafe { *pnewdt = CUT };
+        }
+    }
+}
+
+/// The elastic strains of a state in axes turned by `DROT`.
+fn turned(state: &mut [f64], turn: &[f64; 9]) {
+    if *turn == [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0] {
+        return;
+    }
+    let transformation = voigt::stress_transformation(&polycore::tensor::Tensor::from_column_slice(turn));
+    for branch in state[9..Print::STATES].chunks_exact_mut(6) {
+        let found = transformation * Voigt::from_column_slice(branch);
+        branch.copy_from_slice(found.as_slice());
+    }
+}
+
+/// UMAT_USER of CalculiX 2.20, materials whose name begins with `USER`: Green's strain (tensor shears) in, S and dS/dE out; no `*ORIENTATION`.
+///
+/// # Safety
+/// As in Fortran: every pointer is valid for what CalculiX declares, and nothing else refers to what is written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn umat_user_(
+    amat: *const c_char,
+    iel: *const c_int,
+    iint: *const c_int,
+    kode: *const c_int,
+    elconloc: *const f64,
+    emec: *const [f64; 6],
+    _emec0: *const f64,
+    beta: *const [f64; 6],
+    _xokl: *const f64,
+    _voj: *const f64,
+    _xkl: *const f64,
+    _vj: *const f64,
+    _ithermal: *const c_int,
+    t1l: *const f64,
+    dtime: *const f64,
+    _time: *const f64,
+    _ttime: *const f64,
+    icmd: *const c_int,
+    _ielas: *const c_int,
+    mi: *const c_int,
+    nstate: *const c_int,
+    xstateini: *const f64,
+    xstate: *mut f64,
+    stre: *mut [f64; 6],
+    stiff: *mut [f64; 21],
+    iorien: *const c_int,
+    _pgauss: *const f64,
+    _orab: *const f64,
+    pnewdt: *mut f64,
+) {
+    let length = |count: c_int| usize::try_from(count).unwrap_or(0);
+    // SAFETY: the caller's promise
+    let (orientation, kode) = unsafe { (*iorien, *kode) };
+    if orientation != 0 {
+        end(&Error::new("*ORIENTATION", orientation, "none: these materials are isotropic"));
+    }
+    // SAFETY: the caller's promise: xstate(nstate, mi(1), elements), numbers from 1
+    let (name, constants, strain, old, new) = unsafe {
+        let states = length(*nstate);
+        let place = states * (length(*iint - 1) + length(*mi) * length(*iel - 1));
+        (
+            std::slice::from_raw_parts(amat.cast::<u8>(), NAME),
+            // CalculiX tells the number of constants so
+            std::slice::from_raw_parts(elconloc, length(-kode - 100)),
+            Voigt::from_column_slice(&*emec),
+            std::slice::from_raw_parts(xstateini.wrapping_add(place), states),
+            std::slice::from_raw_parts_mut(xstate.wrapping_add(place), states),
+        )
+    };
+    // shears doubled
+    let doubled = Voigt::from_fn(|k, _| strain[k] * if k < 3 { 1.0 } else { 2.0 });
+    let answer = with(name, constants, |material| match material {
+        Material::Rubber(rubber) => {
+            let c = Voigt::from_fn(|k, _| 2.0 * strain[k] + if k < 3 { 1.0 } else { 0.0 });
+            rubber.material(&c)
+        }
+        Material::Print(print) => {
+            states(old.len());
+            // SAFETY: the caller's promise
+            let (temperature, time) = unsafe { (*t1l, *dtime) };
+            print.advance(old, new, temperature, time, |_| doubled)
+        }
+    });
+    match answer {
+        // SAFETY: the caller's promise; `stiff` is asked for unless ICMD is 3
+        Ok((stress, tangent)) => unsafe {
+            *stre = (stress - Voigt::from(*beta)).into();
+            if *icmd != 3 {
+                *stiff = upper(&tangent);
+            }
+        },
+        // SAFETY: the caller's promise
+        Err(_) => unsafe { *pnewdt = CUT },
+    }
+}
+
+/// The upper triangle, column by column.
+fn upper(tangent: &Voigt6x6) -> [f64; 21] {
+    let places: Vec<(usize, usize)> = (0..6).flat_map(|b| (0..=b).map(move |a| (a, b))).collect();
+    std::array::from_fn(|k| {
+        let (a, b) = places[k];
+        0.5 * (tangent[(a, b)] + tangent[(b, a)])
+    })
+}

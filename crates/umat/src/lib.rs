@@ -1,0 +1,80 @@
+//! Materials of this workspace as UMAT: `umat_`, as Abaqus calls it, and `umat_user_`, CalculiX' own, in `libumat`.
+//!
+//! The name of the material in the input of the host chooses: a hyperelastic law of [`polycore`] (`EIGHT_CHAIN`, `NEO_HOOKEAN`, …, [`Rubber`])
+//! or the solidifying body of prints (`PRINTED_PA12`, [`Print`]); CalculiX wants `USER_` before it. `umatht_` is in the library, too.
+//!
+//! ```
+//! use umat::Rubber;
+//! // K, then C_R and N of the eight-chain law, in the host's unit of stress
+//! let rubber = Rubber::new("eight-chain", &[100.0, 0.3, 25.0])?;
+//! let twice = [2.0, 0.0, 0.0, 0.0, 0.8, 0.0, 0.0, 0.0, 0.7];
+//! let (stress, _) = rubber.cauchy(&twice)?;
+//! assert!(stress[0] > stress[1] && stress[3] == 0.0);
+//! # Ok::<(), umat::Error>(())
+//! ```
+
+mod host;
+mod print;
+mod rubber;
+#[cfg(test)]
+mod tests;
+
+pub use print::Print;
+pub use rubber::Rubber;
+
+/// Why a material cannot be made, or has no stress.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("umat: {what}: found {found}; allowed: {allowed}")]
+pub struct Error {
+    /// What.
+    pub what: String,
+    /// What was found.
+    pub found: String,
+    /// What it may be.
+    pub allowed: String,
+}
+
+impl Error {
+    fn new(what: impl ToString, found: impl ToString, allowed: impl ToString) -> Self {
+        Self { what: what.to_string(), found: found.to_string(), allowed: allowed.to_string() }
+    }
+}
+
+/// A material of a host's input.
+pub enum Material {
+    /// Hyperelastic: no state.
+    Rubber(Rubber),
+    /// Solidifying: [`Print::STATES`] state variables.
+    Print(Print),
+}
+
+impl Material {
+    /// The material of a name: that of a law, in capitals or not, with `_` or `-`, perhaps `USER_` before it and `_…` behind it.
+    ///
+    /// # Errors
+    /// A name that begins with no material's; constants out of range, too few or too many.
+    pub fn new(name: &str, constants: &[f64]) -> Result<Self, Error> {
+        let lower = name.trim().to_lowercase().replace('_', "-");
+        // CalculiX cuts its `USER` off
+        let lower = lower.strip_prefix("user").unwrap_or(&lower).trim_start_matches('-');
+        let is =
+            |key: &str| lower.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'));
+        if is(Print::NAME) {
+            return Ok(Self::Print(Print::new(constants)?));
+        }
+        let keys = rubber::names();
+        // the longest: `eight-chain` begins `eight-chain-root-i2`
+        match keys.iter().filter(|key| is(key)).max_by_key(|key| key.len()) {
+            Some(key) => Ok(Self::Rubber(Rubber::new(key, constants)?)),
+            None => {
+                let allowed =
+                    format!("{}, {}", keys.join(", "), Print::NAME).to_uppercase().replace('-', "_");
+                Err(Error::new(
+                    "name of the material",
+                    name.trim(),
+                    format!("one that begins with {allowed}"),
+                ))
+            }
+        }
+    }
+}

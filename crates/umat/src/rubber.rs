@@ -1,0 +1,66 @@
+//! Hyperelastic laws under the deformations that hosts hand over.
+
+use crate::Error;
+use polycore::constitutive::hyperelastic::{Compressible, Hyperelastic, MODELS, Volumetric, model};
+use polycore::constitutive::{Law, Workspace};
+use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
+use polycore::tensor::{DeformationGradient, Tensor};
+
+/// W₀(λ₁, λ₂, λ₃) − g ln J + ¼λ(J² − 1 − 2 ln J): a law of chapter 1 with a bulk modulus.
+pub struct Rubber {
+    law: Compressible<Box<dyn Hyperelastic>>,
+}
+
+/// Keys of the laws.
+pub(crate) fn names() -> Vec<&'static str> {
+    MODELS.iter().map(|model| model.key).collect()
+}
+
+impl Rubber {
+    /// A law by its key; constants are the bulk modulus K of small strains, then the parameters of the law, stresses in the host's unit.
+    ///
+    /// # Errors
+    /// An unknown key; constants out of range, too few or too many; K below that of the law without a volumetric term.
+    pub fn new(key: &str, constants: &[f64]) -> Result<Self, Error> {
+        let wrong = |error: polycore::constitutive::Error| Error::new(key, format!("{constants:?}"), error);
+        let descriptor = model(key).map_err(wrong)?;
+        let names: Vec<&str> = descriptor.parameters.iter().map(|parameter| parameter.name).collect();
+        let allowed = format!("K, {}", names.join(", "));
+        let Some((&bulk, parameters)) = constants.split_first().filter(|(_, rest)| rest.len() == names.len())
+        else {
+            return Err(Error::new(format!("constants of {key}"), format!("{constants:?}"), allowed));
+        };
+        let law = || descriptor.law(parameters).map_err(wrong);
+        let bare = Compressible::new(law()?, Volumetric::None).and_then(|law| law.bulk_modulus());
+        let bare = bare.map_err(wrong)?;
+        let lame = bulk - bare;
+        if !(lame.is_finite() && lame > 0.0) {
+            return Err(Error::new("K", bulk, format!("above {bare}, that of the law alone")));
+        }
+        let law = Compressible::new(law()?, Volumetric::Ciarlet { lame }).map_err(wrong)?;
+        Ok(Self { law })
+    }
+
+    /// S and ℂ = 2 ∂S/∂C at C, in the order 11, 22, 33, 12, 13, 23.
+    ///
+    /// # Errors
+    /// A C that is not positive definite, chains beyond their length.
+    pub fn material(&self, c: &Voigt) -> Result<(Voigt, Voigt6x6), Error> {
+        let prediction = self.law.tangent(c, &mut Workspace::default()).map_err(stretched)?;
+        Ok((prediction.stress, prediction.tangent.unwrap_or_default()))
+    }
+
+    /// Cauchy stress and the tangent of its Jaumann rate ([`voigt::jaumann_tangent`]) at F, nine numbers column by column.
+    ///
+    /// # Errors
+    /// As [`Self::material`]; det F ≤ 0.
+    pub fn cauchy(&self, f: &[f64; 9]) -> Result<(Voigt, Voigt6x6), Error> {
+        let f = DeformationGradient::new(Tensor::from_column_slice(f)).map_err(stretched)?;
+        let (s, tangent) = self.material(&voigt::from_stress(&f.right_cauchy_green()))?;
+        Ok((voigt::cauchy_of_material(&f, &s), voigt::jaumann_tangent(&f, &s, &tangent)))
+    }
+}
+
+fn stretched(error: impl std::fmt::Display) -> Error {
+    Error::new("deformation", error, "where the law has a stress")
+}
