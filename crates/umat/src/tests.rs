@@ -71,15 +71,7 @@ impl Call<'_> {
 
 fn call<'a>(name: &'a str, constants: &'a [f64], deformation: Tensor) -> Call<'a> {
     let turn = Tensor::identity();
-    Call {
-        name,
-        constants,
-        deformation,
-        strain: [Voigt::zeros(); 2],
-        temperature: [0.0; 2],
-        time: 1.0,
-        turn,
-    }
+    Call { name, constants, deformation, strain: [Voigt::zeros(); 2], temperature: [0.0; 2], time: 1.0, turn }
 }
 
 /// Nearly incompressible under uniaxial stress: σ₁₁ of the incompressible law, to μ/K.
