@@ -64,12 +64,27 @@ impl<T: Real> Packed<T> {
             1 => self.columns::<S, 1>(simd, active, x, stride, biased, out),
             2..=4 => self.columns::<S, 4>(simd, active, x, stride, biased, out),
             5 | 6 => self.columns::<S, 6>(simd, active, x, stride, biased, out),
+            // sixteen registers: two vectors of outputs for six columns at most, or loads are the limit
+            _ if in_panel::<T, S>() == 4 => {
+                let mut first = 0;
+                while first < columns {
+                    let (x, out) = (&x[first * stride..], &mut out[first * self.padded..]);
+                    let biased = biased.saturating_sub(first);
+                    match columns - first {
+                        7 => first += self.columns::<S, 6>(simd, active, x, stride, biased, out),
+                        4.. => first += self.columns::<S, 4>(simd, active, x, stride, biased, out),
+                        _ => first += self.columns::<S, 1>(simd, active, x, stride, biased, out),
+                    }
+                }
+                columns
+            }
             7 => self.columns::<S, 7>(simd, active, x, stride, biased, out),
             8 => self.columns::<S, 8>(simd, active, x, stride, biased, out),
             _ => self.columns::<S, MOST_COLUMNS>(simd, active, x, stride, biased, out),
-        }
+        };
     }
 
+    /// The number of columns.
     #[inline(always)]
     fn columns<S: Simd, const COLUMNS: usize>(
         &self,
@@ -79,16 +94,15 @@ impl<T: Real> Packed<T> {
         stride: usize,
         biased: usize,
         out: &mut [T],
-    ) {
+    ) -> usize {
         let mut lists: [&[T]; COLUMNS] = [&[]; COLUMNS];
         for c in 0..COLUMNS {
             lists[c] = &x[c * stride..c * stride + self.inputs];
         }
         let panels = self.padded / T::PANEL;
-        let in_panel = T::PANEL * size_of::<T>() / size_of::<T::Vector<S>>();
         let mut panel = 0;
         // one column: several panels at a time, to hide the latency of the sums
-        if COLUMNS == 1 && in_panel == 2 {
+        if COLUMNS == 1 && in_panel::<T, S>() == 2 {
             while panel + 4 <= panels {
                 self.tile::<S, COLUMNS, 4, 2>(simd, active, &lists, biased, (panel, 0), out);
                 panel += 4;
@@ -98,22 +112,31 @@ impl<T: Real> Packed<T> {
                 panel += 2;
             }
         }
-        if COLUMNS == 1 && in_panel == 4 {
+        if COLUMNS == 1 && in_panel::<T, S>() == 4 {
             while panel + 2 <= panels {
                 self.tile::<S, COLUMNS, 2, 4>(simd, active, &lists, biased, (panel, 0), out);
                 panel += 2;
             }
         }
-        // 32 registers hold the sums of a whole panel of two; 16 those of one
         for panel in panel..panels {
-            for place in (0..in_panel).step_by(if in_panel == 2 { 2 } else { 1 }) {
-                if in_panel == 2 {
-                    self.tile::<S, COLUMNS, 1, 2>(simd, active, &lists, biased, (panel, place), out);
-                } else {
-                    self.tile::<S, COLUMNS, 1, 1>(simd, active, &lists, biased, (panel, place), out);
+            match in_panel::<T, S>() {
+                // 32 registers hold the sums of a whole panel
+                2 => self.tile::<S, COLUMNS, 1, 2>(simd, active, &lists, biased, (panel, 0), out),
+                4 if COLUMNS == 1 => {
+                    self.tile::<S, COLUMNS, 1, 4>(simd, active, &lists, biased, (panel, 0), out);
+                }
+                4 if COLUMNS <= 6 => {
+                    self.tile::<S, COLUMNS, 1, 2>(simd, active, &lists, biased, (panel, 0), out);
+                    self.tile::<S, COLUMNS, 1, 2>(simd, active, &lists, biased, (panel, 2), out);
+                }
+                places => {
+                    for place in 0..places {
+                        self.tile::<S, COLUMNS, 1, 1>(simd, active, &lists, biased, (panel, place), out);
+                    }
                 }
             }
         }
+        COLUMNS
     }
 
     /// `PANELS` panels from number `panel` on, of each `REGISTERS` vectors of outputs from number `place` on.
@@ -173,6 +196,12 @@ impl<T: Real> Packed<T> {
             }
         }
     }
+}
+
+/// Vectors in a panel.
+#[inline(always)]
+const fn in_panel<T: Real, S: Simd>() -> usize {
+    T::PANEL * size_of::<T>() / size_of::<T::Vector<S>>()
 }
 
 fn zeros<T: Real>(length: usize) -> Lines<T> {
