@@ -20,7 +20,8 @@ pub struct Browser {
 impl Browser {
     /// Opens a file in a window of a size; none, said by name, where there is no chromedriver.
     pub fn open(page: &Path, [width, height]: [u32; 2]) -> Option<Self> {
-        let started = Command::new("chromedriver").arg("--port=0").stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
+        let started =
+            Command::new("chromedriver").arg("--port=0").stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
         let Ok(mut driver) = started else {
             evidence::skipped("chromedriver");
             return None;
@@ -119,9 +120,7 @@ impl Browser {
     /// A way of fingers, or of the mouse with its button down, each from one place of the window to another.
     #[track_caller]
     pub fn drag(&self, kind: &str, ways: &[[[f64; 2]; 2]]) {
-        let step = |[x, y]: [f64; 2], duration: u32| {
-            json!({ "type": "pointerMove", "duration": duration, "x": x.round() as i64, "y": y.round() as i64 })
-        };
+        let step = |[x, y]: [f64; 2], duration: u32| json!({ "type": "pointerMove", "duration": duration, "x": x.round() as i64, "y": y.round() as i64 });
         let pointer = |(k, &[from, to]): (usize, &[[f64; 2]; 2])| {
             let half = [0, 1].map(|d| 0.5 * (from[d] + to[d]));
             json!({ "type": "pointer", "id": format!("{kind}{k}"), "parameters": { "pointerType": kind }, "actions": [

@@ -79,7 +79,9 @@ fn an_archive_for_this_system() {
         if place == "bin/peri" {
             let mut bytes = Vec::new();
             entry.read_to_end(&mut bytes).unwrap();
-            assert!(bytes == fs::read(executable("peri")).unwrap() && entry.header().mode().unwrap() & 0o100 != 0);
+            assert!(
+                bytes == fs::read(executable("peri")).unwrap() && entry.header().mode().unwrap() & 0o100 != 0
+            );
         }
         places.insert(place);
     }

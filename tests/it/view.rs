@@ -224,9 +224,15 @@ fn what_there_is_is_shown_or_named() {
     fs::write(here.join("sheet.toml"), SHEET.replace("steps = 30", "steps = 3000")).unwrap();
     let mut child = command("peri", "run sheet.toml --output half", here).spawn().unwrap();
     let frames = here.join("half/sheet.frames");
-    let written = || fs::read_dir(here.join("half")).into_iter().flatten().flatten().find_map(|entry| {
-        entry.file_name().to_string_lossy().ends_with(".frames").then(|| fs::read_dir(entry.path()).unwrap().count())
-    });
+    let written = || {
+        fs::read_dir(here.join("half")).into_iter().flatten().flatten().find_map(|entry| {
+            entry
+                .file_name()
+                .to_string_lossy()
+                .ends_with(".frames")
+                .then(|| fs::read_dir(entry.path()).unwrap().count())
+        })
+    };
     while written().is_none_or(|count| count < 4) {
         std::thread::sleep(std::time::Duration::from_millis(20));
     }

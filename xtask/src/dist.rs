@@ -16,8 +16,13 @@ use crate::workspace::Workspace;
 /// What an archive contains of the tree.
 const FILES: [&str; 5] = ["README.md", "CHANGELOG.md", "CITATION.cff", "LICENSE-APACHE", "LICENSE-MIT"];
 /// Shells and what their completions are called.
-const SHELLS: [(&str, &str, &str); 5] =
-    [("bash", "", ""), ("zsh", "_", ""), ("fish", "", ".fish"), ("powershell", "_", ".ps1"), ("elvish", "", ".elv")];
+const SHELLS: [(&str, &str, &str); 5] = [
+    ("bash", "", ""),
+    ("zsh", "_", ""),
+    ("fish", "", ".fish"),
+    ("powershell", "_", ".ps1"),
+    ("elvish", "", ".elv"),
+];
 
 /// Options of `cargo xtask dist`.
 #[derive(clap::Args)]
@@ -52,7 +57,10 @@ pub fn run(workspace: &Workspace, options: &Options) -> Result<bool> {
     let file = |place: &str, bytes: &[u8]| -> Result<()> {
         let path = root.join(place);
         let parent = path.parent().unwrap_or(&root);
-        fs::create_dir_all(parent).and_then(|()| fs::write(&path, bytes)).into_diagnostic().wrap_err(path.display().to_string())
+        fs::create_dir_all(parent)
+            .and_then(|()| fs::write(&path, bytes))
+            .into_diagnostic()
+            .wrap_err(path.display().to_string())
     };
     for (program, executable) in programs.iter().zip(&executables) {
         let place = root.join("bin").join(executable.file_name().unwrap_or_default());
@@ -97,7 +105,8 @@ fn said(executable: &Path, arguments: &[&str]) -> Result<Vec<u8>> {
 fn pack(root: &Path, name: &str, archive: &Path) -> Result<()> {
     let temporary = archive.with_extension("part");
     let write = || -> std::io::Result<()> {
-        let mut builder = tar::Builder::new(GzEncoder::new(fs::File::create(&temporary)?, Compression::best()));
+        let mut builder =
+            tar::Builder::new(GzEncoder::new(fs::File::create(&temporary)?, Compression::best()));
         builder.append_dir_all(name, root)?;
         builder.into_inner()?.finish()?.flush()?;
         fs::rename(&temporary, archive)

@@ -11,15 +11,18 @@ use crate::validate::outcome::Outcome;
 /// None where there is nothing to turn.
 pub fn page(outcome: &Outcome) -> Option<PathBuf> {
     let report = outcome.report.as_ref()?;
-    let of_it = |key: &str| ["broken_bonds", "birth_energy"].iter().any(|name| key.split('[').next() == Some(name));
-    let worth = report.values.keys().any(|key| of_it(key) && report.scalar(key).is_some_and(|value| value != 0.0));
+    let of_it =
+        |key: &str| ["broken_bonds", "birth_energy"].iter().any(|name| key.split('[').next() == Some(name));
+    let worth =
+        report.values.keys().any(|key| of_it(key) && report.scalar(key).is_some_and(|value| value != 0.0));
     let entries = std::fs::read_dir(&outcome.output).ok()?.flatten();
     let fields = entries.filter(|entry| entry.path().extension().is_some_and(|end| end == "vtkhdf")).count();
     if !worth || fields == 0 {
         return None;
     }
     let path = outcome.output.join(view::FILE_NAME);
-    let age = |path: &Path| path.metadata().and_then(|file| file.modified()).unwrap_or(SystemTime::UNIX_EPOCH);
+    let age =
+        |path: &Path| path.metadata().and_then(|file| file.modified()).unwrap_or(SystemTime::UNIX_EPOCH);
     if age(&path) < age(&outcome.output.join(polycore::report::FILE_NAME)) {
         view::write(&outcome.output, None).ok()?;
     }

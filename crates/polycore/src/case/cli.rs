@@ -187,7 +187,9 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
             Ok(true)
         }
         Command::Man { output } => prepare_directory(&output)
-            .and_then(|()| clap_mangen::generate_to(command, &output).map_err(Error::io("write into", &output)))
+            .and_then(|()| {
+                clap_mangen::generate_to(command, &output).map_err(Error::io("write into", &output))
+            })
             .map(|()| true)
             .map_err(Failure::from),
     })

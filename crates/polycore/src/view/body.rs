@@ -100,7 +100,8 @@ impl Body {
             true => particles(frames, &steps, bridge, detail, &mut notes)?,
             false => mesh(frames, &steps, detail, &mut notes)?,
         };
-        let nothing = || Error::Data { what: format!("fields `{name}`"), reason: "no cell can be drawn".into() };
+        let nothing =
+            || Error::Data { what: format!("fields `{name}`"), reason: "no cell can be drawn".into() };
         let mut store = Store::default();
         let axes = [0, 1, 2].map(|d| {
             let values: Vec<f64> = solid.points.iter().map(|x| x[d]).collect();
@@ -169,7 +170,8 @@ fn particles(
     if choice.kept.len() < reference.len() {
         notes.push(format!("{} cells for {} particles", choice.kept.len(), reference.len()));
     }
-    let keep = |all: Vec<[f64; 3]>| -> Vec<[f64; 3]> { choice.kept.iter().map(|&k| all[k as usize]).collect() };
+    let keep =
+        |all: Vec<[f64; 3]>| -> Vec<[f64; 3]> { choice.kept.iter().map(|&k| all[k as usize]).collect() };
     let positions = steps.iter().map(|&step| frames.at(step, |series, step| Ok(keep(series.points(step)?))));
     let positions = positions.collect::<Result<Vec<_>, Error>>()?;
     Ok((choice.solid(&keep(reference), &positions, bridge).by_kind(), choice.plane))
@@ -238,9 +240,8 @@ fn groups(solid: &Solid, store: &mut Store) -> Vec<Group> {
         let row = |corner: usize, half: u32| -> Vec<u16> {
             corners.iter().skip(corner).step_by(count).map(|point| (point >> half) as u16).collect()
         };
-        let [low, high] = [0, 16].map(|half| {
-            store.push(&(0..count).map(|corner| row(corner, half)).collect::<Vec<_>>())
-        });
+        let [low, high] =
+            [0, 16].map(|half| store.push(&(0..count).map(|corner| row(corner, half)).collect::<Vec<_>>()));
         Group { kind: kinds[0], low, high }
     });
     groups.collect()

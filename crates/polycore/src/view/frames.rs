@@ -42,7 +42,8 @@ impl Frames {
             vtkhdf::read(&merged)?
         } else {
             let frames = folder.join(format!("{name}.frames"));
-            files.extend(names(&frames)?.iter().filter(|name| !name.starts_with('.')).map(|n| frames.join(n)));
+            files
+                .extend(names(&frames)?.iter().filter(|name| !name.starts_with('.')).map(|n| frames.join(n)));
             files.sort();
             let Some(first) = files.first() else { return Ok(None) };
             vtkhdf::read(first)?
@@ -58,11 +59,6 @@ impl Frames {
     /// Steps.
     pub fn len(&self) -> usize {
         if self.files.is_empty() { self.first.len() } else { self.files.len() }
-    }
-
-    /// Points or particles.
-    pub fn points(&self) -> usize {
-        self.first.number_of_points()
     }
 
     /// Arrays at points and at cells: names and numbers of components.
@@ -82,7 +78,11 @@ impl Frames {
     ///
     /// # Errors
     /// Those of reading a damaged file.
-    pub fn at<T>(&self, step: usize, read: impl FnOnce(&Series, usize) -> Result<T, Error>) -> Result<T, Error> {
+    pub fn at<T>(
+        &self,
+        step: usize,
+        read: impl FnOnce(&Series, usize) -> Result<T, Error>,
+    ) -> Result<T, Error> {
         match self.files.get(step) {
             Some(file) => read(&vtkhdf::read(file)?, 0),
             None => read(&self.first, step),

@@ -64,7 +64,8 @@ pub fn view(folder: impl AsRef<Path>) -> Result<String, Error> {
     found.read(folder, "")?;
     for name in frames::names(folder)? {
         let path = folder.join(&name);
-        let is_run = || [report::FILE_NAME, checkpoint::FILE_NAME].iter().any(|file| path.join(file).is_file());
+        let is_run =
+            || [report::FILE_NAME, checkpoint::FILE_NAME].iter().any(|file| path.join(file).is_file());
         if path.is_dir() && !name.starts_with('.') && is_run() {
             found.read(&path, &format!("{name}/"))?;
         }
@@ -72,13 +73,21 @@ pub fn view(folder: impl AsRef<Path>) -> Result<String, Error> {
     if let Some(report) = &found.report {
         found.tables.curves(report);
     }
-    if found.report.is_none() && found.bodies.is_empty() && found.tables.tables.is_empty() && !found.unfinished {
+    if found.report.is_none()
+        && found.bodies.is_empty()
+        && found.tables.tables.is_empty()
+        && !found.unfinished
+    {
         return Err(Error::OutputDirectory {
             path: folder.to_path_buf(),
-            reason: format!("there are no results: no {}, no tables (*.csv), no fields (*.vtkhdf)", report::FILE_NAME),
+            reason: format!(
+                "there are no results: no {}, no tables (*.csv), no fields (*.vtkhdf)",
+                report::FILE_NAME
+            ),
         });
     }
-    let name = folder.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
+    let name =
+        folder.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
     page(&name.unwrap_or_else(|| folder.display().to_string()), found)
 }
 
@@ -131,28 +140,23 @@ impl Found {
         (1.02 * most).clamp(1.5, 100.0)
     }
 
-    /// Bodies and their numbers, each within its share of the page, and what is left out.
-    fn bodies(&self) -> Result<(Vec<Body>, Vec<String>, Vec<String>), Error> {
-        let (mut bodies, mut numbers) = (Vec::new(), Vec::new());
+    /// Bodies and their numbers as text, each within its share of the page.
+    fn bodies(&self) -> Result<Vec<(Body, String)>, Error> {
         let share = FIELDS / self.bodies.len().clamp(1, BODIES);
-        for (prefix, frames) in self.bodies.iter().take(BODIES) {
-            let name = format!("{prefix}{}", frames.name);
+        let fitting = |(prefix, frames): &(String, Frames)| {
             let bridge = self.bridge(&frames.name);
             let mut detail = Detail { steps: STEPS, coarser: 1 };
             loop {
-                let (body, store) = Body::new(frames, name.clone(), bridge, detail)?;
+                let (body, store) = Body::new(frames, format!("{prefix}{}", frames.name), bridge, detail)?;
                 let text = store.text();
                 let least = detail.coarser >= COARSEST && detail.steps <= 2;
                 if text.len() <= share || least {
-                    bodies.push(body);
-                    numbers.push(text);
-                    break;
+                    return Ok((body, text));
                 }
                 detail = detail.less(frames.len(), text.len() as f64 / share as f64);
             }
-        }
-        let left_out = self.bodies.iter().skip(BODIES).map(|(prefix, frames)| format!("{prefix}{}", frames.name));
-        Ok((bodies, numbers, left_out.collect()))
+        };
+        self.bodies.iter().take(BODIES).map(fitting).collect()
     }
 }
 
@@ -180,8 +184,9 @@ struct Scalar<'a> {
 }
 
 fn page(name: &str, found: Found) -> Result<String, Error> {
-    let (bodies, numbers, mut left_out) = found.bodies()?;
-    left_out.extend(found.tables.left_out.iter().cloned());
+    let (bodies, numbers): (Vec<Body>, Vec<String>) = found.bodies()?.into_iter().unzip();
+    let beyond = found.bodies.iter().skip(BODIES).map(|(prefix, frames)| format!("{prefix}{}", frames.name));
+    let mut left_out: Vec<String> = beyond.chain(found.tables.left_out.iter().cloned()).collect();
     let finite = |x: f64| x.is_finite().then_some(x);
     let mut scalars = Vec::new();
     let (mut judged, mut header) = (Vec::new(), json!(null));
@@ -220,7 +225,10 @@ fn page(name: &str, found: Found) -> Result<String, Error> {
         data += &format!("<script type=\"text/plain\" id=\"body-{index}\">{text}</script>\n");
     }
     if !bodies.is_empty() || !found.tables.tables.is_empty() {
-        data += &format!("<script type=\"text/plain\" id=\"plotly\">{}</script>\n", pack::zipped(plotly().as_bytes()));
+        data += &format!(
+            "<script type=\"text/plain\" id=\"plotly\">{}</script>\n",
+            pack::zipped(plotly().as_bytes())
+        );
     }
     Ok(page.replacen("<!--data-->", &data, 1))
 }

@@ -49,7 +49,7 @@ impl Levels {
     /// The level next to a number; [`NOTHING`] for one that is not finite.
     pub fn level(&self, number: f64) -> u16 {
         match number.is_finite() {
-            true if self.step > 0.0 => ((number - self.low) / self.step).round() as u16,
+            true if self.step > 0.0 => (number / self.step - self.low / self.step).round() as u16,
             true => 0,
             false => NOTHING,
         }

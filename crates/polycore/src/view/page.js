@@ -67,7 +67,7 @@ function stageLayout() {
   const sizes = box.map(([low, high]) => high - low + 2 * pad), longest = Math.max(...sizes);
   const scene = {
     uirevision: `${solid.told.name}`, dragmode: "orbit", aspectmode: "manual",
-    aspectratio: Object.fromEntries(names.map((name, d) => [name, 1.3 * sizes[d] / longest])),
+    aspectratio: Object.fromEntries(names.map((name, d) => [name, (plane ? 1.8 : 1.6) * sizes[d] / longest])),
     camera: plane
       ? { eye: { x: 0, y: 0, z: 1.2 }, up: { x: 0, y: 1, z: 0 }, projection: { type: "orthographic" } }
       : { eye: { x: 0.65, y: -1, z: 0.55 }, up: { x: 0, y: 0, z: 1 }, projection: { type: "orthographic" } },
@@ -81,8 +81,11 @@ function stageLayout() {
   return { scene, margin: { l: 0, r: 0, t: 0, b: 0 }, font: FONT, showlegend: false };
 }
 
+// Inferno of matplotlib at equal distances
+const INFERNO = ["#000004", "#1b0c41", "#4a0c6b", "#781c6d", "#a52c60", "#cf4446", "#ed6925", "#fb9b06", "#f7d13d", "#fcffa4"];
+
 function colours(name) {
-  if (/temperature/.test(name)) return "Inferno";
+  if (/temperature/.test(name)) return INFERNO.map((colour, k) => [k / (INFERNO.length - 1), colour]);
   return /damage|flags/.test(name) ? "Cividis" : "Viridis";
 }
 
@@ -140,7 +143,9 @@ function moment({ time, displacement, load }) {
   if (!solid.told.particles) return `t = ${short(time)} s (${step + 1} of ${many})`;
   const held = displacement === null ? "" : `, displacement ${short(1e3 * displacement)} mm`;
   const pulled = load === null ? "" : `, load ${short(load)} N`;
-  return `load step ${short(time)}${held}${pulled} (${step + 1} of ${many})`;
+  // between two steps: 1/2, 2/3, 3/4, …
+  const part = time % 1, within = part ? `, equilibrium ${Math.round(part / (1 - part))}` : "";
+  return `load step ${Math.ceil(time)}${within}${held}${pulled} (${step + 1} of ${many})`;
 }
 
 async function choose(index) {

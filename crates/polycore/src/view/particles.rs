@@ -63,7 +63,8 @@ impl Choice {
                 // a particle off the lattice is drawn by itself
                 !on(&place(x)) || (0..3).all(|d| at[d] % steps[d] == steps[d] / 2 % layers[d])
             };
-            let kept: Vec<u32> = (0..reference.len() as u32).filter(|&k| keep(&reference[k as usize])).collect();
+            let kept: Vec<u32> =
+                (0..reference.len() as u32).filter(|&k| keep(&reference[k as usize])).collect();
             let coarsest = (0..3).all(|d| steps[d] >= layers[d] / LAYERS);
             if kept.len() <= MOST[0] / coarser.max(1) || coarsest {
                 let sides = [0, 1, 2].map(|d| spacing[d] * steps[d] as f64);
@@ -258,4 +259,85 @@ fn nearest(points: &[[f64; 3]]) -> f64 {
     let mut found: Vec<f64> = (0..points.len()).step_by(every).map(of).filter(|x| x.is_finite()).collect();
     found.sort_unstable_by(f64::total_cmp);
     found.get(found.len() / 2).copied().filter(|x| *x > 0.0).unwrap_or(1e-3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lattice([a, b, c]: [usize; 3]) -> Vec<[f64; 3]> {
+        (0..a * b * c)
+            .map(|k| [0.3 + 0.5 * (k % a) as f64, 0.2 * (k / a % b) as f64, 0.5 * (k / a / b) as f64])
+            .collect()
+    }
+
+    /// Cells of unequal sides deform as one: every corner goes to its image, no corner twice, the volume is that of the block.
+    #[test]
+    fn blocks_deform_as_one() {
+        let rest = lattice([6, 5, 4]);
+        let image =
+            |x: &[f64; 3]| [2.0 * x[0] + 0.3 * x[1], 0.9 * x[1] - 0.1 * x[2], 1.1 * x[2] + 0.2 * x[0]];
+        let choice = Choice::of(&rest, 1);
+        assert!(
+            (0..3).all(|d| (choice.sides[d] - [0.5, 0.2, 0.5][d]).abs() < 1e-12)
+                && !choice.plane
+                && choice.lattice
+        );
+        let solid = choice.solid(&rest, &[rest.clone(), rest.iter().map(image).collect()], 100.0);
+        assert_eq!((solid.points.len(), solid.corners.len()), (7 * 6 * 5, 8 * 120));
+        for (x, (still, moved)) in solid.points.iter().zip(solid.moved[0].iter().zip(&solid.moved[1])) {
+            assert!(
+                (0..3).all(|d| still[d].abs() < 1e-12 && (x[d] + moved[d] - image(x)[d]).abs() < 1e-12),
+                "{x:?}"
+            );
+        }
+        // corners in VTK's order: the determinant of the edges at corner 0 is the volume
+        let corner = |k: usize| solid.points[solid.corners[k] as usize];
+        let edge = |k: usize| [0, 1, 2].map(|d| corner(k)[d] - corner(0)[d]);
+        let [u, v, w] = [1, 3, 4].map(edge);
+        let volume = u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0])
+            + u[2] * (v[0] * w[1] - v[1] * w[0]);
+        assert!((volume - 0.05).abs() < 1e-12, "{volume}");
+    }
+
+    /// A sheet torn in its last step has a seam from the first, closed until then.
+    #[test]
+    fn cracks_split_corners() {
+        let rest = lattice([8, 6, 1]);
+        let torn: Vec<[f64; 3]> =
+            rest.iter().map(|x| [x[0], x[1] + if x[1] > 0.5 { 1.0 } else { 0.0 }, 0.0]).collect();
+        let choice = Choice::of(&rest, 1);
+        assert!(choice.plane);
+        let solid = choice.solid(&rest, &[rest.clone(), torn], 100.0);
+        assert_eq!(solid.points.len(), 9 * 7 + 9, "a second row of corners");
+        assert!(solid.moved[0].iter().flatten().all(|u| u.abs() < 1e-12));
+        let opened = solid.moved[1].iter().filter(|u| (u[1] - 1.0).abs() < 1e-12).count();
+        assert_eq!(opened, 9 * 4, "the upper half goes as it is");
+    }
+
+    #[test]
+    fn fewer_of_many_and_clouds() {
+        let rest = lattice([100, 80, 10]);
+        let choice = Choice::of(&rest, 1);
+        assert!(choice.kept.len() <= MOST[0] && choice.kept.len() > MOST[0] / 10, "{}", choice.kept.len());
+        let extent = 100.0 * 80.0 * 10.0 * 0.05;
+        let volume = choice.kept.len() as f64 * choice.sides.iter().product::<f64>();
+        assert!((volume / extent - 1.0).abs() < 0.1, "{volume} of {extent}");
+        assert!(Choice::of(&rest, 4).kept.len() < choice.kept.len() / 3);
+        // a turned lattice is a cloud
+        let (s, c) = 0.4f64.sin_cos();
+        let turned: Vec<[f64; 3]> =
+            lattice([30, 20, 1]).iter().map(|x| [c * x[0] - s * x[1], s * x[0] + c * x[1], 0.0]).collect();
+        let choice = Choice::of(&turned, 1);
+        assert!(
+            !choice.lattice && choice.plane && (choice.sides[0] - 0.2).abs() < 1e-9,
+            "{:?}",
+            choice.sides
+        );
+        let solid = choice.solid(&turned, std::slice::from_ref(&turned), 2.0);
+        assert_eq!(solid.points.len(), 4 * 600);
+        // one particle
+        let one = [[1.0, 2.0, 0.0]];
+        assert_eq!(Choice::of(&one, 1).solid(&one, &[one.to_vec()], 2.0).points.len(), 4);
+    }
 }

@@ -2,6 +2,9 @@
 
 use nalgebra::Matrix3;
 
+/// The value of a scalar from the components of an array at a place.
+pub type Rule = Box<dyn Fn(&[f64]) -> f64>;
+
 /// A scalar made of the components of an array at a place.
 pub struct Scalar {
     /// As the page shows it.
@@ -9,7 +12,7 @@ pub struct Scalar {
     /// Components of the array.
     pub components: usize,
     /// Its value.
-    pub of: Box<dyn Fn(&[f64]) -> f64>,
+    pub of: Rule,
     /// The least are shown first, and dropped last.
     pub rank: u8,
     unit: &'static str,
@@ -43,7 +46,7 @@ pub fn scalars(array: &str, components: usize, plane: bool) -> Vec<Scalar> {
             .unwrap_or((array, "")),
     };
     let rank = u8::from(array.starts_with("piola")) * 8;
-    let scalar = |what: &str, order: u8, of: Box<dyn Fn(&[f64]) -> f64>| {
+    let scalar = |what: &str, order: u8, of: Rule| {
         let name = if what.is_empty() { stem.to_owned() } else { format!("{stem} {what}") };
         Scalar { name, components, of, rank: rank + order, unit }
     };
@@ -55,7 +58,11 @@ pub fn scalars(array: &str, components: usize, plane: bool) -> Vec<Scalar> {
             let mut list = Vec::new();
             if !array.starts_with("piola") {
                 list.push(scalar("von Mises", 1, Box::new(move |values| von_mises(six(values)))));
-                list.push(scalar("largest principal", 2, Box::new(move |values| largest_principal(six(values)))));
+                list.push(scalar(
+                    "largest principal",
+                    2,
+                    Box::new(move |values| largest_principal(six(values))),
+                ));
             }
             for k in (0..6).filter(|k| !plane || [0, 1, 3].contains(k)) {
                 list.push(scalar(SIX[k], if k < 3 { 1 } else { 3 }, Box::new(move |values| values[part(k)])));

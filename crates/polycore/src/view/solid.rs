@@ -102,14 +102,21 @@ impl Solid {
             }
         }
         let longest = (0..3).map(|d| high[d] - low[d]).fold(f64::MIN_POSITIVE, f64::max);
+        // corners and edges of a solid have the fewest cells: they stand for those around them
+        let mut cells = vec![0u32; self.points.len()];
+        self.corners.iter().for_each(|&corner| cells[corner as usize] += 1);
         let clustered = |side: f64| {
-            let mut first: HashMap<[i64; 3], u32> = HashMap::new();
-            let of = |(k, point): (usize, &[f64; 3])| {
-                let at = [0, 1, 2].map(|d| ((point[d] - low[d]) / side).round() as i64);
-                *first.entry(at).or_insert(k as u32)
-            };
-            let leader: Vec<u32> = self.points.iter().enumerate().map(of).collect();
-            (first.len(), leader)
+            let at =
+                |k: u32| [0, 1, 2].map(|d| ((self.points[k as usize][d] - low[d]) / side).round() as i64);
+            let mut leaders: HashMap<[i64; 3], u32> = HashMap::new();
+            for k in 0..self.points.len() as u32 {
+                let leader = leaders.entry(at(k)).or_insert(k);
+                if cells[k as usize] < cells[*leader as usize] {
+                    *leader = k;
+                }
+            }
+            let of: Vec<u32> = (0..self.points.len() as u32).map(|k| leaders[&at(k)]).collect();
+            (leaders.len(), of)
         };
         // the finest grid of as many points
         let mut side = longest / count as f64;
@@ -165,10 +172,78 @@ impl Solid {
         }
         let mut order: Vec<usize> = (0..self.kinds.len()).collect();
         order.sort_by_key(|&cell| self.kinds[cell]);
-        let corners = |&cell: &usize| &self.corners[starts[cell]..starts[cell] + corners_of(self.kinds[cell])];
+        let corners =
+            |&cell: &usize| &self.corners[starts[cell]..starts[cell] + corners_of(self.kinds[cell])];
         self.corners = order.iter().flat_map(corners).copied().collect();
         self.cell_of = order.iter().map(|&cell| self.cell_of[cell]).collect();
         self.kinds = order.iter().map(|&cell| self.kinds[cell]).collect();
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A brick of n³ hexahedra, with a tetrahedron of second order and a vertex beside it.
+    fn brick(n: usize) -> (Vec<[f64; 3]>, Cells) {
+        let m = n + 1;
+        let mut points: Vec<[f64; 3]> =
+            (0..m * m * m).map(|k| [k % m, k / m % m, k / m / m].map(|x| x as f64 / n as f64)).collect();
+        let mut cells = Cells::default();
+        cells.push(1, &[0]);
+        for k in 0..n * n * n {
+            let first = k % n + m * (k / n % n) + m * m * (k / n / n);
+            cells.push(
+                HEXAHEDRON,
+                &[0, 1, m + 1, m, m * m, m * m + 1, m * m + m + 1, m * m + m].map(|j| (first + j) as u32),
+            );
+        }
+        let first = points.len() as u32;
+        points.extend((0..10).map(|k| [5.0 + f64::from(k % 2), f64::from(k / 2 % 2), f64::from(k / 4)]));
+        cells.push(24, &std::array::from_fn::<u32, 10, _>(|k| first + k as u32));
+        (points, cells)
+    }
+
+    fn volume(solid: &Solid) -> f64 {
+        let (mut sum, mut first) = (0.0, 0);
+        for &kind in &solid.kinds {
+            let corners = &solid.corners[first..first + corners_of(kind)];
+            first += corners.len();
+            let (_, parts) = PARTS.iter().find(|(other, _)| *other == kind).unwrap();
+            for part in *parts {
+                let [o, u, v, w] = part.map(|k| nalgebra::Vector3::from(solid.points[corners[k] as usize]));
+                sum += (u - o).cross(&(v - o)).dot(&(w - o)) / 6.0;
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn meshes_by_their_corners() {
+        let (points, cells) = brick(3);
+        let solid = Solid::mesh(&points, &cells, 1).by_kind();
+        assert_eq!((solid.kinds.len(), solid.points.len()), (28, 64 + 4));
+        assert_eq!(
+            (solid.kinds[0], solid.cell_of[0]),
+            (TETRAHEDRON, 28),
+            "types together, vertices left out"
+        );
+        let hexahedra =
+            Solid { kinds: solid.kinds[1..].to_vec(), corners: solid.corners[4..].to_vec(), ..solid };
+        assert!((volume(&hexahedra) - 1.0).abs() < 1e-12);
+    }
+
+    /// Fewer points fill the same brick.
+    #[test]
+    fn large_meshes_become_coarse() {
+        let (points, cells) = brick(35);
+        let solid = Solid::mesh(&points, &cells, 1);
+        assert!(solid.points.len() <= POINTS && solid.points.len() > POINTS / 4, "{}", solid.points.len());
+        assert!(solid.kinds.iter().all(|&kind| kind == TETRAHEDRON));
+        assert!((volume(&solid) - 1.0).abs() < 0.1, "{}", volume(&solid));
+        assert!(Solid::mesh(&points, &cells, 4).points.len() <= POINTS / 4);
+        let source = |(k, &point): (usize, &u32)| solid.points[k] == points[point as usize];
+        assert!(solid.point_of.iter().enumerate().all(source));
     }
 }

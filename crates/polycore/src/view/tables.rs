@@ -137,7 +137,8 @@ mod tests {
         let mut tables = Tables::default();
         let rows = || (0..10_001).map(f64::from).collect::<Vec<f64>>();
         for name in 0..30 {
-            let columns = [("x", rows()), ("y", rows())].map(|(name, data)| (name.into(), String::new(), data));
+            let columns =
+                [("x", rows()), ("y", rows())].map(|(name, data)| (name.into(), String::new(), data));
             tables.push(&name.to_string(), columns.into());
         }
         let data = &tables.tables[0].columns[0].data;

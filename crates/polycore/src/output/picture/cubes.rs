@@ -81,7 +81,8 @@ impl Particles<'_> {
     #[cfg(feature = "view")]
     pub(crate) fn joins(&self, next: &[[u32; 6]]) -> Vec<[u32; 6]> {
         let lattice = Lattice { particles: self, next };
-        let of = |side: usize, particle: usize| lattice.joined(particle, side).map_or(NONE, |other| other as u32);
+        let of =
+            |side: usize, particle: usize| lattice.joined(particle, side).map_or(NONE, |other| other as u32);
         (0..next.len()).map(|particle| [0, 1, 2, 3, 4, 5].map(|side| of(side, particle))).collect()
     }
 
