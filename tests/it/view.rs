@@ -191,8 +191,10 @@ fn a_print_on_a_small_screen() {
     let grey = "document.getElementById('stage').data[1].i.length";
     assert!(browser.value(grey).as_u64().unwrap() > 0, "glass has no crystallinity");
     browser.picture("print-cut.txt");
-    browser.press("#cut", "\u{e011}");
+    browser.press("#cut", "\u{e010}");
     browser.wait("document.body.dataset.triangles === '0'");
+    browser.click("#other-side");
+    browser.wait(&format!("document.body.dataset.triangles === '{whole}'"));
     // probes
     let traces = browser.value("document.getElementById('chart').data.length").as_u64().unwrap();
     assert!(traces >= 2, "a probe and the marker");

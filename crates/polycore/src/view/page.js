@@ -65,9 +65,13 @@ function stageLayout() {
   const box = scale <= 1 ? solid.box : solid.bounds(scale), names = ["x", "y", "z"];
   const pad = 0.02 * Math.max(...box.map(([low, high]) => high - low)) || 1;
   const sizes = box.map(([low, high]) => high - low + 2 * pad), longest = Math.max(...sizes);
+  // beside the colour bar; lengths are in parts of the height
+  const { clientWidth: width, clientHeight: height } = at("stage"), share = Math.max(0.6, 1 - 95 / width);
+  const room = share * width / height;
+  const fill = plane ? 1.8 * longest * Math.min(1 / sizes[1], room / sizes[0]) : 1.9 * Math.min(1, room);
   const scene = {
-    uirevision: `${solid.told.name}`, dragmode: "orbit", aspectmode: "manual",
-    aspectratio: Object.fromEntries(names.map((name, d) => [name, (plane ? 1.8 : 1.6) * sizes[d] / longest])),
+    uirevision: `${solid.told.name}`, dragmode: "orbit", aspectmode: "manual", domain: { x: [0, share] },
+    aspectratio: Object.fromEntries(names.map((name, d) => [name, fill * sizes[d] / longest])),
     camera: plane
       ? { eye: { x: 0, y: 0, z: 1.2 }, up: { x: 0, y: 1, z: 0 }, projection: { type: "orthographic" } }
       : { eye: { x: 0.65, y: -1, z: 0.55 }, up: { x: 0, y: 0, z: 1 }, projection: { type: "orthographic" } },
@@ -81,8 +85,8 @@ function stageLayout() {
   return { scene, margin: { l: 0, r: 0, t: 0, b: 0 }, font: FONT, showlegend: false };
 }
 
-// Inferno of matplotlib at equal distances
-const INFERNO = ["#000004", "#1b0c41", "#4a0c6b", "#781c6d", "#a52c60", "#cf4446", "#ed6925", "#fb9b06", "#f7d13d", "#fcffa4"];
+// Inferno of matplotlib without its black end, on which no light shows a shape
+const INFERNO = ["#2a0b54", "#4a0c6b", "#781c6d", "#a52c60", "#cf4446", "#ed6925", "#fb9b06", "#f7d13d", "#fcffa4"];
 
 function colours(name) {
   if (/temperature/.test(name)) return INFERNO.map((colour, k) => [k / (INFERNO.length - 1), colour]);
@@ -93,8 +97,10 @@ function cutting() {
   const axis = at("axis").selectedIndex - 1;
   at("cut").disabled = axis < 0;
   if (axis < 0) return null;
-  const [low, high] = solid.box[axis];
-  return { axis, at: low + (high - low) * at("cut").value / 1000, sign: at("other-side").checked ? -1 : 1 };
+  const [low, high] = solid.box[axis], slack = 1e-6 * (high - low);
+  // what is in front goes: towards +x, −y, +z
+  const sign = (axis === 1 ? -1 : 1) * (at("other-side").checked ? -1 : 1);
+  return { axis, at: low - slack + (high - low + 2 * slack) * at("cut").value / 1000, sign };
 }
 
 function traces() {
@@ -102,8 +108,9 @@ function traces() {
   const { soups: [coloured, grey], range } = solid.surface({ step, field, scale: +at("scale").value, cut: cutting() });
   const own = at("own-range").checked && range[0] <= range[1];
   const [low, high] = !told ? [0, 1] : own ? range : [told.levels.low, told.levels.low + 4095 * told.levels.step];
-  const light = solid.told.plane ? { ambient: 1, diffuse: 0, specular: 0, fresnel: 0 } : { ambient: 0.65, diffuse: 0.55, specular: 0.05, fresnel: 0, roughness: 0.9 };
-  const common = { type: "mesh3d", flatshading: true, lighting: light, lightposition: { x: -2000, y: -4000, z: 6000 } };
+  const light = solid.told.plane ? { ambient: 1, diffuse: 0, specular: 0, fresnel: 0 } : { ambient: 0.55, diffuse: 0.6, specular: 0.1, fresnel: 0, roughness: 0.8, facenormalsepsilon: 0, vertexnormalsepsilon: 0 };
+  // the light stands in the space of the viewer: above, on the left
+  const common = { type: "mesh3d", flatshading: true, lighting: light, lightposition: { x: -1e5, y: 1e5, z: -1e5 } };
   const { x, y, z, i, j, k, intensity } = told ? coloured : grey;
   document.body.dataset.triangles = coloured.i.length + grey.i.length;
   document.body.dataset.low = low;
@@ -184,19 +191,23 @@ function play() {
   playing = setTimeout(next, 0);
 }
 
-// two fingers: nearer or farther
+// two fingers: nearer or farther, by turns of the wheel that each scale by a tenth
 function pinch(stage) {
-  let apart = 0;
+  const turn = Math.log(1.1);
+  let apart = 0, left = 0;
   const distance = ({ touches: [a, b] }) => Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY);
-  const start = (event) => { apart = event.touches.length === 2 ? distance(event) : 0; };
+  const start = (event) => { [apart, left] = [event.touches.length === 2 ? distance(event) : 0, 0]; };
   const move = (event) => {
-    if (event.touches.length !== 2 || !apart || !stage._fullLayout?.scene?._scene) return;
+    const canvas = stage._fullLayout?.scene?._scene?.glplot?.canvas;
+    if (event.touches.length !== 2 || !apart || !canvas) return;
     event.preventDefault();
     event.stopPropagation();
-    const { aspectratio } = stage._fullLayout.scene, now = distance(event), by = Math.max(0.5, Math.min(2, now / apart));
+    const now = distance(event);
+    left += Math.log(Math.max(now, 1) / Math.max(apart, 1));
     apart = now;
-    const ratio = Object.fromEntries(["x", "y", "z"].map((d) => [`scene.aspectratio.${d}`, aspectratio[d] * by]));
-    Plotly.relayout(stage, ratio);
+    for (; Math.abs(left) >= turn; left -= Math.sign(left) * turn) {
+      canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: -100 * Math.sign(left), bubbles: true, cancelable: true }));
+    }
   };
   stage.addEventListener("touchstart", start, { capture: true, passive: false });
   stage.addEventListener("touchmove", move, { capture: true, passive: false });
