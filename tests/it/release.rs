@@ -4,6 +4,7 @@ use crate::program::{command, executable, finish, workspace};
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::Read;
+use std::process::Command;
 
 fn read(name: &str) -> String {
     fs::read_to_string(workspace().join(name)).unwrap()
@@ -47,6 +48,14 @@ fn published_crates_are_complete() {
             let text = fs::read_to_string(folder.join(licence)).unwrap();
             assert_eq!(text, read(licence), "{}", folder.display());
         }
+        let name = folder.file_name().unwrap().to_str().unwrap();
+        let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
+        let list = ["package", "--list", "--offline", "--allow-dirty", "--package", name];
+        let output = Command::new(cargo).args(list).current_dir(workspace()).output().unwrap();
+        let packed = String::from_utf8(output.stdout).unwrap();
+        let has = |file: &str| packed.lines().any(|line| line.replace('\\', "/") == file);
+        assert!(has("LICENSE-MIT") && has("README.md"), "{name}: {packed}{:?}", output.stderr);
+        assert!(name != "polycore" || has("src/view/page.js") && has("src/view/page.html"), "{packed}");
     }
     assert_eq!(published, 6);
 }
