@@ -240,22 +240,28 @@ function columns() {
   return chart();
 }
 
+// the times of a table's rows where it belongs to the body: load steps of its history, or seconds
+function timesOf(table) {
+  const folder = (name) => name.replace(/[^/]*$/, ""), own = solid?.told.name;
+  if (!solid || folder(table.name) !== folder(own)) return null;
+  if (!solid.told.particles) return table.columns.find((column) => column.name === "time")?.data ?? null;
+  const isHistory = table.name === `${folder(own)}history_${own.slice(folder(own).length)}`;
+  return isHistory ? table.columns[0].data.map((_, row) => row * table.every + 1) : null;
+}
+
+const nearest = (times, wanted) => {
+  const far = (k) => times[k] === null ? Infinity : Math.abs(times[k] - wanted);
+  return times.reduce((best, _, k) => far(k) < far(best) ? k : best, 0);
+};
+
 // the row of a table at a step of the body, where they belong together
 function rowOf(table, frame) {
-  if (!solid || !frame) return -1;
-  const own = solid.told.name, row = (number) => Math.round(number / table.every);
-  if (solid.told.particles) {
-    const folder = own.replace(/[^/]*$/, ""), variant = own.slice(folder.length);
-    if (table.name !== `${folder}history_${variant}`) return -1;
-    return Math.min(row(Math.max(0, Math.ceil(frame.time) - 1)), table.columns[0].data.length - 1);
-  }
-  const times = table.columns.find((column) => column.name === "time");
-  if (!times || table.name.replace(/[^/]*$/, "") !== own.replace(/[^/]*$/, "")) return -1;
-  const far = (k) => times.data[k] === null ? Infinity : Math.abs(times.data[k] - frame.time);
-  const best = times.data.reduce((best, _, k) => far(k) < far(best) ? k : best, 0);
+  const times = frame && timesOf(table);
+  if (!times) return -1;
+  if (solid.told.particles) return nearest(times, Math.ceil(frame.time));
   // a probe that is not there yet has no row
-  const [first, end] = [times.data[0], times.data[times.data.length - 1]], slack = 0.02 * (end - first);
-  return frame.time < first - slack || frame.time > end + slack ? -1 : best;
+  const [first, end] = [times[0], times[times.length - 1]], slack = 0.02 * (end - first);
+  return frame.time < first - slack || frame.time > end + slack ? -1 : nearest(times, frame.time);
 }
 
 function marks() {
@@ -290,14 +296,8 @@ async function chart() {
 
 // a point of a curve chooses the nearest step
 function clicked({ points: [point] }) {
-  const table = group[point.curveNumber];
-  if (!table || !solid) return;
-  const time = solid.told.particles ? null : table.columns.find((column) => column.name === "time")?.data[point.pointNumber];
-  if (rowOf(table, solid.told.frames[step]) < 0 && time === undefined) return;
-  const wanted = time ?? point.pointNumber * table.every + 1;
-  const far = (frame) => Math.abs(frame.time - wanted);
-  const best = solid.told.frames.reduce((best, frame, k, all) => far(frame) < far(all[best]) ? k : best, 0);
-  go(best);
+  const times = group[point.curveNumber] && timesOf(group[point.curveNumber]);
+  if (times) go(nearest(solid.told.frames.map((frame) => frame.time), times[point.pointNumber]));
 }
 
 async function start() {
