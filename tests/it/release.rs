@@ -109,6 +109,10 @@ fn an_archive_for_this_system() {
     for place in ["README.md", "CHANGELOG.md", "CITATION.cff", "LICENSE-APACHE", "LICENSE-MIT"] {
         assert!(places.contains(place), "no {place}");
     }
+    // what the image takes from it
+    for place in read("Dockerfile").split_whitespace().filter_map(|word| word.strip_prefix("/archive/")) {
+        assert!(places.iter().any(|found| found.starts_with(place)), "Dockerfile: no {place}");
+    }
     assert!(page.starts_with(".ie") && page.contains("\\-\\-checkpoint\\-every"), "{page}");
     assert!(terms.contains("\n| nalgebra ") && terms.contains("plotly.js (MIT"), "{terms}");
 }
