@@ -14,14 +14,17 @@
 //! * [`loads`]: loads, displacements and names of values in reports;
 //! * [`memory`]: no run takes more memory than is stated, absurd sizes are refused before they are allocated;
 //! * [`packages`]: what each crate is built with;
+//! * [`release`]: one version everywhere, the archive;
 //! * [`rubber`]: from tests of rubber to a simulated specimen;
 //! * [`schemas`]: JSON Schemas, by which every case is valid;
+//! * [`view`]: pages in a [`browser`];
 //! * [`words`]: slips that would pass in silence, and how much is said;
 //! * [`documents`]: the commands and links that README and docs show.
 
 mod allocations;
 mod bad;
 mod bits;
+mod browser;
 mod chains;
 mod commands;
 mod documents;
@@ -37,8 +40,10 @@ mod parts;
 mod printing;
 mod probes;
 mod program;
+mod release;
 mod results;
 mod rubber;
 mod scenes;
 mod schemas;
+mod view;
 mod words;

@@ -39,9 +39,19 @@ fn no_crate_is_built_with_what_it_does_not_need() {
 fn libraries_bring_no_shell() {
     for package in ["polycore", "peri", "crystfem", "mdsurrogate"] {
         let tree = tree(package, &["--no-default-features"]);
-        for name in
-            ["miette", "toml", "schemars", "csv", "kuva", "png", "clap", "indicatif", "rust-hdf5", "burn"]
-        {
+        for name in [
+            "miette",
+            "toml",
+            "schemars",
+            "csv",
+            "kuva",
+            "png",
+            "clap",
+            "indicatif",
+            "rust-hdf5",
+            "plotly",
+            "burn",
+        ] {
             let reads_tables = package == "mdsurrogate" && name == "csv";
             assert!(reads_tables || !tree.iter().any(|other| other == name), "{package}: {name}");
         }

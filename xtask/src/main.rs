@@ -6,6 +6,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod bench;
+mod dist;
+mod licences;
 mod report;
 mod stamp;
 mod table;
@@ -36,6 +38,8 @@ enum Task {
     Validate(validate::Options),
     /// Measure: `langevin`, `peri-peers`, or a program that has a `bench --json` of its own (`peri`).
     Bench(bench::Options),
+    /// Make the archive of a release for this system: programs, completions, man pages, licences of dependencies.
+    Dist(dist::Options),
     /// Check the tree: lengths of source files, sizes of files in git.
     Tidy,
 }
@@ -46,6 +50,7 @@ fn main() -> ExitCode {
         Task::Test { arguments } => test::run(&workspace, &arguments),
         Task::Validate(options) => validate::run(&workspace, &options),
         Task::Bench(options) => bench::run(&workspace, &options),
+        Task::Dist(options) => dist::run(&workspace, &options),
         Task::Tidy => tidy::run(&workspace),
     };
     match passed {

@@ -21,6 +21,7 @@ mod errata;
 mod evidence;
 mod markdown;
 mod others;
+mod pages;
 mod pictures;
 mod points;
 mod stability;
@@ -104,6 +105,8 @@ struct CaseView {
     href: String,
     command: String,
     results: String,
+    /// Link to the page that shows its bodies.
+    page: Option<String>,
     log: String,
     seconds: f64,
     kept: bool,
@@ -265,6 +268,7 @@ fn view(workspace: &Workspace, outcome: &Outcome, gallery: &mut Gallery) -> Case
         href: outcome.href.clone(),
         command: outcome.command.clone(),
         results: short(&outcome.output),
+        page: pages::page(outcome).map(|path| link(workspace, &path)),
         log: short(&outcome.log),
         seconds: outcome.seconds,
         kept: outcome.kept,

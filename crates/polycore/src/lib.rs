@@ -36,5 +36,7 @@ pub mod scene;
 pub mod tensor;
 pub mod transfer;
 pub mod units;
+#[cfg(feature = "view")]
+pub mod view;
 
 pub use error::Error;

@@ -5,7 +5,9 @@ use super::terminal::{
     self, Progress, Threads, default_output, exit, interrupted, seconds, with_negative_numbers,
 };
 use super::{Case, Options, Part, Sample, Search, Shard, SweepOptions, Vary};
+use crate::Error;
 use crate::checkpoint::Header;
+use crate::output::prepare_directory;
 use crate::scene::{Failure, Source};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::path::{Path, PathBuf};
@@ -43,6 +45,15 @@ enum Command<V: Subcommand> {
     },
     /// Run a scene for every combination of values of some keys, in parallel; finished runs are kept.
     Sweep(Box<SweepArguments>),
+    /// Write one HTML page that shows a run: solids that turn, step by step, beside the curves.
+    #[cfg(feature = "view")]
+    View {
+        /// The output directory of the run, finished or not.
+        output: PathBuf,
+        /// The page; default: view.html in that directory.
+        #[arg(long, value_name = "FILE")]
+        html: Option<PathBuf>,
+    },
     #[command(flatten)]
     Own(V),
     /// Print the JSON Schema of scenes for editors.
@@ -51,6 +62,11 @@ enum Command<V: Subcommand> {
     Completions {
         /// The shell.
         shell: clap_complete::Shell,
+    },
+    /// Write man pages, one for the program and one for each of its commands.
+    Man {
+        /// Folder for the pages.
+        output: PathBuf,
     },
 }
 
@@ -157,6 +173,8 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
         Command::Resume { output, checkpoints } => resume::<C>(&output, checkpoints.every()),
         Command::Check { scene, quick, inputs } => check::<C>(&scene, quick, &inputs),
         Command::Sweep(arguments) => sweep::<C>(*arguments),
+        #[cfg(feature = "view")]
+        Command::View { output, html } => show::<C>(&output, html.as_deref()),
         Command::Own(command) => own(command),
         Command::Schema => {
             crate::say!("{:#}", C::schema());
@@ -168,6 +186,12 @@ pub fn main<C: Case, V: Subcommand>(own: impl FnOnce(V) -> Result<bool, Failure<
             terminal::print(String::from_utf8_lossy(&text));
             Ok(true)
         }
+        Command::Man { output } => prepare_directory(&output)
+            .and_then(|()| {
+                clap_mangen::generate_to(command, &output).map_err(Error::io("write into", &output))
+            })
+            .map(|()| true)
+            .map_err(Failure::from),
     })
 }
 
@@ -237,6 +261,13 @@ fn explain_all<C: Case>(
     describe(source, output, quick, inputs)?;
     lines.into_iter().for_each(|line| crate::say!("{line}"));
     Ok(())
+}
+
+#[cfg(feature = "view")]
+fn show<C: Case>(output: &Path, html: Option<&Path>) -> Result<bool, Failure<C::Error>> {
+    let page = crate::view::write(output, html)?;
+    crate::say!("{}: open it in a browser", page.display());
+    Ok(true)
 }
 
 fn sweep<C: Case>(arguments: SweepArguments) -> Result<bool, Failure<C::Error>> {

@@ -77,8 +77,17 @@ impl Particles<'_> {
         x.map(|x| (x / self.spacing).floor() as i64)
     }
 
-    /// Reference neighbours at both ends of x, y and z.
-    fn neighbours(&self, count: usize) -> Vec<[u32; 6]> {
+    /// Of the given reference neighbours, those without a crack in between; the others become `u32::MAX`.
+    #[cfg(feature = "view")]
+    pub(crate) fn joins(&self, next: &[[u32; 6]]) -> Vec<[u32; 6]> {
+        let lattice = Lattice { particles: self, next };
+        let of =
+            |side: usize, particle: usize| lattice.joined(particle, side).map_or(NONE, |other| other as u32);
+        (0..next.len()).map(|particle| [0, 1, 2, 3, 4, 5].map(|side| of(side, particle))).collect()
+    }
+
+    /// Reference neighbours at both ends of x, y and z, `u32::MAX` where there is none.
+    pub(crate) fn neighbours(&self, count: usize) -> Vec<[u32; 6]> {
         let Some(origin) = self.reference.first() else { return Vec::new() };
         let place = |x: &[f64; 3]| -> Option<[i64; 3]> {
             let steps = [0, 1, 2].map(|d| (x[d] - origin[d]) / self.spacing);

@@ -153,7 +153,7 @@ impl Series {
     }
 
     /// Whether points have a position for each step.
-    pub(super) fn moves(&self) -> bool {
+    pub fn moves(&self) -> bool {
         self.moves
     }
 
