@@ -38,6 +38,7 @@ class Surrogate:
         activations: Sequence[str],
         *,
         strains: ArrayLike,
+        transposed: bool = False,
         kind: str | dict[str, Any] = "ann",
         input_mean: ArrayLike | None = None,
         input_deviation: ArrayLike | None = None,
@@ -47,8 +48,8 @@ class Surrogate:
     ) -> Surrogate:
         """A network of your own, from any framework, as a law with tangents, flags and exports.
 
-        `members` is a list of (W, b), W of shape (outputs, inputs), the layers from input to output, or a list of such lists, an
-        ensemble. `activations` has a name for each layer: ``linear``, ``relu``, ``softplus``, ``tanh``, ``sigmoid``, ``silu``,
+        `members` is a list of (W, b), W of shape (outputs, inputs) as in PyTorch, the layers from input to output, or a list of such
+        lists, an ensemble; `transposed`: W of shape (inputs, outputs), as in JAX and Keras. `activations` has a name for each layer: ``linear``, ``relu``, ``softplus``, ``tanh``, ``sigmoid``, ``silu``,
         ``elu``; the last is usually ``linear``. `strains`, (N, 6), are the C of your training data: predictions outside of their box
         are flagged.
 
@@ -58,7 +59,8 @@ class Surrogate:
         first = members[0]
         ensemble = members if not _is_layer(first) else [members]
         arrays = [
-            [(np.ascontiguousarray(w, dtype=np.float64), np.ascontiguousarray(b, dtype=np.float64)) for w, b in layers]  # type: ignore[misc]
+            [(np.ascontiguousarray(np.asarray(w, dtype=np.float64).T if transposed else np.asarray(w, dtype=np.float64)),
+              np.ascontiguousarray(b, dtype=np.float64)) for w, b in layers]  # type: ignore[misc]
             for layers in ensemble
         ]
         if len(activations) != len(arrays[0]):

@@ -42,7 +42,7 @@ fn node(ends: &[f64], panel: usize, at: f64) -> f64 {
 /// MATLAB, chapter 6).
 fn differentiation() -> [[f64; DEGREE + 1]; DEGREE + 1] {
     let x = nodes();
-    let c = |k: usize| (if k == 0 || k == DEGREE { 2.0 } else { 1.0 }) * if k % 2 == 0 { 1.0 } else { -1.0 };
+    let c = |k: usize| (if k == 0 || k == DEGREE { 2.0 } else { 1.0 }) * if k.is_multiple_of(2) { 1.0 } else { -1.0 };
     let mut d = [[0.0; DEGREE + 1]; DEGREE + 1];
     for i in 0..=DEGREE {
         for j in 0..=DEGREE {
@@ -63,7 +63,7 @@ fn interpolate(values: &[f64; DEGREE + 1], at: f64) -> f64 {
         if at == x {
             return *value;
         }
-        let weight = if k % 2 == 0 { 1.0 } else { -1.0 } * if k == 0 || k == DEGREE { 0.5 } else { 1.0 } / (at - x);
+        let weight = if k.is_multiple_of(2) { 1.0 } else { -1.0 } * if k == 0 || k == DEGREE { 0.5 } else { 1.0 } / (at - x);
         above += weight * value;
         below += weight;
     }
@@ -95,12 +95,12 @@ impl Sampled {
     /// The energies at the points, from 0 at rest outwards: Gauss' rule of six points between neighbours is exact.
     fn integrate(&mut self) {
         const GAUSS: [[f64; 2]; 6] = [
-            [-0.932_469_514_203_152_1, 0.171_324_492_379_170_36],
+            [-0.932_469_514_203_152, 0.171_324_492_379_170_36],
             [-0.661_209_386_466_264_5, 0.360_761_573_048_138_6],
             [-0.238_619_186_083_196_9, 0.467_913_934_572_691],
             [0.238_619_186_083_196_9, 0.467_913_934_572_691],
             [0.661_209_386_466_264_5, 0.360_761_573_048_138_6],
-            [0.932_469_514_203_152_1, 0.171_324_492_379_170_36],
+            [0.932_469_514_203_152, 0.171_324_492_379_170_36],
         ];
         let x = nodes();
         let panels = self.points.len();
@@ -190,7 +190,7 @@ impl BondLaw {
         }
         let law = Sampled::new(low, high, &tension);
         let found = law.tangent();
-        if !(found > 0.0) {
+        if found.is_nan() || found <= 0.0 {
             return Err(value(format!("dt/dl at rest: found {found}; allowed: above 0")));
         }
         Ok(Self { low, high, tension, law: Arc::new(law) })

@@ -56,9 +56,12 @@ pub fn langevin_methods() -> Vec<(&'static str, &'static str, Option<&'static st
     Inverse::ALL.iter().map(|one| (one.name(), one.source(), one.published_error())).collect()
 }
 
+/// Name, unit and example value.
+type Parameter = (&'static str, &'static str, f64);
+
 /// Name of each law, and name, unit and example value of each of its parameters.
 #[pyfunction]
-pub fn models() -> Vec<(&'static str, Vec<(&'static str, &'static str, f64)>)> {
+pub fn models() -> Vec<(&'static str, Vec<Parameter>)> {
     let parameters = |model: &hyperelastic::ModelDescriptor| {
         model.parameters.iter().zip(model.example).map(|(p, &example)| (p.name, p.unit, example)).collect()
     };

@@ -20,10 +20,13 @@ use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
+/// A function of all positions, (N, D); displacement and body force of the points that it takes.
+type Load = (Py<PyAny>, Vec<Option<f64>>, Vec<f64>);
+
 /// A model as Python describes it; lengths in m.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Spec {
+pub struct Spec {
     /// `add` or `cut`, the kind, its numbers.
     shapes: Vec<(String, String, Vec<f64>)>,
     /// Two ends in a plane; in space a corner and two edges.
@@ -40,8 +43,7 @@ struct Spec {
     lattice_calibration: bool,
     critical_stretch: Option<f64>,
     fracture_energy: Option<f64>,
-    /// A function of all positions, (N, D), displacement and body force.
-    regions: Vec<(Py<PyAny>, Vec<Option<f64>>, Vec<f64>)>,
+    regions: Vec<Load>,
     steps: usize,
     contact: Option<f64>,
 }

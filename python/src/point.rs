@@ -14,7 +14,7 @@ use pyo3::types::PyDict;
 /// A polymer as Python describes it, SI.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Spec {
+pub struct Spec {
     density: f64,
     /// Temperatures, K, none of a constant, and values.
     conductivity: (Vec<f64>, Vec<f64>),

@@ -29,7 +29,7 @@ macro_rules! of_program {
 /// How a run behaves.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-struct Behaviour {
+pub struct Behaviour {
     output: PathBuf,
     quick: bool,
     checkpoint_every: f64,

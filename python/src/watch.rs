@@ -87,13 +87,14 @@ pub fn watched<T: Send>(
     let (sender, receiver) = channel();
     let (wants_progress, wants_steps) = (watchers.progress.is_some(), watchers.on_step.is_some());
     let line = Line { stop: &stop, sender, wants_progress, wants_steps, shown: None };
-    py.detach(|| {
+    let stop = &stop;
+    py.detach(move || {
         std::thread::scope(|scope| {
-            let worker = scope.spawn(|| match &pool {
+            let worker = scope.spawn(move || match pool {
                 Some(pool) => pool.install(|| work(line)),
                 None => work(line),
             });
-            let raised = hear(watchers, &receiver, &stop);
+            let raised = hear(watchers, receiver, stop);
             let found = worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             raised.map_or(Ok(found), Err)
         })
@@ -101,7 +102,7 @@ pub fn watched<T: Send>(
 }
 
 /// Serves the working thread until it ends; what was raised first.
-fn hear(watchers: &Watchers, receiver: &Receiver<Message>, stop: &AtomicBool) -> Option<PyErr> {
+fn hear(watchers: &Watchers, receiver: Receiver<Message>, stop: &AtomicBool) -> Option<PyErr> {
     let mut raised = None;
     loop {
         let message = match receiver.recv_timeout(EVERY) {
