@@ -11,7 +11,7 @@ use crate::contact::Contact;
 use crate::error::Error;
 use crate::material::{BondMaterial, Material};
 use crate::potential::KernelFit;
-use crate::solver::{Breaking, Loads, Method, Policy, Record, State, Support, System};
+use crate::solver::{Breaking, Loads, Method, Policy, Record, State, Status, Support, System};
 use crate::stress::{self, BallVolume, Loaded, Measure, Missing, Tensor};
 
 /// What a body can be made of: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
@@ -38,8 +38,8 @@ impl<const D: usize, M: Material<D> + Clone> IntoMaterial<D> for M {
     }
 }
 
-/// Whether a point X, m, belongs to a region.
-type Region<const D: usize> = Box<dyn Fn([f64; D]) -> bool>;
+/// Which of some points X, m, belong to a region.
+type Region<const D: usize> = Box<dyn Fn(&[[f64; D]]) -> Result<Vec<bool>, Error>>;
 
 /// A body, its material and its loads, before anything is built.
 ///
@@ -76,7 +76,17 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
     }
 
     /// Prescribes some components of the displacement of a region, and a body force.
-    pub fn support(mut self, region: impl Fn([f64; D]) -> bool + 'static, support: Support<D>) -> Self {
+    pub fn support(self, region: impl Fn([f64; D]) -> bool + 'static, support: Support<D>) -> Self {
+        self.support_where(move |points| Ok(points.iter().map(|&point| region(point)).collect()), support)
+    }
+
+    /// As [`Self::support`], of a region that sees all particles at once, in the order of [`Simulation::displacements`]: gives
+    /// for each whether it belongs to it.
+    pub fn support_where(
+        mut self,
+        region: impl Fn(&[[f64; D]]) -> Result<Vec<bool>, Error> + 'static,
+        support: Support<D>,
+    ) -> Self {
         self.regions.push((Box::new(region), support));
         self
     }
@@ -110,9 +120,19 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         let (material, critical) = self.material.into_material(&self.body, &bonds)?;
         let mut regions = Vec::new();
         let mut loaded = vec![false; bonds.sites()];
+        let points: Vec<[f64; D]> =
+            bonds.particles().iter().map(|&site| bonds.position(site as usize)).collect();
         for (number, (region, support)) in self.regions.into_iter().enumerate() {
-            let inside = |&site: &u32| region(bonds.position(site as usize));
-            let members: Vec<u32> = bonds.particles().iter().copied().filter(inside).collect();
+            let inside = region(&points)?;
+            if inside.len() != points.len() {
+                let (found, allowed) = (inside.len(), points.len());
+                return Err(Error::geometry(format!(
+                    "region {} of the loads: found {found} answers; allowed: {allowed}, one for each particle",
+                    number + 1
+                )));
+            }
+            let sites = bonds.particles().iter().zip(inside);
+            let members: Vec<u32> = sites.filter(|(_, inside)| *inside).map(|(&site, _)| site).collect();
             if members.is_empty() {
                 return Err(Error::geometry(format!("region {} of the loads has no particle", number + 1)));
             }
@@ -164,13 +184,26 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
     pub fn solve_with(
         &mut self,
         method: impl Method<D>,
+        finished: impl FnMut(&State<D>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        self.solve_watched(method, |_| Ok(()), finished)
+    }
+
+    /// [`Self::solve_with`]; `watch` sees every iteration and may stop the solution by an error, too.
+    ///
+    /// # Errors
+    /// As [`Self::solve_with`], and those of `watch`.
+    pub fn solve_watched(
+        &mut self,
+        method: impl Method<D>,
+        mut watch: impl FnMut(&Status) -> Result<(), Error>,
         mut finished: impl FnMut(&State<D>) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut system = System::new(&mut self.bonds, self.material.clone(), &self.loads, &self.factors);
         system.breaking.clone_from(&self.breaking);
         system.contact = self.contact.take();
-        let solved =
-            method.solve(&mut system, &mut self.state, &mut |_, _| Ok(()), &mut |_, state| finished(state));
+        let mut seen = |status: &Status, _: &State<D>| watch(status);
+        let solved = method.solve(&mut system, &mut self.state, &mut seen, &mut |_, state| finished(state));
         self.contact = system.contact.take();
         solved
     }

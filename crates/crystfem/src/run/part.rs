@@ -11,7 +11,7 @@ use crate::mesh::Mesh;
 use crate::quantities as q;
 use crate::scene::{PartScene, Task};
 use crate::simulation::{Simulation, State};
-use polycore::case::{Finished, Run, STATISTICS};
+use polycore::case::{Finished, Run, STATISTICS, Step, StepField};
 use polycore::output::vtkhdf::{Cells, Data, MeshSeries};
 use polycore::report::{Phases, Quantity, Report};
 use polycore::scene::Source;
@@ -108,6 +108,21 @@ pub fn explain(source: &Source, scene: &PartScene) -> Result<Vec<String>, Failur
     Ok(lines)
 }
 
+/// A time step, as who watches the run sees it: temperatures and the materials' fields at the nodes, NaN where nothing is yet.
+fn seen(simulation: &Simulation, step: &Record, names: &[&'static str]) -> Step {
+    let mut fields = vec![StepField {
+        name: TEMPERATURE,
+        unit: "°C",
+        components: 1,
+        data: simulation.temperatures(f64::NAN).into_iter().map(|kelvin| kelvin - CELSIUS).collect(),
+    }];
+    fields.extend(names.iter().map(|&name| {
+        let data = simulation.field(name).into_iter().map(|value| value.unwrap_or(f64::NAN)).collect();
+        StepField { name, unit: "", components: 1, data }
+    }));
+    Step { values: vec![("time", "s", simulation.state().time), ("time_step", "s", step.dt)], fields }
+}
+
 /// How far a run is, as its checkpoint holds it: frames of the fields that are written, state, rows of the probes, stress, healing.
 type Reached = (usize, State, Vec<Probe>, Option<mechanics::Reached>, Option<Healed>);
 
@@ -165,6 +180,7 @@ impl Recorder<'_> {
                     let (time, dt, equations) = (state.time, step.dt, state.temperature.len());
                     format!("t = {time:.4} of {end:.4} s  step {dt:.3e} s  {equations} equations")
                 });
+                run.step(|| seen(simulation, step, names));
                 if result.is_ok() {
                     let stressed = || follower.as_ref().map(Follower::reached);
                     let healed = || healer.as_ref().map(Healer::reached);

@@ -32,9 +32,10 @@ use crate::potential::KernelFit;
 use crate::quantities as q;
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
 use crate::solver::{Bilinear, Breaking, Criterion, Loads, Method, State, Status, System, load_stepping};
-use polycore::case::{Fault, Run};
+use polycore::case::{Fault, Run, Step, StepField};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
+use std::cell::RefCell;
 
 /// What stops a run: a fault in the scene, or one on the way.
 pub type Failure = polycore::scene::Failure<Error>;
@@ -307,7 +308,10 @@ fn solve<const D: usize>(
     let Solution { variant, done, material, observed, loads, probes, sections, criterion } = *solution;
     let factors = scene.solver.factors();
     let name = variant.name();
+    // iterations and finished steps are both shown
+    let run = &RefCell::new(run);
     let mut watch = |status: &Status, state: &State<D>| -> Result<(), Error> {
+        let mut run = run.borrow_mut();
         if status.iteration.is_multiple_of(20) {
             let part = (done.finished.len() as f64 + part_of(status)) / done.of as f64;
             run.show(part, &|| format!("{name}  {}", line_of(status)));
@@ -344,6 +348,9 @@ fn solve<const D: usize>(
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {
         phases.stop();
         frames.step(bonds, state, phases)?;
+        if state.round == 0 {
+            run.borrow_mut().step(|| seen(bonds, state));
+        }
         phases.start("solve");
         Ok(())
     };
@@ -353,6 +360,32 @@ fn solve<const D: usize>(
     };
     phases.stop();
     Ok(solved?)
+}
+
+/// A finished step, as who watches the run sees it: positions and displacements in three components.
+fn seen<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
+    let Some(record) = state.history.last() else { return Step::default() };
+    let of_particles = |name, get: &dyn Fn(usize) -> [f64; D]| {
+        let each = bonds.particles().iter().flat_map(|&site| frames::in_space(get(site as usize)));
+        StepField { name, unit: "m", components: 3, data: each.collect() }
+    };
+    Step {
+        values: vec![
+            ("displacement", "m", record.displacement),
+            ("load", "N", record.load),
+            ("time", "s", record.time),
+            ("factor", "", record.factor),
+            ("broken_bonds", "", record.broken as f64),
+            ("largest_stretch", "", record.largest_stretch),
+            ("stored", "J", record.stored),
+            ("work", "J", record.work),
+            ("iterations", "", record.iterations as f64),
+        ],
+        fields: vec![
+            of_particles("position", &|site| bonds.position(site)),
+            of_particles("displacement", &|site| state.displacement.get(site)),
+        ],
+    }
 }
 
 /// An iteration in a line.

@@ -212,9 +212,12 @@ pub fn input_state(input: &Input, quick: bool) -> InputState {
 }
 
 impl InputArguments {
+    fn placed(&self) -> BTreeMap<String, PathBuf> {
+        self.inputs.iter().map(|placed| (placed.name.clone(), placed.output.clone())).collect()
+    }
+
     fn of(&self, source: &Source, output: &Path) -> Result<Vec<Input>, SceneError> {
-        let placed = self.inputs.iter().map(|placed| (placed.name.clone(), placed.output.clone())).collect();
-        inputs(source, output, &placed)
+        inputs(source, output, &self.placed())
     }
 }
 
@@ -247,9 +250,24 @@ pub(super) fn attach<C: Case>(
     arguments: &InputArguments,
     with_inputs: bool,
 ) -> Result<Source, Failure<C::Error>> {
+    attached::<C::Error>(source, output, quick, &arguments.placed(), with_inputs)
+}
+
+/// A scene with the results of its inputs, which lie beside `output` or where `placed` says; `with_inputs`: those that are not
+/// current are computed first, by the programs beside this one.
+///
+/// # Errors
+/// Results that are missing or stale, with the command that computes them; an input that fails.
+pub fn attached<E: From<Error>>(
+    source: Source,
+    output: &Path,
+    quick: bool,
+    placed: &BTreeMap<String, PathBuf>,
+    with_inputs: bool,
+) -> Result<Source, Failure<E>> {
     let mut attached = BTreeMap::new();
     let mut refused: Vec<(String, String)> = Vec::new();
-    for input in arguments.of(&source, output)? {
+    for input in inputs(&source, output, placed)? {
         let mut state = input_state(&input, quick);
         if with_inputs && !matches!(state, InputState::Current { .. }) {
             crate::say!("input `{}` is {state}: {}", input.name, input.command(quick));

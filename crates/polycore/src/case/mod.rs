@@ -12,7 +12,7 @@ pub mod terminal;
 
 pub use cli::{RunArguments, main, solve};
 pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run, share_run};
-pub use inputs::{Input, InputState, input_state, inputs};
+pub use inputs::{Input, InputState, attached, input_state, inputs};
 use rows::fits;
 pub use rows::{Row, Rows, STATISTICS};
 pub use sweep::{
@@ -116,6 +116,31 @@ impl Fault for Error {
 /// Sees the part done, from 0 to 1, and a line about it.
 pub type Watcher<'a> = &'a mut (dyn FnMut(f64, &dyn Fn() -> String) + Send);
 
+/// A finished step of a run, for whoever watches it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Step {
+    /// Numbers of the step: name, unit, value.
+    pub values: Vec<(&'static str, &'static str, f64)>,
+    /// Fields at particles or nodes, which do not change their order.
+    pub fields: Vec<StepField>,
+}
+
+/// A field at a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepField {
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Components at each place.
+    pub components: usize,
+    /// Values, the components of a place together.
+    pub data: Vec<f64>,
+}
+
+/// Sees each finished step; the run stops where it gives `false`, as on a signal.
+pub type StepWatcher<'a> = &'a mut (dyn FnMut(Step) -> bool + Send);
+
 /// How a run behaves towards its user.
 pub struct Options<'a> {
     /// Where results go.
@@ -130,6 +155,8 @@ pub struct Options<'a> {
     pub interrupted: &'a (dyn Fn() -> bool + Sync),
     /// Sees progress.
     pub progress: Option<Watcher<'a>>,
+    /// Sees finished steps.
+    pub on_step: Option<StepWatcher<'a>>,
 }
 
 impl<'a> Options<'a> {
@@ -142,6 +169,7 @@ impl<'a> Options<'a> {
             checkpoint_every: Duration::from_secs(30),
             interrupted: &|| false,
             progress: None,
+            on_step: None,
         }
     }
 }
@@ -171,6 +199,7 @@ pub struct Run<'a> {
     lock: Option<RunLock>,
     saved: Instant,
     asked: Option<Instant>,
+    stopped: bool,
 }
 
 impl<'a> Run<'a> {
@@ -190,6 +219,7 @@ impl<'a> Run<'a> {
             lock: None,
             saved: Instant::now(),
             asked: None,
+            stopped: false,
         }
     }
 
@@ -235,7 +265,7 @@ impl<'a> Run<'a> {
     /// # Errors
     /// [`Error::Interrupted`]; the checkpoint cannot be written.
     pub fn pause<T: Serialize>(&mut self, state: impl FnOnce() -> Option<T>) -> Result<(), Error> {
-        let stop = (self.options.interrupted)();
+        let stop = self.stopped || (self.options.interrupted)();
         if !stop && self.saved.elapsed() < self.options.checkpoint_every {
             return Ok(());
         }
@@ -260,6 +290,13 @@ impl<'a> Run<'a> {
     pub fn show(&mut self, part: f64, line: &dyn Fn() -> String) {
         if let Some(progress) = &mut self.options.progress {
             progress(part, line);
+        }
+    }
+
+    /// Shows a finished step where somebody watches; one who wants no more of them stops the run at the next [`Run::pause`].
+    pub fn step(&mut self, step: impl FnOnce() -> Step) {
+        if let Some(watcher) = &mut self.options.on_step {
+            self.stopped |= !watcher(step());
         }
     }
 

@@ -67,7 +67,15 @@ impl SceneError {
     /// The message with the lines of the source it is about, as the command lines print it: one message line, never
     /// wrapped, so that it can be searched for; in colours if standard error is a terminal.
     pub fn render(&self) -> String {
-        let colors = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        self.drawn(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
+    }
+
+    /// [`Self::render`] without colours, for messages that other programs show.
+    pub fn plain(&self) -> String {
+        self.drawn(false)
+    }
+
+    fn drawn(&self, colors: bool) -> String {
         let theme = if colors { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };
         let handler = GraphicalReportHandler::new_themed(theme).with_wrap_lines(false);
         let mut text = String::new();

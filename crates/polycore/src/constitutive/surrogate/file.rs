@@ -40,10 +40,14 @@ impl Surrogate<f64> {
             return Err(Error::file(path, format!("{size} bytes"), "laws up to 4 GiB").into());
         }
         let bytes = std::fs::read(path).map_err(crate::Error::io("read", path))?;
-        Ok(Self::from_bytes(&bytes).map_err(|(found, allowed)| Error::file(path, found, allowed))?)
+        Ok(Self::decode(&bytes).map_err(|(found, allowed)| Error::file(path, found, allowed))?)
     }
 
-    fn to_bytes(&self) -> Result<Vec<u8>, String> {
+    /// The law as the bytes of its file.
+    ///
+    /// # Errors
+    /// What is wrong with a law that cannot be written.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, String> {
         let mut data = Vec::new();
         for (m, member) in self.members.iter().enumerate() {
             for (l, layer) in member.layers().iter().enumerate() {
@@ -63,7 +67,15 @@ impl Surrogate<f64> {
         safetensors::serialize(views, Some(metadata)).map_err(|error| error.to_string())
     }
 
-    fn from_bytes(bytes: &[u8]) -> Result<Self, (String, String)> {
+    /// The law of the bytes of a file.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for what [`Self::read`] refuses.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
+        Self::decode(bytes).map_err(|(found, allowed)| Error::invalid("law", found, allowed))
+    }
+
+    fn decode(bytes: &[u8]) -> Result<Self, (String, String)> {
         let fail = |found: String, allowed: &str| (found, allowed.to_owned());
         let none = |error: safetensors::SafeTensorError| {
             fail(format!("no safetensors file ({error})"), "a law that this program wrote")

@@ -1,0 +1,21 @@
+"""Polymer mechanics across scales.
+
+>>> import polymech
+>>> result = polymech.peri.run("sheet.toml")            # a scene: results in names, arrays and pictures
+>>> result.history["load"], result.report["peak_load"]  # doctest: +SKIP
+
+`peri` (fracture of elastomers) and `crystfem` (heat and crystallization of prints) run scenes, as their command lines do.
+`Langevin`, `Law`, `Surrogate` and `fit` are constitutive laws as functions of arrays. All numbers are SI unless a name says
+otherwise (``temperature_degC``); `Result.report` and `Table` have units beside the numbers.
+"""
+
+from . import crystfem, peri
+from ._laws import Fit, Langevin, Law, Prediction, fit
+from ._polymech import Interrupted, RunError, SceneError, __version__
+from ._result import Report, Result, Table, Value
+from ._surrogate import Surrogate
+
+__all__ = [
+    "Fit", "Interrupted", "Langevin", "Law", "Prediction", "Report", "Result", "RunError", "SceneError", "Surrogate", "Table",
+    "Value", "__version__", "crystfem", "fit", "peri",
+]

@@ -1,0 +1,243 @@
+"""Chain statistics and constitutive laws as functions of arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _polymech
+from ._result import Value
+
+Array = NDArray[np.float64]
+
+
+def flat(x: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+    """Numbers in a row, and their shape; no copy where they are in a row already."""
+    array = np.asarray(x, dtype=np.float64)
+    return np.ascontiguousarray(array).reshape(-1), array.shape
+
+
+class Langevin:
+    """The Langevin function 𝓛(β) = coth β − 1/β of chain statistics, and what belongs to it, at every element of an array."""
+
+    @staticmethod
+    def value(beta: ArrayLike) -> Array:
+        """𝓛(β)."""
+        return Langevin._at("langevin", beta)
+
+    @staticmethod
+    def derivative(beta: ArrayLike) -> Array:
+        """𝓛′(β) = 1/β² − 1/sinh² β."""
+        return Langevin._at("derivative", beta)
+
+    @staticmethod
+    def free_energy(beta: ArrayLike) -> Array:
+        """ψ = β𝓛(β) + ln(β/sinh β), the free energy of a chain for each link and kθ."""
+        return Langevin._at("free_energy", beta)
+
+    @staticmethod
+    def inverse(x: ArrayLike, method: str = "exact") -> Array:
+        """𝓛⁻¹(x) of the relative extension x, ±∞ at ±1 and NaN beyond: exact to 1.6 ulp, or one of `methods`."""
+        return Langevin._at("inverse", x, method)
+
+    @staticmethod
+    def inverse_derivative(x: ArrayLike, method: str = "exact") -> Array:
+        """d𝓛⁻¹/dx, of an approximant its own derivative."""
+        return Langevin._at("inverse_derivative", x, method)
+
+    @staticmethod
+    def methods() -> dict[str, str]:
+        """Names of the inverses, and where each was published."""
+        return {name: source for name, source, _ in _polymech.langevin_methods()}
+
+    @staticmethod
+    def _at(function: str, x: ArrayLike, method: str = "exact") -> Array:
+        numbers, shape = flat(x)
+        return _polymech.langevin(function, numbers, method).reshape(shape)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What a law predicts at each C, in the shape that C has: (…, 6) in the order 11, 22, 33, 12, 13, 23, or (…, 3, 3)."""
+
+    stress: Array
+    """S, second Piola–Kirchhoff, Pa, in the shape of C."""
+    tangent: Array | None
+    """ℂ = 2 ∂S/∂C, (…, 6, 6), Pa: dS = ℂ dE with doubled shear strains."""
+    energy: Array
+    """W, (…), J/m³; NaN of a law that has none."""
+    spread: Array | None = None
+    """Of an ensemble: root mean square distance of its members from their mean, (…), Pa. This and what follows is of learnt laws."""
+    deviation: Array | None = None
+    """Standard deviation of each component over the members, (…, 6), Pa."""
+    outside: NDArray[np.bool_] | None = None
+    """Components of C outside of the box of the training data, (…, 6)."""
+    unseen: NDArray[np.bool_] | None = None
+    """Of those, the ones that never changed in the training data, (…, 6)."""
+    far: NDArray[np.bool_] | None = None
+    """In a gap of the training data, (…)."""
+    disagree: NDArray[np.bool_] | None = None
+    """The members disagree by more than at any training strain, (…)."""
+
+    @property
+    def flagged(self) -> NDArray[np.bool_]:
+        """Whether there is any reason for doubt, (…): where a learnt law leaves its data."""
+        if self.outside is None or self.far is None or self.disagree is None:
+            raise ValueError("flagged: found a prediction without flags; allowed: of a learnt law, with uncertainty=True")
+        doubt: NDArray[np.bool_] = self.outside.any(axis=-1) | self.far | self.disagree
+        return doubt
+
+
+_PAIRS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
+
+
+def predicted(evaluate: Callable[[Array], dict[str, Any]], c: ArrayLike) -> Prediction:
+    """Calls a law of the module at C of any shape."""
+    array = np.asarray(c, dtype=np.float64)
+    tensors = array.ndim >= 2 and array.shape[-2:] == (3, 3)
+    if not tensors and (array.ndim == 0 or array.shape[-1] != 6):
+        raise ValueError(f"C: found the shape {array.shape}; allowed: (…, 6) or (…, 3, 3)")
+    points = array.shape[:-2] if tensors else array.shape[:-1]
+    found = evaluate(np.ascontiguousarray(array).reshape(-1, 9 if tensors else 6))
+    stress = found["stress"]
+    if tensors:
+        whole = np.empty((len(stress), 3, 3))
+        whole[:, _PAIRS[0], _PAIRS[1]] = stress
+        whole[:, _PAIRS[1], _PAIRS[0]] = stress
+        stress = whole
+    shaped = {"stress": stress.reshape(array.shape), "energy": found["energy"].reshape(points), "tangent": None}
+    if "tangent" in found:
+        shaped["tangent"] = found["tangent"].reshape(*points, 6, 6)
+    if "spread" in found:
+        flags = found["flags"].reshape(*points, 8)
+        shaped |= {
+            "spread": found["spread"].reshape(points),
+            "deviation": found["deviation"].reshape(*points, 6),
+            "unseen": found["unseen"].reshape(*points, 6),
+            "outside": flags[..., :6],
+            "far": flags[..., 6],
+            "disagree": flags[..., 7],
+        }
+    return Prediction(**shaped)
+
+
+class Law:
+    """A hyperelastic law of rubber: ``Law("eight-chain", modulus=0.27e6, links=25)``, parameters in SI by their names or in order.
+
+    Laws are incompressible unless `volumetric` names an energy U(J) and its Lamé constant λ in Pa: ``("ciarlet", 10e6)``,
+    ``"quadratic"``, ``"logarithmic"``. `Law.models()` lists the laws and their parameters.
+    """
+
+    def __init__(
+        self,
+        model: str,
+        *values: float,
+        volumetric: tuple[str, float] | None = None,
+        as_published: bool = False,
+        **parameters: float,
+    ) -> None:
+        known = Law.models().get(model)
+        if parameters:
+            if values or known is None or set(known) != set(parameters):
+                found = [*map(str, values), *parameters]
+                allowed = "one of " + ", ".join(Law.models()) if known is None else ", ".join(known)
+                raise ValueError(f"{model}: found {', '.join(found)}; allowed: {allowed}")
+            values = tuple(parameters[name] for name in known)
+        self._law = _polymech.Law(model, [float(value) for value in values], volumetric, as_published)
+        self.model = model
+
+    @staticmethod
+    def models() -> dict[str, dict[str, Value]]:
+        """Each law, and its parameters with example values."""
+        return {name: {p: Value(x, unit) for p, unit, x in parameters} for name, parameters in _polymech.models()}
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Names and values, SI."""
+        return dict(self._law.parameters())
+
+    @property
+    def shear_modulus(self) -> float:
+        """μ at rest, Pa."""
+        return self._law.shear_modulus()
+
+    def __repr__(self) -> str:
+        return f"Law({self.model!r}, " + ", ".join(f"{name}={value:g}" for name, value in self.parameters.items()) + ")"
+
+    def biaxial(self, first: ArrayLike, second: ArrayLike) -> Array:
+        """Nominal stresses (…, 2), Pa, of an incompressible sheet stretched to λ₁ and λ₂."""
+        a, b = np.broadcast_arrays(np.asarray(first, dtype=float), np.asarray(second, dtype=float))
+        return self._law.biaxial(flat(a)[0], flat(b)[0]).reshape(*a.shape, 2)
+
+    def uniaxial(self, stretch: ArrayLike) -> Array:
+        """Nominal stress, Pa, of an incompressible bar stretched to λ."""
+        stretch = np.asarray(stretch, dtype=float)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return self.biaxial(stretch, 1 / np.sqrt(stretch))[..., 0]
+
+    def equibiaxial(self, stretch: ArrayLike) -> Array:
+        """Nominal stress, Pa, of an incompressible sheet stretched to λ in both directions."""
+        return self.biaxial(stretch, stretch)[..., 0]
+
+    def pure_shear(self, stretch: ArrayLike) -> Array:
+        """Nominal stresses (…, 2), Pa, of a wide incompressible strip stretched to λ: along the load and along the width."""
+        return self.biaxial(stretch, 1.0)
+
+    def energy(self, deformation: ArrayLike) -> Array:
+        """W(F), J/m³, (…) of F (…, 3, 3)."""
+        return self._of("energy", deformation)[..., 0]
+
+    def first_piola_kirchhoff(self, deformation: ArrayLike) -> Array:
+        """P = ∂W/∂F, Pa, (…, 3, 3); of an incompressible law the part that W determines."""
+        return self._of("piola", deformation)
+
+    def cauchy(self, deformation: ArrayLike) -> Array:
+        """σ = P Fᵀ/J, Pa, (…, 3, 3)."""
+        return self._of("cauchy", deformation)
+
+    def _of(self, what: str, deformation: ArrayLike) -> Array:
+        array = np.asarray(deformation, dtype=np.float64)
+        if array.shape[-2:] != (3, 3):
+            raise ValueError(f"F: found the shape {array.shape}; allowed: (…, 3, 3)")
+        found = self._law.of_gradient(what, np.ascontiguousarray(array).reshape(-1, 9))
+        return found.reshape(*array.shape[:-2], 1) if what == "energy" else found.reshape(array.shape)
+
+    def predict(self, c: ArrayLike, tangent: bool = False) -> Prediction:
+        """S, W and, if asked for, ℂ at C = FᵀF of shape (…, 6) or (…, 3, 3)."""
+        return predicted(lambda rows: self._law.predict(rows, tangent), c)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A law fitted to tests of rubber."""
+
+    law: Law
+    """The law."""
+    parameters: dict[str, Value]
+    """Its parameters."""
+    standard_errors: dict[str, float | None]
+    """Of each; none where the data do not determine it."""
+    rms: float
+    """Root mean square of the residuals of the nominal stress, Pa."""
+    measurements: int
+    """Stresses that were measured."""
+    draws: Array
+    """Draws of the parameters from their posterior, (draws, parameters)."""
+
+
+def fit(model: str, tests: Mapping[str, tuple[ArrayLike, ...]]) -> Fit:
+    """The best fit of a law to tests: ``fit("ogden-2", {"uniaxial": (stretch, stress), "equibiaxial": …, "pure-shear": …})``.
+
+    Nominal stresses in Pa, (N,), at stretches (N,); of ``"biaxial"`` tests four columns: λ₁, λ₂, P₁, P₂. A stress of exactly 0 is a
+    condition, not a measurement. Least squares of the stresses by Levenberg–Marquardt from several starts.
+    """
+    rows = [(name, np.column_stack([np.asarray(c, dtype=np.float64) for c in columns])) for name, columns in tests.items()]
+    found = _polymech.fit_law(model, [(name, np.ascontiguousarray(table)) for name, table in rows])
+    parameters = {name: Value(value, unit) for name, unit, value, _ in found["parameters"]}
+    errors = {name: error for name, _, _, error in found["parameters"]}
+    law = Law(model, *(float(value) for value in parameters.values()))
+    return Fit(law, parameters, errors, found["rms"], found["measurements"], found["draws"])

@@ -1,0 +1,134 @@
+"""Runs of scenes, for all programs."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _polymech
+from ._result import Result, Table, Value
+from ._scene import Scene, literal, read
+
+
+@dataclass(frozen=True)
+class Step:
+    """A finished step of a run, as a function `on_step` sees it."""
+
+    values: dict[str, Value]
+    """Numbers with units: `load`, `displacement`, `broken_bonds`, `time`, …"""
+    fields: dict[str, NDArray[np.float64]]
+    """Arrays at particles or nodes, (N, 3) or (N,): `position` and `displacement` in m; `temperature_degC`, `alpha`, …"""
+    units: dict[str, str]
+    """Unit of each of both."""
+
+
+OnStep: TypeAlias = Callable[[Step], Any]
+Progress: TypeAlias = "bool | Callable[[float, str], Any]"
+
+
+def stepper(on_step: OnStep | None) -> Callable[..., Any] | None:
+    """A function of Python as the module calls it."""
+    if on_step is None:
+        return None
+
+    def call(values: dict[str, float], units: dict[str, str], fields: dict[str, NDArray[np.float64]]) -> Any:
+        return on_step(Step({name: Value(x, units[name]) for name, x in values.items()}, fields, units))
+
+    return call
+
+
+def _bar(part: float, line: str) -> None:
+    """One line that is written over: on terminals and in notebooks."""
+    done = round(30 * min(max(part, 0.0), 1.0))
+    sys.stderr.write(f"\r[{'█' * done}{'·' * (30 - done)}] {100 * part:3.0f} %  {line[:80]:<80}")
+    sys.stderr.flush()
+
+
+def _how(
+    output: str | os.PathLike[str] | None,
+    quick: bool = False,
+    threads: int | None = None,
+    checkpoint_every: float = 30.0,
+    inputs: Mapping[str, str | os.PathLike[str]] | None = None,
+    progress: Progress = False,
+    on_step: OnStep | None = None,
+) -> tuple[dict[str, Any], bool]:
+    """What the module is told, and whether the folder is ours to remove."""
+    ours = output is None
+    folder = tempfile.mkdtemp(prefix="polymech-") if output is None else os.fspath(output)
+    how = {
+        "output": folder,
+        "quick": quick,
+        "threads": threads,
+        "checkpoint_every": float(checkpoint_every),
+        "inputs": {name: os.fspath(place) for name, place in (inputs or {}).items()},
+        "progress": (_bar if progress is True else progress) or None,
+        "on_step": stepper(on_step),
+    }
+    return how, ours
+
+
+def _done(how: dict[str, Any], ours: bool, told: tuple[str, str]) -> Result:
+    if how["progress"] is _bar:
+        sys.stderr.write("\r" + " " * 120 + "\r")
+    return Result(json.loads(told[0]), told[1], Path(how["output"]), temporary=ours)
+
+
+def _begin(how: dict[str, Any], ours: bool, call: Callable[[], Any]) -> Any:
+    """Calls; an empty folder of ours does not stay behind a scene that is refused, a checkpoint does."""
+    try:
+        return call()
+    except BaseException as error:
+        folder = Path(how["output"])
+        if ours and folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+        elif hasattr(error, "add_note"):
+            error.add_note(f"the checkpoint is in {folder}: `resume({str(folder)!r})` continues")
+        if isinstance(error, KeyboardInterrupt):
+            error.output = str(folder)  # type: ignore[attr-defined]
+        raise
+
+
+def run(program: str, scene: Scene, output: Any, options: dict[str, Any], overrides: Mapping[str, Any]) -> Result:
+    text, path = read(scene, program, overrides)
+    how, ours = _how(output, **options)
+    return _done(how, ours, _begin(how, ours, lambda: _polymech.run(program, text, path, how)))
+
+
+def resume(program: str, output: Any, options: dict[str, Any]) -> Result:
+    how, _ = _how(output, **options)
+    return _done(how, False, _begin(how, False, lambda: _polymech.resume(program, how)))
+
+
+def check(program: str, scene: Scene, quick: bool, overrides: Mapping[str, Any]) -> list[str]:
+    text, path = read(scene, program, overrides)
+    how, _ = _how(Path("out") / "check", quick=quick)
+    return _polymech.check(program, text, path, how)
+
+
+def sweep(
+    program: str,
+    scene: Scene,
+    vary: Mapping[str, Sequence[Any]],
+    columns: Sequence[str],
+    output: Any,
+    options: dict[str, Any],
+    overrides: Mapping[str, Any],
+) -> Table:
+    text, path = read(scene, program, overrides)
+    how, ours = _how(output, **options)
+    values = [(name, [value if isinstance(value, str) else literal(value) for value in each]) for name, each in vary.items()]
+    told = _begin(how, ours, lambda: _polymech.sweep(program, text, path, values, list(columns), how))
+    result = _done(how, ours, told)
+    table = Table.read(Path(how["output"]) / "sweep.csv")
+    table.result = result
+    return table

@@ -1,0 +1,127 @@
+"""Laws learnt from data."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _polymech
+from ._laws import Prediction, predicted
+
+Layers = Sequence[tuple[ArrayLike, ArrayLike]]
+
+
+class Surrogate:
+    """A law C → S learnt from data, a file of `mdsurrogate`: ``Surrogate("law.safetensors")``.
+
+    Predictions have tangents, and flags where they leave the training data.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self._law = _polymech.Surrogate.read(os.fspath(path))
+
+    @classmethod
+    def _of(cls, law: _polymech.Surrogate) -> Surrogate:
+        new = cls.__new__(cls)
+        new._law = law
+        return new
+
+    @classmethod
+    def from_weights(
+        cls,
+        members: Sequence[Layers] | Layers,
+        activations: Sequence[str],
+        *,
+        strains: ArrayLike,
+        transposed: bool = False,
+        kind: str | dict[str, Any] = "ann",
+        input_mean: ArrayLike | None = None,
+        input_deviation: ArrayLike | None = None,
+        output_mean: ArrayLike | None = None,
+        output_deviation: ArrayLike | None = None,
+        provenance: Sequence[str] = (),
+    ) -> Surrogate:
+        """A network of your own, from any framework, as a law with tangents, flags and exports.
+
+        `members` is a list of (W, b), W of shape (outputs, inputs) as in PyTorch, the layers from input to output, or a list of such
+        lists, an ensemble; `transposed`: W of shape (inputs, outputs), as in JAX and Keras. `activations` has a name for each layer: ``linear``, ``relu``, ``softplus``, ``tanh``, ``sigmoid``, ``silu``,
+        ``elu``; the last is usually ``linear``. `strains`, (N, 6), are the C of your training data: predictions outside of their box
+        are flagged.
+
+        An ``ann`` maps six standardised components of C to six of S: S = output_mean + output_deviation · N((C − input_mean) /
+        input_deviation), in Pa. `kind` may be an energy in the form of `header`, of invariants.
+        """
+        first = members[0]
+        ensemble = members if not _is_layer(first) else [members]
+        arrays = [
+            [(np.ascontiguousarray(np.asarray(w, dtype=np.float64).T if transposed else np.asarray(w, dtype=np.float64)),
+              np.ascontiguousarray(b, dtype=np.float64)) for w, b in layers]  # type: ignore[misc]
+            for layers in ensemble
+        ]
+        if len(activations) != len(arrays[0]):
+            raise ValueError(f"activations: found {len(activations)}; allowed: {len(arrays[0])}, one for each layer")
+        widths = [arrays[0][0][0].shape[1], *(w.shape[0] for w, _ in arrays[0])]
+        for layers in arrays:
+            for place, (weights, bias) in enumerate(layers):
+                allowed = ((widths[place + 1], widths[place]), (widths[place + 1],))
+                if (weights.shape, bias.shape) != allowed:
+                    raise ValueError(f"layer {place}: found W {weights.shape}, b {bias.shape}; allowed: W {allowed[0]}, b {allowed[1]}")
+        seen = np.asarray(strains, dtype=np.float64)
+        if seen.ndim != 2 or seen.shape[1] != 6 or len(seen) == 0:
+            raise ValueError(f"strains: found the shape {seen.shape}; allowed: (N, 6)")
+
+        def row(values: ArrayLike | None, default: float, length: int) -> list[float]:
+            filled = np.full(length, default) if values is None else np.broadcast_to(np.asarray(values, dtype=float), (length,))
+            return [float(value) for value in filled]
+
+        header = {
+            "kind": kind,
+            "architecture": {"widths": widths, "activations": list(activations)},
+            "members": len(arrays),
+            "input_mean": row(input_mean, 0.0, widths[0]),
+            "input_deviation": row(input_deviation, 1.0, widths[0]),
+            "output_mean": row(output_mean, 0.0, widths[-1]),
+            "output_deviation": row(output_deviation, 1.0, widths[-1]),
+            "training_box": np.stack([seen.min(axis=0), seen.max(axis=0)], axis=1).tolist(),
+            "spread_limit": None,
+            "provenance": list(provenance),
+        }
+        return cls._of(_polymech.Surrogate.build(json.dumps(header), arrays))
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """All but the weights: kind, architecture, scaling, training box, provenance."""
+        found: dict[str, Any] = json.loads(self._law.header())
+        return found
+
+    @property
+    def weights(self) -> list[list[tuple[NDArray[np.float64], NDArray[np.float64]]]]:
+        """W, (outputs, inputs), and b of each layer of each member."""
+        return self._law.weights()
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Writes the law as a file that `mdsurrogate export`, `predict` and scenes read."""
+        self._law.write(os.fspath(path))
+
+    def predict(self, c: ArrayLike, tangent: bool = False, uncertainty: bool = True) -> Prediction:
+        """S and, if asked for, ℂ at C = FᵀF of shape (…, 6) or (…, 3, 3), on all threads and without the interpreter's lock.
+
+        Contiguous arrays of float64 are read where they are. `uncertainty=False` leaves spread, deviation and flags out.
+        Raises `ValueError` for a C that is not positive definite, and tells which.
+        """
+        return predicted(lambda rows: self._law.predict(rows, tangent, uncertainty), c)
+
+    def __repr__(self) -> str:
+        header = self.header
+        kind = header["kind"] if isinstance(header["kind"], str) else next(iter(header["kind"]))
+        return f"Surrogate({kind}, {header['members']} of {'-'.join(map(str, header['architecture']['widths']))})"
+
+
+def _is_layer(item: Any) -> bool:
+    """Whether this is (W, b), not a list of layers."""
+    return len(item) == 2 and np.ndim(item[0]) == 2 and np.ndim(item[1]) == 1

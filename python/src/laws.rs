@@ -1,0 +1,230 @@
+//! The Langevin function and its inverses, hyperelastic laws and their fits.
+
+use crate::error::value;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use polycore::constitutive::Error;
+use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::{
+    self, Compressible, Coupling, Hyperelastic, MODELS, Volumetric, fit, homogeneous,
+};
+use polycore::langevin::{self as chain, Inverse};
+use polycore::tensor::{DeformationGradient, Tensor};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+
+/// From so many numbers on they are shared out to threads.
+const MANY: usize = 1 << 14;
+
+/// Numbers that a thread takes at once.
+const CHUNK: usize = 1 << 12;
+
+/// A function of Langevin statistics at each number; `method` is the inverse.
+#[pyfunction]
+pub fn langevin<'py>(
+    py: Python<'py>,
+    function: &str,
+    x: PyReadonlyArray1<'py, f64>,
+    method: &str,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let known = Inverse::ALL.into_iter().find(|one| one.name() == method).ok_or_else(|| {
+        let names: Vec<&str> = Inverse::ALL.iter().map(|one| one.name()).collect();
+        value(format!("method: found {method:?}; allowed: {}", names.join(", ")))
+    })?;
+    let x = x.as_slice()?;
+    let found = py.detach(|| match function {
+        "langevin" => Some(each(x, chain::langevin)),
+        "derivative" => Some(each(x, chain::derivative)),
+        "free_energy" => Some(each(x, chain::free_energy)),
+        "inverse" => Some(each(x, |x| known.value(x))),
+        "inverse_derivative" => Some(each(x, |x| known.derivative(x))),
+        _ => None,
+    });
+    found.map(|found| found.into_pyarray(py)).ok_or_else(|| value(format!("no function {function}")))
+}
+
+fn each(x: &[f64], function: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
+    if x.len() < MANY {
+        return x.iter().map(|&x| function(x)).collect();
+    }
+    x.par_iter().with_min_len(CHUNK).map(|&x| function(x)).collect()
+}
+
+/// Name, source and published error, in per cent, of each inverse.
+#[pyfunction]
+pub fn langevin_methods() -> Vec<(&'static str, &'static str, Option<&'static str>)> {
+    Inverse::ALL.iter().map(|one| (one.name(), one.source(), one.published_error())).collect()
+}
+
+/// Name, unit and example value.
+type Parameter = (&'static str, &'static str, f64);
+
+/// Name of each law, and name, unit and example value of each of its parameters.
+#[pyfunction]
+pub fn models() -> Vec<(&'static str, Vec<Parameter>)> {
+    let parameters = |model: &hyperelastic::ModelDescriptor| {
+        model.parameters.iter().zip(model.example).map(|(p, &example)| (p.name, p.unit, example)).collect()
+    };
+    MODELS.iter().map(|model| (model.key, parameters(model))).collect()
+}
+
+/// A hyperelastic law of Chapter 1.
+#[pyclass(frozen, module = "polymech._polymech")]
+pub struct Law {
+    key: String,
+    values: Vec<f64>,
+    volumetric: Option<(String, f64)>,
+    published: bool,
+    law: Box<dyn Hyperelastic>,
+}
+
+#[pymethods]
+impl Law {
+    #[new]
+    fn new(key: String, values: Vec<f64>, volumetric: Option<(String, f64)>, published: bool) -> PyResult<Self> {
+        let known: Vec<&str> = MODELS.iter().map(|model| model.key).collect();
+        let refused = |_| value(format!("law: found {key:?}; allowed: {}", known.join(", ")));
+        let law = hyperelastic::model(&key).map_err(refused)?.law(&values).map_err(value)?;
+        let term = match &volumetric {
+            None => None,
+            Some((name, lame)) => Some(match name.as_str() {
+                "quadratic" => Volumetric::Quadratic { lame: *lame },
+                "logarithmic" => Volumetric::Logarithmic { lame: *lame },
+                "ciarlet" => Volumetric::Ciarlet { lame: *lame },
+                "pressure" => Volumetric::Pressure { pressure: *lame },
+                other => {
+                    let allowed = "quadratic, logarithmic, ciarlet, pressure";
+                    return Err(value(format!("volumetric: found {other:?}; allowed: {allowed}")));
+                }
+            }),
+        };
+        let coupling = if published { Coupling::AsPublished } else { Coupling::StressFree };
+        let law: Box<dyn Hyperelastic> = match (term, published) {
+            (None, false) => law,
+            (term, _) => Box::new(
+                Compressible::with_coupling(law, term.unwrap_or(Volumetric::None), coupling).map_err(value)?,
+            ),
+        };
+        Ok(Self { key, values, volumetric, published, law })
+    }
+
+    fn __getnewargs__(&self) -> (String, Vec<f64>, Option<(String, f64)>, bool) {
+        (self.key.clone(), self.values.clone(), self.volumetric.clone(), self.published)
+    }
+
+    fn name(&self) -> String {
+        self.law.name()
+    }
+
+    fn parameters(&self) -> Vec<(String, f64)> {
+        self.law.parameters()
+    }
+
+    fn shear_modulus(&self) -> f64 {
+        self.law.shear_modulus()
+    }
+
+    /// Nominal stresses P₁, P₂, (N, 2), of an incompressible sheet stretched to λ₁, λ₂.
+    fn biaxial<'py>(
+        &self,
+        py: Python<'py>,
+        first: PyReadonlyArray1<'py, f64>,
+        second: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let (first, second) = (first.as_slice()?, second.as_slice()?);
+        let law = &*self.law;
+        let at = |k: usize| homogeneous::biaxial(law, first[k], second[k]);
+        let found = py.detach(|| points(first.len().min(second.len()), at))?;
+        let count = found.len();
+        found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, 2])
+    }
+
+    /// W, (N, 1), P, σ or S, (N, 9), at each F, (N, 9).
+    fn of_gradient<'py>(
+        &self,
+        py: Python<'py>,
+        what: &str,
+        gradients: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let rows = gradients.as_slice()?;
+        if gradients.as_array().ncols() != 9 {
+            return Err(value("F: allowed: (N, 9)"));
+        }
+        let law = &*self.law;
+        let count = rows.len() / 9;
+        let gradient = |k: usize| DeformationGradient::new(Tensor::from_row_slice(&rows[9 * k..9 * k + 9]));
+        let flat = |tensor: Tensor| tensor.transpose().as_slice().to_vec();
+        let at = |k: usize| -> Result<Vec<f64>, Error> {
+            let f = gradient(k)?;
+            Ok(match what {
+                "energy" => vec![law.energy(&f)?],
+                "piola" => flat(law.first_piola_kirchhoff(&f)?),
+                "cauchy" => flat(law.cauchy(&f)?),
+                _ => flat(law.second_piola_kirchhoff(&f)?),
+            })
+        };
+        let found = py.detach(|| points(count, at))?;
+        let width = if what == "energy" { 1 } else { 9 };
+        found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, width])
+    }
+
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        c: PyReadonlyArray2<'py, f64>,
+        tangent: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        crate::predict::predict(py, &self.law, &c, tangent, false)
+    }
+}
+
+/// A function at each of some points, on all threads where there are many; the first that fails is told.
+fn points<T: Send>(count: usize, at: impl Fn(usize) -> Result<T, Error> + Sync) -> PyResult<Vec<T>> {
+    let one = |k: usize| at(k).map_err(|error| format!("point {k}: {error}"));
+    let found: Result<Vec<T>, String> = match count < 256 {
+        true => (0..count).map(one).collect(),
+        false => (0..count).into_par_iter().with_min_len(64).map(one).collect(),
+    };
+    found.map_err(value)
+}
+
+/// The best fit of a law to nominal stresses: P₁ at λ₁ of a `mode`, or (P₁, P₂) at (λ₁, λ₂) of `biaxial` rows.
+#[pyfunction]
+pub fn fit_law<'py>(
+    py: Python<'py>,
+    key: &str,
+    tests: Vec<(String, PyReadonlyArray2<'py, f64>)>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let mut states = Vec::new();
+    for (name, rows) in &tests {
+        let known = [Mode::Uniaxial, Mode::Equibiaxial, Mode::PureShear, Mode::Biaxial];
+        let mode = known.into_iter().find(|mode| mode.name() == name).ok_or_else(|| {
+            value(format!("test: found {name:?}; allowed: {}", known.map(Mode::name).join(", ")))
+        })?;
+        for row in rows.as_array().rows() {
+            let state = match (mode, row.as_slice()) {
+                (Mode::Biaxial, Some(&[first, second, p, q])) => {
+                    State { mode, stretches: [first, second], nominal: [p, q] }
+                }
+                (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => {
+                    State { mode, stretches: [stretch, mode.second_stretch(stretch)], nominal: [nominal, 0.0] }
+                }
+                _ => return Err(value(format!("{name}: found {} columns; allowed: 2, of biaxial tests 4", row.len()))),
+            };
+            state.principal_stretches().map_err(value)?;
+            states.push(state);
+        }
+    }
+    let table = Table { source: String::new(), states };
+    let model = hyperelastic::model(key).map_err(value)?;
+    let found = py.detach(|| fit::fit(model, &table)).map_err(value)?;
+    let answer = PyDict::new(py);
+    let parameters: Vec<_> =
+        found.parameters.iter().map(|p| (p.name, p.unit, p.value, p.standard_error)).collect();
+    answer.set_item("parameters", parameters)?;
+    answer.set_item("rms", found.rms)?;
+    answer.set_item("measurements", found.measurements)?;
+    answer.set_item("evaluations", found.iterations)?;
+    answer.set_item("draws", PyArray2::from_vec2(py, &found.draws).map_err(value)?)?;
+    Ok(answer)
+}

@@ -1,0 +1,41 @@
+//! `polymech._polymech`: the crates of this workspace as a Python module, in plain arrays and texts.
+//!
+//! The package `polymech` in `python/polymech` is what users see: shapes of arrays, names, pictures and docstrings are there. Here
+//! is what needs Rust: scenes run as the command lines run them ([`scenes`]), fields of VTKHDF files ([`fields`]), laws at many
+//! points ([`laws`], [`surrogates`], by [`predict`]), models of `peri` ([`model`], [`bond`]) and the material of `crystfem` at a
+//! point ([`point`]). Work is done without the interpreter's lock; [`watch`] lets signals and Python's functions in.
+
+use pyo3::prelude::*;
+
+mod bond;
+mod error;
+mod fields;
+mod laws;
+mod model;
+mod point;
+mod predict;
+mod scenes;
+mod surrogates;
+mod watch;
+
+#[pymodule(gil_used = false)]
+mod _polymech {
+    use super::*;
+
+    #[pymodule_export]
+    use super::{
+        bond::BondLaw,
+        error::{Interrupted, RunError, SceneError},
+        fields::{field, layout},
+        laws::{Law, fit_law, langevin, langevin_methods, models},
+        model::Simulation,
+        point::{course, fit_kinetics},
+        scenes::{check, resume, run, schema, sweep},
+        surrogates::Surrogate,
+    };
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

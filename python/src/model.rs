@@ -1,0 +1,494 @@
+//! Models of `peri` in a few lines of Python.
+
+use crate::bond::BondLaw;
+use crate::error::{fault, value};
+use crate::watch::{Line, Watchers, watched};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
+use peri::Error;
+use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::calibrate::{Calibration, Space, lattice_factor, modulus};
+use peri::geometry::{Cut, Shape};
+use peri::material::BondMaterial;
+use peri::model::{self, Body, IntoMaterial, Model, Rubber};
+use peri::potential::{BondPotential, Law, Scaled};
+use peri::solver::{DynamicRelaxation, Lbfgs, State, Status, Support, VelocityVerlet};
+use peri::stress::{self, Measure, Tensor};
+use polycore::case::{Fault, Step, StepField};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::collections::HashMap;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+
+/// A function of all positions, (N, D); displacement and body force of the points that it takes.
+type Load = (Py<PyAny>, Vec<Option<f64>>, Vec<f64>);
+
+/// A model as Python describes it; lengths in m.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Spec {
+    /// `add` or `cut`, the kind, its numbers.
+    shapes: Vec<(String, String, Vec<f64>)>,
+    /// Two ends in a plane; in space a corner and two edges.
+    cracks: Vec<Vec<f64>>,
+    spacing: f64,
+    horizon: f64,
+    partial_volumes: bool,
+    space: String,
+    thickness: f64,
+    law: Py<PyAny>,
+    youngs_modulus: f64,
+    links: f64,
+    dissociation: f64,
+    lattice_calibration: bool,
+    critical_stretch: Option<f64>,
+    fracture_energy: Option<f64>,
+    regions: Vec<Load>,
+    steps: usize,
+    contact: Option<f64>,
+}
+
+/// What bonds are made of.
+enum Bonded {
+    Rubber(Rubber),
+    /// A law of Python, scaled to t′(1) = 3.
+    Sampled { law: Arc<crate::bond::Sampled>, space: Space, youngs_modulus: f64, thickness: f64, calibration: Calibration },
+}
+
+impl<const D: usize> IntoMaterial<D> for Bonded {
+    type Material = BondMaterial<'static>;
+
+    fn into_material(
+        self,
+        body: &Body<D>,
+        bonds: &LatticeBonds<D>,
+    ) -> Result<(Self::Material, Option<f64>), Error> {
+        match self {
+            Self::Rubber(rubber) => rubber.into_material(body, bonds),
+            Self::Sampled { law, space, youngs_modulus, thickness, calibration } => {
+                let k = modulus(space, youngs_modulus, bonds.horizon(), thickness) * lattice_factor(calibration, bonds);
+                let factor = 3.0 / law.tangent();
+                Ok((BondMaterial::new(Scaled { law, factor }, k), None))
+            }
+        }
+    }
+}
+
+/// Method and settings.
+#[derive(Clone, Copy)]
+enum Solver {
+    Lbfgs(Lbfgs),
+    Relaxation(DynamicRelaxation),
+    Verlet(VelocityVerlet),
+}
+
+/// A body in the plane or in space.
+trait AnyBody: Send + Sync {
+    fn dimension(&self) -> usize;
+    fn solve(&mut self, method: Solver, line: &Line<'_>) -> Result<(), Error>;
+    fn positions(&self) -> Vec<f64>;
+    fn displacements(&self) -> Vec<f64>;
+    fn set_velocity(&mut self, velocity: &[f64]);
+    fn history(&self) -> Vec<(&'static str, &'static str, Vec<f64>)>;
+    fn stress(&self, which: &str, measure: Measure) -> Result<Vec<f64>, Error>;
+    fn intact(&self) -> Vec<u32>;
+    fn fragments(&self) -> usize;
+    fn extend(&mut self, factors: Vec<f64>);
+}
+
+type Body3<const D: usize> = model::Simulation<D, BondMaterial<'static>>;
+
+fn stopped() -> Error {
+    Error::Shared(polycore::Error::Interrupted { program: "peri", output: Default::default() })
+}
+
+impl<const D: usize> AnyBody for Body3<D> {
+    fn dimension(&self) -> usize {
+        D
+    }
+
+    fn solve(&mut self, method: Solver, line: &Line<'_>) -> Result<(), Error> {
+        let sites: Vec<usize> = self.bonds.particles().iter().map(|&site| site as usize).collect();
+        let positions = line.wants_steps().then(|| self.positions());
+        let watch = |_: &Status| if line.stop().load(Ordering::Relaxed) { Err(stopped()) } else { Ok(()) };
+        let finished = |state: &State<D>| {
+            let (Some(positions), Some(record)) = (&positions, state.history.last()) else { return Ok(()) };
+            if state.round > 0 {
+                return Ok(());
+            }
+            let field = |name, data| StepField { name, unit: "m", components: D, data };
+            let displacement = sites.iter().flat_map(|&site| state.displacement.get(site)).collect();
+            let step = Step {
+                values: COLUMNS.iter().map(|(name, unit, get)| (*name, *unit, get(record))).collect(),
+                fields: vec![field("position", positions.clone()), field("displacement", displacement)],
+            };
+            if line.step(step) { Ok(()) } else { Err(stopped()) }
+        };
+        match method {
+            Solver::Lbfgs(method) => self.solve_watched(method, watch, finished),
+            Solver::Relaxation(method) => self.solve_watched(method, watch, finished),
+            Solver::Verlet(method) => self.solve_watched(method, watch, finished),
+        }
+    }
+
+    fn positions(&self) -> Vec<f64> {
+        Body3::displacements(self).flat_map(|(position, _)| position).collect()
+    }
+
+    fn displacements(&self) -> Vec<f64> {
+        Body3::displacements(self).flat_map(|(_, displacement)| displacement).collect()
+    }
+
+    fn set_velocity(&mut self, velocity: &[f64]) {
+        let sites = self.bonds.particles().iter().zip(velocity.chunks_exact(D));
+        for (&site, value) in sites {
+            self.state.velocity.set(site as usize, std::array::from_fn(|d| value[d]));
+        }
+    }
+
+    fn history(&self) -> Vec<(&'static str, &'static str, Vec<f64>)> {
+        let rows = Body3::history(self);
+        COLUMNS.iter().map(|(name, unit, get)| (*name, *unit, rows.iter().map(get).collect())).collect()
+    }
+
+    fn stress(&self, which: &str, measure: Measure) -> Result<Vec<f64>, Error> {
+        let flat = |tensors: Vec<Tensor<D>>| tensors.into_iter().flatten().flatten().collect();
+        Ok(match which {
+            "piola" => flat(self.piola(measure)?),
+            "deformation" => flat(stress::deformation_gradients(&self.bonds, &self.state.displacement)),
+            _ => flat(self.cauchy(measure)?),
+        })
+    }
+
+    fn intact(&self) -> Vec<u32> {
+        let count = |&site: &u32| {
+            let mut count = 0;
+            self.bonds.neighbours(site as usize, &mut |_| count += 1);
+            count
+        };
+        self.bonds.particles().iter().map(count).collect()
+    }
+
+    fn fragments(&self) -> usize {
+        Body3::fragments(self)
+    }
+
+    fn extend(&mut self, factors: Vec<f64>) {
+        self.factors.extend(factors);
+    }
+}
+
+/// A column of the history: name, unit, value.
+type ColumnOf = (&'static str, &'static str, fn(&peri::solver::Record) -> f64);
+
+const COLUMNS: [ColumnOf; 12] = [
+    ("displacement", "m", |record| record.displacement),
+    ("load", "N", |record| record.load),
+    ("factor", "", |record| record.factor),
+    ("time", "s", |record| record.time),
+    ("broken_bonds", "", |record| record.broken as f64),
+    ("largest_stretch", "", |record| record.largest_stretch),
+    ("stored", "J", |record| record.stored),
+    ("work", "J", |record| record.work),
+    ("released", "J", |record| record.released),
+    ("kinetic", "J", |record| record.kinetic),
+    ("out_of_balance", "", |record| record.residual),
+    ("iterations", "", |record| record.iterations as f64),
+];
+
+/// A model that is built: particles, bonds and state.
+#[pyclass(module = "polymech._polymech")]
+pub struct Simulation {
+    body: Box<dyn AnyBody>,
+    whole: Vec<u32>,
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    fn new(py: Python<'_>, spec: Spec) -> PyResult<Self> {
+        let sampled = match spec.law.bind(py).cast::<BondLaw>() {
+            Ok(law) => Some(law.get().law.clone()),
+            Err(_) => None,
+        };
+        let named = if sampled.is_none() { Some(spec.law.extract::<String>(py)?) } else { None };
+        // what a region of Python raised
+        let raised = Arc::new(Mutex::new(None));
+        let built = py.detach(|| match spec.space.as_str() {
+            "solid" => build::<3>(spec, sampled, named, &raised),
+            _ => build::<2>(spec, sampled, named, &raised),
+        });
+        if let Some(raised) = raised.lock().ok().and_then(|mut raised| raised.take()) {
+            return Err(raised);
+        }
+        let body = built?;
+        Ok(Self { whole: body.intact(), body })
+    }
+
+    /// Solves what is left of the load steps; `False` where `on_step` stopped it.
+    #[pyo3(signature = (method, settings, threads, on_step))]
+    fn solve(
+        &mut self,
+        py: Python<'_>,
+        method: &str,
+        settings: HashMap<String, f64>,
+        threads: Option<usize>,
+        on_step: Option<Py<PyAny>>,
+    ) -> PyResult<bool> {
+        let method = solver(method, settings)?;
+        let watchers = Watchers { progress: None, on_step };
+        let body = &mut self.body;
+        match watched(py, &watchers, threads, |line| body.solve(method, &line))? {
+            Ok(()) => Ok(true),
+            Err(error) if error.is_interruption() => Ok(false),
+            Err(error) => Err(fault(&error)),
+        }
+    }
+
+    /// Adds load steps.
+    fn extend(&mut self, factors: Vec<f64>) {
+        self.body.extend(factors);
+    }
+
+    fn set_velocity(&mut self, velocity: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
+        let found = velocity.as_slice()?;
+        let allowed = self.body.positions().len();
+        if found.len() != allowed {
+            return Err(value(format!("velocity: found {} numbers; allowed: {allowed}", found.len())));
+        }
+        self.body.set_velocity(found);
+        Ok(())
+    }
+
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.vectors(py, self.body.positions())
+    }
+
+    fn displacements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.vectors(py, self.body.displacements())
+    }
+
+    /// Name and unit of each column, and its values, a row for each step.
+    fn history<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let columns = PyDict::new(py);
+        for (name, unit, values) in self.body.history() {
+            columns.set_item(name, (unit, values.into_pyarray(py)))?;
+        }
+        Ok(columns)
+    }
+
+    /// `cauchy` or `piola` stress, Pa, or the `deformation` gradient, (N, D, D).
+    fn tensors<'py>(&self, py: Python<'py>, which: &str, measure: &str) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let known = Measure::ALL.into_iter().find(|one| one.name() == measure).ok_or_else(|| {
+            let names: Vec<&str> = Measure::ALL.iter().map(|one| one.name()).collect();
+            value(format!("measure: found {measure:?}; allowed: {}", names.join(", ")))
+        })?;
+        let found = py.detach(|| self.body.stress(which, known)).map_err(|error| fault(&error))?;
+        let d = self.body.dimension();
+        let count = found.len() / (d * d);
+        found.into_pyarray(py).reshape(vec![count, d, d])
+    }
+
+    /// The part of its bonds that each particle has lost.
+    fn damage<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let now = self.body.intact();
+        let lost = now.iter().zip(&self.whole).map(|(&now, &whole)| 1.0 - f64::from(now) / f64::from(whole.max(1)));
+        lost.collect::<Vec<f64>>().into_pyarray(py)
+    }
+
+    fn fragments(&self) -> usize {
+        self.body.fragments()
+    }
+}
+
+impl Simulation {
+    fn vectors<'py>(&self, py: Python<'py>, flat: Vec<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let d = self.body.dimension();
+        let count = flat.len() / d;
+        flat.into_pyarray(py).reshape([count, d])
+    }
+}
+
+/// A shape of a kind and numbers.
+fn shape<const D: usize>(kind: &str, numbers: &[f64]) -> PyResult<Shape<D>> {
+    let vector = |from: usize| -> [f64; D] { std::array::from_fn(|d| numbers[from + d]) };
+    match (kind, numbers.len()) {
+        ("box", n) if n == 2 * D => Ok(Shape::Box { min: vector(0), max: vector(D) }),
+        ("ball", n) if n == D + 1 => Ok(Shape::Ball { centre: vector(0), radius: numbers[D] }),
+        ("cylinder", n) if n == D + 3 && D == 3 && [0.0, 1.0, 2.0].contains(&numbers[D + 2]) => Ok(Shape::Cylinder {
+            centre: vector(0),
+            radius: numbers[D],
+            length: numbers[D + 1],
+            axis: numbers[D + 2] as usize,
+        }),
+        _ => Err(value(format!("shape: found a {kind} of {} numbers in {D} dimensions", numbers.len()))),
+    }
+}
+
+fn build<const D: usize>(
+    spec: Spec,
+    sampled: Option<Arc<crate::bond::Sampled>>,
+    named: Option<String>,
+    raised: &Arc<Mutex<Option<PyErr>>>,
+) -> PyResult<Box<dyn AnyBody>>
+where
+    Body<D>: Placed,
+{
+    let mut shapes = spec.shapes.iter();
+    let Some((_, kind, numbers)) = shapes.next() else { return Err(value("a body needs a shape")) };
+    let mut body = Body::<D>::lattice(shape(kind, numbers)?, spec.spacing).horizon(spec.horizon);
+    for (operation, kind, numbers) in shapes {
+        let shape = shape(kind, numbers)?;
+        body = if operation == "cut" { body.cut(shape) } else { body.join(shape) };
+    }
+    for numbers in &spec.cracks {
+        body = body.crack(cut::<D>(numbers)?);
+    }
+    if spec.partial_volumes {
+        body = body.volume_correction(VolumeCorrection::Linear);
+    }
+    let (body, space) = body.placed(&spec.space, spec.thickness)?;
+    let calibration = if spec.lattice_calibration { Calibration::Lattice } else { Calibration::Continuum };
+    let material = match (sampled, named) {
+        (Some(law), _) => {
+            let (youngs_modulus, thickness) = (spec.youngs_modulus, spec.thickness);
+            if !(youngs_modulus > 0.0 && youngs_modulus.is_finite()) {
+                return Err(value(format!("Young's modulus: found {youngs_modulus}; allowed: above 0, finite")));
+            }
+            if spec.fracture_energy.is_some() {
+                return Err(value("fracture_energy: found one with a law of Python; allowed: critical_stretch"));
+            }
+            Bonded::Sampled { law, space, youngs_modulus, thickness, calibration }
+        }
+        (None, name) => {
+            let name = name.unwrap_or_default();
+            let law = Law::ALL.into_iter().find(|law| law.name() == name).ok_or_else(|| {
+                let known: Vec<&str> = Law::ALL.iter().map(|law| law.name()).collect();
+                value(format!("law: found {name:?}; allowed: {}, or a function", known.join(", ")))
+            })?;
+            let rubber = Rubber::new(law, spec.youngs_modulus).chains(spec.links, spec.dissociation);
+            let rubber = rubber.calibration(calibration);
+            Bonded::Rubber(match (spec.critical_stretch, spec.fracture_energy) {
+                (Some(stretch), _) => rubber.critical_stretch(stretch),
+                (None, Some(energy)) => rubber.fracture_energy(energy),
+                (None, None) => rubber,
+            })
+        }
+    };
+    let mut model = Model::new(body, material).steps(spec.steps);
+    if let Some(stretch) = spec.critical_stretch {
+        model = model.critical_stretch(stretch);
+    }
+    if let Some(stiffness) = spec.contact {
+        model = model.contact(stiffness);
+    }
+    for (region, displacement, force) in spec.regions {
+        if displacement.len() != D || force.len() != D {
+            let found = displacement.len().max(force.len());
+            return Err(value(format!("a load: found {found} components; allowed: {D}")));
+        }
+        let support = Support {
+            displacement: std::array::from_fn(|d| displacement[d]),
+            body_force: std::array::from_fn(|d| force[d]),
+        };
+        let raised = raised.clone();
+        let inside = move |points: &[[f64; D]]| {
+            asked(&region, points).map_err(|error| {
+                if let Ok(mut raised) = raised.lock() {
+                    raised.get_or_insert(error);
+                }
+                Error::geometry("a region of Python failed".to_owned())
+            })
+        };
+        model = model.support_where(inside, support);
+    }
+    model.build().map(|built| Box::new(built) as Box<dyn AnyBody>).map_err(|error| fault(&error))
+}
+
+/// Which points a function of Python takes.
+fn asked<const D: usize>(region: &Py<PyAny>, points: &[[f64; D]]) -> PyResult<Vec<bool>> {
+    Python::attach(|py| {
+        let flat: Vec<f64> = points.iter().flatten().copied().collect();
+        let points = flat.into_pyarray(py).reshape([points.len(), D])?;
+        let answer = region.call1(py, (points,))?;
+        Ok(answer.extract::<PyReadonlyArray1<'_, bool>>(py)?.as_array().to_vec())
+    })
+}
+
+fn cut<const D: usize>(numbers: &[f64]) -> PyResult<Cut<D>> {
+    if numbers.len() != D * D {
+        return Err(value(format!("crack: found {} numbers; allowed: {}", numbers.len(), D * D)));
+    }
+    let vector = |from: usize| -> [f64; D] { std::array::from_fn(|d| numbers[from + d]) };
+    // in a plane its other end, in space its edges
+    let edge = |k: usize| match D {
+        2 if k == 0 => std::array::from_fn(|d| numbers[2 + d] - numbers[d]),
+        2 => [0.0; D],
+        _ if k + 1 < D => vector(D * (k + 1)),
+        _ => [0.0; D],
+    };
+    Ok(Cut { corner: vector(0), edges: std::array::from_fn(edge) })
+}
+
+/// The space of a body.
+trait Placed: Sized {
+    fn placed(self, space: &str, thickness: f64) -> PyResult<(Self, Space)>;
+}
+
+impl Placed for Body<2> {
+    fn placed(self, space: &str, thickness: f64) -> PyResult<(Self, Space)> {
+        match space {
+            "plane-stress" => Ok((self.plane_stress(thickness), Space::PlaneStress)),
+            "plane-strain" => Ok((self.plane_strain(thickness), Space::PlaneStrain)),
+            _ => Err(value(format!("space: found {space:?}; allowed: plane-stress, plane-strain"))),
+        }
+    }
+}
+
+impl Placed for Body<3> {
+    fn placed(self, _: &str, _: f64) -> PyResult<(Self, Space)> {
+        Ok((self, Space::Solid))
+    }
+}
+
+/// A method by its name, with some of its settings.
+fn solver(name: &str, mut settings: HashMap<String, f64>) -> PyResult<Solver> {
+    let mut take = |name: &str, default: f64| settings.remove(name).unwrap_or(default);
+    let method = match name {
+        "lbfgs" => {
+            let own = Lbfgs::default();
+            Solver::Lbfgs(Lbfgs {
+                tolerance: take("tolerance", 1e-4),
+                max_iterations: take("max_iterations", own.max_iterations as f64) as u64,
+                accept: take("accept", own.accept),
+                ..own
+            })
+        }
+        "relaxation" => {
+            let own = DynamicRelaxation::default();
+            Solver::Relaxation(DynamicRelaxation {
+                tolerance: take("tolerance", own.tolerance),
+                max_iterations: take("max_iterations", own.max_iterations as f64) as u64,
+                accept: take("accept", own.accept),
+                mass_safety: take("mass_safety", own.mass_safety),
+            })
+        }
+        "verlet" => {
+            let step = take("time_step", 0.0);
+            Solver::Verlet(VelocityVerlet {
+                density: take("density", 1000.0),
+                time_step: (step > 0.0).then_some(step),
+                safety: take("safety", 0.8),
+                damping: take("damping", 0.0),
+                ramp: take("ramp", 0.0),
+                end_time: take("end_time", 0.0),
+                records: take("records", 100.0) as usize,
+            })
+        }
+        _ => return Err(value(format!("method: found {name:?}; allowed: lbfgs, relaxation, verlet"))),
+    };
+    match settings.keys().next() {
+        None => Ok(method),
+        Some(other) => Err(value(format!("setting: found {other:?}, which `{name}` has not"))),
+    }
+}

@@ -1,0 +1,171 @@
+//! A law at many points: flat arrays in, flat arrays out, on all threads and without the interpreter's lock.
+
+use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2};
+use polycore::constitutive::{Error, Law, Prediction, Workspace};
+use polycore::tensor::Voigt;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+
+/// Points that a thread takes at once.
+const CHUNK: usize = 256;
+
+/// Places of the six components among the nine of a tensor, rows first.
+const UPPER: [usize; 6] = [0, 4, 8, 1, 2, 5];
+
+/// What a law predicts at N points.
+#[derive(Default)]
+struct Found {
+    stress: Vec<f64>,
+    tangent: Vec<f64>,
+    energy: Vec<f64>,
+    spread: Vec<f64>,
+    deviation: Vec<f64>,
+    /// 8 for each point: six components outside, far, spread.
+    flags: Vec<bool>,
+    unseen: Vec<bool>,
+}
+
+/// What a thread fills.
+struct Part<'a> {
+    c: &'a [f64],
+    stress: &'a mut [f64],
+    tangent: Option<&'a mut [f64]>,
+    energy: &'a mut [f64],
+    uncertainty: Option<Uncertainty<'a>>,
+}
+
+struct Uncertainty<'a> {
+    spread: &'a mut [f64],
+    deviation: &'a mut [f64],
+    flags: &'a mut [bool],
+    unseen: &'a mut [bool],
+}
+
+/// `stress` (N, 6) in Pa, `tangent` (N, 6, 6) in Pa if asked for, `energy` (N) in J/m³ (NaN of a law without), and of a learnt law
+/// `spread` (N), `deviation` (N, 6), `outside` and `unseen` (N, 6), `far`, `disagree` (N), at the rows of C, (N, 6) or (N, 9).
+pub fn predict<'py>(
+    py: Python<'py>,
+    law: &dyn Law,
+    c: &PyReadonlyArray2<'py, f64>,
+    tangent: bool,
+    uncertainty: bool,
+) -> PyResult<Bound<'py, PyDict>> {
+    let shape = c.as_array().dim();
+    if ![6, 9].contains(&shape.1) {
+        return Err(PyValueError::new_err(format!("C: found {} columns; allowed: 6 or 9", shape.1)));
+    }
+    let rows = c.as_slice().map_err(|_| PyValueError::new_err("C: found strides; allowed: contiguous rows"))?;
+    let (count, width) = shape;
+    let found = py.detach(|| evaluate(law, rows, width, tangent, uncertainty)).map_err(crate::error::value)?;
+    let answer = PyDict::new(py);
+    answer.set_item("stress", found.stress.into_pyarray(py).reshape([count, 6])?)?;
+    answer.set_item("energy", found.energy.into_pyarray(py))?;
+    if tangent {
+        answer.set_item("tangent", found.tangent.into_pyarray(py).reshape([count, 6, 6])?)?;
+    }
+    if uncertainty {
+        answer.set_item("spread", found.spread.into_pyarray(py))?;
+        answer.set_item("deviation", found.deviation.into_pyarray(py).reshape([count, 6])?)?;
+        answer.set_item("flags", found.flags.into_pyarray(py).reshape([count, 8])?)?;
+        answer.set_item("unseen", found.unseen.into_pyarray(py).reshape([count, 6])?)?;
+    }
+    Ok(answer)
+}
+
+fn evaluate(law: &dyn Law, rows: &[f64], width: usize, tangent: bool, uncertainty: bool) -> Result<Found, String> {
+    let count = rows.len() / width;
+    let mut found = Found { stress: vec![0.0; 6 * count], energy: vec![0.0; count], ..Found::default() };
+    if tangent {
+        found.tangent = vec![0.0; 36 * count];
+    }
+    if uncertainty {
+        found.spread = vec![0.0; count];
+        found.deviation = vec![0.0; 6 * count];
+        found.flags = vec![false; 8 * count];
+        found.unseen = vec![false; 6 * count];
+    }
+    let mut parts: Vec<Part<'_>> = Vec::with_capacity(count.div_ceil(CHUNK));
+    let mut tangents = found.tangent.chunks_mut(36 * CHUNK);
+    let mut spreads = found.spread.chunks_mut(CHUNK);
+    let mut deviations = found.deviation.chunks_mut(6 * CHUNK);
+    let mut flags = found.flags.chunks_mut(8 * CHUNK);
+    let mut unseen = found.unseen.chunks_mut(6 * CHUNK);
+    let whole = rows.chunks(width * CHUNK).zip(found.stress.chunks_mut(6 * CHUNK));
+    for ((c, stress), energy) in whole.zip(found.energy.chunks_mut(CHUNK)) {
+        let uncertainty = match (spreads.next(), deviations.next(), flags.next(), unseen.next()) {
+            (Some(spread), Some(deviation), Some(flags), Some(unseen)) => {
+                Some(Uncertainty { spread, deviation, flags, unseen })
+            }
+            _ => None,
+        };
+        parts.push(Part { c, stress, tangent: tangents.next(), energy, uncertainty });
+    }
+    let fill = |memory: &mut (Workspace, Vec<Voigt>, Vec<Prediction>), (number, part): (usize, &mut Part<'_>)| {
+        part.fill(law, width, memory).map_err(|(point, told)| (number * CHUNK + point, told))
+    };
+    let filled: Result<(), (usize, String)> =
+        parts.par_iter_mut().enumerate().map_init(Default::default, |memory, part| fill(memory, part)).collect();
+    match filled {
+        Ok(()) => Ok(found),
+        Err((point, told)) => Err(format!("point {point}: {told}")),
+    }
+}
+
+impl Part<'_> {
+    /// Evaluates the points; the first that the law refuses, and why.
+    fn fill(
+        &mut self,
+        law: &dyn Law,
+        width: usize,
+        (memory, points, predictions): &mut (Workspace, Vec<Voigt>, Vec<Prediction>),
+    ) -> Result<(), (usize, String)> {
+        points.clear();
+        for (point, row) in self.c.chunks_exact(width).enumerate() {
+            points.push(match width {
+                9 => {
+                    if let Some((i, j)) = [(1, 3), (2, 6), (5, 7)].into_iter().find(|&(i, j)| row[i] != row[j]) {
+                        return Err((point, format!("C: found {} and {}; allowed: a symmetric tensor", row[i], row[j])));
+                    }
+                    Voigt::from_fn(|a, _| row[UPPER[a]])
+                }
+                _ => Voigt::from_fn(|a, _| row[a]),
+            });
+        }
+        predictions.clear();
+        predictions.resize(points.len(), Prediction::default());
+        let told = |point: usize, error: Error| (point, error.to_string());
+        if self.tangent.is_some() {
+            for (point, (c, prediction)) in points.iter().zip(predictions.iter_mut()).enumerate() {
+                *prediction = law.tangent(c, memory).map_err(|error| told(point, error))?;
+            }
+        } else if law.stresses(points, memory, predictions).is_err() {
+            // one by one: which of them it is
+            for (point, (c, prediction)) in points.iter().zip(predictions.iter_mut()).enumerate() {
+                *prediction = law.stress(c, memory).map_err(|error| told(point, error))?;
+            }
+        }
+        for (k, found) in predictions.iter().enumerate() {
+            self.stress[6 * k..6 * k + 6].copy_from_slice(found.stress.as_slice());
+            self.energy[k] = found.energy.unwrap_or(f64::NAN);
+            if let (Some(tangent), Some(matrix)) = (&mut self.tangent, &found.tangent) {
+                // nalgebra's columns are numpy's rows of the transposed
+                for a in 0..6 {
+                    for b in 0..6 {
+                        tangent[36 * k + 6 * a + b] = matrix[(a, b)];
+                    }
+                }
+            }
+            if let Some(uncertainty) = &mut self.uncertainty {
+                uncertainty.spread[k] = found.spread;
+                uncertainty.deviation[6 * k..6 * k + 6].copy_from_slice(found.deviation.as_slice());
+                let flags = &mut uncertainty.flags[8 * k..8 * k + 8];
+                flags[..6].copy_from_slice(&found.flags.outside);
+                (flags[6], flags[7]) = (found.flags.far, found.flags.spread);
+                uncertainty.unseen[6 * k..6 * k + 6].copy_from_slice(&found.flags.unseen);
+            }
+        }
+        Ok(())
+    }
+}

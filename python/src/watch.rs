@@ -1,0 +1,154 @@
+//! Long work on a thread of its own, while the caller's thread hears signals and calls Python's functions.
+
+use polycore::case::{Step, StepField};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use numpy::{IntoPyArray, PyArrayMethods};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
+use std::time::{Duration, Instant};
+
+/// How often signals are looked for.
+const EVERY: Duration = Duration::from_millis(50);
+
+/// Time between two calls of a function that sees progress.
+const SHOWN_EVERY: Duration = Duration::from_millis(100);
+
+/// Functions of Python that see a run.
+pub struct Watchers {
+    /// `progress(part, line)`.
+    pub progress: Option<Py<PyAny>>,
+    /// `on_step(values, units, fields)`; `False` stops.
+    pub on_step: Option<Py<PyAny>>,
+}
+
+/// What the working thread says.
+enum Message {
+    Progress(f64, String),
+    Step(Step, SyncSender<bool>),
+}
+
+/// The working thread's end.
+pub struct Line<'a> {
+    stop: &'a AtomicBool,
+    sender: Sender<Message>,
+    wants_progress: bool,
+    wants_steps: bool,
+    shown: Option<Instant>,
+}
+
+impl<'a> Line<'a> {
+    /// Whether the user asked to stop.
+    pub fn stop(&self) -> &'a AtomicBool {
+        self.stop
+    }
+
+    /// Whether a function of Python sees steps.
+    pub fn wants_steps(&self) -> bool {
+        self.wants_steps
+    }
+
+    /// Shows the part done, now and then.
+    pub fn progress(&mut self, part: f64, line: &dyn Fn() -> String) {
+        if self.wants_progress && self.shown.is_none_or(|shown| shown.elapsed() > SHOWN_EVERY) {
+            self.shown = Some(Instant::now());
+            let _ = self.sender.send(Message::Progress(part, line()));
+        }
+    }
+
+    /// The end of a line that shows steps alone.
+    pub fn steps(&self) -> Line<'a> {
+        Line { sender: self.sender.clone(), wants_progress: false, shown: None, ..*self }
+    }
+
+    /// Shows a step; whether to go on.
+    pub fn step(&self, step: Step) -> bool {
+        let (answer, answered) = sync_channel(1);
+        let sent = self.sender.send(Message::Step(step, answer));
+        sent.is_ok() && answered.recv().unwrap_or(false)
+    }
+}
+
+/// Runs `work` on a thread of its own, on `threads` threads where given. A signal (`KeyboardInterrupt`) and what a function of
+/// Python raises ask it to stop, and are raised when it has.
+pub fn watched<T: Send>(
+    py: Python<'_>,
+    watchers: &Watchers,
+    threads: Option<usize>,
+    work: impl FnOnce(Line<'_>) -> T + Send,
+) -> PyResult<T> {
+    let stop = AtomicBool::new(false);
+    let pool = match threads {
+        Some(threads) => Some(
+            rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(crate::error::value)?,
+        ),
+        None => None,
+    };
+    let (sender, receiver) = channel();
+    let (wants_progress, wants_steps) = (watchers.progress.is_some(), watchers.on_step.is_some());
+    let line = Line { stop: &stop, sender, wants_progress, wants_steps, shown: None };
+    let stop = &stop;
+    py.detach(move || {
+        std::thread::scope(|scope| {
+            let worker = scope.spawn(move || match pool {
+                Some(pool) => pool.install(|| work(line)),
+                None => work(line),
+            });
+            let raised = hear(watchers, receiver, stop);
+            let found = worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            raised.map_or(Ok(found), Err)
+        })
+    })
+}
+
+/// Serves the working thread until it ends; what was raised first.
+fn hear(watchers: &Watchers, receiver: Receiver<Message>, stop: &AtomicBool) -> Option<PyErr> {
+    let mut raised = None;
+    loop {
+        let message = match receiver.recv_timeout(EVERY) {
+            Err(RecvTimeoutError::Disconnected) => return raised,
+            Err(RecvTimeoutError::Timeout) => None,
+            Ok(message) => Some(message),
+        };
+        Python::attach(|py| {
+            let answered = message.map_or(Ok(()), |message| serve(py, watchers, message));
+            if let Err(error) = answered.and_then(|()| py.check_signals()) {
+                stop.store(true, Ordering::Relaxed);
+                raised.get_or_insert(error);
+            }
+        });
+    }
+}
+
+fn serve(py: Python<'_>, watchers: &Watchers, message: Message) -> PyResult<()> {
+    match message {
+        Message::Progress(part, line) => {
+            if let Some(progress) = &watchers.progress {
+                progress.call1(py, (part, line))?;
+            }
+            Ok(())
+        }
+        Message::Step(step, answer) => {
+            let Some(on_step) = &watchers.on_step else { return Ok(()) };
+            let (values, units) = (PyDict::new(py), PyDict::new(py));
+            for (name, unit, value) in step.values {
+                values.set_item(name, value)?;
+                units.set_item(name, unit)?;
+            }
+            let fields = PyDict::new(py);
+            for StepField { name, unit, components, data } in step.fields {
+                units.set_item(name, unit)?;
+                let flat = data.into_pyarray(py);
+                match components {
+                    1 => fields.set_item(name, flat)?,
+                    _ => fields.set_item(name, flat.reshape([flat.len()? / components, components])?)?,
+                }
+            }
+            // an error leaves the answer out, which stops the run
+            let more = on_step.call1(py, (values, units, fields))?;
+            let stop = more.bind(py).is(pyo3::types::PyBool::new(py, false));
+            let _ = answer.send(!stop);
+            Ok(())
+        }
+    }
+}
