@@ -29,6 +29,11 @@ impl<const D: usize> Field<D> {
         std::array::from_fn(|d| self.components[d].as_slice())
     }
 
+    /// The components to write to.
+    pub fn components_mut(&mut self) -> [&mut [f64]; D] {
+        self.components.each_mut().map(Vec::as_mut_slice)
+    }
+
     /// The vector in one site.
     pub fn get(&self, site: usize) -> [f64; D] {
         std::array::from_fn(|d| self.components[d][site])

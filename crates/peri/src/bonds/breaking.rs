@@ -1,8 +1,7 @@
 //! Which bonds are stretched beyond what they bear.
 
 use super::{Bonds, Property};
-use crate::field::{CHUNK, Field, chunk_range};
-use crate::potential::StretchRange;
+use crate::field::{CHUNK, Field};
 use rayon::prelude::*;
 
 /// A bond, seen from one of its ends, that is to be severed.
@@ -30,19 +29,10 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
     let sites = bonds.sites();
     let least = critical.least() * critical.least() - 1.0;
     let of_chunk = |chunk: usize| {
-        let range = chunk_range(chunk, sites);
-        // the vectorised kernel finds the items to look into
-        let mut scratch = vec![0.0; D * range.len()];
-        let mut parts = scratch.chunks_mut(range.len());
-        let mut out: [&mut [f64]; D] = std::array::from_fn(|_| parts.next().unwrap_or_default());
-        let mut observed = StretchRange::REST;
-        bonds.force(displacement, chunk, &mut out, Some(&mut observed));
         let mut found = Vec::new();
-        // its last bits may differ from those below
-        if observed.high * (1.0 + 1e-9) < least {
-            return found;
-        }
-        for site in range {
+        // vectorised loops find the sites to look into; their last bits may differ from those below
+        let suspects = bonds.suspects(displacement, chunk, least * (1.0 - 1e-9) - 1e-12);
+        for site in suspects.into_iter().flatten() {
             let own = displacement.get(site);
             bonds.neighbours(site, &mut |bond| {
                 let other = displacement.get(bond.site);

@@ -1,8 +1,10 @@
 //! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
 
 use super::lattice_kernel::{Class, TILE, Tiles};
+use super::lattice_sums::{Span, Spans};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, Softening, integrity};
+use super::stencil::{Stencil, layout};
 use super::{
     Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
 };
@@ -11,64 +13,13 @@ use crate::field::{CHUNK, Field, chunk_range};
 use crate::geometry::{Cut, Lattice, severed};
 use crate::potential::{KernelFit, StretchRange};
 use rayon::prelude::*;
-
-/// The offsets within the horizon, in an order in which bond k and bond (n − 1 − k) are opposite.
-#[derive(Clone, Debug)]
-pub struct Stencil<const D: usize> {
-    /// Offsets in cells.
-    pub offsets: Vec<[i32; D]>,
-}
-
-impl<const D: usize> Stencil<D> {
-    /// All offsets 0 < |o| ≤ `ratio` (horizon over spacing).
-    pub fn new(ratio: f64) -> Self {
-        let reach = ratio.floor() as i32;
-        let side = (2 * reach + 1) as usize;
-        let offsets = (0..side.pow(D as u32))
-            .map(|index| {
-                // last axis slowest, so that consecutive offsets read consecutive sites
-                std::array::from_fn(|d| (index / side.pow(d as u32) % side) as i32 - reach)
-            })
-            .filter(|o: &[i32; D]| {
-                let square: i64 = o.iter().map(|&x| i64::from(x) * i64::from(x)).sum();
-                square > 0 && square as f64 <= ratio * ratio
-            })
-            .collect();
-        Self { offsets }
-    }
-
-    /// |ξ|/Δx of bond `k`.
-    pub fn length(&self, k: usize) -> f64 {
-        self.offsets[k].iter().map(|&x| f64::from(x * x)).sum::<f64>().sqrt()
-    }
-}
-
-/// Steps in sites along each axis, empty sites before the first cell, and all sites of a box of cells.
-fn layout<const D: usize>(cells: [usize; D], ratio: f64) -> ([usize; D], usize, usize) {
-    // empty cells between rows, so that nothing within twice the horizon and a cell wraps into the next row: stress
-    // measures look that far; odd strides, or rows of a power of two would fall into the same cache sets
-    let far = ratio.floor() as usize;
-    let mut strides = [1; D];
-    for d in 1..D {
-        strides[d] = (strides[d - 1] * (cells[d - 1] + 2 * far + 1)) | 1;
-    }
-    let guard = strides.iter().map(|s| s * far).sum::<usize>().next_multiple_of(TILE);
-    (strides, guard, (2 * guard + strides[D - 1] * cells[D - 1]).next_multiple_of(TILE))
-}
-
-/// Sites of a box of cells and a horizon over the spacing, as a real number: a thin box has many more than cells.
-pub fn storage<const D: usize>(cells: [f64; D], ratio: f64) -> f64 {
-    // larger boxes need no exact number, and have none
-    if cells.iter().product::<f64>() < 1e12 && ratio < 1e3 {
-        return layout(cells.map(|c| c as usize), ratio).2 as f64;
-    }
-    cells.iter().product::<f64>()
-}
+use std::ops::Range;
 
 /// The bonds of a lattice.
 pub struct LatticeBonds<const D: usize> {
     lattice: Lattice<D>,
     stencil: Stencil<D>,
+    spans: Vec<Span<D>>,
     ratio: f64,
     volume_correction: VolumeCorrection,
     strides: [usize; D],
@@ -117,6 +68,7 @@ impl<const D: usize> LatticeBonds<D> {
         let (strides, guard, sites) = layout(lattice.cells, ratio);
         let mut bonds = Self {
             stencil,
+            spans: Vec::new(),
             ratio,
             volume_correction,
             strides,
@@ -133,6 +85,7 @@ impl<const D: usize> LatticeBonds<D> {
             softening: Softening::default(),
             lattice,
         };
+        bonds.spans = bonds.measure();
         bonds.particles = bonds.occupied_sites();
         if bonds.particles.is_empty() {
             return Err(Error::geometry("the body contains no particle".to_owned()));
@@ -175,14 +128,33 @@ impl<const D: usize> LatticeBonds<D> {
 
     /// Weight of bond `k` of the particle in `site`: volume correction × surface correction.
     pub fn weight(&self, site: usize, k: usize) -> f64 {
+        let Span { shift, bond, length, share, .. } = self.spans[k];
+        let Some(factors) = &self.factors else { return share };
+        let other = site.wrapping_add_signed(shift);
+        share * self.interior_factor * surface_weight(bond, length, factors.get(site), factors.get(other))
+    }
+
+    /// The bonds of the stencil, measured once.
+    fn measure(&self) -> Vec<Span<D>> {
         let spacing = self.lattice.spacing;
-        let length = self.stencil.length(k) * spacing;
-        let volume = self.volume_correction.factor(length, self.horizon(), spacing);
-        let Some(factors) = &self.factors else { return volume };
-        let offset = self.stencil.offsets[k];
-        let other = site.wrapping_add_signed(self.shift(offset));
-        let bond = offset.map(|o| f64::from(o) * spacing);
-        volume * self.interior_factor * surface_weight(bond, length, factors.get(site), factors.get(other))
+        let span = |(k, &offset): (usize, &[i32; D])| {
+            let length = self.stencil.length(k) * spacing;
+            let bond = offset.map(|o| f64::from(o) * spacing);
+            let share = self.volume_correction.factor(length, self.horizon(), spacing);
+            let inverse_square = 1.0 / bond.iter().map(|x| x * x).sum::<f64>();
+            Span { shift: self.shift(offset), bond, length, share, inverse_square }
+        };
+        self.stencil.offsets.iter().enumerate().map(span).collect()
+    }
+
+    /// What sums over half of the stencil read: every bond of the body once.
+    pub(super) fn spans<'a>(&'a self, displacement: &'a Field<D>) -> Spans<'a, D> {
+        Spans { spans: &self.spans, tiles: self.tiles(displacement) }
+    }
+
+    /// Whether bonds carry a weight of their own: integrities, or surface factors.
+    pub(super) fn is_uniform(&self) -> bool {
+        self.factors.is_none() && self.softening.bonds().is_empty()
     }
 
     /// What lattice kernels read, with a displacement.
@@ -349,17 +321,20 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     }
 
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
-        let (spacing, soft) = (self.lattice.spacing, self.softening.among(site..site + 1));
-        for (k, &offset) in self.stencil.offsets.iter().enumerate() {
-            if self.is_intact(site, k) {
-                let length = self.stencil.length(k) * spacing;
+        let soft = self.softening.among(site..site + 1);
+        for (word, words) in self.intact.iter().enumerate() {
+            let mut present = words[site];
+            while present != 0 {
+                let k = 64 * word + present.trailing_zeros() as usize;
+                present &= present - 1;
+                let Span { shift, bond, length, share, .. } = self.spans[k];
                 let whole = integrity(soft, k as u32) * self.lattice.volume;
                 visit(Neighbour {
                     index: k as u32,
-                    site: site.wrapping_add_signed(self.shift(offset)),
-                    bond: offset.map(|o| f64::from(o) * spacing),
+                    site: site.wrapping_add_signed(shift),
+                    bond,
                     length,
-                    volume: whole * self.volume_correction.factor(length, self.horizon(), spacing),
+                    volume: whole * share,
                     weight: whole * self.weight(site, k),
                     relief: [0.0; D],
                 });
@@ -392,20 +367,12 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     }
 
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
-        let spacing = self.lattice.spacing;
-        let stencil: Vec<StencilBond<D>> = (0..self.stencil.offsets.len())
-            .map(|k| {
-                let length = self.stencil.length(k) * spacing;
-                let share = self.volume_correction.factor(length, self.horizon(), spacing);
-                let weight = self.interior_factor * share;
-                let offset = self.stencil.offsets[k];
-                StencilBond {
-                    shift: self.shift(offset),
-                    bond: offset.map(|o| f64::from(o) * spacing),
-                    stiffness: 2.0 * modulus * weight * self.lattice.volume / length,
-                }
-            })
-            .collect();
+        let scaled = |span: &Span<D>| {
+            let stiffness =
+                2.0 * modulus * (self.interior_factor * span.share) * self.lattice.volume / span.length;
+            StencilBond { shift: span.shift, bond: span.bond, stiffness }
+        };
+        let stencil: Vec<StencilBond<D>> = self.spans.iter().map(scaled).collect();
         self.kernel = lattice_kernel(fit, &stencil);
         self.table = self.kernel.is_none().then(|| (fit.clone(), modulus));
     }
@@ -443,6 +410,14 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         } else if let Some((fit, modulus)) = &self.table {
             plain_force(self, fit, *modulus, displacement, start, force, track);
         }
+    }
+
+    fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange {
+        self.spans(displacement).range(chunk_range(chunk, self.sites))
+    }
+
+    fn suspects(&self, displacement: &Field<D>, chunk: usize, least: f64) -> Vec<Range<usize>> {
+        self.spans(displacement).beyond(chunk_range(chunk, self.sites), least)
     }
 
     fn sever(&mut self, bonds: &[Overstretched]) {

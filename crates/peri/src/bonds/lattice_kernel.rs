@@ -84,8 +84,8 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_,
         );
         assert!(self.tiles.factors.is_none_or(|g| g.iter().all(|c| c.len() == sites)));
         assert!(self.rows.iter().all(|r| r.shift.unsigned_abs() <= self.tiles.guard));
-        let mut seen = StretchRange::REST;
         let tracking = track.is_some();
+        let mut seen = [simd.splat_f64s(0.0); 2];
         for offset in (0..length).step_by(TILE) {
             let base = start + offset;
             let class = self.tiles.classes[base / TILE];
@@ -97,7 +97,8 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_,
             }
             assert!(base >= self.tiles.guard && base + TILE + self.tiles.guard <= sites);
             let lanes = S::F64_LANES;
-            let pair = 2 * lanes <= TILE;
+            // two vectors at once share the loads of coefficients, where registers hold both
+            let pair = 2 * lanes <= TILE && (D < 3 || S::REGISTER_COUNT >= 32);
             let step = if pair { 2 * lanes } else { lanes };
             for sub in (0..TILE).step_by(step) {
                 let mut out = [std::ptr::null_mut(); D];
@@ -106,52 +107,66 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_,
                 }
                 // SAFETY: see above; `out` has at least `step` elements left in its tile.
                 unsafe {
-                    match (class == Class::Full && !tracking, pair) {
-                        (true, true) => self.full::<S, 2>(simd, base + sub, out),
-                        (true, false) => self.full::<S, 1>(simd, base + sub, out),
-                        (false, true) => {
-                            self.partial::<S>(simd, base + sub, out, tracking, &mut seen);
-                            for d in 0..D {
-                                out[d] = out[d].add(lanes);
-                            }
-                            self.partial::<S>(simd, base + sub + lanes, out, tracking, &mut seen);
-                        }
-                        (false, false) => self.partial::<S>(simd, base + sub, out, tracking, &mut seen),
+                    match (class == Class::Full, pair) {
+                        (true, true) => self.full::<S, 2>(simd, base + sub, out, tracking, &mut seen),
+                        (true, false) => self.full::<S, 1>(simd, base + sub, out, tracking, &mut seen),
+                        (false, true) => self.partial::<S, 2>(simd, base + sub, out, tracking, &mut seen),
+                        (false, false) => self.partial::<S, 1>(simd, base + sub, out, tracking, &mut seen),
                     }
                 }
             }
         }
         if let Some(range) = track {
+            let [low, high] = seen;
+            let seen = StretchRange { low: simd.reduce_min_f64s(low), high: simd.reduce_max_f64s(high) };
             *range = range.join(seen);
         }
     }
 }
 
 impl<const D: usize, const P: usize, const Q: usize> LatticePass<'_, D, P, Q> {
+    /// Rows whose stretches are tracked: those of one direction see every bond of the body once.
+    #[inline(always)]
+    fn tracked(&self, tracking: bool) -> usize {
+        if tracking { self.rows.len() / 2 } else { 0 }
+    }
+
     /// Every bond present: nothing but loads and arithmetic.
     ///
     /// # Safety
     /// Sites `base − guard .. base + V·lanes + guard` exist in every slice; `out` takes V·lanes values.
     #[inline(always)]
-    unsafe fn full<S: Simd, const V: usize>(&self, simd: S, base: usize, out: [*mut f64; D]) {
+    unsafe fn full<S: Simd, const V: usize>(
+        &self,
+        simd: S,
+        base: usize,
+        out: [*mut f64; D],
+        tracking: bool,
+        seen: &mut [S::f64s; 2],
+    ) {
         let zero = simd.splat_f64s(0.0);
         let mut sum = [[zero; V]; D];
-        let mut own = [[zero; V]; D];
-        for d in 0..D {
+        let (tracked, others) = self.rows.split_at(self.tracked(tracking));
+        let [mut low, mut high] = *seen;
+        for row in tracked {
+            let inverse = simd.splat_f64s(row.inverse_square);
             for v in 0..V {
-                own[d][v] = unsafe { load::<S>(self.tiles.displacement[d], base + v * S::F64_LANES) };
+                // SAFETY: as above
+                let (zeta, e) = unsafe { self.stretch(simd, row, base + v * S::F64_LANES) };
+                let relative = simd.mul_f64s(e, inverse);
+                low = simd.min_f64s(low, relative);
+                high = simd.max_f64s(high, relative);
+                let q = law::<S, P, Q>(simd, e, row.clamp, row.constant, &row.numerator, &row.denominator);
+                for d in 0..D {
+                    sum[d][v] = simd.mul_add_f64s(q, zeta[d], sum[d][v]);
+                }
             }
         }
-        for row in self.rows {
-            let there = base.wrapping_add_signed(row.shift);
+        *seen = [low, high];
+        for row in others {
             for v in 0..V {
-                let (mut eta, mut zeta) = ([zero; D], [zero; D]);
-                for d in 0..D {
-                    let other = unsafe { load::<S>(self.tiles.displacement[d], there + v * S::F64_LANES) };
-                    eta[d] = simd.sub_f64s(other, own[d][v]);
-                    zeta[d] = simd.add_f64s(eta[d], simd.splat_f64s(row.bond[d]));
-                }
-                let e = elongation::<S, D>(simd, &eta, &zeta, &row.bond);
+                // SAFETY: as above
+                let (zeta, e) = unsafe { self.stretch(simd, row, base + v * S::F64_LANES) };
                 let q = law::<S, P, Q>(simd, e, row.clamp, row.constant, &row.numerator, &row.denominator);
                 for d in 0..D {
                     sum[d][v] = simd.mul_add_f64s(q, zeta[d], sum[d][v]);
@@ -165,65 +180,94 @@ impl<const D: usize, const P: usize, const Q: usize> LatticePass<'_, D, P, Q> {
         }
     }
 
-    /// Bonds masked by their bits, weighted by their ends' factors, stretches collected if asked.
+    /// Bonds masked by their bits, weighted by their ends' factors; those that no particle of the block has are left out.
     ///
     /// # Safety
-    /// As [`Self::full`] with V = 1.
+    /// As [`Self::full`].
     #[inline(always)]
-    unsafe fn partial<S: Simd>(
+    unsafe fn partial<S: Simd, const V: usize>(
         &self,
         simd: S,
         base: usize,
         out: [*mut f64; D],
         tracking: bool,
-        seen: &mut StretchRange,
+        seen: &mut [S::f64s; 2],
     ) {
         let zero = simd.splat_f64s(0.0);
-        let mut sum = [zero; D];
-        let (mut low, mut high) = (simd.splat_f64s(seen.low), simd.splat_f64s(seen.high));
-        let mut own = [zero; D];
-        for d in 0..D {
-            own[d] = unsafe { load::<S>(self.tiles.displacement[d], base) };
-        }
+        let mut sum = [[zero; V]; D];
+        let [mut low, mut high] = *seen;
+        let tracked = self.tracked(tracking);
         for (word, rows) in self.rows.chunks(64).enumerate() {
-            let bits =
-                unsafe { self.tiles.intact[word].as_ptr().add(base).cast::<S::u64s>().read_unaligned() };
-            for (k, row) in rows.iter().enumerate() {
+            let own = &self.tiles.intact[word][base..base + V * S::F64_LANES];
+            let mut present = 0;
+            for bits in own {
+                present |= bits;
+            }
+            while present != 0 {
+                let k = present.trailing_zeros() as usize;
+                present &= present - 1;
+                let row = &rows[k];
                 let bit = simd.splat_u64s(1 << k);
-                let present = simd.equal_u64s(simd.and_u64s(bits, bit), bit);
-                let there = base.wrapping_add_signed(row.shift);
-                let (mut eta, mut zeta) = ([zero; D], [zero; D]);
-                for d in 0..D {
-                    let other = unsafe { load::<S>(self.tiles.displacement[d], there) };
-                    eta[d] = simd.select_f64s(present, simd.sub_f64s(other, own[d]), zero);
-                    zeta[d] = simd.add_f64s(eta[d], simd.splat_f64s(row.bond[d]));
-                }
-                let e = elongation::<S, D>(simd, &eta, &zeta, &row.bond);
-                let mut q =
-                    law::<S, P, Q>(simd, e, row.clamp, row.constant, &row.numerator, &row.denominator);
-                if let Some(factors) = self.tiles.factors {
-                    let weight = unsafe {
-                        directional_weight::<S, D>(simd, factors, base, there, &row.bond, row.inverse_square)
+                for v in 0..V {
+                    let here = base + v * S::F64_LANES;
+                    // SAFETY: as above
+                    let (zeta, e, bits) = unsafe {
+                        let bits = own.as_ptr().add(v * S::F64_LANES).cast::<S::u64s>().read_unaligned();
+                        let (zeta, e) = self.stretch(simd, row, here);
+                        (zeta, e, bits)
                     };
-                    q = simd.mul_f64s(q, weight);
-                }
-                q = simd.select_f64s(present, q, zero);
-                for d in 0..D {
-                    sum[d] = simd.mul_add_f64s(q, zeta[d], sum[d]);
-                }
-                if tracking {
-                    let relative = simd.mul_f64s(e, simd.splat_f64s(row.inverse_square));
-                    low = simd.min_f64s(low, relative);
-                    high = simd.max_f64s(high, relative);
+                    let has = simd.equal_u64s(simd.and_u64s(bits, bit), bit);
+                    let mut q =
+                        law::<S, P, Q>(simd, e, row.clamp, row.constant, &row.numerator, &row.denominator);
+                    if let Some(factors) = self.tiles.factors {
+                        let there = here.wrapping_add_signed(row.shift);
+                        let inverse = row.inverse_square;
+                        // SAFETY: as above
+                        let weight = unsafe {
+                            directional_weight::<S, D>(simd, factors, here, there, &row.bond, inverse)
+                        };
+                        q = simd.mul_f64s(q, weight);
+                    }
+                    q = simd.select_f64s(has, q, zero);
+                    for d in 0..D {
+                        sum[d][v] = simd.mul_add_f64s(q, zeta[d], sum[d][v]);
+                    }
+                    if 64 * word + k < tracked {
+                        let relative = simd.mul_f64s(e, simd.splat_f64s(row.inverse_square));
+                        let relative = simd.select_f64s(has, relative, zero);
+                        low = simd.min_f64s(low, relative);
+                        high = simd.max_f64s(high, relative);
+                    }
                 }
             }
         }
+        *seen = [low, high];
         for d in 0..D {
-            unsafe { out[d].cast::<S::f64s>().write_unaligned(sum[d]) };
+            for v in 0..V {
+                unsafe { out[d].add(v * S::F64_LANES).cast::<S::f64s>().write_unaligned(sum[d][v]) };
+            }
         }
-        if tracking {
-            *seen = StretchRange { low: simd.reduce_min_f64s(low), high: simd.reduce_max_f64s(high) };
+    }
+
+    /// ζ of a bond of the particles from `here` on, and E.
+    ///
+    /// # Safety
+    /// As [`Self::full`] with V = 1.
+    #[inline(always)]
+    unsafe fn stretch<S: Simd>(&self, simd: S, row: &Row<D, P, Q>, here: usize) -> ([S::f64s; D], S::f64s) {
+        let zero = simd.splat_f64s(0.0);
+        let there = here.wrapping_add_signed(row.shift);
+        let (mut eta, mut zeta) = ([zero; D], [zero; D]);
+        for d in 0..D {
+            // SAFETY: as above
+            let (own, other) = unsafe {
+                (load::<S>(self.tiles.displacement[d], here), load::<S>(self.tiles.displacement[d], there))
+            };
+            eta[d] = simd.sub_f64s(other, own);
+            zeta[d] = simd.add_f64s(eta[d], simd.splat_f64s(row.bond[d]));
         }
+        let e = elongation::<S, D>(simd, &eta, &zeta, &row.bond);
+        (zeta, e)
     }
 }
 

@@ -1,12 +1,25 @@
-//! Both passes of materials whose forces are linear in a bond, on a lattice.
+//! Sums over the bonds of a lattice: energies, and both passes of materials whose forces are linear in a bond.
 
 use super::kernel::dispatch;
 use super::linear_kernel::{self, LinearPass, LinearRow, MomentPass, Moments};
 use super::{Bonds, LatticeBonds};
-use crate::field::{Field, chunk_range};
+use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::StretchRange;
+use rayon::prelude::*;
 
 impl<const D: usize> LatticeBonds<D> {
+    /// Σ_I V_I Σ_J w V_J |ξ| φ(e), each bond computed once; `None` where bonds carry weights of their own.
+    pub fn energy(&self, displacement: &Field<D>, energy: impl Fn(f64) -> f64 + Sync) -> Option<f64> {
+        if !self.is_uniform() {
+            return None;
+        }
+        let (sites, volume) = (self.sites(), self.lattice().volume);
+        let spans = self.spans(displacement);
+        let of = |chunk: usize| spans.energy(chunk_range(chunk, sites), &energy);
+        let parts: Vec<f64> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        Some(2.0 * volume * volume * parts.iter().sum::<f64>())
+    }
+
     /// The stencil for [`Self::moments`] and [`Self::linear_force`].
     pub fn linear_rows(&self) -> Vec<LinearRow<D>> {
         let spacing = self.spacing();

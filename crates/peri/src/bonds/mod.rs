@@ -8,11 +8,13 @@ mod cloud_linear;
 mod kernel;
 mod lattice;
 mod lattice_kernel;
+mod lattice_sums;
 mod linear;
 mod linear_kernel;
 mod property;
 mod rows;
 mod softening;
+mod stencil;
 
 pub use crate::geometry::Lattice;
 pub use crate::potential::StretchRange;
@@ -21,16 +23,18 @@ pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
 pub use cloud_linear::{CloudMoments, CloudPlaces, Columns};
-pub use lattice::{LatticeBonds, Stencil, storage};
+pub use lattice::LatticeBonds;
 pub use lattice_kernel::TILE;
 pub use linear_kernel::{LinearRow, Moments};
 pub use property::Property;
 pub use softening::{Softened, Softening, among};
+pub use stencil::{Stencil, storage};
 
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A neighbour J of a particle I, as set-up code sees it.
 #[derive(Clone, Copy, Debug)]
@@ -104,7 +108,8 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
     /// Sets per-particle surface-correction factors (one field of `D` components over the sites).
     fn set_factors(&mut self, factors: Field<D>);
-    /// Force densities Σ_J f V_J, N/m³, of work item `chunk`; collects the stretches observed if asked.
+    /// Force densities Σ_J f V_J, N/m³, of work item `chunk`; collects the stretches observed if asked, of every bond in at least
+    /// one of the items that hold its ends.
     fn force(
         &self,
         displacement: &Field<D>,
@@ -112,6 +117,21 @@ pub trait Bonds<const D: usize>: Send + Sync {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     );
+    /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are those of the body.
+    fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange {
+        let length = chunk_range(chunk, self.sites()).len();
+        let mut scratch = vec![0.0; D * length];
+        let mut parts = scratch.chunks_mut(length);
+        let mut out: [&mut [f64]; D] = std::array::from_fn(|_| parts.next().unwrap_or_default());
+        let mut range = StretchRange::REST;
+        self.force(displacement, chunk, &mut out, Some(&mut range));
+        range
+    }
+    /// Sites of work item `chunk` among which all are that have a bond with e > `least`.
+    fn suspects(&self, displacement: &Field<D>, chunk: usize, least: f64) -> Vec<Range<usize>> {
+        let range = chunk_range(chunk, self.sites());
+        if self.stretches(displacement, chunk).high > least { vec![range] } else { Vec::new() }
+    }
     /// Severs bonds, each named from both of its ends.
     fn sever(&mut self, bonds: &[Overstretched]);
     /// Sets θ of solids of the mean deformation of a family, see [`crate::material::relief`]: before any bond breaks. Lattices have none.
@@ -167,15 +187,7 @@ pub fn stretch_range<const D: usize, B: Bonds<D> + ?Sized>(
     let sites = bonds.sites();
     (0..sites.div_ceil(CHUNK))
         .into_par_iter()
-        .map(|chunk| {
-            let length = chunk_range(chunk, sites).len();
-            let mut scratch = vec![0.0; D * length];
-            let mut parts = scratch.chunks_mut(length);
-            let mut out: [&mut [f64]; D] = std::array::from_fn(|_| parts.next().unwrap_or_default());
-            let mut range = StretchRange::REST;
-            bonds.force(displacement, chunk, &mut out, Some(&mut range));
-            range
-        })
+        .map(|chunk| bonds.stretches(displacement, chunk))
         .reduce(|| StretchRange::REST, StretchRange::join)
 }
 

@@ -77,7 +77,7 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
     where
         Self: 'a,
     {
-        Box::new(Kernels { material: self, table: None })
+        Box::new(Kernels { material: self, fitted: None, table: None })
     }
 }
 
@@ -90,7 +90,9 @@ pub(super) fn mixed<const D: usize>(n: [f64; D]) -> f64 {
 /// A bond law in the kernels.
 struct Kernels<'a> {
     material: BondMaterial<'a>,
-    /// Energies over the range of stretches last requested: a law costs more to sample than bonds to sum.
+    /// Energies of the fit, where it is not a table.
+    fitted: Option<EnergyTable>,
+    /// Energies of the law over the range of stretches last requested: it costs more to sample than bonds to sum.
     table: Option<(StretchRange, EnergyTable)>,
 }
 
@@ -111,6 +113,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
             fit = fit.clamped();
         }
         bonds.set_law(&fit, modulus);
+        self.fitted = EnergyTable::of_fit(&fit, law.energy(1.0));
         let tangent =
             |stretch: f64| law.tension_derivative(stretch).abs().max(law.tension(stretch).abs() / stretch);
         Ok(samples(cover.stretches).map(tangent).fold(0.0, f64::max) * modulus)
@@ -136,10 +139,17 @@ impl<const D: usize> Response<D> for Kernels<'_> {
     /// Σ_I V_I Σ_J w V_J kθ |ξ| φ.
     fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, observed: StretchRange) -> f64 {
         let (law, modulus) = (&*self.material.law, self.material.modulus);
-        if self.table.as_ref().is_none_or(|(range, _)| *range != observed) {
+        if self.fitted.is_none() && self.table.as_ref().is_none_or(|(range, _)| *range != observed) {
             self.table = Some((observed, EnergyTable::new(law, observed)));
         }
-        let Some((_, table)) = &self.table else { return 0.0 };
+        let Some(table) = self.fitted.as_ref().or(self.table.as_ref().map(|(_, table)| table)) else {
+            return 0.0;
+        };
+        if let Some(sum) =
+            bonds.as_lattice().and_then(|lattice| lattice.energy(displacement, |e| table.value(e)))
+        {
+            return modulus * sum;
+        }
         let of = |sites: &[u32]| {
             let mut sum = 0.0;
             for &site in sites {

@@ -122,6 +122,33 @@ impl KernelFit {
         if self.stress_free { e * ratio } else { ratio }
     }
 
+    /// q of several e at once, with the bits of [`Self::value`].
+    #[inline(always)]
+    pub fn values<const N: usize>(&self, e: &mut [f64; N]) {
+        if !self.table.is_empty() {
+            e.iter_mut().for_each(|e| *e = self.value(*e));
+            return;
+        }
+        let (mut above, mut below) = ([0.0; N], [0.0; N]);
+        for e in e.iter_mut() {
+            *e = e.clamp(self.clamp[0], self.clamp[1]);
+        }
+        for c in self.numerator.iter().rev() {
+            for k in 0..N {
+                above[k] = above[k] * e[k] + c;
+            }
+        }
+        for c in self.denominator.iter().rev() {
+            for k in 0..N {
+                below[k] = below[k] * e[k] + c;
+            }
+        }
+        for k in 0..N {
+            let ratio = above[k] / (1.0 + e[k] * below[k]);
+            e[k] = if self.stress_free { e[k] * ratio } else { ratio };
+        }
+    }
+
     /// What is fitted: `polynomial of degree 6`, `rational 3/2`, `table of 2000 nodes`.
     pub fn kind(&self) -> String {
         if !self.table.is_empty() {

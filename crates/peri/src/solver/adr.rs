@@ -11,6 +11,7 @@ use super::passes::{force_pass, move_pass};
 use super::state::{State, Status, Watch};
 use super::system::System;
 
+use crate::bonds::StretchRange;
 use crate::error::Error;
 
 /// Iterations between looks at the stretches.
@@ -173,7 +174,7 @@ impl<const D: usize> Equilibrium<D> for RelaxationSolver {
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-    ) -> Result<(), Error> {
+    ) -> Result<Option<StretchRange>, Error> {
         if self.unit_mass.len() != system.bonds.sites() {
             self.unit_mass = vec![1.0; system.bonds.sites()];
             let particles = system.bonds.particles();
@@ -181,7 +182,7 @@ impl<const D: usize> Equilibrium<D> for RelaxationSolver {
         }
         self.own_mass.clear();
         while !self.iterate(system, state, watch)? {}
-        Ok(())
+        Ok(None)
     }
 
     fn broke(&mut self, system: &System<D>, sites: &[u32]) {

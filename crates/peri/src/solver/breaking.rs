@@ -64,7 +64,6 @@ impl<const D: usize> System<'_, D> {
                 })
             }
         };
-        self.count_evaluation(state);
         if list.is_empty() && softened.is_none() {
             return Vec::new();
         }

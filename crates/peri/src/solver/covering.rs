@@ -32,10 +32,13 @@ impl<const D: usize> System<'_, D> {
         self.fit(state, known)
     }
 
-    /// Whether every stretch of the state lies within the fit; widens it otherwise.
-    pub(super) fn covers_stretches(&mut self, state: &mut State<D>) -> Result<bool, Error> {
-        let observed = stretch_range(&*self.bonds, &state.displacement);
-        self.count_evaluation(state);
+    /// Whether every stretch of the state, `observed` if that is known, lies within the fit; widens it otherwise.
+    pub(super) fn covers_stretches(
+        &mut self,
+        state: &mut State<D>,
+        observed: Option<StretchRange>,
+    ) -> Result<bool, Error> {
+        let observed = observed.unwrap_or_else(|| stretch_range(&*self.bonds, &state.displacement));
         state.balanced_stretches = observed;
         state.observed = state.observed.join(observed);
         Ok(!self.widen(state)?)

@@ -4,16 +4,17 @@
 
 use super::balance::Goal;
 use super::load_stepping::{Equilibrium, load_stepping};
-use super::memory::{Memory, product};
+use super::memory::Memory;
 use super::method::{Finished, Method};
-use super::passes::{Sums, force_pass};
+use super::passes::{Sums, gradient_pass};
+use super::places::Places;
 use super::preconditioner::Preconditioner;
 use super::state::{State, Status, Watch};
 use super::system::System;
 use crate::bonds::{StretchRange, stretch_range};
+use crate::contact::Contact;
 use crate::error::Error;
-use crate::field::{Field, chunk_range};
-use rayon::prelude::*;
+use crate::field::Field;
 
 /// Searches, load steps, and iterations of one search, after which the preconditioner is rebuilt …
 const SEARCHES: u64 = 25;
@@ -100,6 +101,8 @@ pub struct LbfgsSolver<const D: usize> {
     settings: Lbfgs,
     preconditioner: Preconditioner<D>,
     memory: Memory<D>,
+    /// Where particles are: all fields below are over particles.
+    places: Places,
     /// Gradients −V F of the energy at the iterate and at the trial, 0 where constrained.
     gradient: Field<D>,
     trial: Field<D>,
@@ -139,6 +142,7 @@ impl<const D: usize> LbfgsSolver<D> {
             settings,
             preconditioner: Preconditioner::new(),
             memory: Memory::new(settings.memory),
+            places: Places::default(),
             gradient: Field::zeros(0),
             trial: Field::zeros(0),
             image: Field::zeros(0),
@@ -161,7 +165,7 @@ impl<const D: usize> LbfgsSolver<D> {
     fn begin(&mut self, system: &mut System<D>, state: &State<D>, watch: &mut Watch<D>) -> Result<(), Error> {
         watch(&self.status(system, state, true), state)?;
         system.prepare(&state.displacement);
-        let sites = system.bonds.sites();
+        let particles = system.bonds.particles().len();
         let fields = [
             &mut self.gradient,
             &mut self.trial,
@@ -169,8 +173,9 @@ impl<const D: usize> LbfgsSolver<D> {
             &mut self.trial_image,
             &mut self.direction,
         ];
-        if fields[0].sites() != sites {
-            fields.into_iter().for_each(|field| *field = Field::zeros(sites));
+        if fields[0].sites() != particles {
+            fields.into_iter().for_each(|field| *field = Field::zeros(particles));
+            self.places = Places::new(&*system.bonds, &system.loads);
         }
         self.memory.clear(true);
         self.local_only = false;
@@ -197,38 +202,11 @@ impl<const D: usize> LbfgsSolver<D> {
     fn evaluate(&mut self, system: &mut System<D>, state: &mut State<D>) -> Point {
         let factor = system.factors[state.step];
         system.prepare(&state.displacement);
-        // at rest the velocity leaves the pass' quotients at 0
-        let (sums, observed) = force_pass(system, state, self.preconditioner.local(), 1.0, factor, true);
+        let body = (&self.places, self.preconditioner.volumes());
+        let (sums, observed, slope) =
+            gradient_pass(system, state, body, &self.direction, factor, &mut self.trial);
         system.count_evaluation(state);
-        let (sites, volumes) = (system.bonds.sites(), self.preconditioner.volumes());
-        let (force, direction) = (state.force.components(), self.direction.components());
-        let loads = &*system.loads;
-        let parts: Vec<f64> = self
-            .trial
-            .chunks_mut()
-            .into_par_iter()
-            .enumerate()
-            .map(|(chunk, gradient)| {
-                let range = chunk_range(chunk, sites);
-                let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
-                let volumes = &volumes[range.clone()];
-                let mut slope = 0.0;
-                for d in 0..D {
-                    let (g, f) = (&mut *gradient[d], &force[d][range.clone()]);
-                    for k in 0..f.len() {
-                        g[k] = -volumes[k] * f[k];
-                    }
-                    for (g, constrained) in g.iter_mut().zip(constrained) {
-                        if constrained >> d & 1 == 1 {
-                            *g = 0.0;
-                        }
-                    }
-                    slope += product(g, &direction[d][range.clone()]);
-                }
-                slope
-            })
-            .collect();
-        Point { sums, observed, slope: parts.iter().sum() }
+        Point { sums, observed, slope }
     }
 
     /// Evaluates, and once more where the fitted law had to be widened.
@@ -243,25 +221,18 @@ impl<const D: usize> LbfgsSolver<D> {
 
     /// u += step·d.
     fn step(&self, state: &mut State<D>, step: f64) {
-        let sites = state.displacement.sites();
-        let direction = self.direction.components();
-        state.displacement.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, u)| {
-            let range = chunk_range(chunk, sites);
-            for d in 0..D {
-                u[d].iter_mut().zip(&direction[d][range.clone()]).for_each(|(u, d)| *u += step * d);
-            }
-        });
+        self.places.add_scaled(&mut state.displacement, step, &self.direction);
     }
 
     /// z = B g of the trial, then the direction from it; the slope along it. The steepest of what is left where the
     /// memory gives no descent.
-    fn direct(&mut self, system: &System<D>) -> f64 {
+    fn direct(&mut self) -> f64 {
         let slope = self.memory.direction(&self.gradient, &self.image, &mut self.direction);
         if slope < 0.0 && slope.is_finite() {
             return slope;
         }
         self.memory.clear(true);
-        self.preconditioner.apply(&system.loads, &self.gradient, &mut self.image, self.local_only);
+        self.preconditioner.apply(&self.places, &self.gradient, &mut self.image, self.local_only);
         self.memory.direction(&self.gradient, &self.image, &mut self.direction)
     }
 
@@ -316,16 +287,22 @@ impl<const D: usize> LbfgsSolver<D> {
 
     /// How far a step may go along the direction where bonds soften at stretches up to e = `most`, or particles touch:
     /// the energy is not convex there.
-    fn longest_step(&mut self, system: &System<D>, state: &mut State<D>, most: f64) -> f64 {
-        let contact = system.repulsion();
-        let longest = contact.map_or(f64::INFINITY, |c| c.longest_step(&state.displacement, &self.direction));
-        if system.material.bond_law().0.tension_derivative((1.0 + most).sqrt()) >= 0.0 {
+    fn longest_step(&mut self, system: &System<D>, state: &State<D>, most: f64) -> f64 {
+        let softens = system.material.bond_law().0.tension_derivative((1.0 + most).sqrt()) < 0.0;
+        if !softens && system.repulsion().is_none() {
+            return f64::INFINITY;
+        }
+        let spread = |factor: f64| {
+            let mut field = Field::zeros(state.displacement.sites());
+            self.places.add_scaled(&mut field, factor, &self.direction);
+            field
+        };
+        let touching = |contact: &Contact<D>| contact.longest_step(&state.displacement, &spread(1.0));
+        let longest = system.repulsion().map_or(f64::INFINITY, touching);
+        if !softens {
             return longest;
         }
-        scale(&mut self.direction, FAR);
-        let range = stretch_range(&*system.bonds, &self.direction);
-        scale(&mut self.direction, 1.0 / FAR);
-        system.count_evaluation(state);
+        let range = stretch_range(&*system.bonds, &spread(FAR));
         (LEAP * FAR / (1.0 + range.high).sqrt()).min(longest)
     }
 
@@ -336,7 +313,7 @@ impl<const D: usize> LbfgsSolver<D> {
         state: &mut State<D>,
         point: &Point,
     ) -> Result<Option<Point>, Error> {
-        let slope = self.direct(system);
+        let slope = self.direct();
         if slope == 0.0 || !slope.is_finite() {
             return Ok(None);
         }
@@ -344,7 +321,7 @@ impl<const D: usize> LbfgsSolver<D> {
             Search::Found(step, point) => {
                 std::mem::swap(&mut self.gradient, &mut self.trial);
                 self.preconditioner.apply(
-                    &system.loads,
+                    &self.places,
                     &self.gradient,
                     &mut self.trial_image,
                     self.local_only,
@@ -376,7 +353,7 @@ impl<const D: usize> LbfgsSolver<D> {
             return Err(system.not_finite(state));
         }
         std::mem::swap(&mut self.gradient, &mut self.trial);
-        self.preconditioner.apply(&system.loads, &self.gradient, &mut self.image, self.local_only);
+        self.preconditioner.apply(&self.places, &self.gradient, &mut self.image, self.local_only);
         Ok(point)
     }
 }
@@ -387,7 +364,7 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-    ) -> Result<(), Error> {
+    ) -> Result<Option<StretchRange>, Error> {
         let goal = self.settings.goal();
         self.memory.clear(false);
         // a run can be interrupted where it is built
@@ -408,7 +385,7 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
                 self.first = if self.searches == 0 { took } else { self.first };
                 self.searches += 1;
                 self.worn = took > WORN * self.first.max(FEW);
-                return Ok(());
+                return Ok(Some(point.observed));
             }
             broken = false;
             let next = self.iterate(system, state, &point)?;
@@ -441,11 +418,6 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         self.preconditioner.broke(&*system.bonds, sites);
         self.memory.clear(false);
     }
-}
-
-fn scale<const D: usize>(field: &mut Field<D>, factor: f64) {
-    let parts = field.chunks_mut().into_par_iter();
-    parts.for_each(|part| part.into_iter().flatten().for_each(|d| *d *= factor));
 }
 
 /// How far stretches may go in one step, as e = λ² − 1.

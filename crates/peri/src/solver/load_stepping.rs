@@ -5,13 +5,15 @@ use super::scale::{Balance, Scale};
 use super::state::{Record, State, Watch};
 use super::system::System;
 
+use crate::bonds::StretchRange;
 use crate::contact::Contact;
 use crate::error::Error;
 
 /// A method that finds the equilibrium of a state at the load factor of its step.
 pub trait Equilibrium<const D: usize> {
     /// Moves the free components until the forces balance; leaves the force of the final displacement in
-    /// [`State::force`], counts iterations in [`State::iteration`] (reset by the caller) and the others.
+    /// [`State::force`], counts iterations in [`State::iteration`] (reset by the caller) and the others. The stretches of that
+    /// displacement, where it has looked at them.
     ///
     /// # Errors
     /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` returns.
@@ -20,7 +22,7 @@ pub trait Equilibrium<const D: usize> {
         system: &mut System<D>,
         state: &mut State<D>,
         watch: &mut Watch<D>,
-    ) -> Result<(), Error>;
+    ) -> Result<Option<StretchRange>, Error>;
 
     /// Takes notice of the sites whose bonds have broken since the last equilibrium.
     fn broke(&mut self, system: &System<D>, sites: &[u32]);
@@ -56,12 +58,12 @@ pub fn load_stepping<const D: usize>(
             predict(system, state, &predictor);
             state.predicted = true;
             // the step may leap out of the fitted range: its first force and mass must know
-            system.covers_stretches(state)?;
+            system.covers_stretches(state, None)?;
         }
         loop {
             loop {
-                method.equilibrate(system, state, watch)?;
-                if system.covers_stretches(state)? {
+                let observed = method.equilibrate(system, state, watch)?;
+                if system.covers_stretches(state, observed)? {
                     break;
                 }
             }

@@ -4,12 +4,14 @@
 //!
 //! With an initial inverse γB, B the preconditioner, only s and w = B y are stored.
 
-use crate::field::{CHUNK, Field, chunk_range};
-use rayon::prelude::*;
+use super::passes::{LANES, sum};
+use super::places::in_order;
+use crate::field::{Field, chunk_range};
+use pulp::{Arch, NullaryFnOnce};
 use std::collections::VecDeque;
 
-/// Parts of a sum of products, so that it vectorises.
-const LANES: usize = 8;
+/// Entries that are worked on at a time, so that what several pairs need of them stays in the cache.
+const BLOCK: usize = 512;
 
 /// A step, and what it did to the gradient.
 struct Pair<const D: usize> {
@@ -87,29 +89,28 @@ impl<const D: usize> Memory<D> {
         }
         let (sites, scale) = (gradient.sites(), self.scale);
         let (gradient, image) = (gradient.components(), image.components());
-        let parts: Vec<f64> = result
-            .chunks_mut()
-            .into_par_iter()
-            .enumerate()
-            .map(|(chunk, d)| {
-                let range = chunk_range(chunk, sites);
-                let mut sum = 0.0;
-                for c in 0..D {
-                    let out = &mut *d[c];
-                    out.iter_mut().zip(&image[c][range.clone()]).for_each(|(d, z)| *d = -scale * z);
+        let arch = Arch::new();
+        let parts = in_order(result.chunks_mut(), |chunk, d| {
+            let range = chunk_range(chunk, sites);
+            let mut sum = 0.0;
+            for (c, out) in d.into_iter().enumerate() {
+                for (block, out) in out.chunks_mut(BLOCK).enumerate() {
+                    let start = range.start + block * BLOCK;
+                    let place = start..start + out.len();
+                    let (z, g) = (&image[c][place.clone()], &gradient[c][place.clone()]);
+                    for k in 0..out.len() {
+                        out[k] = -scale * z[k];
+                    }
                     for (pair, (a, weight)) in self.pairs.iter().zip(back.iter().zip(&weights)) {
                         let (s, w) = (pair.step.components()[c], pair.image.components()[c]);
-                        let (s, w) = (&s[range.clone()], &w[range.clone()]);
-                        let scaled = scale * a;
-                        for k in 0..out.len() {
-                            out[k] += scaled * w[k] - weight * s[k];
-                        }
+                        let (s, w) = (&s[place.clone()], &w[place.clone()]);
+                        arch.dispatch(Combine { out: &mut *out, scaled: scale * a, w, weight: *weight, s });
                     }
-                    sum += product(out, &gradient[c][range.clone()]);
+                    sum += arch.dispatch(Product { a: out, b: g });
                 }
-                sum
-            })
-            .collect();
+            }
+            sum
+        });
         parts.iter().sum()
     }
 
@@ -127,31 +128,40 @@ impl<const D: usize> Memory<D> {
         let (g0, g1, z1) = (old_gradient.components(), gradient.components(), image.components());
         let pairs = &self.pairs;
         // s·y, w·y, s·g, w·g of the new pair, then of each other with the new y and g
-        let items = direction.chunks_mut().into_par_iter().zip(old_image.chunks_mut()).enumerate();
-        let parts: Vec<Vec<f64>> = items
-            .map(|(chunk, (s, w))| {
-                let range = chunk_range(chunk, sites);
-                let mut sums = vec![0.0; 4 * (pairs.len() + 1)];
-                let mut change = [0.0; CHUNK];
-                let change = &mut change[..range.len()];
-                for c in 0..D {
-                    let (g, z) = (&g1[c][range.clone()], &z1[c][range.clone()]);
-                    change
-                        .iter_mut()
-                        .zip(g)
-                        .zip(&g0[c][range.clone()])
-                        .for_each(|((y, g), old)| *y = g - old);
-                    s[c].iter_mut().for_each(|s| *s *= step);
-                    w[c].iter_mut().zip(z).for_each(|(w, z)| *w = z - *w);
-                    add_products(&mut sums[..4], s[c], w[c], change, g);
+        let items = direction.chunks_mut().into_iter().zip(old_image.chunks_mut()).collect();
+        let arch = Arch::new();
+        let parts = in_order(items, |chunk, (s, w)| {
+            let range = chunk_range(chunk, sites);
+            let mut sums = vec![0.0; 4 * (pairs.len() + 1)];
+            let mut change = [0.0; BLOCK];
+            for c in 0..D {
+                let blocks = s[c].chunks_mut(BLOCK).zip(w[c].chunks_mut(BLOCK)).enumerate();
+                for (block, (s, w)) in blocks {
+                    let start = range.start + block * BLOCK;
+                    let place = start..start + s.len();
+                    let change = &mut change[..s.len()];
+                    let (g, old, z) = (&g1[c][place.clone()], &g0[c][place.clone()], &z1[c][place.clone()]);
+                    for k in 0..s.len() {
+                        change[k] = g[k] - old[k];
+                        s[k] *= step;
+                        w[k] = z[k] - w[k];
+                    }
+                    let y = &*change;
+                    let add = |s: &[f64], w: &[f64], sums: &mut [f64]| {
+                        let products = arch.dispatch(Products { s, w, y, g });
+                        for k in 0..4 {
+                            sums[k] += products[k];
+                        }
+                    };
+                    add(s, w, &mut sums[..4]);
                     for (pair, sums) in pairs.iter().zip(sums[4..].chunks_mut(4)) {
                         let (s, w) = (pair.step.components()[c], pair.image.components()[c]);
-                        add_products(sums, &s[range.clone()], &w[range.clone()], change, g);
+                        add(&s[place.clone()], &w[place.clone()], sums);
                     }
                 }
-                sums
-            })
-            .collect();
+            }
+            sums
+        });
         let mut sums = vec![0.0; 4 * (self.pairs.len() + 1)];
         for part in &parts {
             sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
@@ -180,30 +190,83 @@ impl<const D: usize> Memory<D> {
     }
 }
 
-/// sums += (s·y, w·y, s·g, w·g).
-fn add_products(sums: &mut [f64], s: &[f64], w: &[f64], y: &[f64], g: &[f64]) {
-    let mut lanes = [[0.0; LANES]; 4];
-    let parts = s.chunks(LANES).zip(w.chunks(LANES)).zip(y.chunks(LANES).zip(g.chunks(LANES)));
-    for ((s, w), (y, g)) in parts {
-        for lane in 0..s.len() {
-            lanes[0][lane] += s[lane] * y[lane];
-            lanes[1][lane] += w[lane] * y[lane];
-            lanes[2][lane] += s[lane] * g[lane];
-            lanes[3][lane] += w[lane] * g[lane];
+/// s·y, w·y, s·g, w·g.
+struct Products<'a> {
+    s: &'a [f64],
+    w: &'a [f64],
+    y: &'a [f64],
+    g: &'a [f64],
+}
+
+impl NullaryFnOnce for Products<'_> {
+    type Output = [f64; 4];
+    #[inline(always)]
+    fn call(self) -> [f64; 4] {
+        let ([s, w], [y, g]) = ([self.s, self.w], [self.y, self.g]);
+        let ((s, s_last), (w, w_last)) = (s.as_chunks::<LANES>(), w.as_chunks::<LANES>());
+        let ((y, y_last), (g, g_last)) = (y.as_chunks::<LANES>(), g.as_chunks::<LANES>());
+        let (w, y, g) = (&w[..s.len()], &y[..s.len()], &g[..s.len()]);
+        let mut lanes = [[0.0; LANES]; 4];
+        for k in 0..s.len() {
+            for lane in 0..LANES {
+                lanes[0][lane] += s[k][lane] * y[k][lane];
+                lanes[1][lane] += w[k][lane] * y[k][lane];
+                lanes[2][lane] += s[k][lane] * g[k][lane];
+                lanes[3][lane] += w[k][lane] * g[k][lane];
+            }
         }
+        for lane in 0..s_last.len() {
+            lanes[0][lane] += s_last[lane] * y_last[lane];
+            lanes[1][lane] += w_last[lane] * y_last[lane];
+            lanes[2][lane] += s_last[lane] * g_last[lane];
+            lanes[3][lane] += w_last[lane] * g_last[lane];
+        }
+        [sum(&lanes[0]), sum(&lanes[1]), sum(&lanes[2]), sum(&lanes[3])]
     }
-    for (sum, lanes) in sums.iter_mut().zip(&lanes) {
-        *sum += lanes.iter().sum::<f64>();
+}
+
+/// out += scaled·w − weight·s.
+struct Combine<'a> {
+    out: &'a mut [f64],
+    scaled: f64,
+    w: &'a [f64],
+    weight: f64,
+    s: &'a [f64],
+}
+
+impl NullaryFnOnce for Combine<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let Self { out, scaled, w, weight, s } = self;
+        let (w, s) = (&w[..out.len()], &s[..out.len()]);
+        for k in 0..out.len() {
+            out[k] += scaled * w[k] - weight * s[k];
+        }
     }
 }
 
 /// a·b.
-pub fn product(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; LANES];
-    for (a, b) in a.chunks(LANES).zip(b.chunks(LANES)) {
-        for lane in 0..a.len() {
-            lanes[lane] += a[lane] * b[lane];
+struct Product<'a> {
+    a: &'a [f64],
+    b: &'a [f64],
+}
+
+impl NullaryFnOnce for Product<'_> {
+    type Output = f64;
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let ((a, a_last), (b, b_last)) = (self.a.as_chunks::<LANES>(), self.b.as_chunks::<LANES>());
+        let b = &b[..a.len()];
+        let mut lanes = [0.0; LANES];
+        for k in 0..a.len() {
+            for lane in 0..LANES {
+                lanes[lane] += a[k][lane] * b[k][lane];
+            }
         }
+        for lane in 0..a_last.len() {
+            lanes[lane] += a_last[lane] * b_last[lane];
+        }
+        sum(&lanes)
     }
-    lanes.iter().sum()
 }

@@ -14,6 +14,7 @@ mod memory;
 mod method;
 mod motion;
 mod passes;
+mod places;
 mod preconditioner;
 mod scale;
 mod state;

@@ -1,10 +1,13 @@
-//! The two passes of an iteration over all sites: new forces with every sum over them, and the move.
+//! The passes of an iteration over all sites: new forces with every sum over them, and the move of dynamic relaxation; the gradient of
+//! L-BFGS.
 
 use super::load::Loads;
+use super::places::Places;
 use super::state::State;
 use super::system::System;
 use crate::bonds::StretchRange;
-use crate::field::{CHUNK, chunk_range};
+use crate::field::{CHUNK, Field, chunk_range};
+use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 
 /// Sums over all sites, item by item in a fixed order.
@@ -99,9 +102,110 @@ pub fn force_pass<const D: usize>(
     (sums, observed)
 }
 
+/// New forces, the gradient −V F of the energy over particles (0 where constrained), the sums over forces, the stretches, and the slope
+/// of the energy along a direction.
+pub fn gradient_pass<const D: usize>(
+    system: &System<D>,
+    state: &mut State<D>,
+    (places, volumes): (&Places, &[f64]),
+    direction: &Field<D>,
+    factor: f64,
+    gradient: &mut Field<D>,
+) -> (Sums, StretchRange, f64) {
+    let (sites, loads, displacement) = (system.bonds.sites(), &*system.loads, &state.displacement);
+    let direction = direction.components();
+    let items = state.force.chunks_mut().into_par_iter().zip(places.parts_mut(gradient)).enumerate();
+    // one work item at a time where there are hardly any
+    let items = items.with_min_len(if sites <= 2 * CHUNK && D == 2 { 2 } else { 1 });
+    let results: Vec<(Sums, StretchRange, f64)> = items
+        .map(|(item, (mut force, gradient))| {
+            let mut observed = StretchRange::REST;
+            system.internal_force(displacement, item, &mut force, Some(&mut observed));
+            let (mut sums, mut slope) = (Sums::default(), 0.0);
+            let particles = places.of_item(item);
+            let held = places.held(particles.clone());
+            for d in 0..D {
+                if let Some(body) = &loads.body_force {
+                    for (f, b) in force[d].iter_mut().zip(&body.components()[d][chunk_range(item, sites)]) {
+                        *f += factor * b;
+                        sums.external += (factor * b) * (factor * b);
+                    }
+                }
+                let g = &mut *gradient[d];
+                places.gather(item, force[d], g);
+                for &(particle, _) in held.iter().filter(|held| held.1 >> d & 1 == 1) {
+                    let force = &mut g[particle - particles.start];
+                    sums.constrained += *force * *force;
+                    *force = 0.0;
+                }
+                let (volumes, direction) = (&volumes[particles.clone()], &direction[d][particles.clone()]);
+                let [free, along] = Arch::new().dispatch(Turn { force: g, volumes, direction });
+                sums.free += free;
+                slope += along;
+            }
+            (sums, observed, slope)
+        })
+        .collect();
+    let start = (Sums::default(), StretchRange::REST, 0.0);
+    let (mut sums, observed, slope) = results.into_iter().fold(start, |(sums, observed, slope), item| {
+        (sums.add(item.0), observed.join(item.1), slope + item.2)
+    });
+    // planes hold a body, too
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes(displacement));
+    (sums, observed, slope)
+}
+
+/// Parts of a sum, so that it vectorises.
+pub const LANES: usize = 8;
+
+/// F becomes −V F; Σ F², and the sum of −V F along a direction.
+struct Turn<'a> {
+    force: &'a mut [f64],
+    volumes: &'a [f64],
+    direction: &'a [f64],
+}
+
+impl NullaryFnOnce for Turn<'_> {
+    type Output = [f64; 2];
+    #[inline(always)]
+    fn call(self) -> [f64; 2] {
+        let (force, last) = self.force.as_chunks_mut::<LANES>();
+        let (volumes, last_volumes) = self.volumes.as_chunks::<LANES>();
+        let (direction, last_direction) = self.direction.as_chunks::<LANES>();
+        let (volumes, direction) = (&volumes[..force.len()], &direction[..force.len()]);
+        let (mut square, mut slope) = ([0.0; LANES], [0.0; LANES]);
+        for k in 0..force.len() {
+            for lane in 0..LANES {
+                let f = force[k][lane];
+                let g = -volumes[k][lane] * f;
+                square[lane] += f * f;
+                slope[lane] += g * direction[k][lane];
+                force[k][lane] = g;
+            }
+        }
+        for lane in 0..last.len() {
+            let f = last[lane];
+            let g = -last_volumes[lane] * f;
+            square[lane] += f * f;
+            slope[lane] += g * last_direction[lane];
+            last[lane] = g;
+        }
+        [sum(&square), sum(&slope)]
+    }
+}
+
+/// The sum of the lanes, in their order.
+#[inline(always)]
+pub fn sum(lanes: &[f64; LANES]) -> f64 {
+    let mut sum = 0.0;
+    for lane in lanes {
+        sum += lane;
+    }
+    sum
+}
+
 /// The sums over components that are all free, in eight interleaved parts so that they vectorise.
 fn free_sums(new: &[f64], old: &[f64], v: &[f64], m: &[f64], mass: f64) -> Sums {
-    const LANES: usize = 8;
     let (mut top, mut bottom, mut square) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
     let parts = new.chunks(LANES).zip(old.chunks(LANES)).zip(v.chunks(LANES).zip(m.chunks(LANES)));
     for ((new, old), (v, m)) in parts {

@@ -2,24 +2,23 @@
 //! Gershgorin mass M of dynamic relaxation and a coarse level.
 
 use super::coarse::{Body, Coarse, Survey};
-use super::load::Loads;
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
+use super::places::{Places, in_order};
 use super::state::State;
 use super::system::System;
 use crate::bonds::Bonds;
 use crate::field::{CHUNK, Field, chunk_range};
-use rayon::prelude::*;
 
 /// Degrees of freedom of the coarse level at most, in two and three dimensions.
 const MOST: [usize; 2] = [30_000, 8_000];
 
 /// The approximate inverse.
 pub struct Preconditioner<const D: usize> {
-    /// ω/(V M) of each site.
+    /// ω/(V M) of each particle.
     local: Vec<f64>,
-    /// V of each site.
+    /// V of each particle.
     volumes: Vec<f64>,
-    /// Gershgorin sums for a unit bond tangent.
+    /// Gershgorin sums of each site for a unit bond tangent.
     unit_mass: Vec<f64>,
     /// The smallest of `local`: that of particles that nothing holds.
     least: f64,
@@ -50,8 +49,7 @@ impl<const D: usize> Preconditioner<D> {
         let (bonds, sites) = (&*system.bonds, system.bonds.sites());
         let survey = Survey::new(bonds, &state.displacement);
         self.unit_mass.resize(sites, 1.0);
-        self.volumes.resize(sites, 0.0);
-        bonds.particles().iter().for_each(|&s| self.volumes[s as usize] = bonds.volume(s as usize));
+        self.volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).collect();
         update_unit_mass(bonds, bonds.particles(), &mut self.unit_mass);
         let (law, modulus) = system.material.bond_law();
         let tangent = if own { modulus } else { state.tangent };
@@ -64,25 +62,16 @@ impl<const D: usize> Preconditioner<D> {
             contact.add_stiffness(&state.displacement, tangent, &mut springs);
         }
         springs.iter_mut().for_each(|m| *m *= 0.5 * tangent);
-        self.local.clear();
-        self.local.resize(sites, 0.0);
-        self.least = f64::INFINITY;
-        for &site in bonds.particles() {
-            let site = site as usize;
-            if springs[site] > 0.0 {
-                self.local[site] = weight / (bonds.volume(site) * springs[site]);
-                self.least = self.least.min(self.local[site]);
-            }
-        }
+        let local = |(&site, volume): (&u32, &f64)| {
+            let spring = springs[site as usize];
+            if spring > 0.0 { weight / (volume * spring) } else { f64::INFINITY }
+        };
+        self.local = bonds.particles().iter().zip(&self.volumes).map(local).collect();
+        self.least = self.local.iter().copied().fold(f64::INFINITY, f64::min);
         if !self.least.is_finite() {
             self.least = 1.0;
         }
-        for &site in bonds.particles() {
-            let local = &mut self.local[site as usize];
-            if *local == 0.0 {
-                *local = self.least;
-            }
-        }
+        self.local.iter_mut().filter(|local| local.is_infinite()).for_each(|local| *local = self.least);
         let body = Body {
             bonds,
             loads: &system.loads,
@@ -100,46 +89,46 @@ impl<const D: usize> Preconditioner<D> {
         let before: Vec<f64> = sites.iter().map(|&site| self.unit_mass[site as usize]).collect();
         update_unit_mass(bonds, sites, &mut self.unit_mass);
         for (&site, before) in sites.iter().zip(before) {
-            let local = &mut self.local[site as usize];
+            let Ok(particle) = bonds.particles().binary_search(&site) else { continue };
+            let local = &mut self.local[particle];
             let alone = bonds.is_alone(site as usize);
             *local = if alone { self.least } else { *local * before / self.unit_mass[site as usize] };
         }
     }
 
-    /// z = B g, or its local part alone; g is zero where components are constrained, and so is z.
-    pub fn apply(&mut self, loads: &Loads<D>, gradient: &Field<D>, result: &mut Field<D>, local_only: bool) {
+    /// z = B g over particles, or its local part alone; g is zero where components are constrained, and so is z.
+    pub fn apply(&mut self, places: &Places, gradient: &Field<D>, result: &mut Field<D>, local_only: bool) {
         if let Some(coarse) = self.coarse.as_mut().filter(|_| !local_only) {
             coarse.solve(gradient);
         }
-        let sites = gradient.sites();
+        let particles = gradient.sites();
         let coarse = self.coarse.as_ref().filter(|_| !local_only);
         let (g, local) = (gradient.components(), &self.local);
-        result.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, z)| {
-            let range = chunk_range(chunk, sites);
-            let start = chunk * CHUNK;
+        in_order(result.chunks_mut(), |chunk, z| {
+            let range = chunk_range(chunk, particles);
+            let (start, local) = (chunk * CHUNK, &local[range.clone()]);
             for d in 0..D {
-                let parts = z[d].iter_mut().zip(&g[d][range.clone()]).zip(&local[range.clone()]);
-                parts.for_each(|((z, g), local)| *z = g * local);
+                let (z, g) = (&mut *z[d], &g[d][range.clone()]);
+                for k in 0..z.len() {
+                    z[k] = g[k] * local[k];
+                }
             }
             let Some(coarse) = coarse else { return };
-            for site in range {
-                let value = coarse.value(site);
-                let constrained = loads.constrained(site);
+            for particle in range.clone() {
+                let value = coarse.value(particle);
                 for d in 0..D {
-                    if constrained >> d & 1 == 0 {
-                        z[d][site - start] += value[d];
-                    }
+                    z[d][particle - start] += value[d];
+                }
+            }
+            for &(particle, components) in places.held(range) {
+                for d in (0..D).filter(|d| components >> d & 1 == 1) {
+                    z[d][particle - start] = 0.0;
                 }
             }
         });
     }
 
-    /// The local part, site by site.
-    pub fn local(&self) -> &[f64] {
-        &self.local
-    }
-
-    /// Volume of each site's particle, m³.
+    /// Volume of each particle, m³.
     pub fn volumes(&self) -> &[f64] {
         &self.volumes
     }

@@ -170,7 +170,7 @@ impl VelocityVerlet {
         // another method may have left it at another displacement
         state.tangent = 0.0;
         system.restore(state)?;
-        system.covers_stretches(state)?;
+        system.covers_stretches(state, None)?;
         refresh(system, state, factor, None);
         system.count_evaluation(state);
         let observed = state.balanced_stretches;

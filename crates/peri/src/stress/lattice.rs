@@ -2,13 +2,13 @@
 //! of that bond's forces with fixed weights.
 
 use super::window::{Averaged, Window, normalise};
-use super::{
-    BallVolume, Loaded, Measure, Tensor, ball_volume, cell_fractions, force_over_length, segment_fraction,
-};
+use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, cell_fractions, segment_fraction};
 use crate::bonds::{Bonds, LatticeBonds};
 use crate::field::{CHUNK, Field, chunk_range};
-use pulp::Arch;
+use crate::potential::KernelFit;
+use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Where a bond must begin, relative to the point of interest, and the weight with which it counts there.
 struct Tap {
@@ -28,12 +28,14 @@ pub fn piola<const D: usize>(
     let mut averages = Field::zeros(sites);
     let window = measure.is_partition().then(|| Averaged::<D>::new(Window::of(measure), bonds.ratio()));
     let rim = Rim::new(bonds, state, measure);
+    let filled = blocks(sites, bonds.particles());
+    let mut alike = BTreeMap::new();
     // one direction of every bond; the other adds the same f ⊗ ξ, which the factor ½ of the definition undoes
     for k in 0..bonds.stencil().offsets.len() / 2 {
         let offset = bonds.stencil().offsets[k];
-        bond_forces(bonds, state, k, &mut forces);
-        let taps = taps(bonds, offset, measure, window.as_ref());
-        convolve(&forces, &taps, &mut averages);
+        bond_forces(bonds, state, k, &filled, &mut forces);
+        let taps = taps(bonds, offset, measure, window.as_ref(), &mut alike);
+        convolve(&forces, &taps, &filled, &mut averages);
         rim.complete(bonds.shift(offset), &taps, &mut averages);
         let spacing = bonds.lattice().spacing;
         for d in (0..D).filter(|&d| offset[d] != 0) {
@@ -51,28 +53,112 @@ pub fn piola<const D: usize>(
         .collect()
 }
 
+/// Which blocks of sites hold any of those given.
+fn blocks(sites: usize, of: &[u32]) -> Vec<bool> {
+    let mut filled = vec![false; sites.div_ceil(BLOCK)];
+    of.iter().for_each(|&site| filled[site as usize / BLOCK] = true);
+    filled
+}
+
 /// f V_I V_J, N, of bond `k` from every site; zero where it is not intact.
-fn bond_forces<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, k: usize, forces: &mut Field<D>) {
+fn bond_forces<const D: usize>(
+    bonds: &LatticeBonds<D>,
+    state: &Loaded<D>,
+    k: usize,
+    filled: &[bool],
+    forces: &mut Field<D>,
+) {
     let offset = bonds.stencil().offsets[k];
     let shift = bonds.shift(offset);
     let bond = offset.map(|o| f64::from(o) * bonds.lattice().spacing);
-    let volume = bonds.lattice().volume;
-    forces.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, out)| {
-        for (index, site) in chunk_range(chunk, bonds.sites()).enumerate() {
-            let mut force = [0.0; D];
-            if bonds.is_intact(site, k) {
-                let (own, other) =
-                    (state.displacement.get(site), state.displacement.get(site.wrapping_add_signed(shift)));
-                let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
-                let weight = bonds.weight(site, k) * volume;
-                let scale = force_over_length(state.fit, state.modulus, weight, volume, bond, eta);
-                force = std::array::from_fn(|d| scale * (bond[d] + eta[d]));
+    let square: f64 = bond.iter().map(|x| x * x).sum();
+    let (volume, length) = (bonds.lattice().volume, square.sqrt());
+    let (displacement, arch) = (state.displacement.components(), Arch::new());
+    forces.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
+        let range = chunk_range(chunk, bonds.sites());
+        for start in range.clone().step_by(BLOCK).filter(|start| filled[start / BLOCK]) {
+            let count = BLOCK.min(range.end - start);
+            let mut scale = [0.0; BLOCK];
+            for (index, scale) in scale[..count].iter_mut().enumerate() {
+                if bonds.is_intact(start + index, k) {
+                    let weight = bonds.weight(start + index, k) * volume;
+                    *scale = 2.0 * state.modulus * weight * volume / length;
+                }
             }
-            for d in 0..D {
-                out[d][index] = force[d];
+            let at = start - range.start;
+            let there = start.wrapping_add_signed(shift);
+            // rows are padded: a bond that leaves the storage is never intact
+            if there.checked_add(count).is_none_or(|end| end > bonds.sites()) {
+                out.iter_mut().for_each(|out| out[at..at + count].fill(0.0));
+                continue;
             }
+            let out = out.each_mut().map(|out| &mut out[at..at + count]);
+            let ends = displacement.map(|u| [&u[start..start + count], &u[there..there + count]]);
+            arch.dispatch(Pull { fit: state.fit, bond, square, scale: &scale, ends, out });
         }
     });
+}
+
+/// scale·q(e) ζ of a block of bonds, from the displacements of both ends.
+struct Pull<'a, const D: usize> {
+    fit: &'a KernelFit,
+    bond: [f64; D],
+    square: f64,
+    scale: &'a [f64; BLOCK],
+    ends: [[&'a [f64]; 2]; D],
+    out: [&'a mut [f64]; D],
+}
+
+impl<const D: usize> NullaryFnOnce for Pull<'_, D> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let count = self.out[0].len();
+        let mut q = [0.0; BLOCK];
+        for d in 0..D {
+            let [own, other] = self.ends[d];
+            for k in 0..count {
+                let eta = other[k] - own[k];
+                q[k] += eta * (2.0 * self.bond[d] + eta);
+            }
+        }
+        for q in &mut q {
+            *q /= self.square;
+        }
+        self.fit.values(&mut q);
+        for d in 0..D {
+            let ([own, other], out) = (self.ends[d], &mut *self.out[d]);
+            for k in 0..count {
+                let force = self.scale[k] * q[k] * (self.bond[d] + (other[k] - own[k]));
+                out[k] = if self.scale[k] == 0.0 { 0.0 } else { force };
+            }
+        }
+    }
+}
+
+/// Bond functions of offsets that are the same but for order and signs of their components.
+type Alike<const D: usize> = BTreeMap<[i32; D], Vec<([i32; D], f64)>>;
+
+/// The bond function of an offset, from that of the one with ascending components, none of them negative.
+fn bond_function<const D: usize>(
+    window: &Averaged<D>,
+    offset: [i32; D],
+    alike: &mut Alike<D>,
+) -> Vec<([i32; D], f64)> {
+    let mut order: [usize; D] = std::array::from_fn(|d| d);
+    order.sort_by_key(|&d| offset[d].abs());
+    let plain: [i32; D] = std::array::from_fn(|d| offset[order[d]].abs());
+    let found = alike.entry(plain).or_insert_with(|| window.bond_function(plain));
+    let turn = |(start, weight): &([i32; D], f64)| {
+        let mut turned = [0; D];
+        for d in 0..D {
+            turned[order[d]] = if offset[order[d]] < 0 { -start[d] } else { start[d] };
+        }
+        (turned, *weight)
+    };
+    let mut turned: Vec<([i32; D], f64)> = found.iter().map(turn).collect();
+    turned.sort_by_key(|(start, _)| std::array::from_fn::<i32, D, _>(|d| start[D - 1 - d]));
+    turned
 }
 
 /// The weights of a stencil bond for a measure.
@@ -81,6 +167,7 @@ fn taps<const D: usize>(
     offset: [i32; D],
     measure: Measure,
     window: Option<&Averaged<D>>,
+    alike: &mut Alike<D>,
 ) -> Vec<Tap> {
     let weights = match (measure, window) {
         (Measure::OnePoint, _) => vec![([0; D], 0.5), (offset.map(|o| -o), 0.5)],
@@ -89,7 +176,7 @@ fn taps<const D: usize>(
             normalise(&mut weights);
             weights
         }
-        (_, Some(window)) => window.bond_function(offset),
+        (_, Some(window)) => bond_function(window, offset, alike),
         _ => crossing(bonds.ratio(), offset, measure),
     };
     weights.into_iter().map(|(start, weight)| Tap { shift: bonds.shift(start), weight }).collect()
@@ -120,6 +207,8 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
 struct Rim {
     sites: Vec<u32>,
     occupied: Vec<bool>,
+    /// The blocks that hold any of them.
+    filled: Vec<bool>,
 }
 
 impl Rim {
@@ -147,21 +236,22 @@ impl Rim {
             whole = next;
         }
         let particles = bonds.particles().iter().copied();
-        let sites = particles.filter(|&s| !whole[s as usize] && wanted(s as usize)).collect();
-        Self { sites, occupied }
+        let sites: Vec<u32> = particles.filter(|&s| !whole[s as usize] && wanted(s as usize)).collect();
+        Self { filled: blocks(occupied.len(), &sites), sites, occupied }
     }
 
     /// Divides the averages of a bond by the weights of those whose two particles exist.
     fn complete<const D: usize>(&self, shift: isize, taps: &[Tap], averages: &mut Field<D>) {
+        if self.sites.is_empty() {
+            return;
+        }
         let there = |site: usize| self.occupied.get(site).copied().unwrap_or(false);
-        let one = |&site: &u32| -> f64 {
-            let at = |tap: &&Tap| {
-                let start = (site as usize).wrapping_add_signed(tap.shift);
-                there(start) && there(start.wrapping_add_signed(shift))
-            };
-            taps.iter().filter(at).map(|tap| tap.weight).sum()
-        };
-        let weights: Vec<f64> = self.sites.par_iter().map(one).collect();
+        let both = |site: usize| self.occupied[site] && there(site.wrapping_add_signed(shift));
+        let mut pairs = Field::<1>::zeros(self.occupied.len());
+        (0..self.occupied.len()).filter(|&site| both(site)).for_each(|site| pairs.set(site, [1.0]));
+        let mut sums = Field::<1>::zeros(self.occupied.len());
+        convolve(&pairs, taps, &self.filled, &mut sums);
+        let weights = self.sites.iter().map(|&site| sums.get(site as usize)[0]);
         for (&site, weight) in self.sites.iter().zip(weights) {
             let average = averages.get(site as usize);
             // where no such bond exists, the average is zero
@@ -173,37 +263,52 @@ impl Rim {
 /// Sites that a convolution sums at a time, in registers.
 const BLOCK: usize = 32;
 
-/// averages(p) = Σ weight·forces(p + shift); nothing lies beyond the ends.
-fn convolve<const D: usize>(forces: &Field<D>, taps: &[Tap], averages: &mut Field<D>) {
+/// averages(p) = Σ weight·forces(p + shift) in the blocks that are `filled`; nothing lies beyond the ends.
+fn convolve<const D: usize>(forces: &Field<D>, taps: &[Tap], filled: &[bool], averages: &mut Field<D>) {
     let forces = forces.components();
     let arch = Arch::new();
     averages.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, out)| {
         for (d, out) in out.into_iter().enumerate() {
             for (block, out) in out.chunks_mut(BLOCK).enumerate() {
-                arch.dispatch(|| sum_taps(out, forces[d], chunk * CHUNK + block * BLOCK, taps));
+                let start = chunk * CHUNK + block * BLOCK;
+                if filled[start / BLOCK] {
+                    arch.dispatch(Convolution { out, values: forces[d], start, taps });
+                }
             }
         }
     });
 }
 
 /// out[i] = Σ weight·values[start + i + shift].
-#[inline(always)]
-fn sum_taps(out: &mut [f64], values: &[f64], start: usize, taps: &[Tap]) {
-    let mut sum = [0.0; BLOCK];
-    for tap in taps {
-        let there = start.checked_add_signed(tap.shift).and_then(|from| values.get(from..from + BLOCK));
-        if let Some(there) = there {
-            for (sum, value) in sum.iter_mut().zip(there) {
-                *sum += tap.weight * value;
-            }
-        } else {
-            for (index, sum) in sum.iter_mut().enumerate() {
-                let at = (start + index).checked_add_signed(tap.shift);
-                *sum += tap.weight * at.and_then(|at| values.get(at)).copied().unwrap_or(0.0);
+struct Convolution<'a> {
+    out: &'a mut [f64],
+    values: &'a [f64],
+    start: usize,
+    taps: &'a [Tap],
+}
+
+impl NullaryFnOnce for Convolution<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let Self { out, values, start, taps } = self;
+        let mut sum = [0.0; BLOCK];
+        for tap in taps {
+            let from = start.wrapping_add_signed(tap.shift);
+            if from < values.len() && values.len() - from >= BLOCK {
+                let there = &values[from..from + BLOCK];
+                for i in 0..BLOCK {
+                    sum[i] += tap.weight * there[i];
+                }
+            } else {
+                for i in 0..BLOCK {
+                    let at = from.wrapping_add(i);
+                    sum[i] += tap.weight * if at < values.len() { values[at] } else { 0.0 };
+                }
             }
         }
+        out.copy_from_slice(&sum[..out.len()]);
     }
-    out.copy_from_slice(&sum[..out.len()]);
 }
 
 /// out += factor·values over the shorter of both.

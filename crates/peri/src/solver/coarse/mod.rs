@@ -11,6 +11,7 @@ use crate::bonds::Bonds;
 use crate::field::Field;
 use crate::potential::BondPotential;
 use crate::solver::load::Loads;
+use crate::solver::places::in_order;
 use factor::{Factor, Pattern};
 use rayon::prelude::*;
 use space::{CORNERS, NONE, Space};
@@ -56,7 +57,7 @@ impl<const D: usize> Coarse<D> {
     pub fn new(body: &Body<D>, edge: f64, most: usize, old: Option<Self>) -> Option<Self> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
         let whole = if body.bonds.as_lattice().is_some() { body.survey.most } else { u32::MAX };
-        let space = Space::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
+        let mut space = Space::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
         let Body { bonds, loads, displacement, law, springs, survey } = *body;
         let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
         let matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
@@ -66,22 +67,23 @@ impl<const D: usize> Coarse<D> {
         let (pattern, blocks) = pattern::<D>(&space);
         let entries = assemble::<D>(&space, &pattern, &blocks, &matrices, shift);
         let factor = Factor::new(pattern, &entries, old.map(|old| old.factor))?;
+        space.renumber(bonds.particles());
         let parts = vec![0.0; space.elements.len() * CORNERS * D];
         let coefficients = vec![0.0; space.functions * D];
         Some(Self { space, factor, parts, coefficients })
     }
 
-    /// Solves A_c c = Pᵀg; g is zero where components are constrained.
+    /// Solves A_c c = Pᵀg of a field over particles; g is zero where components are constrained.
     pub fn solve(&mut self, gradient: &Field<D>) {
         let (space, gradient) = (&self.space, gradient.components());
         let corners = 1 << D;
-        self.parts.par_chunks_mut(BATCH * CORNERS * D).enumerate().for_each(|(batch, parts)| {
+        in_order(self.parts.chunks_mut(BATCH * CORNERS * D).collect(), |batch, parts| {
             for (part, element) in parts.chunks_mut(CORNERS * D).zip(&space.elements[batch * BATCH..]) {
                 part.fill(0.0);
-                for &site in &space.members[element.members[0]..element.members[1]] {
-                    let hats = hat_values(space.local.get(site as usize));
+                for &particle in &space.members[element.members[0]..element.members[1]] {
+                    let hats = hat_values(space.local.get(particle as usize));
                     for d in 0..D {
-                        let g = gradient[d][site as usize];
+                        let g = gradient[d][particle as usize];
                         for a in 0..corners {
                             part[a * D + d] += hats[a] * g;
                         }
@@ -100,14 +102,14 @@ impl<const D: usize> Coarse<D> {
         self.factor.solve(&mut self.coefficients);
     }
 
-    /// (P c)_I with the coefficients of the last [`Self::solve`].
+    /// (P c)_I of a particle with the coefficients of the last [`Self::solve`].
     #[inline]
-    pub fn value(&self, site: usize) -> [f64; D] {
-        let element = self.space.element_of[site];
+    pub fn value(&self, particle: usize) -> [f64; D] {
+        let element = self.space.element_of[particle];
         let mut value = [0.0; D];
         if element != NONE {
             let functions = &self.space.elements[element as usize].functions;
-            let hats = hat_values(self.space.local.get(site));
+            let hats = hat_values(self.space.local.get(particle));
             for a in 0..1 << D {
                 let at = functions[a] as usize * D;
                 for d in 0..D {

@@ -22,7 +22,7 @@ pub struct Element {
     pub members: [usize; 2],
 }
 
-/// The functions, and the particles they move.
+/// The functions, and the particles they move: by their sites, and by their numbers after [`Space::renumber`].
 pub struct Space<const D: usize> {
     /// Edges of a cell, m.
     pub edge: [f64; D],
@@ -214,6 +214,18 @@ impl<const D: usize> Space<D> {
             }
         }
         space
+    }
+
+    /// Names particles by their numbers instead of their sites.
+    pub fn renumber(&mut self, particles: &[u32]) {
+        let mut number = vec![NONE; self.element_of.len()];
+        particles.iter().enumerate().for_each(|(index, &site)| number[site as usize] = index as u32);
+        self.members.iter_mut().for_each(|member| *member = number[*member as usize]);
+        self.element_of = particles.iter().map(|&site| self.element_of[site as usize]).collect();
+        let mut local = Field::zeros(particles.len());
+        let at = particles.iter().map(|&site| self.local.get(site as usize)).enumerate();
+        at.for_each(|(index, at)| local.set(index, at));
+        self.local = local;
     }
 
     /// Adds the elements of a cell: one, or one for each set of parts that its particles belong to.

@@ -354,6 +354,7 @@ fn hats<const D: usize>(local: [f64; D], edge: [f64; D]) -> ([f64; CORNERS], [[f
 }
 
 /// The hats alone.
+#[inline]
 pub fn hat_values<const D: usize>(local: [f64; D]) -> [f64; CORNERS] {
     let mut values = [0.0; CORNERS];
     values[0] = 1.0;
