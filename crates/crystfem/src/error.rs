@@ -82,6 +82,12 @@ pub enum Error {
         /// Tolerance, K.
         wanted: f64,
     },
+    /// A step was stopped on request; what was before it stays.
+    #[error("stopped on request at t = {time} s")]
+    Stopped {
+        /// Time before the step, s.
+        time: f64,
+    },
     /// One of several studies failed.
     #[error("study {name}: {error}")]
     Study {

@@ -3,7 +3,7 @@
 use crate::element::{self, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::simulation::Simulation;
-use crate::system::Points;
+use crate::system::{NONE, Points};
 
 impl Simulation {
     /// Names of the quantities that materials show, each once, in the order of the materials.
@@ -17,6 +17,32 @@ impl Simulation {
             }
         }
         names
+    }
+
+    /// [`Self::field`] at some nodes.
+    pub fn field_of(&self, name: &str, nodes: &[u32]) -> Vec<Option<f64>> {
+        let (problem, system) = (&self.problem, &self.system);
+        if !system.general.is_empty() {
+            let field = self.field(name);
+            return nodes.iter().map(|&node| field[node as usize]).collect();
+        }
+        let (points, stride) = (&self.state.memory.nodal, system.nodal.stride);
+        let mut values = [0.0; 16];
+        let mut of = |&node: &u32| {
+            let equation = *system.equation.get(node as usize).filter(|equation| **equation != NONE)?;
+            let (mut sum, mut mass) = (0.0, 0.0);
+            for point in system.nodal.of(equation as usize) {
+                let law = &problem.materials[usize::from(system.nodal.material[point])];
+                let place = law.field_names().iter().position(|other| *other == name);
+                let own = values.get_mut(..law.field_names().len());
+                let (Some(place), Some(own)) = (place, own) else { continue };
+                law.fields(&points.state[point * stride..][..law.state_names().len()], own);
+                sum += system.nodal.mass[point] * own[place];
+                mass += system.nodal.mass[point];
+            }
+            (mass > 0.0).then(|| sum / mass)
+        };
+        nodes.iter().map(&mut of).collect()
     }
 
     /// A quantity of the materials at all nodes of the mesh: the mean of the points there, weighted by mass; `None` where no

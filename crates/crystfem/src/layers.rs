@@ -10,7 +10,7 @@ use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::material::Point;
 use crate::simulation::{Simulation, State};
-use crate::system::{Memory, NONE, Points, System};
+use crate::system::{Added, Memory, Moves, NONE, Points, System};
 use crate::time::Steps;
 use nalgebra::Vector3;
 use std::collections::HashMap;
@@ -61,13 +61,15 @@ impl Simulation {
         if births.iter().all(|birth| birth.elements.is_empty()) {
             return Ok(());
         }
+        let mut elements: Vec<u32> = births.iter().flat_map(|birth| birth.elements.iter().copied()).collect();
+        elements.sort_unstable();
+        let Self { problem, behaviours, system, state, .. } = self;
+        let added = system.add(problem, behaviours, &state.born, state.births, &elements)?;
         self.state.work.builds += 1;
-        let build = self.state.work.builds;
-        let new = System::build(&self.problem, &self.behaviours, &self.state.born, build)?;
-        let old = std::mem::replace(&mut self.system, new);
+        self.state.work.visited += added.visited;
         let sums = self.linear_sums(first)?;
         let mut state = std::mem::take(&mut self.state);
-        let result = self.migrate(&old, &mut state, &sums);
+        let result = self.migrate(&mut state, &added, &sums);
         self.state = state;
         result?;
         self.restart();
@@ -149,112 +151,42 @@ impl Simulation {
         Ok(sums)
     }
 
-    /// Takes temperatures and points over to the new equations, and mixes at the nodes in `sums`.
-    fn migrate(&mut self, old: &System, state: &mut State, sums: &HashMap<u32, Sum>) -> Result<(), Error> {
-        let (problem, new) = (&self.problem, &self.system);
-        let mut memory = Memory::empty(new);
-        let mut temperature = vec![0.0; new.size()];
-        let mut parts: HashMap<u32, Vec<Part>> = HashMap::new();
-        // points at nodes
-        for equation in 0..new.size() {
-            let before = old.equation[new.nodes[equation] as usize];
-            if before != NONE {
-                temperature[equation] = state.temperature[before as usize];
-            }
-            for point in new.nodal.of(equation) {
-                let key = (new.nodal.birth[point], new.nodal.material[point]);
-                let kept = (before != NONE)
-                    .then(|| {
-                        old.nodal
-                            .of(before as usize)
-                            .find(|&p| (old.nodal.birth[p], old.nodal.material[p]) == key)
-                    })
-                    .flatten();
-                let stride = new.nodal.stride;
-                let from = match kept {
-                    Some(from) => {
-                        memory.nodal.copy(&state.memory.nodal, from, point, stride);
-                        temperature[equation]
-                    }
-                    None => {
-                        let birth = problem.births[key.0 as usize - 1].temperature;
-                        memory.nodal.fresh(problem, usize::from(key.1), stride, point, birth);
-                        birth
-                    }
-                };
-                if sums.contains_key(&(equation as u32)) {
-                    let coupled = !new.nodal.follows(key.1);
-                    parts.entry(equation as u32).or_default().push(Part {
-                        material: key.1,
-                        mass: if coupled { new.nodal.mass[point] } else { 0.0 },
-                        temperature: from,
-                        energy: memory.nodal.energy[point],
-                        state: memory.nodal.state[point * stride..(point + 1) * stride].to_vec(),
-                        general: false,
-                        point,
-                        old: kept.is_some(),
-                    });
-                }
-            }
-        }
-        // points in elements
-        for (index, &number) in new.general.elements.iter().enumerate() {
-            let kept = old.general.elements.binary_search(&number).ok();
-            let (corners, nodes) = element::corners(&problem.mesh, number);
-            let material = problem.material_of[number as usize];
-            let stride = new.general.stride;
-            let volumes = <Geometry>::new(&corners[..nodes]).map_or([0.0; MOST], |g| g.corner_volumes);
-            for g in 0..nodes {
-                let point = new.general.starts[index] as usize + g;
-                let equation = new.general.equations_of(index)[g];
-                let from = match kept {
-                    Some(kept) => {
-                        let from = old.general.starts[kept] as usize + g;
-                        memory.general.copy(&state.memory.general, from, point, stride);
-                        temperature[equation as usize]
-                    }
-                    None => {
-                        let birth = state.born[number as usize] as usize - 1;
-                        let birth = problem.births[birth].temperature;
-                        memory.general.fresh(problem, usize::from(material), stride, point, birth);
-                        birth
-                    }
-                };
-                if sums.contains_key(&equation) {
-                    parts.entry(equation).or_default().push(Part {
-                        material,
-                        mass: problem.materials[usize::from(material)].density() * volumes[g],
-                        temperature: from,
-                        energy: memory.general.energy[point],
-                        state: memory.general.state[point * stride..(point + 1) * stride].to_vec(),
-                        general: true,
-                        point,
-                        old: kept.is_some(),
-                    });
-                }
-            }
-        }
-        // mixture
-        let mut prescribed = temperature.clone();
-        new.prescribe(problem, state.time, &mut prescribed);
+    /// Makes room for what is new in temperatures and points, and mixes at the nodes in `sums`.
+    fn migrate(&mut self, state: &mut State, added: &Added, sums: &HashMap<u32, Sum>) -> Result<(), Error> {
+        let (problem, system) = (&self.problem, &self.system);
+        let Memory { nodal, general } = &mut state.memory;
+        let birth_of = |birth: u32| problem.births[birth as usize - 1].temperature;
+        nodal.go(&added.nodal, system.nodal.stride, |nodal, point| {
+            let (birth, material) = (system.nodal.birth[point], system.nodal.material[point]);
+            nodal.fresh(problem, usize::from(material), system.nodal.stride, point, birth_of(birth));
+        });
+        general.go(&added.general, system.general.stride, |general, point| {
+            let index = system.general.starts.partition_point(|&first| first as usize <= point) - 1;
+            let number = system.general.elements[index] as usize;
+            let material = usize::from(problem.material_of[number]);
+            general.fresh(problem, material, system.general.stride, point, birth_of(state.born[number]));
+        });
+        state.temperature.resize(system.size(), 0.0);
         let (mut stored, mut brought, mut reaction) = (0.0, 0.0, 0.0);
-        let mut equations: Vec<u32> = sums.keys().copied().collect();
-        equations.sort_unstable();
-        for equation in equations {
-            let sum = &sums[&equation];
-            let k = equation as usize;
-            let before = old.equation[new.nodes[k] as usize];
-            let existed = before != NONE;
-            let capacity = if existed { old.capacity[before as usize] } else { 0.0 };
-            let mut list = parts.remove(&equation).unwrap_or_default();
-            let fixed = (new.free[k] == 0.0).then_some(prescribed[k]);
-            let mixture = Mixture { capacity, temperature: temperature[k], existed, sum };
+        let mut prescribed = vec![0.0; if system.fixed.is_empty() { 0 } else { system.size() }];
+        system.prescribe(problem, state.time, &mut prescribed);
+        for &(equation, before) in &added.before {
+            // with consistent capacity all are touched
+            let Some(sum) = sums.get(&equation) else { continue };
+            let (k, existed) = (equation as usize, before.is_some());
+            let old = state.temperature[k];
+            let mut list = self.parts(state, added, equation);
+            let fixed = system.fixed.binary_search_by_key(&equation, |entry| entry.0);
+            let fixed = fixed.ok().map(|_| prescribed[k]);
+            let capacity = before.unwrap_or(0.0);
+            let mixture = Mixture { capacity, temperature: old, existed, sum };
             let reached = mixture.settle(self, fixed, &mut list)?;
-            let old_heat = if existed { capacity * temperature[k] } else { 0.0 };
+            let old_heat = if existed { capacity * old } else { 0.0 };
             let mut change = (capacity + sum.capacity) * reached - old_heat;
             let mut new_heat = sum.heat;
             for part in &list {
-                let points = if part.general { &mut memory.general } else { &mut memory.nodal };
+                let points =
+                    if part.general { &mut state.memory.general } else { &mut state.memory.nodal };
                 let stride = part.state.len();
                 points.state[part.point * stride..(part.point + 1) * stride].copy_from_slice(&part.state);
                 let before = points.energy[part.point];
@@ -265,11 +197,47 @@ impl Simulation {
             stored += change;
             brought += new_heat;
             reaction += if fixed.is_some() { change - new_heat } else { 0.0 };
-            temperature[k] = reached;
+            state.temperature[k] = reached;
         }
-        (state.temperature, state.memory) = (temperature, memory);
         state.ledger.add_birth(stored, brought, reaction);
         Ok(())
+    }
+
+    /// What is at a node, old and new.
+    fn parts(&self, state: &State, added: &Added, equation: u32) -> Vec<Part> {
+        let (problem, system) = (&self.problem, &self.system);
+        let old = state.temperature[equation as usize];
+        let mut parts = Vec::new();
+        let part = |points: &Points, stride: usize, moves: &Moves, point: usize| Part {
+            material: 0,
+            mass: 0.0,
+            temperature: old,
+            energy: points.energy[point],
+            state: points.state[point * stride..(point + 1) * stride].to_vec(),
+            general: false,
+            point,
+            old: point.checked_sub(moves.first).is_none_or(|k| moves.from.get(k).is_none_or(|&k| k != NONE)),
+        };
+        let birth_of = |birth: u32| problem.births[birth as usize - 1].temperature;
+        let nodal = &system.nodal;
+        for point in nodal.of(equation as usize) {
+            let (birth, material) = (nodal.birth[point], nodal.material[point]);
+            let mass = if nodal.follows(material) { 0.0 } else { nodal.mass[point] };
+            let part = Part { material, mass, ..part(&state.memory.nodal, nodal.stride, &added.nodal, point) };
+            parts.push(Part { temperature: if part.old { old } else { birth_of(birth) }, ..part });
+        }
+        for (number, g) in system.around(equation, &state.born) {
+            let Ok(index) = system.general.elements.binary_search(&number) else { continue };
+            let material = problem.material_of[number as usize];
+            let (corners, nodes) = element::corners(&problem.mesh, number);
+            let volumes = <Geometry>::new(&corners[..nodes]).map_or([0.0; MOST], |g| g.corner_volumes);
+            let mass = problem.materials[usize::from(material)].density() * volumes[g];
+            let point = system.general.starts[index] as usize + g;
+            let part = part(&state.memory.general, system.general.stride, &added.general, point);
+            let temperature = if part.old { old } else { birth_of(state.born[number as usize]) };
+            parts.push(Part { material, mass, temperature, general: true, ..part });
+        }
+        parts
     }
 }
 
@@ -376,9 +344,21 @@ impl Points {
         self.energy[point] = material.energy(temperature, state);
     }
 
-    fn copy(&mut self, from: &Self, source: usize, point: usize, stride: usize) {
-        self.state[point * stride..(point + 1) * stride]
-            .copy_from_slice(&from.state[source * stride..(source + 1) * stride]);
-        self.energy[point] = from.energy[source];
+    /// Moves points; `fresh` makes the new ones.
+    fn go(&mut self, moves: &Moves, stride: usize, fresh: impl Fn(&mut Self, usize)) {
+        let (state, energy) = (self.state.split_off(moves.first * stride), self.energy.split_off(moves.first));
+        for (point, &from) in (moves.first..).zip(&moves.from) {
+            match (from as usize).checked_sub(moves.first).filter(|_| from != NONE) {
+                Some(from) => {
+                    self.state.extend_from_slice(&state[from * stride..(from + 1) * stride]);
+                    self.energy.push(energy[from]);
+                }
+                None => {
+                    self.state.resize((point + 1) * stride, 0.0);
+                    self.energy.push(0.0);
+                    fresh(self, point);
+                }
+            }
+        }
     }
 }

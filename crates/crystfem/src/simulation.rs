@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::problem::Problem;
 use crate::solver::Task;
-pub use crate::solver::{Choice, LinearSolver};
+pub use crate::solver::{Choice, LinearSolver, Method};
 use crate::system::vector::largest;
 use crate::system::{Behaviour, Exchange, NONE, System};
 pub use crate::system::{Memory, Points};
@@ -92,8 +92,10 @@ pub struct State {
     pub next_dt: f64,
     /// Whether the last thing was a jump.
     pub jump: bool,
-    /// Whether linear systems are solved by factors since the last jump.
-    pub direct: bool,
+    /// How linear systems are solved since the last jump.
+    pub method: Method,
+    /// Iterations since then that other methods would have saved.
+    pub excess: f64,
     /// Energy since the start.
     pub ledger: Ledger,
     /// Work since the start.
@@ -127,7 +129,7 @@ impl Simulation {
             state.next_dt = first;
         }
         let system = System::build(&problem, &behaviours, &state.born, 0)?;
-        state.work.builds = 1;
+        (state.work.builds, state.work.visited) = (1, system.elements as u64);
         state.temperature =
             system.nodes.iter().map(|&n| problem.initial.at(problem.mesh.points[n as usize], 0.0)).collect();
         if let Some(found) = state.temperature.iter().copied().find(|t| !(*t >= 0.0 && t.is_finite())) {
@@ -156,7 +158,7 @@ impl Simulation {
                 problem.material_of.len()
             )));
         }
-        let system = System::build(&problem, &behaviours, &state.born, 0)?;
+        let system = System::build(&problem, &behaviours, &state.born, state.births)?;
         let size = system.size();
         let fits = |list: &[f64]| list.is_empty() || list.len() == size;
         let memory = &state.memory;
@@ -243,6 +245,19 @@ impl Simulation {
         until: f64,
         observe: &mut (dyn FnMut(&Self, &Record) -> ControlFlow<()> + Send),
     ) -> Result<ControlFlow<()>, Error> {
+        self.advance_unless(&|| false, until, observe)
+    }
+
+    /// [`Self::advance`], which also stops within a step once `stop` is true, and stays so: as if that step had not begun.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn advance_unless(
+        &mut self,
+        stop: &(dyn Fn() -> bool + Sync),
+        until: f64,
+        observe: &mut (dyn FnMut(&Self, &Record) -> ControlFlow<()> + Send),
+    ) -> Result<ControlFlow<()>, Error> {
         if !(until >= self.state.time && until.is_finite()) {
             let allowed = format!("{} s (now) or later, finite", self.state.time);
             return Err(Error::Parameter { name: "end time", found: until, allowed });
@@ -251,7 +266,14 @@ impl Simulation {
         rayon::scope(|_| {
             while self.state.time < until {
                 self.give_birth()?;
-                let record = self.step(until)?;
+                let work = self.state.work;
+                let record = match self.step(until, stop) {
+                    Err(Error::Stopped { .. }) => {
+                        self.state.work = work;
+                        return Ok(ControlFlow::Break(()));
+                    }
+                    step => step?,
+                };
                 if observe(self, &record).is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
@@ -276,10 +298,10 @@ impl Simulation {
     /// Entries of the factors that a run to a time makes, about; 0 where it makes none.
     pub fn factors(&self, until: f64) -> f64 {
         let task = self.task(until);
-        if task.choose().direct { task.factor_entries() } else { 0.0 }
+        if task.choose().method == Method::Factors { task.factor_entries() } else { 0.0 }
     }
 
-    fn task(&self, until: f64) -> Task {
+    pub(crate) fn task(&self, until: f64) -> Task {
         let (equal_steps, dt) = match self.settings.steps {
             Steps::Fixed { dt } => (true, dt),
             Steps::Adaptive { first, .. } => (false, first),
@@ -312,6 +334,7 @@ impl Simulation {
             solves: span / dt,
             linear: self.system.is_linear(),
             symmetric: self.system.is_symmetric(),
+            constant: self.system.general.is_empty(),
             equal_steps,
             wanted: self.settings.solver,
         }
@@ -324,10 +347,10 @@ impl Simulation {
         let mut lines = vec![
             format!(
                 "{} equations for {} of {} elements; {} nodes have no equation, {} are prescribed",
-                system.size(),
-                system.elements.len(),
+                system.equation.iter().filter(|equation| **equation != NONE).count(),
+                system.elements,
                 self.problem.material_of.len(),
-                self.problem.mesh.points.len() - system.size(),
+                system.equation.iter().filter(|equation| **equation == NONE).count(),
                 system.fixed.len()
             ),
             format!("conduction: {rows} distinct rows ({entries} entries) in {segments} runs of equal rows"),

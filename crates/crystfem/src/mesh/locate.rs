@@ -37,6 +37,11 @@ impl Place {
         self.distance
     }
 
+    /// Nodes with a weight.
+    pub fn nodes(&self) -> Vec<u32> {
+        self.weights.iter().map(|pair| pair.0).collect()
+    }
+
     /// Σ N_a u_a of a field over nodes; `None` where a node has no value.
     pub fn value(&self, field: impl Fn(u32) -> Option<f64>) -> Option<f64> {
         self.weights.iter().map(|&(node, weight)| Some(weight * field(node)?)).sum()

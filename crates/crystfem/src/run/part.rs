@@ -164,6 +164,7 @@ impl Recorder<'_> {
             self.follower.as_mut().map_or(Ok(()), |follower| follower.see(simulation, false))?;
             self.healer.iter_mut().for_each(|healer| healer.see(simulation));
         }
+        let interrupted = run.options.interrupted;
         while self.frames <= last {
             let until = (self.frames as f64 * every).min(end);
             let (probes, names, frames) = (&mut self.probes, &self.names, self.frames);
@@ -189,8 +190,19 @@ impl Recorder<'_> {
                 }
                 if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
-            let _ = simulation.advance(until, &mut observe)?;
+            let flow = simulation.advance_unless(interrupted, until, &mut observe)?;
             result?;
+            if flow.is_break() {
+                // within a step
+                let reached = (
+                    self.frames,
+                    simulation.state(),
+                    &self.probes,
+                    self.follower.as_ref().map(Follower::reached),
+                    self.healer.as_ref().map(Healer::reached),
+                );
+                run.pause(|| Some(reached)).map_err(Error::from)?;
+            }
             if let Some(follower) = self.follower.as_mut().filter(|_| self.frames == last) {
                 follower.see(simulation, true)?;
                 follower.release()?;

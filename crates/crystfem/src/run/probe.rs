@@ -78,16 +78,18 @@ pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static s
         return Ok(());
     }
     let time = simulation.time();
-    let fields: Vec<Vec<Option<f64>>> = names.iter().map(|name| simulation.field(name)).collect();
     for probe in probes.iter_mut().filter(|probe| probe.exists(simulation)) {
         let Some(temperature) = probe.place.value(|node| simulation.temperature(node)) else { continue };
         if probe.last() == Some(time) {
             continue;
         }
-        let values: Vec<Option<f64>> = fields
-            .iter()
-            .map(|field| probe.place.value(|node| field.get(node as usize).copied().flatten()))
-            .collect();
+        let nodes = probe.place.nodes();
+        let of = |name: &&'static str| {
+            let field = simulation.field_of(name, &nodes);
+            let at = |node: u32| field[nodes.iter().position(|&other| other == node)?];
+            probe.place.value(at)
+        };
+        let values: Vec<Option<f64>> = names.iter().map(of).collect();
         let all = std::iter::once(("temperature", Some(temperature)))
             .chain(names.iter().copied().zip(values.iter().copied()));
         for (quantity, value) in all {

@@ -1,19 +1,24 @@
 //! One accepted step: its length, its attempts, and what it leaves.
 
-use super::{LinearSolver, Simulation};
+use super::{LinearSolver, Method, Simulation};
 use crate::error::Error;
 use crate::ledger::Record;
+use crate::solver::LEVELS;
 use crate::system::At;
 use crate::system::vector::{set, sum};
-use crate::time::{Attempt, Scheme, Stepper, Steps};
+use crate::time::{Attempt, Scheme, Stepper, Steps, Work};
 
 /// Part of the step that the temporal error would allow, and growth of a step at most.
 const SAFETY: f64 = 0.9;
 const MOST_GROWTH: f64 = 4.0;
+/// Iterations of a solve that no other method saves.
+const FEWEST: f64 = 16.0;
+/// Solves with the matrix of equal steps.
+const MANY: f64 = 20.0;
 
 impl Simulation {
     /// One accepted step.
-    pub(super) fn step(&mut self, until: f64) -> Result<Record, Error> {
+    pub(super) fn step(&mut self, until: f64, stop: &(dyn Fn() -> bool + Sync)) -> Result<Record, Error> {
         let time = self.state.time;
         let next = self.breaks[self.breaks.partition_point(|&t| t <= time)..].first().copied();
         let target = next.map_or(until, |next| next.min(until));
@@ -28,12 +33,19 @@ impl Simulation {
             (self.state.rate, self.state.exchange) = (rate, exchange);
         }
         if jump {
-            self.state.direct = self.choose(until).direct;
+            (self.state.method, self.state.excess) = (self.choose(until).method, 0.0);
         }
         let mut wanted = match self.settings.steps {
             Steps::Fixed { dt } => dt,
             Steps::Adaptive { largest, .. } => self.state.next_dt.min(largest),
         };
+        let before = self.state.work;
+        // a ladder of steps, so that factors serve many
+        if let (Method::Factors, Steps::Adaptive { first, .. }, true) =
+            (self.state.method, self.settings.steps, self.system.is_linear())
+        {
+            wanted = first * (wanted / first * (1.0 + 1e-9)).log2().floor().exp2();
+        }
         loop {
             let left = target - time;
             let lands = wanted >= left * (1.0 - 1e-9);
@@ -53,8 +65,11 @@ impl Simulation {
             }
             // factors serve many steps; a single one of another length does without
             let single = adaptive.is_none() && (!equal || scheme != self.settings.scheme);
-            self.stepper.stages.direct =
-                self.state.direct && (!single || self.settings.solver == LinearSolver::Direct);
+            let single = single && self.settings.solver != LinearSolver::Direct;
+            self.stepper.stages.method = match self.state.method {
+                Method::Factors if single => Method::Diagonal,
+                method => method,
+            };
             let accuracy = adaptive.map(|(tolerance, ..)| 0.05 * tolerance);
             let mut work = self.state.work;
             let attempt = self.stepper.attempt(
@@ -65,6 +80,7 @@ impl Simulation {
                 [dt, end],
                 self.settings.tolerance,
                 accuracy,
+                stop,
                 &mut work,
             );
             self.state.work = work;
@@ -73,8 +89,13 @@ impl Simulation {
                 attempt.step_ratio = ratio.into_iter().chain(attempt.step_ratio).reduce(f64::min);
                 Ok(attempt)
             });
+            if let Err(Error::Stopped { .. }) = attempt {
+                return Err(Error::Stopped { time });
+            }
             let Some((tolerance, smallest, largest)) = adaptive else {
-                return Ok(self.accept([dt, end], &attempt?));
+                let record = self.accept([dt, end], &attempt?);
+                self.reconsider(&before, until);
+                return Ok(record);
             };
             // the length as it was wished: in time, far from 0, it is rounded and may come out longer
             let shortest = wanted.min(dt) <= smallest * (1.0 + 1e-9);
@@ -89,7 +110,9 @@ impl Simulation {
                         // a step cut short by a landing says little about the next
                         let grown = (dt * grow).max(if lands { wanted } else { 0.0 });
                         self.state.next_dt = grown.min(dt * ratio).clamp(smallest, largest);
-                        return Ok(self.accept([dt, end], attempt));
+                        let record = self.accept([dt, end], attempt);
+                        self.reconsider(&before, until);
+                        return Ok(record);
                     }
                     grow.min(ratio.max(0.1)).min(0.9)
                 }
@@ -101,6 +124,31 @@ impl Simulation {
             self.state.work.rejected += 1;
             wanted = (dt * factor).max(smallest);
         }
+    }
+
+    /// Takes another method where iterations have cost as much more than it would as its preparation costs. What it costs is counted, not timed,
+    /// so that a resumed run decides alike.
+    fn reconsider(&mut self, before: &Work, until: f64) {
+        let work = &self.state.work;
+        let solves = (work.cg_solves - before.cg_solves) as f64;
+        let iterations = (work.cg_iterations - before.cg_iterations) as f64;
+        let candidate = self.state.method == Method::Diagonal && self.system.is_symmetric();
+        if self.settings.solver != LinearSolver::Auto || !candidate || iterations <= FEWEST * solves {
+            return;
+        }
+        self.state.excess += iterations;
+        if self.state.excess < LEVELS {
+            return;
+        }
+        // both stages of a step, and the filter of its error
+        let one = match (self.system.is_linear(), self.settings.scheme, self.settings.steps) {
+            (false, ..) => 1.0,
+            (_, _, Steps::Fixed { .. }) => MANY,
+            (_, Scheme::BackwardEuler, _) => 2.0,
+            (_, Scheme::TrBdf2, _) => 3.0,
+        };
+        self.state.method = self.task(until).instead(iterations / solves, one);
+        self.state.excess = 0.0;
     }
 
     /// States of materials whose energy does not depend on them, at the end of an attempt.

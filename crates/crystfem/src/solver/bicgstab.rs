@@ -17,6 +17,7 @@ pub struct BiconjugateGradients {
 impl BiconjugateGradients {
     /// Solves A x = r from x = 0; arguments as of [`super::ConjugateGradients::solve`]. It stops by the residual: at
     /// √(Σ r²/diagonal / `capacity`) = `tolerance`.
+    #[allow(clippy::too_many_arguments)]
     pub fn solve(
         &mut self,
         operator: &Operator,
@@ -25,6 +26,7 @@ impl BiconjugateGradients {
         solution: &mut [f64],
         [capacity, tolerance, floor]: [f64; 3],
         limit: usize,
+        stop: &(dyn Fn() -> bool + Sync),
     ) -> Ended {
         let size = residual.len();
         let Self { shadow, direction, scaled, image, second } = self;
@@ -37,6 +39,9 @@ impl BiconjugateGradients {
         // 0 restarts: along the residual, with the residual as shadow
         let (mut rho, mut alpha, mut omega) = (0.0, 0.0, 0.0);
         for iteration in 0..limit {
+            if stop() {
+                return Ended { iterations: iteration, error: f64::NAN, converged: false };
+            }
             let square = norm_squared(residual, inverse);
             let error = (square / capacity).sqrt();
             if !square.is_finite() {
@@ -117,7 +122,7 @@ mod tests {
         let solve = |limit, solution: &mut [f64]| {
             let goal = [3.0, 1e-10, 0.0];
             let mut right = residual.clone();
-            BiconjugateGradients::default().solve(&operator, &inverse, &mut right, solution, goal, limit)
+            BiconjugateGradients::default().solve(&operator, &inverse, &mut right, solution, goal, limit, &|| false)
         };
         let ended = solve(3000, &mut solution);
         let error = solution.iter().zip(&exact).map(|(s, e)| (s - e).abs()).fold(0.0, f64::max);

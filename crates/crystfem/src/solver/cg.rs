@@ -1,12 +1,13 @@
-//! Conjugate gradients with the diagonal as preconditioner, without a stored matrix where the mesh has equal rows.
+//! Conjugate gradients with the diagonal or a multigrid cycle as preconditioner, without a stored matrix where the mesh has equal rows.
 //!
 //! It stops by the error, not by the residual: eᵀAe after k steps is Σ_{j≥k} α_j (r_j·z_j) (Hestenes & Stiefel 1952,
 //! doi:10.6028/jres.049.044), continued here as a geometric series; and eᵀAe ≥ eᵀCe, C the capacity, so that the
 //! root of eᵀAe/ΣC bounds the capacity-weighted rms error of temperature.
 
 use super::Operator;
+use super::multigrid::{Multigrid, dot};
 use crate::solver::norm_squared;
-use crate::system::vector::{advance, turn};
+use crate::system::vector::{advance, combine, turn};
 
 /// How an iteration ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,16 +20,35 @@ pub struct Ended {
     pub converged: bool,
 }
 
+/// The terms of eᵀAe, of which the last four tell what is left.
+struct Estimate([f64; 4]);
+
+impl Estimate {
+    /// After a term: what is left, K²·J/K; `None` where that is not known yet.
+    fn left(&mut self, term: f64) -> Option<f64> {
+        let Self(terms) = self;
+        let first = terms[3] == f64::INFINITY;
+        terms.rotate_left(1);
+        terms[3] = term;
+        // terms shrink by ρ each, over three iterations and over the last one
+        let ratio = |from: usize| if terms[from] < f64::INFINITY { terms[3] / terms[from] } else { 1.0 };
+        let rho = if terms[0] < f64::INFINITY { ratio(0).cbrt().max(ratio(2)) } else { ratio(2) };
+        (!first && rho < 0.9999).then(|| terms[3] * rho / (1.0 - rho))
+    }
+}
+
 /// Conjugate gradients with their work space.
 #[derive(Clone, Debug, Default)]
 pub struct ConjugateGradients {
     direction: Vec<f64>,
     image: Vec<f64>,
+    conditioned: Vec<f64>,
 }
 
 impl ConjugateGradients {
     /// Solves A x = r from x = 0. `inverse` is one over A's diagonal, 0 where x stays 0; `residual` becomes r − A x;
-    /// `capacity` is ΣC, J/K; `floor` is a square of the residual's norm that is rounding.
+    /// `capacity` is ΣC, J/K; `floor` is a square of the residual's norm that is rounding. It ends where `stop` becomes true.
+    #[allow(clippy::too_many_arguments)]
     pub fn solve(
         &mut self,
         operator: &Operator,
@@ -37,6 +57,7 @@ impl ConjugateGradients {
         solution: &mut [f64],
         [capacity, tolerance, floor]: [f64; 3],
         limit: usize,
+        stop: &(dyn Fn() -> bool + Sync),
     ) -> Ended {
         let size = residual.len();
         self.direction.resize(size, 0.0);
@@ -44,7 +65,7 @@ impl ConjugateGradients {
         self.direction.fill(0.0);
         solution.fill(0.0);
         let mut square = norm_squared(residual, inverse);
-        let mut terms = [f64::INFINITY; 4];
+        let mut estimate = Estimate([f64::INFINITY; 4]);
         let mut factor = 0.0;
         let goal = tolerance * tolerance * capacity;
         for iteration in 0..limit {
@@ -53,26 +74,66 @@ impl ConjugateGradients {
             }
             turn(factor, &mut self.direction, residual, inverse);
             let curvature = operator.product(&self.direction, &mut self.image);
-            if !(curvature > 0.0 && curvature.is_finite()) {
+            if stop() || !(curvature > 0.0 && curvature.is_finite()) {
                 return Ended { iterations: iteration, error: f64::NAN, converged: false };
             }
             let length = square / curvature;
             let next = advance(length, solution, residual, &self.direction, &self.image, inverse);
-            terms.rotate_left(1);
-            terms[3] = length * square;
+            let left = estimate.left(length * square);
             (factor, square) = (next / square, next);
-            // terms shrink by ρ each, over three iterations and over the last one
-            let ratio = |from: usize| if terms[from] < f64::INFINITY { terms[3] / terms[from] } else { 1.0 };
-            let rho = if terms[0] < f64::INFINITY { ratio(0).cbrt().max(ratio(2)) } else { ratio(2) };
-            if iteration > 0 && rho < 0.9999 {
-                let rest = terms[3] * rho / (1.0 - rho);
-                if rest <= goal {
-                    let error = (rest / capacity).sqrt();
-                    return Ended { iterations: iteration + 1, error, converged: true };
-                }
+            if let Some(left) = left.filter(|left| *left <= goal) {
+                let error = (left / capacity).sqrt();
+                return Ended { iterations: iteration + 1, error, converged: true };
             }
         }
-        Ended { iterations: limit, error: (terms[3] / capacity).sqrt(), converged: false }
+        Ended { iterations: limit, error: (estimate.0[3] / capacity).sqrt(), converged: false }
+    }
+
+    /// The same with a multigrid cycle as preconditioner.
+    #[allow(clippy::too_many_arguments)]
+    pub fn solve_with(
+        &mut self,
+        multigrid: &mut Multigrid,
+        operator: &Operator,
+        inverse: &[f64],
+        residual: &mut [f64],
+        solution: &mut [f64],
+        [capacity, tolerance, floor]: [f64; 3],
+        limit: usize,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Ended {
+        let size = residual.len();
+        for field in [&mut self.direction, &mut self.image, &mut self.conditioned] {
+            field.resize(size, 0.0);
+        }
+        solution.fill(0.0);
+        let Self { direction, image, conditioned } = self;
+        let mut estimate = Estimate([f64::INFINITY; 4]);
+        let mut last = 0.0;
+        let goal = tolerance * tolerance * capacity;
+        for iteration in 0..limit {
+            if norm_squared(residual, inverse) <= floor {
+                return Ended { iterations: iteration, error: 0.0, converged: true };
+            }
+            multigrid.apply(operator, inverse, residual, conditioned);
+            let square = dot(residual, conditioned);
+            let factor = if iteration == 0 { 0.0 } else { square / last };
+            last = square;
+            combine(direction, |k, own| conditioned[k] + factor * own);
+            let curvature = operator.product(direction, image);
+            if stop() || !(curvature > 0.0 && curvature.is_finite() && square > 0.0) {
+                return Ended { iterations: iteration, error: f64::NAN, converged: false };
+            }
+            let length = square / curvature;
+            combine(solution, |k, own| own + length * direction[k]);
+            combine(residual, |k, own| own - length * image[k]);
+            let left = estimate.left(length * square);
+            if let Some(left) = left.filter(|left| *left <= goal) {
+                let error = (left / capacity).sqrt();
+                return Ended { iterations: iteration + 1, error, converged: true };
+            }
+        }
+        Ended { iterations: limit, error: (estimate.0[3] / capacity).sqrt(), converged: false }
     }
 }
 
@@ -116,6 +177,7 @@ mod tests {
                 &mut solution,
                 [0.5, tolerance, 0.0],
                 1000,
+                &|| false,
             );
             let error = solution.iter().zip(&exact).map(|(s, e)| (s - e) * (s - e)).sum::<f64>();
             assert!(ended.converged, "{ended:?}");
@@ -134,7 +196,7 @@ mod tests {
         let mut solution = [0.0; 2];
         let mut solve = |limit| {
             let (mut residual, mut cg) = ([1.0, 2.0], ConjugateGradients::default());
-            cg.solve(&operator, &[1.0; 2], &mut residual, &mut solution, [1.0, 1e-9, 0.0], limit)
+            cg.solve(&operator, &[1.0; 2], &mut residual, &mut solution, [1.0, 1e-9, 0.0], limit, &|| false)
         };
         assert!(!solve(10).converged);
         assert!(!solve(0).converged);

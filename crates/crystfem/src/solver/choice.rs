@@ -8,23 +8,41 @@ pub enum LinearSolver {
     /// By an estimate of the work, see [`Choice`].
     #[default]
     Auto,
-    /// Conjugate gradients.
+    /// Conjugate gradients with the diagonal.
     ConjugateGradients,
+    /// Conjugate gradients with a multigrid cycle.
+    Multigrid,
     /// Factors, even where each step has a matrix of its own.
     Direct,
+}
+
+/// A way to solve linear systems.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum Method {
+    /// Conjugate gradients with the diagonal, or biconjugate ones.
+    #[default]
+    Diagonal,
+    /// Conjugate gradients with a multigrid cycle.
+    Multigrid,
+    /// Factors.
+    Factors,
 }
 
 /// A choice with its reason.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// Whether factors are used.
-    pub direct: bool,
+    /// How it begins.
+    pub method: Method,
     /// Why.
     pub reason: String,
 }
 
 /// Equations beyond which factors are too large: about 1.5 GB.
 const MOST_EQUATIONS: usize = 250_000;
+/// What a solve with multigrid costs in iterations with the diagonal: about 14 cycles of 4.5.
+const CYCLES: f64 = 64.0;
+/// What its levels, or an analysis for factors, cost.
+pub const LEVELS: f64 = 300.0;
 
 /// What is known of a matrix before anything is solved.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +61,8 @@ pub struct Task {
     pub linear: bool,
     /// Whether the matrix is symmetric.
     pub symmetric: bool,
+    /// Whether conduction never changes, so that levels can serve it.
+    pub constant: bool,
     /// Whether steps are all equal.
     pub equal_steps: bool,
     /// The requirement.
@@ -68,7 +88,10 @@ impl Task {
     /// 11 n √s entries, s the equations across; a solve with them and their making were measured against that (bricks
     /// of 20 000 and 97 000 equations, whose solves took 100 and 180 iterations, their making 800 and 3200).
     pub fn choose(&self) -> Choice {
-        let by = |direct, reason: String| Choice { direct, reason };
+        let by = |direct, reason: String| {
+            let method = if direct { Method::Factors } else { Method::Diagonal };
+            Choice { method, reason }
+        };
         if !self.symmetric {
             return by(
                 false,
@@ -78,13 +101,20 @@ impl Task {
         match self.wanted {
             LinearSolver::ConjugateGradients => return by(false, "conjugate gradients: requested".into()),
             LinearSolver::Direct => return by(true, "factors: requested".into()),
+            LinearSolver::Multigrid if self.constant => {
+                return Choice { method: Method::Multigrid, reason: "multigrid: requested".into() };
+            }
+            LinearSolver::Multigrid => {
+                return by(false, "conjugate gradients: the conductivity changes, multigrid cannot serve it".into());
+            }
             LinearSolver::Auto => {}
         }
+        let until = "until others have become cheaper by their count";
         if !self.linear {
-            return by(false, "conjugate gradients: the matrix changes with temperature".into());
+            return by(false, format!("conjugate gradients: the matrix changes with temperature; {until}"));
         }
         if !self.equal_steps {
-            return by(false, "conjugate gradients: the matrix changes with the adaptive step".into());
+            return by(false, format!("conjugate gradients: the matrix changes with the adaptive step; {until}"));
         }
         if self.size > MOST_EQUATIONS {
             return by(
@@ -92,13 +122,9 @@ impl Task {
                 format!("conjugate gradients: factors of {} equations are too large", self.size),
             );
         }
-        let size = self.size as f64;
         let condition = (2.0 * self.stiffness).min(self.length * self.length);
         let iterations = 0.5 * condition.sqrt() * (2.0_f64 / 1e-4).ln();
-        let across = self.across();
-        let stored = 120.0 / (120.0 + 12.0 * self.entries as f64 / size);
-        let solve = 3.9 * stored * across.sqrt();
-        let factor = 1.4 * stored * across / self.solves.max(1.0);
+        let [solve, factor] = self.direct(self.solves);
         let direct = iterations > solve + factor;
         let name = if direct { "factors" } else { "conjugate gradients" };
         by(
@@ -110,11 +136,54 @@ impl Task {
             ),
         )
     }
+
+    /// Costs of a solve with factors, and of its share of a factorization that serves so many.
+    fn direct(&self, solves: f64) -> [f64; 2] {
+        let stored = 120.0 / (120.0 + 12.0 * self.entries as f64 / self.size as f64);
+        let across = self.across();
+        [3.9 * stored * across.sqrt(), 1.4 * stored * across / solves.max(1.0)]
+    }
+
+    /// What takes over from the diagonal where a solve takes so many iterations and one matrix serves so many solves.
+    pub fn instead(&self, iterations: f64, solves: f64) -> Method {
+        let [solve, factor] = self.direct(solves);
+        let factors = if self.size > MOST_EQUATIONS { f64::INFINITY } else { solve + factor };
+        let cycles = if self.constant { CYCLES } else { f64::INFINITY };
+        if !self.symmetric || iterations <= factors.min(cycles) {
+            Method::Diagonal
+        } else if factors <= cycles {
+            Method::Factors
+        } else {
+            Method::Multigrid
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_takes_over() {
+        let task = Task {
+            size: 100_000,
+            length: 46.0,
+            entries: 1000,
+            stiffness: 1.0,
+            solves: 1.0,
+            linear: false,
+            symmetric: true,
+            constant: true,
+            equal_steps: false,
+            wanted: LinearSolver::Auto,
+        };
+        assert_eq!(task.instead(50.0, 1.0), Method::Diagonal);
+        assert_eq!(task.instead(200.0, 1.0), Method::Multigrid);
+        // a rod of 3 × 3 nodes
+        assert_eq!(Task { length: 11_111.0, ..task }.instead(200.0, 1.0), Method::Factors);
+        assert_eq!(Task { constant: false, ..task }.instead(200.0, 1.0), Method::Diagonal);
+        assert_eq!(Task { symmetric: false, ..task }.instead(1e4, 1.0), Method::Diagonal);
+    }
 
     #[test]
     fn long_steps_with_one_matrix_take_factors() {
@@ -126,18 +195,19 @@ mod tests {
             solves: 1000.0,
             linear: true,
             symmetric: true,
+            constant: true,
             equal_steps: true,
             wanted: LinearSolver::Auto,
         };
-        assert!(!task.choose().direct);
+        assert!(task.choose().method == Method::Diagonal);
         let long = Task { stiffness: 1e4, ..task };
-        assert!(long.choose().direct && long.choose().reason.contains("1000 solves"));
-        assert!(!Task { solves: 1.0, ..long }.choose().direct);
-        assert!(!Task { linear: false, ..long }.choose().direct);
-        assert!(!Task { equal_steps: false, ..long }.choose().direct);
-        assert!(!Task { symmetric: false, wanted: LinearSolver::Direct, ..long }.choose().direct);
-        assert!(!Task { size: 1_000_000, ..long }.choose().direct);
-        assert!(Task { wanted: LinearSolver::Direct, ..task }.choose().direct);
-        assert!(!Task { wanted: LinearSolver::ConjugateGradients, ..long }.choose().direct);
+        assert!(long.choose().method == Method::Factors && long.choose().reason.contains("1000 solves"));
+        assert!(Task { solves: 1.0, ..long }.choose().method == Method::Diagonal);
+        assert!(Task { linear: false, ..long }.choose().method == Method::Diagonal);
+        assert!(Task { equal_steps: false, ..long }.choose().method == Method::Diagonal);
+        assert!(Task { symmetric: false, wanted: LinearSolver::Direct, ..long }.choose().method == Method::Diagonal);
+        assert!(Task { size: 1_000_000, ..long }.choose().method == Method::Diagonal);
+        assert!(Task { wanted: LinearSolver::Direct, ..task }.choose().method == Method::Factors);
+        assert!(Task { wanted: LinearSolver::ConjugateGradients, ..long }.choose().method == Method::Diagonal);
     }
 }

@@ -1,15 +1,18 @@
 //! Linear systems of one stage of a step, A δ = r with A = D + M + a·(K + faces).
 
+mod aggregation;
 mod bicgstab;
 mod cg;
 mod choice;
 mod direct;
 mod dissection;
+mod multigrid;
 
 pub use bicgstab::BiconjugateGradients;
 pub use cg::{ConjugateGradients, Ended};
-pub use choice::{Choice, LinearSolver, Task};
+pub use choice::{Choice, LEVELS, LinearSolver, Method, Task};
 pub use direct::Direct;
+pub use multigrid::Multigrid;
 
 use crate::system::vector::{sum, weighted_square};
 use crate::system::{FaceMatrices, Rows};

@@ -1,10 +1,15 @@
-//! Building the equations of what exists.
+//! Adding elements to the equations: all that exist at first, and those of a birth later.
+//!
+//! A birth costs what it adds. Equations are appended ([`super::numbering`]); rows, capacity, points and faces are made anew at the nodes of
+//! new elements only, and what stands behind the first of them in a list moves. The result is that of building all at once, bit by bit.
 
+use super::around::Around;
 use super::classes::{Class, OWN, VARYING, classify, matrices};
 use super::general::General;
 use super::nodal::Nodal;
+use super::numbering::Numbering;
 use super::rows::{Row, Rows};
-use super::surfaces::Surfaces;
+use super::surfaces::{Surfaces, Touched};
 use super::{Behaviour, NONE, System};
 use crate::boundary::{Condition, Where};
 use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
@@ -12,17 +17,46 @@ use crate::error::Error;
 use crate::mesh::{Face, Mesh};
 use crate::problem::{Capacity, Problem};
 use rayon::prelude::*;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// Elements whose matrices are made before they are added.
 const BATCH: usize = 4096;
 
-/// The elements around each node, as `stride` × (position in the list of active elements) + number of the node in it.
-struct Around {
-    starts: Vec<u32>,
-    corners: Vec<u32>,
-    /// 8, or 32 of a mesh with second-order elements.
-    stride: u32,
+/// Where points are that stand at a place or behind it.
+#[derive(Clone, Debug, Default)]
+pub struct Moves {
+    /// That place.
+    pub first: usize,
+    /// Where each was before, or [`NONE`].
+    pub from: Vec<u32>,
+}
+
+/// What elements did that were added.
+#[derive(Clone, Debug, Default)]
+pub struct Added {
+    /// Equations of their nodes, ascending, with the capacity of linear materials before, J/K; `None` where nothing was.
+    pub before: Vec<(u32, Option<f64>)>,
+    /// Points at nodes.
+    pub nodal: Moves,
+    /// Points in elements.
+    pub general: Moves,
+    /// Elements that were visited: the new ones and their neighbours.
+    pub visited: u64,
+}
+
+/// What of a problem never changes, as building needs it.
+pub struct Plan {
+    numbering: Numbering,
+    around: Around,
+    /// Class of each element.
+    kinds: Vec<u16>,
+    classes: Vec<Class>,
+    /// By their corners, faces on which each condition acts, or does not.
+    named: Vec<HashSet<[u32; 4]>>,
+    /// The last condition that prescribes a node's temperature.
+    held: HashMap<u32, u32>,
+    /// Elements of each source, ascending.
+    heated: Vec<Vec<u32>>,
 }
 
 /// Matrices of an element of its own.
@@ -31,75 +65,67 @@ enum Own {
     Wide(Box<Geometry<WIDE, WIDE_POINTS>>),
 }
 
-impl Around {
-    fn new(mesh: &Mesh, active: &[u32], equation: &[u32], size: usize) -> Self {
-        let mut starts = vec![0_u32; size + 1];
-        let stride = if mesh.is_second_order() { 32 } else { 8 };
-        let each = |visit: &mut dyn FnMut(usize, u32)| {
-            for (position, &number) in active.iter().enumerate() {
-                for (corner, &node) in mesh.nodes(number).iter().enumerate() {
-                    visit(equation[node as usize] as usize, stride * position as u32 + corner as u32);
-                }
-            }
+impl Own {
+    fn new(mesh: &Mesh, element: u32) -> Result<Self, Error> {
+        let geometry = if mesh.nodes(element).len() > MOST {
+            element::wide(mesh, element).map(|geometry| Self::Wide(Box::new(geometry)))
+        } else {
+            let (corners, nodes) = element::corners(mesh, element);
+            Geometry::new(&corners[..nodes]).map(|geometry| Self::Narrow(Box::new(geometry)))
         };
-        each(&mut |node, _| starts[node + 1] += 1);
-        for k in 0..size {
-            starts[k + 1] += starts[k];
-        }
-        let mut next = starts.clone();
-        let mut corners = vec![0; starts[size] as usize];
-        each(&mut |node, corner| {
-            corners[next[node] as usize] = corner;
-            next[node] += 1;
-        });
-        Self { starts, corners, stride }
-    }
-
-    fn of(&self, node: usize) -> &[u32] {
-        &self.corners[self.starts[node] as usize..self.starts[node + 1] as usize]
+        geometry.ok_or_else(|| Error::Mesh(format!("element {element}: inverted")))
     }
 }
 
-/// Sides of existing elements that no other existing element shares, ascending.
-fn outer(mesh: &Mesh, active: &[u32], equation: &[u32], around: &Around) -> Vec<Face> {
-    let faces: Vec<Vec<Face>> = active
-        .par_chunks(BATCH)
-        .enumerate()
-        .map(|(chunk, numbers)| {
-            let mut faces = Vec::new();
-            for (k, &number) in numbers.iter().enumerate() {
-                let position = chunk * BATCH + k;
-                for side in 0..mesh.side_count(number) {
-                    let corners = mesh.face_nodes(Face { element: number, side });
-                    let covered = around.of(equation[corners[0] as usize] as usize).iter().any(|&other| {
-                        let other = (other / around.stride) as usize;
-                        other != position && {
-                            let others = mesh.nodes(active[other]);
-                            corners[1..].iter().all(|corner| others.contains(corner))
-                        }
-                    });
-                    if !covered {
-                        faces.push(Face { element: number, side });
-                    }
-                }
+impl Plan {
+    fn new(problem: &Problem, behaviours: &[Behaviour], born: &[u32]) -> Self {
+        let mesh = &problem.mesh;
+        let (kinds, classes) = classify(mesh, &problem.material_of, behaviours);
+        let by_corners = |condition: &Condition| {
+            let faces: &[Face] = match condition.surface() {
+                Some(Where::Faces(faces)) => faces,
+                Some(Where::Outer { except }) => except,
+                None => &[],
+            };
+            faces.iter().map(|&face| mesh.face_nodes(face).key()).collect()
+        };
+        let mut held = HashMap::new();
+        for (index, condition) in (0..).zip(&problem.conditions) {
+            if let Condition::Temperature { nodes, .. } = condition {
+                held.extend(nodes.iter().map(|&node| (node, index)));
             }
-            faces
-        })
-        .collect();
-    faces.concat()
-}
+        }
+        let sorted = |elements: &[u32]| {
+            let mut elements = elements.to_vec();
+            elements.sort_unstable();
+            elements
+        };
+        Self {
+            numbering: Numbering::new(problem, born),
+            around: Around::new(mesh, &problem.absent),
+            kinds,
+            classes,
+            named: problem.conditions.iter().map(by_corners).collect(),
+            held,
+            heated: problem.sources.iter().map(|source| sorted(&source.elements)).collect(),
+        }
+    }
 
-/// Corners of a face, sorted.
-fn nodes_of(mesh: &Mesh, face: Face) -> [u32; 4] {
-    mesh.face_nodes(face).key()
-}
-
-fn by_nodes(mesh: &Mesh, faces: &[Face]) -> HashSet<[u32; 4]> {
-    faces.iter().map(|&face| nodes_of(mesh, face)).collect()
+    /// Whether a condition acts on a face.
+    fn acts(&self, problem: &Problem, condition: usize, face: Face) -> bool {
+        let named = &self.named[condition];
+        match problem.conditions[condition].surface() {
+            Some(Where::Faces(_)) => named.contains(&problem.mesh.face_nodes(face).key()),
+            Some(Where::Outer { .. }) => {
+                named.is_empty() || !named.contains(&problem.mesh.face_nodes(face).key())
+            }
+            None => false,
+        }
+    }
 }
 
 impl System {
-    /// Of the elements that are born: those whose entry in `born` is not [`NONE`].
+    /// Of the elements that are born, those whose entry in `born` is not [`NONE`], by so many births.
     ///
     /// # Errors
     /// [`Error::Mesh`] for an inverted element.
@@ -107,44 +133,151 @@ impl System {
         problem: &Problem,
         behaviours: &[Behaviour],
         born: &[u32],
-        build: u64,
+        births: usize,
     ) -> Result<Self, Error> {
-        let mesh = &problem.mesh;
         let consistent = problem.capacity == Capacity::Consistent;
-        let elements: Vec<u32> = (0..born.len() as u32).filter(|&e| born[e as usize] != NONE).collect();
-        let mut equation = vec![NONE; mesh.points.len()];
-        for &number in &elements {
-            for &node in mesh.nodes(number) {
-                equation[node as usize] = 0;
-            }
-        }
-        let mut nodes = Vec::new();
-        for (node, equation) in equation.iter_mut().enumerate() {
-            if *equation == 0 {
-                *equation = nodes.len() as u32;
-                nodes.push(node as u32);
-            }
-        }
-        let size = nodes.len();
-        let (kinds, classes) = classify(mesh, &elements, &problem.material_of, behaviours);
-        let around = Around::new(mesh, &elements, &equation, size);
+        let stride = |wanted: &dyn Fn(&Behaviour) -> bool| {
+            behaviours.iter().filter(|b| wanted(b)).map(|b| b.states).max().unwrap_or(0)
+        };
+        let nodal = Nodal {
+            stride: stride(&Behaviour::nodal),
+            followers: behaviours.iter().map(|b| b.capacity.is_some()).collect(),
+            ..Nodal::default()
+        };
+        let mut system = Self {
+            elements: 0,
+            nodes: Vec::new(),
+            equation: vec![NONE; problem.mesh.points.len()],
+            rows: Rows::new(consistent),
+            capacity: Vec::new(),
+            nodal,
+            general: General::new(stride(&|b| b.conductivity.is_none())),
+            surfaces: Surfaces::new(problem),
+            fixed: Vec::new(),
+            free: Vec::new(),
+            consistent,
+            build: 0,
+            generation: 0,
+            evaluated_at: f64::NEG_INFINITY,
+            plan: Plan::new(problem, behaviours, born),
+        };
+        let elements = (0..born.len() as u32).filter(|&e| born[e as usize] != NONE).collect::<Vec<_>>();
+        system.add(problem, behaviours, born, births, &elements)?;
+        Ok(system)
+    }
 
-        let rows = Rows::build(size, consistent, |index, row: &mut Row| {
+    /// Elements of an equation's node that are born, ascending, and its number in each.
+    pub fn around(&self, equation: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
+        self.plan.around.of(self.nodes[equation as usize], born)
+    }
+
+    /// Adds elements, ascending, that are born with the last of so many births.
+    ///
+    /// # Errors
+    /// [`Error::Mesh`] for an inverted element.
+    pub fn add(
+        &mut self,
+        problem: &Problem,
+        behaviours: &[Behaviour],
+        born: &[u32],
+        births: usize,
+        new: &[u32],
+    ) -> Result<Added, Error> {
+        let (mesh, old) = (&problem.mesh, self.size());
+        let size = self.plan.numbering.end(births);
+        self.nodes.extend_from_slice(&self.plan.numbering.nodes[old..size]);
+        self.capacity.resize(size, 0.0);
+        self.free.resize(size, 0.0);
+        let mut touched = Touched::new(size);
+        let mut fresh = Vec::new();
+        for &node in new.iter().flat_map(|&element| mesh.nodes(element)) {
+            if self.equation[node as usize] == NONE {
+                let around = self.plan.around.of(node, born);
+                let first = around.map(|(element, _)| born[element as usize]).min().unwrap_or(NONE);
+                let Some(equation) = self.plan.numbering.equation(node, first) else {
+                    return Err(Error::Mesh(format!("node {node} of birth {first}: has no equation")));
+                };
+                self.equation[node as usize] = equation;
+                self.free[equation as usize] = 1.0;
+                fresh.push(equation);
+            }
+            touched.add(self.equation[node as usize]);
+        }
+        fresh.sort_unstable();
+        let new_fresh = |equation: u32| fresh.binary_search(&equation).is_ok();
+        // consistent matrices of faces are in no order that new ones could be added to
+        if self.consistent && old > 0 {
+            self.equation.iter().filter(|equation| **equation != NONE).for_each(|&e| touched.add(e));
+        }
+        touched.sort();
+        let before = touched.list.iter().map(|&e| (e, (!new_fresh(e)).then_some(self.capacity[e as usize])));
+        let mut added = Added { before: before.collect(), ..Added::default() };
+        let mut ring = Vec::new();
+        if old == 0 {
+            ring.extend_from_slice(new);
+        } else {
+            let around = |&e: &u32| self.plan.around.of(self.nodes[e as usize], born);
+            ring.extend(touched.list.iter().flat_map(around).map(|(element, _)| element));
+            ring.sort_unstable();
+            ring.dedup();
+        }
+        added.visited = ring.len() as u64;
+        self.elements += new.len();
+        self.connect(mesh, born, size, &touched);
+        let Self { plan, nodes, nodal, .. } = self;
+        if behaviours.iter().any(Behaviour::nodal) {
+            added.nodal = nodal.replace(size, &touched.list, |equation, keys| {
+                for (element, _) in plan.around.of(nodes[equation as usize], born) {
+                    let key = (born[element as usize], problem.material_of[element as usize]);
+                    if behaviours[usize::from(key.1)].nodal() && !keys.contains(&key) {
+                        keys.push(key);
+                    }
+                }
+            });
+        }
+        let varying: Vec<u32> =
+            new.iter().copied().filter(|&element| self.plan.kinds[element as usize] == VARYING).collect();
+        let material = |element: &u32| &behaviours[usize::from(problem.material_of[*element as usize])];
+        self.general.potential |= varying.iter().any(|element| material(element).potential);
+        added.general = self.general.insert(mesh, &varying, &self.equation);
+        touched.list.iter().for_each(|&equation| self.capacity[equation as usize] = 0.0);
+        let volumes = self.add_elements(problem, behaviours, born, &ring, &touched)?;
+        if !self.general.is_empty() {
+            self.rows.keep();
+        }
+        self.act(problem, born, &ring, &touched, &volumes);
+        for &equation in &fresh {
+            if let Some(&condition) = self.plan.held.get(&self.nodes[equation as usize]) {
+                self.fixed.push((equation, condition));
+                self.free[equation as usize] = 0.0;
+            }
+        }
+        self.fixed.sort_unstable();
+        self.build += 1;
+        self.generation = self.build << 32;
+        self.evaluated_at = f64::NEG_INFINITY;
+        Ok(added)
+    }
+
+    /// Rows of the equations that are touched.
+    fn connect(&mut self, mesh: &Mesh, born: &[u32], size: usize, touched: &Touched) {
+        let Self { rows, plan, nodes, equation, .. } = self;
+        let Plan { around, kinds, classes, .. } = plan;
+        rows.update(size, &touched.list, |index, row: &mut Row| {
+            let around = || around.of(nodes[index], born);
             // corners, classes and relative nodes of the elements around say all, but for elements of no class
-            let repeated = row.begin(around.of(index).iter().flat_map(|&corner| {
-                let position = (corner / around.stride) as usize;
-                let here = [corner % around.stride, u32::from(kinds[position])];
-                let others = mesh.nodes(elements[position]).iter();
+            let repeated = row.begin(around().flat_map(|(element, corner)| {
+                let here = [corner as u32, u32::from(kinds[element as usize])];
+                let others = mesh.nodes(element).iter();
                 here.into_iter().chain(others.map(|&n| equation[n as usize].wrapping_sub(index as u32)))
             }));
             if repeated {
                 return;
             }
-            for &corner in around.of(index) {
-                let (position, a) = ((corner / around.stride) as usize, (corner % around.stride) as usize);
-                let class = classes.get(usize::from(kinds[position]));
+            for (element, a) in around() {
+                let class = classes.get(usize::from(kinds[element as usize]));
                 row.own |= class.is_none();
-                for (b, &node) in mesh.nodes(elements[position]).iter().enumerate() {
+                for (b, &node) in mesh.nodes(element).iter().enumerate() {
                     let offset = equation[node as usize].wrapping_sub(index as u32) as i32;
                     match class {
                         Some(class) => row.add(offset, class.conduction[a][b], class.capacity[a][b]),
@@ -153,148 +286,66 @@ impl System {
                 }
             }
         });
-        let mut system = Self {
-            elements,
-            nodes,
-            equation,
-            rows,
-            capacity: vec![0.0; size],
-            nodal: Nodal::default(),
-            general: General::default(),
-            surfaces: Surfaces::default(),
-            fixed: Vec::new(),
-            free: vec![1.0; size],
-            consistent,
-            base: None,
-            build,
-            generation: build << 32,
-            evaluated_at: f64::NEG_INFINITY,
-        };
-        system.collect_points(problem, behaviours, born, &kinds, &around);
-        let volumes = system.add_elements(problem, behaviours, born, &kinds, &classes)?;
-        if !system.general.is_empty() {
-            system.base = Some(system.rows.values());
-        }
-        system.act(problem, &around, &volumes);
-        Ok(system)
     }
 
-    /// Which points there are; their masses follow in `add_elements`.
-    fn collect_points(
-        &mut self,
-        problem: &Problem,
-        behaviours: &[Behaviour],
-        born: &[u32],
-        kinds: &[u16],
-        around: &Around,
-    ) {
-        let nodal = |number: u32| behaviours[usize::from(problem.material_of[number as usize])].nodal();
-        let stride = |wanted: &dyn Fn(&Behaviour) -> bool| {
-            behaviours.iter().filter(|b| wanted(b)).map(|b| b.states).max().unwrap_or(0)
-        };
-        if self.elements.iter().any(|&number| nodal(number)) {
-            self.nodal.stride = stride(&Behaviour::nodal);
-            self.nodal.starts.push(0);
-            let mut keys = Vec::new();
-            for node in 0..self.size() {
-                keys.clear();
-                for &corner in around.of(node) {
-                    let number = self.elements[(corner / around.stride) as usize];
-                    let key = (born[number as usize], problem.material_of[number as usize]);
-                    if nodal(number) && !keys.contains(&key) {
-                        keys.push(key);
-                    }
-                }
-                keys.sort_unstable();
-                for &(birth, material) in &keys {
-                    self.nodal.birth.push(birth);
-                    self.nodal.material.push(material);
-                    self.nodal.mass.push(0.0);
-                }
-                self.nodal.starts.push(self.nodal.material.len() as u32);
-            }
-        }
-        self.nodal.followers = behaviours.iter().map(|b| b.capacity.is_some()).collect();
-        self.nodal.coupled = self.nodal.material.iter().any(|&material| !self.nodal.follows(material));
-        self.general.stride = stride(&|b| b.conductivity.is_none());
-        self.general.starts.push(0);
-        for (&number, _) in self.elements.iter().zip(kinds).filter(|(_, kind)| **kind == VARYING) {
-            let nodes = problem.mesh.nodes(number);
-            self.general.equations.extend(nodes.iter().map(|&node| self.equation[node as usize]));
-            self.general.ends.push(self.general.equations.len() as u32);
-            let material = problem.material_of[number as usize];
-            self.general.potential |= behaviours[usize::from(material)].potential;
-            let first = self.general.points();
-            self.general.elements.push(number);
-            self.general.starts.push((first + element::points(nodes.len())) as u32);
-        }
-    }
-
-    /// Adds what elements of no class have of their own, and the capacity of all; returns ∫ N dV of each first-order element
-    /// with a source.
+    /// Adds, at equations that are touched, what elements of no class have of their own, and the capacity of all; returns
+    /// ∫ N dV of each first-order element with a source.
     fn add_elements(
         &mut self,
         problem: &Problem,
         behaviours: &[Behaviour],
         born: &[u32],
-        kinds: &[u16],
-        classes: &[Class],
+        elements: &[u32],
+        touched: &Touched,
     ) -> Result<Vec<(u32, [f64; MOST])>, Error> {
         let mesh = &problem.mesh;
-        let mut heated: Vec<u32> = problem.sources.iter().flat_map(|s| s.elements.iter().copied()).collect();
-        heated.sort_unstable();
-        heated.dedup();
         let mut volumes = Vec::new();
-        for first in (0..self.elements.len()).step_by(BATCH) {
-            let range = first..(first + BATCH).min(self.elements.len());
-            // boxed: most elements have none, and a geometry has thousands of bytes
-            let own: Vec<Option<Own>> = range
-                .clone()
-                .into_par_iter()
-                .map(|position| {
-                    if usize::from(kinds[position]) < classes.len() {
-                        return Ok(None);
-                    }
-                    let number = self.elements[position];
-                    let geometry = if mesh.nodes(number).len() > MOST {
-                        element::wide(mesh, number).map(|geometry| Own::Wide(Box::new(geometry)))
-                    } else {
-                        let (corners, nodes) = element::corners(mesh, number);
-                        Geometry::new(&corners[..nodes]).map(|geometry| Own::Narrow(Box::new(geometry)))
-                    };
-                    geometry.map(Some).ok_or_else(|| Error::Mesh(format!("element {number}: inverted")))
+        for elements in elements.chunks(BATCH) {
+            let Plan { kinds, classes, .. } = &self.plan;
+            // most elements have none
+            let own: Vec<Option<Own>> = elements
+                .par_iter()
+                .with_min_len(64)
+                .map(|&element| match usize::from(kinds[element as usize]) < classes.len() {
+                    true => Ok(None),
+                    false => Own::new(mesh, element).map(Some),
                 })
                 .collect::<Result<_, _>>()?;
-            for (position, geometry) in range.zip(own) {
-                let number = self.elements[position];
-                let material = problem.material_of[number as usize];
+            for (&element, geometry) in elements.iter().zip(own) {
+                let kind = self.plan.kinds[element as usize];
+                let material = problem.material_of[element as usize];
                 let behaviour = &behaviours[usize::from(material)];
-                let nodes = mesh.nodes(number);
+                let nodes = mesh.nodes(element);
+                match geometry.as_ref().filter(|_| kind == OWN) {
+                    Some(Own::Narrow(geometry)) => {
+                        self.add_own(nodes, &matrices(geometry, behaviour), touched);
+                    }
+                    Some(Own::Wide(geometry)) => self.add_own(nodes, &matrices(geometry, behaviour), touched),
+                    None => {}
+                }
                 let corner_volumes = match geometry.as_ref() {
                     Some(Own::Narrow(geometry)) => &geometry.corner_volumes[..],
                     Some(Own::Wide(geometry)) => &geometry.corner_volumes[..],
-                    None => &classes[usize::from(kinds[position])].volumes[..],
+                    None => &self.plan.classes[usize::from(kind)].volumes[..],
                 };
-                match geometry.as_ref().filter(|_| kinds[position] == OWN) {
-                    Some(Own::Narrow(geometry)) => self.add_own(nodes, &matrices(geometry, behaviour)),
-                    Some(Own::Wide(geometry)) => self.add_own(nodes, &matrices(geometry, behaviour)),
-                    None => {}
-                }
-                if let (Some(volume), Ok(_)) =
-                    (corner_volumes.first_chunk::<MOST>(), heated.binary_search(&number))
+                if let Some(volume) = corner_volumes.first_chunk::<MOST>()
                     && nodes.len() <= MOST
+                    && self.plan.heated.iter().any(|list| list.binary_search(&element).is_ok())
                 {
-                    volumes.push((number, *volume));
+                    volumes.push((element, *volume));
                 }
                 for (&node, &volume) in nodes.iter().zip(corner_volumes) {
-                    let node = self.equation[node as usize] as usize;
+                    let node = self.equation[node as usize];
+                    if !touched.contains(node) {
+                        continue;
+                    }
                     if let Some(capacity) = behaviour.capacity {
-                        self.capacity[node] += capacity * volume;
+                        self.capacity[node as usize] += capacity * volume;
                     }
                     if behaviour.nodal() {
-                        let key = (born[number as usize], material);
+                        let key = (born[element as usize], material);
                         let density = problem.materials[usize::from(material)].density();
-                        for point in self.nodal.of(node) {
+                        for point in self.nodal.of(node as usize) {
                             if (self.nodal.birth[point], self.nodal.material[point]) == key {
                                 self.nodal.mass[point] += density * volume;
                             }
@@ -306,80 +357,64 @@ impl System {
         Ok(volumes)
     }
 
-    /// Conduction and capacity of one element.
+    /// Conduction and capacity of one element, in rows that are touched.
     fn add_own<const N: usize>(
         &mut self,
         nodes: &[u32],
         (conduction, capacity): &([[f64; N]; N], [[f64; N]; N]),
+        touched: &Touched,
     ) {
         for (a, &row) in nodes.iter().enumerate() {
+            let row = self.equation[row as usize];
+            if !touched.contains(row) {
+                continue;
+            }
             for (b, &column) in nodes.iter().enumerate() {
-                let [row, column] = [row, column].map(|node| self.equation[node as usize] as usize);
-                self.rows.add(row, column, conduction[a][b], capacity[a][b]);
+                let column = self.equation[column as usize] as usize;
+                self.rows.add(row as usize, column, conduction[a][b], capacity[a][b]);
             }
         }
     }
 
-    /// Conditions on the outer surface, prescribed temperatures, sources.
-    fn act(&mut self, problem: &Problem, around: &Around, volumes: &[(u32, [f64; MOST])]) {
+    /// Conditions on the outer surface and sources, at equations that are touched.
+    fn act(
+        &mut self,
+        problem: &Problem,
+        born: &[u32],
+        elements: &[u32],
+        touched: &Touched,
+        volumes: &[(u32, [f64; MOST])],
+    ) {
+        let Self { plan, surfaces, equation, consistent, .. } = self;
         let mesh = &problem.mesh;
-        let exposed = if problem.conditions.iter().any(|condition| condition.surface().is_some()) {
-            outer(mesh, &self.elements, &self.equation, around)
-        } else {
-            Vec::new()
-        };
-        let mut fixed = vec![NONE; if problem.conditions.is_empty() { 0 } else { self.size() }];
-        for (index, condition) in problem.conditions.iter().enumerate() {
-            let faces = match condition.surface() {
-                None => {
-                    if let Condition::Temperature { nodes, .. } = condition {
-                        for &node in nodes {
-                            let equation = self.equation[node as usize];
-                            if equation != NONE {
-                                fixed[equation as usize] = index as u32;
-                            }
+        if problem.conditions.iter().any(|condition| condition.surface().is_some()) {
+            let wanted = |node: u32| touched.contains(equation[node as usize]);
+            let exposed = plan.around.outer(mesh, born, elements, wanted);
+            surfaces.act(problem, &exposed, equation, *consistent, touched, |condition, face| {
+                plan.acts(problem, condition, face)
+            });
+        }
+        for (source, heated) in plan.heated.iter().enumerate() {
+            let (mut list, mut pairs) = (Vec::new(), Vec::new());
+            for &number in elements {
+                let first = heated.partition_point(|&element| element < number);
+                for _ in heated[first..].iter().take_while(|&&element| element == number) {
+                    let nodes = mesh.nodes(number);
+                    if nodes.len() > MOST {
+                        let Some(geometry) = element::wide(mesh, number) else { continue };
+                        let equation = |a: usize| equation[nodes[a] as usize];
+                        let mass = geometry.mass();
+                        for (a, b) in (0..nodes.len()).flat_map(|a| (0..nodes.len()).map(move |b| (a, b))) {
+                            pairs.push((equation(a), equation(b), mass[a][b]));
                         }
                     }
-                    continue;
-                }
-                // by their nodes, so that a face between two elements counts from either side
-                Some(Where::Faces(faces)) => {
-                    let named = by_nodes(mesh, faces);
-                    exposed.iter().filter(|&&face| named.contains(&nodes_of(mesh, face))).copied().collect()
-                }
-                Some(Where::Outer { except }) => {
-                    let except = by_nodes(mesh, except);
-                    let left = |face: &&Face| except.is_empty() || !except.contains(&nodes_of(mesh, **face));
-                    exposed.iter().filter(left).copied().collect::<Vec<_>>()
-                }
-            };
-            self.surfaces.act(problem, index, &faces, &self.equation, self.consistent);
-        }
-        for (equation, &condition) in fixed.iter().enumerate() {
-            if condition != NONE {
-                self.fixed.push((equation as u32, condition));
-                self.free[equation] = 0.0;
-            }
-        }
-        for (index, source) in problem.sources.iter().enumerate() {
-            let (mut list, mut pairs) = (Vec::new(), Vec::new());
-            for &number in &source.elements {
-                let nodes = mesh.nodes(number);
-                if nodes.len() > MOST && self.elements.binary_search(&number).is_ok() {
-                    let Some(geometry) = element::wide(mesh, number) else { continue };
-                    let equation = |a: usize| self.equation[nodes[a] as usize];
-                    let mass = geometry.mass();
-                    for (a, b) in (0..nodes.len()).flat_map(|a| (0..nodes.len()).map(move |b| (a, b))) {
-                        pairs.push((equation(a), equation(b), mass[a][b]));
-                    }
-                }
-                if let Ok(at) = volumes.binary_search_by_key(&number, |entry| entry.0) {
-                    for (&node, volume) in mesh.nodes(number).iter().zip(volumes[at].1) {
-                        list.push((self.equation[node as usize], volume));
+                    if let Ok(at) = volumes.binary_search_by_key(&number, |entry| entry.0) {
+                        let nodes = nodes.iter().map(|&node| equation[node as usize]).zip(volumes[at].1);
+                        list.extend(nodes.filter(|entry| touched.contains(entry.0)));
                     }
                 }
             }
-            self.surfaces.release(index, list, pairs);
+            surfaces.release(source, list, pairs, touched);
         }
     }
 }

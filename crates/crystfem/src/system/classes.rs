@@ -26,19 +26,13 @@ pub struct Class {
     pub volumes: [f64; MOST],
 }
 
-/// The class of each active element, or [`OWN`] or [`VARYING`].
-pub fn classify(
-    mesh: &Mesh,
-    active: &[u32],
-    material_of: &[u16],
-    behaviours: &[Behaviour],
-) -> (Vec<u16>, Vec<Class>) {
+/// The class of each element that ever exists, or [`OWN`] or [`VARYING`].
+pub fn classify(mesh: &Mesh, material_of: &[u16], behaviours: &[Behaviour]) -> (Vec<u16>, Vec<Class>) {
     let mut classes: Vec<Class> = Vec::new();
     let mut last = 0;
-    let kinds = active
-        .iter()
-        .map(|&element| {
-            let material = material_of[element as usize];
+    let kinds = (0..)
+        .zip(material_of)
+        .map(|(element, &material)| {
             let behaviour = &behaviours[usize::from(material)];
             if behaviour.conductivity.is_none() {
                 return VARYING;

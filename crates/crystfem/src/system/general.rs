@@ -11,10 +11,11 @@
 //! nodes of a line at rest; its tangent ∇N_a·D∇N_b k(T_b) is complete, and not symmetric.
 
 use super::rows::Rows;
-use super::{At, Evaluation, Points};
+use super::{At, Evaluation, Moves, NONE, Points};
 use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::material::Point;
+use crate::mesh::Mesh;
 use crate::problem::Problem;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -51,6 +52,41 @@ struct Part<const N: usize> {
 }
 
 impl General {
+    /// None, with room for so many state variables at a point.
+    pub fn new(stride: usize) -> Self {
+        Self { starts: vec![0], stride, ..Self::default() }
+    }
+
+    /// Adds elements, ascending. Returns where points were from the first that may have moved.
+    pub fn insert(&mut self, mesh: &Mesh, new: &[u32], equation: &[u32]) -> Moves {
+        let first = new.first().map_or(self.elements.len(), |least| self.elements.partition_point(|e| e < least));
+        let mut moves = Moves { first: self.starts[first] as usize, from: Vec::new() };
+        self.equations.truncate(first.checked_sub(1).map_or(0, |before| self.ends[before] as usize));
+        let points = self.starts.split_off(first + 1);
+        let kept = self.elements.split_off(first);
+        self.ends.truncate(first);
+        let (mut old, mut added) = (kept.iter().zip(points).peekable(), new.iter().peekable());
+        let mut before = moves.first as u32;
+        while old.peek().is_some() || added.peek().is_some() {
+            let least = old.peek().map_or(NONE, |(element, _)| **element);
+            let (element, from) = match added.next_if(|new| **new < least) {
+                Some(&element) => (element, None),
+                None => {
+                    let Some((&element, end)) = old.next() else { break };
+                    (element, Some(std::mem::replace(&mut before, end)))
+                }
+            };
+            let nodes = mesh.nodes(element);
+            self.elements.push(element);
+            self.equations.extend(nodes.iter().map(|&node| equation[node as usize]));
+            self.ends.push(self.equations.len() as u32);
+            let count = element::points(nodes.len()) as u32;
+            moves.from.extend((0..count).map(|point| from.map_or(NONE, |from| from + point)));
+            self.starts.push((self.points() + count as usize) as u32);
+        }
+        moves
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.elements.is_empty()

@@ -2,20 +2,23 @@
 //!
 //! dE_i/dt + Q_i = 0 at each node i, with the energy E_i = ∫ N_i ρU dV and the heat that leaves the node,
 //! Q_i = −∫ ∇N_i·f dV + ∮ N_i q dA − ∫ N_i r dV.
-//! A [`System`] is built when elements appear: nodes of elements that do not exist have no equation. It holds
+//! A [`System`] grows when elements appear: nodes of elements that do not exist have no equation. It holds
 //! the pattern and constant coefficients; [`System::evaluate`] gives E, Q and their tangents at a temperature.
 //!
 //! Three kinds of material: linear ones have no points at all; ones whose conductivity alone is constant are asked at
 //! nodes (one point for each node, material and birth); all others at the integration points of each element.
 
+mod around;
 mod build;
 mod classes;
 mod general;
 mod nodal;
+mod numbering;
 mod rows;
 mod surfaces;
 pub mod vector;
 
+pub use build::{Added, Moves};
 pub use general::General;
 pub use nodal::Nodal;
 pub use rows::Rows;
@@ -151,9 +154,9 @@ pub struct Evaluation {
 
 /// The equations of what exists.
 pub struct System {
-    /// Elements, ascending.
-    pub elements: Vec<u32>,
-    /// Node of the mesh of each equation.
+    /// Number of elements.
+    pub elements: usize,
+    /// Node of the mesh of each equation, also of those out of use, which are not free and have no capacity.
     pub nodes: Vec<u32>,
     /// Equation of each node of the mesh, or [`NONE`].
     pub equation: Vec<u32>,
@@ -169,22 +172,21 @@ pub struct System {
     pub surfaces: Surfaces,
     /// Equations with prescribed temperature and their conditions, ascending.
     pub fixed: Vec<(u32, u32)>,
-    /// 0 where the temperature is prescribed, 1 elsewhere.
+    /// 0 where the temperature is prescribed and out of use, 1 elsewhere.
     pub free: Vec<f64>,
     /// Whether capacity is consistent.
     pub consistent: bool,
-    /// Values of `rows` without the elements whose conduction or capacity varies.
-    base: Option<[Vec<f64>; 2]>,
     /// Number of this build.
     pub build: u64,
     /// Counts rebuilt tangents: a matrix is unchanged while this is.
     pub generation: u64,
     /// Time of the last evaluation, s.
     evaluated_at: f64,
+    plan: build::Plan,
 }
 
 impl System {
-    /// Number of equations.
+    /// Number of equations, those out of use included.
     pub fn size(&self) -> usize {
         self.nodes.len()
     }
@@ -227,9 +229,7 @@ impl System {
             field.resize(size, 0.0);
         }
         out.step_ratio = None;
-        if let Some(base) = &self.base {
-            self.rows.restore(base);
-        }
+        self.rows.restore();
         // linear materials
         self.rows.flow(at.temperature, &mut out.rate);
         if self.consistent {

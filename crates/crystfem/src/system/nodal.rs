@@ -4,7 +4,7 @@
 //! state; a mesh of hexahedra needs an eighth of the calls that its Gauss points would need.
 
 use super::vector::{CHUNK, items};
-use super::{At, Evaluation, Points};
+use super::{At, Evaluation, Moves, NONE, Points};
 use crate::error::Error;
 use crate::material::{Point, ThermalMaterial};
 use crate::problem::Problem;
@@ -44,6 +44,50 @@ impl Nodal {
     /// Whether the state of a material only follows the temperature.
     pub fn follows(&self, material: u16) -> bool {
         self.followers.get(usize::from(material)).is_some_and(|&follows| follows)
+    }
+
+    /// Makes the points of these equations anew, ascending, and of all others up to `size`; `keys` gives birth and material of those that a
+    /// node has. Those have no mass yet. Returns where points were from the first that may have moved.
+    pub fn replace(
+        &mut self,
+        size: usize,
+        touched: &[u32],
+        mut keys: impl FnMut(u32, &mut Vec<(u32, u16)>),
+    ) -> Moves {
+        if self.starts.is_empty() {
+            self.starts.push(0);
+        }
+        let first = touched.first().map_or(size, |&e| e as usize).min(self.starts.len() - 1);
+        let start = self.starts[first] as usize;
+        let ends = self.starts.split_off(first + 1);
+        let (birth, material, mass) =
+            (self.birth.split_off(start), self.material.split_off(start), self.mass.split_off(start));
+        let mut moves = Moves { first: start, from: Vec::new() };
+        let mut touched = touched.iter().peekable();
+        let mut list = Vec::new();
+        let mut begin = 0;
+        for equation in first as u32..size as u32 {
+            let end = ends.get(equation as usize - first).map_or(begin, |&end| end as usize - start);
+            list.clear();
+            let anew = touched.next_if(|&&e| e == equation).is_some();
+            if anew {
+                keys(equation, &mut list);
+                list.sort_unstable();
+            } else {
+                list.extend((begin..end).map(|point| (birth[point], material[point])));
+            }
+            for &key in &list {
+                let old = (begin..end).find(|&point| (birth[point], material[point]) == key);
+                self.birth.push(key.0);
+                self.material.push(key.1);
+                self.mass.push(old.filter(|_| !anew).map_or(0.0, |old| mass[old]));
+                self.coupled |= !self.follows(key.1);
+                moves.from.push(old.map_or(NONE, |old| (start + old) as u32));
+            }
+            self.starts.push(self.material.len() as u32);
+            begin = end;
+        }
+        moves
     }
 
     /// Of materials whose energy is not linear: adds to `change`, `capacity`; sets the new points.

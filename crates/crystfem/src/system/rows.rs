@@ -115,7 +115,7 @@ impl Stencils {
 }
 
 /// Finds equal rows.
-#[derive(Default)]
+#[derive(Clone, Debug, Default)]
 struct Finder {
     by_hash: HashMap<u64, Vec<u32>>,
 }
@@ -144,92 +144,146 @@ impl Finder {
 #[derive(Clone, Debug)]
 pub struct Rows {
     size: usize,
-    segments: Vec<Segment>,
-    /// First segment of each work item, and the number of segments.
-    firsts: Vec<u32>,
+    consistent: bool,
+    /// Runs of equal rows of each work item, as long as they can be.
+    segments: Vec<Vec<Segment>>,
     stencils: Stencils,
+    finder: Finder,
     /// Stencil of each row that has one of its own; empty where no row has.
     own: Vec<u32>,
+    /// Entries of stencils of their own that no row has any more.
+    dead: usize,
+    /// Values without what is added in each evaluation.
+    base: Option<[Vec<f64>; 2]>,
 }
 
 /// No stencil of its own.
 const SHARED: u32 = u32::MAX;
+/// The part of the entries that may be dead.
+const MOST_DEAD: usize = 4;
+
+/// New rows of one work item: runs with stencils of their own numbering, and whether each is a row's own.
+struct Part {
+    runs: Vec<(Segment, bool)>,
+    stencils: Stencils,
+}
 
 impl Rows {
-    /// Of `size` rows; `fill` begins each row and says what is in it.
-    pub fn build(size: usize, consistent: bool, fill: impl Fn(usize, &mut Row) + Sync) -> Self {
-        struct Part {
-            segments: Vec<Segment>,
-            own: Vec<bool>,
-            stencils: Stencils,
+    /// None.
+    pub fn new(consistent: bool) -> Self {
+        Self {
+            size: 0,
+            consistent,
+            segments: Vec::new(),
+            stencils: Stencils::new(),
+            finder: Finder::default(),
+            own: Vec::new(),
+            dead: 0,
+            base: None,
         }
-        let parts: Vec<Part> = (0..items(size))
-            .into_par_iter()
-            .map(|item| {
-                let mut part = Part { segments: Vec::new(), own: Vec::new(), stencils: Stencils::new() };
-                let mut finder = Finder::default();
-                let mut row = Row::default();
-                for index in item * CHUNK..((item + 1) * CHUNK).min(size) {
-                    fill(index, &mut row);
-                    if row.repeated
-                        && let Some(last) = part.segments.last_mut()
-                    {
-                        last.length += 1;
-                        continue;
-                    }
-                    row.entries.sort_unstable_by_key(|entry| entry.0);
-                    let last =
-                        part.segments.last_mut().filter(|_| !row.own && part.own.last() == Some(&false));
-                    match last {
-                        Some(last) if part.stencils.equals(last.stencil, &row.entries) => last.length += 1,
-                        _ => {
-                            let stencil = if row.own {
-                                part.stencils.push(&row.entries, consistent)
-                            } else {
-                                finder.find_or_add(&mut part.stencils, &row.entries, consistent)
-                            };
-                            part.segments.push(Segment { start: index as u32, length: 1, stencil });
-                            part.own.push(row.own);
-                        }
-                    }
-                }
-                part
-            })
-            .collect();
+    }
 
-        let mut rows =
-            Self { size, segments: Vec::new(), firsts: vec![0], stencils: Stencils::new(), own: Vec::new() };
-        if parts.iter().any(|part| part.own.contains(&true)) {
-            rows.own = vec![SHARED; size];
-        }
-        let mut finder = Finder::default();
-        for part in parts {
-            let mut global = vec![SHARED; part.stencils.count()];
-            for (mut segment, own) in part.segments.into_iter().zip(part.own) {
-                let name = &mut global[segment.stencil as usize];
-                if *name == SHARED {
-                    let entries = part.stencils.entries(segment.stencil);
-                    *name = if own {
-                        rows.stencils.push(&entries, consistent)
-                    } else {
-                        finder.find_or_add(&mut rows.stencils, &entries, consistent)
-                    };
-                }
-                segment.stencil = *name;
-                if own {
-                    rows.own[segment.start as usize] = *name;
-                }
-                rows.segments.push(segment);
-            }
-            rows.firsts.push(rows.segments.len() as u32);
-        }
-        rows.segments.shrink_to_fit();
+    /// Of `size` rows; `fill` begins each row and says what is in it.
+    #[cfg(test)]
+    pub fn build(size: usize, consistent: bool, fill: impl Fn(usize, &mut Row) + Sync) -> Self {
+        let mut rows = Self::new(consistent);
+        rows.update(size, &(0..size as u32).collect::<Vec<_>>(), fill);
         rows
+    }
+
+    /// Makes these rows, ascending, and empty ones up to `size`; `fill` begins each row and says what is in it. Other rows stay. What it
+    /// leaves depends on the rows alone, not on how they came about, but for stencils that no row has any more.
+    pub fn update(&mut self, size: usize, changed: &[u32], fill: impl Fn(usize, &mut Row) + Sync) {
+        if self.dead * MOST_DEAD > self.stencils.offsets.len() {
+            self.compact();
+        }
+        let groups: Vec<&[u32]> = changed.chunk_by(|a, b| *a as usize / CHUNK == *b as usize / CHUNK).collect();
+        let parts: Vec<Part> =
+            groups.par_iter().map(|changed| Part::new(changed, self.consistent, &fill)).collect();
+        let before = self.size;
+        self.size = size.max(before);
+        self.segments.resize_with(items(self.size), Vec::new);
+        if !self.own.is_empty() || parts.iter().any(|part| part.runs.iter().any(|run| run.1)) {
+            self.own.resize(self.size, SHARED);
+        }
+        let mut of = Vec::with_capacity(CHUNK);
+        let mut parts = groups.iter().map(|group| group[0] as usize / CHUNK).zip(parts).peekable();
+        for item in 0..self.segments.len() {
+            let first = item * CHUNK;
+            let end = (first + CHUNK).min(self.size);
+            let part = parts.next_if(|part| part.0 == item).map(|part| part.1);
+            if part.is_none() && end <= before {
+                continue;
+            }
+            let empty = if end > before { self.finder.find_or_add(&mut self.stencils, &[], false) } else { SHARED };
+            of.clear();
+            of.resize(end - first, empty);
+            for segment in &self.segments[item] {
+                of[segment.start as usize - first..][..segment.length as usize].fill(segment.stencil);
+            }
+            if let Some(part) = part {
+                let mut global = vec![SHARED; part.stencils.count()];
+                for (run, own) in &part.runs {
+                    let name = &mut global[run.stencil as usize];
+                    if *name == SHARED {
+                        let entries = part.stencils.entries(run.stencil);
+                        *name = match own {
+                            true => self.stencils.push(&entries, self.consistent),
+                            false => self.finder.find_or_add(&mut self.stencils, &entries, self.consistent),
+                        };
+                    }
+                    of[run.start as usize - first..][..run.length as usize].fill(*name);
+                    if let Some(place) = self.own.get_mut(run.start as usize)
+                        && *own
+                    {
+                        let old = std::mem::replace(place, *name);
+                        self.dead += if old == SHARED { 0 } else { self.stencils.range(old).len() };
+                    }
+                }
+            }
+            let runs = of.chunk_by(|a, b| a == b);
+            self.segments[item].clear();
+            let mut start = first as u32;
+            for run in runs {
+                let length = run.len() as u32;
+                self.segments[item].push(Segment { start, length, stencil: run[0] });
+                start += length;
+            }
+            self.segments[item].shrink_to_fit();
+        }
+    }
+
+    /// Drops stencils that no row has.
+    fn compact(&mut self) {
+        let old = std::mem::replace(&mut self.stencils, Stencils::new());
+        let base = self.base.take();
+        self.finder = Finder::default();
+        let mut names = vec![SHARED; old.count()];
+        let mut kept = base.as_ref().map(|_| [Vec::new(), Vec::new()]);
+        for segment in self.segments.iter_mut().flatten() {
+            let name = &mut names[segment.stencil as usize];
+            if *name == SHARED {
+                let entries = old.entries(segment.stencil);
+                let own = self.own.get(segment.start as usize).is_some_and(|&own| own != SHARED);
+                *name = match own {
+                    true => self.stencils.push(&entries, self.consistent),
+                    false => self.finder.find_or_add(&mut self.stencils, &entries, self.consistent),
+                };
+                for (kept, base) in kept.iter_mut().flatten().zip(base.iter().flatten()) {
+                    kept.extend_from_slice(base.get(old.range(segment.stencil)).unwrap_or_default());
+                }
+            }
+            segment.stencil = *name;
+            if let Some(own) = self.own.get_mut(segment.start as usize).filter(|own| **own != SHARED) {
+                *own = *name;
+            }
+        }
+        (self.base, self.dead) = (kept, 0);
     }
 
     /// Distinct rows stored, segments of equal rows, and stored entries.
     pub fn stored(&self) -> [usize; 3] {
-        [self.stencils.count(), self.segments.len(), self.stencils.offsets.len()]
+        [self.stencils.count(), self.segments.iter().map(Vec::len).sum(), self.stencils.offsets.len()]
     }
 
     /// Adds to an entry of a row of its own; without effect elsewhere.
@@ -246,21 +300,27 @@ impl Rows {
         }
     }
 
-    /// The values, for [`Self::restore`].
-    pub fn values(&self) -> [Vec<f64>; 2] {
-        [self.stencils.conduction.clone(), self.stencils.capacity.clone()]
+    /// Takes the values of rows that are new since the last call as those to which [`Self::restore`] sets them.
+    pub fn keep(&mut self) {
+        let base = self.base.get_or_insert_default();
+        let Stencils { conduction, capacity, .. } = &self.stencils;
+        for (base, values) in base.iter_mut().zip([conduction, capacity]) {
+            base.extend_from_slice(&values[base.len()..]);
+        }
     }
 
     /// Sets the values back to what they were.
-    pub fn restore(&mut self, values: &[Vec<f64>; 2]) {
-        self.stencils.conduction.copy_from_slice(&values[0]);
-        self.stencils.capacity.copy_from_slice(&values[1]);
+    pub fn restore(&mut self) {
+        if let Some([conduction, capacity]) = &self.base {
+            self.stencils.conduction.copy_from_slice(conduction);
+            self.stencils.capacity.copy_from_slice(capacity);
+        }
     }
 
     /// Diagonal of `capacity`·M + `conduction`·K.
     pub fn diagonal(&self, [capacity, conduction]: [f64; 2]) -> Vec<f64> {
         let mut diagonal = vec![0.0; self.size];
-        for segment in &self.segments {
+        for segment in self.segments.iter().flatten() {
             let range = self.stencils.range(segment.stencil);
             if let Ok(at) = self.stencils.offsets[range.clone()].binary_search(&0) {
                 let value = self.value(range.start + at, [capacity, conduction]);
@@ -273,8 +333,9 @@ impl Rows {
 
     /// Entries (column, value) of a row of `capacity`·M + `conduction`·K, columns ascending.
     pub fn row(&self, row: usize, weights: [f64; 2]) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let segment = self.segments.partition_point(|s| s.start as usize <= row).saturating_sub(1);
-        let range = self.segments.get(segment).map_or(0..0, |s| self.stencils.range(s.stencil));
+        let segments = self.segments.get(row / CHUNK).map_or(&[][..], Vec::as_slice);
+        let segment = segments.partition_point(|s| s.start as usize <= row).saturating_sub(1);
+        let range = segments.get(segment).map_or(0..0, |s| self.stencils.range(s.stencil));
         range.map(move |at| {
             (row.wrapping_add_signed(self.stencils.offsets[at] as isize), self.value(at, weights))
         })
@@ -311,10 +372,9 @@ impl Rows {
             .par_chunks_mut(CHUNK)
             .enumerate()
             .map(|(item, y)| {
-                let segments = self.firsts[item] as usize..self.firsts[item + 1] as usize;
                 arch.dispatch(Product::<FLOW> {
                     rows: self,
-                    segments: &self.segments[segments],
+                    segments: &self.segments[item],
                     weights,
                     diagonal,
                     x,
@@ -324,6 +384,36 @@ impl Rows {
             })
             .collect();
         parts.iter().sum()
+    }
+}
+
+impl Part {
+    /// Of rows of one work item, ascending.
+    fn new(changed: &[u32], consistent: bool, fill: &(impl Fn(usize, &mut Row) + Sync)) -> Self {
+        let mut part = Self { runs: Vec::new(), stencils: Stencils::new() };
+        let (mut finder, mut row) = (Finder::default(), Row::default());
+        for &index in changed {
+            fill(index as usize, &mut row);
+            if !row.repeated {
+                row.entries.sort_unstable_by_key(|entry| entry.0);
+            }
+            let last = part.runs.last_mut().filter(|last| !row.own && !last.1);
+            let same = last.filter(|last| row.repeated || part.stencils.equals(last.0.stencil, &row.entries));
+            match same {
+                Some((last, _)) if last.start + last.length == index => last.length += 1,
+                Some(&mut (last, own)) => {
+                    part.runs.push((Segment { start: index, length: 1, stencil: last.stencil }, own));
+                }
+                None => {
+                    let stencil = match row.own {
+                        true => part.stencils.push(&row.entries, consistent),
+                        false => finder.find_or_add(&mut part.stencils, &row.entries, consistent),
+                    };
+                    part.runs.push((Segment { start: index, length: 1, stencil }, row.own));
+                }
+            }
+        }
+        part
     }
 }
 

@@ -123,9 +123,10 @@ impl<const N: usize, const P: usize> Acting<N, P> {
 type Pairs = Vec<(u32, u32, f64)>;
 
 /// One condition on what exists.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Part {
     condition: usize,
+    radiates: bool,
     /// Equations with ∮ N dA, m², ascending.
     nodes: Vec<(u32, f64)>,
     /// Equations that take a flux, those at which it is known, and ∮ N N dA, m²: of second-order faces, whose ∮ N dA is
@@ -145,7 +146,6 @@ pub struct Surfaces {
     sources: Vec<(usize, Vec<(u32, f64)>)>,
     /// Source, equations that take its heat, those at which it is known, and ∫ N N dV, m³, of second-order elements.
     wide_sources: Vec<(usize, Pairs)>,
-    radiates: bool,
 }
 
 /// Sorts by equation and adds equal ones, in the order given.
@@ -174,54 +174,113 @@ fn gather_pairs(mut list: Pairs) -> Pairs {
     list
 }
 
+/// Equations whose elements became more.
+pub struct Touched {
+    /// Ascending, each once.
+    pub list: Vec<u32>,
+    marks: Vec<bool>,
+}
+
+impl Touched {
+    /// None of so many.
+    pub fn new(size: usize) -> Self {
+        Self { list: Vec::new(), marks: vec![false; size] }
+    }
+
+    /// Adds one.
+    pub fn add(&mut self, equation: u32) {
+        if !std::mem::replace(&mut self.marks[equation as usize], true) {
+            self.list.push(equation);
+        }
+    }
+
+    /// After all are added.
+    pub fn sort(&mut self) {
+        self.list.sort_unstable();
+    }
+
+    /// Whether an equation is one.
+    pub fn contains(&self, equation: u32) -> bool {
+        self.marks[equation as usize]
+    }
+
+    /// Puts new entries in the place of those that are touched.
+    fn replace(&self, list: &mut Vec<(u32, f64)>, new: Vec<(u32, f64)>) {
+        let Some(&first) = self.list.first() else { return };
+        let tail = list.split_off(list.partition_point(|entry| entry.0 < first));
+        let mut new = gather(new).into_iter().peekable();
+        for entry in tail.into_iter().filter(|entry| !self.contains(entry.0)) {
+            while let Some(before) = new.next_if(|new| new.0 < entry.0) {
+                list.push(before);
+            }
+            list.push(entry);
+        }
+        list.extend(new);
+    }
+}
+
 impl Surfaces {
-    /// Adds a condition on faces that exist and are not covered.
+    /// Of what does not exist yet.
+    pub fn new(problem: &Problem) -> Self {
+        let surfaces = (0..problem.conditions.len()).filter(|&k| problem.conditions[k].surface().is_some());
+        let part = |condition: usize| {
+            let radiates = matches!(problem.conditions[condition], Condition::Radiation { .. });
+            Part { condition, radiates, ..Part::default() }
+        };
+        let sources = (0..problem.sources.len()).map(|source| (source, Vec::new())).collect();
+        Self { parts: surfaces.map(part).collect(), sources, wide_sources: Vec::new() }
+    }
+
+    /// Conditions at equations that are touched: on those of the faces there, which exist and are not covered, on which one `acts`. With
+    /// consistent capacity all equations are touched.
     pub fn act(
         &mut self,
         problem: &Problem,
-        condition: usize,
         faces: &[Face],
         equation: &[u32],
         consistent: bool,
+        touched: &Touched,
+        acts: impl Fn(usize, Face) -> bool,
     ) {
-        let (nodes, pairs, faces_of, wide) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let mut part = Part { condition, nodes, pairs, faces: faces_of, wide };
-        let kind = &problem.conditions[condition];
-        let by_nodes = !consistent || matches!(kind, Condition::Flux { .. });
-        for &face in faces {
-            let nodes = problem.mesh.face_nodes(face).len();
-            if nodes > 4 {
-                let acting = Acting::<8, 9>::new(problem, face, equation);
-                if !by_nodes {
-                    part.wide.push(acting);
+        for part in &mut self.parts {
+            let by_nodes = !consistent || matches!(problem.conditions[part.condition], Condition::Flux { .. });
+            let (mut list, mut pairs) = (Vec::new(), Vec::new());
+            part.faces.clear();
+            part.wide.clear();
+            for &face in faces.iter().filter(|&&face| acts(part.condition, face)) {
+                let nodes = problem.mesh.face_nodes(face).len();
+                if nodes > 4 {
+                    let acting = Acting::<8, 9>::new(problem, face, equation);
+                    if !by_nodes {
+                        part.wide.push(acting);
+                        continue;
+                    }
+                    let Acting { equations, geometry } = acting;
+                    for (a, b) in (0..nodes).flat_map(|a| (0..nodes).map(move |b| (a, b))) {
+                        let of =
+                            |g: usize| geometry.weights[g] * geometry.shapes[g][a] * geometry.shapes[g][b];
+                        pairs.push((equations[a], equations[b], (0..geometry.points).map(of).sum()));
+                    }
                     continue;
                 }
-                let Acting { equations, geometry } = acting;
-                for (a, b) in (0..nodes).flat_map(|a| (0..nodes).map(move |b| (a, b))) {
-                    let of = |g: usize| geometry.weights[g] * geometry.shapes[g][a] * geometry.shapes[g][b];
-                    part.pairs.push((equations[a], equations[b], (0..geometry.points).map(of).sum()));
+                let acting = Acting::<4, 4>::new(problem, face, equation);
+                if by_nodes {
+                    let Acting { equations, geometry } = acting;
+                    let areas = (0..nodes).map(|k| (equations[k], geometry.corner_areas[k]));
+                    list.extend(areas.filter(|entry| touched.contains(entry.0)));
+                } else {
+                    part.faces.push(acting);
                 }
-                continue;
             }
-            let acting = Acting::<4, 4>::new(problem, face, equation);
-            if by_nodes {
-                let Acting { equations, geometry } = acting;
-                part.nodes.extend((0..nodes).map(|k| (equations[k], geometry.corner_areas[k])));
-            } else {
-                part.faces.push(acting);
-            }
+            touched.replace(&mut part.nodes, list);
+            part.pairs = gather_pairs(pairs);
         }
-        part.nodes = gather(part.nodes);
-        part.pairs = gather_pairs(part.pairs);
-        self.radiates |= matches!(kind, Condition::Radiation { .. }) && !faces.is_empty();
-        self.parts.push(part);
     }
 
-    /// Adds a source, with ∫ N dV of its first-order elements' nodes and ∫ N N dV of the others'.
-    pub fn release(&mut self, source: usize, volumes: Vec<(u32, f64)>, pairs: Pairs) {
-        if !volumes.is_empty() || pairs.is_empty() {
-            self.sources.push((source, gather(volumes)));
-        }
+    /// A source at equations that are touched, with ∫ N dV of its first-order elements' nodes and ∫ N N dV of the others', which are never
+    /// born.
+    pub fn release(&mut self, source: usize, volumes: Vec<(u32, f64)>, pairs: Pairs, touched: &Touched) {
+        touched.replace(&mut self.sources[source].1, volumes);
         if !pairs.is_empty() {
             self.wide_sources.push((source, gather_pairs(pairs)));
         }
@@ -229,7 +288,8 @@ impl Surfaces {
 
     /// Whether something radiates.
     pub fn radiates(&self) -> bool {
-        self.radiates
+        let acts = |part: &Part| !(part.nodes.is_empty() && part.faces.is_empty() && part.wide.is_empty());
+        self.parts.iter().any(|part| part.radiates && acts(part))
     }
 
     /// Whether a film has another coefficient at one time than at another: the matrix is another too.

@@ -109,6 +109,15 @@ pub fn set(out: &mut [f64], value: impl Fn(usize) -> f64 + Sync) {
     });
 }
 
+/// out_k = f(k, out_k), in work items.
+pub fn combine(out: &mut [f64], value: impl Fn(usize, f64) -> f64 + Sync) {
+    out.par_chunks_mut(CHUNK).enumerate().for_each(|(item, out)| {
+        for (k, out) in out.iter_mut().enumerate() {
+            *out = value(item * CHUNK + k, *out);
+        }
+    });
+}
+
 struct Advance<'a> {
     length: f64,
     solution: &'a mut [f64],

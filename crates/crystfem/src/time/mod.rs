@@ -63,6 +63,10 @@ pub struct Work {
     pub newton_iterations: u64,
     /// Iterations of conjugate gradients.
     pub cg_iterations: u64,
+    /// Solves by conjugate gradients.
+    pub cg_solves: u64,
+    /// Times the levels of multigrid were made.
+    pub levels: u64,
     /// Factorizations.
     pub factorizations: u64,
     /// Solves with factors.
@@ -71,6 +75,8 @@ pub struct Work {
     pub evaluations: u64,
     /// Responses of materials at points.
     pub responses: u64,
-    /// Times the equations were built.
+    /// Times that elements were added to the equations.
     pub builds: u64,
+    /// Elements visited for that: those added and their neighbours.
+    pub visited: u64,
 }

@@ -4,7 +4,8 @@ use super::Work;
 use crate::error::Error;
 use crate::ledger::NOTHING;
 use crate::problem::Problem;
-use crate::solver::{BiconjugateGradients, ConjugateGradients, Direct, Ended, Operator, norm_squared};
+use crate::solver::{BiconjugateGradients, ConjugateGradients, Direct, Ended, Method, Multigrid, Operator};
+use crate::solver::norm_squared;
 use crate::system::vector::{largest, set, sum};
 use crate::system::{At, Evaluation, FaceMatrices, Memory, System};
 
@@ -34,6 +35,8 @@ pub struct Stage<'a> {
     pub start: &'a [f64],
     /// Points at the start.
     pub old: &'a Memory,
+    /// Whether to give up.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// Solves stages; keeps what does not change between them.
@@ -55,9 +58,13 @@ pub struct Stages {
     free_sums: [Vec<f64>; 2],
     cg: ConjugateGradients,
     bicg: BiconjugateGradients,
-    /// Whether factors are wanted; they are made when first needed.
-    pub direct: bool,
+    /// What is wanted; factors and levels are made when first needed.
+    pub method: Method,
     factors: Option<Direct>,
+    multigrid: Option<Multigrid>,
+    /// For which system its levels and for which matrix their sums were made.
+    levels_for: Option<u64>,
+    set_for: Option<(u64, u64)>,
     /// For which generation the analysis and for which weight the factors were made.
     analysed_for: Option<u64>,
     factored_for: Option<(u64, u64)>,
@@ -69,6 +76,13 @@ pub struct Stages {
 }
 
 impl Stages {
+    /// Forgets everything made for another system, but keeps the room for it.
+    pub fn reset(&mut self) {
+        (self.factors, self.analysed_for, self.factored_for) = (None, None, None);
+        (self.multigrid, self.levels_for, self.set_for) = (None, None, None);
+        (self.made_for, self.sums_for) = (None, None);
+    }
+
     /// Solves a stage; `temperature` is the first guess and becomes the solution, at which `evaluation` and
     /// `residual` stand.
     ///
@@ -163,6 +177,7 @@ impl Stages {
     /// result is the largest |e|, K.
     pub fn filter(
         &mut self,
+        problem: &Problem,
         system: &System,
         weight: f64,
         right: impl Fn(usize) -> f64 + Sync,
@@ -170,6 +185,7 @@ impl Stages {
         work: &mut Work,
     ) -> f64 {
         self.prepare(system, weight);
+        self.raise(problem, system, weight, work);
         let size = system.size();
         self.right.resize(size, 0.0);
         set(&mut self.right, |k| system.free[k] * right(k));
@@ -178,17 +194,22 @@ impl Stages {
         self.correction.resize(size, 0.0);
         let made_for = Some((system.generation, weight.to_bits()));
         match &mut self.factors {
-            Some(factors) if self.direct && self.factored_for == made_for && system.is_linear() => {
+            Some(factors) if self.method == Method::Factors && self.factored_for == made_for && system.is_linear() => {
                 factors.solve(&self.right, &mut self.correction);
                 work.direct_solves += 1;
             }
             _ => {
                 let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
-                let ended = match system.is_symmetric() {
-                    true => self.cg.solve(&operator, inverse, right, found, goal, limit(size)),
-                    false => self.bicg.solve(&operator, inverse, right, found, goal, limit(size)),
+                let (go_on, limit) = (&|| false, limit(size));
+                let ended = match (system.is_symmetric(), &mut self.multigrid) {
+                    (true, Some(levels)) => {
+                        self.cg.solve_with(levels, &operator, inverse, right, found, goal, limit, go_on)
+                    }
+                    (true, None) => self.cg.solve(&operator, inverse, right, found, goal, limit, go_on),
+                    (false, _) => self.bicg.solve(&operator, inverse, right, found, goal, limit, go_on),
                 };
                 work.cg_iterations += ended.iterations as u64;
+                work.cg_solves += 1;
             }
         }
         largest(size, |k| self.correction[k].abs()).max(0.0)
@@ -257,7 +278,7 @@ impl Stages {
             set(&mut self.row_sums, |k| system.free[k] * diagonal[k] + weight * conduction[k]);
         }
         self.inverse.resize(size, 0.0);
-        set(&mut self.inverse, |k| system.free[k] / whole[k]);
+        set(&mut self.inverse, |k| if system.free[k] == 0.0 { 0.0 } else { 1.0 / whole[k] });
         self.capacity = sum(size, |k| system.free[k] * capacity[k]).max(f64::MIN_POSITIVE);
         let row_sums = &self.row_sums;
         self.sensitivity = sum(size, |k| system.free[k] * row_sums[k]);
@@ -265,6 +286,36 @@ impl Stages {
         let rounding = 5e-12_f64;
         self.floor = rounding * rounding * sum(size, |k| system.free[k] * whole[k]);
         self.made_for = made_for;
+    }
+
+    /// Levels of multigrid where they are wanted, for the matrix that is prepared.
+    fn raise(&mut self, problem: &Problem, system: &System, weight: f64, work: &mut Work) {
+        if self.method != Method::Multigrid || !system.is_symmetric() {
+            self.multigrid = None;
+            return;
+        }
+        if self.levels_for != Some(system.build) || self.multigrid.is_none() {
+            let operator = operator(system, &self.diagonal, weight, &self.evaluation);
+            let place = |k: usize| problem.mesh.points[system.nodes[k] as usize];
+            self.multigrid = Some(Multigrid::new(&operator, &system.free, place));
+            (self.levels_for, self.set_for) = (Some(system.build), None);
+            work.levels += 1;
+        }
+        let made_for = Some((system.generation, weight.to_bits()));
+        if let Some(multigrid) = &mut self.multigrid
+            && (self.set_for != made_for || !system.is_linear())
+        {
+            let Evaluation { capacity, faces, .. } = &self.evaluation;
+            if system.consistent {
+                let mut lumped = capacity.clone();
+                let one = vec![1.0; lumped.len()];
+                faces.iter().for_each(|face| face.add_product(weight, &one, &mut lumped));
+                multigrid.set(&lumped, weight);
+            } else {
+                multigrid.set(&self.diagonal, weight);
+            }
+            self.set_for = made_for;
+        }
     }
 
     /// The correction of temperature: A δ = −residual, and Σ(residual + A δ) = 0 over the free nodes to rounding.
@@ -277,6 +328,7 @@ impl Stages {
         work: &mut Work,
     ) -> Result<(), Error> {
         let size = system.size();
+        self.raise(problem, system, stage.weight, work);
         self.right.resize(size, 0.0);
         self.correction.resize(size, 0.0);
         let residual = &self.residual;
@@ -284,7 +336,7 @@ impl Stages {
         let operator = operator(system, &self.diagonal, stage.weight, &self.evaluation);
         let goal = [self.capacity, tolerance, self.floor];
         let limit = limit(size);
-        let factored = self.direct && system.is_symmetric() && {
+        let factored = self.method == Method::Factors && system.is_symmetric() && {
             let made_for = Some((system.generation, stage.weight.to_bits()));
             if self.analysed_for != Some(system.build) {
                 let place = |e: u32| problem.mesh.points[system.nodes[e as usize] as usize];
@@ -314,12 +366,21 @@ impl Stages {
         let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
         let ended = if factored {
             Ended { iterations: 0, error: 0.0, converged: true }
-        } else if system.is_symmetric() {
-            self.cg.solve(&operator, inverse, right, found, goal, limit)
         } else {
-            self.bicg.solve(&operator, inverse, right, found, goal, limit)
+            work.cg_solves += 1;
+            let stop = stage.stop;
+            match (system.is_symmetric(), &mut self.multigrid) {
+                (true, Some(levels)) => {
+                    self.cg.solve_with(levels, &operator, inverse, right, found, goal, limit, stop)
+                }
+                (true, None) => self.cg.solve(&operator, inverse, right, found, goal, limit, stop),
+                (false, _) => self.bicg.solve(&operator, inverse, right, found, goal, limit, stop),
+            }
         };
         work.cg_iterations += ended.iterations as u64;
+        if (stage.stop)() {
+            return Err(Error::Stopped { time: stage.time - stage.dt });
+        }
         if !ended.converged {
             return Err(Error::NotConverged {
                 method: if system.is_symmetric() { "conjugate gradients" } else { "biconjugate gradients" },

@@ -37,9 +37,9 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// Forgets everything made for another system.
+    /// Forgets everything made for another system, but keeps the room for it.
     pub fn reset(&mut self) {
-        *self = Self::default();
+        self.stages.reset();
     }
 
     /// Q at the start, where a step needs it: after a jump nothing else knows it.
@@ -73,6 +73,7 @@ impl Stepper {
         [dt, end]: [f64; 2],
         tolerance: f64,
         accuracy: Option<f64>,
+        stop: &(dyn Fn() -> bool + Sync),
         work: &mut Work,
     ) -> Result<Attempt, Error> {
         let size = system.size();
@@ -82,7 +83,7 @@ impl Stepper {
             true => guess.copy_from_slice(start),
             false => set(guess, |k| start[k] + time * slope[k]),
         };
-        let stage = Stage { weight: dt, dt, time: end, known: &[], start, old: &state.memory };
+        let stage = Stage { weight: dt, dt, time: end, known: &[], start, old: &state.memory, stop };
         let mut exchange = Exchange::default();
         if scheme == Scheme::BackwardEuler {
             ahead(dt, &mut self.temperature);
@@ -92,7 +93,7 @@ impl Stepper {
             let error = accuracy.map(|accuracy| {
                 let (before, after) = (&state.rate, std::mem::take(&mut self.stages.evaluation.rate));
                 let difference = |k: usize| 0.5 * dt * (after[k] - before[k]);
-                let error = self.stages.filter(system, dt, difference, accuracy, work);
+                let error = self.stages.filter(problem, system, dt, difference, accuracy, work);
                 self.stages.evaluation.rate = after;
                 error
             });
@@ -124,7 +125,7 @@ impl Stepper {
                 let first = (W - (1.0 - W) / 3.0) * before[k];
                 dt * (first - middle[k] / 3.0 + (D - D / 3.0) * after[k])
             };
-            let error = self.stages.filter(system, weight, difference, accuracy, work);
+            let error = self.stages.filter(problem, system, weight, difference, accuracy, work);
             self.stages.evaluation.rate = after;
             error
         });

@@ -3,7 +3,7 @@
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, radiation, run};
 use crystfem::boundary::{Field, Where};
 use crystfem::problem::{Capacity, Problem};
-use crystfem::simulation::{LinearSolver, Settings, Simulation};
+use crystfem::simulation::{LinearSolver, Method, Settings, Simulation};
 use crystfem::time::{Scheme, Steps};
 
 fn brick(elements: usize, capacity: Capacity, settings: Settings) -> Simulation {
@@ -68,14 +68,14 @@ fn factors_of_a_scene_that_is_not_linear() {
 #[test]
 fn the_choice_follows_the_scene() {
     let settings = |dt| settings(LinearSolver::Auto, Scheme::BackwardEuler, dt);
-    assert!(!brick(12, Capacity::Lumped, settings(0.5)).choose(500.0).direct);
+    assert_eq!(brick(12, Capacity::Lumped, settings(0.5)).choose(500.0).method, Method::Diagonal);
     let adaptive = brick(4, Capacity::Lumped, Settings::adaptive(1.0));
     assert!(adaptive.choose(1e6).reason.contains("adaptive"));
     let mesh = grid([0.2, 1e-3, 1e-3], [200, 1, 1]);
     let conditions = vec![held(&mesh, "left", Field::constant(353.15))];
     let problem = Problem { conditions, ..Problem::new(mesh, conductor(PA12), 493.15) };
     let mut line = Simulation::new(problem, settings(100.0)).unwrap();
-    assert!(line.choose(1e4).direct, "{:?}", line.choose(1e4));
+    assert_eq!(line.choose(1e4).method, Method::Factors, "{:?}", line.choose(1e4));
     let lines = line.explain(1e4);
     assert!(lines.iter().any(|line| line.contains("804 equations for 200 of 200 elements")), "{lines:#?}");
     run(&mut line, 1e4);
