@@ -197,7 +197,8 @@ impl Rows {
         if self.dead * MOST_DEAD > self.stencils.offsets.len() {
             self.compact();
         }
-        let groups: Vec<&[u32]> = changed.chunk_by(|a, b| *a as usize / CHUNK == *b as usize / CHUNK).collect();
+        let groups: Vec<&[u32]> =
+            changed.chunk_by(|a, b| *a as usize / CHUNK == *b as usize / CHUNK).collect();
         let parts: Vec<Part> =
             groups.par_iter().map(|changed| Part::new(changed, self.consistent, &fill)).collect();
         let before = self.size;
@@ -215,7 +216,8 @@ impl Rows {
             if part.is_none() && end <= before {
                 continue;
             }
-            let empty = if end > before { self.finder.find_or_add(&mut self.stencils, &[], false) } else { SHARED };
+            let empty =
+                if end > before { self.finder.find_or_add(&mut self.stencils, &[], false) } else { SHARED };
             of.clear();
             of.resize(end - first, empty);
             for segment in &self.segments[item] {
