@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Longer than anything on a page takes on a busy machine.
@@ -15,6 +15,8 @@ pub struct Browser {
     driver: Child,
     port: u16,
     session: String,
+    /// Kept open: the driver may write to it.
+    _output: BufReader<ChildStdout>,
 }
 
 impl Browser {
@@ -26,11 +28,13 @@ impl Browser {
             evidence::skipped("chromedriver");
             return None;
         };
-        let mut lines = BufReader::new(driver.stdout.take().unwrap()).lines();
+        let mut output = BufReader::new(driver.stdout.take().unwrap());
+        let mut lines = output.by_ref().lines();
         let port = lines.find_map(|line| {
-            line.unwrap().split_once("on port ")?.1.trim_end_matches('.').parse::<u16>().ok()
+            line.unwrap().split_once("successfully on port ")?.1.trim_end_matches('.').parse::<u16>().ok()
         });
-        let mut browser = Self { driver, port: port.expect("a port"), session: String::new() };
+        let port = port.expect("a port");
+        let mut browser = Self { driver, port, session: String::new(), _output: output };
         let size = format!("--window-size={width},{height}");
         let arguments = [
             "--headless=new",
@@ -117,14 +121,14 @@ impl Browser {
         self.ask("POST", &format!("/element/{element}/value"), &json!({ "text": keys }));
     }
 
-    /// A way of fingers, or of the mouse with its button down, each from one place of the window to another.
+    /// A way of fingers, or of the mouse that rests and goes on with its button down, each from one place of the window to another.
     #[track_caller]
     pub fn drag(&self, kind: &str, ways: &[[[f64; 2]; 2]]) {
         let step = |[x, y]: [f64; 2], duration: u32| json!({ "type": "pointerMove", "duration": duration, "x": x.round() as i64, "y": y.round() as i64 });
         let pointer = |(k, &[from, to]): (usize, &[[f64; 2]; 2])| {
             let half = [0, 1].map(|d| 0.5 * (from[d] + to[d]));
             json!({ "type": "pointer", "id": format!("{kind}{k}"), "parameters": { "pointerType": kind }, "actions": [
-                step(from, 0), { "type": "pointerDown", "button": 0 }, step(half, 80), step(to, 80),
+                step(from, 0), { "type": "pause", "duration": 400 }, { "type": "pointerDown", "button": 0 }, step(half, 80), step(to, 80),
                 { "type": "pointerUp", "button": 0 },
             ] })
         };

@@ -15,7 +15,7 @@ fn all_programs_have_the_same_commands() {
         let ended = finish(command(program, &format!("{of} --help"), here).spawn().unwrap()).with_code(0);
         ended.stdout.replace(program, "PROGRAM")
     };
-    for of in ["run", "resume", "check", "sweep", "schema", "completions"] {
+    for of in ["run", "resume", "check", "sweep", "view", "schema", "completions", "man"] {
         for program in PROGRAMS {
             assert_eq!(help(program, of), help("peri", of), "{program} {of}");
         }
