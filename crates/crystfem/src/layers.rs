@@ -185,8 +185,7 @@ impl Simulation {
             let mut change = (capacity + sum.capacity) * reached - old_heat;
             let mut new_heat = sum.heat;
             for part in &list {
-                let points =
-                    if part.general { &mut state.memory.general } else { &mut state.memory.nodal };
+                let points = if part.general { &mut state.memory.general } else { &mut state.memory.nodal };
                 let stride = part.state.len();
                 points.state[part.point * stride..(part.point + 1) * stride].copy_from_slice(&part.state);
                 let before = points.energy[part.point];
@@ -223,7 +222,8 @@ impl Simulation {
         for point in nodal.of(equation as usize) {
             let (birth, material) = (nodal.birth[point], nodal.material[point]);
             let mass = if nodal.follows(material) { 0.0 } else { nodal.mass[point] };
-            let part = Part { material, mass, ..part(&state.memory.nodal, nodal.stride, &added.nodal, point) };
+            let part =
+                Part { material, mass, ..part(&state.memory.nodal, nodal.stride, &added.nodal, point) };
             parts.push(Part { temperature: if part.old { old } else { birth_of(birth) }, ..part });
         }
         for (number, g) in system.around(equation, &state.born) {
@@ -346,7 +346,8 @@ impl Points {
 
     /// Moves points; `fresh` makes the new ones.
     fn go(&mut self, moves: &Moves, stride: usize, fresh: impl Fn(&mut Self, usize)) {
-        let (state, energy) = (self.state.split_off(moves.first * stride), self.energy.split_off(moves.first));
+        let (state, energy) =
+            (self.state.split_off(moves.first * stride), self.energy.split_off(moves.first));
         for (point, &from) in (moves.first..).zip(&moves.from) {
             match (from as usize).checked_sub(moves.first).filter(|_| from != NONE) {
                 Some(from) => {

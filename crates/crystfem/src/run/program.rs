@@ -53,7 +53,10 @@ impl Fault for Error {
             | Self::Unknown { .. }
             | Self::File { .. }
             | Self::Data { .. } => 2,
-            Self::NotFinite { .. } | Self::Finite { .. } | Self::NotConverged { .. } | Self::Stopped { .. } => 1,
+            Self::NotFinite { .. }
+            | Self::Finite { .. }
+            | Self::NotConverged { .. }
+            | Self::Stopped { .. } => 1,
             Self::Study { error, .. } => error.exit_code(),
             Self::Shared(error) => error.exit_code(),
         }

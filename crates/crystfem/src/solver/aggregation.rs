@@ -138,14 +138,17 @@ pub fn levels(
                 let (a, b) = (places[row], places[column as usize]);
                 (0..3).map(|d| (a[d] - b[d]).powi(2)).sum()
             };
-            let others = || conduction.columns[conduction.starts[row] as usize..conduction.starts[row + 1] as usize]
-                .iter()
-                .copied()
-                .filter(move |&column| column as usize != row);
+            let others = || {
+                conduction.columns[conduction.starts[row] as usize..conduction.starts[row + 1] as usize]
+                    .iter()
+                    .copied()
+                    .filter(move |&column| column as usize != row)
+            };
             let least = others().map(square).fold(f64::INFINITY, f64::min);
             others().filter(move |&column| square(column) <= NEAR * (1.0 + 1e-9) * least)
         };
-        let (group, count) = aggregate(conduction.rows(), |row| near(row), |row| conduction.row(row).next().is_some());
+        let (group, count) =
+            aggregate(conduction.rows(), |row| near(row), |row| conduction.row(row).next().is_some());
         if (exists as f64) < LEAST * f64::from(count) {
             return levels;
         }
@@ -167,7 +170,9 @@ pub fn levels(
             }
             let factor = SMOOTHING / if diagonal > PIVOT * whole { diagonal } else { whole };
             add(group[row], 1.0 - factor * diagonal);
-            for (column, value) in conduction.row(row).filter(|(column, _)| list.binary_search(column).is_ok()) {
+            for (column, value) in
+                conduction.row(row).filter(|(column, _)| list.binary_search(column).is_ok())
+            {
                 add(group[column as usize], -factor * value);
             }
         });

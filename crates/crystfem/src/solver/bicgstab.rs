@@ -122,7 +122,15 @@ mod tests {
         let solve = |limit, solution: &mut [f64]| {
             let goal = [3.0, 1e-10, 0.0];
             let mut right = residual.clone();
-            BiconjugateGradients::default().solve(&operator, &inverse, &mut right, solution, goal, limit, &|| false)
+            BiconjugateGradients::default().solve(
+                &operator,
+                &inverse,
+                &mut right,
+                solution,
+                goal,
+                limit,
+                &|| false,
+            )
         };
         let ended = solve(3000, &mut solution);
         let error = solution.iter().zip(&exact).map(|(s, e)| (s - e).abs()).fold(0.0, f64::max);

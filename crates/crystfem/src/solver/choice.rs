@@ -105,7 +105,10 @@ impl Task {
                 return Choice { method: Method::Multigrid, reason: "multigrid: requested".into() };
             }
             LinearSolver::Multigrid => {
-                return by(false, "conjugate gradients: the conductivity changes, multigrid cannot serve it".into());
+                return by(
+                    false,
+                    "conjugate gradients: the conductivity changes, multigrid cannot serve it".into(),
+                );
             }
             LinearSolver::Auto => {}
         }
@@ -114,7 +117,10 @@ impl Task {
             return by(false, format!("conjugate gradients: the matrix changes with temperature; {until}"));
         }
         if !self.equal_steps {
-            return by(false, format!("conjugate gradients: the matrix changes with the adaptive step; {until}"));
+            return by(
+                false,
+                format!("conjugate gradients: the matrix changes with the adaptive step; {until}"),
+            );
         }
         if self.size > MOST_EQUATIONS {
             return by(
@@ -205,9 +211,14 @@ mod tests {
         assert!(Task { solves: 1.0, ..long }.choose().method == Method::Diagonal);
         assert!(Task { linear: false, ..long }.choose().method == Method::Diagonal);
         assert!(Task { equal_steps: false, ..long }.choose().method == Method::Diagonal);
-        assert!(Task { symmetric: false, wanted: LinearSolver::Direct, ..long }.choose().method == Method::Diagonal);
+        assert!(
+            Task { symmetric: false, wanted: LinearSolver::Direct, ..long }.choose().method
+                == Method::Diagonal
+        );
         assert!(Task { size: 1_000_000, ..long }.choose().method == Method::Diagonal);
         assert!(Task { wanted: LinearSolver::Direct, ..task }.choose().method == Method::Factors);
-        assert!(Task { wanted: LinearSolver::ConjugateGradients, ..long }.choose().method == Method::Diagonal);
+        assert!(
+            Task { wanted: LinearSolver::ConjugateGradients, ..long }.choose().method == Method::Diagonal
+        );
     }
 }

@@ -59,7 +59,8 @@ impl General {
 
     /// Adds elements, ascending. Returns where points were from the first that may have moved.
     pub fn insert(&mut self, mesh: &Mesh, new: &[u32], equation: &[u32]) -> Moves {
-        let first = new.first().map_or(self.elements.len(), |least| self.elements.partition_point(|e| e < least));
+        let first =
+            new.first().map_or(self.elements.len(), |least| self.elements.partition_point(|e| e < least));
         let mut moves = Moves { first: self.starts[first] as usize, from: Vec::new() };
         self.equations.truncate(first.checked_sub(1).map_or(0, |before| self.ends[before] as usize));
         let points = self.starts.split_off(first + 1);

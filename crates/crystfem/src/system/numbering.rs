@@ -107,7 +107,8 @@ mod tests {
         let mut born = vec![0; 384];
         births.iter().flatten().for_each(|&element| born[element as usize] = NONE);
         let births = births.into_iter().zip(1..);
-        let births = births.map(|(elements, time)| Birth { time: f64::from(time), elements, temperature: 300.0 });
+        let births =
+            births.map(|(elements, time)| Birth { time: f64::from(time), elements, temperature: 300.0 });
         (Problem { births: births.collect(), ..Problem::new(mesh, material, 300.0) }, born)
     }
 
@@ -116,7 +117,10 @@ mod tests {
         let (problem, born) = problem((1..6).map(|layer| (64 * layer..64 * (layer + 1)).collect()).collect());
         let found = Numbering::new(&problem, &born);
         assert_eq!(found.nodes, (0..81 * 7).collect::<Vec<u32>>());
-        assert_eq!((0..6).map(|births| found.end(births)).collect::<Vec<_>>(), [162, 243, 324, 405, 486, 567]);
+        assert_eq!(
+            (0..6).map(|births| found.end(births)).collect::<Vec<_>>(),
+            [162, 243, 324, 405, 486, 567]
+        );
     }
 
     /// Element by element, against the order: each node once; those of a birth have an equation before its end; few are out of use.

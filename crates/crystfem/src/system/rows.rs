@@ -197,7 +197,8 @@ impl Rows {
         if self.dead * MOST_DEAD > self.stencils.offsets.len() {
             self.compact();
         }
-        let groups: Vec<&[u32]> = changed.chunk_by(|a, b| *a as usize / CHUNK == *b as usize / CHUNK).collect();
+        let groups: Vec<&[u32]> =
+            changed.chunk_by(|a, b| *a as usize / CHUNK == *b as usize / CHUNK).collect();
         let parts: Vec<Part> =
             groups.par_iter().map(|changed| Part::new(changed, self.consistent, &fill)).collect();
         let before = self.size;

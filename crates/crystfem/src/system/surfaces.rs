@@ -243,7 +243,8 @@ impl Surfaces {
         acts: impl Fn(usize, Face) -> bool,
     ) {
         for part in &mut self.parts {
-            let by_nodes = !consistent || matches!(problem.conditions[part.condition], Condition::Flux { .. });
+            let by_nodes =
+                !consistent || matches!(problem.conditions[part.condition], Condition::Flux { .. });
             let (mut list, mut pairs) = (Vec::new(), Vec::new());
             part.faces.clear();
             part.wide.clear();

@@ -4,8 +4,8 @@ use super::Work;
 use crate::error::Error;
 use crate::ledger::NOTHING;
 use crate::problem::Problem;
-use crate::solver::{BiconjugateGradients, ConjugateGradients, Direct, Ended, Method, Multigrid, Operator};
 use crate::solver::norm_squared;
+use crate::solver::{BiconjugateGradients, ConjugateGradients, Direct, Ended, Method, Multigrid, Operator};
 use crate::system::vector::{largest, set, sum};
 use crate::system::{At, Evaluation, FaceMatrices, Memory, System};
 
@@ -194,7 +194,9 @@ impl Stages {
         self.correction.resize(size, 0.0);
         let made_for = Some((system.generation, weight.to_bits()));
         match &mut self.factors {
-            Some(factors) if self.method == Method::Factors && self.factored_for == made_for && system.is_linear() => {
+            Some(factors)
+                if self.method == Method::Factors && self.factored_for == made_for && system.is_linear() =>
+            {
                 factors.solve(&self.right, &mut self.correction);
                 work.direct_solves += 1;
             }
