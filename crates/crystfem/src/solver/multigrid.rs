@@ -95,12 +95,6 @@ impl Multigrid {
         operator.product(z, left);
         combine(z, |k, own| own + DAMPING * inverse[k] * (residual[k] - left[k]));
     }
-
-    /// Unknowns of each level below the finest.
-    #[cfg(test)]
-    pub fn sizes(&self) -> Vec<usize> {
-        self.transfers.iter().map(|transfer| transfer.restriction.rows()).collect()
-    }
 }
 
 /// From the right side of the first of these levels to its solution.

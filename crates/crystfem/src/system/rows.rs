@@ -216,10 +216,8 @@ impl Rows {
             if part.is_none() && end <= before {
                 continue;
             }
-            let empty =
-                if end > before { self.finder.find_or_add(&mut self.stencils, &[], false) } else { SHARED };
             of.clear();
-            of.resize(end - first, empty);
+            of.resize(end - first, SHARED);
             for segment in &self.segments[item] {
                 of[segment.start as usize - first..][..segment.length as usize].fill(segment.stencil);
             }
@@ -242,6 +240,11 @@ impl Rows {
                         self.dead += if old == SHARED { 0 } else { self.stencils.range(old).len() };
                     }
                 }
+            }
+            // rows out of use
+            if of.contains(&SHARED) {
+                let empty = self.finder.find_or_add(&mut self.stencils, &[], false);
+                of.iter_mut().filter(|stencil| **stencil == SHARED).for_each(|stencil| *stencil = empty);
             }
             let runs = of.chunk_by(|a, b| a == b);
             self.segments[item].clear();

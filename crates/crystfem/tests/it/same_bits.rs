@@ -5,7 +5,9 @@ use crystfem::boundary::Field;
 use crystfem::material::{Conductor, Property};
 use crystfem::problem::{Birth, Capacity, Problem};
 use crystfem::simulation::{Settings, Simulation, State};
+use std::ops::ControlFlow;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// More than two work items of nodes, with births, radiation, latent heat, and conductivity that follows temperature.
 fn problem(general: bool) -> Problem {
@@ -33,6 +35,21 @@ fn problem(general: bool) -> Problem {
     }
 }
 
+/// The same, its layers laid in lines of five elements: equations are numbered in groups, of which some are out of use.
+fn path(general: bool) -> Problem {
+    let mut problem = problem(general);
+    let layers = std::mem::take(&mut problem.births);
+    for layer in layers {
+        let lines: Vec<&[u32]> = layer.elements.chunks(5).collect();
+        let count = lines.len() as f64;
+        for (number, line) in lines.iter().enumerate() {
+            let time = layer.time + number as f64 / count;
+            problem.births.push(Birth { time, elements: line.to_vec(), temperature: layer.temperature });
+        }
+    }
+    problem
+}
+
 fn bits(state: &State) -> Vec<u64> {
     state.temperature.iter().chain(&state.memory.nodal.state).map(|x| x.to_bits()).collect()
 }
@@ -56,6 +73,53 @@ fn on_any_number_of_threads() {
             assert!(bits(&runs[0]) == bits(other) && runs[0] == *other);
         }
     }
+}
+
+/// What is added birth by birth is what is built at once: resumed simulations build all that exists. A birth visits its neighbourhood.
+#[test]
+fn along_a_path() {
+    for general in [false, true] {
+        let settings = Settings::adaptive(0.05);
+        let mut whole = Simulation::new(path(general), settings).unwrap();
+        let mut parts = whole_copy(&whole, general, settings);
+        let mut before = whole.state().clone();
+        for stop in [0.05, 0.1, 0.17] {
+            run(&mut whole, stop);
+            run(&mut parts, stop);
+            assert!(bits(whole.state()) == bits(parts.state()) && whole.state() == parts.state(), "{stop}");
+            parts = whole_copy(&parts, general, settings);
+            let (work, births) = (whole.state().work, whole.state().births - before.births);
+            // a line of five with its neighbours in both layers: 7 × 3 × 2
+            let visited = work.visited - before.work.visited;
+            assert!(births > 2 && visited <= 42 * births as u64, "{visited} in {births}");
+            before = whole.state().clone();
+        }
+    }
+}
+
+fn whole_copy(of: &Simulation, general: bool, settings: Settings) -> Simulation {
+    Simulation::resume(path(general), settings, of.state().clone()).unwrap()
+}
+
+/// Stopped within a step, a simulation is where the step began, and goes on with the same bits.
+#[test]
+fn stopped_within_a_step() {
+    let settings = Settings::adaptive(0.05);
+    let mut whole = Simulation::new(problem(false), settings).unwrap();
+    run(&mut whole, 0.1);
+    let mut stopped = Simulation::new(problem(false), settings).unwrap();
+    let mut stops = 0;
+    for most in [1, 7, 30, 100, 1000, usize::MAX] {
+        let asked = AtomicUsize::new(0);
+        let stop = || asked.fetch_add(1, Ordering::Relaxed) >= most;
+        let flow = stopped.advance_unless(&stop, 0.1, &mut |_, _| ControlFlow::Continue(())).unwrap();
+        stops += usize::from(flow.is_break());
+        let saved = postcard::to_stdvec(stopped.state()).unwrap();
+        let state = postcard::from_bytes(&saved).unwrap();
+        stopped = Simulation::resume(problem(false), settings, state).unwrap();
+    }
+    assert!(stops >= 3, "{stops}");
+    assert!(bits(whole.state()) == bits(stopped.state()) && whole.state() == stopped.state());
 }
 
 #[test]

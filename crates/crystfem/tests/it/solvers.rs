@@ -1,7 +1,8 @@
 //! Factors and conjugate gradients give one temperature, and the choice follows the scene.
 
 use crate::bodies::{PA12, conductor, everywhere, film, grid, held, radiation, run};
-use crystfem::boundary::{Field, Where};
+use crystfem::boundary::{Condition, Field, Where};
+use crystfem::mesh::{Block, Grid, Split};
 use crystfem::problem::{Capacity, Problem};
 use crystfem::simulation::{LinearSolver, Method, Settings, Simulation};
 use crystfem::time::{Scheme, Steps};
@@ -80,4 +81,52 @@ fn the_choice_follows_the_scene() {
     assert!(lines.iter().any(|line| line.contains("804 equations for 200 of 200 elements")), "{lines:#?}");
     run(&mut line, 1e4);
     assert_eq!((line.state().work.factorizations, line.state().work.direct_solves), (1, 100));
+}
+
+/// A block of `elements` along an edge, of distorted hexahedra or of five tetrahedra for each.
+fn distorted(elements: usize, tetrahedra: bool, settings: Settings) -> Simulation {
+    let into = if tetrahedra { Split::FiveTetrahedra } else { Split::Hexahedra };
+    let block = Block { name: "body".into(), lower: [0.0; 3], upper: [0.02; 3] };
+    let grid = Grid::uniform(block.lower, block.upper, [elements; 3]).unwrap();
+    let mesh = grid.blocks(&[block], into).unwrap().distorted(0.1).unwrap();
+    let nodes = &mesh.points;
+    let bottom: Vec<u32> = (0..).zip(nodes).filter(|(_, p)| p[2] < 1e-9).map(|(node, _)| node).collect();
+    let conditions = vec![
+        Condition::Temperature { nodes: bottom, value: Field::constant(353.15) },
+        film(everywhere(), 15.0, 353.15),
+    ];
+    Simulation::new(Problem { conditions, ..Problem::new(mesh, conductor(PA12), 493.15) }, settings).unwrap()
+}
+
+/// Multigrid takes as many iterations on a finer mesh and in a longer step, and gives the same temperatures.
+#[test]
+fn multigrid_depends_on_nothing() {
+    let run_with = |simulation: &mut Simulation, until: f64| -> f64 {
+        run(simulation, until);
+        let work = simulation.state().work;
+        work.cg_iterations as f64 / work.cg_solves as f64
+    };
+    let at = |solver, dt| settings(solver, Scheme::BackwardEuler, dt);
+    for tetrahedra in [false, true] {
+        let mut most = 0.0_f64;
+        for elements in [8, 16, 24] {
+            for dt in [10.0, 1e3, 1e5] {
+                let [mut diagonal, mut multigrid] =
+                    [LinearSolver::ConjugateGradients, LinearSolver::Multigrid]
+                        .map(|solver| distorted(elements, tetrahedra, at(solver, dt)));
+                let many = run_with(&mut diagonal, 3.0 * dt);
+                let few = run_with(&mut multigrid, 3.0 * dt);
+                println!(
+                    "tetrahedra: {tetrahedra}, {elements} elements, {dt} s: {many} with the diagonal, {few}"
+                );
+                most = most.max(few);
+                assert_eq!(multigrid.state().work.levels, 1);
+                for (a, b) in diagonal.temperatures(0.0).iter().zip(multigrid.temperatures(0.0)) {
+                    // the tolerance of both
+                    assert!((a - b).abs() < 1e-6, "{a} {b}");
+                }
+            }
+        }
+        evidence::at_most(&format!("multigrid_iterations_tetrahedra_{tetrahedra}"), most, 22.0);
+    }
 }
