@@ -3,6 +3,7 @@
 //! Conjugate gradients with 3 × 3 blocks alone need as many iterations as a part is slender; blocks plus P (Pᵀ K P)⁻¹ Pᵀ need about
 //! 45 whatever its shape (`docs/guide/src/theory/print-stress.md`).
 
+use super::product::Stiff;
 use nalgebra::{Matrix3, Matrix3x6, SMatrix, Vector3, Vector6};
 use std::collections::BTreeMap;
 
@@ -11,9 +12,6 @@ const SIDE: f64 = 4.0;
 /// A pivot below this part of its diagonal is a motion that nothing resists or that is there twice.
 const DEAD: f64 = 1e-10;
 const NONE: u32 = u32::MAX;
-
-/// An element as the coarse level sees it: its nodes, K̂ and its modulus.
-pub type Stiff<'a> = (&'a [u32; 8], &'a SMatrix<f64, 24, 24>, f64);
 
 /// Groups of nodes and the Cholesky factor of Pᵀ K P.
 pub struct Coarse {
@@ -26,14 +24,10 @@ pub struct Coarse {
 
 impl Coarse {
     /// Of elements on nodes at `points`, of which `free` components move.
-    pub fn new<'a>(
-        elements: impl Iterator<Item = Stiff<'a>> + Clone,
-        points: &[[f64; 3]],
-        free: &[[bool; 3]],
-    ) -> Self {
+    pub fn new(elements: &[Stiff], points: &[[f64; 3]], free: &[[bool; 3]]) -> Self {
         let mut exists = vec![false; points.len()];
         let (mut edges, mut count) = (Vector3::zeros(), 0.0);
-        for (nodes, ..) in elements.clone() {
+        for (nodes, ..) in elements {
             nodes.iter().for_each(|&node| exists[node as usize] = true);
             let at = |k: usize| Vector3::from(points[nodes[k] as usize]);
             // of an upright brick: its edges
@@ -70,7 +64,7 @@ impl Coarse {
             }
         }
         let mut first: Vec<u32> = (0..numbers.len() as u32).collect();
-        for (nodes, ..) in elements.clone() {
+        for (nodes, ..) in elements {
             let least = nodes.iter().map(|&node| group[node as usize]).min().unwrap_or(0);
             nodes.iter().for_each(|&node| {
                 let first = &mut first[group[node as usize] as usize];
@@ -78,7 +72,7 @@ impl Coarse {
             });
         }
         let mut matrix = Skyline::new(&first);
-        for (nodes, stiffness, modulus) in elements {
+        for &(nodes, stiffness, modulus) in elements {
             let groups = nodes.map(|node| group[node as usize]);
             let held = nodes.iter().any(|&node| free[node as usize] != [true; 3]);
             // rigid motions of one group do not strain an element inside of it

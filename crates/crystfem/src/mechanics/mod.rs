@@ -7,6 +7,7 @@ mod coarse;
 mod eigenstrain;
 mod element;
 mod maxwell;
+mod product;
 mod solve;
 
 pub use body::{Audit, Body, BodyState, Support};

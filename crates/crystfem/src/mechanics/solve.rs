@@ -1,9 +1,12 @@
 //! One linear solution of a body: conjugate gradients without a matrix.
 
 use super::body::Body;
-use super::coarse::{Coarse, Stiff};
+use super::coarse::Coarse;
+use super::product::{Elements, combine, dot};
 use crate::error::Error;
 use nalgebra::{Matrix3, SVector, Vector3};
+
+const NONE: u32 = u32::MAX;
 
 /// Iterations at most, over the equations.
 const ITERATIONS: usize = 20;
@@ -19,26 +22,8 @@ pub(super) struct Load {
 }
 
 impl Body<'_> {
-    fn stiff<'b>(&'b self, moduli: &'b [(usize, f64)]) -> impl Iterator<Item = Stiff<'b>> + Clone {
-        moduli.iter().map(|&(element, modulus)| {
-            (&self.mesh.hexahedra[element], &self.shape_of(element).condensed, modulus)
-        })
-    }
-
-    /// Σ E K̂ u of elements with moduli E, on free components.
-    fn product(&self, moduli: &[(usize, f64)], free: &[[bool; 3]], u: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-        let mut result = vec![Vector3::zeros(); u.len()];
-        for (nodes, condensed, modulus) in self.stiff(moduli) {
-            let forces = condensed * gather(nodes, u) * modulus;
-            for (k, &node) in nodes.iter().enumerate() {
-                result[node as usize] += Vector3::from(forces.fixed_rows::<3>(3 * k));
-            }
-        }
-        keep(&mut result, free);
-        result
-    }
-
-    /// Conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid motions; adds its iterations to the state.
+    /// Conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid motions, on the nodes that exist; adds
+    /// its iterations to the state.
     ///
     /// # Errors
     /// [`Error::Parameter`] where they do not converge.
@@ -48,11 +33,28 @@ impl Body<'_> {
         free: &[[bool; 3]],
         load: Load,
     ) -> Result<Vec<Vector3<f64>>, Error> {
-        let mut residual = load.sum;
+        // number of each node among those that exist
+        let mut number = vec![NONE; free.len()];
+        for &node in moduli.iter().flat_map(|&(element, _)| &self.mesh.hexahedra[element]) {
+            number[node as usize] = 0;
+        }
+        let mut nodes = Vec::new();
+        for (node, number) in number.iter_mut().enumerate().filter(|(_, number)| **number == 0) {
+            *number = nodes.len() as u32;
+            nodes.push(node);
+        }
+        let points: Vec<[f64; 3]> = nodes.iter().map(|&node| self.mesh.points[node]).collect();
+        let stiff = moduli.iter().map(|&(element, modulus)| {
+            let own = self.mesh.hexahedra[element].map(|node| number[node as usize]);
+            (own, &self.shape_of(element).condensed, modulus)
+        });
+        let mut elements = Elements::new(stiff.collect(), nodes.iter().map(|&node| free[node]).collect());
+        let free = elements.free();
+        let mut residual: Vec<Vector3<f64>> = nodes.iter().map(|&node| load.sum[node]).collect();
         let mut blocks = vec![Matrix3::zeros(); residual.len()];
-        for (nodes, condensed, modulus) in self.stiff(moduli) {
+        for (nodes, condensed, modulus) in elements.list() {
             for (k, &node) in nodes.iter().enumerate() {
-                blocks[node as usize] += condensed.fixed_view::<3, 3>(3 * k, 3 * k) * modulus;
+                blocks[node as usize] += condensed.fixed_view::<3, 3>(3 * k, 3 * k) * *modulus;
             }
         }
         for (block, free) in blocks.iter_mut().zip(free) {
@@ -63,39 +65,51 @@ impl Body<'_> {
             }
             *block = block.try_inverse().unwrap_or_else(Matrix3::identity);
         }
-        keep(&mut residual, free);
-        let dot =
-            |a: &[Vector3<f64>], b: &[Vector3<f64>]| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
+        for (value, free) in residual.iter_mut().zip(free) {
+            (0..3).filter(|&d| !free[d]).for_each(|d| value[d] = 0.0);
+        }
         let goal = (self.tolerance * dot(&residual, &residual).sqrt()).max(ROUNDING * load.parts.sqrt());
+        let spread = |moved: &[Vector3<f64>]| {
+            let mut all = vec![Vector3::zeros(); number.len()];
+            nodes.iter().zip(moved).for_each(|(&node, &moved)| all[node] = moved);
+            all
+        };
         let mut moved = vec![Vector3::zeros(); residual.len()];
         if dot(&residual, &residual).sqrt() <= goal {
-            return Ok(moved);
+            return Ok(spread(&moved));
         }
-        let coarse = Coarse::new(self.stiff(moduli), &self.mesh.points, free);
-        let precondition = |residual: &[Vector3<f64>]| -> Vec<Vector3<f64>> {
-            let mut result: Vec<_> = blocks.iter().zip(residual).map(|(block, r)| block * r).collect();
-            coarse.add(residual, &mut result);
-            result
+        let coarse = Coarse::new(elements.list(), &points, free);
+        let precondition = |residual: &[Vector3<f64>], result: &mut [Vector3<f64>]| {
+            combine(result, |k, _| blocks[k] * residual[k]);
+            coarse.add(residual, result);
         };
-        let mut direction = precondition(&residual);
+        let mut conditioned = vec![Vector3::zeros(); residual.len()];
+        precondition(&residual, &mut conditioned);
+        let mut direction = conditioned.clone();
+        let mut image = vec![Vector3::zeros(); residual.len()];
         let mut product = dot(&residual, &direction);
+        let mut iterations = 0;
+        let mut found = f64::INFINITY;
         for _ in 0..(ITERATIONS * 3 * residual.len()).max(100) {
-            self.state.iterations += 1;
-            let image = self.product(moduli, free, &direction);
+            iterations += 1;
+            elements.product(&direction, &mut image);
             let length = product / dot(&direction, &image);
-            for k in 0..moved.len() {
-                moved[k] += direction[k] * length;
-                residual[k] -= image[k] * length;
+            combine(&mut moved, |k, moved| moved + direction[k] * length);
+            combine(&mut residual, |k, residual| residual - image[k] * length);
+            found = dot(&residual, &residual).sqrt();
+            if found <= goal {
+                break;
             }
-            if dot(&residual, &residual).sqrt() <= goal {
-                return Ok(moved);
-            }
-            let conditioned = precondition(&residual);
+            precondition(&residual, &mut conditioned);
             let next = dot(&residual, &conditioned);
-            direction.iter_mut().zip(&conditioned).for_each(|(d, c)| *d = c + *d * (next / product));
+            combine(&mut direction, |k, direction| conditioned[k] + direction * (next / product));
             product = next;
         }
-        let found = dot(&residual, &residual).sqrt();
+        let moved = spread(&moved);
+        self.state.iterations += iterations;
+        if found <= goal {
+            return Ok(moved);
+        }
         Err(Error::Parameter {
             name: "residual of the stresses",
             found,
@@ -106,11 +120,4 @@ impl Body<'_> {
 
 pub(super) fn gather(nodes: &[u32; 8], u: &[Vector3<f64>]) -> SVector<f64, 24> {
     SVector::from_fn(|k, _| u[nodes[k / 3] as usize][k % 3])
-}
-
-/// 0 where a component is not free.
-fn keep(field: &mut [Vector3<f64>], free: &[[bool; 3]]) {
-    for (value, free) in field.iter_mut().zip(free) {
-        (0..3).filter(|&d| !free[d]).for_each(|d| value[d] = 0.0);
-    }
 }
