@@ -208,3 +208,9 @@ pub fn schema(program: &str) -> PyResult<String> {
     }
     of_program!(program, of())
 }
+
+/// The page of a run in a folder, as HTML.
+#[pyfunction]
+pub fn view(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
+    py.detach(|| polycore::view::view(folder)).map_err(|error| crate::error::file(&error))
+}

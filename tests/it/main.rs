@@ -14,6 +14,7 @@
 //! * [`loads`]: loads, displacements and names of values in reports;
 //! * [`memory`]: no run takes more memory than is stated, absurd sizes are refused before they are allocated;
 //! * [`packages`]: what each crate is built with;
+//! * [`python`]: the Python package;
 //! * [`release`]: one version everywhere, the archive;
 //! * [`rubber`]: from tests of rubber to a simulated specimen;
 //! * [`schemas`]: JSON Schemas, by which every case is valid;
@@ -40,6 +41,7 @@ mod parts;
 mod printing;
 mod probes;
 mod program;
+mod python;
 mod release;
 mod results;
 mod rubber;

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _polymech
 from ._fields import Fields
 
 if TYPE_CHECKING:
@@ -188,8 +189,25 @@ def _unknown(name: str, known: Mapping[str, Any]) -> str:
     return f"no {name!r}; there are {', '.join(map(repr, near))}" + (" and others" if len(known) > len(near) else "")
 
 
+class Page:
+    """A page that needs no network; notebooks show it."""
+
+    def __init__(self, html: str) -> None:
+        self.html = html
+
+    def write(self, path: str | Path) -> None:
+        """Writes the page, whole or not at all."""
+        path = Path(path)
+        part = path.with_name(f".{path.name}.part")
+        part.write_text(self.html, encoding="utf-8")
+        part.replace(path)
+
+    def _repr_html_(self) -> str:
+        return f'<iframe srcdoc="{html.escape(self.html)}" width="100%" height="640" style="border:0"></iframe>'
+
+
 class Result:
-    """A finished run: `report`, `history`, `tables`, `fields`, `mesh()`, `plot()`, and the folder `output` of its files.
+    """A finished run: `report`, `history`, `tables`, `fields`, `mesh()`, `plot()`, `view()`, and the folder `output` of its files.
 
     Results without a folder of the user's lie in a temporary one, which goes with this object. A pickled result takes all of its
     numbers along, but no folder.
@@ -244,6 +262,12 @@ class Result:
         from ._plot import plot
 
         return plot(self, field, variant, step)
+
+    def view(self) -> Page:
+        """One HTML page: the body to turn and cut, in colours of its fields, beside its curves. A notebook shows it."""
+        if self.output is None:
+            raise ValueError("view: found a result without a folder; allowed: one of a run")
+        return Page(_polymech.view(str(self.output)))
 
     def __getstate__(self) -> dict[str, Any]:
         return {"report": self.report, "output": None, "tables": self.tables, "fields": self.fields.loaded()}
