@@ -206,7 +206,8 @@ class Model:
             low, high = (np.asarray(_numbers(corner, self.body.dimension, "corner")) for corner in region)
 
             def inside(points: Array) -> NDArray[np.bool_]:
-                return np.all((low <= points) & (points <= high), axis=1)
+                inner: NDArray[np.bool_] = np.all((low <= points) & (points <= high), axis=1)
+                return inner
 
         self._spec["regions"].append((inside, displacement, force))
         return self

@@ -111,7 +111,10 @@ class Table(Mapping[str, Array]):
 
     def _repr_html_(self) -> str:
         shown = list(range(self.rows)) if self.rows <= 10 else [*range(5), *range(self.rows - 5, self.rows)]
-        cell = lambda x: f"{x:.5g}" if isinstance(x, float) else html.escape(str(x))  # noqa: E731
+
+        def cell(x: Any) -> str:
+            return f"{x:.5g}" if isinstance(x, float) else html.escape(str(x))
+
         head = "".join(f"<th>{html.escape(n)}<br>{html.escape(u)}</th>" for n, u in self.units.items())
         rows = ("<tr>" + "".join(f"<td>{cell(c[k].item())}</td>" for c in self._columns.values()) + "</tr>" for k in shown)
         return f"<table><tr>{head}</tr>{''.join(rows)}</table>"
