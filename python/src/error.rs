@@ -24,7 +24,13 @@ pyo3::create_exception!(
 pub fn failure<E: Fault>(py: Python<'_>, failure: Failure<E>, output: &Path) -> PyErr {
     match failure {
         Failure::Scene(error) => {
-            let raised = SceneError::new_err(format!("{}\n{}", error.message(), error.plain()));
+            let plain = error.plain();
+            // the message stands before the picture already
+            let picture = plain.find("╭─").and_then(|at| plain[..at].rfind('\n')).map(|at| &plain[at + 1..]);
+            let raised = SceneError::new_err(match picture {
+                Some(picture) => format!("{}\n{picture}", error.message()),
+                None => plain,
+            });
             let value = raised.value(py);
             // an exception takes attributes
             let _ = value.setattr("key", error.key()).and_then(|()| value.setattr("line", error.line()));

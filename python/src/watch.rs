@@ -63,6 +63,9 @@ impl<'a> Line<'a> {
 
     /// Shows a step; whether to go on.
     pub fn step(&self, step: Step) -> bool {
+        if self.stop.load(Ordering::Relaxed) {
+            return false;
+        }
         let (answer, answered) = sync_channel(1);
         let sent = self.sender.send(Message::Step(step, answer));
         sent.is_ok() && answered.recv().unwrap_or(false)

@@ -87,9 +87,10 @@ def test_constants_are_found_again():
 def printed(**more):
     scene = {
         **BAR,
+        "region": [{"elements": "bar", "material": "pa12", "temperature": "220 degC"}],
         "print": {"layer_time": "10 s", "temperature": "220 degC"},
         "boundary": [{"surface": "bottom", "temperature": "80 degC"}],
-        "time": {"end": "40 s"},
+        "time": {"end": "40 s", "tolerance": "0.5 K"},
         "output": {"every": "10 s", "pictures": False},
         "probe": [{"name": "first", "at": ["0 mm", "0 mm", "0.25 mm"]}],
     }

@@ -73,7 +73,7 @@ def test_names_of_parameters():
     assert list(law.parameters) and names and law.shear_modulus > 0
     with pytest.raises(ValueError, match="found modulos; allowed: " + ", ".join(names)):
         Law("gent", modulos=1e6)
-    with pytest.raises(ValueError, match="found 'gnt'|found \"gnt\""):
+    with pytest.raises(ValueError, match="found .gnt."):
         Law("gnt", 1.0)
 
 

@@ -44,7 +44,7 @@ def test_stress_of_a_strip():
     assert np.allclose(strip.piola()[middle, 0, 0], strip.cauchy()[middle, 0, 0], rtol=0.05)
     gradient = strip.deformation_gradients()[middle].mean(axis=0)
     assert abs(gradient[0, 0] - 1 - 0.2 / 34) < 1e-3
-    with pytest.raises(ValueError, match="measure: found 'hardi'; allowed: hardy"):
+    with pytest.raises(ValueError, match="measure: found .hardi.; allowed: hardy"):
         strip.cauchy("hardi")
 
 
@@ -81,7 +81,7 @@ def test_samples_of_a_law():
     assert np.allclose(law.tension(tiny) / (tiny - 1), 2.3, rtol=1e-6)
     again = pickle.loads(pickle.dumps(law))
     assert (again.tension(l) == law.tension(l)).all()
-    with pytest.raises(ValueError, match="tension at the stretch .*: found nan"):
+    with pytest.raises(ValueError, match="tension at the stretch .*: found NaN"):
         peri.BondLaw(lambda l: np.where(l > 2, np.nan, l - 1))
     with pytest.raises(ValueError, match="dt/dl at rest"):
         peri.BondLaw(lambda l: 1 - l)
@@ -92,7 +92,7 @@ def test_samples_of_a_law():
 def test_a_solid_and_its_steps():
     body = peri.Body.box((0, 0, 0), (20e-3, 10e-3, 10e-3), 2e-3)
     model = peri.Model(body, "linear", youngs_modulus=1e6)
-    model.clamp(lambda x, y, z: x < 6e-3).displace(lambda x, y, z: x > 14e-3, (1e-3, None, None)).steps(4)
+    model.clamp(lambda x, y, z: x < 6e-3).displace(lambda x, y, z: x > 14e-3, (0.1e-3, None, None)).steps(4)
     block, seen = model.build(), []
 
     def look(step):
@@ -119,7 +119,7 @@ def test_dynamics_start_with_a_velocity():
 
 def test_refusals():
     body = sheet()
-    with pytest.raises(ValueError, match="law: found 'rubber'; allowed: chain-offset"):
+    with pytest.raises(ValueError, match="law: found .rubber.; allowed: chain-offset"):
         peri.Model(body, "rubber", youngs_modulus=1e6).clamp(lambda x, y: x < 1).build()
     with pytest.raises(ValueError, match="region 1 of the loads has no particle"):
         peri.Model(body, youngs_modulus=1e6).clamp(lambda x, y: x > 1).build()
@@ -131,9 +131,9 @@ def test_refusals():
         peri.Body.rectangle((0, 0, 0), (1, 1), 0.1)
     with pytest.raises(ValueError, match="a load: found 3 components; allowed: 2"):
         peri.Model(body, youngs_modulus=1e6).displace(lambda x, y: x > 0, (0, 0, 0)).build()
-    with pytest.raises(ValueError, match="setting: found 'tolerence'"):
+    with pytest.raises(ValueError, match="setting: found .tolerence."):
         pulled(body).solve(tolerence=1)
-    with pytest.raises(ValueError, match="method: found 'newton'; allowed: lbfgs"):
+    with pytest.raises(ValueError, match="method: found .newton.; allowed: lbfgs"):
         pulled(body).solve("newton")
     with pytest.raises(RunError, match="not converged"):
         pulled(body).solve(tolerance=1e-12, max_iterations=3)

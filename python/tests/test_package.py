@@ -18,7 +18,7 @@ NOTEBOOKS = sorted((Path(__file__).resolve().parents[1] / "notebooks").glob("*.i
 def test_types(root, tmp_path):
     pytest.importorskip("mypy")
     run = subprocess.run(
-        [sys.executable, "-m", "mypy", "--config-file", root / "python/pyproject.toml", "--cache-dir", tmp_path, root / "python/polymech"],
+        [sys.executable, "-m", "mypy", "--config-file", root / "python/pyproject.toml", "--cache-dir", tmp_path, root / "python/package/polymech"],
         capture_output=True, text=True, cwd=root / "python",
     )
     assert run.returncode == 0, run.stdout + run.stderr
@@ -39,7 +39,7 @@ def test_everything_is_documented():
 
 
 def test_the_stub_names_what_there_is(root):
-    stub = (root / "python/polymech/_polymech.pyi").read_text()
+    stub = (root / "python/package/polymech/_polymech.pyi").read_text()
     named = set(re.findall(r"^(?:def|class) (\w+)", stub, re.M))
     assert named == {name for name in dir(polymech._polymech) if not name.startswith("_")}
 

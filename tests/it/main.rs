@@ -14,6 +14,7 @@
 //! * [`loads`]: loads, displacements and names of values in reports;
 //! * [`memory`]: no run takes more memory than is stated, absurd sizes are refused before they are allocated;
 //! * [`packages`]: what each crate is built with;
+//! * [`python`]: the Python package;
 //! * [`rubber`]: from tests of rubber to a simulated specimen;
 //! * [`schemas`]: JSON Schemas, by which every case is valid;
 //! * [`words`]: slips that would pass in silence, and how much is said;
@@ -37,6 +38,7 @@ mod parts;
 mod printing;
 mod probes;
 mod program;
+mod python;
 mod results;
 mod rubber;
 mod scenes;

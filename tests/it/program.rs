@@ -7,8 +7,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-/// Programs whose command lines are tested.
-const PACKAGES: [&str; 5] = ["crystfem", "mdsurrogate", "peri", "polycore", "xtask"];
+/// Packages whose command lines, and the module of Python, are tested.
+pub const PACKAGES: [&str; 6] = ["crystfem", "mdsurrogate", "peri", "polycore", "polymech", "xtask"];
 
 /// Longer than any of these tests takes on a busy machine: a program that hangs ends here.
 const PATIENCE: Duration = Duration::from_secs(240);

@@ -295,8 +295,10 @@ impl<'a> Run<'a> {
 
     /// Shows a finished step where somebody watches; one who wants no more of them stops the run at the next [`Run::pause`].
     pub fn step(&mut self, step: impl FnOnce() -> Step) {
-        if let Some(watcher) = &mut self.options.on_step {
-            self.stopped |= !watcher(step());
+        if let Some(watcher) = &mut self.options.on_step
+            && !self.stopped
+        {
+            self.stopped = !watcher(step());
         }
     }
 

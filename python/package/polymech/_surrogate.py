@@ -56,13 +56,13 @@ class Surrogate:
         An ``ann`` maps six standardised components of C to six of S: S = output_mean + output_deviation · N((C − input_mean) /
         input_deviation), in Pa. `kind` may be an energy in the form of `header`, of invariants.
         """
-        first = members[0]
-        ensemble = members if not _is_layer(first) else [members]
-        arrays = [
-            [(np.ascontiguousarray(np.asarray(w, dtype=np.float64).T if transposed else np.asarray(w, dtype=np.float64)),
-              np.ascontiguousarray(b, dtype=np.float64)) for w, b in layers]  # type: ignore[misc]
-            for layers in ensemble
-        ]
+        found: Any = members
+        ensemble = [found] if _is_layer(found[0]) else found
+
+        def array(values: ArrayLike) -> NDArray[np.float64]:
+            return np.ascontiguousarray(np.asarray(values, dtype=np.float64))
+
+        arrays = [[(array(np.transpose(w) if transposed else w), array(b)) for w, b in layers] for layers in ensemble]
         if len(activations) != len(arrays[0]):
             raise ValueError(f"activations: found {len(activations)}; allowed: {len(arrays[0])}, one for each layer")
         widths = [arrays[0][0][0].shape[1], *(w.shape[0] for w, _ in arrays[0])]

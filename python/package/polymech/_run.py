@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -84,17 +85,17 @@ def _done(how: dict[str, Any], ours: bool, told: tuple[str, str]) -> Result:
 
 
 def _begin(how: dict[str, Any], ours: bool, call: Callable[[], Any]) -> Any:
-    """Calls; an empty folder of ours does not stay behind a scene that is refused, a checkpoint does."""
+    """Calls; where a run stopped on its way, its folder stays and is told."""
     try:
         return call()
     except BaseException as error:
         folder = Path(how["output"])
-        if ours and folder.is_dir() and not any(folder.iterdir()):
-            folder.rmdir()
-        elif hasattr(error, "add_note"):
-            error.add_note(f"the checkpoint is in {folder}: `resume({str(folder)!r})` continues")
-        if isinstance(error, KeyboardInterrupt):
-            error.output = str(folder)  # type: ignore[attr-defined]
+        if (folder / "checkpoint.bin").is_file() or (folder / "sweep.csv").is_file() or not ours:
+            if isinstance(error, KeyboardInterrupt):
+                error.args = error.args or (f"stopped; continue with resume({str(folder)!r})",)
+                error.output = str(folder)  # type: ignore[attr-defined]
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
         raise
 
 
@@ -124,9 +125,12 @@ def sweep(
     options: dict[str, Any],
     overrides: Mapping[str, Any],
 ) -> Table:
-    text, path = read(scene, program, overrides)
+    text, path = read(scene, program, {})
     how, ours = _how(output, **options)
-    values = [(name, [value if isinstance(value, str) else literal(value) for value in each]) for name, each in vary.items()]
+    # what the runs have in common is a key of one value
+    common = {name.replace("__", "."): [value] for name, value in overrides.items()}
+    each = {**common, **vary}.items()
+    values = [(name, [value if isinstance(value, str) else literal(value) for value in column]) for name, column in each]
     told = _begin(how, ours, lambda: _polymech.sweep(program, text, path, values, list(columns), how))
     result = _done(how, ours, told)
     table = Table.read(Path(how["output"]) / "sweep.csv")

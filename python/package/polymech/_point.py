@@ -73,7 +73,8 @@ class Material:
             at = np.arange(self.temperatures[0], self.temperatures[1] + 0.5)
             value = (at, np.broadcast_to(np.asarray(value(at), dtype=float), at.shape))
         if isinstance(value, tuple):
-            return tuple(np.asarray(column, dtype=float).tolist() for column in value)  # type: ignore[return-value]
+            temperatures, values = (np.asarray(column, dtype=float).tolist() for column in value)
+            return temperatures, values
         return [], [float(value)]
 
 

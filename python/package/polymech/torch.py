@@ -25,7 +25,7 @@ except ImportError as error:  # pragma: no cover
 _MODULES = {"relu": nn.ReLU, "softplus": nn.Softplus, "tanh": nn.Tanh, "sigmoid": nn.Sigmoid, "silu": nn.SiLU, "elu": nn.ELU}
 
 
-class Module(nn.Module):
+class Module(nn.Module):  # type: ignore[misc, unused-ignore]
     """An ``ann`` law as a module: C (…, 6) → S (…, 6) in Pa, the mean of its members, whose weights can be trained on."""
 
     def __init__(self, surrogate: Surrogate) -> None:

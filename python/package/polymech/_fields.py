@@ -103,7 +103,7 @@ class Series:
             if kind != "position":
                 (grid.cell_data if kind == "cell" else grid.point_data)[name] = self.read(kind, name, [step])[0]
         if not self.moves and "exists" in grid.cell_data:
-            grid = grid.extract_cells(np.flatnonzero(grid.cell_data["exists"] > 0.5))
+            grid = grid.extract_cells(np.flatnonzero(grid.cell_data["exists"] > 0.5).astype(np.int64))
         return grid
 
 

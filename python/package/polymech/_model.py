@@ -206,8 +206,7 @@ class Model:
             low, high = (np.asarray(_numbers(corner, self.body.dimension, "corner")) for corner in region)
 
             def inside(points: Array) -> NDArray[np.bool_]:
-                within: NDArray[np.bool_] = ((low <= points) & (points <= high)).all(axis=1)
-                return within
+                return np.all((low <= points) & (points <= high), axis=1)
 
         self._spec["regions"].append((inside, displacement, force))
         return self

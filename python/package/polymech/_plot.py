@@ -30,7 +30,7 @@ def plot(result: Result, field: str | None, variant: str | None, step: int) -> F
         body(axes[0, 0], series, field, step)
     if histories:
         history(axes[0, -1], {variant: histories[variant]} if variant in histories else histories)
-    return figure  # type: ignore[no-any-return]
+    return figure
 
 
 def body(axes: Axes, series: Series, field: str | None, step: int) -> None:
