@@ -42,7 +42,9 @@ fn node(ends: &[f64], panel: usize, at: f64) -> f64 {
 /// MATLAB, chapter 6).
 fn differentiation() -> [[f64; DEGREE + 1]; DEGREE + 1] {
     let x = nodes();
-    let c = |k: usize| (if k == 0 || k == DEGREE { 2.0 } else { 1.0 }) * if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let c = |k: usize| {
+        (if k == 0 || k == DEGREE { 2.0 } else { 1.0 }) * if k.is_multiple_of(2) { 1.0 } else { -1.0 }
+    };
     let mut d = [[0.0; DEGREE + 1]; DEGREE + 1];
     for i in 0..=DEGREE {
         for j in 0..=DEGREE {
@@ -63,7 +65,9 @@ fn interpolate(values: &[f64; DEGREE + 1], at: f64) -> f64 {
         if at == x {
             return *value;
         }
-        let weight = if k.is_multiple_of(2) { 1.0 } else { -1.0 } * if k == 0 || k == DEGREE { 0.5 } else { 1.0 } / (at - x);
+        let weight = if k.is_multiple_of(2) { 1.0 } else { -1.0 }
+            * if k == 0 || k == DEGREE { 0.5 } else { 1.0 }
+            / (at - x);
         above += weight * value;
         below += weight;
     }
@@ -186,7 +190,9 @@ impl BondLaw {
             return Err(value(format!("tensions: found {found}; allowed: {allowed}, one for each stretch")));
         }
         if let Some((stretch, bad)) = stretches.iter().zip(&tension).find(|(_, t)| !t.is_finite()) {
-            return Err(value(format!("tension at the stretch {stretch}: found {bad}; allowed: finite numbers")));
+            return Err(value(format!(
+                "tension at the stretch {stretch}: found {bad}; allowed: finite numbers"
+            )));
         }
         let law = Sampled::new(low, high, &tension);
         let found = law.tangent();
@@ -221,7 +227,9 @@ impl BondLaw {
 
 fn stretches(low: f64, high: f64) -> PyResult<Vec<f64>> {
     if !(low > 0.0 && low < 1.0 && high > 1.0 && high.is_finite()) {
-        return Err(value(format!("stretches: found {low} to {high}; allowed: from above 0, below 1, to above 1")));
+        return Err(value(format!(
+            "stretches: found {low} to {high}; allowed: from above 0, below 1, to above 1"
+        )));
     }
     let ends = ends(low, high);
     Ok((0..2 * PANELS).flat_map(|panel| nodes().map(|at| node(&ends, panel, at))).collect())

@@ -12,7 +12,12 @@ pyo3::create_exception!(
     PyValueError,
     "A fault in a scene. The text has the lines of the scene with a caret; `key` is the path of the key, `line` its line."
 );
-pyo3::create_exception!(polymech, RunError, PyRuntimeError, "A run that failed: its solution did not converge, for example.");
+pyo3::create_exception!(
+    polymech,
+    RunError,
+    PyRuntimeError,
+    "A run that failed: its solution did not converge, for example."
+);
 pyo3::create_exception!(
     polymech,
     Interrupted,

@@ -1,7 +1,7 @@
 //! Fields over time, read from VTKHDF files.
 
 use crate::error::file;
-use numpy::{IntoPyArray, PyArray1, PyArrayMethods, PyArrayDyn};
+use numpy::{IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods};
 use polycore::output::vtkhdf;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -81,7 +81,12 @@ pub struct Law {
 #[pymethods]
 impl Law {
     #[new]
-    fn new(key: String, values: Vec<f64>, volumetric: Option<(String, f64)>, published: bool) -> PyResult<Self> {
+    fn new(
+        key: String,
+        values: Vec<f64>,
+        volumetric: Option<(String, f64)>,
+        published: bool,
+    ) -> PyResult<Self> {
         let known: Vec<&str> = MODELS.iter().map(|model| model.key).collect();
         let refused = |_| value(format!("law: found {key:?}; allowed: {}", known.join(", ")));
         let law = hyperelastic::model(&key).map_err(refused)?.law(&values).map_err(value)?;
@@ -102,7 +107,8 @@ impl Law {
         let law: Box<dyn Hyperelastic> = match (term, published) {
             (None, false) => law,
             (term, _) => Box::new(
-                Compressible::with_coupling(law, term.unwrap_or(Volumetric::None), coupling).map_err(value)?,
+                Compressible::with_coupling(law, term.unwrap_or(Volumetric::None), coupling)
+                    .map_err(value)?,
             ),
         };
         Ok(Self { key, values, volumetric, published, law })
@@ -206,10 +212,17 @@ pub fn fit_law<'py>(
                 (Mode::Biaxial, Some(&[first, second, p, q])) => {
                     State { mode, stretches: [first, second], nominal: [p, q] }
                 }
-                (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => {
-                    State { mode, stretches: [stretch, mode.second_stretch(stretch)], nominal: [nominal, 0.0] }
+                (_, Some(&[stretch, nominal])) if mode != Mode::Biaxial => State {
+                    mode,
+                    stretches: [stretch, mode.second_stretch(stretch)],
+                    nominal: [nominal, 0.0],
+                },
+                _ => {
+                    return Err(value(format!(
+                        "{name}: found {} columns; allowed: 2, of biaxial tests 4",
+                        row.len()
+                    )));
                 }
-                _ => return Err(value(format!("{name}: found {} columns; allowed: 2, of biaxial tests 4", row.len()))),
             };
             state.principal_stretches().map_err(value)?;
             states.push(state);

@@ -52,7 +52,13 @@ pub struct Spec {
 enum Bonded {
     Rubber(Rubber),
     /// A law of Python, scaled to t′(1) = 3.
-    Sampled { law: Arc<crate::bond::Sampled>, space: Space, youngs_modulus: f64, thickness: f64, calibration: Calibration },
+    Sampled {
+        law: Arc<crate::bond::Sampled>,
+        space: Space,
+        youngs_modulus: f64,
+        thickness: f64,
+        calibration: Calibration,
+    },
 }
 
 impl<const D: usize> IntoMaterial<D> for Bonded {
@@ -66,7 +72,8 @@ impl<const D: usize> IntoMaterial<D> for Bonded {
         match self {
             Self::Rubber(rubber) => rubber.into_material(body, bonds),
             Self::Sampled { law, space, youngs_modulus, thickness, calibration } => {
-                let k = modulus(space, youngs_modulus, bonds.horizon(), thickness) * lattice_factor(calibration, bonds);
+                let k = modulus(space, youngs_modulus, bonds.horizon(), thickness)
+                    * lattice_factor(calibration, bonds);
                 let factor = 3.0 / law.tangent();
                 Ok((BondMaterial::new(Scaled { law, factor }, k), None))
             }
@@ -278,7 +285,12 @@ impl Simulation {
     }
 
     /// `cauchy` or `piola` stress, Pa, or the `deformation` gradient, (N, D, D).
-    fn tensors<'py>(&self, py: Python<'py>, which: &str, measure: &str) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    fn tensors<'py>(
+        &self,
+        py: Python<'py>,
+        which: &str,
+        measure: &str,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let known = Measure::ALL.into_iter().find(|one| one.name() == measure).ok_or_else(|| {
             let names: Vec<&str> = Measure::ALL.iter().map(|one| one.name()).collect();
             value(format!("measure: found {measure:?}; allowed: {}", names.join(", ")))
@@ -292,7 +304,8 @@ impl Simulation {
     /// The part of its bonds that each particle has lost.
     fn damage<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let now = self.body.intact();
-        let lost = now.iter().zip(&self.whole).map(|(&now, &whole)| 1.0 - f64::from(now) / f64::from(whole.max(1)));
+        let lost =
+            now.iter().zip(&self.whole).map(|(&now, &whole)| 1.0 - f64::from(now) / f64::from(whole.max(1)));
         lost.collect::<Vec<f64>>().into_pyarray(py)
     }
 
@@ -315,12 +328,14 @@ fn shape<const D: usize>(kind: &str, numbers: &[f64]) -> PyResult<Shape<D>> {
     match (kind, numbers.len()) {
         ("box", n) if n == 2 * D => Ok(Shape::Box { min: vector(0), max: vector(D) }),
         ("ball", n) if n == D + 1 => Ok(Shape::Ball { centre: vector(0), radius: numbers[D] }),
-        ("cylinder", n) if n == D + 3 && D == 3 && [0.0, 1.0, 2.0].contains(&numbers[D + 2]) => Ok(Shape::Cylinder {
-            centre: vector(0),
-            radius: numbers[D],
-            length: numbers[D + 1],
-            axis: numbers[D + 2] as usize,
-        }),
+        ("cylinder", n) if n == D + 3 && D == 3 && [0.0, 1.0, 2.0].contains(&numbers[D + 2]) => {
+            Ok(Shape::Cylinder {
+                centre: vector(0),
+                radius: numbers[D],
+                length: numbers[D + 1],
+                axis: numbers[D + 2] as usize,
+            })
+        }
         _ => Err(value(format!("shape: found a {kind} of {} numbers in {D} dimensions", numbers.len()))),
     }
 }
@@ -353,10 +368,14 @@ where
         (Some(law), _) => {
             let (youngs_modulus, thickness) = (spec.youngs_modulus, spec.thickness);
             if !(youngs_modulus > 0.0 && youngs_modulus.is_finite()) {
-                return Err(value(format!("Young's modulus: found {youngs_modulus}; allowed: above 0, finite")));
+                return Err(value(format!(
+                    "Young's modulus: found {youngs_modulus}; allowed: above 0, finite"
+                )));
             }
             if spec.fracture_energy.is_some() {
-                return Err(value("fracture_energy: found one with a law of Python; allowed: critical_stretch"));
+                return Err(value(
+                    "fracture_energy: found one with a law of Python; allowed: critical_stretch",
+                ));
             }
             Bonded::Sampled { law, space, youngs_modulus, thickness, calibration }
         }

@@ -34,9 +34,16 @@ impl Spec {
             [value] if temperatures.is_empty() => Property::constant(name, value),
             _ => Property::table(name, temperatures, values),
         };
-        let [growth_rate, nucleation, activation_energy, equilibrium_melting, frozen, avrami_exponent] = self.kinetics;
-        let constants =
-            Constants { growth_rate, nucleation, activation_energy, equilibrium_melting, frozen, avrami_exponent };
+        let [growth_rate, nucleation, activation_energy, equilibrium_melting, frozen, avrami_exponent] =
+            self.kinetics;
+        let constants = Constants {
+            growth_rate,
+            nucleation,
+            activation_energy,
+            equilibrium_melting,
+            frozen,
+            avrami_exponent,
+        };
         let melting = self.melting.map(|[sharpness, shape, peak]| Melting::new(sharpness, shape, peak));
         Semicrystalline::new(Polymer {
             density: self.density,

@@ -56,9 +56,11 @@ pub fn predict<'py>(
     if ![6, 9].contains(&shape.1) {
         return Err(PyValueError::new_err(format!("C: found {} columns; allowed: 6 or 9", shape.1)));
     }
-    let rows = c.as_slice().map_err(|_| PyValueError::new_err("C: found strides; allowed: contiguous rows"))?;
+    let rows =
+        c.as_slice().map_err(|_| PyValueError::new_err("C: found strides; allowed: contiguous rows"))?;
     let (count, width) = shape;
-    let found = py.detach(|| evaluate(law, rows, width, tangent, uncertainty)).map_err(crate::error::value)?;
+    let found =
+        py.detach(|| evaluate(law, rows, width, tangent, uncertainty)).map_err(crate::error::value)?;
     let answer = PyDict::new(py);
     answer.set_item("stress", found.stress.into_pyarray(py).reshape([count, 6])?)?;
     answer.set_item("energy", found.energy.into_pyarray(py))?;
@@ -74,7 +76,13 @@ pub fn predict<'py>(
     Ok(answer)
 }
 
-fn evaluate(law: &dyn Law, rows: &[f64], width: usize, tangent: bool, uncertainty: bool) -> Result<Found, String> {
+fn evaluate(
+    law: &dyn Law,
+    rows: &[f64],
+    width: usize,
+    tangent: bool,
+    uncertainty: bool,
+) -> Result<Found, String> {
     let count = rows.len() / width;
     let mut found = Found { stress: vec![0.0; 6 * count], energy: vec![0.0; count], ..Found::default() };
     if tangent {
@@ -102,11 +110,15 @@ fn evaluate(law: &dyn Law, rows: &[f64], width: usize, tangent: bool, uncertaint
         };
         parts.push(Part { c, stress, tangent: tangents.next(), energy, uncertainty });
     }
-    let fill = |memory: &mut (Workspace, Vec<Voigt>, Vec<Prediction>), (number, part): (usize, &mut Part<'_>)| {
+    let fill = |memory: &mut (Workspace, Vec<Voigt>, Vec<Prediction>),
+                (number, part): (usize, &mut Part<'_>)| {
         part.fill(law, width, memory).map_err(|(point, told)| (number * CHUNK + point, told))
     };
-    let filled: Result<(), (usize, String)> =
-        parts.par_iter_mut().enumerate().map_init(Default::default, |memory, part| fill(memory, part)).collect();
+    let filled: Result<(), (usize, String)> = parts
+        .par_iter_mut()
+        .enumerate()
+        .map_init(Default::default, |memory, part| fill(memory, part))
+        .collect();
     match filled {
         Ok(()) => Ok(found),
         Err((point, told)) => Err(format!("point {point}: {told}")),
@@ -125,8 +137,13 @@ impl Part<'_> {
         for (point, row) in self.c.chunks_exact(width).enumerate() {
             points.push(match width {
                 9 => {
-                    if let Some((i, j)) = [(1, 3), (2, 6), (5, 7)].into_iter().find(|&(i, j)| row[i] != row[j]) {
-                        return Err((point, format!("C: found {} and {}; allowed: a symmetric tensor", row[i], row[j])));
+                    if let Some((i, j)) =
+                        [(1, 3), (2, 6), (5, 7)].into_iter().find(|&(i, j)| row[i] != row[j])
+                    {
+                        return Err((
+                            point,
+                            format!("C: found {} and {}; allowed: a symmetric tensor", row[i], row[j]),
+                        ));
                     }
                     Voigt::from_fn(|a, _| row[UPPER[a]])
                 }

@@ -51,7 +51,13 @@ impl Behaviour {
 
 /// Runs a scene into a folder: the text of `report.json` and what the command line prints of it.
 #[pyfunction]
-pub fn run(py: Python<'_>, program: &str, text: String, path: PathBuf, how: Behaviour) -> PyResult<(String, String)> {
+pub fn run(
+    py: Python<'_>,
+    program: &str,
+    text: String,
+    path: PathBuf,
+    how: Behaviour,
+) -> PyResult<(String, String)> {
     of_program!(program, run_of(py, Source::new(path, text), how, false))
 }
 
@@ -65,7 +71,8 @@ fn resume_of<C: Case>(py: Python<'_>, how: Behaviour) -> PyResult<(String, Strin
     let output = &how.output;
     let there = |name: &str| output.join(name).is_file();
     if !there(polycore::checkpoint::FILE_NAME) && there(polycore::report::FILE_NAME) {
-        let report = Report::read(output.join(polycore::report::FILE_NAME)).map_err(|e| crate::error::file(&e))?;
+        let report =
+            Report::read(output.join(polycore::report::FILE_NAME)).map_err(|e| crate::error::file(&e))?;
         return told(&report.clone().into());
     }
     let header = Header::read(output, C::PROGRAM.magic)
@@ -123,7 +130,13 @@ fn told(finished: &Finished) -> PyResult<(String, String)> {
 
 /// What a scene builds and leaves out, in lines.
 #[pyfunction]
-pub fn check(py: Python<'_>, program: &str, text: String, path: PathBuf, how: Behaviour) -> PyResult<Vec<String>> {
+pub fn check(
+    py: Python<'_>,
+    program: &str,
+    text: String,
+    path: PathBuf,
+    how: Behaviour,
+) -> PyResult<Vec<String>> {
     of_program!(program, check_of(py, Source::new(path, text), how))
 }
 
@@ -148,8 +161,7 @@ pub fn sweep(
     columns: Vec<String>,
     how: Behaviour,
 ) -> PyResult<(String, String)> {
-    let vary: Vec<Vary> =
-        vary.into_iter().map(|(key, values)| Vary { key, values, drawn: false }).collect();
+    let vary: Vec<Vary> = vary.into_iter().map(|(key, values)| Vary { key, values, drawn: false }).collect();
     of_program!(program, sweep_of(py, Source::new(path, text), vary, columns, how))
 }
 
@@ -167,7 +179,9 @@ fn sweep_of<C: Case>(
         let stop = line.stop();
         let interrupted = &|| stop.load(Ordering::Relaxed);
         let mut progress = |done: usize, all: usize, last: &str| {
-            line.progress(done as f64 / all as f64, &|| format!("{done} of {all} runs are done, last {last}"));
+            line.progress(done as f64 / all as f64, &|| {
+                format!("{done} of {all} runs are done, last {last}")
+            });
         };
         let mut options = SweepOptions {
             output,

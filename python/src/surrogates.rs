@@ -37,7 +37,8 @@ impl Surrogate {
         header: &str,
         members: Vec<Vec<(PyReadonlyArray2<'_, f64>, PyReadonlyArray1<'_, f64>)>>,
     ) -> PyResult<Self> {
-        let header: Header = serde_json::from_str(header).map_err(|error| value(format!("header: {error}")))?;
+        let header: Header =
+            serde_json::from_str(header).map_err(|error| value(format!("header: {error}")))?;
         let networks = members.iter().map(|layers| network(&header.architecture, layers));
         let networks = networks.collect::<PyResult<Vec<_>>>()?;
         surrogate::Surrogate::new(header, networks).map(|law| Self { law }).map_err(value)

@@ -1,9 +1,9 @@
 //! Long work on a thread of its own, while the caller's thread hears signals and calls Python's functions.
 
+use numpy::{IntoPyArray, PyArrayMethods};
 use polycore::case::{Step, StepField};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use numpy::{IntoPyArray, PyArrayMethods};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::time::{Duration, Instant};
@@ -82,9 +82,9 @@ pub fn watched<T: Send>(
 ) -> PyResult<T> {
     let stop = AtomicBool::new(false);
     let pool = match threads {
-        Some(threads) => Some(
-            rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(crate::error::value)?,
-        ),
+        Some(threads) => {
+            Some(rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(crate::error::value)?)
+        }
         None => None,
     };
     let (sender, receiver) = channel();

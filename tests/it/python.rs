@@ -51,7 +51,8 @@ fn environment() -> Result<PathBuf, &'static str> {
         return Err("a virtual environment of CPython");
     }
     let install = |packages: &[&str]| {
-        let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries=1", "--timeout=20"];
+        let pip =
+            ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries=1", "--timeout=20"];
         has(&own, packages) || passes(&own, &[&pip[..], packages].concat())
     };
     if !install(&NEEDED) {
@@ -77,7 +78,8 @@ fn the_package_passes_its_tests() {
     let packed = python(&interpreter, &["python/pack.py", library, out]).unwrap();
     assert!(packed.status.success(), "{}", String::from_utf8_lossy(&packed.stderr));
     let wheel = String::from_utf8(packed.stdout).unwrap();
-    let pip = ["-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--force-reinstall", wheel.trim()];
+    let pip =
+        ["-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--force-reinstall", wheel.trim()];
     let installed = python(&interpreter, &pip).unwrap();
     assert!(installed.status.success(), "{}", String::from_utf8_lossy(&installed.stderr));
     let cache = format!("cache_dir={out}/cache");

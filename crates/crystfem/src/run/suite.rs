@@ -103,8 +103,7 @@ fn study(
         whole.show((place as f64 + part) / of as f64, &line);
     };
     let progress = Some(&mut progress as _);
-    let options =
-        Options { quick, resume, checkpoint_every, interrupted, progress, ..Options::new(output) };
+    let options = Options { quick, resume, checkpoint_every, interrupted, progress, ..Options::new(output) };
     let mut own = Run::new(const { &Crystfem::PROGRAM }, source, Some(&spec.name), options);
     let outcome = scene.of_study(source, index).map_err(Failure::from).and_then(|(source, scene)| {
         let report = part::one(&source, &scene, true, &mut own)?;

@@ -211,8 +211,14 @@ fn finish<C: Case>(
     let mut bar = Progress::start();
     let mut progress = |part: f64, line: &dyn Fn() -> String| bar.show(part, line);
     let interrupted = interrupted();
-    let options =
-        Options { quick, resume, checkpoint_every, interrupted, progress: Some(&mut progress), ..Options::new(output) };
+    let options = Options {
+        quick,
+        resume,
+        checkpoint_every,
+        interrupted,
+        progress: Some(&mut progress),
+        ..Options::new(output)
+    };
     let finished = super::run::<C>(source, options)?;
     bar.finish();
     terminal::print(format_args!("{}results in {}\n", finished.text, output.display()));
