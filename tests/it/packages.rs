@@ -19,6 +19,7 @@ fn tree(package: &str, flags: &[&str]) -> Vec<String> {
 fn no_crate_is_built_with_what_it_does_not_need() {
     let framework = |name: &String| name == "burn" || name.starts_with("burn-");
     assert!(tree("mdsurrogate", &[]).iter().any(framework));
+    assert!(!tree("polymech", &[]).iter().any(framework), "the Python module is built with burn");
     for package in ["polycore", "peri", "crystfem"] {
         let tree = tree(package, &[]);
         assert!(tree.iter().any(|name| name == "polycore"), "{tree:?}");

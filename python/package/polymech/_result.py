@@ -41,7 +41,7 @@ class Value(float):
         return Value, (float(self), self.unit)
 
     def __repr__(self) -> str:
-        return f"{float(self):.6g} {self.unit}".rstrip()
+        return f"{float(self):.6g} {self.unit}".removesuffix(" 1").rstrip()
 
 
 class Table(Mapping[str, Array]):
