@@ -13,7 +13,9 @@ const USED: [&str; 4] = ["matplotlib", "mypy", "pandas", "xarray"];
 fn library() -> PathBuf {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let mut command = Command::new(cargo);
-    command.args(["build", "--release", "--quiet", "--lib", "--message-format=json-render-diagnostics"]);
+    // examples too: their dependencies choose features, and nothing is compiled twice
+    command.args(["build", "--release", "--quiet", "--lib", "--bins", "--examples"]);
+    command.arg("--message-format=json-render-diagnostics");
     command.args(PACKAGES.map(|package| format!("--package={package}"))).current_dir(workspace());
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
