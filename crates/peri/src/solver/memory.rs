@@ -7,7 +7,7 @@
 use super::passes::{LANES, sum};
 use super::places::in_order;
 use crate::field::{Field, chunk_range};
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use std::collections::VecDeque;
 
 /// Entries that are worked on at a time, so that what several pairs need of them stays in the cache.
@@ -198,30 +198,34 @@ struct Products<'a> {
     g: &'a [f64],
 }
 
-impl NullaryFnOnce for Products<'_> {
+impl WithSimd for Products<'_> {
     type Output = [f64; 4];
     #[inline(always)]
-    fn call(self) -> [f64; 4] {
-        let ([s, w], [y, g]) = ([self.s, self.w], [self.y, self.g]);
-        let ((s, s_last), (w, w_last)) = (s.as_chunks::<LANES>(), w.as_chunks::<LANES>());
-        let ((y, y_last), (g, g_last)) = (y.as_chunks::<LANES>(), g.as_chunks::<LANES>());
+    fn with_simd<S: Simd>(self, simd: S) -> [f64; 4] {
+        let ((s, s_last), (w, w_last)) = (S::as_simd_f64s(self.s), S::as_simd_f64s(self.w));
+        let ((y, y_last), (g, g_last)) = (S::as_simd_f64s(self.y), S::as_simd_f64s(self.g));
         let (w, y, g) = (&w[..s.len()], &y[..s.len()], &g[..s.len()]);
-        let mut lanes = [[0.0; LANES]; 4];
+        let zero = simd.splat_f64s(0.0);
+        let (mut sy, mut wy, mut sg, mut wg) = (zero, zero, zero, zero);
         for k in 0..s.len() {
-            for lane in 0..LANES {
-                lanes[0][lane] += s[k][lane] * y[k][lane];
-                lanes[1][lane] += w[k][lane] * y[k][lane];
-                lanes[2][lane] += s[k][lane] * g[k][lane];
-                lanes[3][lane] += w[k][lane] * g[k][lane];
-            }
+            sy = simd.mul_add_f64s(s[k], y[k], sy);
+            wy = simd.mul_add_f64s(w[k], y[k], wy);
+            sg = simd.mul_add_f64s(s[k], g[k], sg);
+            wg = simd.mul_add_f64s(w[k], g[k], wg);
         }
-        for lane in 0..s_last.len() {
-            lanes[0][lane] += s_last[lane] * y_last[lane];
-            lanes[1][lane] += w_last[lane] * y_last[lane];
-            lanes[2][lane] += s_last[lane] * g_last[lane];
-            lanes[3][lane] += w_last[lane] * g_last[lane];
+        let mut sums = [
+            simd.reduce_sum_f64s(sy),
+            simd.reduce_sum_f64s(wy),
+            simd.reduce_sum_f64s(sg),
+            simd.reduce_sum_f64s(wg),
+        ];
+        for k in 0..s_last.len() {
+            sums[0] += s_last[k] * y_last[k];
+            sums[1] += w_last[k] * y_last[k];
+            sums[2] += s_last[k] * g_last[k];
+            sums[3] += w_last[k] * g_last[k];
         }
-        [sum(&lanes[0]), sum(&lanes[1]), sum(&lanes[2]), sum(&lanes[3])]
+        sums
     }
 }
 

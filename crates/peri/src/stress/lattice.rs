@@ -6,7 +6,7 @@ use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, cell_fractions, se
 use crate::bonds::{Bonds, LatticeBonds};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -287,27 +287,46 @@ struct Convolution<'a> {
     taps: &'a [Tap],
 }
 
-impl NullaryFnOnce for Convolution<'_> {
+impl WithSimd for Convolution<'_> {
     type Output = ();
     #[inline(always)]
-    fn call(self) {
+    fn with_simd<S: Simd>(self, simd: S) {
+        match BLOCK / S::F64_LANES {
+            4 => self.sum::<S, 4>(simd),
+            8 => self.sum::<S, 8>(simd),
+            16 => self.sum::<S, 16>(simd),
+            _ => self.sum::<S, BLOCK>(simd),
+        }
+    }
+}
+
+impl Convolution<'_> {
+    /// With V vectors a block.
+    #[inline(always)]
+    fn sum<S: Simd, const V: usize>(self, simd: S) {
         let Self { out, values, start, taps } = self;
-        let mut sum = [0.0; BLOCK];
+        let mut sum = [simd.splat_f64s(0.0); V];
         for tap in taps {
             let from = start.wrapping_add_signed(tap.shift);
-            if from < values.len() && values.len() - from >= BLOCK {
-                let there = &values[from..from + BLOCK];
-                for i in 0..BLOCK {
-                    sum[i] += tap.weight * there[i];
-                }
+            let weight = simd.splat_f64s(tap.weight);
+            let mut near = [0.0; BLOCK];
+            let there = if from < values.len() && values.len() - from >= BLOCK {
+                &values[from..from + BLOCK]
             } else {
                 for i in 0..BLOCK {
                     let at = from.wrapping_add(i);
-                    sum[i] += tap.weight * if at < values.len() { values[at] } else { 0.0 };
+                    near[i] = if at < values.len() { values[at] } else { 0.0 };
                 }
+                &near[..]
+            };
+            let there = &S::as_simd_f64s(there).0[..V];
+            for v in 0..V {
+                sum[v] = simd.mul_add_f64s(weight, there[v], sum[v]);
             }
         }
-        out.copy_from_slice(&sum[..out.len()]);
+        let mut all = [0.0; BLOCK];
+        S::as_mut_simd_f64s(&mut all).0.copy_from_slice(&sum);
+        out.copy_from_slice(&all[..out.len()]);
     }
 }
 

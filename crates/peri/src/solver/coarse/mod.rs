@@ -4,6 +4,7 @@
 mod factor;
 mod space;
 mod stiffness;
+mod transfer;
 
 pub use stiffness::Survey;
 
@@ -13,9 +14,11 @@ use crate::potential::BondPotential;
 use crate::solver::load::Loads;
 use crate::solver::places::in_order;
 use factor::{Factor, Pattern};
+use pulp::Arch;
 use rayon::prelude::*;
 use space::{CORNERS, NONE, Space};
-use stiffness::{Assembly, ElementMatrix, hat_values};
+use stiffness::{Assembly, ElementMatrix};
+use transfer::{Prolong, Restrict};
 
 /// Stiffness against rigid motion over that against the longest wave of the body: pieces that float free, and those that
 /// turn about one bond, have none of their own.
@@ -45,7 +48,11 @@ pub struct Body<'a, const D: usize> {
 pub struct Coarse<const D: usize> {
     space: Space<D>,
     factor: Factor,
-    /// Of each element: Pᵀg at its corners.
+    /// Place of each particle among the elements' members; [`NONE`] for those without bonds.
+    places: Vec<u32>,
+    /// P c of the members, in their order.
+    moved: Field<D>,
+    /// Of each element: Pᵀg at its corners, component by component.
     parts: Vec<f64>,
     /// Coefficients of the functions, D each.
     coefficients: Vec<f64>,
@@ -67,57 +74,70 @@ impl<const D: usize> Coarse<D> {
         let (pattern, blocks) = pattern::<D>(&space);
         let entries = assemble::<D>(&space, &pattern, &blocks, &matrices, shift);
         let factor = Factor::new(pattern, &entries, old.map(|old| old.factor))?;
-        space.renumber(bonds.particles());
+        let places = space.renumber(bonds.particles());
+        let moved = Field::zeros(space.members.len());
         let parts = vec![0.0; space.elements.len() * CORNERS * D];
         let coefficients = vec![0.0; space.functions * D];
-        Some(Self { space, factor, parts, coefficients })
+        Some(Self { space, factor, places, moved, parts, coefficients })
     }
 
     /// Solves A_c c = Pᵀg of a field over particles; g is zero where components are constrained.
     pub fn solve(&mut self, gradient: &Field<D>) {
-        let (space, gradient) = (&self.space, gradient.components());
-        let corners = 1 << D;
+        let (space, gradient, arch) = (&self.space, gradient.components(), Arch::new());
+        let local = space.local.components();
         in_order(self.parts.chunks_mut(BATCH * CORNERS * D).collect(), |batch, parts| {
             for (part, element) in parts.chunks_mut(CORNERS * D).zip(&space.elements[batch * BATCH..]) {
-                part.fill(0.0);
-                for &particle in &space.members[element.members[0]..element.members[1]] {
-                    let hats = hat_values(space.local.get(particle as usize));
-                    for d in 0..D {
-                        let g = gradient[d][particle as usize];
-                        for a in 0..corners {
-                            part[a * D + d] += hats[a] * g;
-                        }
-                    }
-                }
+                let [from, to] = element.members;
+                let members = &space.members[from..to];
+                arch.dispatch(Restrict { members, local: local.map(|x| &x[from..to]), gradient, part });
             }
         });
         self.coefficients.fill(0.0);
         for (part, element) in self.parts.chunks(CORNERS * D).zip(&space.elements) {
-            for a in 0..corners {
+            for a in 0..1 << D {
                 for d in 0..D {
-                    self.coefficients[element.functions[a] as usize * D + d] += part[a * D + d];
+                    self.coefficients[element.functions[a] as usize * D + d] += part[d * CORNERS + a];
                 }
             }
         }
         self.factor.solve(&mut self.coefficients);
+        let (mut rest, mut at) = (self.moved.components_mut(), 0);
+        let cut = |elements: &'_ [space::Element]| {
+            let length = elements.last().map_or(at, |element| element.members[1]) - at;
+            at += length;
+            rest.each_mut().map(|rest| {
+                let (part, others) = std::mem::take(rest).split_at_mut(length);
+                *rest = others;
+                part
+            })
+        };
+        let pieces: Vec<[&mut [f64]; D]> = space.elements.chunks(BATCH).map(cut).collect();
+        let coefficients = &self.coefficients;
+        in_order(pieces, |batch, moved| {
+            let elements = &space.elements[batch * BATCH..];
+            let (count, first) = (moved[0].len(), elements[0].members[0]);
+            let mut moved = moved;
+            for element in elements.iter().take_while(|element| element.members[1] <= first + count) {
+                let [from, to] = element.members;
+                let mut corners = [[0.0; CORNERS]; D];
+                for a in 0..1 << D {
+                    for d in 0..D {
+                        corners[d][a] = coefficients[element.functions[a] as usize * D + d];
+                    }
+                }
+                let out = moved.each_mut().map(|moved| &mut moved[from - first..to - first]);
+                arch.dispatch(Prolong { local: local.map(|x| &x[from..to]), corners, out });
+            }
+        });
     }
 
     /// (P c)_I of a particle with the coefficients of the last [`Self::solve`].
     #[inline]
     pub fn value(&self, particle: usize) -> [f64; D] {
-        let element = self.space.element_of[particle];
-        let mut value = [0.0; D];
-        if element != NONE {
-            let functions = &self.space.elements[element as usize].functions;
-            let hats = hat_values(self.space.local.get(particle));
-            for a in 0..1 << D {
-                let at = functions[a] as usize * D;
-                for d in 0..D {
-                    value[d] += hats[a] * self.coefficients[at + d];
-                }
-            }
+        match self.places[particle] {
+            NONE => [0.0; D],
+            place => self.moved.get(place as usize),
         }
-        value
     }
 
     /// Degrees of freedom, and entries of the factors.

@@ -216,16 +216,20 @@ impl<const D: usize> Space<D> {
         space
     }
 
-    /// Names particles by their numbers instead of their sites.
-    pub fn renumber(&mut self, particles: &[u32]) {
+    /// Names particles by their numbers instead of their sites, and orders coordinates as [`Self::members`]; the place of each particle
+    /// there.
+    pub fn renumber(&mut self, particles: &[u32]) -> Vec<u32> {
         let mut number = vec![NONE; self.element_of.len()];
         particles.iter().enumerate().for_each(|(index, &site)| number[site as usize] = index as u32);
-        self.members.iter_mut().for_each(|member| *member = number[*member as usize]);
-        self.element_of = particles.iter().map(|&site| self.element_of[site as usize]).collect();
-        let mut local = Field::zeros(particles.len());
-        let at = particles.iter().map(|&site| self.local.get(site as usize)).enumerate();
-        at.for_each(|(index, at)| local.set(index, at));
-        self.local = local;
+        let mut local = Field::zeros(self.members.len());
+        let mut places = vec![NONE; particles.len()];
+        for (place, member) in self.members.iter_mut().enumerate() {
+            local.set(place, self.local.get(*member as usize));
+            *member = number[*member as usize];
+            places[*member as usize] = place as u32;
+        }
+        (self.local, self.element_of) = (local, Vec::new());
+        places
     }
 
     /// Adds the elements of a cell: one, or one for each set of parts that its particles belong to.

@@ -352,19 +352,3 @@ fn hats<const D: usize>(local: [f64; D], edge: [f64; D]) -> ([f64; CORNERS], [[f
     }
     (values, slopes)
 }
-
-/// The hats alone.
-#[inline]
-pub fn hat_values<const D: usize>(local: [f64; D]) -> [f64; CORNERS] {
-    let mut values = [0.0; CORNERS];
-    values[0] = 1.0;
-    let mut count = 1;
-    for d in 0..D {
-        for corner in 0..count {
-            values[corner + count] = values[corner] * local[d];
-            values[corner] *= 1.0 - local[d];
-        }
-        count *= 2;
-    }
-    values
-}
