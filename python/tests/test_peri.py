@@ -152,6 +152,15 @@ def test_errors_of_functions_are_raised(sheet, tmp_path):
 
 
 def test_control_c(sheet, tmp_path):
+    # processes in the background of a shell ignore it
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        control_c(sheet, tmp_path)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def control_c(sheet, tmp_path):
     fine = {"body.spacing": "0.5 mm", "output.every": 100}
     asked = []
 
