@@ -184,7 +184,7 @@ impl Law {
     }
 }
 
-/// A function at each of some points, on all threads where there are many; the first that fails is told.
+/// Evaluates a function at `count` points, on all threads where there are many; returns the first error.
 fn points<T: Send>(count: usize, at: impl Fn(usize) -> Result<T, Error> + Sync) -> PyResult<Vec<T>> {
     let one = |k: usize| at(k).map_err(|error| format!("point {k}: {error}"));
     let found: Result<Vec<T>, String> = match count < 256 {

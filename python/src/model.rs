@@ -5,13 +5,13 @@ use crate::error::{fault, value};
 use crate::watch::{Line, Watchers, watched};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
 use peri::Error;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
-use peri::calibrate::{Calibration, Space, lattice_factor, modulus};
+use peri::bonds::{Bonds, VolumeCorrection};
+use peri::calibrate::Calibration;
 use peri::geometry::{Cut, Shape};
 use peri::material::BondMaterial;
-use peri::model::{self, Body, IntoMaterial, Model, Rubber};
-use peri::potential::{BondPotential, Law, Scaled};
-use peri::solver::{DynamicRelaxation, Lbfgs, State, Status, Support, VelocityVerlet};
+use peri::model::{self, Body, Model, Rubber};
+use peri::potential::Law;
+use peri::solver::{DynamicRelaxation, Lbfgs, Record, State, Status, Support, VelocityVerlet};
 use peri::stress::{self, Measure, Tensor};
 use polycore::case::{Fault, Step, StepField};
 use pyo3::prelude::*;
@@ -48,39 +48,6 @@ pub struct Spec {
     contact: Option<f64>,
 }
 
-/// What bonds are made of.
-enum Bonded {
-    Rubber(Rubber),
-    /// A law of Python, scaled to t′(1) = 3.
-    Sampled {
-        law: Arc<crate::bond::Sampled>,
-        space: Space,
-        youngs_modulus: f64,
-        thickness: f64,
-        calibration: Calibration,
-    },
-}
-
-impl<const D: usize> IntoMaterial<D> for Bonded {
-    type Material = BondMaterial<'static>;
-
-    fn into_material(
-        self,
-        body: &Body<D>,
-        bonds: &LatticeBonds<D>,
-    ) -> Result<(Self::Material, Option<f64>), Error> {
-        match self {
-            Self::Rubber(rubber) => rubber.into_material(body, bonds),
-            Self::Sampled { law, space, youngs_modulus, thickness, calibration } => {
-                let k = modulus(space, youngs_modulus, bonds.horizon(), thickness)
-                    * lattice_factor(calibration, bonds);
-                let factor = 3.0 / law.tangent();
-                Ok((BondMaterial::new(Scaled { law, factor }, k), None))
-            }
-        }
-    }
-}
-
 /// Method and settings.
 #[derive(Clone, Copy)]
 enum Solver {
@@ -103,13 +70,13 @@ trait AnyBody: Send + Sync {
     fn extend(&mut self, factors: Vec<f64>);
 }
 
-type Body3<const D: usize> = model::Simulation<D, BondMaterial<'static>>;
+type Built<const D: usize> = model::Simulation<D, BondMaterial<'static>>;
 
 fn stopped() -> Error {
     Error::Shared(polycore::Error::Interrupted { program: "peri", output: Default::default() })
 }
 
-impl<const D: usize> AnyBody for Body3<D> {
+impl<const D: usize> AnyBody for Built<D> {
     fn dimension(&self) -> usize {
         D
     }
@@ -126,7 +93,7 @@ impl<const D: usize> AnyBody for Body3<D> {
             let field = |name, data| StepField { name, unit: "m", components: D, data };
             let displacement = sites.iter().flat_map(|&site| state.displacement.get(site)).collect();
             let step = Step {
-                values: COLUMNS.iter().map(|(name, unit, get)| (*name, *unit, get(record))).collect(),
+                values: Record::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
                 fields: vec![field("position", positions.clone()), field("displacement", displacement)],
             };
             if line.step(step) { Ok(()) } else { Err(stopped()) }
@@ -139,11 +106,11 @@ impl<const D: usize> AnyBody for Body3<D> {
     }
 
     fn positions(&self) -> Vec<f64> {
-        Body3::displacements(self).flat_map(|(position, _)| position).collect()
+        Built::displacements(self).flat_map(|(position, _)| position).collect()
     }
 
     fn displacements(&self) -> Vec<f64> {
-        Body3::displacements(self).flat_map(|(_, displacement)| displacement).collect()
+        Built::displacements(self).flat_map(|(_, displacement)| displacement).collect()
     }
 
     fn set_velocity(&mut self, velocity: &[f64]) {
@@ -154,8 +121,8 @@ impl<const D: usize> AnyBody for Body3<D> {
     }
 
     fn history(&self) -> Vec<(&'static str, &'static str, Vec<f64>)> {
-        let rows = Body3::history(self);
-        COLUMNS.iter().map(|(name, unit, get)| (*name, *unit, rows.iter().map(get).collect())).collect()
+        let rows = Built::history(self);
+        Record::SCALARS.map(|(name, unit, get)| (name, unit, rows.iter().map(get).collect())).to_vec()
     }
 
     fn stress(&self, which: &str, measure: Measure) -> Result<Vec<f64>, Error> {
@@ -177,31 +144,13 @@ impl<const D: usize> AnyBody for Body3<D> {
     }
 
     fn fragments(&self) -> usize {
-        Body3::fragments(self)
+        Built::fragments(self)
     }
 
     fn extend(&mut self, factors: Vec<f64>) {
         self.factors.extend(factors);
     }
 }
-
-/// A column of the history: name, unit, value.
-type ColumnOf = (&'static str, &'static str, fn(&peri::solver::Record) -> f64);
-
-const COLUMNS: [ColumnOf; 12] = [
-    ("displacement", "m", |record| record.displacement),
-    ("load", "N", |record| record.load),
-    ("factor", "", |record| record.factor),
-    ("time", "s", |record| record.time),
-    ("broken_bonds", "", |record| record.broken as f64),
-    ("largest_stretch", "", |record| record.largest_stretch),
-    ("stored", "J", |record| record.stored),
-    ("work", "J", |record| record.work),
-    ("released", "J", |record| record.released),
-    ("kinetic", "J", |record| record.kinetic),
-    ("out_of_balance", "", |record| record.residual),
-    ("iterations", "", |record| record.iterations as f64),
-];
 
 /// A model that is built: particles, bonds and state.
 #[pyclass(module = "polymech._polymech")]
@@ -362,42 +311,26 @@ where
     if spec.partial_volumes {
         body = body.volume_correction(VolumeCorrection::Linear);
     }
-    let (body, space) = body.placed(&spec.space, spec.thickness)?;
+    let body = body.placed(&spec.space, spec.thickness)?;
     let calibration = if spec.lattice_calibration { Calibration::Lattice } else { Calibration::Continuum };
-    let material = match (sampled, named) {
-        (Some(law), _) => {
-            let (youngs_modulus, thickness) = (spec.youngs_modulus, spec.thickness);
-            if !(youngs_modulus > 0.0 && youngs_modulus.is_finite()) {
-                return Err(value(format!(
-                    "Young's modulus: found {youngs_modulus}; allowed: above 0, finite"
-                )));
-            }
-            if spec.fracture_energy.is_some() {
-                return Err(value(
-                    "fracture_energy: found one with a law of Python; allowed: critical_stretch",
-                ));
-            }
-            Bonded::Sampled { law, space, youngs_modulus, thickness, calibration }
-        }
+    let rubber = match (sampled, named) {
+        (Some(law), _) => Rubber::of_law(law, spec.youngs_modulus),
         (None, name) => {
             let name = name.unwrap_or_default();
             let law = Law::ALL.into_iter().find(|law| law.name() == name).ok_or_else(|| {
                 let known: Vec<&str> = Law::ALL.iter().map(|law| law.name()).collect();
                 value(format!("law: found {name:?}; allowed: {}, or a function", known.join(", ")))
             })?;
-            let rubber = Rubber::new(law, spec.youngs_modulus).chains(spec.links, spec.dissociation);
-            let rubber = rubber.calibration(calibration);
-            Bonded::Rubber(match (spec.critical_stretch, spec.fracture_energy) {
-                (Some(stretch), _) => rubber.critical_stretch(stretch),
-                (None, Some(energy)) => rubber.fracture_energy(energy),
-                (None, None) => rubber,
-            })
+            Rubber::new(law, spec.youngs_modulus).chains(spec.links, spec.dissociation)
         }
     };
-    let mut model = Model::new(body, material).steps(spec.steps);
-    if let Some(stretch) = spec.critical_stretch {
-        model = model.critical_stretch(stretch);
-    }
+    let rubber = rubber.calibration(calibration);
+    let rubber = match (spec.critical_stretch, spec.fracture_energy) {
+        (Some(stretch), _) => rubber.critical_stretch(stretch),
+        (None, Some(energy)) => rubber.fracture_energy(energy),
+        (None, None) => rubber,
+    };
+    let mut model = Model::new(body, rubber).steps(spec.steps);
     if let Some(stiffness) = spec.contact {
         model = model.contact(stiffness);
     }
@@ -451,22 +384,22 @@ fn cut<const D: usize>(numbers: &[f64]) -> PyResult<Cut<D>> {
 
 /// The space of a body.
 trait Placed: Sized {
-    fn placed(self, space: &str, thickness: f64) -> PyResult<(Self, Space)>;
+    fn placed(self, space: &str, thickness: f64) -> PyResult<Self>;
 }
 
 impl Placed for Body<2> {
-    fn placed(self, space: &str, thickness: f64) -> PyResult<(Self, Space)> {
+    fn placed(self, space: &str, thickness: f64) -> PyResult<Self> {
         match space {
-            "plane-stress" => Ok((self.plane_stress(thickness), Space::PlaneStress)),
-            "plane-strain" => Ok((self.plane_strain(thickness), Space::PlaneStrain)),
+            "plane-stress" => Ok(self.plane_stress(thickness)),
+            "plane-strain" => Ok(self.plane_strain(thickness)),
             _ => Err(value(format!("space: found {space:?}; allowed: plane-stress, plane-strain"))),
         }
     }
 }
 
 impl Placed for Body<3> {
-    fn placed(self, _: &str, _: f64) -> PyResult<(Self, Space)> {
-        Ok((self, Space::Solid))
+    fn placed(self, _: &str, _: f64) -> PyResult<Self> {
+        Ok(self)
     }
 }
 

@@ -61,6 +61,12 @@ def test_a_law_of_python_is_its_own():
     assert 0.5 < softer.load / theirs.load < 0.99
 
 
+def test_a_law_of_python_breaks_by_its_energy():
+    ours = pulled(sheet(), lambda l: 3 * (l - 1), fracture_energy=500.0).steps(7).solve()
+    theirs = pulled(sheet(), "linear", fracture_energy=500.0).steps(7).solve()
+    assert theirs.damage.max() > 0.3 and (ours.damage == theirs.damage).all()
+
+
 def test_samples_of_a_law():
     calls = []
 

@@ -19,30 +19,42 @@ impl Simulation {
         names
     }
 
-    /// [`Self::field`] at some nodes.
+    /// A quantity of a material at one of its points; `None` where the material does not have it.
+    fn value(&self, name: &str, points: &Points, stride: usize, point: usize, material: u16) -> Option<f64> {
+        let law = &self.problem.materials[usize::from(material)];
+        let (states, names) = (law.state_names().len(), law.field_names());
+        let place = names.iter().position(|other| *other == name)?;
+        let mut values = [0.0; 16];
+        let values = values.get_mut(..names.len())?;
+        law.fields(&points.state[point * stride..point * stride + states], values);
+        Some(values[place])
+    }
+
+    /// Σ m f and Σ m over the points at a node.
+    fn at_node(&self, name: &str, equation: usize) -> [f64; 2] {
+        let (nodal, points) = (&self.system.nodal, &self.state.memory.nodal);
+        let mut sums = [0.0; 2];
+        for point in nodal.of(equation) {
+            if let Some(value) = self.value(name, points, nodal.stride, point, nodal.material[point]) {
+                sums[0] += nodal.mass[point] * value;
+                sums[1] += nodal.mass[point];
+            }
+        }
+        sums
+    }
+
+    /// [`Self::field`] at some nodes; looks at no others where all points are at nodes.
     pub fn field_of(&self, name: &str, nodes: &[u32]) -> Vec<Option<f64>> {
-        let (problem, system) = (&self.problem, &self.system);
-        if !system.general.is_empty() {
+        if !self.system.general.is_empty() {
             let field = self.field(name);
             return nodes.iter().map(|&node| field[node as usize]).collect();
         }
-        let (points, stride) = (&self.state.memory.nodal, system.nodal.stride);
-        let mut values = [0.0; 16];
-        let mut of = |&node: &u32| {
-            let equation = *system.equation.get(node as usize).filter(|equation| **equation != NONE)?;
-            let (mut sum, mut mass) = (0.0, 0.0);
-            for point in system.nodal.of(equation as usize) {
-                let law = &problem.materials[usize::from(system.nodal.material[point])];
-                let place = law.field_names().iter().position(|other| *other == name);
-                let own = values.get_mut(..law.field_names().len());
-                let (Some(place), Some(own)) = (place, own) else { continue };
-                law.fields(&points.state[point * stride..][..law.state_names().len()], own);
-                sum += system.nodal.mass[point] * own[place];
-                mass += system.nodal.mass[point];
-            }
+        let of = |&node: &u32| {
+            let equation = self.system.equation.get(node as usize).filter(|equation| **equation != NONE)?;
+            let [sum, mass] = self.at_node(name, *equation as usize);
             (mass > 0.0).then(|| sum / mass)
         };
-        nodes.iter().map(&mut of).collect()
+        nodes.iter().map(of).collect()
     }
 
     /// A quantity of the materials at all nodes of the mesh: the mean of the points there, weighted by mass; `None` where no
@@ -51,41 +63,23 @@ impl Simulation {
         let (problem, system) = (&self.problem, &self.system);
         let nodes = problem.mesh.points.len();
         let (mut sum, mut mass) = (vec![0.0; nodes], vec![0.0; nodes]);
-        let place: Vec<Option<usize>> = problem
-            .materials
-            .iter()
-            .map(|material| material.field_names().iter().position(|other| *other == name))
-            .collect();
-        let mut values = [0.0; 16];
-        let mut value = |points: &Points, stride: usize, point: usize, material: usize| -> Option<f64> {
-            let law = &problem.materials[material];
-            let place = place[material]?;
-            let (states, fields) = (law.state_names().len(), law.field_names().len());
-            let values = values.get_mut(..fields)?;
-            law.fields(&points.state[point * stride..point * stride + states], values);
-            Some(values[place])
-        };
-        for equation in 0..system.size() {
-            let node = system.nodes[equation] as usize;
-            for point in system.nodal.of(equation) {
-                let material = usize::from(system.nodal.material[point]);
-                if let Some(value) = value(&self.state.memory.nodal, system.nodal.stride, point, material) {
-                    sum[node] += system.nodal.mass[point] * value;
-                    mass[node] += system.nodal.mass[point];
-                }
-            }
+        for (equation, &node) in system.nodes.iter().enumerate() {
+            let [own, of_mass] = self.at_node(name, equation);
+            sum[node as usize] += own;
+            mass[node as usize] += of_mass;
         }
         for (index, &number) in system.general.elements.iter().enumerate() {
-            let material = usize::from(problem.material_of[number as usize]);
-            if place[material].is_none() {
+            let material = problem.material_of[number as usize];
+            let law = &problem.materials[usize::from(material)];
+            if !law.field_names().contains(&name) {
                 continue;
             }
             let nodes = problem.mesh.nodes(number);
             let first = system.general.starts[index] as usize;
-            let density = problem.materials[material].density();
+            let density = law.density();
+            let (points, stride) = (&self.state.memory.general, system.general.stride);
             let mut add = |node: u32, weight: f64, point: usize| {
-                if let Some(value) = value(&self.state.memory.general, system.general.stride, point, material)
-                {
+                if let Some(value) = self.value(name, points, stride, point, material) {
                     sum[node as usize] += weight * value;
                     mass[node as usize] += weight;
                 }
@@ -113,15 +107,6 @@ impl Simulation {
     /// have it or it does not exist.
     pub fn element_means(&self, name: &str) -> Vec<Option<f64>> {
         let (problem, system) = (&self.problem, &self.system);
-        let mut values = [0.0; 16];
-        let mut value = |points: &Points, stride: usize, point: usize, material: usize| -> Option<f64> {
-            let law = &problem.materials[material];
-            let place = law.field_names().iter().position(|other| *other == name)?;
-            let (states, fields) = (law.state_names().len(), law.field_names().len());
-            let values = values.get_mut(..fields)?;
-            law.fields(&points.state[point * stride..point * stride + states], values);
-            Some(values[place])
-        };
         let mean = |sum: f64, count: usize| (count > 0).then(|| sum / count as f64);
         let mut means = vec![None; problem.material_of.len()];
         for (element, slot) in
@@ -135,9 +120,8 @@ impl Simulation {
                     system.nodal.material[*point] == material && system.nodal.birth[*point] == birth
                 };
                 let found = system.nodal.of(equation as usize).find(own);
-                let found = found.and_then(|point| {
-                    value(&self.state.memory.nodal, system.nodal.stride, point, usize::from(material))
-                });
+                let (points, stride) = (&self.state.memory.nodal, system.nodal.stride);
+                let found = found.and_then(|point| self.value(name, points, stride, point, material));
                 if let Some(found) = found {
                     (sum, count) = (sum + found, count + 1);
                 }
@@ -145,12 +129,10 @@ impl Simulation {
             *slot = mean(sum, count);
         }
         for (index, &element) in system.general.elements.iter().enumerate() {
-            let material = usize::from(problem.material_of[element as usize]);
-            let points = system.general.starts[index] as usize..system.general.starts[index + 1] as usize;
-            let count = points.len();
-            let sum: Option<f64> = points
-                .map(|point| value(&self.state.memory.general, system.general.stride, point, material))
-                .sum();
+            let material = problem.material_of[element as usize];
+            let own = system.general.starts[index] as usize..system.general.starts[index + 1] as usize;
+            let (count, points, stride) = (own.len(), &self.state.memory.general, system.general.stride);
+            let sum: Option<f64> = own.map(|point| self.value(name, points, stride, point, material)).sum();
             means[element as usize] = sum.and_then(|sum| mean(sum, count));
         }
         means

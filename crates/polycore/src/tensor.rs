@@ -18,7 +18,7 @@ mod decomposition;
 
 pub use decomposition::PrincipalFrame;
 pub use deformation::{DeformationGradient, Invariants};
-pub use stress::StressMeasure;
+pub use stress::{StressMeasure, von_mises};
 pub use voigt::{Voigt, Voigt6x6};
 
 /// A second-order tensor in three dimensions, row i and column j its component ij.

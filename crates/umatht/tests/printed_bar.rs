@@ -152,7 +152,7 @@ fn deck(mesh: &Mesh, latent: bool) -> String {
     text
 }
 
-/// Temperatures of all nodes at the end of each layer: CalculiX with steps of 5 and 25 ms (first order in time), without latent heat and with it.
+/// Compares the temperatures of all nodes at the end of each layer, without latent heat and with it. CalculiX takes steps of 5 and 25 ms and is first order in time.
 #[test]
 fn node_by_node() {
     let Some(source) = hosts::calculix() else { return };

@@ -99,40 +99,90 @@ def _begin(how: dict[str, Any], ours: bool, call: Callable[[], Any]) -> Any:
         raise
 
 
-def run(program: str, scene: Scene, output: Any, options: dict[str, Any], overrides: Mapping[str, Any]) -> Result:
-    text, path = read(scene, program, overrides)
-    how, ours = _how(output, **options)
-    return _done(how, ours, _begin(how, ours, lambda: _polymech.run(program, text, path, how)))
+class Program:
+    """The commands of a program, of which `peri` and `crystfem` are made."""
 
+    def __init__(self, name: str) -> None:
+        self._name = name
 
-def resume(program: str, output: Any, options: dict[str, Any]) -> Result:
-    how, _ = _how(output, **options)
-    return _done(how, False, _begin(how, False, lambda: _polymech.resume(program, how)))
+    def run(
+        self,
+        scene: Scene,
+        output: str | os.PathLike[str] | None = None,
+        *,
+        quick: bool = False,
+        threads: int | None = None,
+        checkpoint_every: float = 30.0,
+        inputs: Mapping[str, str | os.PathLike[str]] | None = None,
+        progress: Progress = False,
+        on_step: OnStep | None = None,
+        **overrides: Any,
+    ) -> Result:
+        """Runs a scene to its end.
 
+        `scene` is the path of a TOML file, its text, or a dictionary; `overrides` replace keys of it, with ``__`` for a dot:
+        ``material__youngs_modulus="2 MPa"``, or ``**{"a.b[0].c": 1}``.
 
-def check(program: str, scene: Scene, quick: bool, overrides: Mapping[str, Any]) -> list[str]:
-    text, path = read(scene, program, overrides)
-    how, _ = _how(Path("out") / "check", quick=quick)
-    return _polymech.check(program, text, path, how)
+        `output` is the folder of the results; without it they lie in a temporary folder that goes with the `Result`. `threads` may be
+        any number: results are the same to the bit. `progress=True` shows a bar, a function is called as ``progress(part, line)``.
+        `on_step` sees every finished step (`Step`: values, fields); where it returns `False` the run stops with `Interrupted`.
+        Ctrl-C raises `KeyboardInterrupt`. In both cases the checkpoint stays, and `resume` continues to the same bits.
 
+        Raises `SceneError` (a `ValueError`) for a fault of the scene, `RunError` for a run that fails.
+        """
+        text, path = read(scene, self._name, overrides)
+        how, ours = _how(output, quick, threads, checkpoint_every, inputs, progress, on_step)
+        return _done(how, ours, _begin(how, ours, lambda: _polymech.run(self._name, text, path, how)))
 
-def sweep(
-    program: str,
-    scene: Scene,
-    vary: Mapping[str, Sequence[Any]],
-    columns: Sequence[str],
-    output: Any,
-    options: dict[str, Any],
-    overrides: Mapping[str, Any],
-) -> Table:
-    text, path = read(scene, program, {})
-    how, ours = _how(output, **options)
-    # what the runs have in common is a key of one value
-    common = {name.replace("__", "."): [value] for name, value in overrides.items()}
-    each = {**common, **vary}.items()
-    values = [(name, [value if isinstance(value, str) else literal(value) for value in column]) for name, column in each]
-    told = _begin(how, ours, lambda: _polymech.sweep(program, text, path, values, list(columns), how))
-    result = _done(how, ours, told)
-    table = Table.read(Path(how["output"]) / "sweep.csv")
-    table.result = result
-    return table
+    def resume(
+        self,
+        output: str | os.PathLike[str],
+        *,
+        threads: int | None = None,
+        checkpoint_every: float = 30.0,
+        progress: Progress = False,
+        on_step: OnStep | None = None,
+    ) -> Result:
+        """Continues the run that was stopped or killed in a folder; of a finished one its results."""
+        how, _ = _how(output, threads=threads, checkpoint_every=checkpoint_every, progress=progress, on_step=on_step)
+        return _done(how, False, _begin(how, False, lambda: _polymech.resume(self._name, how)))
+
+    def check(self, scene: Scene, *, quick: bool = False, **overrides: Any) -> list[str]:
+        """What a scene builds and leaves out, in lines; raises `SceneError` for a fault in it."""
+        text, path = read(scene, self._name, overrides)
+        how, _ = _how(Path("out") / "check", quick=quick)
+        return _polymech.check(self._name, text, path, how)
+
+    def sweep(
+        self,
+        scene: Scene,
+        vary: Mapping[str, Sequence[Any]],
+        output: str | os.PathLike[str] | None = None,
+        *,
+        columns: Sequence[str] = (),
+        quick: bool = False,
+        threads: int | None = None,
+        progress: Progress = False,
+        **overrides: Any,
+    ) -> Table:
+        """Runs a scene for every combination of values, in parallel: ``{"print.layer_time": ["10 s", "20 s"]}``.
+
+        Gives a row for each run: its settings, and values of its report, of which `columns` names more (``*`` stands for any text).
+        The same call into the same folder continues and extends a sweep.
+        """
+        text, path = read(scene, self._name, {})
+        how, ours = _how(output, quick=quick, threads=threads, progress=progress)
+        # what the runs have in common is a key of one value
+        common = {name.replace("__", "."): [value] for name, value in overrides.items()}
+        each = {**common, **vary}.items()
+        values = [(name, [value if isinstance(value, str) else literal(value) for value in column]) for name, column in each]
+        told = _begin(how, ours, lambda: _polymech.sweep(self._name, text, path, values, list(columns), how))
+        result = _done(how, ours, told)
+        table = Table.read(Path(how["output"]) / "sweep.csv")
+        table.result = result
+        return table
+
+    def schema(self) -> dict[str, Any]:
+        """The JSON Schema of scenes."""
+        found: dict[str, Any] = json.loads(_polymech.schema(self._name))
+        return found

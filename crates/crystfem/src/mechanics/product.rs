@@ -1,6 +1,7 @@
 //! Products of element matrices with displacements: each element by vectors of the processor, then the sum at each node in the order of its
 //! elements, so that its bits do not depend on threads.
 
+use crate::system::vector::sum;
 use nalgebra::{SMatrix, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -115,19 +116,7 @@ impl WithSimd for Product<'_, '_> {
 
 /// a·b, in work items.
 pub fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
-    let own =
-        |(a, b): (&[Vector3<f64>], &[Vector3<f64>])| a.iter().zip(b).map(|(a, b)| a.dot(b)).sum::<f64>();
-    let parts: Vec<f64> = a.par_chunks(8 * ITEM).zip(b.par_chunks(8 * ITEM)).map(own).collect();
-    parts.iter().sum()
-}
-
-/// x_k = f(k, x_k), in work items.
-pub fn combine(x: &mut [Vector3<f64>], value: impl Fn(usize, &Vector3<f64>) -> Vector3<f64> + Sync) {
-    x.par_chunks_mut(8 * ITEM).enumerate().for_each(|(item, x)| {
-        for (k, x) in (item * 8 * ITEM..).zip(x) {
-            *x = value(k, x);
-        }
-    });
+    sum(a.len(), |k| a[k].dot(&b[k]))
 }
 
 #[cfg(test)]

@@ -2,8 +2,9 @@
 
 use super::body::Body;
 use super::coarse::Coarse;
-use super::product::{Elements, combine, dot};
+use super::product::{Elements, dot};
 use crate::error::Error;
+use crate::system::vector::combine;
 use nalgebra::{Matrix3, SVector, Vector3};
 
 const NONE: u32 = u32::MAX;

@@ -38,8 +38,8 @@ impl Place {
     }
 
     /// Nodes with a weight.
-    pub fn nodes(&self) -> Vec<u32> {
-        self.weights.iter().map(|pair| pair.0).collect()
+    pub fn nodes(&self) -> impl Iterator<Item = u32> {
+        self.weights.iter().map(|pair| pair.0)
     }
 
     /// Σ N_a u_a of a field over nodes; `None` where a node has no value.

@@ -9,6 +9,7 @@ use crate::scene::Mechanics;
 use crate::simulation::Simulation;
 use nalgebra::{Matrix3, Vector3};
 use polycore::report::Report;
+use polycore::tensor::von_mises;
 
 /// Residual over the load at which a solution ends: its error is far below that of the model.
 const TOLERANCE: f64 = 1e-8;
@@ -223,7 +224,7 @@ impl<'a> Follower<'a> {
     pub fn mises(&self) -> Vec<f64> {
         let of = |element: usize| {
             let alive = self.reached.last.get(element).is_some_and(Option::is_some);
-            let points = (0..POINTS).map(|point| mises(self.body.stress(element, point)));
+            let points = (0..POINTS).map(|point| von_mises(self.body.stress(element, point)));
             if alive { points.fold(0.0, f64::max) } else { f64::NAN }
         };
         (0..self.mesh.element_count()).map(of).collect()
@@ -305,9 +306,4 @@ impl Last {
     fn at(&self, point: usize) -> f64 {
         Hexahedron::shapes(point).iter().zip(self.nodes).map(|(share, t)| share * t).sum()
     }
-}
-
-fn mises([x, y, z, xy, yz, zx]: [f64; 6]) -> f64 {
-    let normal = (x - y).powi(2) + (y - z).powi(2) + (z - x).powi(2);
-    (0.5 * normal + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
 }

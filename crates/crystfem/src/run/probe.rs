@@ -78,18 +78,18 @@ pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static s
         return Ok(());
     }
     let time = simulation.time();
+    let mut nodes: Vec<u32> = probes.iter().flat_map(|probe| probe.place.nodes()).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let fields: Vec<_> = names.iter().map(|name| simulation.field_of(name, &nodes)).collect();
     for probe in probes.iter_mut().filter(|probe| probe.exists(simulation)) {
         let Some(temperature) = probe.place.value(|node| simulation.temperature(node)) else { continue };
         if probe.last() == Some(time) {
             continue;
         }
-        let nodes = probe.place.nodes();
-        let of = |name: &&'static str| {
-            let field = simulation.field_of(name, &nodes);
-            let at = |node: u32| field[nodes.iter().position(|&other| other == node)?];
-            probe.place.value(at)
-        };
-        let values: Vec<Option<f64>> = names.iter().map(of).collect();
+        let of =
+            |field: &Vec<Option<f64>>| probe.place.value(|node| field[nodes.binary_search(&node).ok()?]);
+        let values: Vec<Option<f64>> = fields.iter().map(of).collect();
         let all = std::iter::once(("temperature", Some(temperature)))
             .chain(names.iter().copied().zip(values.iter().copied()));
         for (quantity, value) in all {

@@ -1,7 +1,7 @@
 //! Stabilized biconjugate gradients, for matrices that are not symmetric, with the diagonal as preconditioner on the right
 //! (van der Vorst 1992, doi:10.1137/0913035).
 
-use super::{Ended, Operator, norm_squared};
+use super::{Ended, Goal, Operator, norm_squared};
 use crate::system::vector::{set, sum};
 
 /// Biconjugate gradients with their work space.
@@ -17,16 +17,13 @@ pub struct BiconjugateGradients {
 impl BiconjugateGradients {
     /// Solves A x = r from x = 0; arguments as of [`super::ConjugateGradients::solve`]. It stops by the residual: at
     /// √(Σ r²/diagonal / `capacity`) = `tolerance`.
-    #[allow(clippy::too_many_arguments)]
     pub fn solve(
         &mut self,
         operator: &Operator,
         inverse: &[f64],
         residual: &mut [f64],
         solution: &mut [f64],
-        [capacity, tolerance, floor]: [f64; 3],
-        limit: usize,
-        stop: &(dyn Fn() -> bool + Sync),
+        &Goal { capacity, tolerance, floor, limit, stop }: &Goal,
     ) -> Ended {
         let size = residual.len();
         let Self { shadow, direction, scaled, image, second } = self;
@@ -120,17 +117,9 @@ mod tests {
         operator.product(&exact, &mut residual);
         let mut solution = vec![0.0; size];
         let solve = |limit, solution: &mut [f64]| {
-            let goal = [3.0, 1e-10, 0.0];
+            let goal = Goal { capacity: 3.0, tolerance: 1e-10, floor: 0.0, limit, stop: &|| false };
             let mut right = residual.clone();
-            BiconjugateGradients::default().solve(
-                &operator,
-                &inverse,
-                &mut right,
-                solution,
-                goal,
-                limit,
-                &|| false,
-            )
+            BiconjugateGradients::default().solve(&operator, &inverse, &mut right, solution, &goal)
         };
         let ended = solve(3000, &mut solution);
         let error = solution.iter().zip(&exact).map(|(s, e)| (s - e).abs()).fold(0.0, f64::max);

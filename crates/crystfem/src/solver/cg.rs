@@ -20,11 +20,43 @@ pub struct Ended {
     pub converged: bool,
 }
 
-/// The terms of eᵀAe, of which the last four tell what is left.
+/// When an iteration ends.
+#[derive(Clone, Copy)]
+pub struct Goal<'a> {
+    /// ΣC, J/K.
+    pub capacity: f64,
+    /// Error at which it has converged, K.
+    pub tolerance: f64,
+    /// A square of the residual's norm that is rounding.
+    pub floor: f64,
+    /// Iterations at most.
+    pub limit: usize,
+    /// Whether to give up.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// The last four terms of eᵀAe, from which the sum of those that follow is estimated.
 struct Estimate([f64; 4]);
 
 impl Estimate {
-    /// After a term: what is left, K²·J/K; `None` where that is not known yet.
+    /// Adds a term; how the iteration ended, if the sum of those that follow is below the goal.
+    fn reached(&mut self, term: f64, iterations: usize, goal: &Goal) -> Option<Ended> {
+        let left = self.left(term)?;
+        let error = (left / goal.capacity).sqrt();
+        (left <= goal.tolerance * goal.tolerance * goal.capacity).then_some(Ended {
+            iterations,
+            error,
+            converged: true,
+        })
+    }
+
+    /// After all iterations.
+    fn given_up(&self, goal: &Goal) -> Ended {
+        let error = (self.0[3] / goal.capacity).sqrt();
+        Ended { iterations: goal.limit, error, converged: false }
+    }
+
+    /// The sum of the terms after this one, K²·J/K; `None` where it is not known yet.
     fn left(&mut self, term: f64) -> Option<f64> {
         let Self(terms) = self;
         let first = terms[3] == f64::INFINITY;
@@ -46,18 +78,14 @@ pub struct ConjugateGradients {
 }
 
 impl ConjugateGradients {
-    /// Solves A x = r from x = 0. `inverse` is one over A's diagonal, 0 where x stays 0; `residual` becomes r − A x;
-    /// `capacity` is ΣC, J/K; `floor` is a square of the residual's norm that is rounding. It ends where `stop` becomes true.
-    #[allow(clippy::too_many_arguments)]
+    /// Solves A x = r from x = 0. `inverse` is one over A's diagonal, 0 where x stays 0; `residual` becomes r − A x.
     pub fn solve(
         &mut self,
         operator: &Operator,
         inverse: &[f64],
         residual: &mut [f64],
         solution: &mut [f64],
-        [capacity, tolerance, floor]: [f64; 3],
-        limit: usize,
-        stop: &(dyn Fn() -> bool + Sync),
+        goal: &Goal,
     ) -> Ended {
         let size = residual.len();
         self.direction.resize(size, 0.0);
@@ -67,30 +95,27 @@ impl ConjugateGradients {
         let mut square = norm_squared(residual, inverse);
         let mut estimate = Estimate([f64::INFINITY; 4]);
         let mut factor = 0.0;
-        let goal = tolerance * tolerance * capacity;
-        for iteration in 0..limit {
-            if square <= floor || square == 0.0 {
+        for iteration in 0..goal.limit {
+            if square <= goal.floor || square == 0.0 {
                 return Ended { iterations: iteration, error: 0.0, converged: true };
             }
             turn(factor, &mut self.direction, residual, inverse);
             let curvature = operator.product(&self.direction, &mut self.image);
-            if stop() || !(curvature > 0.0 && curvature.is_finite()) {
+            if (goal.stop)() || !(curvature > 0.0 && curvature.is_finite()) {
                 return Ended { iterations: iteration, error: f64::NAN, converged: false };
             }
             let length = square / curvature;
             let next = advance(length, solution, residual, &self.direction, &self.image, inverse);
-            let left = estimate.left(length * square);
+            let ended = estimate.reached(length * square, iteration + 1, goal);
             (factor, square) = (next / square, next);
-            if let Some(left) = left.filter(|left| *left <= goal) {
-                let error = (left / capacity).sqrt();
-                return Ended { iterations: iteration + 1, error, converged: true };
+            if let Some(ended) = ended {
+                return ended;
             }
         }
-        Ended { iterations: limit, error: (estimate.0[3] / capacity).sqrt(), converged: false }
+        estimate.given_up(goal)
     }
 
     /// The same with a multigrid cycle as preconditioner.
-    #[allow(clippy::too_many_arguments)]
     pub fn solve_with(
         &mut self,
         multigrid: &mut Multigrid,
@@ -98,9 +123,7 @@ impl ConjugateGradients {
         inverse: &[f64],
         residual: &mut [f64],
         solution: &mut [f64],
-        [capacity, tolerance, floor]: [f64; 3],
-        limit: usize,
-        stop: &(dyn Fn() -> bool + Sync),
+        goal: &Goal,
     ) -> Ended {
         let size = residual.len();
         for field in [&mut self.direction, &mut self.image, &mut self.conditioned] {
@@ -110,9 +133,8 @@ impl ConjugateGradients {
         let Self { direction, image, conditioned } = self;
         let mut estimate = Estimate([f64::INFINITY; 4]);
         let mut last = 0.0;
-        let goal = tolerance * tolerance * capacity;
-        for iteration in 0..limit {
-            if norm_squared(residual, inverse) <= floor {
+        for iteration in 0..goal.limit {
+            if norm_squared(residual, inverse) <= goal.floor {
                 return Ended { iterations: iteration, error: 0.0, converged: true };
             }
             multigrid.apply(operator, inverse, residual, conditioned);
@@ -121,19 +143,17 @@ impl ConjugateGradients {
             last = square;
             combine(direction, |k, own| conditioned[k] + factor * own);
             let curvature = operator.product(direction, image);
-            if stop() || !(curvature > 0.0 && curvature.is_finite() && square > 0.0) {
+            if (goal.stop)() || !(curvature > 0.0 && curvature.is_finite() && square > 0.0) {
                 return Ended { iterations: iteration, error: f64::NAN, converged: false };
             }
             let length = square / curvature;
             combine(solution, |k, own| own + length * direction[k]);
             combine(residual, |k, own| own - length * image[k]);
-            let left = estimate.left(length * square);
-            if let Some(left) = left.filter(|left| *left <= goal) {
-                let error = (left / capacity).sqrt();
-                return Ended { iterations: iteration + 1, error, converged: true };
+            if let Some(ended) = estimate.reached(length * square, iteration + 1, goal) {
+                return ended;
             }
         }
-        Ended { iterations: limit, error: (estimate.0[3] / capacity).sqrt(), converged: false }
+        estimate.given_up(goal)
     }
 }
 
@@ -175,9 +195,7 @@ mod tests {
                 &inverse,
                 &mut right,
                 &mut solution,
-                [0.5, tolerance, 0.0],
-                1000,
-                &|| false,
+                &Goal { capacity: 0.5, tolerance, floor: 0.0, limit: 1000, stop: &|| false },
             );
             let error = solution.iter().zip(&exact).map(|(s, e)| (s - e) * (s - e)).sum::<f64>();
             assert!(ended.converged, "{ended:?}");
@@ -196,7 +214,8 @@ mod tests {
         let mut solution = [0.0; 2];
         let mut solve = |limit| {
             let (mut residual, mut cg) = ([1.0, 2.0], ConjugateGradients::default());
-            cg.solve(&operator, &[1.0; 2], &mut residual, &mut solution, [1.0, 1e-9, 0.0], limit, &|| false)
+            let goal = Goal { capacity: 1.0, tolerance: 1e-9, floor: 0.0, limit, stop: &|| false };
+            cg.solve(&operator, &[1.0; 2], &mut residual, &mut solution, &goal)
         };
         assert!(!solve(10).converged);
         assert!(!solve(0).converged);

@@ -39,9 +39,10 @@ pub struct Choice {
 
 /// Equations beyond which factors are too large: about 1.5 GB.
 const MOST_EQUATIONS: usize = 250_000;
-/// What a solve with multigrid costs in iterations with the diagonal: about 14 cycles of 4.5.
+/// What a solve with multigrid costs in iterations with the diagonal: measured on blocks of 16³ to 48³ elements, a solve
+/// takes 10 to 21 cycles, and a cycle costs 3 to 5 iterations (up to 7 on bricks of equal elements).
 const CYCLES: f64 = 64.0;
-/// What its levels, or an analysis for factors, cost.
+/// What its levels, or an analysis for factors, cost. Measured there: 46 to 67 (up to 295 on bricks of equal elements).
 pub const LEVELS: f64 = 300.0;
 
 /// What is known of a matrix before anything is solved.

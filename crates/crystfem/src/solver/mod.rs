@@ -8,14 +8,15 @@ mod direct;
 mod dissection;
 mod multigrid;
 
-pub use bicgstab::BiconjugateGradients;
-pub use cg::{ConjugateGradients, Ended};
+pub use cg::{Ended, Goal};
 pub use choice::{Choice, LEVELS, LinearSolver, Method, Task};
 pub use direct::Direct;
 pub use multigrid::Multigrid;
 
 use crate::system::vector::{sum, weighted_square};
 use crate::system::{FaceMatrices, Rows};
+use bicgstab::BiconjugateGradients;
+use cg::ConjugateGradients;
 
 /// A = D + `weights[0]`·M + `weights[1]`·(K + faces).
 #[derive(Clone, Copy)]
@@ -41,6 +42,36 @@ impl Operator<'_> {
             face.add_product(self.weights[1], x, y);
         }
         sum(x.len(), |k| x[k] * y[k])
+    }
+}
+
+/// The iterative methods with their work space.
+#[derive(Default)]
+pub struct Iterative {
+    conjugate: ConjugateGradients,
+    biconjugate: BiconjugateGradients,
+    /// The preconditioner of symmetric matrices, where it is not the diagonal.
+    pub multigrid: Option<Multigrid>,
+}
+
+impl Iterative {
+    /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0 where x stays 0;
+    /// `residual` becomes r − A x.
+    pub fn solve(
+        &mut self,
+        operator: &Operator,
+        symmetric: bool,
+        inverse: &[f64],
+        residual: &mut [f64],
+        solution: &mut [f64],
+        goal: &Goal,
+    ) -> Ended {
+        let Self { conjugate, biconjugate, multigrid } = self;
+        match multigrid {
+            _ if !symmetric => biconjugate.solve(operator, inverse, residual, solution, goal),
+            Some(levels) => conjugate.solve_with(levels, operator, inverse, residual, solution, goal),
+            None => conjugate.solve(operator, inverse, residual, solution, goal),
+        }
     }
 }
 

@@ -110,7 +110,7 @@ pub fn set(out: &mut [f64], value: impl Fn(usize) -> f64 + Sync) {
 }
 
 /// out_k = f(k, out_k), in work items.
-pub fn combine(out: &mut [f64], value: impl Fn(usize, f64) -> f64 + Sync) {
+pub fn combine<T: Copy + Send>(out: &mut [T], value: impl Fn(usize, T) -> T + Sync) {
     out.par_chunks_mut(CHUNK).enumerate().for_each(|(item, out)| {
         for (k, out) in out.iter_mut().enumerate() {
             *out = value(item * CHUNK + k, *out);

@@ -4,8 +4,7 @@ use super::Work;
 use crate::error::Error;
 use crate::ledger::NOTHING;
 use crate::problem::Problem;
-use crate::solver::norm_squared;
-use crate::solver::{BiconjugateGradients, ConjugateGradients, Direct, Ended, Method, Multigrid, Operator};
+use crate::solver::{Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, norm_squared};
 use crate::system::vector::{largest, set, sum};
 use crate::system::{At, Evaluation, FaceMatrices, Memory, System};
 
@@ -56,13 +55,11 @@ pub struct Stages {
     row_sums: Vec<f64>,
     /// K·1 and M·1 over the free nodes.
     free_sums: [Vec<f64>; 2],
-    cg: ConjugateGradients,
-    bicg: BiconjugateGradients,
+    iterative: Iterative,
     /// What is wanted; factors and levels are made when first needed.
     pub method: Method,
     factors: Option<Direct>,
-    multigrid: Option<Multigrid>,
-    /// For which system its levels and for which matrix their sums were made.
+    /// For which system the levels of multigrid and for which matrix their sums were made.
     levels_for: Option<u64>,
     set_for: Option<(u64, u64)>,
     /// For which generation the analysis and for which weight the factors were made.
@@ -79,7 +76,7 @@ impl Stages {
     /// Forgets everything made for another system, but keeps the room for it.
     pub fn reset(&mut self) {
         (self.factors, self.analysed_for, self.factored_for) = (None, None, None);
-        (self.multigrid, self.levels_for, self.set_for) = (None, None, None);
+        (self.iterative.multigrid, self.levels_for, self.set_for) = (None, None, None);
         (self.made_for, self.sums_for) = (None, None);
     }
 
@@ -190,7 +187,8 @@ impl Stages {
         self.right.resize(size, 0.0);
         set(&mut self.right, |k| system.free[k] * right(k));
         let operator = operator(system, &self.diagonal, weight, &self.evaluation);
-        let goal = [self.capacity, tolerance, 0.0];
+        let goal =
+            Goal { capacity: self.capacity, tolerance, floor: 0.0, limit: limit(size), stop: &|| false };
         self.correction.resize(size, 0.0);
         let made_for = Some((system.generation, weight.to_bits()));
         match &mut self.factors {
@@ -202,14 +200,8 @@ impl Stages {
             }
             _ => {
                 let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
-                let (go_on, limit) = (&|| false, limit(size));
-                let ended = match (system.is_symmetric(), &mut self.multigrid) {
-                    (true, Some(levels)) => {
-                        self.cg.solve_with(levels, &operator, inverse, right, found, goal, limit, go_on)
-                    }
-                    (true, None) => self.cg.solve(&operator, inverse, right, found, goal, limit, go_on),
-                    (false, _) => self.bicg.solve(&operator, inverse, right, found, goal, limit, go_on),
-                };
+                let symmetric = system.is_symmetric();
+                let ended = self.iterative.solve(&operator, symmetric, inverse, right, found, &goal);
                 work.cg_iterations += ended.iterations as u64;
                 work.cg_solves += 1;
             }
@@ -293,18 +285,18 @@ impl Stages {
     /// Levels of multigrid where they are wanted, for the matrix that is prepared.
     fn raise(&mut self, problem: &Problem, system: &System, weight: f64, work: &mut Work) {
         if self.method != Method::Multigrid || !system.is_symmetric() {
-            self.multigrid = None;
+            self.iterative.multigrid = None;
             return;
         }
-        if self.levels_for != Some(system.build) || self.multigrid.is_none() {
+        if self.levels_for != Some(system.build) || self.iterative.multigrid.is_none() {
             let operator = operator(system, &self.diagonal, weight, &self.evaluation);
             let place = |k: usize| problem.mesh.points[system.nodes[k] as usize];
-            self.multigrid = Some(Multigrid::new(&operator, &system.free, place));
+            self.iterative.multigrid = Some(Multigrid::new(&operator, &system.free, place));
             (self.levels_for, self.set_for) = (Some(system.build), None);
             work.levels += 1;
         }
         let made_for = Some((system.generation, weight.to_bits()));
-        if let Some(multigrid) = &mut self.multigrid
+        if let Some(multigrid) = &mut self.iterative.multigrid
             && (self.set_for != made_for || !system.is_linear())
         {
             let Evaluation { capacity, faces, .. } = &self.evaluation;
@@ -336,8 +328,13 @@ impl Stages {
         let residual = &self.residual;
         set(&mut self.right, |k| -system.free[k] * residual[k]);
         let operator = operator(system, &self.diagonal, stage.weight, &self.evaluation);
-        let goal = [self.capacity, tolerance, self.floor];
-        let limit = limit(size);
+        let goal = Goal {
+            capacity: self.capacity,
+            tolerance,
+            floor: self.floor,
+            limit: limit(size),
+            stop: stage.stop,
+        };
         let factored = self.method == Method::Factors && system.is_symmetric() && {
             let made_for = Some((system.generation, stage.weight.to_bits()));
             if self.analysed_for != Some(system.build) {
@@ -370,14 +367,7 @@ impl Stages {
             Ended { iterations: 0, error: 0.0, converged: true }
         } else {
             work.cg_solves += 1;
-            let stop = stage.stop;
-            match (system.is_symmetric(), &mut self.multigrid) {
-                (true, Some(levels)) => {
-                    self.cg.solve_with(levels, &operator, inverse, right, found, goal, limit, stop)
-                }
-                (true, None) => self.cg.solve(&operator, inverse, right, found, goal, limit, stop),
-                (false, _) => self.bicg.solve(&operator, inverse, right, found, goal, limit, stop),
-            }
+            self.iterative.solve(&operator, system.is_symmetric(), inverse, right, found, &goal)
         };
         work.cg_iterations += ended.iterations as u64;
         if (stage.stop)() {

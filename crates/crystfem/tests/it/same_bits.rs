@@ -101,7 +101,7 @@ fn whole_copy(of: &Simulation, general: bool, settings: Settings) -> Simulation 
     Simulation::resume(path(general), settings, of.state().clone()).unwrap()
 }
 
-/// Stopped within a step, a simulation is where the step began, and goes on with the same bits.
+/// A stop within a step restores the state before that step; the simulation continues to the same bits.
 #[test]
 fn stopped_within_a_step() {
     let settings = Settings::adaptive(0.05);

@@ -6,13 +6,14 @@ use crate::calibrate::{Calibration, lattice_factor, modulus};
 use crate::critical::{Context, Critical};
 use crate::error::Error;
 use crate::material::BondMaterial;
-use crate::potential::Law;
+use crate::potential::{BondPotential, Law, Scaled};
 use polycore::units::EnergyPerArea;
+use std::sync::Arc;
 
-/// Rubber whose bonds follow a [`Law`].
-#[derive(Clone, Copy, Debug)]
+/// Rubber whose bonds follow a [`Law`], or a law of the caller.
+#[derive(Clone)]
 pub struct Rubber {
-    law: Law,
+    law: Kind,
     youngs_modulus: f64,
     links: f64,
     dissociation: f64,
@@ -20,10 +21,25 @@ pub struct Rubber {
     critical: Option<Critical>,
 }
 
+#[derive(Clone)]
+enum Kind {
+    Named(Law),
+    Own(Arc<dyn BondPotential>),
+}
+
 impl Rubber {
     /// Rubber of Young's modulus E, Pa, that does not break. Chains have n̄ = 720 links of D̂ = 1200 unless
     /// [`Self::chains`] says otherwise.
     pub fn new(law: Law, youngs_modulus: f64) -> Self {
+        Self::of(Kind::Named(law), youngs_modulus)
+    }
+
+    /// Rubber of any law, which is scaled so that t′(1) = 3, as the calibration of kθ expects.
+    pub fn of_law(law: impl BondPotential + 'static, youngs_modulus: f64) -> Self {
+        Self::of(Kind::Own(Arc::new(law)), youngs_modulus)
+    }
+
+    fn of(law: Kind, youngs_modulus: f64) -> Self {
         let (links, dissociation, calibration) = (720.0, 1200.0, Calibration::Continuum);
         Self { law, youngs_modulus, links, dissociation, calibration, critical: None }
     }
@@ -67,10 +83,22 @@ impl<const D: usize> IntoMaterial<D> for Rubber {
             let allowed = "above 0, finite".into();
             return Err(Error::Parameter { name: "Young's modulus", found, allowed });
         }
-        let law = self.law.build(self.links, self.dissociation, self.law.rescales())?;
+        let (law, links): (Box<dyn BondPotential>, _) = match self.law {
+            Kind::Named(law) => {
+                let links = law.is_chain().then_some(self.links);
+                (law.build(self.links, self.dissociation, law.rescales())?, links)
+            }
+            Kind::Own(law) => {
+                let found = law.tangent();
+                if !(found > 0.0 && found.is_finite()) {
+                    let allowed = "above 0, finite".into();
+                    return Err(Error::Parameter { name: "t′(1) of the bond law", found, allowed });
+                }
+                (Box::new(Scaled { law, factor: 3.0 / found }), None)
+            }
+        };
         let (space, horizon, thickness) = (body.space, bonds.horizon(), body.thickness);
         let modulus = modulus(space, found, horizon, thickness) * lattice_factor(self.calibration, bonds);
-        let links = self.law.is_chain().then_some(self.links);
         let context = Context { law: &*law, links, space, modulus, horizon, thickness };
         let critical = self.critical.map(|critical| critical.resolve(&context)).transpose()?;
         Ok((BondMaterial::new(law, modulus), critical))

@@ -31,7 +31,9 @@ use crate::material::relief;
 use crate::potential::KernelFit;
 use crate::quantities as q;
 use crate::scene::{self, Scene, Variant, body_of, loads_of};
-use crate::solver::{Bilinear, Breaking, Criterion, Loads, Method, State, Status, System, load_stepping};
+use crate::solver::{
+    Bilinear, Breaking, Criterion, Loads, Method, Record, State, Status, System, load_stepping,
+};
 use polycore::case::{Fault, Run, Step, StepField};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
@@ -370,17 +372,7 @@ fn seen<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
         StepField { name, unit: "m", components: 3, data: each.collect() }
     };
     Step {
-        values: vec![
-            ("displacement", "m", record.displacement),
-            ("load", "N", record.load),
-            ("time", "s", record.time),
-            ("factor", "", record.factor),
-            ("broken_bonds", "", record.broken as f64),
-            ("largest_stretch", "", record.largest_stretch),
-            ("stored", "J", record.stored),
-            ("work", "J", record.work),
-            ("iterations", "", record.iterations as f64),
-        ],
+        values: Record::SCALARS.map(|(name, unit, get)| (name, unit, get(record))).to_vec(),
         fields: vec![
             of_particles("position", &|site| bonds.position(site)),
             of_particles("displacement", &|site| state.displacement.get(site)),

@@ -56,6 +56,27 @@ pub struct Record {
     pub seen: Vec<f64>,
 }
 
+/// A scalar of a step: name, unit, value.
+type Scalar = (&'static str, &'static str, fn(&Record) -> f64);
+
+impl Record {
+    /// The scalars that every step has.
+    pub const SCALARS: [Scalar; 12] = [
+        ("displacement", "m", |record| record.displacement),
+        ("load", "N", |record| record.load),
+        ("factor", "", |record| record.factor),
+        ("time", "s", |record| record.time),
+        ("broken_bonds", "", |record| record.broken as f64),
+        ("largest_stretch", "", |record| record.largest_stretch),
+        ("stored", "J", |record| record.stored),
+        ("work", "J", |record| record.work),
+        ("released", "J", |record| record.released),
+        ("kinetic", "J", |record| record.kinetic),
+        ("out_of_balance", "", |record| record.residual),
+        ("iterations", "", |record| record.iterations as f64),
+    ];
+}
+
 /// Bonds that broke together.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Event {

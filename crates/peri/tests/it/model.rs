@@ -7,7 +7,7 @@ use peri::calibrate::{Space, modulus};
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::model::{Body, Model, Rubber};
-use peri::potential::Law;
+use peri::potential::{BondPotential, Law};
 use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, Support, System, VelocityVerlet,
 };
@@ -100,6 +100,39 @@ fn any_material() {
         moved(21e-3) - moved(19e-3)
     };
     assert!(opening(1e-3) > 3.0 * opening(23e-3), "{} {}", opening(1e-3), opening(23e-3));
+}
+
+/// A law of the caller, whatever its scale, is the named one of the same shape; so is the stretch of a fracture energy.
+#[test]
+fn a_law_of_the_caller() {
+    struct Springs(f64);
+    impl BondPotential for Springs {
+        fn tension(&self, stretch: f64) -> f64 {
+            self.0 * (stretch - 1.0)
+        }
+        fn tension_derivative(&self, _: f64) -> f64 {
+            self.0
+        }
+        fn energy(&self, stretch: f64) -> f64 {
+            0.5 * self.0 * (stretch - 1.0).powi(2)
+        }
+    }
+    let torn = |rubber: Rubber| {
+        let model = Model::new(sheet(), rubber.fracture_energy(500.0)).clamp(|[_, y]| y < 6e-3);
+        let mut simulation = model.displace(|[_, y]| y > 34e-3, [0.0, 12e-3]).steps(4).build().unwrap();
+        simulation.solve(Lbfgs::default()).unwrap();
+        simulation
+    };
+    let (ours, theirs) = (torn(Rubber::of_law(Springs(0.7), 1e6)), torn(Rubber::new(Law::Linear, 1e6)));
+    assert!(theirs.state.broken > 0);
+    assert_eq!(ours.bonds.intact(), theirs.bonds.intact());
+    for (a, b) in ours.history().iter().zip(theirs.history()) {
+        // both to residuals of 1e-4
+        assert!((a.load - b.load).abs() <= 2e-4 * b.load.abs(), "{} {}", a.load, b.load);
+    }
+    let slack = Model::new(sheet(), Rubber::of_law(Springs(0.0), 1e6)).build();
+    let message = slack.err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(message.starts_with("t′(1) of the bond law: found 0"), "{message}");
 }
 
 #[test]

@@ -21,6 +21,12 @@ impl StressMeasure {
         [Self::FirstPiolaKirchhoff, Self::SecondPiolaKirchhoff, Self::Kirchhoff, Self::Cauchy];
 }
 
+/// The von Mises stress √(3/2 s:s), s the deviator, from the three normal and the three shear stresses.
+pub fn von_mises([x, y, z, first, second, third]: [f64; 6]) -> f64 {
+    let normal = (x - y).powi(2) + (y - z).powi(2) + (z - x).powi(2);
+    (0.5 * normal + 3.0 * (first * first + second * second + third * third)).sqrt()
+}
+
 impl DeformationGradient {
     /// Rewrites a stress from one measure in another. Same unit in and out; a measure into itself is returned as it is.
     pub fn convert_stress(&self, stress: &Tensor, from: StressMeasure, to: StressMeasure) -> Tensor {

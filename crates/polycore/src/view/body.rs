@@ -25,7 +25,7 @@ pub struct Detail {
     pub coarser: usize,
 }
 
-/// What the page is told of a body; the numbers are in a [`Store`].
+/// A body as the page reads it; its numbers are in a [`Store`].
 #[derive(Debug, Serialize)]
 pub struct Body {
     name: String,

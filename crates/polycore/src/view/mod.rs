@@ -2,8 +2,8 @@
 //!
 //! [`view`] reads what a run has written (`report.json`, tables, fields) and gives the page: solids that turn and can be
 //! cut, coloured by any field, step by step, beside the curves of the history. Drawing is done by plotly.js, which the
-//! crate [`plotly`] contains; numbers are quantised and deflated, and steps, cells and fields are left out until all of
-//! it fits. Pages state what is left out.
+//! crate [`plotly`] contains; numbers are quantised and deflated, and steps and cells are dropped until all of
+//! it fits. Pages list what is dropped.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -29,7 +29,7 @@ pub struct Choice {
 }
 
 impl Choice {
-    /// Every particle, or where they are too many every k-th along each axis; `coarser` leaves out more.
+    /// The particles that are drawn: all, or every k-th along each axis of a large body; `coarser` drops more.
     pub fn of(reference: &[[f64; 3]], coarser: usize) -> Self {
         let extent: [[f64; 2]; 3] = [0, 1, 2].map(|d| {
             let low = reference.iter().fold(f64::INFINITY, |low, x| low.min(x[d]));

@@ -1,5 +1,6 @@
 //! What is shown of an array: its components and invariants, each with name and unit.
 
+use crate::tensor::von_mises;
 use nalgebra::Matrix3;
 
 /// The value of a scalar from the components of an array at a place.
@@ -78,12 +79,6 @@ pub fn scalars(array: &str, components: usize, plane: bool) -> Vec<Scalar> {
             list
         }
     }
-}
-
-/// √(3/2 s:s) of 11, 22, 33, 12, 23, 13.
-fn von_mises([a, b, c, d, e, f]: [f64; 6]) -> f64 {
-    let normal = (a - b).powi(2) + (b - c).powi(2) + (c - a).powi(2);
-    (0.5 * normal + 3.0 * (d * d + e * e + f * f)).sqrt()
 }
 
 fn largest_principal(six: [f64; 6]) -> f64 {
