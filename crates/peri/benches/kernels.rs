@@ -1,10 +1,11 @@
 //! `cargo bench -p peri`: force densities of all bonds, as `peri bench` and `cargo xtask bench peri` measure them.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use peri::bonds::{Bonds, force};
+use peri::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
-use peri::potential::Law;
+use peri::potential::{KernelFit, Law};
 use peri::run::Failure;
+use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_in_cloud};
 
 #[path = "../src/command/bench/kernel.rs"]
 mod kernel;
@@ -47,5 +48,31 @@ fn forces(criterion: &mut Criterion) {
     run.unwrap_or_else(|error| panic!("{error}"));
 }
 
-criterion_group! { name = kernels; config = Criterion::default().sample_size(20); targets = forces }
+/// Stress of a cloud of 17³ particles off their lattice, δ = 4 Δx.
+fn stress(criterion: &mut Criterion) {
+    let points: Vec<[f64; 3]> = (0..17_usize.pow(3))
+        .map(|k| [k % 17, k / 17 % 17, k / 289].map(|i| i as f64))
+        .map(|[x, y, z]| [x + 0.1 * (y + z).sin(), y + 0.1 * (2.0 * x).sin(), z + 0.1 * (x - y).cos()])
+        .collect();
+    let volumes = vec![1.0; points.len()];
+    let bonds = CloudBonds::new(&points, &volumes, 1.0, 4.0, VolumeCorrection::None, &[]);
+    let bonds = bonds.unwrap_or_else(|error| panic!("{error}"));
+    let mut displacement = Field::zeros(bonds.sites());
+    for (site, point) in points.iter().enumerate() {
+        displacement.set(site, point.map(|x| 0.05 * x));
+    }
+    let law = Law::Linear.build(0.0, 0.0, false).unwrap_or_else(|error| panic!("{error}"));
+    let fit = KernelFit::new(&*law, [0.5, 2.0], 1e-7);
+    let fit = fit.unwrap_or_else(|error| panic!("{error}"));
+    let mut group = criterion.benchmark_group("stress of a cloud");
+    for measure in [Measure::Hardy, Measure::Gaussian] {
+        let state = Loaded { displacement: &displacement, fit: &fit, modulus: 1.0, missing: Missing::Bonds };
+        group.bench_function(measure.name(), |bencher| {
+            bencher.iter(|| piola_in_cloud(&bonds, &state, measure, BallVolume::Particles));
+        });
+    }
+    group.finish();
+}
+
+criterion_group! { name = kernels; config = Criterion::default().sample_size(20); targets = forces, stress }
 criterion_main!(kernels);
