@@ -28,79 +28,53 @@ pub struct Spans<'a, const D: usize> {
     pub tiles: Tiles<'a, D>,
 }
 
-/// e = λ² − 1 of one bond of each particle of a tile, where it is intact; 0 elsewhere.
-struct Elongations<'a, const D: usize> {
-    displacement: [&'a [f64]; D],
-    words: &'a [u64],
-    span: &'a Span<D>,
-    bit: usize,
-    base: usize,
-    out: &'a mut [f64; TILE],
-}
-
-impl<const D: usize> NullaryFnOnce for Elongations<'_, D> {
-    type Output = ();
+impl<const D: usize> Spans<'_, D> {
+    /// Calls `add` for the tiles of some sites that hold bonds: with the first site, and which of the first `count` bonds of the stencil
+    /// any of the particles has.
     #[inline(always)]
-    fn call(self) {
-        let Self { displacement, words, span, bit, base, out } = self;
+    fn tiles<A: Add<D>>(&self, sites: Range<usize>, count: usize, add: &mut A) {
+        let mut present = Vec::with_capacity(count);
+        for base in sites.step_by(TILE).filter(|base| self.tiles.classes[base / TILE] != Class::Empty) {
+            present.clear();
+            for (word, words) in self.tiles.intact.iter().enumerate() {
+                let mut any = words[base..base + TILE].iter().fold(0, |any, bits| any | bits);
+                while any != 0 {
+                    present.push(64 * word + any.trailing_zeros() as usize);
+                    any &= any - 1;
+                }
+            }
+            let end = present.partition_point(|&k| k < count);
+            add.tile(self, base, &present[..end]);
+        }
+    }
+
+    /// e = λ² − 1 of bond k of each particle of a tile, where it is intact; 0 elsewhere.
+    #[inline(always)]
+    fn elongations(&self, base: usize, k: usize) -> [f64; TILE] {
+        let span = &self.spans[k];
         let there = base.wrapping_add_signed(span.shift);
-        *out = [0.0; TILE];
+        let mut out = [0.0; TILE];
         for d in 0..D {
-            let (own, other) = (&displacement[d][base..base + TILE], &displacement[d][there..there + TILE]);
+            let displacement = self.tiles.displacement[d];
+            let (own, other) = (&displacement[base..base + TILE], &displacement[there..there + TILE]);
             for i in 0..TILE {
                 let eta = other[i] - own[i];
                 out[i] += eta * (2.0 * span.bond[d] + eta);
             }
         }
+        let words = &self.tiles.intact[k / 64][base..base + TILE];
         for i in 0..TILE {
-            let present = words[base + i] >> bit & 1 == 1;
+            let present = words[i] >> (k % 64) & 1 == 1;
             out[i] = if present { out[i] * span.inverse_square } else { 0.0 };
         }
-    }
-}
-
-impl<const D: usize> Spans<'_, D> {
-    /// The tiles of some sites that hold bonds, by their first site.
-    fn tiles(&self, sites: Range<usize>) -> impl Iterator<Item = usize> {
-        sites.step_by(TILE).filter(|base| self.tiles.classes[base / TILE] != Class::Empty)
-    }
-
-    /// Visits the elongations of the first `count` bonds of the stencil of a tile's particles, where any of them has that bond.
-    #[inline(always)]
-    fn visit(&self, base: usize, count: usize, mut visit: impl FnMut(&Span<D>, u64, usize, &[f64; TILE])) {
-        let arch = Arch::new();
-        let mut e = [0.0; TILE];
-        for (word, words) in self.tiles.intact.iter().enumerate() {
-            let mut any = 0;
-            for bits in &words[base..base + TILE] {
-                any |= bits;
-            }
-            while any != 0 {
-                let bit = any.trailing_zeros() as usize;
-                any &= any - 1;
-                if 64 * word + bit >= count {
-                    return;
-                }
-                let span = &self.spans[64 * word + bit];
-                let (displacement, out) = (self.tiles.displacement, &mut e);
-                arch.dispatch(Elongations { displacement, words, span, bit, base, out });
-                visit(span, 1 << bit, word, &e);
-            }
-        }
+        out
     }
 
     /// Extremes of e over the bonds that begin in these sites, of one direction each.
     pub fn range(&self, sites: Range<usize>) -> StretchRange {
-        let (mut low, mut high) = ([0.0_f64; TILE], [0.0_f64; TILE]);
-        for base in self.tiles(sites) {
-            self.visit(base, self.spans.len() / 2, |_, _, _, e| {
-                for i in 0..TILE {
-                    // a stretch that is not a number is no extreme, as in the kernels
-                    low[i] = if e[i] < low[i] { e[i] } else { low[i] };
-                    high[i] = if e[i] > high[i] { e[i] } else { high[i] };
-                }
-            });
-        }
+        let mut found = Extremes { low: [0.0; TILE], high: [0.0; TILE] };
+        self.sum(sites, self.spans.len() / 2, &mut found);
+        let Extremes { low, high } = found;
         StretchRange {
             low: low.iter().copied().fold(0.0, f64::min),
             high: high.iter().copied().fold(0.0, f64::max),
@@ -109,32 +83,103 @@ impl<const D: usize> Spans<'_, D> {
 
     /// The tiles with a bond beyond e = `least`, whichever end it is seen from.
     pub fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<Range<usize>> {
-        let mut found = Vec::new();
-        for base in self.tiles(sites) {
-            let mut beyond = false;
-            self.visit(base, self.spans.len(), |_, _, _, e| beyond |= e.iter().any(|&e| e > least));
-            if beyond {
-                found.push(base..base + TILE);
-            }
-        }
-        found
+        let mut found = Beyond { least, tiles: Vec::new() };
+        self.sum(sites, self.spans.len(), &mut found);
+        found.tiles
     }
 
     /// Σ share·|ξ|·φ(e) over the bonds that begin in these sites, of one direction each.
     pub fn energy(&self, sites: Range<usize>, energy: impl Fn(f64) -> f64) -> f64 {
-        let mut total = 0.0;
-        for base in self.tiles(sites) {
-            self.visit(base, self.spans.len() / 2, |span, bit, word, e| {
-                let words = &self.tiles.intact[word][base..base + TILE];
-                let mut sum = 0.0;
-                for i in 0..TILE {
-                    if words[i] & bit != 0 {
-                        sum += energy(e[i]);
-                    }
-                }
-                total += span.share * span.length * sum;
-            });
+        let mut found = Energy { energy, total: 0.0 };
+        self.sum(sites, self.spans.len() / 2, &mut found);
+        found.total
+    }
+
+    fn sum<A: Add<D>>(&self, sites: Range<usize>, count: usize, add: &mut A) {
+        Arch::new().dispatch(Sum { spans: self, sites, count, add });
+    }
+}
+
+/// What a tile adds to a sum: `present` are the bonds of the stencil that any of its particles has.
+trait Add<const D: usize> {
+    fn tile(&mut self, spans: &Spans<D>, base: usize, present: &[usize]);
+}
+
+/// A sum, compiled as a whole for the vectors of the machine.
+struct Sum<'a, 'b, const D: usize, A> {
+    spans: &'b Spans<'a, D>,
+    sites: Range<usize>,
+    count: usize,
+    add: &'b mut A,
+}
+
+impl<const D: usize, A: Add<D>> NullaryFnOnce for Sum<'_, '_, D, A> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        self.spans.tiles(self.sites, self.count, self.add);
+    }
+}
+
+struct Extremes {
+    low: [f64; TILE],
+    high: [f64; TILE],
+}
+
+impl<const D: usize> Add<D> for Extremes {
+    #[inline(always)]
+    fn tile(&mut self, spans: &Spans<D>, base: usize, present: &[usize]) {
+        let Self { low, high } = self;
+        for &k in present {
+            let e = spans.elongations(base, k);
+            for i in 0..TILE {
+                // a stretch that is not a number is no extreme, as in the kernels
+                low[i] = if e[i] < low[i] { e[i] } else { low[i] };
+                high[i] = if e[i] > high[i] { e[i] } else { high[i] };
+            }
         }
-        total
+    }
+}
+
+struct Beyond {
+    least: f64,
+    tiles: Vec<Range<usize>>,
+}
+
+impl<const D: usize> Add<D> for Beyond {
+    #[inline(always)]
+    fn tile(&mut self, spans: &Spans<D>, base: usize, present: &[usize]) {
+        let mut high = [0.0; TILE];
+        for &k in present {
+            let e = spans.elongations(base, k);
+            for i in 0..TILE {
+                high[i] = if e[i] > high[i] { e[i] } else { high[i] };
+            }
+        }
+        if high.iter().any(|&e| e > self.least) {
+            self.tiles.push(base..base + TILE);
+        }
+    }
+}
+
+struct Energy<F> {
+    energy: F,
+    total: f64,
+}
+
+impl<const D: usize, F: Fn(f64) -> f64> Add<D> for Energy<F> {
+    #[inline(always)]
+    fn tile(&mut self, spans: &Spans<D>, base: usize, present: &[usize]) {
+        for &k in present {
+            let (span, e) = (&spans.spans[k], spans.elongations(base, k));
+            let words = &spans.tiles.intact[k / 64][base..base + TILE];
+            let mut sum = 0.0;
+            for i in 0..TILE {
+                if words[i] >> (k % 64) & 1 == 1 {
+                    sum += (self.energy)(e[i]);
+                }
+            }
+            self.total += span.share * span.length * sum;
+        }
     }
 }

@@ -3,7 +3,7 @@
 use super::window::{Window, bond_function};
 use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, force_over_length, segment_fraction};
 use crate::bonds::{Bonds, CellGrid, CloudBonds, Neighbour, Stencil};
-use pulp::Arch;
+use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 
 pub fn piola<const D: usize>(
@@ -152,7 +152,7 @@ impl<const D: usize> Shares<'_, D> {
                         bonds.push(bond);
                     }
                 });
-                let shares = arch.dispatch(|| self.shares(own, &bonds, &around));
+                let shares = arch.dispatch(Given { shares: self, own, bonds: &bonds, around: &around });
                 (around.members, shares)
             };
             let all: Vec<_> = owners.par_iter().map(of).collect();
@@ -192,12 +192,23 @@ impl<const D: usize> Shares<'_, D> {
         });
         around
     }
+}
 
-    /// What bonds of `own` give to each particle around it.
+/// What bonds of `own` give to each particle around it.
+struct Given<'a, const D: usize> {
+    shares: &'a Shares<'a, D>,
+    own: usize,
+    bonds: &'a [Neighbour<D>],
+    around: &'a Around<D>,
+}
+
+impl<const D: usize> NullaryFnOnce for Given<'_, D> {
+    type Output = Vec<Tensor<D>>;
     #[inline(always)]
-    fn shares(&self, own: usize, bonds: &[Neighbour<D>], around: &Around<D>) -> Vec<Tensor<D>> {
+    fn call(self) -> Vec<Tensor<D>> {
+        let Self { shares: all, own, bonds, around } = self;
         let count = around.members.len();
-        let radius = self.bonds.horizon();
+        let radius = all.bonds.horizon();
         let mut shares = vec![[[0.0; D]; D]; count];
         let mut parts = vec![0.0; count];
         let mut crossed = vec![0; count];
@@ -209,15 +220,15 @@ impl<const D: usize> Shares<'_, D> {
                 crossings += usize::from(*part > 0.0);
             }
             let crossed = &crossed[..crossings];
-            if self.window != Window::Ball {
+            if all.window != Window::Ball {
                 for &k in crossed {
                     let p: [f64; D] = std::array::from_fn(|d| -around.relative[d][k]);
                     let q = std::array::from_fn(|d| bond.bond[d] - around.relative[d][k]);
-                    parts[k] = bond_function(self.window, p, q, radius);
+                    parts[k] = bond_function(all.window, p, q, radius);
                 }
             }
             let total: f64 = crossed.iter().map(|&k| around.volumes[k] * parts[k]).sum();
-            let whole = moment(self.bonds, self.state, own, bond);
+            let whole = moment(all.bonds, all.state, own, bond);
             for &k in crossed {
                 let weight = parts[k] / total;
                 for a in 0..D {
