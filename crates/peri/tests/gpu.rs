@@ -194,11 +194,14 @@ fn gpu_motion_breaks_the_same_bonds() {
 /// One particle moves in a straight line; a body without one is no body.
 #[test]
 fn gpu_smallest_bodies() {
-    let Some(device) = devices().pop() else { return };
+    devices().iter().for_each(smallest_bodies);
+}
+
+fn smallest_bodies(device: &Device) {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
     let one = Body::<3>::solid([1, 1, 1], 0.1, 3.015).build().lattice;
     let site = one.particles()[0] as usize;
-    let mut body = DeviceBody::new(&device, &one, &fit(&*law, [0.9, 1.1]), MODULUS, Some(1.1)).unwrap();
+    let mut body = DeviceBody::new(device, &one, &fit(&*law, [0.9, 1.1]), MODULUS, Some(1.1)).unwrap();
     assert_eq!(body.force(&Field::zeros(one.sites())).unwrap().get(site), [0.0; 3]);
     let mut velocity = Field::zeros(one.sites());
     velocity.set(site, [0.4, 0.0, -0.8]);
@@ -239,6 +242,9 @@ fn gpu_refusals() {
             .map(|error| error.to_string())
             .unwrap_or_default()
     };
+    if !cfg!(feature = "gpu-cuda") {
+        assert!(Device::cuda(0).err().is_some_and(|error| error.to_string().contains("Cuda")));
+    }
     let bonds = damaged([8, 9]);
     let corrected = Body::<2>::damaged([8, 9], 1e-3, 3.015).build().lattice;
     assert!(refused(&corrected, &fit, MODULUS, None).contains("surface factors"));

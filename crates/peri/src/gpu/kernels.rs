@@ -33,7 +33,8 @@ impl Form {
 ///
 /// A thread writes what belongs to its own particle; the two ends of a bond find the same bits of E, so both break it.
 #[cube(launch)]
-#[allow(clippy::too_many_arguments)] // a kernel's buffers
+// a kernel's buffers; what is decided before it is compiled, around what is decided when it runs
+#[allow(clippy::too_many_arguments, clippy::collapsible_if)]
 pub fn pull<F: Float>(
     displacement: &[F],
     particles: &[u32],

@@ -29,7 +29,7 @@ pub use body::{DeviceBody, Motion, Start};
 
 use crate::error::Error;
 use cubecl::client::Client;
-use cubecl::device::WgpuDeviceKind;
+use cubecl::device::{DeviceUnavailable, WgpuDeviceKind};
 use cubecl::ir::{ElemType, FloatKind};
 
 /// The floating-point numbers that kernels compute with.
@@ -75,9 +75,19 @@ impl Device {
     /// # Errors
     /// [`Error::Device`] where this machine has none.
     pub fn portable() -> Result<Self, Error> {
-        let named = cubecl::Device::wgpu(WgpuDeviceKind::default());
-        let device = named.map_err(|error| Error::Device(error.to_string()))?;
-        let client = device.client();
+        Self::open(cubecl::Device::wgpu(WgpuDeviceKind::default()))
+    }
+
+    /// The card that CUDA counts as `index` (feature `gpu-cuda`).
+    ///
+    /// # Errors
+    /// [`Error::Device`] where this machine has none, or this build no CUDA.
+    pub fn cuda(index: usize) -> Result<Self, Error> {
+        Self::open(cubecl::Device::cuda(index))
+    }
+
+    fn open(named: Result<cubecl::Device, DeviceUnavailable>) -> Result<Self, Error> {
+        let client = named.map_err(|error| Error::Device(error.to_string()))?.client();
         let double = client.features().supports_type(Precision::Double.element());
         let precision = if double { Precision::Double } else { Precision::Single };
         Ok(Self { client, precision })
