@@ -6,7 +6,7 @@ mod bodies;
 
 use bodies::{Body, MODULUS, Random, fit, hold, laws, norm};
 use peri::Error;
-use peri::bonds::{Bonds, LatticeBonds, force, overstretched, stretch_range};
+use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection, force, overstretched, stretch_range};
 use peri::field::Field;
 use peri::gpu::{Device, DeviceBody, Precision, Start};
 use peri::material::BondMaterial;
@@ -220,14 +220,9 @@ fn smallest_bodies(device: &Device) {
         assert!((found - exact).abs() <= 16.0 * device.precision().epsilon(), "{found} {exact}");
     }
     assert_eq!(body.intact().unwrap(), one.intact());
-    let empty = peri::geometry::Lattice {
-        spacing: 1.0,
-        origin: [0.0; 3],
-        cells: [2, 1, 1],
-        occupied: vec![false; 2],
-        volume: 1.0,
-    };
-    assert!(LatticeBonds::new(empty, 3.015, peri::bonds::VolumeCorrection::None, &[]).is_err());
+    let empty =
+        Lattice { spacing: 1.0, origin: [0.0; 3], cells: [2, 1, 1], occupied: vec![false; 2], volume: 1.0 };
+    assert!(LatticeBonds::new(empty, 3.015, VolumeCorrection::None, &[]).is_err());
 }
 
 /// What kernels cannot do is refused, and what is not finite is found, each by name.
@@ -255,8 +250,10 @@ fn gpu_refusals() {
     assert!(refused(&bonds, &table, MODULUS, None).contains("found a table"));
 
     let mut body = DeviceBody::new(&device, &bonds, &fit, MODULUS, None).unwrap();
+    assert!(body.advance(1).unwrap_err().to_string().contains("time step: found 0"));
     let mut wrong = Field::zeros(bonds.sites());
     wrong.set(bonds.particles()[20] as usize, [0.0, f64::NAN]);
+    assert!(body.force(&Field::zeros(7)).unwrap_err().to_string().contains("a body of"));
     let error = body.force(&wrong).unwrap_err();
     assert!(matches!(error, Error::NotFinite { quantity: "force", .. }), "{error}");
     let zero = Field::zeros(bonds.sites());
@@ -274,4 +271,25 @@ fn gpu_refusals() {
     assert!(body.start(&start).unwrap_err().to_string().contains("a body of"));
     start.time_step = 0.0;
     assert!(body.start(&start).unwrap_err().to_string().contains("time step: found 0"));
+}
+
+/// A body that does not fit is refused by the name of what does not.
+#[test]
+fn gpu_bodies_beyond_the_memory() {
+    let Some(device) = devices().pop() else { return };
+    let most = device.largest_buffer() / 16;
+    if most > 1 << 25 {
+        return evidence::skipped("a device with small buffers");
+    }
+    // three sites a cell, with the empty ones on either side of the row: within the limit in single precision, beyond it in double
+    let cells = [most as usize / 2, 1];
+    let row = Lattice { spacing: 1.0, origin: [0.5; 2], cells, occupied: vec![true; cells[0]], volume: 1.0 };
+    let bonds = LatticeBonds::new(row, 1.0, VolumeCorrection::None, &[]).unwrap();
+    let law = fit(&*Law::Linear.build(1.0, 1.0, false).unwrap(), [0.9, 1.1]);
+    let device = device.with_precision(Precision::Single).unwrap();
+    assert!(DeviceBody::new(&device, &bonds, &law, MODULUS, None).is_ok());
+    let Ok(device) = device.with_precision(Precision::Double) else { return };
+    let error = DeviceBody::new(&device, &bonds, &law, MODULUS, None).err().map(|error| error.to_string());
+    let error = error.unwrap_or_default();
+    assert!(error.contains("displacement: found") && error.contains(device.name()), "{error}");
 }

@@ -91,12 +91,8 @@ impl<'a, const D: usize> DeviceBody<'a, D> {
         let sites = bonds.sites();
         let field = (D * sites) as u64 * precision.bytes();
         let words = 4 * (sites * form.bonds.div_ceil(32)) as u64;
-        let properties = &device.client.properties().memory;
-        let limits = Limits { one: properties.max_page_size, all: properties.max_memory() };
-        limits.hold(
-            device.name(),
-            &[("displacement", field), ("velocity", field), ("force", field), ("intact bonds", words)],
-        )?;
+        let fields = [("displacement", field), ("velocity", field), ("force", field)];
+        hold(device, &[&fields[..], &[("intact bonds", words)]].concat())?;
         let client = device.client.clone();
         let whole = |list: &[u32]| client.create_from_slice(u32::as_bytes(list));
         let shifts: Vec<i32> = bonds.stencil_bonds(modulus).iter().map(|bond| bond.shift as i32).collect();
@@ -125,11 +121,14 @@ impl<'a, const D: usize> DeviceBody<'a, D> {
     /// Force densities, N/m³, in a displacement, m, without a step. No bond breaks.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] for forces that are not finite; [`Error::Device`] where the device fails.
-    pub fn force(&mut self, displacement: &Field<D>) -> Result<Field<D>, Error> {
-        self.displacement = upload(&self.client, self.precision, displacement, 1.0 / self.spacing);
-        self.pull(0.0, Form { breaks: false, ..self.form });
-        let force = self.download(&self.force, self.unit)?;
+    /// [`Error::NotFinite`] for forces that are not finite; [`Error::Geometry`] for the field of another body;
+    /// [`Error::Device`] where the device fails.
+    pub fn force(&self, displacement: &Field<D>) -> Result<Field<D>, Error> {
+        self.fits(&[displacement.sites()])?;
+        let there = upload(&self.client, self.precision, displacement, 1.0 / self.spacing);
+        let found = upload(&self.client, self.precision, &Field::<D>::zeros(self.bonds.sites()), 1.0);
+        self.pull(&there, &found, Form { breaks: false, kicks: false, ..self.form });
+        let force = self.download(&found, self.unit)?;
         self.finite("force", &force)?;
         Ok(force)
     }
@@ -145,10 +144,8 @@ impl<'a, const D: usize> DeviceBody<'a, D> {
             }
         }
         let sites = self.bonds.sites();
-        let lengths = [start.displacement.sites(), start.velocity.sites(), start.held.len()];
-        if lengths[..2] != [sites; 2] || ![0, sites].contains(&lengths[2]) {
-            return Err(Error::geometry(format!("fields over {lengths:?} sites for a body of {sites}")));
-        }
+        let held = if start.held.is_empty() { sites } else { start.held.len() };
+        self.fits(&[start.displacement.sites(), start.velocity.sites(), held])?;
         let held: Vec<u32> =
             (0..sites).map(|site| start.held.get(site).map_or(0, |&bits| bits.into())).collect();
         self.time_step = start.time_step;
@@ -157,18 +154,22 @@ impl<'a, const D: usize> DeviceBody<'a, D> {
         self.held = self.client.create_from_slice(u32::as_bytes(&held));
         self.displacement = upload(&self.client, self.precision, &start.displacement, 1.0 / self.spacing);
         self.velocity = upload(&self.client, self.precision, &start.velocity, self.time_step / self.spacing);
-        self.pull(0.0, self.form);
+        self.pull(&self.displacement, &self.force, Form { kicks: false, ..self.form });
         Ok(())
     }
 
     /// Steps of velocity Verlet: v ← v + ½Δt f/ρ, u ← u + Δt v, new f, v ← v + ½Δt f/ρ, then bonds break.
     ///
     /// # Errors
-    /// [`Error::Device`] where the device fails.
+    /// [`Error::Parameter`] without a [`Self::start`]; [`Error::Device`] where the device fails.
     pub fn advance(&mut self, steps: u64) -> Result<(), Error> {
+        if self.time_step == 0.0 {
+            let allowed = "above 0: `start` sets it".to_owned();
+            return Err(Error::Parameter { name: "time step", found: 0.0, allowed });
+        }
         for step in 1..=steps {
             self.leap();
-            self.pull(self.push, self.form);
+            self.pull(&self.displacement, &self.force, self.form);
             if step.is_multiple_of(QUEUE) || step == steps {
                 cubecl::future::block_on(self.client.sync()).map_err(|error| failed(&error))?;
             }
@@ -209,6 +210,14 @@ impl<'a, const D: usize> DeviceBody<'a, D> {
         Ok(words)
     }
 
+    fn fits(&self, lengths: &[usize]) -> Result<(), Error> {
+        let sites = self.bonds.sites();
+        if lengths.iter().all(|&length| length == sites) {
+            return Ok(());
+        }
+        Err(Error::geometry(format!("fields over {lengths:?} sites for a body of {sites}")))
+    }
+
     fn finite(&self, quantity: &'static str, field: &Field<D>) -> Result<(), Error> {
         let wrong = field.non_finite().map(|(site, _)| site);
         wrong.map_or(Ok(()), |site| Err(not_finite(self.bonds, quantity, site, 0, self.steps)))
@@ -235,22 +244,22 @@ impl<'a, const D: usize> DeviceBody<'a, D> {
         )
     }
 
-    fn pull(&self, push: f64, form: Form) {
+    fn pull(&self, displacement: &Handle, force: &Handle, form: Form) {
         let (sites, element) = (self.bonds.sites(), self.precision.element());
         let words = form.bonds.div_ceil(32);
         pull::launch(
             &self.client,
             self.cubes(),
             CubeDim::new_1d(CUBE),
-            buffer(&self.displacement, D * sites),
+            buffer(displacement, D * sites),
             buffer(&self.particles, self.bonds.particles().len()),
             buffer(&self.held, sites),
             buffer(&self.shifts, form.bonds),
             buffer(&self.rows, form.bonds * form.width()),
             buffer(&self.intact, words * sites),
-            buffer(&self.force, D * sites),
+            buffer(force, D * sites),
             buffer(&self.velocity, D * sites),
-            InputScalar::new(push, element),
+            InputScalar::new(self.push, element),
             form,
             element,
         );
@@ -310,6 +319,7 @@ fn stencil<const D: usize>(
         numerator: laws[0].numerator.len(),
         denominator: laws[0].denominator.len(),
         breaks: critical.is_some(),
+        kicks: true,
     };
     let mut rows = Vec::with_capacity(form.bonds * form.width());
     for (bond, law) in scaled.iter().zip(&laws) {
@@ -344,47 +354,20 @@ fn numbers(client: &Client, precision: Precision, values: impl Iterator<Item = f
 }
 
 fn failed(error: &ServerError) -> Error {
-    Error::Device(error.to_string())
+    let text = error.to_string();
+    Error::Device(text.split("\nBacktrace").next().unwrap_or_default().to_owned())
 }
 
-/// Bytes that a device holds in one buffer, and in all, where it says so.
-#[derive(Clone, Copy)]
-struct Limits {
-    one: u64,
-    all: Option<u64>,
-}
-
-impl Limits {
-    fn hold(self, device: &str, buffers: &[(&str, u64)]) -> Result<(), Error> {
-        // sites and bytes are counted in 32 bits by the kernels
-        let one = self.one.min(1 << 32);
-        if let Some((name, bytes)) = buffers.iter().find(|(_, bytes)| *bytes > one) {
-            return Err(Error::Device(format!(
-                "{name}: found {bytes} bytes; allowed: {one} in a buffer of {device}"
-            )));
-        }
-        let total = buffers.iter().map(|(_, bytes)| bytes).sum::<u64>();
-        match self.all.filter(|all| total > *all) {
-            Some(all) => {
-                Err(Error::Device(format!("memory: found {total} bytes; allowed: {all} on {device}")))
-            }
-            None => Ok(()),
-        }
+/// Whether a device holds these buffers, bytes each by name.
+fn hold(device: &Device, buffers: &[(&str, u64)]) -> Result<(), Error> {
+    let (name, one) = (device.name(), device.largest_buffer());
+    if let Some((what, bytes)) = buffers.iter().find(|(_, bytes)| *bytes > one) {
+        let found = format!("{what}: found {bytes} bytes; allowed: {one} in a buffer of {name}");
+        return Err(Error::Device(found));
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A body that does not fit is refused by the name of its buffer, before anything is allocated.
-    #[test]
-    fn bodies_beyond_the_memory_are_refused() {
-        let limits = Limits { one: 1000, all: Some(2500) };
-        assert!(limits.hold("a card", &[("force", 1000), ("velocity", 1000)]).is_ok());
-        let one = limits.hold("a card", &[("force", 10), ("velocity", 1001)]).unwrap_err().to_string();
-        assert!(one.contains("velocity: found 1001 bytes; allowed: 1000 in a buffer of a card"), "{one}");
-        let all = limits.hold("a card", &[("force", 1000); 3]).unwrap_err().to_string();
-        assert!(all.contains("memory: found 3000 bytes; allowed: 2500 on a card"), "{all}");
+    let total = buffers.iter().map(|(_, bytes)| bytes).sum::<u64>();
+    match device.client.properties().memory.max_memory().filter(|all| total > *all) {
+        Some(all) => Err(Error::Device(format!("memory: found {total} bytes; allowed: {all} on {name}"))),
+        None => Ok(()),
     }
 }

@@ -16,6 +16,8 @@ pub struct Form {
     pub denominator: usize,
     /// Whether bonds break.
     pub breaks: bool,
+    /// Whether velocities follow the forces.
+    pub kicks: bool,
 }
 
 /// Numbers of a row before its bond's coefficients: the ends of the law in E, its value at E = 0, and the E at which the bond breaks.
@@ -128,8 +130,10 @@ pub fn pull<F: Float>(
     let push = push.get::<F>();
     #[unroll]
     for d in 0..dimension {
-        if held[site] >> (d as u32) & 1 == 0 {
-            velocity[d * sites + site] = fma(push, sum[d], velocity[d * sites + site]);
+        if comptime!(form.kicks) {
+            if held[site] >> (d as u32) & 1 == 0 {
+                velocity[d * sites + site] = fma(push, sum[d], velocity[d * sites + site]);
+            }
         }
         force[d * sites + site] = sum[d] - lost[d];
     }

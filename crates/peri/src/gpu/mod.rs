@@ -98,6 +98,12 @@ impl Device {
         &self.client.properties().identity.name
     }
 
+    /// Bytes that a buffer may have: a field of a body, of D numbers a site, must fit into one. At most 4 GiB, as kernels count in
+    /// 32 bits.
+    pub fn largest_buffer(&self) -> u64 {
+        self.client.properties().memory.max_page_size.min(1 << 32)
+    }
+
     /// The numbers that kernels compute with: double where the device has them.
     pub fn precision(&self) -> Precision {
         self.precision
