@@ -78,7 +78,8 @@ impl Device {
         Self::open(cubecl::Device::wgpu(WgpuDeviceKind::default()))
     }
 
-    /// The card that CUDA counts as `index` (feature `gpu-cuda`).
+    /// The card that CUDA counts as `index`, in programs that depend on `cubecl` with its feature `cuda`: this crate does not turn it
+    /// on, as its build downloads a compiler from GitHub.
     ///
     /// # Errors
     /// [`Error::Device`] where this machine has none, or this build no CUDA.
