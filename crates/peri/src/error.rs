@@ -73,6 +73,10 @@ pub enum Error {
         /// Estimate of the critical one for all stretches observed, s.
         critical: f64,
     },
+    /// A device lacks what is asked of it, or fails; see [`crate::gpu`].
+    #[cfg(feature = "gpu")]
+    #[error("device: {0}")]
+    Device(String),
     /// One of several variants.
     #[error("{variant}: {error}")]
     Within {

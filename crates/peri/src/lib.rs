@@ -39,6 +39,8 @@ pub mod error;
 pub mod exact;
 pub mod field;
 pub mod geometry;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod integrals;
 pub mod material;
 pub mod model;

@@ -152,8 +152,18 @@ impl<const D: usize> LatticeBonds<D> {
         Spans { spans: &self.spans, tiles: self.tiles(displacement) }
     }
 
-    /// Whether bonds carry a weight of their own: integrities, or surface factors.
-    pub(super) fn is_uniform(&self) -> bool {
+    /// The bonds of the stencil with their stiffness 2kθ w V/|ξ|, for a modulus kθ.
+    pub(crate) fn stencil_bonds(&self, modulus: f64) -> Vec<StencilBond<D>> {
+        let scaled = |span: &Span<D>| {
+            let stiffness =
+                2.0 * modulus * (self.interior_factor * span.share) * self.lattice.volume / span.length;
+            StencilBond { shift: span.shift, bond: span.bond, stiffness }
+        };
+        self.spans.iter().map(scaled).collect()
+    }
+
+    /// Whether no bond carries a weight of its own: integrities, or surface factors.
+    pub(crate) fn is_uniform(&self) -> bool {
         self.factors.is_none() && self.softening.bonds().is_empty()
     }
 
@@ -367,13 +377,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     }
 
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
-        let scaled = |span: &Span<D>| {
-            let stiffness =
-                2.0 * modulus * (self.interior_factor * span.share) * self.lattice.volume / span.length;
-            StencilBond { shift: span.shift, bond: span.bond, stiffness }
-        };
-        let stencil: Vec<StencilBond<D>> = self.spans.iter().map(scaled).collect();
-        self.kernel = lattice_kernel(fit, &stencil);
+        self.kernel = lattice_kernel(fit, &self.stencil_bonds(modulus));
         self.table = self.kernel.is_none().then(|| (fit.clone(), modulus));
     }
 

@@ -30,6 +30,9 @@ pub use property::Property;
 pub use softening::{Softened, Softening, among};
 pub use stencil::{Stencil, storage};
 
+#[cfg(feature = "gpu")]
+pub(crate) use rows::{StencilBond, scaled_laws};
+
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
@@ -168,6 +171,18 @@ fn refuse_one_sided<const D: usize>(bonds: &dyn Bonds<D>) -> Result<(), Error> {
     let Some(pair) = bonds.one_sided() else { return Ok(()) };
     let [here, there] = pair.map(|site| bonds.position(site));
     Err(Error::geometry(format!("the bond from {here:?} to {there:?} m has no counterpart")))
+}
+
+/// What is not finite in a site, and when: for errors.
+pub(crate) fn not_finite<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    quantity: &'static str,
+    site: usize,
+    step: usize,
+    iteration: u64,
+) -> Error {
+    let particle = bonds.particles().partition_point(|&s| (s as usize) < site);
+    Error::NotFinite { quantity, particle, position: bonds.position(site).to_vec(), step, iteration }
 }
 
 /// Force densities of the whole body, N/m³.

@@ -96,8 +96,46 @@ impl Rational {
     }
 }
 
-fn padded<const N: usize>(values: &[f64], scale: impl Fn(usize) -> f64) -> [f64; N] {
-    std::array::from_fn(|k| values.get(k).map_or(0.0, |v| v * scale(k)))
+/// The law of one bond of the stencil: its coefficients in E = |ξ|² e, times the bond's stiffness; see [`Row`].
+pub struct ScaledLaw {
+    /// 1/|ξ|².
+    pub inverse_square: f64,
+    /// Ends of the law in E.
+    pub clamp: [f64; 2],
+    /// Value at E = 0.
+    pub constant: f64,
+    /// Scaled numerator.
+    pub numerator: Vec<f64>,
+    /// Scaled denominator beyond its leading 1.
+    pub denominator: Vec<f64>,
+}
+
+impl Rational {
+    fn scaled<const D: usize>(&self, bond: &StencilBond<D>) -> ScaledLaw {
+        let inverse_square = 1.0 / bond.bond.iter().map(|x| x * x).sum::<f64>();
+        let scale = |k: usize| inverse_square.powi(k as i32 + 1);
+        let times = |list: &[f64], factor: &dyn Fn(usize) -> f64| {
+            list.iter().enumerate().map(|(k, v)| v * factor(k)).collect()
+        };
+        ScaledLaw {
+            inverse_square,
+            clamp: self.clamp.map(|e| e / inverse_square),
+            constant: self.constant * bond.stiffness,
+            numerator: times(&self.numerator, &|k| bond.stiffness * scale(k)),
+            denominator: times(&self.denominator, &scale),
+        }
+    }
+}
+
+/// The law of every bond of a stencil; `None` where the law is a table.
+#[cfg(feature = "gpu")]
+pub fn scaled_laws<const D: usize>(fit: &KernelFit, stencil: &[StencilBond<D>]) -> Option<Vec<ScaledLaw>> {
+    let law = Rational::new(fit)?;
+    Some(stencil.iter().map(|bond| law.scaled(bond)).collect())
+}
+
+fn padded<const N: usize>(values: &[f64]) -> [f64; N] {
+    std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0))
 }
 
 /// Sizes (numerator, denominator) that are compiled; a fit is padded with zeros to the first that holds it.
@@ -163,22 +201,14 @@ fn lattice_rows<const D: usize, const P: usize, const Q: usize>(
     stencil: &[StencilBond<D>],
 ) -> Box<dyn LatticeKernel<D>> {
     let row = |bond: &StencilBond<D>| {
-        let inverse_square = 1.0 / bond.bond.iter().map(|x| x * x).sum::<f64>();
-        let scale = |k: usize| inverse_square.powi(k as i32 + 1);
-        Row {
-            shift: bond.shift,
-            bond: bond.bond,
-            inverse_square,
-            clamp: law.clamp.map(|e| e / inverse_square),
-            constant: law.constant * bond.stiffness,
-            numerator: padded(&law.numerator, |k| bond.stiffness * scale(k)),
-            denominator: padded(&law.denominator, scale),
-        }
+        let ScaledLaw { inverse_square, clamp, constant, numerator, denominator } = law.scaled(bond);
+        let (numerator, denominator) = (padded(&numerator), padded(&denominator));
+        Row { shift: bond.shift, bond: bond.bond, inverse_square, clamp, constant, numerator, denominator }
     };
     Box::new(LatticeRows::<D, P, Q>(stencil.iter().map(row).collect()))
 }
 
 fn cloud_law<const D: usize, const P: usize, const Q: usize>(law: &Rational) -> Box<dyn CloudKernel<D>> {
-    let coefficients = (law.constant, padded(&law.numerator, |_| 1.0), padded(&law.denominator, |_| 1.0));
+    let coefficients = (law.constant, padded(&law.numerator), padded(&law.denominator));
     Box::new(CloudLaw::<P, Q>(coefficients, law.clamp))
 }

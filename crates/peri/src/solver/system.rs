@@ -4,7 +4,7 @@ use super::criterion::Breaking;
 use super::load::Loads;
 use super::scale::Scale;
 use super::state::State;
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, not_finite};
 use crate::contact::{Contact, Plane, Resting, Touching};
 use crate::error::Error;
 use crate::field::Field;
@@ -210,14 +210,7 @@ impl<'a, const D: usize> System<'a, D> {
             [("displacement", &state.displacement), ("velocity", &state.velocity), ("force", &state.force)];
         for (quantity, field) in fields {
             if let Some((site, _)) = field.non_finite() {
-                let particle = bonds.particles().partition_point(|&s| (s as usize) < site);
-                return Error::NotFinite {
-                    quantity,
-                    particle,
-                    position: bonds.position(site).to_vec(),
-                    step: state.step,
-                    iteration: state.iteration,
-                };
+                return not_finite(bonds, quantity, site, state.step, state.iteration);
             }
         }
         // every entry is finite, their squares are not: the greatest force is to blame

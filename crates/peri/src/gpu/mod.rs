@@ -1,0 +1,123 @@
+//! Lattices on a graphics card (feature `gpu`): forces and velocity Verlet with bonds that break, many steps without a copy to the host.
+//!
+//! A [`Device`] is a card, or a program that does as one does; [`DeviceBody`] is a lattice on it, with the stencil, the fitted law and
+//! the bits of intact bonds of the host's kernel (see [`crate::potential::KernelFit`]). The kernels are written once, in Rust, and
+//! compiled for the device when they first run ([`cubecl`](https://docs.rs/cubecl)). Lengths are in spacings there and velocities in
+//! spacings a step, so that nothing leaves the range of single precision; stretches come from differences of displacements.
+//!
+//! ```no_run
+//! # use peri::{Error, bonds::{Bonds, LatticeBonds}, field::Field, potential::KernelFit};
+//! use peri::gpu::{Device, DeviceBody, Start};
+//! # fn run(mut bonds: LatticeBonds<3>, law: &KernelFit, modulus: f64, start: &Start<3>) -> Result<(), Error> {
+//! let device = Device::portable()?;
+//! let mut body = DeviceBody::new(&device, &bonds, law, modulus, Some(1.02))?;
+//! body.start(start)?;
+//! body.advance(1000)?;
+//! let (state, intact) = (body.state()?, body.intact()?);
+//! bonds.restore(&intact);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! What the kernels do not know is refused by name: laws that only a table represents, surface factors, softened bonds. Contact,
+//! body forces, damping and a watch on the time step are the host's ([`crate::solver::VelocityVerlet`]).
+
+mod body;
+mod kernels;
+
+pub use body::{DeviceBody, Motion, Start};
+
+use crate::error::Error;
+use cubecl::client::Client;
+use cubecl::device::{DeviceUnavailable, WgpuDeviceKind};
+use cubecl::ir::{ElemType, FloatKind};
+
+/// The floating-point numbers that kernels compute with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// 32 bits.
+    Single,
+    /// 64 bits.
+    Double,
+}
+
+impl Precision {
+    /// Distance of 1 from the next larger number.
+    pub fn epsilon(self) -> f64 {
+        match self {
+            Self::Single => f64::from(f32::EPSILON),
+            Self::Double => f64::EPSILON,
+        }
+    }
+
+    fn element(self) -> ElemType {
+        ElemType::Float(match self {
+            Self::Single => FloatKind::F32,
+            Self::Double => FloatKind::F64,
+        })
+    }
+
+    fn bytes(self) -> u64 {
+        self.element().size() as u64
+    }
+}
+
+/// A device that kernels run on.
+pub struct Device {
+    client: Client,
+    precision: Precision,
+}
+
+impl Device {
+    /// A card behind Vulkan, Metal or DirectX 12, the fastest there is; where there is no card, a program that stands for one
+    /// (Mesa's lavapipe). `CUBECL_WGPU_DEFAULT_DEVICE` names another one: `DiscreteGpu(1)`, `Cpu`.
+    ///
+    /// # Errors
+    /// [`Error::Device`] where this machine has none.
+    pub fn portable() -> Result<Self, Error> {
+        Self::open(cubecl::Device::wgpu(WgpuDeviceKind::default()))
+    }
+
+    /// The card that CUDA counts as `index`, in programs that depend on `cubecl` with its feature `cuda`: this crate does not turn it
+    /// on, as its build downloads a compiler from GitHub.
+    ///
+    /// # Errors
+    /// [`Error::Device`] where this machine has none, or this build no CUDA.
+    pub fn cuda(index: usize) -> Result<Self, Error> {
+        Self::open(cubecl::Device::cuda(index))
+    }
+
+    fn open(named: Result<cubecl::Device, DeviceUnavailable>) -> Result<Self, Error> {
+        let client = named.map_err(|error| Error::Device(error.to_string()))?.client();
+        let double = client.features().supports_type(Precision::Double.element());
+        let precision = if double { Precision::Double } else { Precision::Single };
+        Ok(Self { client, precision })
+    }
+
+    /// What the device calls itself.
+    pub fn name(&self) -> &str {
+        &self.client.properties().identity.name
+    }
+
+    /// Bytes that a buffer may have: a field of a body, of D numbers a site, must fit into one. At most 4 GiB, as kernels count in
+    /// 32 bits.
+    pub fn largest_buffer(&self) -> u64 {
+        self.client.properties().memory.max_page_size.min(1 << 32)
+    }
+
+    /// The numbers that kernels compute with: double where the device has them.
+    pub fn precision(&self) -> Precision {
+        self.precision
+    }
+
+    /// Computes with these numbers.
+    ///
+    /// # Errors
+    /// [`Error::Device`] for double precision on a device without it.
+    pub fn with_precision(self, precision: Precision) -> Result<Self, Error> {
+        if self.client.features().supports_type(precision.element()) {
+            return Ok(Self { precision, ..self });
+        }
+        Err(Error::Device(format!("{} does not compute in {precision:?} precision", self.name())))
+    }
+}
