@@ -82,7 +82,7 @@ read_data plate.data
 pair_style peri/pmb
 pair_coeff * * {18 * bulk / (math.pi * horizon ** 4)!r} {horizon!r} {stretch!r} 0.0
 group hit type 2
-velocity hit set 32 0 0
+velocity hit set 32 0 0 units box
 fix 1 all nve
 fix 2 hit setforce 0 0 0
 compute damage all damage/atom

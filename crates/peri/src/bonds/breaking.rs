@@ -28,11 +28,15 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
 ) -> Vec<Overstretched> {
     let sites = bonds.sites();
     let least = critical.least() * critical.least() - 1.0;
-    let of_chunk = |chunk: usize| {
+    // vectorised loops find the sites to look into; their last bits may differ from those below
+    let near = |chunk: usize| bonds.suspects(displacement, chunk, least * (1.0 - 1e-9) - 1e-12);
+    let near: Vec<Vec<usize>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(near).collect();
+    let mut near = near.concat();
+    near.sort_unstable();
+    near.dedup();
+    let beyond = |sites: &[usize]| {
         let mut found = Vec::new();
-        // vectorised loops find the sites to look into; their last bits may differ from those below
-        let suspects = bonds.suspects(displacement, chunk, least * (1.0 - 1e-9) - 1e-12);
-        for site in suspects.into_iter().flatten() {
+        for &site in sites {
             let own = displacement.get(site);
             bonds.neighbours(site, &mut |bond| {
                 let other = displacement.get(bond.site);
@@ -56,7 +60,7 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
         }
         found
     };
-    let parts: Vec<Vec<Overstretched>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect();
+    let parts: Vec<Vec<Overstretched>> = near.par_chunks(256).map(beyond).collect();
     parts.concat()
 }
 

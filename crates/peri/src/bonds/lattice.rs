@@ -13,7 +13,6 @@ use crate::field::{CHUNK, Field, chunk_range};
 use crate::geometry::{Cut, Lattice, severed};
 use crate::potential::{KernelFit, StretchRange};
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// The bonds of a lattice.
 pub struct LatticeBonds<const D: usize> {
@@ -420,7 +419,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.spans(displacement).range(chunk_range(chunk, self.sites))
     }
 
-    fn suspects(&self, displacement: &Field<D>, chunk: usize, least: f64) -> Vec<Range<usize>> {
+    fn suspects(&self, displacement: &Field<D>, chunk: usize, least: f64) -> Vec<usize> {
         self.spans(displacement).beyond(chunk_range(chunk, self.sites), least)
     }
 

@@ -81,11 +81,11 @@ impl<const D: usize> Spans<'_, D> {
         }
     }
 
-    /// The tiles with a bond beyond e = `least`, whichever end it is seen from.
-    pub fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<Range<usize>> {
-        let mut found = Beyond { least, tiles: Vec::new() };
-        self.sum(sites, self.spans.len(), &mut found);
-        found.tiles
+    /// Both ends of the bonds beyond e = `least` that begin in these sites, of one direction each; an end may come more than once.
+    pub fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<usize> {
+        let mut found = Beyond { least, sites: Vec::new() };
+        self.sum(sites, self.spans.len() / 2, &mut found);
+        found.sites
     }
 
     /// Σ share·|ξ|·φ(e) over the bonds that begin in these sites, of one direction each.
@@ -143,7 +143,7 @@ impl<const D: usize> Add<D> for Extremes {
 
 struct Beyond {
     least: f64,
-    tiles: Vec<Range<usize>>,
+    sites: Vec<usize>,
 }
 
 impl<const D: usize> Add<D> for Beyond {
@@ -157,7 +157,13 @@ impl<const D: usize> Add<D> for Beyond {
             }
         }
         if high.iter().any(|&e| e > self.least) {
-            self.tiles.push(base..base + TILE);
+            for &k in present {
+                let e = spans.elongations(base, k);
+                for i in (0..TILE).filter(|&i| e[i] > self.least) {
+                    let there = (base + i).wrapping_add_signed(spans.spans[k].shift);
+                    self.sites.extend([base + i, there]);
+                }
+            }
         }
     }
 }

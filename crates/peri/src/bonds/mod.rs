@@ -37,7 +37,6 @@ use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
-use std::ops::Range;
 
 /// A neighbour J of a particle I, as set-up code sees it.
 #[derive(Clone, Copy, Debug)]
@@ -130,10 +129,10 @@ pub trait Bonds<const D: usize>: Send + Sync {
         self.force(displacement, chunk, &mut out, Some(&mut range));
         range
     }
-    /// Sites of work item `chunk` among which all are that have a bond with e > `least`.
-    fn suspects(&self, displacement: &Field<D>, chunk: usize, least: f64) -> Vec<Range<usize>> {
+    /// Sites which, for all work items together, contain both ends of every bond with e > `least`.
+    fn suspects(&self, displacement: &Field<D>, chunk: usize, least: f64) -> Vec<usize> {
         let range = chunk_range(chunk, self.sites());
-        if self.stretches(displacement, chunk).high > least { vec![range] } else { Vec::new() }
+        if self.stretches(displacement, chunk).high > least { range.collect() } else { Vec::new() }
     }
     /// Severs bonds, each named from both of its ends.
     fn sever(&mut self, bonds: &[Overstretched]);
