@@ -128,7 +128,7 @@ fn told(finished: &Finished) -> PyResult<(String, String)> {
     Ok((report, finished.text.clone()))
 }
 
-/// What a scene builds and leaves out, in lines.
+/// Describes in lines what a scene builds and what it omits.
 #[pyfunction]
 pub fn check(
     py: Python<'_>,
@@ -150,7 +150,7 @@ fn check_of<C: Case>(py: Python<'_>, source: Source, mut how: Behaviour) -> PyRe
     lines.map_err(|error| failure(py, error, output))
 }
 
-/// Runs a scene for every combination of values of keys: as [`run`].
+/// Runs a scene once for every combination of values; arguments and errors are those of [`run`].
 #[pyfunction]
 pub fn sweep(
     py: Python<'_>,

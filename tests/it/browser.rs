@@ -121,7 +121,7 @@ impl Browser {
         self.ask("POST", &format!("/element/{element}/value"), &json!({ "text": keys }));
     }
 
-    /// A way of fingers, or of the mouse that rests and goes on with its button down, each from one place of the window to another.
+    /// Drags fingers across the window, or the mouse with its button down, which pauses on the way; each from one place to another.
     #[track_caller]
     pub fn drag(&self, kind: &str, ways: &[[[f64; 2]; 2]]) {
         let step = |[x, y]: [f64; 2], duration: u32| json!({ "type": "pointerMove", "duration": duration, "x": x.round() as i64, "y": y.round() as i64 });

@@ -117,7 +117,7 @@ fn part(package: &Package, what: String, mit: &str, apache: &str) -> Result<Part
     Ok(Part { what, terms, texts })
 }
 
-/// The list, and each text once with the crates that come with it.
+/// The list of crates, then every licence text once, with the names of the crates that have it.
 fn written(parts: &mut [Part]) -> String {
     parts.sort_by(|a, b| a.what.cmp(&b.what));
     let mut text = String::from(

@@ -94,7 +94,7 @@ pub struct State {
     pub jump: bool,
     /// How linear systems are solved since the last jump.
     pub method: Method,
-    /// Iterations since then that other methods would have saved.
+    /// Iterations since the last choice, in steps whose solves took many.
     pub excess: f64,
     /// Energy since the start.
     pub ledger: Ledger,

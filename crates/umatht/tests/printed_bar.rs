@@ -152,7 +152,8 @@ fn deck(mesh: &Mesh, latent: bool) -> String {
     text
 }
 
-/// Compares the temperatures of all nodes at the end of each layer, without latent heat and with it. CalculiX takes steps of 5 and 25 ms and is first order in time.
+/// Compares the temperatures of all nodes at the end of each layer, without latent heat and with it. CalculiX
+/// integrates with first order in time, in steps of 5 and 25 ms.
 #[test]
 fn node_by_node() {
     let Some(source) = hosts::calculix() else { return };

@@ -148,7 +148,7 @@ class Program:
         return _done(how, False, _begin(how, False, lambda: _polymech.resume(self._name, how)))
 
     def check(self, scene: Scene, *, quick: bool = False, **overrides: Any) -> list[str]:
-        """What a scene builds and leaves out, in lines; raises `SceneError` for a fault in it."""
+        """Describes in lines what a scene builds and what it omits; raises `SceneError` for a fault in it."""
         text, path = read(scene, self._name, overrides)
         how, _ = _how(Path("out") / "check", quick=quick)
         return _polymech.check(self._name, text, path, how)

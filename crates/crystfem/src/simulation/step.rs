@@ -11,7 +11,7 @@ use crate::time::{Attempt, Scheme, Stepper, Steps, Work};
 /// Part of the step that the temporal error would allow, and growth of a step at most.
 const SAFETY: f64 = 0.9;
 const MOST_GROWTH: f64 = 4.0;
-/// Iterations of a solve that no other method saves.
+/// Iterations of a solve that no other method undercuts.
 const FEWEST: f64 = 16.0;
 /// Solves with the matrix of equal steps.
 const MANY: f64 = 20.0;
@@ -126,8 +126,8 @@ impl Simulation {
         }
     }
 
-    /// Takes another method where iterations have cost as much more than it would as its preparation costs. What it costs is counted, not timed,
-    /// so that a resumed run decides alike.
+    /// Chooses the method anew once steps whose solves take more than [`FEWEST`] iterations have taken [`LEVELS`] of them, the cost of
+    /// preparing another method. Work is counted, not timed, so that a resumed run decides alike.
     fn reconsider(&mut self, before: &Work, until: f64) {
         let work = &self.state.work;
         let solves = (work.cg_solves - before.cg_solves) as f64;
