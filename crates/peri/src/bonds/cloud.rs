@@ -213,12 +213,6 @@ impl<const D: usize> CloudBonds<D> {
         CloudPlaces::new(&self.position, &self.volumes)
     }
 
-    /// Number of intact bonds of a site.
-    pub fn bonded(&self, site: usize) -> u32 {
-        let row = &self.inverse_length[self.starts[site]..self.starts[site + 1]];
-        row.iter().map(|&inverse| u32::from(inverse > 0.0)).sum()
-    }
-
     /// A bond of a site by its [`Neighbour::index`], as if it were not softened.
     pub fn whole_bond(&self, site: usize, index: u32) -> Neighbour<D> {
         self.bond(site, self.starts[site] + index as usize)
@@ -275,6 +269,11 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
                 visit(Neighbour { volume: part * bond.volume, weight: part * bond.weight, ..bond });
             }
         }
+    }
+
+    fn bonded(&self, site: usize) -> u32 {
+        let row = &self.inverse_length[self.starts[site]..self.starts[site + 1]];
+        row.iter().map(|&inverse| u32::from(inverse > 0.0)).sum()
     }
 
     fn is_bonded(&self, site: usize, other: usize) -> bool {

@@ -1,7 +1,7 @@
 //! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
 
 use super::lattice_kernel::{Class, TILE, Tiles};
-use super::lattice_sums::{Span, Spans};
+use super::lattice_sums::{GradientSums, Span, Spans};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, Softening, integrity};
 use super::stencil::{Stencil, layout};
@@ -177,9 +177,14 @@ impl<const D: usize> LatticeBonds<D> {
         }
     }
 
-    /// Number of intact bonds of a site.
-    pub fn bonded(&self, site: usize) -> u32 {
-        self.intact.iter().map(|word| word[site].count_ones()).sum()
+    /// Σ share ξ⊗ξ/|ξ|² and Σ share η⊗ξ/|ξ|² over the intact bonds of the sites of a work item; `None` where bonds soften.
+    pub(crate) fn gradient_sums(
+        &self,
+        displacement: &Field<D>,
+        chunk: usize,
+    ) -> Option<Vec<GradientSums<D>>> {
+        let sites = chunk_range(chunk, self.sites);
+        self.softening.bonds().is_empty().then(|| self.spans(displacement).gradient_sums(sites))
     }
 
     /// Which sites hold a particle.
@@ -359,8 +364,8 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         found.is_ok_and(|k| self.is_intact(site, k))
     }
 
-    fn is_alone(&self, site: usize) -> bool {
-        self.intact.iter().all(|words| words[site] == 0)
+    fn bonded(&self, site: usize) -> u32 {
+        self.intact.iter().map(|word| word[site].count_ones()).sum()
     }
 
     fn one_sided(&self) -> Option<[usize; 2]> {

@@ -2,7 +2,8 @@
 
 use super::lattice_kernel::{Class, TILE, Tiles};
 use crate::potential::StretchRange;
-use pulp::{Arch, NullaryFnOnce};
+use pulp::bytemuck::cast_slice;
+use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use std::ops::Range;
 
 /// A bond of the stencil.
@@ -95,6 +96,13 @@ impl<const D: usize> Spans<'_, D> {
         found.total
     }
 
+    /// Of each of these sites, whole tiles, over all its bonds.
+    pub fn gradient_sums(&self, sites: Range<usize>) -> Vec<GradientSums<D>> {
+        let mut sums = vec![GradientSums::NONE; sites.len()];
+        Arch::new().dispatch(Gradients { spans: self, first: sites.start, sums: &mut sums });
+        sums
+    }
+
     fn sum<A: Add<D>>(&self, sites: Range<usize>, count: usize, add: &mut A) {
         Arch::new().dispatch(Sum { spans: self, sites, count, add });
     }
@@ -162,6 +170,78 @@ impl<const D: usize> Add<D> for Beyond {
                 for i in (0..TILE).filter(|&i| e[i] > self.least) {
                     let there = (base + i).wrapping_add_signed(spans.spans[k].shift);
                     self.sites.extend([base + i, there]);
+                }
+            }
+        }
+    }
+}
+
+/// What the mean deformation of a family follows from.
+#[derive(Clone, Copy, Debug)]
+pub struct GradientSums<const D: usize> {
+    /// Σ share ξ⊗ξ/|ξ|².
+    pub shape: [[f64; D]; D],
+    /// Σ share η⊗ξ/|ξ|².
+    pub change: [[f64; D]; D],
+}
+
+impl<const D: usize> GradientSums<D> {
+    const NONE: Self = Self { shape: [[0.0; D]; D], change: [[0.0; D]; D] };
+}
+
+/// The sums of whole tiles from `first` on, a vector of sites at a time.
+struct Gradients<'a, 'b, const D: usize> {
+    spans: &'b Spans<'a, D>,
+    first: usize,
+    sums: &'b mut [GradientSums<D>],
+}
+
+impl<const D: usize> WithSimd for Gradients<'_, '_, D> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Spans { spans, tiles } = self.spans;
+        let zero = simd.splat_f64s(0.0);
+        for (at, sums) in self.sums.chunks_mut(S::F64_LANES).enumerate() {
+            let base = self.first + at * S::F64_LANES;
+            if tiles.classes[base / TILE] == Class::Empty {
+                continue;
+            }
+            let (mut shape, mut change) = ([[zero; D]; D], [[zero; D]; D]);
+            for (k, span) in spans.iter().enumerate() {
+                let words = S::as_simd_u64s(&tiles.intact[k / 64][base..base + S::F64_LANES]).0[0];
+                let bit = simd.splat_u64s(1 << (k % 64));
+                let has = simd.equal_u64s(simd.and_u64s(words, bit), bit);
+                let weight = simd.select_f64s(has, simd.splat_f64s(span.share * span.inverse_square), zero);
+                // a bond out of the storage is never intact
+                let there = base.wrapping_add_signed(span.shift);
+                if there > tiles.displacement[0].len() - S::F64_LANES {
+                    continue;
+                }
+                // closures would not be compiled for the vectors of the machine
+                let mut weighted = [zero; D];
+                for b in 0..D {
+                    weighted[b] = simd.mul_f64s(weight, simd.splat_f64s(span.bond[b]));
+                }
+                for a in 0..D {
+                    let displacement = tiles.displacement[a];
+                    let own = S::as_simd_f64s(&displacement[base..base + S::F64_LANES]).0[0];
+                    let other = S::as_simd_f64s(&displacement[there..there + S::F64_LANES]).0[0];
+                    let eta = simd.sub_f64s(other, own);
+                    let bond = simd.splat_f64s(span.bond[a]);
+                    for b in 0..D {
+                        change[a][b] = simd.mul_add_f64s(weighted[b], eta, change[a][b]);
+                        shape[a][b] = simd.mul_add_f64s(weighted[b], bond, shape[a][b]);
+                    }
+                }
+            }
+            for a in 0..D {
+                for b in 0..D {
+                    let (shape, change) = ([shape[a][b]], [change[a][b]]);
+                    let (shape, change) = (cast_slice(&shape), cast_slice(&change));
+                    for (i, sums) in sums.iter_mut().enumerate() {
+                        (sums.shape[a][b], sums.change[a][b]) = (shape[i], change[i]);
+                    }
                 }
             }
         }

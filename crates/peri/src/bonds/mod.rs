@@ -25,6 +25,7 @@ pub use cloud_kernel::GROUP;
 pub use cloud_linear::{CloudMoments, CloudPlaces, Columns};
 pub use lattice::LatticeBonds;
 pub use lattice_kernel::TILE;
+pub(crate) use lattice_sums::GradientSums;
 pub use linear_kernel::{LinearRow, Moments};
 pub use property::Property;
 pub use softening::{Softened, Softening, among};
@@ -88,11 +89,15 @@ pub trait Bonds<const D: usize>: Send + Sync {
         self.neighbours(site, &mut |bond| bonded |= bond.site == other);
         bonded
     }
+    /// Number of intact bonds of a site.
+    fn bonded(&self, site: usize) -> u32 {
+        let mut count = 0;
+        self.neighbours(site, &mut |_| count += 1);
+        count
+    }
     /// Whether a site has no intact bond.
     fn is_alone(&self, site: usize) -> bool {
-        let mut alone = true;
-        self.neighbours(site, &mut |_| alone = false);
-        alone
+        self.bonded(site) == 0
     }
     /// The sites of a bond that only the first of them has; `None` where every family is symmetric, as it must be.
     fn one_sided(&self) -> Option<[usize; 2]> {

@@ -38,15 +38,8 @@ pub struct Stresses<const D: usize> {
     pub cauchy: Fields<D>,
 }
 
-/// Intact bonds of a site.
-pub(super) fn intact<const D: usize>(bonds: &dyn Bonds<D>, site: usize) -> u32 {
-    let mut count = 0;
-    bonds.neighbours(site, &mut |_| count += 1);
-    count
-}
-
 fn all_intact<const D: usize>(bonds: &dyn Bonds<D>) -> Vec<u32> {
-    bonds.particles().iter().map(|&site| intact(bonds, site as usize)).collect()
+    bonds.particles().iter().map(|&site| bonds.bonded(site as usize)).collect()
 }
 
 /// Whether the fields of the last step of a history are written during the run.

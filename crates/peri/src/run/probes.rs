@@ -4,7 +4,6 @@ use super::material::Observed;
 use super::outcome::Outcome;
 use crate::bonds::Bonds;
 use crate::quantities as q;
-use crate::run::frames::intact;
 use crate::scene::{Body, Probe, Scene, Track};
 use crate::solver::State;
 use polycore::report::{Named, Quantity};
@@ -60,7 +59,7 @@ impl<const D: usize> Probes<D> {
         }
         let cracks = scene.probe.iter().any(|probe| probe.track == Track::Crack);
         let whole =
-            if cracks { (0..bonds.sites()).map(|site| intact(bonds, site)).collect() } else { Vec::new() };
+            if cracks { (0..bonds.sites()).map(|site| bonds.bonded(site)).collect() } else { Vec::new() };
         Ok(Self { probes, whole })
     }
 
@@ -95,7 +94,7 @@ impl<const D: usize> Probes<D> {
         let [low, high] = probe.damage.unwrap_or(AT_THE_TIP);
         let damaged = |&site: &u32| {
             let whole = self.whole[site as usize];
-            let damage = 1.0 - f64::from(intact(bonds, site as usize)) / f64::from(whole.max(1));
+            let damage = 1.0 - f64::from(bonds.bonded(site as usize)) / f64::from(whole.max(1));
             whole > 0 && (low..=high).contains(&damage)
         };
         let torn: Vec<[f64; D]> =

@@ -1,20 +1,14 @@
 //! On a lattice the bond function depends on offsets only: each measure is, bond by bond of the stencil, a convolution
 //! of that bond's forces with fixed weights.
 
+use super::convolution::{BLOCK, Shared, Tap};
 use super::window::{Averaged, Window, normalise};
 use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, cell_fractions, segment_fraction};
 use crate::bonds::{Bonds, LatticeBonds};
-use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
-use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
+use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-
-/// Where a bond must begin, relative to the point of interest, and the weight with which it counts there.
-struct Tap {
-    shift: isize,
-    weight: f64,
-}
 
 pub fn piola<const D: usize>(
     bonds: &LatticeBonds<D>,
@@ -23,80 +17,59 @@ pub fn piola<const D: usize>(
     ball: BallVolume,
 ) -> Vec<Tensor<D>> {
     let sites = bonds.sites();
-    let mut columns: [Field<D>; D] = std::array::from_fn(|_| Field::zeros(sites));
-    let mut forces = Field::zeros(sites);
-    let mut averages = Field::zeros(sites);
+    let mut sums = vec![[[0.0; D]; D]; sites];
     let window = measure.is_partition().then(|| Averaged::<D>::new(Window::of(measure), bonds.ratio()));
-    let rim = Rim::new(bonds, state, measure);
-    let filled = blocks(sites, bonds.particles());
+    let (filled, rim) = (blocks(sites, bonds.particles()), rim(bonds, state, measure));
+    let mut shared = Shared::new(sites, bonds.occupancy(), &rim);
     let mut alike = BTreeMap::new();
     // one direction of every bond; the other adds the same f ⊗ ξ, which the factor ½ of the definition undoes
     for k in 0..bonds.stencil().offsets.len() / 2 {
         let offset = bonds.stencil().offsets[k];
-        bond_forces(bonds, state, k, &filled, &mut forces);
         let taps = taps(bonds, offset, measure, window.as_ref(), &mut alike);
-        convolve(&forces, &taps, &filled, &mut averages);
-        rim.complete(bonds.shift(offset), &taps, &mut averages);
-        let spacing = bonds.lattice().spacing;
-        for d in (0..D).filter(|&d| offset[d] != 0) {
-            let edge = f64::from(offset[d]) * spacing;
-            accumulate(&averages, edge, &mut columns[d]);
-        }
+        let edge = offset.map(|o| f64::from(o) * bonds.lattice().spacing);
+        shared
+            .set(bonds.shift(offset), &filled, &taps, |start, out| bond_forces(bonds, state, k, start, out));
+        shared.add(&taps, &filled, edge, &mut sums);
     }
     let volumes = volumes(bonds, state, measure, ball, window.as_ref());
     let particles = bonds.particles().iter().zip(volumes);
-    particles
-        .map(|(&site, volume)| {
-            let columns: [[f64; D]; D] = std::array::from_fn(|b| columns[b].get(site as usize));
-            std::array::from_fn(|a| std::array::from_fn(|b| columns[b][a] / volume))
-        })
-        .collect()
+    particles.map(|(&site, volume)| sums[site as usize].map(|row| row.map(|sum| sum / volume))).collect()
 }
 
 /// Which blocks of sites hold any of those given.
-fn blocks(sites: usize, of: &[u32]) -> Vec<bool> {
+pub(super) fn blocks(sites: usize, of: &[u32]) -> Vec<bool> {
     let mut filled = vec![false; sites.div_ceil(BLOCK)];
     of.iter().for_each(|&site| filled[site as usize / BLOCK] = true);
     filled
 }
 
-/// f V_I V_J, N, of bond `k` from every site; zero where it is not intact.
+/// f V_I V_J, N, of bond `k` from a block of sites; zero where it is not intact.
 fn bond_forces<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &Loaded<D>,
     k: usize,
-    filled: &[bool],
-    forces: &mut Field<D>,
+    start: usize,
+    mut out: [&mut [f64]; D],
 ) {
-    let offset = bonds.stencil().offsets[k];
-    let shift = bonds.shift(offset);
+    let (offset, count) = (bonds.stencil().offsets[k], out[0].len());
     let bond = offset.map(|o| f64::from(o) * bonds.lattice().spacing);
     let square: f64 = bond.iter().map(|x| x * x).sum();
     let (volume, length) = (bonds.lattice().volume, square.sqrt());
-    let (displacement, arch) = (state.displacement.components(), Arch::new());
-    forces.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
-        let range = chunk_range(chunk, bonds.sites());
-        for start in range.clone().step_by(BLOCK).filter(|start| filled[start / BLOCK]) {
-            let count = BLOCK.min(range.end - start);
-            let mut scale = [0.0; BLOCK];
-            for (index, scale) in scale[..count].iter_mut().enumerate() {
-                if bonds.is_intact(start + index, k) {
-                    let weight = bonds.weight(start + index, k) * volume;
-                    *scale = 2.0 * state.modulus * weight * volume / length;
-                }
-            }
-            let at = start - range.start;
-            let there = start.wrapping_add_signed(shift);
-            // rows are padded: a bond that leaves the storage is never intact
-            if there.checked_add(count).is_none_or(|end| end > bonds.sites()) {
-                out.iter_mut().for_each(|out| out[at..at + count].fill(0.0));
-                continue;
-            }
-            let out = out.each_mut().map(|out| &mut out[at..at + count]);
-            let ends = displacement.map(|u| [&u[start..start + count], &u[there..there + count]]);
-            arch.dispatch(Pull { fit: state.fit, bond, square, scale: &scale, ends, out });
+    let mut scale = [0.0; BLOCK];
+    for (index, scale) in scale[..count].iter_mut().enumerate() {
+        if bonds.is_intact(start + index, k) {
+            let weight = bonds.weight(start + index, k) * volume;
+            *scale = 2.0 * state.modulus * weight * volume / length;
         }
-    });
+    }
+    let there = start.wrapping_add_signed(bonds.shift(offset));
+    // rows are padded: a bond that leaves the storage is never intact
+    if there.checked_add(count).is_none_or(|end| end > bonds.sites()) {
+        out.iter_mut().for_each(|out| out.fill(0.0));
+        return;
+    }
+    let ends = state.displacement.components().map(|u| [&u[start..start + count], &u[there..there + count]]);
+    Arch::new().dispatch(Pull { fit: state.fit, bond, square, scale: &scale, ends, out });
 }
 
 /// scale·q(e) ζ of a block of bonds, from the displacements of both ends.
@@ -203,150 +176,31 @@ fn crossing<const D: usize>(ratio: f64, offset: [i32; D], measure: Measure) -> V
         .collect()
 }
 
-/// Particles so near a surface that bonds of their windows are missing, where existing ones make up for them.
-struct Rim {
-    sites: Vec<u32>,
-    occupied: Vec<bool>,
-    /// The blocks that hold any of them.
-    filled: Vec<bool>,
-}
-
-impl Rim {
-    fn new<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Self {
-        let wanted = |site: usize| match measure {
-            Measure::HardyBonds => true,
-            Measure::HardyWindow => false,
-            _ => measure.is_partition() && !state.missing.is_window(site),
+/// The sites of particles so near a surface that bonds of their windows are missing, where existing ones make up for them.
+fn rim<const D: usize>(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Vec<u32> {
+    let wanted = |site: usize| match measure {
+        Measure::HardyBonds => true,
+        Measure::HardyWindow => false,
+        _ => measure.is_partition() && !state.missing.is_window(site),
+    };
+    // no bond that crosses a window begins farther away
+    let reach = (bonds.ratio() + 0.5).floor() as i32 + bonds.ratio().floor() as i32;
+    // axis by axis: whether all within reach along it, and along those before, are occupied
+    let mut whole = bonds.occupancy();
+    for d in 0..D {
+        let mut offset = [0; D];
+        offset[d] = 1;
+        let stride = bonds.shift(offset);
+        let full = |site: usize| {
+            let at = |k: i32| site.wrapping_add_signed(k as isize * stride);
+            (-reach..=reach).all(|k| whole.get(at(k)).copied().unwrap_or(false))
         };
-        let occupied = bonds.occupancy();
-        // no bond that crosses a window begins farther away
-        let reach = (bonds.ratio() + 0.5).floor() as i32 + bonds.ratio().floor() as i32;
-        // axis by axis: whether all within reach along it, and along those before, are occupied
-        let mut whole = occupied.clone();
-        for d in 0..D {
-            let mut offset = [0; D];
-            offset[d] = 1;
-            let stride = bonds.shift(offset);
-            let full = |site: usize| {
-                let at = |k: i32| site.wrapping_add_signed(k as isize * stride);
-                (-reach..=reach).all(|k| whole.get(at(k)).copied().unwrap_or(false))
-            };
-            let next: Vec<bool> =
-                (0..whole.len()).into_par_iter().map(|site| whole[site] && full(site)).collect();
-            whole = next;
-        }
-        let particles = bonds.particles().iter().copied();
-        let sites: Vec<u32> = particles.filter(|&s| !whole[s as usize] && wanted(s as usize)).collect();
-        Self { filled: blocks(occupied.len(), &sites), sites, occupied }
+        let next: Vec<bool> =
+            (0..whole.len()).into_par_iter().map(|site| whole[site] && full(site)).collect();
+        whole = next;
     }
-
-    /// Divides the averages of a bond by the weights of those whose two particles exist.
-    fn complete<const D: usize>(&self, shift: isize, taps: &[Tap], averages: &mut Field<D>) {
-        if self.sites.is_empty() {
-            return;
-        }
-        let there = |site: usize| self.occupied.get(site).copied().unwrap_or(false);
-        let both = |site: usize| self.occupied[site] && there(site.wrapping_add_signed(shift));
-        let mut pairs = Field::<1>::zeros(self.occupied.len());
-        (0..self.occupied.len()).filter(|&site| both(site)).for_each(|site| pairs.set(site, [1.0]));
-        let mut sums = Field::<1>::zeros(self.occupied.len());
-        convolve(&pairs, taps, &self.filled, &mut sums);
-        let weights = self.sites.iter().map(|&site| sums.get(site as usize)[0]);
-        for (&site, weight) in self.sites.iter().zip(weights) {
-            let average = averages.get(site as usize);
-            // where no such bond exists, the average is zero
-            averages.set(site as usize, average.map(|f| if weight > 0.0 { f / weight } else { 0.0 }));
-        }
-    }
-}
-
-/// Sites that a convolution sums at a time, in registers.
-const BLOCK: usize = 32;
-
-/// averages(p) = Σ weight·forces(p + shift) in the blocks that are `filled`; nothing lies beyond the ends.
-fn convolve<const D: usize>(forces: &Field<D>, taps: &[Tap], filled: &[bool], averages: &mut Field<D>) {
-    let forces = forces.components();
-    let arch = Arch::new();
-    averages.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, out)| {
-        for (d, out) in out.into_iter().enumerate() {
-            for (block, out) in out.chunks_mut(BLOCK).enumerate() {
-                let start = chunk * CHUNK + block * BLOCK;
-                if filled[start / BLOCK] {
-                    arch.dispatch(Convolution { out, values: forces[d], start, taps });
-                }
-            }
-        }
-    });
-}
-
-/// out[i] = Σ weight·values[start + i + shift].
-struct Convolution<'a> {
-    out: &'a mut [f64],
-    values: &'a [f64],
-    start: usize,
-    taps: &'a [Tap],
-}
-
-impl WithSimd for Convolution<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        match BLOCK / S::F64_LANES {
-            4 => self.sum::<S, 4>(simd),
-            8 => self.sum::<S, 8>(simd),
-            16 => self.sum::<S, 16>(simd),
-            _ => self.sum::<S, BLOCK>(simd),
-        }
-    }
-}
-
-impl Convolution<'_> {
-    /// With V vectors a block.
-    #[inline(always)]
-    fn sum<S: Simd, const V: usize>(self, simd: S) {
-        let Self { out, values, start, taps } = self;
-        let mut sum = [simd.splat_f64s(0.0); V];
-        for tap in taps {
-            let from = start.wrapping_add_signed(tap.shift);
-            let weight = simd.splat_f64s(tap.weight);
-            let mut near = [0.0; BLOCK];
-            let there = if from < values.len() && values.len() - from >= BLOCK {
-                &values[from..from + BLOCK]
-            } else {
-                for i in 0..BLOCK {
-                    let at = from.wrapping_add(i);
-                    near[i] = if at < values.len() { values[at] } else { 0.0 };
-                }
-                &near[..]
-            };
-            let there = &S::as_simd_f64s(there).0[..V];
-            for v in 0..V {
-                sum[v] = simd.mul_add_f64s(weight, there[v], sum[v]);
-            }
-        }
-        let mut all = [0.0; BLOCK];
-        S::as_mut_simd_f64s(&mut all).0.copy_from_slice(&sum);
-        out.copy_from_slice(&all[..out.len()]);
-    }
-}
-
-/// out += factor·values over the shorter of both.
-fn add_scaled(out: &mut [f64], values: &[f64], factor: f64) {
-    Arch::new().dispatch(|| {
-        for (o, v) in out.iter_mut().zip(values) {
-            *o += factor * v;
-        }
-    });
-}
-
-fn accumulate<const D: usize>(averages: &Field<D>, edge: f64, column: &mut Field<D>) {
-    let sites = averages.sites();
-    let averages = averages.components();
-    column.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, out)| {
-        for (d, out) in out.into_iter().enumerate() {
-            add_scaled(out, &averages[d][chunk_range(chunk, sites)], edge);
-        }
-    });
+    let particles = bonds.particles().iter().copied();
+    particles.filter(|&s| !whole[s as usize] && wanted(s as usize)).collect()
 }
 
 /// What the sum over bonds is divided by, particle by particle.

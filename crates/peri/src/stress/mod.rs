@@ -7,13 +7,14 @@
 
 mod ball;
 mod cloud;
+mod convolution;
 mod lattice;
 mod window;
 
 pub use ball::{ball_volume, cell_fractions, segment_fraction};
 
-use crate::bonds::{Bonds, CloudBonds, Kind, LatticeBonds};
-use crate::field::Field;
+use crate::bonds::{Bonds, CloudBonds, GradientSums, Kind, LatticeBonds};
+use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -211,35 +212,60 @@ pub fn deformation_gradients<const D: usize>(
     bonds: &dyn Bonds<D>,
     displacement: &Field<D>,
 ) -> Vec<Tensor<D>> {
+    let particles = bonds.particles();
+    // what one work item has of them; `None` where bonds have to be visited one by one
+    let chunks: Option<Vec<Vec<Tensor<D>>>> = bonds.as_lattice().and_then(|lattice| {
+        let chunk = |chunk: usize| {
+            let sums = lattice.gradient_sums(displacement, chunk)?;
+            let sites = chunk_range(chunk, bonds.sites());
+            let [from, to] =
+                [sites.start, sites.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
+            Some(
+                particles[from..to]
+                    .iter()
+                    .map(|&site| gradient(&sums[site as usize - sites.start]))
+                    .collect(),
+            )
+        };
+        (0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(chunk).collect()
+    });
+    if let Some(chunks) = chunks {
+        return chunks.concat();
+    }
     let one = |&site: &u32| {
         let own = displacement.get(site as usize);
-        let mut shape = nalgebra::SMatrix::<f64, D, D>::zeros();
-        let mut change = nalgebra::SMatrix::<f64, D, D>::zeros();
+        let (mut shape, mut change) = ([[0.0; D]; D], [[0.0; D]; D]);
         bonds.neighbours(site as usize, &mut |bond| {
             let other = displacement.get(bond.site);
-            let unit = 1.0 / (bond.length * bond.length);
+            let weight = bond.volume / (bond.length * bond.length);
             for a in 0..D {
                 for b in 0..D {
-                    shape[(a, b)] += bond.volume * unit * bond.bond[a] * bond.bond[b];
-                    change[(a, b)] += bond.volume * unit * (other[a] - own[a]) * bond.bond[b];
+                    shape[a][b] += weight * bond.bond[a] * bond.bond[b];
+                    change[a][b] += weight * (other[a] - own[a]) * bond.bond[b];
                 }
             }
         });
-        let mut gradient: Tensor<D> =
-            std::array::from_fn(|a| std::array::from_fn(|b| f64::from(u8::from(a == b))));
-        let size = shape.trace();
-        let singular = determinant::<D>(|a, b| shape[(a, b)]).abs() <= 1e-9 * size.powi(D as i32);
-        if let Some(inverse) = shape.try_inverse().filter(|_| !singular) {
-            let h = change * inverse;
-            for a in 0..D {
-                for b in 0..D {
-                    gradient[a][b] += h[(a, b)];
-                }
+        gradient(&GradientSums { shape, change })
+    };
+    particles.par_iter().map(one).collect()
+}
+
+/// 1 + change·shape⁻¹; the identity where there is no such inverse.
+fn gradient<const D: usize>(sums: &GradientSums<D>) -> Tensor<D> {
+    let matrix = |t: &Tensor<D>| nalgebra::SMatrix::<f64, D, D>::from_fn(|a, b| t[a][b]);
+    let shape = matrix(&sums.shape);
+    let mut gradient: Tensor<D> =
+        std::array::from_fn(|a| std::array::from_fn(|b| f64::from(u8::from(a == b))));
+    let singular = determinant::<D>(|a, b| shape[(a, b)]).abs() <= 1e-9 * shape.trace().powi(D as i32);
+    if let Some(inverse) = shape.try_inverse().filter(|_| !singular) {
+        let change = matrix(&sums.change) * inverse;
+        for a in 0..D {
+            for b in 0..D {
+                gradient[a][b] += change[(a, b)];
             }
         }
-        gradient
-    };
-    bonds.particles().par_iter().map(one).collect()
+    }
+    gradient
 }
 
 /// Cauchy stress σ = P Fᵀ/J, Eq. (2.32), particle by particle.

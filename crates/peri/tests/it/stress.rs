@@ -367,6 +367,28 @@ fn divergence_is_the_average_force() {
     evidence::at_most("divergence of the stress by ball-share against the average force", worst, 1e-5);
 }
 
+/// The lattice sums deformation gradients by vectors, a cloud bond by bond: bodies with a hole, cracks and a volume correction.
+#[test]
+fn deformation_gradients_of_torn_bodies() {
+    fn check<const D: usize>(cells: [usize; D]) {
+        let built = Body::<D>::damaged(cells, 0.1, 3.015).build();
+        let u = Random(7).vectors::<D>(built.points.len(), 0.01);
+        let on_lattice = scatter(built.lattice.sites(), &built.on_lattice, &u);
+        let in_cloud = scatter(built.cloud.sites(), &built.in_cloud, &u);
+        let found = deformation_gradients::<D>(&built.lattice, &on_lattice);
+        let expected = deformation_gradients::<D>(&built.cloud, &in_cloud);
+        assert_eq!(found.len(), built.points.len());
+        for (f, &site) in found.iter().zip(&built.in_cloud) {
+            for (f, e) in f.as_flattened().iter().zip(expected[site].as_flattened()) {
+                // another order of sums of about 100 terms, and a solve
+                assert!((f - e).abs() < 1e-13, "{f} against {e}");
+            }
+        }
+    }
+    check([40, 33]);
+    check([14, 13, 9]);
+}
+
 /// Cauchy stress and deformation gradient of a large homogeneous strain: F as imposed, σ = P Fᵀ/J symmetric inside.
 #[test]
 fn cauchy_stress_of_a_homogeneous_strain() {
