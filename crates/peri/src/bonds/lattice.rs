@@ -11,7 +11,7 @@ use super::{
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::geometry::{Cut, Lattice, severed};
-use crate::potential::{KernelFit, StretchRange};
+use crate::potential::{KernelFit, StretchRange, TangentTable};
 use rayon::prelude::*;
 
 /// The bonds of a lattice.
@@ -185,6 +185,19 @@ impl<const D: usize> LatticeBonds<D> {
     ) -> Option<Vec<GradientSums<D>>> {
         let sites = chunk_range(chunk, self.sites);
         self.softening.bonds().is_empty().then(|| self.spans(displacement).gradient_sums(sites))
+    }
+
+    /// Of each site of a work item, Σ_J (2 w V_J/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|), n the direction of the
+    /// deformed bond; `None` where bonds have weights of their own.
+    pub(crate) fn stiffness(
+        &self,
+        displacement: &Field<D>,
+        chunk: usize,
+        table: &TangentTable,
+        least: f64,
+    ) -> Option<Vec<f64>> {
+        let (sites, volume) = (chunk_range(chunk, self.sites), self.lattice.volume);
+        self.is_uniform().then(|| self.spans(displacement).stiffness(sites, volume, table, least))
     }
 
     /// Which sites hold a particle.

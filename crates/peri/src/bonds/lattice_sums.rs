@@ -1,7 +1,7 @@
 //! Sums over the bonds of a lattice without forces: stretches, and energies, each bond seen from one of its ends.
 
 use super::lattice_kernel::{Class, TILE, Tiles};
-use crate::potential::StretchRange;
+use crate::potential::{StretchRange, TangentTable};
 use pulp::bytemuck::cast_slice;
 use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use std::ops::Range;
@@ -96,6 +96,15 @@ impl<const D: usize> Spans<'_, D> {
         found.total
     }
 
+    /// Of each of these sites, whole tiles: Σ (2 share V/|ξ|)·max(table(e), least)·(1 + max_{d≠e} |n_d n_e|) over all its bonds,
+    /// n the direction of the deformed bond.
+    pub fn stiffness(&self, sites: Range<usize>, volume: f64, table: &TangentTable, least: f64) -> Vec<f64> {
+        let sums = vec![0.0; sites.len()];
+        let mut found = Stiffness { first: sites.start, volume, table, least, sums };
+        self.sum(sites, self.spans.len(), &mut found);
+        found.sums
+    }
+
     /// Of each of these sites, whole tiles, over all its bonds.
     pub fn gradient_sums(&self, sites: Range<usize>) -> Vec<GradientSums<D>> {
         let mut sums = vec![GradientSums::NONE; sites.len()];
@@ -171,6 +180,47 @@ impl<const D: usize> Add<D> for Beyond {
                     let there = (base + i).wrapping_add_signed(spans.spans[k].shift);
                     self.sites.extend([base + i, there]);
                 }
+            }
+        }
+    }
+}
+
+struct Stiffness<'a> {
+    first: usize,
+    volume: f64,
+    table: &'a TangentTable,
+    least: f64,
+    sums: Vec<f64>,
+}
+
+impl<const D: usize> Add<D> for Stiffness<'_> {
+    #[inline(always)]
+    fn tile(&mut self, spans: &Spans<D>, base: usize, present: &[usize]) {
+        let sums = &mut self.sums[base - self.first..][..TILE];
+        for &k in present {
+            let span = &spans.spans[k];
+            let there = base.wrapping_add_signed(span.shift);
+            let (mut zeta, mut square, mut mixed) = ([[0.0; TILE]; D], [0.0; TILE], [0.0_f64; TILE]);
+            for d in 0..D {
+                let displacement = spans.tiles.displacement[d];
+                let (own, other) = (&displacement[base..base + TILE], &displacement[there..there + TILE]);
+                for i in 0..TILE {
+                    zeta[d][i] = span.bond[d] + other[i] - own[i];
+                    square[i] += zeta[d][i] * zeta[d][i];
+                }
+                for e in 0..d {
+                    for i in 0..TILE {
+                        mixed[i] = mixed[i].max((zeta[d][i] * zeta[e][i]).abs());
+                    }
+                }
+            }
+            let factor = 2.0 * (self.volume * span.share) / span.length;
+            let words = &spans.tiles.intact[k / 64][base..base + TILE];
+            for i in 0..TILE {
+                let e = square[i] / (span.length * span.length) - 1.0;
+                let tangent = self.table.value(e).max(self.least);
+                let part = factor * tangent * (1.0 + mixed[i] / square[i].max(f64::MIN_POSITIVE));
+                sums[i] += if words[i] >> (k % 64) & 1 == 1 { part } else { 0.0 };
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Bond laws as materials: no state of a particle, forces by the kernels of [`crate::bonds`].
 
 use super::{Bond, Cover, Family, LawRange, Material, Response};
-use crate::bonds::{Bonds, Overstretched};
+use crate::bonds::{Bonds, LatticeBonds, Overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::potential::{BondPotential, EnergyTable, KernelFit, StretchRange, TangentTable};
@@ -77,7 +77,7 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
     where
         Self: 'a,
     {
-        Box::new(Kernels { material: self, fitted: None, table: None })
+        Box::new(Kernels { material: self, fitted: None, table: None, tangents: None })
     }
 }
 
@@ -94,6 +94,8 @@ struct Kernels<'a> {
     fitted: Option<EnergyTable>,
     /// Energies of the law over the range of stretches last requested: it costs more to sample than bonds to sum.
     table: Option<(StretchRange, EnergyTable)>,
+    /// Tangents likewise.
+    tangents: Option<(StretchRange, TangentTable)>,
 }
 
 impl<const D: usize> Response<D> for Kernels<'_> {
@@ -202,9 +204,21 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         let law = &*self.material.law;
         // bonds crushed to nothing have no bound: the law's own at a thousandth
         let [low, high] = stretches.map(|stretch| stretch.powi(2) - 1.0);
-        let table = TangentTable::new(law, StretchRange { low, high });
+        let range = StretchRange { low, high };
+        let tangents = self.tangents.take().filter(|(sampled, _)| *sampled == range);
+        let (_, table) =
+            self.tangents.insert(tangents.unwrap_or_else(|| (range, TangentTable::new(law, range))));
         // a bond past its greatest force is soft, but a light particle would leap when it meets a stiff one
         let least = LEAST_TANGENT * law.tangent().abs();
+        let sites = bonds.sites();
+        let on_lattice = |lattice: &LatticeBonds<D>| -> Option<Vec<Vec<f64>>> {
+            let chunk = |chunk| lattice.stiffness(displacement, chunk, table, least);
+            (0..sites.div_ceil(CHUNK)).into_par_iter().map(chunk).collect()
+        };
+        if let Some(sums) = bonds.as_lattice().and_then(on_lattice) {
+            let sums = sums.concat();
+            return bonds.particles().iter().map(|&site| sums[site as usize]).collect();
+        }
         let of = |&site: &u32| {
             let own = displacement.get(site as usize);
             let mut sum = 0.0;

@@ -82,7 +82,8 @@ impl EnergyTable {
 pub struct TangentTable {
     low: f64,
     step: f64,
-    nodes: Vec<f64>,
+    /// The bound of each piece.
+    pieces: Vec<f64>,
 }
 
 impl TangentTable {
@@ -95,13 +96,15 @@ impl TangentTable {
             let stretch = (1.0 + low + step * k as f64).sqrt();
             law.tension_derivative(stretch).abs().max(law.tension(stretch).abs() / stretch)
         };
-        Self { low, step, nodes: (0..=PIECES).map(node).collect() }
+        let nodes: Vec<f64> = (0..=PIECES).map(node).collect();
+        Self { low, step, pieces: nodes.windows(2).map(|ends| ends[0].max(ends[1])).collect() }
     }
 
     /// The bound at e; beyond the table that of its end.
+    #[inline]
     pub fn value(&self, e: f64) -> f64 {
-        let k = (((e - self.low) / self.step).max(0.0) as usize).min(PIECES - 1);
-        self.nodes[k].max(self.nodes[k + 1])
+        let piece = (((e - self.low) / self.step).max(0.0) as usize).min(PIECES - 1);
+        self.pieces[piece]
     }
 }
 
