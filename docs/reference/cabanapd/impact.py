@@ -1,18 +1,19 @@
 """Whole runs of CabanaPD (PMB) and of peri, the same scene in both: time and what breaks.
 
-python impact.py PERI BESIDE FOLDER [SCENE] [THREADS] [REPEATS] (needs numpy, h5py). BESIDE is beside.cpp, built among CabanaPD's examples.
+python impact.py PERI BESIDE FOLDER [SCENE] [THREADS] [REPEATS] [STEPS] (needs numpy, h5py). BESIDE is beside.cpp, built among CabanaPD's examples.
 Prints a JSON object. SCENE is one of
 plate (default): Kalthoff and Winkler's plate of ../lammps/impact.py, 75 × 150 × 7 cubic cells, horizon 3.015 cells, K = E/1.5, 32 m/s, 90 µs;
 its notches have no width here;
 deck: the same plate as CabanaPD's regression test has it, 75 × 151 × 7 cells with unequal sides, horizon 2 mm, K = E, 16 m/s, 70 µs;
 cylinder: the fragmenting cylinder of CabanaPD's example with particles at the middles of its cells, without contact; contact: with it.
-The plates first run for 10 µs, in which no bond breaks; so does the cylinder, with unbreakable bonds.
+All first run for 10 µs: in the plates no bond breaks in that time, the cylinder's bonds cannot break then. With LATE set in the
+environment, a bond of CabanaPD's plates acts once more in the second half of the step in which it breaks, as in peri.
 """
 import glob, json, math, os, re, resource, statistics, subprocess, sys, time
 import h5py, numpy
 
 peri, beside, folder, *rest = sys.argv[1:]
-scene, threads, repeats = (rest + ['plate', '1', '1'][len(rest):])[:3]
+scene, threads, repeats, most = (rest + ['plate', '1', '1', '0'][len(rest):])[:4]
 os.makedirs(folder, exist_ok=True)
 os.chdir(folder)
 side = lambda x: '[' + ', '.join(f'"{value!r} m"' for value in map(float, x)) + ']'
@@ -35,7 +36,7 @@ class Plate:
     def json(self, steps, _):
         return dict(
             low_corner=list(self.low), high_corner=list(-self.low), num_cells=self.cells.tolist(), density=self.density,
-            bulk_modulus=self.bulk, fracture_energy=self.energy, horizon=self.horizon, impactor_velocity=self.speed, **({'late': 1} if 'LATE' in os.environ else {}))
+            bulk_modulus=self.bulk, fracture_energy=self.energy, horizon=self.horizon, impactor_velocity=self.speed)
 
     def toml(self, steps, _):
         low, spacing, end = self.low, self.spacing, steps * self.step
@@ -107,6 +108,7 @@ velocity_field = ["{radial.format('x')}", "{radial.format('y')}", "100*z/0.05"]
 
 
 it = Plate(scene == 'deck') if scene in ('plate', 'deck') else Cylinder(scene == 'contact')
+it.steps = int(most) or it.steps
 
 
 def run(words, count):
@@ -161,6 +163,8 @@ pictures = false
 
 def theirs(steps, breaks):
     deck = {**it.json(steps, breaks), 'final_time': (steps + 0.5) * it.step, 'timestep': it.step, 'output_frequency': steps, 'output_reference': True}
+    if 'LATE' in os.environ:
+        deck['late'] = 1
     units = lambda key: {'unit': 'm'} if 'corner' in key else {}
     with open('deck.json', 'w') as file:
         json.dump({key: {'value': value, **units(key)} for key, value in deck.items()}, file, default=float)
