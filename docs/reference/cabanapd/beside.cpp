@@ -83,17 +83,17 @@ struct Open : CabanaPD::Solver<T...>
     }
 
     // As run of CabanaPD, but a bond that breaks acts once more in the second half of its step, as in peri.
-    template <class Held, class Unbreakable>
-    void late( Held& held, Unbreakable& unbreakable )
+    template <class Hold, class Unbreakable>
+    void late( Hold hold, Unbreakable unbreakable )
     {
         for ( int step = 1; step <= this->num_steps; step++ )
         {
             this->integrator->initialHalfStep( Space{}, this->particles );
             computeForce( unbreakable, *this->force, this->particles, *this->neighbor );
-            held.apply( Space{}, this->particles, 0 );
+            hold();
             this->integrator->finalHalfStep( Space{}, this->particles );
             this->updateForce();
-            held.apply( Space{}, this->particles, 0 );
+            hold();
         }
         computeEnergy( this->force_model, *this->force, this->particles, *this->neighbor );
     }
@@ -148,8 +148,7 @@ void plate( CabanaPD::Inputs inputs )
     auto whole = solver.bonds();
     if ( inputs.contains( "late" ) )
     {
-        CabanaPD::ForceModel unbreakable( CabanaPD::PMB{}, horizon, K, 1e20 );
-        solver.late( held, unbreakable );
+        solver.late( [&] { held.apply( Space{}, solver.particles, 0 ); }, CabanaPD::ForceModel( CabanaPD::PMB{}, horizon, K, 1e20 ) );
     }
     else
         solver.run( held );
@@ -188,7 +187,16 @@ void cylinder( CabanaPD::Inputs inputs, Particles& particles, Models... models )
     Open solver( inputs, particles, models... );
     solver.init();
     auto whole = solver.bonds();
-    solver.run();
+    bool ran = false;
+    if constexpr ( sizeof...( models ) == 1 )
+        if ( inputs.contains( "late" ) )
+        {
+            double K = inputs["bulk_modulus"];
+            solver.late( [] {}, CabanaPD::ForceModel( CabanaPD::PMB{}, horizon + 1e-10, K, 1e20 ) );
+            ran = true;
+        }
+    if ( !ran )
+        solver.run();
     solver.write( whole );
 }
 

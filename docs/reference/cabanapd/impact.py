@@ -7,7 +7,7 @@ its notches have no width here;
 deck: the same plate as CabanaPD's regression test has it, 75 × 151 × 7 cells with unequal sides, horizon 2 mm, K = E, 16 m/s, 70 µs;
 cylinder: the fragmenting cylinder of CabanaPD's example with particles at the middles of its cells, without contact; contact: with it.
 All first run for 10 µs: in the plates no bond breaks in that time, the cylinder's bonds cannot break then. With LATE set in the
-environment, a bond of CabanaPD's plates acts once more in the second half of the step in which it breaks, as in peri.
+environment, a bond of CabanaPD (without contact) acts once more in the second half of the step in which it breaks, as in peri.
 """
 import glob, json, math, os, re, resource, statistics, subprocess, sys, time
 import h5py, numpy
