@@ -271,6 +271,10 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         }
     }
 
+    fn other_end(&self, site: usize, index: u32) -> usize {
+        self.whole_bond(site, index).site
+    }
+
     fn bonded(&self, site: usize) -> u32 {
         let row = &self.inverse_length[self.starts[site]..self.starts[site + 1]];
         row.iter().map(|&inverse| u32::from(inverse > 0.0)).sum()

@@ -369,6 +369,10 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         }
     }
 
+    fn other_end(&self, site: usize, index: u32) -> usize {
+        site.wrapping_add_signed(self.spans[index as usize].shift)
+    }
+
     fn is_bonded(&self, site: usize, other: usize) -> bool {
         let (Some(own), Some(there)) = (self.cell_of(site), self.cell_of(other)) else { return false };
         let offset: [i32; D] = std::array::from_fn(|d| there[d] as i32 - own[d] as i32);

@@ -108,7 +108,48 @@ impl<const D: usize> List<D> {
         }
     }
 
-    /// Makes the list for a displacement; to be called where bonds have changed.
+    /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends: the list is then that which would
+    /// have been made of the bonds that are left.
+    pub fn part(&mut self, bonds: &dyn Bonds<D>, pairs: &[[u32; 2]]) {
+        if self.listed_at.sites() != bonds.sites() {
+            // the next update makes it anew
+            return;
+        }
+        let reach = self.gap + self.skin;
+        let near = |&[own, other]: &[u32; 2]| {
+            let candidate = self.candidate(bonds, own as usize, other as usize);
+            let (_, r) = candidate.apart(&self.listed_at, own as usize);
+            (r < candidate.distance + reach).then_some((own, candidate))
+        };
+        let mut found: Vec<(u32, Candidate<D>)> = pairs.par_iter().filter_map(near).collect();
+        found.sort_unstable_by_key(|(own, candidate)| (*own, candidate.site));
+        let (listed, candidates) = (std::mem::take(&mut self.listed), std::mem::take(&mut self.candidates));
+        self.candidates.reserve(candidates.len() + found.len());
+        let (mut at, mut start, mut found) = (0, 0, &found[..]);
+        loop {
+            let next = [listed.get(at).map(|own| own.site), found.first().map(|new| new.0)];
+            let Some(site) = next.into_iter().flatten().min() else { break };
+            let from = self.candidates.len();
+            if let Some(own) = listed.get(at).filter(|own| own.site == site) {
+                self.candidates.extend_from_slice(&candidates[start..own.end]);
+                (at, start) = (at + 1, own.end);
+            }
+            let (new, others) = found.split_at(found.partition_point(|new| new.0 == site));
+            found = others;
+            if !new.is_empty() {
+                self.candidates.extend(new.iter().map(|new| new.1));
+                self.candidates[from..].sort_unstable_by_key(|candidate| candidate.site);
+            }
+            let (volume, alone) = (bonds.volume(site as usize), bonds.is_alone(site as usize));
+            self.listed.push(Listed { site, end: self.candidates.len(), volume, alone });
+        }
+        let alone = pairs.iter().map(|pair| pair[0]).filter(|&site| bonds.is_alone(site as usize));
+        self.alone.extend(alone);
+        self.alone.sort_unstable();
+        self.alone.dedup();
+    }
+
+    /// Makes the list for a displacement.
     pub fn rebuild(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
         let particles = bonds.particles();
         let reach = self.gap + self.skin;

@@ -10,7 +10,7 @@
 //! whatever the corrections of bonds.
 //!
 //! The pairs come from a list of all that are within d, what is about to touch, and a skin, rebuilt where a particle
-//! has moved by half of the skin. Pairs beyond d add nothing, not even a rounding: the list is no part of the state, and
+//! has moved by half of the skin; where a bond breaks its pair is added. Pairs beyond d add nothing, not even a rounding: the list is no part of the state, and
 //! how often it is made makes no difference to any bit.
 //!
 //! Limits. Contact knows distances only: a particle that leaps past another in one step stays there. Force and energy
@@ -264,7 +264,12 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Makes the list for a displacement; to be called where bonds have changed.
+    /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends.
+    pub fn part(&mut self, bonds: &dyn Bonds<D>, pairs: &[[u32; 2]]) {
+        self.list.part(bonds, pairs);
+    }
+
+    /// Makes the list for a displacement; to be called where bonds have changed, otherwise than by [`Self::part`].
     pub fn rebuild(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
         self.list.rebuild(bonds, displacement);
     }

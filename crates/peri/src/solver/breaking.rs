@@ -92,7 +92,12 @@ impl<const D: usize> System<'_, D> {
             // what rubs depends on bonds, too
             self.lag(state);
         }
-        self.rebuild_contact(&state.displacement);
+        if let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_pairs()) {
+            let pair = |bond: &Overstretched| {
+                [bond.site, self.bonds.other_end(bond.site as usize, bond.index) as u32]
+            };
+            contact.part(&*self.bonds, &list.iter().map(pair).collect::<Vec<_>>());
+        }
         if bonds > 0 {
             state.intact = Some(self.bonds.intact());
         }

@@ -2,7 +2,7 @@
 //! energy, objectivity; bodies pressed together; no list in any bit.
 
 use crate::bodies::{Body, Built, MODULUS, Random, distance, norm, rms, scatter};
-use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
+use peri::bonds::{Bonds, CloudBonds, Overstretched, VolumeCorrection};
 use peri::contact::{Contact, STIFFNESS};
 use peri::field::Field;
 
@@ -137,6 +137,63 @@ fn check_plainly<const D: usize>(cells: [usize; D]) {
 fn lattice_and_cloud_equal_plain_sums() {
     check_plainly([22, 17]);
     check_plainly([9, 8, 7]);
+}
+
+/// Pairs whose bonds break are taken into a list that stays, and later moves within its skin need no other.
+fn check_parted<const D: usize>(cells: [usize; D]) {
+    fn parted<const D: usize>(bonds: &mut dyn Bonds<D>, sites: &[usize], count: usize) {
+        let mut random = Random(11);
+        let (u, step) = (random.vectors::<D>(count, 0.04), random.vectors::<D>(count, 0.002));
+        let mut contact = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
+        contact.rebuild(bonds, &scatter(bonds.sites(), sites, &u));
+        let rebuilds = contact.rebuilds();
+        // every fifth bond in one half of the body, and all in a corner
+        let (mut list, mut pairs) = (Vec::new(), Vec::new());
+        for &site in sites {
+            bonds.neighbours(site, &mut |bond| {
+                let low = |site: usize| bonds.position(site).into_iter().fold(0.0, f64::max) < 0.5;
+                let one = bonds.position(site)[0] < 1.0 && (site + bond.site).is_multiple_of(5);
+                let one = one && bonds.position(bond.site)[0] < 1.0;
+                if one || low(site) || low(bond.site) {
+                    let (site, index, length) = (site as u32, bond.index, bond.length);
+                    list.push(Overstretched { site, index, elongation: 1.0, length, weight: bond.weight });
+                    pairs.push([site, bond.site as u32]);
+                }
+            });
+        }
+        for (bond, pair) in list.iter().zip(&pairs) {
+            assert_eq!(bonds.other_end(bond.site as usize, bond.index), pair[1] as usize);
+        }
+        bonds.sever(&list);
+        contact.part(bonds, &pairs);
+        let moved: Vec<[f64; D]> =
+            u.iter().zip(&step).map(|(u, s)| std::array::from_fn(|d| u[d] + s[d])).collect();
+        let field = scatter(bonds.sites(), sites, &moved);
+        contact.update(bonds, &field);
+        assert_eq!(contact.rebuilds(), rebuilds, "the list was made again");
+        let mut fresh = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
+        fresh.rebuild(bonds, &field);
+        let forces = |contact: &Contact<D>| {
+            let mut force = Field::zeros(bonds.sites());
+            for (chunk, mut out) in force.chunks_mut().into_iter().enumerate() {
+                contact.force(&field, chunk, &mut out);
+            }
+            force
+        };
+        assert_eq!(forces(&contact), forces(&fresh));
+        assert_eq!(contact.touching(&field), fresh.touching(&field));
+        assert!(contact.touching(&field).pairs > 50);
+    }
+    let built = Body::damaged(cells, 0.1, 2.015).build();
+    let Built { mut lattice, mut cloud, points, on_lattice, in_cloud } = built;
+    parted(&mut lattice, &on_lattice, points.len());
+    parted(&mut cloud, &in_cloud, points.len());
+}
+
+#[test]
+fn broken_bonds_join_the_list() {
+    check_parted([22, 17]);
+    check_parted([12, 9, 8]);
 }
 
 /// Scattered points with volumes from 1 to 5 times the least.
