@@ -16,6 +16,8 @@ pub struct Ended {
     pub iterations: usize,
     /// Estimated rms error, K.
     pub error: f64,
+    /// What the solution moved, K: the root of xᵀAx/ΣC.
+    pub size: f64,
     /// Whether the error is below the tolerance, or nothing but rounding is left.
     pub converged: bool,
 }
@@ -36,29 +38,39 @@ pub struct Goal<'a> {
 }
 
 /// The last four terms of eᵀAe, from which the sum of those that follow is estimated.
-struct Estimate([f64; 4]);
+struct Estimate {
+    terms: [f64; 4],
+    /// Of all terms, xᵀAx.
+    sum: f64,
+}
 
 impl Estimate {
+    fn new() -> Self {
+        Self { terms: [f64::INFINITY; 4], sum: 0.0 }
+    }
+
+    /// After so many iterations.
+    fn ended(&self, iterations: usize, error: f64, converged: bool, goal: &Goal) -> Ended {
+        Ended { iterations, error, size: (self.sum / goal.capacity).sqrt(), converged }
+    }
+
     /// Adds a term; how the iteration ended, if the sum of those that follow is below the goal.
     fn reached(&mut self, term: f64, iterations: usize, goal: &Goal) -> Option<Ended> {
+        self.sum += term;
         let left = self.left(term)?;
         let error = (left / goal.capacity).sqrt();
-        (left <= goal.tolerance * goal.tolerance * goal.capacity).then_some(Ended {
-            iterations,
-            error,
-            converged: true,
-        })
+        (left <= goal.tolerance * goal.tolerance * goal.capacity)
+            .then(|| self.ended(iterations, error, true, goal))
     }
 
     /// After all iterations.
     fn given_up(&self, goal: &Goal) -> Ended {
-        let error = (self.0[3] / goal.capacity).sqrt();
-        Ended { iterations: goal.limit, error, converged: false }
+        self.ended(goal.limit, (self.terms[3] / goal.capacity).sqrt(), false, goal)
     }
 
     /// The sum of the terms after this one, K²·J/K; `None` where it is not known yet.
     fn left(&mut self, term: f64) -> Option<f64> {
-        let Self(terms) = self;
+        let terms = &mut self.terms;
         let first = terms[3] == f64::INFINITY;
         terms.rotate_left(1);
         terms[3] = term;
@@ -93,16 +105,16 @@ impl ConjugateGradients {
         self.direction.fill(0.0);
         solution.fill(0.0);
         let mut square = norm_squared(residual, inverse);
-        let mut estimate = Estimate([f64::INFINITY; 4]);
+        let mut estimate = Estimate::new();
         let mut factor = 0.0;
         for iteration in 0..goal.limit {
             if square <= goal.floor || square == 0.0 {
-                return Ended { iterations: iteration, error: 0.0, converged: true };
+                return estimate.ended(iteration, 0.0, true, goal);
             }
             turn(factor, &mut self.direction, residual, inverse);
             let curvature = operator.product(&self.direction, &mut self.image);
             if (goal.stop)() || !(curvature > 0.0 && curvature.is_finite()) {
-                return Ended { iterations: iteration, error: f64::NAN, converged: false };
+                return estimate.ended(iteration, f64::NAN, false, goal);
             }
             let length = square / curvature;
             let next = advance(length, solution, residual, &self.direction, &self.image, inverse);
@@ -131,11 +143,11 @@ impl ConjugateGradients {
         }
         solution.fill(0.0);
         let Self { direction, image, conditioned } = self;
-        let mut estimate = Estimate([f64::INFINITY; 4]);
+        let mut estimate = Estimate::new();
         let mut last = 0.0;
         for iteration in 0..goal.limit {
             if norm_squared(residual, inverse) <= goal.floor {
-                return Ended { iterations: iteration, error: 0.0, converged: true };
+                return estimate.ended(iteration, 0.0, true, goal);
             }
             multigrid.apply(operator, inverse, residual, conditioned);
             let square = dot(residual, conditioned);
@@ -144,7 +156,7 @@ impl ConjugateGradients {
             combine(direction, |k, own| conditioned[k] + factor * own);
             let curvature = operator.product(direction, image);
             if (goal.stop)() || !(curvature > 0.0 && curvature.is_finite() && square > 0.0) {
-                return Ended { iterations: iteration, error: f64::NAN, converged: false };
+                return estimate.ended(iteration, f64::NAN, false, goal);
             }
             let length = square / curvature;
             combine(solution, |k, own| own + length * direction[k]);
@@ -182,6 +194,7 @@ mod tests {
             diagonal: Some(&capacity),
             weights: [0.0, 1.0],
             faces: FaceMatrices::NONE,
+            packed: None,
         };
         let exact: Vec<f64> = (0..size).map(|k| 300.0 + (0.1 * k as f64).sin()).collect();
         let mut residual = vec![0.0; size];
@@ -209,8 +222,13 @@ mod tests {
             out.begin(std::iter::empty());
             out.add(0, -1.0, 0.0);
         });
-        let operator =
-            Operator { rows: &rows, diagonal: None, weights: [0.0, 1.0], faces: FaceMatrices::NONE };
+        let operator = Operator {
+            rows: &rows,
+            diagonal: None,
+            weights: [0.0, 1.0],
+            faces: FaceMatrices::NONE,
+            packed: None,
+        };
         let mut solution = [0.0; 2];
         let mut solve = |limit| {
             let (mut residual, mut cg) = ([1.0, 2.0], ConjugateGradients::default());

@@ -155,8 +155,12 @@ pub struct Rows {
     dead: usize,
     /// Values without what is added in each evaluation.
     base: Option<[Vec<f64>; 2]>,
+    /// Counts changes of the pattern, and of values.
+    versions: [u64; 2],
 }
 
+/// Rows of a run on average where runs count as short.
+const MOST_ALONE: usize = 4;
 /// No stencil of its own.
 const SHARED: u32 = u32::MAX;
 /// The part of the entries that may be dead.
@@ -180,7 +184,29 @@ impl Rows {
             own: Vec::new(),
             dead: 0,
             base: None,
+            versions: [0; 2],
         }
+    }
+
+    /// Number of rows.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Number of work items.
+    pub fn items(&self) -> usize {
+        self.segments.len()
+    }
+
+    /// What changes with the pattern, and what changes with the values.
+    pub fn versions(&self) -> [u64; 2] {
+        self.versions
+    }
+
+    /// Whether most rows of a work item stand alone.
+    pub fn is_unequal(&self, item: usize) -> bool {
+        let rows: u32 = self.segments[item].iter().map(|segment| segment.length).sum();
+        MOST_ALONE * self.segments[item].len() > rows as usize
     }
 
     /// Of `size` rows; `fill` begins each row and says what is in it.
@@ -197,6 +223,7 @@ impl Rows {
         if self.dead * MOST_DEAD > self.stencils.offsets.len() {
             self.compact();
         }
+        self.versions = self.versions.map(|version| version + 1);
         let groups: Vec<&[u32]> =
             changed.chunk_by(|a, b| *a as usize / CHUNK == *b as usize / CHUNK).collect();
         let parts: Vec<Part> =
@@ -296,6 +323,7 @@ impl Rows {
         let Some(&stencil) = self.own.get(row).filter(|&&stencil| stencil != SHARED) else { return };
         let range = self.stencils.range(stencil);
         let offset = column as i64 - row as i64;
+        self.versions[1] += 1;
         if let Ok(at) = self.stencils.offsets[range.clone()].binary_search_by_key(&offset, |&o| i64::from(o))
         {
             self.stencils.conduction[range.start + at] += conduction;
@@ -319,6 +347,7 @@ impl Rows {
         if let Some([conduction, capacity]) = &self.base {
             self.stencils.conduction.copy_from_slice(conduction);
             self.stencils.capacity.copy_from_slice(capacity);
+            self.versions[1] += 1;
         }
     }
 
@@ -334,6 +363,11 @@ impl Rows {
             }
         }
         diagonal
+    }
+
+    /// Columns of a row, ascending.
+    pub fn columns(&self, row: usize) -> impl Iterator<Item = usize> + '_ {
+        self.row(row, [0.0; 2]).map(|(column, _)| column)
     }
 
     /// Entries (column, value) of a row of `capacity`·M + `conduction`·K, columns ascending.
@@ -372,23 +406,33 @@ impl Rows {
         x: &[f64],
         y: &mut [f64],
     ) -> f64 {
-        let arch = Arch::new();
-        let parts: Vec<f64> = y
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .map(|(item, y)| {
-                arch.dispatch(Product::<FLOW> {
-                    rows: self,
-                    segments: &self.segments[item],
-                    weights,
-                    diagonal,
-                    x,
-                    y,
-                    first: item * CHUNK,
-                })
-            })
-            .collect();
+        let part = |(item, y): (usize, &mut [f64])| self.part::<FLOW>(item, diagonal, weights, x, y);
+        let parts: Vec<f64> = y.par_chunks_mut(CHUNK).enumerate().map(part).collect();
         parts.iter().sum()
+    }
+
+    /// [`Self::product`] of the rows of one work item, `y`.
+    pub fn product_of(
+        &self,
+        item: usize,
+        diagonal: Option<&[f64]>,
+        weights: [f64; 2],
+        x: &[f64],
+        y: &mut [f64],
+    ) -> f64 {
+        self.part::<false>(item, diagonal, weights, x, y)
+    }
+
+    fn part<const FLOW: bool>(
+        &self,
+        item: usize,
+        diagonal: Option<&[f64]>,
+        weights: [f64; 2],
+        x: &[f64],
+        y: &mut [f64],
+    ) -> f64 {
+        let (segments, first) = (&self.segments[item], item * CHUNK);
+        Arch::new().dispatch(Product::<FLOW> { rows: self, segments, weights, diagonal, x, y, first })
     }
 }
 

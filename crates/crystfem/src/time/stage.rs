@@ -4,7 +4,7 @@ use super::Work;
 use crate::error::Error;
 use crate::ledger::NOTHING;
 use crate::problem::Problem;
-use crate::solver::{Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, norm_squared};
+use crate::solver::{Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, Packed, norm_squared};
 use crate::system::vector::{largest, set, sum};
 use crate::system::{At, Evaluation, FaceMatrices, Memory, System};
 
@@ -56,6 +56,7 @@ pub struct Stages {
     /// K·1 and M·1 over the free nodes.
     free_sums: [Vec<f64>; 2],
     iterative: Iterative,
+    packed: Packed,
     /// What is wanted; factors and levels are made when first needed.
     pub method: Method,
     factors: Option<Direct>,
@@ -186,7 +187,8 @@ impl Stages {
         let size = system.size();
         self.right.resize(size, 0.0);
         set(&mut self.right, |k| system.free[k] * right(k));
-        let operator = operator(system, &self.diagonal, weight, &self.evaluation);
+        let packed = pack(&mut self.packed, system, weight);
+        let operator = Operator { packed, ..operator(system, &self.diagonal, weight, &self.evaluation) };
         let goal =
             Goal { capacity: self.capacity, tolerance, floor: 0.0, limit: limit(size), stop: &|| false };
         self.correction.resize(size, 0.0);
@@ -362,12 +364,19 @@ impl Stages {
                 *right -= free * image;
             }
         }
-        let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
+        let symmetric = system.is_symmetric();
+        // 1·(r + A δ) by the sums of the columns, where the iterations know A to single precision only
+        let mut total = 0.0;
         let ended = if factored {
-            Ended { iterations: 0, error: 0.0, converged: true }
+            Ended { iterations: 0, error: 0.0, size: 0.0, converged: true }
         } else {
             work.cg_solves += 1;
-            self.iterative.solve(&operator, system.is_symmetric(), inverse, right, found, &goal)
+            let packed = pack(&mut self.packed, system, stage.weight);
+            let operator = Operator { packed, ..operator };
+            let right = &self.right;
+            total = sum(size, |k| right[k]);
+            let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
+            self.iterative.solve(&operator, symmetric, inverse, right, found, &goal)
         };
         work.cg_iterations += ended.iterations as u64;
         if (stage.stop)() {
@@ -383,8 +392,12 @@ impl Stages {
             });
         }
         // a uniform shift of the free nodes makes the balance of the whole body exact
-        let right = &self.right;
-        let shift = sum(size, |k| system.free[k] * right[k]) / self.sensitivity;
+        let (right, sums, found) = (&self.right, &self.row_sums, &self.correction);
+        let left = match symmetric && !factored {
+            true => total - sum(size, |k| sums[k] * found[k]),
+            false => sum(size, |k| system.free[k] * right[k]),
+        };
+        let shift = left / self.sensitivity;
         if shift.is_finite() {
             for (correction, free) in self.correction.iter_mut().zip(&system.free) {
                 *correction += shift * free;
@@ -416,6 +429,12 @@ fn limit(size: usize) -> usize {
     (10 * size + 100).min(100_000)
 }
 
+/// Packed rows of a symmetric matrix, where there are any.
+fn pack<'a>(packed: &'a mut Packed, system: &System, weight: f64) -> Option<&'a Packed> {
+    let weights = if system.consistent { [1.0, weight] } else { [0.0, 1.0] };
+    (system.is_symmetric() && packed.update(&system.rows, weights)).then_some(packed)
+}
+
 fn operator<'a>(
     system: &'a System,
     diagonal: &'a [f64],
@@ -423,13 +442,20 @@ fn operator<'a>(
     evaluation: &'a Evaluation,
 ) -> Operator<'a> {
     if system.consistent {
-        Operator { rows: &system.rows, diagonal: None, weights: [1.0, weight], faces: &evaluation.faces }
+        Operator {
+            rows: &system.rows,
+            diagonal: None,
+            weights: [1.0, weight],
+            faces: &evaluation.faces,
+            packed: None,
+        }
     } else {
         Operator {
             rows: &system.rows,
             diagonal: Some(diagonal),
             weights: [0.0, weight],
             faces: FaceMatrices::NONE,
+            packed: None,
         }
     }
 }
