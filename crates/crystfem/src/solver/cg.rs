@@ -5,9 +5,9 @@
 //! root of eᵀAe/ΣC bounds the capacity-weighted rms error of temperature.
 
 use super::Operator;
-use super::multigrid::{Multigrid, dot};
+use super::multigrid::Multigrid;
 use crate::solver::norm_squared;
-use crate::system::vector::{advance, combine, turn};
+use crate::system::vector::{advance, blend, dot, turn};
 
 /// How an iteration ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,22 +145,22 @@ impl ConjugateGradients {
         let Self { direction, image, conditioned } = self;
         let mut estimate = Estimate::new();
         let mut last = 0.0;
+        let mut norm = norm_squared(residual, inverse);
         for iteration in 0..goal.limit {
-            if norm_squared(residual, inverse) <= goal.floor {
+            if norm <= goal.floor {
                 return estimate.ended(iteration, 0.0, true, goal);
             }
             multigrid.apply(operator, inverse, residual, conditioned);
             let square = dot(residual, conditioned);
             let factor = if iteration == 0 { 0.0 } else { square / last };
             last = square;
-            combine(direction, |k, own| conditioned[k] + factor * own);
+            blend(direction, conditioned, conditioned, |own, z, _| z + factor * own);
             let curvature = operator.product(direction, image);
             if (goal.stop)() || !(curvature > 0.0 && curvature.is_finite() && square > 0.0) {
                 return estimate.ended(iteration, f64::NAN, false, goal);
             }
             let length = square / curvature;
-            combine(solution, |k, own| own + length * direction[k]);
-            combine(residual, |k, own| own - length * image[k]);
+            norm = advance(length, solution, residual, direction, image, inverse);
             if let Some(ended) = estimate.reached(length * square, iteration + 1, goal) {
                 return ended;
             }

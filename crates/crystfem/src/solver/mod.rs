@@ -15,7 +15,7 @@ pub use direct::Direct;
 pub use multigrid::Multigrid;
 pub use packed::Packed;
 
-use crate::system::vector::{combine, set, sum, weighted_square};
+use crate::system::vector::{combine, dot, set, weighted_square};
 use crate::system::{FaceMatrices, Rows};
 use bicgstab::BiconjugateGradients;
 use cg::ConjugateGradients;
@@ -56,7 +56,7 @@ impl Operator<'_> {
         for face in self.faces.iter() {
             face.add_product(self.weights[1], x, y);
         }
-        sum(x.len(), |k| x[k] * y[k])
+        dot(x, y)
     }
 }
 

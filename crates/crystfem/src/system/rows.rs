@@ -9,7 +9,7 @@
 mod product;
 
 use super::vector::{CHUNK, items};
-use product::Product;
+use product::{Both, Product};
 use pulp::Arch;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -397,6 +397,16 @@ impl Rows {
     /// heat is conserved to rounding of what flows, not of what is stored.
     pub fn flow(&self, x: &[f64], y: &mut [f64]) {
         self.multiply::<true>(None, [0.0, 1.0], x, y);
+    }
+
+    /// [`Self::flow`] of x, and M u of the consistent capacity.
+    pub fn flow_and_capacity(&self, x: &[f64], u: &[f64], flow: &mut [f64], stored: &mut [f64]) {
+        flow.par_chunks_mut(CHUNK).zip(stored.par_chunks_mut(CHUNK)).enumerate().for_each(
+            |(item, (flow, stored))| {
+                let (segments, first) = (&self.segments[item], item * CHUNK);
+                Arch::new().dispatch(Both { rows: self, segments, x, u, flow, stored, first });
+            },
+        );
     }
 
     fn multiply<const FLOW: bool>(

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::ledger::NOTHING;
 use crate::problem::Problem;
 use crate::solver::{Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, Packed, norm_squared};
-use crate::system::vector::{largest, set, sum};
+use crate::system::vector::{blend, largest, set, sum};
 use crate::system::{At, Evaluation, FaceMatrices, Memory, System};
 
 /// Newton iterations at most.
@@ -55,6 +55,9 @@ pub struct Stages {
     row_sums: Vec<f64>,
     /// K·1 and M·1 over the free nodes.
     free_sums: [Vec<f64>; 2],
+    /// Diagonals of M and K, and of A.
+    diagonals: [Vec<f64>; 2],
+    whole: Vec<f64>,
     iterative: Iterative,
     packed: Packed,
     /// What is wanted; factors and levels are made when first needed.
@@ -70,7 +73,7 @@ pub struct Stages {
     floor: f64,
     /// For which generation and which weight the above was made.
     made_for: Option<(u64, u64)>,
-    sums_for: Option<u64>,
+    sums_for: Option<(u64, u64)>,
 }
 
 impl Stages {
@@ -243,16 +246,21 @@ impl Stages {
         let size = system.size();
         let Evaluation { capacity, conductance, faces, .. } = &self.evaluation;
         let mass = if system.consistent { 1.0 } else { 0.0 };
-        if self.sums_for != Some(system.generation) {
+        let sums_for = Some((system.build, system.rows.versions()[1]));
+        if self.sums_for != sums_for {
             self.free_sums[0].resize(size, 0.0);
             system.rows.product(None, [0.0, 1.0], &system.free, &mut self.free_sums[0]);
             if system.consistent {
                 self.free_sums[1].resize(size, 0.0);
                 system.rows.product(None, [1.0, 0.0], &system.free, &mut self.free_sums[1]);
             }
-            self.sums_for = Some(system.generation);
+            self.diagonals = [system.rows.diagonal([mass, 0.0]), system.rows.diagonal([0.0, 1.0])];
+            self.sums_for = sums_for;
         }
-        let mut whole = system.rows.diagonal([mass, weight]);
+        let mut whole = std::mem::take(&mut self.whole);
+        whole.resize(size, 0.0);
+        let [capacities, conductions] = &self.diagonals;
+        blend(&mut whole, capacities, conductions, |_, capacity, conduction| capacity + weight * conduction);
         self.row_sums.resize(size, 0.0);
         let [conduction, consistent] = &self.free_sums;
         if system.consistent {
@@ -281,6 +289,7 @@ impl Stages {
         // rounding of the residual: 1e-14 of a temperature of 500 K, everywhere
         let rounding = 5e-12_f64;
         self.floor = rounding * rounding * sum(size, |k| system.free[k] * whole[k]);
+        self.whole = whole;
         self.made_for = made_for;
     }
 
