@@ -37,15 +37,15 @@ impl BiconjugateGradients {
         let (mut rho, mut alpha, mut omega) = (0.0, 0.0, 0.0);
         for iteration in 0..limit {
             if stop() {
-                return Ended { iterations: iteration, error: f64::NAN, size: 0.0, converged: false };
+                return Ended { iterations: iteration, error: f64::NAN, converged: false };
             }
             let square = norm_squared(residual, inverse);
             let error = (square / capacity).sqrt();
             if !square.is_finite() {
-                return Ended { iterations: iteration, error: f64::NAN, size: 0.0, converged: false };
+                return Ended { iterations: iteration, error: f64::NAN, converged: false };
             }
             if square <= goal {
-                return Ended { iterations: iteration, error, size: 0.0, converged: true };
+                return Ended { iterations: iteration, error, converged: true };
             }
             let last = rho;
             rho = if last == 0.0 { 0.0 } else { sum(size, |k| inverse[k] * shadow[k] * residual[k]) };
@@ -80,7 +80,7 @@ impl BiconjugateGradients {
             }
         }
         let error = (norm_squared(residual, inverse) / capacity).sqrt();
-        Ended { iterations: limit, error, size: 0.0, converged: false }
+        Ended { iterations: limit, error, converged: false }
     }
 }
 

@@ -15,7 +15,7 @@ pub use direct::Direct;
 pub use multigrid::Multigrid;
 pub use packed::Packed;
 
-use crate::system::vector::{combine, dot, set, weighted_square};
+use crate::system::vector::{dot, weighted_square};
 use crate::system::{FaceMatrices, Rows};
 use bicgstab::BiconjugateGradients;
 use cg::ConjugateGradients;
@@ -60,19 +60,9 @@ impl Operator<'_> {
     }
 }
 
-/// Relative change of a solution by packed rows, in the norm of A: 2⁻²⁴ of the terms |a_ij| (x_i − x_j)²/2, which add up to at most about
-/// four times xᵀAx, as entries of both signs do.
-const PACKED: f64 = 4.0 / 16_777_216.0;
-/// Part of the tolerance that it may be.
-const UNSEEN: f64 = 0.3;
-/// Solutions in a row, each from the residual that the last one left.
-const MOST_RESTARTS: usize = 4;
-
 /// The iterative methods with their work space.
 #[derive(Default)]
 pub struct Iterative {
-    right: Vec<f64>,
-    restarted: Vec<f64>,
     conjugate: ConjugateGradients,
     biconjugate: BiconjugateGradients,
     /// The preconditioner of symmetric matrices, where it is not the diagonal.
@@ -91,42 +81,7 @@ impl Iterative {
         solution: &mut [f64],
         goal: &Goal,
     ) -> Ended {
-        if operator.packed.is_none() {
-            return self.once(operator, symmetric, inverse, residual, solution, goal);
-        }
-        self.right.clear();
-        self.right.extend_from_slice(residual);
-        let mut ended = self.once(operator, symmetric, inverse, residual, solution, goal);
-        let mut rounding = PACKED * ended.size;
-        for _ in 0..MOST_RESTARTS {
-            if !ended.converged || rounding <= UNSEEN * goal.tolerance {
-                break;
-            }
-            let size = solution.len();
-            let mut more = std::mem::take(&mut self.restarted);
-            more.resize(size, 0.0);
-            operator.exact().product(solution, &mut more);
-            let right = &self.right;
-            set(residual, |k| if inverse[k] == 0.0 { 0.0 } else { right[k] - more[k] });
-            let again = self.once(operator, symmetric, inverse, residual, &mut more, goal);
-            combine(solution, |k, own| own + more[k]);
-            self.restarted = more;
-            rounding = PACKED * again.size;
-            ended = Ended { iterations: ended.iterations + again.iterations, size: ended.size, ..again };
-        }
-        ended
-    }
-
-    fn once(
-        &mut self,
-        operator: &Operator,
-        symmetric: bool,
-        inverse: &[f64],
-        residual: &mut [f64],
-        solution: &mut [f64],
-        goal: &Goal,
-    ) -> Ended {
-        let Self { conjugate, biconjugate, multigrid, .. } = self;
+        let Self { conjugate, biconjugate, multigrid } = self;
         match multigrid {
             _ if !symmetric => biconjugate.solve(operator, inverse, residual, solution, goal),
             Some(levels) => conjugate.solve_with(levels, operator, inverse, residual, solution, goal),

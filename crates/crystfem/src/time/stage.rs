@@ -377,7 +377,7 @@ impl Stages {
         // 1·(r + A δ) by the sums of the columns, where the iterations know A to single precision only
         let mut total = 0.0;
         let ended = if factored {
-            Ended { iterations: 0, error: 0.0, size: 0.0, converged: true }
+            Ended { iterations: 0, error: 0.0, converged: true }
         } else {
             work.cg_solves += 1;
             let packed = pack(&mut self.packed, system, stage.weight);
