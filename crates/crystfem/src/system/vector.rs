@@ -88,12 +88,22 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     parts.iter().sum()
 }
 
-/// Σ f(k) over 0..size, in work items.
+/// Σ f(k) over 0..size, in work items, each in partial sums that do not wait for each other.
 pub fn sum(size: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
-    let parts: Vec<f64> = (0..items(size))
-        .into_par_iter()
-        .map(|item| (item * CHUNK..((item + 1) * CHUNK).min(size)).map(&term).sum::<f64>())
-        .collect();
+    const LANES: usize = 8;
+    let item = |item: usize| {
+        let (start, end) = (item * CHUNK, ((item + 1) * CHUNK).min(size));
+        let mut sums = [0.0; LANES];
+        let whole = end - (end - start) % LANES;
+        for k in (start..whole).step_by(LANES) {
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                *sum += term(k + lane);
+            }
+        }
+        (whole..end).for_each(|k| sums[0] += term(k));
+        sums.iter().sum::<f64>()
+    };
+    let parts: Vec<f64> = (0..items(size)).into_par_iter().map(item).collect();
     parts.iter().sum()
 }
 
