@@ -270,7 +270,7 @@ mod tests {
                 out.begin(std::iter::once(row as u32));
                 let k = of[row];
                 let mut sum = 0.0;
-                let sides = [k % width > 0, k % width + 1 < width, k >= width, k + width < size];
+                let sides = [!k.is_multiple_of(width), k % width + 1 < width, k >= width, k + width < size];
                 for (other, _) in [k.wrapping_sub(1), k + 1, k.wrapping_sub(width), k + width]
                     .into_iter()
                     .zip(sides)

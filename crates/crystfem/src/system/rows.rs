@@ -7,12 +7,13 @@
 //! around a node have 64.
 
 mod product;
+mod stencils;
 
 use super::vector::{CHUNK, items};
 use product::{Both, Product};
 use pulp::Arch;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use stencils::{Finder, Stencils};
 
 /// Consecutive equal rows, within one work item.
 #[derive(Clone, Copy, Debug)]
@@ -59,84 +60,6 @@ impl Row {
             }
             None => self.entries.push((offset, conduction, capacity)),
         }
-    }
-}
-
-/// Distinct rows, flat.
-#[derive(Clone, Debug, Default)]
-struct Stencils {
-    starts: Vec<u32>,
-    offsets: Vec<i32>,
-    conduction: Vec<f64>,
-    /// Empty with lumped capacity.
-    capacity: Vec<f64>,
-}
-
-impl Stencils {
-    fn new() -> Self {
-        Self { starts: vec![0], ..Self::default() }
-    }
-
-    fn count(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    fn range(&self, stencil: u32) -> std::ops::Range<usize> {
-        self.starts[stencil as usize] as usize..self.starts[stencil as usize + 1] as usize
-    }
-
-    fn push(&mut self, entries: &[(i32, f64, f64)], consistent: bool) -> u32 {
-        for &(offset, conduction, capacity) in entries {
-            self.offsets.push(offset);
-            self.conduction.push(conduction);
-            if consistent {
-                self.capacity.push(capacity);
-            }
-        }
-        self.starts.push(self.offsets.len() as u32);
-        (self.count() - 1) as u32
-    }
-
-    fn entries(&self, stencil: u32) -> Vec<(i32, f64, f64)> {
-        self.range(stencil)
-            .map(|at| (self.offsets[at], self.conduction[at], self.capacity.get(at).copied().unwrap_or(0.0)))
-            .collect()
-    }
-
-    fn equals(&self, stencil: u32, entries: &[(i32, f64, f64)]) -> bool {
-        let range = self.range(stencil);
-        range.len() == entries.len()
-            && range.zip(entries).all(|(at, entry)| {
-                self.offsets[at] == entry.0
-                    && self.conduction[at].to_bits() == entry.1.to_bits()
-                    && (self.capacity.is_empty() || self.capacity[at].to_bits() == entry.2.to_bits())
-            })
-    }
-}
-
-/// Finds equal rows.
-#[derive(Clone, Debug, Default)]
-struct Finder {
-    by_hash: HashMap<u64, Vec<u32>>,
-}
-
-impl Finder {
-    fn find_or_add(&mut self, stencils: &mut Stencils, entries: &[(i32, f64, f64)], consistent: bool) -> u32 {
-        // FNV-1a over the bits
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        for entry in entries {
-            for word in [entry.0 as u64, entry.1.to_bits(), entry.2.to_bits()] {
-                hash = (hash ^ word).wrapping_mul(0x0100_0000_01b3);
-                hash ^= hash >> 29;
-            }
-        }
-        let list = self.by_hash.entry(hash).or_default();
-        if let Some(&found) = list.iter().find(|&&stencil| stencils.equals(stencil, entries)) {
-            return found;
-        }
-        let added = stencils.push(entries, consistent);
-        list.push(added);
-        added
     }
 }
 
