@@ -7,6 +7,8 @@ use crate::melting::Melting;
 
 /// A change of α in one increment at which the suggested step is the one taken.
 pub const LARGEST_CHANGE: f64 = 0.1;
+/// The largest suggested step over the one taken.
+const LONGEST: f64 = 10.0;
 
 /// What makes up a [`Semicrystalline`] material, SI.
 #[derive(Clone, Debug, PartialEq)]
@@ -161,10 +163,18 @@ impl ThermalMaterial for Semicrystalline {
         if grown.z == old[0] && self.latent.is_none() {
             return Ok(response);
         }
+        // |∂α/∂z| ≤ n: the wish is the longest step without looking at α
+        if self.latent.is_none()
+            && grown.z < 1.0
+            && kinetics.constants().avrami_exponent * (grown.z - old[0]).abs() <= LARGEST_CHANGE / LONGEST
+        {
+            response.step_ratio = Some(LONGEST);
+            return Ok(response);
+        }
         let [after, slope] = kinetics.degree_and_slope(grown.z);
         if grown.z != old[0] {
             let change = (after - kinetics.degree(old[0])).abs();
-            response.step_ratio = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, 10.0));
+            response.step_ratio = (change > 0.0).then(|| (LARGEST_CHANGE / change).clamp(0.1, LONGEST));
         }
         if let Some(latent) = self.latent {
             response.energy -= latent * after;

@@ -193,6 +193,16 @@ fn step_ratio_is_that_of_the_change_of_alpha() {
         [1.0, 1.0 + material.kinetics().growth(420.0, 420.0, 2.0).z].map(|z| material.kinetics().degree(z));
     let found = ratio(1.0, 2.0).unwrap();
     assert!((found - LARGEST_CHANGE / (after - before)).abs() < 1e-12, "{found}");
+    // also where a bound on the change is enough
+    let mut bounded = 0;
+    for dt in [1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0] {
+        let grown = material.kinetics().growth(420.0, 420.0, dt).z;
+        bounded += usize::from(grown * material.kinetics().constants().avrami_exponent < 0.01);
+        let [before, after] = [0.3, 0.3 + grown].map(|z| material.kinetics().degree(z));
+        let expected = (LARGEST_CHANGE / (after - before)).clamp(0.1, 10.0);
+        assert!((ratio(0.3, dt).unwrap() - expected).abs() < 1e-9 * expected, "{dt}");
+    }
+    assert!((1..7).contains(&bounded), "{bounded}");
 }
 
 #[test]

@@ -92,7 +92,19 @@ impl Sparse {
 
     /// Σ over a row of value times x.
     pub fn dot(&self, row: usize, x: &[f64]) -> f64 {
-        self.row(row).map(|(column, value)| value * x[column as usize]).sum()
+        let range = self.starts[row] as usize..self.starts[row + 1] as usize;
+        let (columns, left) = self.columns[range.clone()].as_chunks::<4>();
+        let (values, over) = self.values[range].as_chunks::<4>();
+        let mut sums = [0.0; 4];
+        for (columns, values) in columns.iter().zip(values) {
+            for lane in 0..4 {
+                sums[lane] += values[lane] * x[columns[lane] as usize];
+            }
+        }
+        for (&column, value) in left.iter().zip(over) {
+            sums[0] += value * x[column as usize];
+        }
+        (sums[0] + sums[1]) + (sums[2] + sums[3])
     }
 }
 

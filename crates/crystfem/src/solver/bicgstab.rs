@@ -110,6 +110,7 @@ mod tests {
             diagonal: Some(&capacity),
             weights: [0.0, 1.0],
             faces: FaceMatrices::NONE,
+            packed: None,
         };
         let exact: Vec<f64> = (0..size).map(|k| 300.0 + (0.1 * k as f64).sin()).collect();
         let inverse: Vec<f64> = (0..size).map(|k| 1.0 / (2.0 * scale(k) + 1e-2)).collect();

@@ -180,6 +180,7 @@ mod tests {
                 diagonal: Some(&diagonal),
                 weights: [0.0, weight],
                 faces: FaceMatrices::NONE,
+                packed: None,
             };
             let exact: Vec<f64> = (0..size).map(|k| free[k] * (k as f64).sin()).collect();
             let mut right = vec![0.0; size];
@@ -192,8 +193,13 @@ mod tests {
             // condition below 250
             assert!(found.iter().zip(&exact).all(|(f, e)| (f - e).abs() < 1e-13), "{found:?}");
         }
-        let negative =
-            Operator { rows: &rows, diagonal: None, weights: [0.0, -1.0], faces: FaceMatrices::NONE };
+        let negative = Operator {
+            rows: &rows,
+            diagonal: None,
+            weights: [0.0, -1.0],
+            faces: FaceMatrices::NONE,
+            packed: None,
+        };
         let mut direct = Direct::analyse(&negative, &free, |e| [f64::from(e), 0.0, 0.0]).unwrap();
         assert!(!direct.factor(&negative));
     }

@@ -7,13 +7,15 @@ mod choice;
 mod direct;
 mod dissection;
 mod multigrid;
+mod packed;
 
 pub use cg::{Ended, Goal};
 pub use choice::{Choice, LEVELS, LinearSolver, Method, Task};
 pub use direct::Direct;
 pub use multigrid::Multigrid;
+pub use packed::Packed;
 
-use crate::system::vector::{sum, weighted_square};
+use crate::system::vector::{dot, weighted_square};
 use crate::system::{FaceMatrices, Rows};
 use bicgstab::BiconjugateGradients;
 use cg::ConjugateGradients;
@@ -29,19 +31,32 @@ pub struct Operator<'a> {
     pub weights: [f64; 2],
     /// Surfaces with consistent capacity.
     pub faces: &'a FaceMatrices,
+    /// M and K for the iterations, where rows are unequal: A with consistent capacity, K with lumped one. Rounded to single precision.
+    pub packed: Option<&'a Packed>,
 }
 
 impl Operator<'_> {
+    /// Without packed rows.
+    pub fn exact(&self) -> Self {
+        Self { packed: None, ..*self }
+    }
+
     /// y = A x; returns x·y.
     pub fn product(&self, x: &[f64], y: &mut [f64]) -> f64 {
-        let product = self.rows.product(self.diagonal, self.weights, x, y);
+        let product = match self.packed {
+            Some(packed) => {
+                let factor = if self.diagonal.is_some() { self.weights[1] } else { 1.0 };
+                packed.product(self.rows, self.diagonal, (factor, self.weights), x, y)
+            }
+            None => self.rows.product(self.diagonal, self.weights, x, y),
+        };
         if self.faces.is_empty() {
             return product;
         }
         for face in self.faces.iter() {
             face.add_product(self.weights[1], x, y);
         }
-        sum(x.len(), |k| x[k] * y[k])
+        dot(x, y)
     }
 }
 
@@ -56,7 +71,7 @@ pub struct Iterative {
 
 impl Iterative {
     /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0 where x stays 0;
-    /// `residual` becomes r − A x.
+    /// `residual` becomes r − A x, as the iterations know it.
     pub fn solve(
         &mut self,
         operator: &Operator,

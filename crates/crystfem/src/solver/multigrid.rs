@@ -4,7 +4,7 @@
 
 use super::Operator;
 use super::aggregation::{Sparse, Transfer, levels};
-use crate::system::vector::{combine, set, sum};
+use crate::system::vector::{blend, combine, set};
 
 /// Part of 1/diagonal that a smoothing step takes, for λ of D⁻¹A up to 2.
 const DAMPING: f64 = 2.0 / 3.0;
@@ -82,10 +82,10 @@ impl Multigrid {
         let (smoothed, left) = (&mut self.smoothed, &mut self.left);
         smoothed.resize(size, 0.0);
         left.resize(size, 0.0);
-        set(z, |k| DAMPING * inverse[k] * residual[k]);
+        blend(z, inverse, residual, |_, inverse, r| DAMPING * inverse * r);
         if let (Some(transfer), Some(level)) = (self.transfers.first(), self.levels.first_mut()) {
             operator.product(z, left);
-            set(smoothed, |k| residual[k] - left[k]);
+            blend(smoothed, residual, left, |_, r, left| r - left);
             set(&mut level.right, |row| transfer.restriction.dot(row, smoothed));
             cycle(&self.transfers, &mut self.levels, &self.bottom);
             let found = &self.levels[0].found;
@@ -93,7 +93,8 @@ impl Multigrid {
             combine(z, |k, own| own + prolongation.dot(k, found));
         }
         operator.product(z, left);
-        combine(z, |k, own| own + DAMPING * inverse[k] * (residual[k] - left[k]));
+        blend(left, residual, inverse, |left, r, inverse| DAMPING * inverse * (r - left));
+        blend(z, left, left, |own, more, _| own + more);
     }
 }
 
@@ -162,9 +163,4 @@ impl Bottom {
             found[row] = if pivot(row) > 0.0 { (found[row] - dot) / pivot(row) } else { 0.0 };
         }
     }
-}
-
-/// r·z.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    sum(a.len(), |k| a[k] * b[k])
 }

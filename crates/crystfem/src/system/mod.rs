@@ -231,12 +231,13 @@ impl System {
         out.step_ratio = None;
         self.rows.restore();
         // linear materials
-        self.rows.flow(at.temperature, &mut out.rate);
         if self.consistent {
             out.scratch.resize(size, 0.0);
             vector::set(&mut out.scratch, |k| at.temperature[k] - at.start[k]);
-            self.rows.product(None, [1.0, 0.0], &out.scratch, &mut out.change);
+            let Evaluation { scratch, rate, change, .. } = &mut *out;
+            self.rows.flow_and_capacity(at.temperature, scratch, rate, change);
         } else {
+            self.rows.flow(at.temperature, &mut out.rate);
             vector::set(&mut out.change, |k| self.capacity[k] * (at.temperature[k] - at.start[k]));
         }
         out.capacity.copy_from_slice(&self.capacity);

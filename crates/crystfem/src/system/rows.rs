@@ -7,12 +7,13 @@
 //! around a node have 64.
 
 mod product;
+mod stencils;
 
 use super::vector::{CHUNK, items};
-use product::Product;
+use product::{Both, Product};
 use pulp::Arch;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use stencils::{Finder, Stencils};
 
 /// Consecutive equal rows, within one work item.
 #[derive(Clone, Copy, Debug)]
@@ -62,84 +63,6 @@ impl Row {
     }
 }
 
-/// Distinct rows, flat.
-#[derive(Clone, Debug, Default)]
-struct Stencils {
-    starts: Vec<u32>,
-    offsets: Vec<i32>,
-    conduction: Vec<f64>,
-    /// Empty with lumped capacity.
-    capacity: Vec<f64>,
-}
-
-impl Stencils {
-    fn new() -> Self {
-        Self { starts: vec![0], ..Self::default() }
-    }
-
-    fn count(&self) -> usize {
-        self.starts.len() - 1
-    }
-
-    fn range(&self, stencil: u32) -> std::ops::Range<usize> {
-        self.starts[stencil as usize] as usize..self.starts[stencil as usize + 1] as usize
-    }
-
-    fn push(&mut self, entries: &[(i32, f64, f64)], consistent: bool) -> u32 {
-        for &(offset, conduction, capacity) in entries {
-            self.offsets.push(offset);
-            self.conduction.push(conduction);
-            if consistent {
-                self.capacity.push(capacity);
-            }
-        }
-        self.starts.push(self.offsets.len() as u32);
-        (self.count() - 1) as u32
-    }
-
-    fn entries(&self, stencil: u32) -> Vec<(i32, f64, f64)> {
-        self.range(stencil)
-            .map(|at| (self.offsets[at], self.conduction[at], self.capacity.get(at).copied().unwrap_or(0.0)))
-            .collect()
-    }
-
-    fn equals(&self, stencil: u32, entries: &[(i32, f64, f64)]) -> bool {
-        let range = self.range(stencil);
-        range.len() == entries.len()
-            && range.zip(entries).all(|(at, entry)| {
-                self.offsets[at] == entry.0
-                    && self.conduction[at].to_bits() == entry.1.to_bits()
-                    && (self.capacity.is_empty() || self.capacity[at].to_bits() == entry.2.to_bits())
-            })
-    }
-}
-
-/// Finds equal rows.
-#[derive(Clone, Debug, Default)]
-struct Finder {
-    by_hash: HashMap<u64, Vec<u32>>,
-}
-
-impl Finder {
-    fn find_or_add(&mut self, stencils: &mut Stencils, entries: &[(i32, f64, f64)], consistent: bool) -> u32 {
-        // FNV-1a over the bits
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        for entry in entries {
-            for word in [entry.0 as u64, entry.1.to_bits(), entry.2.to_bits()] {
-                hash = (hash ^ word).wrapping_mul(0x0100_0000_01b3);
-                hash ^= hash >> 29;
-            }
-        }
-        let list = self.by_hash.entry(hash).or_default();
-        if let Some(&found) = list.iter().find(|&&stencil| stencils.equals(stencil, entries)) {
-            return found;
-        }
-        let added = stencils.push(entries, consistent);
-        list.push(added);
-        added
-    }
-}
-
 /// The matrices K and, with consistent capacity, M, over the nodes that exist.
 #[derive(Clone, Debug)]
 pub struct Rows {
@@ -155,8 +78,12 @@ pub struct Rows {
     dead: usize,
     /// Values without what is added in each evaluation.
     base: Option<[Vec<f64>; 2]>,
+    /// Counts changes of the pattern, and of values.
+    versions: [u64; 2],
 }
 
+/// Rows of a run on average where runs count as short.
+const MOST_ALONE: usize = 4;
 /// No stencil of its own.
 const SHARED: u32 = u32::MAX;
 /// The part of the entries that may be dead.
@@ -180,7 +107,29 @@ impl Rows {
             own: Vec::new(),
             dead: 0,
             base: None,
+            versions: [0; 2],
         }
+    }
+
+    /// Number of rows.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Number of work items.
+    pub fn items(&self) -> usize {
+        self.segments.len()
+    }
+
+    /// What changes with the pattern, and what changes with the values.
+    pub fn versions(&self) -> [u64; 2] {
+        self.versions
+    }
+
+    /// Whether most rows of a work item stand alone.
+    pub fn is_unequal(&self, item: usize) -> bool {
+        let rows: u32 = self.segments[item].iter().map(|segment| segment.length).sum();
+        MOST_ALONE * self.segments[item].len() > rows as usize
     }
 
     /// Of `size` rows; `fill` begins each row and says what is in it.
@@ -197,6 +146,7 @@ impl Rows {
         if self.dead * MOST_DEAD > self.stencils.offsets.len() {
             self.compact();
         }
+        self.versions = self.versions.map(|version| version + 1);
         let groups: Vec<&[u32]> =
             changed.chunk_by(|a, b| *a as usize / CHUNK == *b as usize / CHUNK).collect();
         let parts: Vec<Part> =
@@ -296,6 +246,7 @@ impl Rows {
         let Some(&stencil) = self.own.get(row).filter(|&&stencil| stencil != SHARED) else { return };
         let range = self.stencils.range(stencil);
         let offset = column as i64 - row as i64;
+        self.versions[1] += 1;
         if let Ok(at) = self.stencils.offsets[range.clone()].binary_search_by_key(&offset, |&o| i64::from(o))
         {
             self.stencils.conduction[range.start + at] += conduction;
@@ -319,6 +270,7 @@ impl Rows {
         if let Some([conduction, capacity]) = &self.base {
             self.stencils.conduction.copy_from_slice(conduction);
             self.stencils.capacity.copy_from_slice(capacity);
+            self.versions[1] += 1;
         }
     }
 
@@ -334,6 +286,11 @@ impl Rows {
             }
         }
         diagonal
+    }
+
+    /// Columns of a row, ascending.
+    pub fn columns(&self, row: usize) -> impl Iterator<Item = usize> + '_ {
+        self.row(row, [0.0; 2]).map(|(column, _)| column)
     }
 
     /// Entries (column, value) of a row of `capacity`·M + `conduction`·K, columns ascending.
@@ -365,6 +322,16 @@ impl Rows {
         self.multiply::<true>(None, [0.0, 1.0], x, y);
     }
 
+    /// [`Self::flow`] of x, and M u of the consistent capacity.
+    pub fn flow_and_capacity(&self, x: &[f64], u: &[f64], flow: &mut [f64], stored: &mut [f64]) {
+        flow.par_chunks_mut(CHUNK).zip(stored.par_chunks_mut(CHUNK)).enumerate().for_each(
+            |(item, (flow, stored))| {
+                let (segments, first) = (&self.segments[item], item * CHUNK);
+                Arch::new().dispatch(Both { rows: self, segments, x, u, flow, stored, first });
+            },
+        );
+    }
+
     fn multiply<const FLOW: bool>(
         &self,
         diagonal: Option<&[f64]>,
@@ -372,23 +339,33 @@ impl Rows {
         x: &[f64],
         y: &mut [f64],
     ) -> f64 {
-        let arch = Arch::new();
-        let parts: Vec<f64> = y
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .map(|(item, y)| {
-                arch.dispatch(Product::<FLOW> {
-                    rows: self,
-                    segments: &self.segments[item],
-                    weights,
-                    diagonal,
-                    x,
-                    y,
-                    first: item * CHUNK,
-                })
-            })
-            .collect();
+        let part = |(item, y): (usize, &mut [f64])| self.part::<FLOW>(item, diagonal, weights, x, y);
+        let parts: Vec<f64> = y.par_chunks_mut(CHUNK).enumerate().map(part).collect();
         parts.iter().sum()
+    }
+
+    /// [`Self::product`] of the rows of one work item, `y`.
+    pub fn product_of(
+        &self,
+        item: usize,
+        diagonal: Option<&[f64]>,
+        weights: [f64; 2],
+        x: &[f64],
+        y: &mut [f64],
+    ) -> f64 {
+        self.part::<false>(item, diagonal, weights, x, y)
+    }
+
+    fn part<const FLOW: bool>(
+        &self,
+        item: usize,
+        diagonal: Option<&[f64]>,
+        weights: [f64; 2],
+        x: &[f64],
+        y: &mut [f64],
+    ) -> f64 {
+        let (segments, first) = (&self.segments[item], item * CHUNK);
+        Arch::new().dispatch(Product::<FLOW> { rows: self, segments, weights, diagonal, x, y, first })
     }
 }
 

@@ -70,12 +70,40 @@ pub fn weighted_square(value: &[f64], weight: &[f64]) -> f64 {
     parts.iter().sum()
 }
 
-/// Σ f(k) over 0..size, in work items.
+struct Dot<'a>(&'a [f64], &'a [f64]);
+
+impl WithSimd for Dot<'_> {
+    type Output = f64;
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        dot_simd(simd, self.0, self.1)
+    }
+}
+
+/// a·b.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let arch = Arch::new();
+    let parts: Vec<f64> =
+        a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK)).map(|(a, b)| arch.dispatch(Dot(a, b))).collect();
+    parts.iter().sum()
+}
+
+/// Σ f(k) over 0..size, in work items, each in partial sums that do not wait for each other.
 pub fn sum(size: usize, term: impl Fn(usize) -> f64 + Sync) -> f64 {
-    let parts: Vec<f64> = (0..items(size))
-        .into_par_iter()
-        .map(|item| (item * CHUNK..((item + 1) * CHUNK).min(size)).map(&term).sum::<f64>())
-        .collect();
+    const LANES: usize = 8;
+    let item = |item: usize| {
+        let (start, end) = (item * CHUNK, ((item + 1) * CHUNK).min(size));
+        let mut sums = [0.0; LANES];
+        let whole = end - (end - start) % LANES;
+        for k in (start..whole).step_by(LANES) {
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                *sum += term(k + lane);
+            }
+        }
+        (whole..end).for_each(|k| sums[0] += term(k));
+        sums.iter().sum::<f64>()
+    };
+    let parts: Vec<f64> = (0..items(size)).into_par_iter().map(item).collect();
     parts.iter().sum()
 }
 
@@ -105,6 +133,15 @@ pub fn set(out: &mut [f64], value: impl Fn(usize) -> f64 + Sync) {
     out.par_chunks_mut(CHUNK).enumerate().for_each(|(item, out)| {
         for (k, out) in out.iter_mut().enumerate() {
             *out = value(item * CHUNK + k);
+        }
+    });
+}
+
+/// out_k = f(out_k, a_k, b_k), in work items.
+pub fn blend(out: &mut [f64], a: &[f64], b: &[f64], value: impl Fn(f64, f64, f64) -> f64 + Sync) {
+    out.par_chunks_mut(CHUNK).zip(a.par_chunks(CHUNK).zip(b.par_chunks(CHUNK))).for_each(|(out, (a, b))| {
+        for (out, (a, b)) in out.iter_mut().zip(a.iter().zip(b)) {
+            *out = value(*out, *a, *b);
         }
     });
 }
@@ -241,6 +278,10 @@ mod tests {
         let mut d = p.clone();
         turn(0.25, &mut d, &r, &w);
         assert!((0..size).all(|k| (d[k] - (r[k] * w[k] + 0.25 * p[k])).abs() < 1e-15));
+        let plain: f64 = p.iter().zip(&q).map(|(p, q)| p * q).sum();
+        assert!((dot(&p, &q) - plain).abs() < 1e-10);
+        blend(&mut d, &p, &q, |d, p, q| d - p * q);
+        assert!((0..size).all(|k| (d[k] - (r[k] * w[k] + 0.25 * p[k] - p[k] * q[k])).abs() < 1e-15));
         assert_eq!(sum(size, |_| 1.0), size as f64);
         assert_eq!(largest(size, |k| k as f64), size as f64 - 1.0);
         assert!(largest(size, |k| if k == 3 { f64::NAN } else { 1.0 }).is_nan());

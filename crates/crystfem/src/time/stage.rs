@@ -4,8 +4,8 @@ use super::Work;
 use crate::error::Error;
 use crate::ledger::NOTHING;
 use crate::problem::Problem;
-use crate::solver::{Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, norm_squared};
-use crate::system::vector::{largest, set, sum};
+use crate::solver::{Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, Packed, norm_squared};
+use crate::system::vector::{blend, dot, largest, set, sum};
 use crate::system::{At, Evaluation, FaceMatrices, Memory, System};
 
 /// Newton iterations at most.
@@ -53,9 +53,12 @@ pub struct Stages {
     diagonal: Vec<f64>,
     inverse: Vec<f64>,
     row_sums: Vec<f64>,
-    /// K·1 and M·1 over the free nodes.
+    /// K·1 and M·1 over the free nodes; empty where it is nothing.
     free_sums: [Vec<f64>; 2],
+    /// Diagonals of M and K.
+    diagonals: [Vec<f64>; 2],
     iterative: Iterative,
+    packed: Packed,
     /// What is wanted; factors and levels are made when first needed.
     pub method: Method,
     factors: Option<Direct>,
@@ -69,7 +72,7 @@ pub struct Stages {
     floor: f64,
     /// For which generation and which weight the above was made.
     made_for: Option<(u64, u64)>,
-    sums_for: Option<u64>,
+    sums_for: Option<(u64, u64)>,
 }
 
 impl Stages {
@@ -186,7 +189,8 @@ impl Stages {
         let size = system.size();
         self.right.resize(size, 0.0);
         set(&mut self.right, |k| system.free[k] * right(k));
-        let operator = operator(system, &self.diagonal, weight, &self.evaluation);
+        let packed = pack(&mut self.packed, system, weight);
+        let operator = Operator { packed, ..operator(system, &self.diagonal, weight, &self.evaluation) };
         let goal =
             Goal { capacity: self.capacity, tolerance, floor: 0.0, limit: limit(size), stop: &|| false };
         self.correction.resize(size, 0.0);
@@ -240,20 +244,30 @@ impl Stages {
         }
         let size = system.size();
         let Evaluation { capacity, conductance, faces, .. } = &self.evaluation;
-        let mass = if system.consistent { 1.0 } else { 0.0 };
-        if self.sums_for != Some(system.generation) {
-            self.free_sums[0].resize(size, 0.0);
-            system.rows.product(None, [0.0, 1.0], &system.free, &mut self.free_sums[0]);
+        let sums_for = Some((system.build, system.rows.versions()[1]));
+        if self.sums_for != sums_for {
+            self.free_sums = [Vec::new(), Vec::new()];
+            // rows of K add up to nothing but at prescribed neighbours
+            if system.consistent || !system.fixed.is_empty() {
+                self.free_sums[0].resize(size, 0.0);
+                system.rows.product(None, [0.0, 1.0], &system.free, &mut self.free_sums[0]);
+            }
+            self.diagonals = [Vec::new(), system.rows.diagonal([0.0, 1.0])];
             if system.consistent {
                 self.free_sums[1].resize(size, 0.0);
                 system.rows.product(None, [1.0, 0.0], &system.free, &mut self.free_sums[1]);
+                self.diagonals[0] = system.rows.diagonal([1.0, 0.0]);
             }
-            self.sums_for = Some(system.generation);
+            self.sums_for = sums_for;
         }
-        let mut whole = system.rows.diagonal([mass, weight]);
+        // A's diagonal, until it is inverted
+        self.inverse.resize(size, 0.0);
         self.row_sums.resize(size, 0.0);
+        let [capacities, conductions] = &self.diagonals;
         let [conduction, consistent] = &self.free_sums;
+        let whole = &mut self.inverse;
         if system.consistent {
+            blend(whole, capacities, conductions, |_, capacity, conduction| capacity + weight * conduction);
             set(&mut self.row_sums, |k| consistent[k] + weight * conduction[k]);
             for face in faces.iter() {
                 face.add_product(weight, &system.free, &mut self.row_sums);
@@ -264,21 +278,28 @@ impl Stages {
             }
         } else {
             self.diagonal.resize(size, 0.0);
-            set(&mut self.diagonal, |k| capacity[k] + weight * conductance[k]);
-            let diagonal = &self.diagonal;
-            for (whole, diagonal) in whole.iter_mut().zip(diagonal) {
-                *whole += diagonal;
+            blend(&mut self.diagonal, capacity, conductance, |_, capacity, conductance| {
+                capacity + weight * conductance
+            });
+            blend(whole, &self.diagonal, conductions, |_, diagonal, conduction| {
+                diagonal + weight * conduction
+            });
+            blend(&mut self.row_sums, &self.diagonal, &system.free, |_, diagonal, free| free * diagonal);
+            if !conduction.is_empty() {
+                blend(&mut self.row_sums, conduction, conduction, |own, sum, _| own + weight * sum);
             }
-            set(&mut self.row_sums, |k| system.free[k] * diagonal[k] + weight * conduction[k]);
         }
-        self.inverse.resize(size, 0.0);
-        set(&mut self.inverse, |k| if system.free[k] == 0.0 { 0.0 } else { 1.0 / whole[k] });
-        self.capacity = sum(size, |k| system.free[k] * capacity[k]).max(f64::MIN_POSITIVE);
-        let row_sums = &self.row_sums;
-        self.sensitivity = sum(size, |k| system.free[k] * row_sums[k]);
         // rounding of the residual: 1e-14 of a temperature of 500 K, everywhere
         let rounding = 5e-12_f64;
-        self.floor = rounding * rounding * sum(size, |k| system.free[k] * whole[k]);
+        self.floor = rounding * rounding * dot(&system.free, whole);
+        blend(
+            whole,
+            &system.free,
+            &system.free,
+            |whole, free, _| if free == 0.0 { 0.0 } else { 1.0 / whole },
+        );
+        self.capacity = dot(&system.free, capacity).max(f64::MIN_POSITIVE);
+        self.sensitivity = dot(&system.free, &self.row_sums);
         self.made_for = made_for;
     }
 
@@ -362,12 +383,19 @@ impl Stages {
                 *right -= free * image;
             }
         }
-        let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
+        let symmetric = system.is_symmetric();
+        // 1·(r + A δ) by the sums of the columns, where the iterations know A to single precision only
+        let mut total = 0.0;
         let ended = if factored {
             Ended { iterations: 0, error: 0.0, converged: true }
         } else {
             work.cg_solves += 1;
-            self.iterative.solve(&operator, system.is_symmetric(), inverse, right, found, &goal)
+            let packed = pack(&mut self.packed, system, stage.weight);
+            let operator = Operator { packed, ..operator };
+            let right = &self.right;
+            total = sum(size, |k| right[k]);
+            let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
+            self.iterative.solve(&operator, symmetric, inverse, right, found, &goal)
         };
         work.cg_iterations += ended.iterations as u64;
         if (stage.stop)() {
@@ -383,8 +411,12 @@ impl Stages {
             });
         }
         // a uniform shift of the free nodes makes the balance of the whole body exact
-        let right = &self.right;
-        let shift = sum(size, |k| system.free[k] * right[k]) / self.sensitivity;
+        let (right, sums, found) = (&self.right, &self.row_sums, &self.correction);
+        let left = match symmetric && !factored {
+            true => total - dot(sums, found),
+            false => dot(&system.free, right),
+        };
+        let shift = left / self.sensitivity;
         if shift.is_finite() {
             for (correction, free) in self.correction.iter_mut().zip(&system.free) {
                 *correction += shift * free;
@@ -396,7 +428,7 @@ impl Stages {
     /// Whether the free nodes' residuals add up to nothing.
     fn balanced(&self, system: &System, weight: f64) -> bool {
         let size = system.size();
-        let total = sum(size, |k| system.free[k] * self.residual[k]);
+        let total = dot(&system.free, &self.residual);
         let mut gross = sum(size, |k| self.evaluation.change[k].abs());
         gross += weight * self.evaluation.exchange.gross();
         gross +=
@@ -416,6 +448,12 @@ fn limit(size: usize) -> usize {
     (10 * size + 100).min(100_000)
 }
 
+/// Packed rows of a symmetric matrix, where there are any.
+fn pack<'a>(packed: &'a mut Packed, system: &System, weight: f64) -> Option<&'a Packed> {
+    let weights = if system.consistent { [1.0, weight] } else { [0.0, 1.0] };
+    (system.is_symmetric() && packed.update(&system.rows, weights)).then_some(packed)
+}
+
 fn operator<'a>(
     system: &'a System,
     diagonal: &'a [f64],
@@ -423,13 +461,20 @@ fn operator<'a>(
     evaluation: &'a Evaluation,
 ) -> Operator<'a> {
     if system.consistent {
-        Operator { rows: &system.rows, diagonal: None, weights: [1.0, weight], faces: &evaluation.faces }
+        Operator {
+            rows: &system.rows,
+            diagonal: None,
+            weights: [1.0, weight],
+            faces: &evaluation.faces,
+            packed: None,
+        }
     } else {
         Operator {
             rows: &system.rows,
             diagonal: Some(diagonal),
             weights: [0.0, weight],
             faces: FaceMatrices::NONE,
+            packed: None,
         }
     }
 }

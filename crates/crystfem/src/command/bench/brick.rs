@@ -8,7 +8,7 @@ use crate::material::{Conductor, Property};
 use crate::mesh::{Grid, abaqus};
 use crate::problem::{Capacity, Problem};
 use crate::run::Failure;
-use crate::simulation::{Settings, Simulation};
+use crate::simulation::{LinearSolver, Settings, Simulation};
 use polycore::case::terminal::Measurement;
 use polycore::output::{atomic_write, csv};
 use std::path::PathBuf;
@@ -37,6 +37,9 @@ pub struct Options {
     /// Move inner nodes by up to this part of an edge, smoothly, so that no two elements are equal.
     #[arg(long, default_value_t = 0.0, value_parser = amplitude)]
     distorted: f64,
+    /// How linear systems are solved, as in a scene: `auto`, `conjugate-gradients`, `multigrid` or `direct`.
+    #[arg(long, default_value = "auto", value_parser = solver)]
+    solver: LinearSolver,
     /// Write the mesh here, as CalculiX reads it (`.inp`).
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
@@ -50,6 +53,11 @@ fn amplitude(text: &str) -> Result<f64, String> {
     if (0.0..=0.2).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 0 to 0.2")) }
 }
 
+fn solver(text: &str) -> Result<LinearSolver, String> {
+    let name = serde_json::Value::String(text.to_owned());
+    serde_json::from_value(name).map_err(|error| error.to_string())
+}
+
 /// Rows of one run.
 pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     let before = peak_memory();
@@ -59,8 +67,9 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
         atomic_write(path, |file| abaqus::write(&problem.mesh, false, file))?;
     }
     let meshed = since.elapsed().as_secs_f64();
+    let settings = Settings { solver: options.solver, ..Settings::backward_euler(options.step) };
     let since = Instant::now();
-    let mut simulation = Simulation::new(problem, Settings::backward_euler(options.step))?;
+    let mut simulation = Simulation::new(problem, settings)?;
     let built = since.elapsed().as_secs_f64();
     let since = Instant::now();
     let end = options.step * f64::from(options.steps);
@@ -79,6 +88,7 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     push("build", built, "s");
     push("step", solved / steps, "s/step");
     push("Newton iterations", work.newton_iterations as f64 / steps, "/step");
+    push("evaluations", work.evaluations as f64 / steps, "/step");
     push("CG iterations", work.cg_iterations as f64 / steps, "/step");
     if let Some(memory) = memory {
         push("memory", memory / size as f64, "bytes/dof");

@@ -25,28 +25,11 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
     fn with_simd<S: Simd>(self, simd: S) -> f64 {
         let Self { rows, segments, weights, diagonal, x, y, first } = self;
         let stencils = &rows.stencils;
-        let lanes = S::F64_LANES;
-        let mut values = [0.0; MOST_ENTRIES];
         for segment in segments {
             let range = stencils.range(segment.stencil);
             let (start, length) = (segment.start as usize, segment.length as usize);
-            if length >= lanes && range.len() <= MOST_ENTRIES {
-                let offsets = &stencils.offsets[range.clone()];
-                let values = &mut values[..offsets.len()];
-                for (value, at) in values.iter_mut().zip(range) {
-                    *value = rows.value(at, weights);
-                }
-                let mut row = start;
-                let end = start + length;
-                while row + 4 * lanes <= end {
-                    block::<S, 4, FLOW>(simd, offsets, values, diagonal, x, y, row, first);
-                    row += 4 * lanes;
-                }
-                while row < end {
-                    // the last vector may overlap the one before: it writes the same bits again
-                    block::<S, 1, FLOW>(simd, offsets, values, diagonal, x, y, row.min(end - lanes), first);
-                    row += lanes;
-                }
+            if length >= S::F64_LANES && range.len() <= MOST_ENTRIES {
+                Runs { rows, segment, diagonal, y: &mut *y, first }.run::<S, FLOW>(simd, weights, x);
             } else {
                 for row in start..start + length {
                     let mut sums = [0.0; 4];
@@ -65,7 +48,84 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
                 }
             }
         }
-        dot_simd(simd, &x[first..first + y.len()], y)
+        if FLOW { 0.0 } else { dot_simd(simd, &x[first..first + y.len()], y) }
+    }
+}
+
+/// One work item of K x and M u, in one look at each row.
+pub(super) struct Both<'a> {
+    pub rows: &'a Rows,
+    pub segments: &'a [Segment],
+    pub x: &'a [f64],
+    pub u: &'a [f64],
+    pub flow: &'a mut [f64],
+    pub stored: &'a mut [f64],
+    pub first: usize,
+}
+
+impl WithSimd for Both<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { rows, segments, x, u, flow, stored, first } = self;
+        let stencils = &rows.stencils;
+        for segment in segments {
+            let range = stencils.range(segment.stencil);
+            let (start, length) = (segment.start as usize, segment.length as usize);
+            if length >= S::F64_LANES && range.len() <= MOST_ENTRIES {
+                let rows_of = |y| Runs { rows, segment, diagonal: None, y, first };
+                rows_of(&mut *flow).run::<S, true>(simd, [0.0, 1.0], x);
+                rows_of(&mut *stored).run::<S, false>(simd, [1.0, 0.0], u);
+                continue;
+            }
+            let offsets = &stencils.offsets[range.clone()];
+            let values = stencils.conduction[range.clone()].iter().zip(&stencils.capacity[range]);
+            for row in start..start + length {
+                let (own, mut sums) = (x[row], [[0.0; 2]; 2]);
+                for (k, (offset, (conduction, capacity))) in offsets.iter().zip(values.clone()).enumerate() {
+                    let other = row.wrapping_add_signed(*offset as isize);
+                    sums[k & 1][0] += conduction * (x[other] - own);
+                    sums[k & 1][1] += capacity * u[other];
+                }
+                [flow[row - first], stored[row - first]] = [0, 1].map(|k| sums[0][k] + sums[1][k]);
+            }
+        }
+    }
+}
+
+/// A run of equal rows.
+struct Runs<'a> {
+    rows: &'a Rows,
+    segment: &'a Segment,
+    diagonal: Option<&'a [f64]>,
+    y: &'a mut [f64],
+    first: usize,
+}
+
+impl Runs<'_> {
+    #[inline(always)]
+    fn run<S: Simd, const FLOW: bool>(self, simd: S, weights: [f64; 2], x: &[f64]) {
+        let Self { rows, segment, diagonal, y, first } = self;
+        let lanes = S::F64_LANES;
+        let range = rows.stencils.range(segment.stencil);
+        let mut values = [0.0; MOST_ENTRIES];
+        let offsets = &rows.stencils.offsets[range.clone()];
+        let values = &mut values[..offsets.len()];
+        for (value, at) in values.iter_mut().zip(range) {
+            *value = rows.value(at, weights);
+        }
+        let mut row = segment.start as usize;
+        let end = row + segment.length as usize;
+        while row + 4 * lanes <= end {
+            block::<S, 4, FLOW>(simd, offsets, values, diagonal, x, y, row, first);
+            row += 4 * lanes;
+        }
+        while row < end {
+            // the last vector may overlap the one before: it writes the same bits again
+            block::<S, 1, FLOW>(simd, offsets, values, diagonal, x, y, row.min(end - lanes), first);
+            row += lanes;
+        }
     }
 }
 

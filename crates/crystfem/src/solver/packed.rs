@@ -1,0 +1,316 @@
+//! A matrix for the iterations alone, where rows are unequal: entries combined for one step, in single precision, eight rows side by side.
+//!
+//! Iterations on unequal rows take as long as reading them from memory does. Entries beside the diagonal are rounded to f32, and the diagonal
+//! takes what that leaves, so that sums of rows stay those of f64. The energy xᵀAx is then that of A to about 2⁻²⁴ in long and short
+//! steps alike; conjugate gradients go on from the residual of A itself before that shows.
+
+use crate::system::Rows;
+use crate::system::vector::CHUNK;
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+/// Rows side by side.
+const LANES: usize = 8;
+/// Entries of a block over those of its longest row at most, where its rows share a list of distances.
+const MOST_SPREAD: f64 = 1.3;
+
+/// Rows of M and K for given factors, packed.
+#[derive(Default)]
+pub struct Packed {
+    /// Of each work item; `None` where rows are mostly equal.
+    items: Vec<Option<Item>>,
+    /// For which rows the pattern, and for which values and factors the entries were made.
+    shaped_for: Option<u64>,
+    filled_for: Option<(u64, [u64; 2])>,
+}
+
+/// Rows of one work item.
+#[derive(Default)]
+struct Item {
+    /// The diagonal and what rounding took from the other entries.
+    core: Vec<f64>,
+    /// Beside the diagonal, block after block, entry after entry.
+    values: Vec<[f32; LANES]>,
+    blocks: Vec<Block>,
+    /// Distances from the diagonal, of blocks with few of them.
+    offsets: Vec<i32>,
+    /// Columns of the other blocks.
+    columns: Vec<[u32; LANES]>,
+}
+
+/// Eight rows, or the last ones.
+#[derive(Clone, Copy)]
+struct Block {
+    /// Its first entry in `offsets` or `columns`.
+    first: u32,
+    count: u16,
+    banded: bool,
+}
+
+impl Packed {
+    /// Makes it of these rows, as far as it is not yet; false where no rows are packed.
+    pub fn update(&mut self, rows: &Rows, weights: [f64; 2]) -> bool {
+        let [shape, values] = rows.versions();
+        if self.shaped_for != Some(shape) {
+            let item = |item: usize| rows.is_unequal(item).then(|| Item::new(rows, item));
+            self.items = (0..rows.items()).into_par_iter().map(item).collect();
+            (self.shaped_for, self.filled_for) = (Some(shape), None);
+        }
+        let made_for = Some((values, weights.map(f64::to_bits)));
+        if self.filled_for != made_for {
+            self.items.par_iter_mut().enumerate().for_each(|(index, item)| {
+                if let Some(item) = item {
+                    item.fill(rows, index, weights);
+                }
+            });
+            self.filled_for = made_for;
+        }
+        self.items.iter().any(Option::is_some)
+    }
+
+    /// y = (diagonal + `factor`·A) x; returns x·y. `weights` are `factor` times those of A.
+    pub fn product(
+        &self,
+        rows: &Rows,
+        diagonal: Option<&[f64]>,
+        (factor, weights): (f64, [f64; 2]),
+        x: &[f64],
+        y: &mut [f64],
+    ) -> f64 {
+        let arch = Arch::new();
+        let part = |(index, y): (usize, &mut [f64])| match self.items.get(index) {
+            Some(Some(item)) => {
+                let first = index * CHUNK;
+                let diagonal = diagonal.map(|diagonal| &diagonal[first..first + y.len()]);
+                arch.dispatch(Product { item, diagonal, factor, x, y, first })
+            }
+            _ => rows.product_of(index, diagonal, weights, x, y),
+        };
+        let parts: Vec<f64> = y.par_chunks_mut(CHUNK).enumerate().map(part).collect();
+        parts.iter().sum()
+    }
+}
+
+impl Item {
+    /// The pattern of a work item.
+    fn new(rows: &Rows, index: usize) -> Self {
+        let mut item = Self::default();
+        let (start, end) = (index * CHUNK, ((index + 1) * CHUNK).min(rows.size()));
+        item.core.resize(end - start, 0.0);
+        let mut offsets: Vec<i32> = Vec::new();
+        for first in (start..end).step_by(LANES) {
+            let lanes = first..(first + LANES).min(end);
+            offsets.clear();
+            let mut most = 0;
+            for row in lanes.clone() {
+                let before = offsets.len();
+                let others = rows.columns(row).filter(|&column| column != row);
+                offsets.extend(others.map(|column| (column as i64 - row as i64) as i32));
+                most = most.max(offsets.len() - before);
+            }
+            offsets.sort_unstable();
+            offsets.dedup();
+            let inside = |offset: &i32| {
+                let to = first as i64 + i64::from(*offset);
+                to >= 0 && to as usize + LANES <= rows.size()
+            };
+            let banded = lanes.len() == LANES
+                && offsets.len() as f64 <= MOST_SPREAD * most as f64
+                && offsets.first().is_none_or(inside)
+                && offsets.last().is_none_or(inside);
+            if banded {
+                let last = item.blocks.last().filter(|last| last.banded);
+                let same = last.map(|last| (last.first, &item.offsets[last.range()]));
+                let begin = match same {
+                    Some((begin, list)) if list == offsets => begin,
+                    _ => {
+                        item.offsets.extend_from_slice(&offsets);
+                        (item.offsets.len() - offsets.len()) as u32
+                    }
+                };
+                item.blocks.push(Block { first: begin, count: offsets.len() as u16, banded });
+                item.values.resize(item.values.len() + offsets.len(), [0.0; LANES]);
+            } else {
+                let begin = item.columns.len();
+                item.columns.resize(begin + most, [first as u32; LANES]);
+                for (lane, row) in lanes.enumerate() {
+                    let others = rows.columns(row).filter(|&column| column != row);
+                    for (columns, column) in item.columns[begin..].iter_mut().zip(others) {
+                        columns[lane] = column as u32;
+                    }
+                }
+                item.blocks.push(Block { first: begin as u32, count: most as u16, banded });
+                item.values.resize(item.values.len() + most, [0.0; LANES]);
+            }
+        }
+        item.offsets.shrink_to_fit();
+        item.columns.shrink_to_fit();
+        item.values.shrink_to_fit();
+        item
+    }
+
+    /// The entries for these factors.
+    fn fill(&mut self, rows: &Rows, index: usize, weights: [f64; 2]) {
+        self.values.fill([0.0; LANES]);
+        let mut values = self.values.as_mut_slice();
+        for (place, block) in self.blocks.iter().enumerate() {
+            let (own, rest) = values.split_at_mut(usize::from(block.count));
+            values = rest;
+            let offsets = if block.banded { &self.offsets[block.range()] } else { &[] };
+            let begin = LANES * place;
+            for lane in 0..LANES.min(self.core.len() - begin) {
+                let row = index * CHUNK + begin + lane;
+                let (mut core, mut at) = (0.0, 0);
+                for (column, value) in rows.row(row, weights) {
+                    if column == row {
+                        core += value;
+                        continue;
+                    }
+                    if block.banded {
+                        let offset = (column as i64 - row as i64) as i32;
+                        at += offsets[at..].iter().take_while(|other| **other < offset).count();
+                    }
+                    own[at][lane] = value as f32;
+                    core += value - f64::from(own[at][lane]);
+                    at += 1;
+                }
+                self.core[begin + lane] = core;
+            }
+        }
+    }
+}
+
+impl Block {
+    fn range(self) -> std::ops::Range<usize> {
+        self.first as usize..self.first as usize + usize::from(self.count)
+    }
+}
+
+/// One work item of a product.
+struct Product<'a> {
+    item: &'a Item,
+    diagonal: Option<&'a [f64]>,
+    factor: f64,
+    x: &'a [f64],
+    y: &'a mut [f64],
+    first: usize,
+}
+
+impl WithSimd for Product<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f64 {
+        let Self { item, diagonal, factor, x, y, first } = self;
+        let mut values = item.values.as_slice();
+        let mut dots = [0.0; LANES];
+        for (place, block) in item.blocks.iter().enumerate() {
+            let (own, rest) = values.split_at(usize::from(block.count));
+            values = rest;
+            let begin = LANES * place;
+            let row = first + begin;
+            let mut sums = [0.0; LANES];
+            if block.banded {
+                for (value, offset) in own.iter().zip(&item.offsets[block.range()]) {
+                    let start = row.wrapping_add_signed(*offset as isize);
+                    if let Some(other) = x[start..].first_chunk::<LANES>() {
+                        for lane in 0..LANES {
+                            sums[lane] += f64::from(value[lane]) * other[lane];
+                        }
+                    }
+                }
+            } else {
+                for (value, columns) in own.iter().zip(&item.columns[block.range()]) {
+                    for lane in 0..LANES {
+                        sums[lane] += f64::from(value[lane]) * x[columns[lane] as usize];
+                    }
+                }
+            }
+            let range = begin..(begin + LANES).min(y.len());
+            let (out, core, x) = (&mut y[range.clone()], &item.core[range.clone()], &x[row..]);
+            match diagonal.map(|diagonal| &diagonal[range]) {
+                Some(diagonal) => {
+                    for lane in 0..out.len() {
+                        out[lane] = (factor * core[lane] + diagonal[lane]) * x[lane] + factor * sums[lane];
+                        dots[lane] += x[lane] * out[lane];
+                    }
+                }
+                None => {
+                    for lane in 0..out.len() {
+                        out[lane] = factor * (core[lane] * x[lane] + sums[lane]);
+                        dots[lane] += x[lane] * out[lane];
+                    }
+                }
+            }
+        }
+        dots.iter().sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grid of 90 × 70 with unequal entries, of neighbours in order and of neighbours anywhere: products as with f64 to the rounding of
+    /// f32, and exactly so on uniform vectors.
+    #[test]
+    fn products_of_grids_and_of_unordered_rows() {
+        let (width, height) = (90, 70);
+        let size = width * height;
+        for scattered in [false, true] {
+            let mut of: Vec<usize> = (0..size).collect();
+            if scattered {
+                of.sort_by(|a, b| f64::total_cmp(&((a * a) as f64).sin(), &((b * b) as f64).sin()));
+            }
+            let mut names = vec![0; size];
+            of.iter().enumerate().for_each(|(name, &k)| names[k] = name);
+            let name = |k: usize| names[k];
+            let entry = |a: usize, b: usize| -1.0 - 0.5 * ((a.min(b) + 3 * a.max(b)) as f64).sin();
+            let rows = Rows::build(size, true, |row, out| {
+                out.begin(std::iter::once(row as u32));
+                let k = of[row];
+                let mut sum = 0.0;
+                let sides = [!k.is_multiple_of(width), k % width + 1 < width, k >= width, k + width < size];
+                for (other, _) in [k.wrapping_sub(1), k + 1, k.wrapping_sub(width), k + width]
+                    .into_iter()
+                    .zip(sides)
+                    .filter(|(_, there)| *there)
+                {
+                    let value = entry(k, other);
+                    sum -= value;
+                    out.add((name(other) as i64 - row as i64) as i32, value, -0.1 * value);
+                }
+                out.add(0, sum, 1.0);
+            });
+            let mut packed = Packed::default();
+            let diagonal: Vec<f64> = (0..size).map(|k| 1e-3 * (k as f64).cos().abs()).collect();
+            let x: Vec<f64> = (0..size).map(|k| (k as f64).sin()).collect();
+            let one = vec![1.0; size];
+            for weights in [[0.0, 1.0], [1.0, 1e6]] {
+                assert!(packed.update(&rows, weights) && packed.items.iter().all(Option::is_some));
+                let banded = packed.items.iter().flatten().flat_map(|item| &item.blocks);
+                let banded = banded.filter(|block| block.banded).count();
+                assert!(if scattered { banded == 0 } else { banded * LANES > size * 9 / 10 }, "{banded}");
+                let [mut found, mut exact] = [vec![0.0; size], vec![0.0; size]];
+                for (x, rounding) in [(&x, 4.0 * f64::from(f32::EPSILON)), (&one, 1e-15)] {
+                    let dot = packed.product(&rows, Some(&diagonal), (1.0, weights), x, &mut found);
+                    let exact_dot = rows.product(Some(&diagonal), weights, x, &mut exact);
+                    let scale = weights[1] * 8.0;
+                    let far = found.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    assert!(far <= rounding * scale, "{far:e} {scale:e}");
+                    assert!((dot - exact_dot).abs() <= rounding * scale * size as f64);
+                }
+            }
+        }
+    }
+
+    /// Where rows are equal nothing is packed.
+    #[test]
+    fn equal_rows_are_left() {
+        let rows = Rows::build(10_000, false, |_, out| {
+            out.begin(std::iter::empty());
+            out.add(0, 2.0, 0.0);
+        });
+        assert!(!Packed::default().update(&rows, [0.0, 1.0]));
+    }
+}
