@@ -272,7 +272,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     }
 
     fn other_end(&self, site: usize, index: u32) -> usize {
-        self.whole_bond(site, index).site
+        self.neighbours[self.starts[site] + index as usize] as usize
     }
 
     fn bonded(&self, site: usize) -> u32 {

@@ -83,7 +83,7 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn spacing(&self) -> f64;
     /// Visits the intact bonds of a site.
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>));
-    /// Site of the other end of a bond by its [`Neighbour::index`], intact or not.
+    /// Site of the other end of an intact bond by its [`Neighbour::index`].
     fn other_end(&self, site: usize, index: u32) -> usize;
     /// Whether an intact bond leads from a site to another.
     fn is_bonded(&self, site: usize, other: usize) -> bool {

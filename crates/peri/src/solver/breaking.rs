@@ -4,6 +4,7 @@ use super::criterion::{Bilinear, Criterion, Policy, most};
 use super::state::{Event, State};
 use super::system::System;
 use crate::bonds::{Overstretched, Softened, fingerprint};
+use crate::contact::Contact;
 use crate::potential::StretchRange;
 
 /// Softening that an equilibrium may still lack: bonds of it bear up to this part of an intact bond's force too much.
@@ -71,6 +72,10 @@ impl<const D: usize> System<'_, D> {
         // what does not follow bond by bond is what the whole body loses
         let before = released.is_none().then(|| self.stored_energy(state, state.observed));
         let bonds = list.len() as u64 / 2;
+        let touches = self.contact.as_ref().is_some_and(Contact::has_pairs);
+        let pair =
+            |bond: &Overstretched| [bond.site, self.bonds.other_end(bond.site as usize, bond.index) as u32];
+        let parted: Vec<[u32; 2]> = if touches { list.iter().map(pair).collect() } else { Vec::new() };
         state.broken += bonds;
         let [factor, pull, push] = state.balanced;
         let load = self.response(factor, (pull, push)).0;
@@ -92,11 +97,8 @@ impl<const D: usize> System<'_, D> {
             // what rubs depends on bonds, too
             self.lag(state);
         }
-        if let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_pairs()) {
-            let pair = |bond: &Overstretched| {
-                [bond.site, self.bonds.other_end(bond.site as usize, bond.index) as u32]
-            };
-            contact.part(&*self.bonds, &list.iter().map(pair).collect::<Vec<_>>());
+        if let Some(contact) = self.contact.as_mut().filter(|_| touches) {
+            contact.part(&*self.bonds, &parted);
         }
         if bonds > 0 {
             state.intact = Some(self.bonds.intact());
