@@ -249,6 +249,12 @@ impl<const D: usize> Candidate<D> {
 
     /// Where it touches.
     pub fn touch(&self, displacement: &Field<D>, own: usize) -> Option<Touch<D>> {
+        // most are farther apart by much more than rounding, which costs no root to see
+        let (here, there) = (displacement.components(), self.site as usize);
+        let square: f64 = (0..D).map(|d| (self.bond[d] + (here[d][there] - here[d][own])).powi(2)).sum();
+        if square > (1.0 + 1e-9) * self.distance * self.distance {
+            return None;
+        }
         let (zeta, r) = self.apart(displacement, own);
         if r < self.distance {
             let (along, size) = if r > 0.0 { (zeta, r) } else { (self.bond, length(self.bond)) };
