@@ -146,7 +146,7 @@ impl<const D: usize> Block<'_, D> {
                 }
             }
             let out = &mut S::as_mut_simd_f64s(out).0[..V];
-            // one by one: a slice of the sums would keep them in memory
+            #[expect(clippy::manual_memcpy, reason = "a slice of the sums would keep them in memory")]
             for v in 0..V {
                 out[v] = sums[v];
             }
