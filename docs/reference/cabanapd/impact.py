@@ -173,36 +173,6 @@ def theirs(steps, breaks):
     return wall, user, json.loads(re.search('RESULT (.*)', text)[1]), rows[place(rows[:, :3])]
 
 
-def pieces(x, u):
-    """Numbers of the pieces that bonds below the critical stretch hold together: what was broken and is short again counts as intact."""
-    index = numpy.floor((x - it.low) / it.spacing).astype(int)
-    grid = numpy.full(it.cells + 10, -1)
-    grid[tuple((index + 5).T)] = numpy.arange(len(x))
-    ends = []
-    for offset in numpy.ndindex(11, 11, 11):
-        offset = numpy.array(offset) - 5
-        length = numpy.linalg.norm(offset * it.spacing)
-        if tuple(offset) <= (0, 0, 0) or length > it.horizon + 1e-10:
-            continue
-        other = grid[tuple((index + 5 + offset).T)]
-        near = numpy.flatnonzero(other >= 0)
-        other = other[near]
-        stretched = numpy.linalg.norm(x[other] + u[other] - x[near] - u[near], axis=1)
-        intact = stretched < (1 + it.stretch) * length
-        ends.append(numpy.stack([near[intact], other[intact]]))
-    a, b = numpy.concatenate(ends, axis=1)
-    label = numpy.arange(len(x))
-    while True:
-        before = label.copy()
-        least = numpy.minimum(label[a], label[b])
-        numpy.minimum.at(label, label[a], least)
-        numpy.minimum.at(label, label[b], least)
-        while (label[label] != label).any():
-            label = label[label]
-        if (label == before).all():
-            return label, numpy.bincount(numpy.concatenate([a, b]), minlength=len(x))
-
-
 def sizes(label):
     count = numpy.sort(numpy.unique(label, return_counts=True)[1])[::-1]
     mass = it.density * it.spacing.prod()
@@ -234,17 +204,14 @@ out['medians, s'] = middle
 out['ratio of processors'] = middle['CabanaPD'][1] / middle['peri'][1]
 x = rows[:, :3]
 theirs_damage = 1 - rows[:, 10] / rows[:, 9]
-for name, share, w, broken, stored in [
-        ('peri', damage, u, values['broken_bonds'], values['stored_energy']),
-        ('CabanaPD', theirs_damage, rows[:, 3:6], result['broken bonds'], result['stored, J'])]:
+for name, share, broken, stored in [
+        ('peri', damage, values['broken_bonds'], values['stored_energy']),
+        ('CabanaPD', theirs_damage, result['broken bonds'], result['stored, J'])]:
     torn = x[share > 0.3]
     it_is = out[name] = {'broken bonds': broken, 'mean damage': float(share.mean()), 'particles with damage > 0.3': len(torn), 'stored, J': stored}
     if plate:
         it_is['largest |y| of damage > 0.3, mm'] = float(1e3 * abs(torn[:, 1]).max()) if len(torn) else 0
         it_is['upper end x, y, mm'] = [float(1e3 * t) for t in torn[torn[:, 1].argmax()]] if len(torn) else 0
-    else:
-        label, intact = pieces(x, w)
-        it_is['from final stretches'] = sizes(label) | {'bonds intact but for their stretch': float(intact.sum() / 2 - (rows[:, 9] * (1 - share)).sum() / 2)}
 out['peri']['kinetic'] = values['kinetic_energy']
 out['CabanaPD']['kinetic'] = result['kinetic, J']
 if plate:

@@ -73,13 +73,11 @@ impl Estimate {
             self.since = left;
             return Next::Renew;
         }
-        match left <= wanted {
-            true => {
-                let error = (left / goal.capacity).sqrt();
-                Next::End(Ended { iterations, error, converged: true })
-            }
-            false => Next::Iterate,
+        if left > wanted {
+            return Next::Iterate;
         }
+        let error = (left / goal.capacity).sqrt();
+        Next::End(Ended { iterations, error, converged: true })
     }
 
     /// After all iterations.

@@ -84,7 +84,7 @@ impl Packed {
                 let diagonal = diagonal.map(|diagonal| &diagonal[first..first + y.len()]);
                 arch.dispatch(Product { item, diagonal, factor, x, y, first })
             }
-            _ => rows.product_of(index, diagonal, weights, x, y),
+            _ => rows.part::<false>(index, diagonal, weights, x, y),
         };
         let parts: Vec<f64> = y.par_chunks_mut(CHUNK).enumerate().map(part).collect();
         parts.iter().sum()

@@ -344,19 +344,8 @@ impl Rows {
         parts.iter().sum()
     }
 
-    /// [`Self::product`] of the rows of one work item, `y`.
-    pub fn product_of(
-        &self,
-        item: usize,
-        diagonal: Option<&[f64]>,
-        weights: [f64; 2],
-        x: &[f64],
-        y: &mut [f64],
-    ) -> f64 {
-        self.part::<false>(item, diagonal, weights, x, y)
-    }
-
-    fn part<const FLOW: bool>(
+    /// [`Self::product`], or the flow, of the rows of one work item, `y`.
+    pub fn part<const FLOW: bool>(
         &self,
         item: usize,
         diagonal: Option<&[f64]>,

@@ -412,10 +412,7 @@ impl Stages {
         }
         // a uniform shift of the free nodes makes the balance of the whole body exact
         let (right, sums, found) = (&self.right, &self.row_sums, &self.correction);
-        let left = match symmetric && !factored {
-            true => total - dot(sums, found),
-            false => dot(&system.free, right),
-        };
+        let left = if symmetric && !factored { total - dot(sums, found) } else { dot(&system.free, right) };
         let shift = left / self.sensitivity;
         if shift.is_finite() {
             for (correction, free) in self.correction.iter_mut().zip(&system.free) {

@@ -240,22 +240,25 @@ pub struct Touch<const D: usize> {
 }
 
 impl<const D: usize> Candidate<D> {
+    fn zeta(&self, displacement: &Field<D>, own: usize) -> [f64; D] {
+        let (here, there) = (displacement.get(own), displacement.get(self.site as usize));
+        std::array::from_fn(|d| self.bond[d] + (there[d] - here[d]))
+    }
+
     /// ζ and r; both have the same bits from either side, but for the sign of ζ.
     pub fn apart(&self, displacement: &Field<D>, own: usize) -> ([f64; D], f64) {
-        let (here, there) = (displacement.get(own), displacement.get(self.site as usize));
-        let zeta = std::array::from_fn(|d| self.bond[d] + (there[d] - here[d]));
+        let zeta = self.zeta(displacement, own);
         (zeta, length(zeta))
     }
 
     /// Where it touches.
     pub fn touch(&self, displacement: &Field<D>, own: usize) -> Option<Touch<D>> {
+        let zeta = self.zeta(displacement, own);
         // most are farther apart by much more than rounding, which costs no root to see
-        let (here, there) = (displacement.components(), self.site as usize);
-        let square: f64 = (0..D).map(|d| (self.bond[d] + (here[d][there] - here[d][own])).powi(2)).sum();
-        if square > (1.0 + 1e-9) * self.distance * self.distance {
+        if zeta.iter().map(|x| x * x).sum::<f64>() > (1.0 + 1e-9) * self.distance * self.distance {
             return None;
         }
-        let (zeta, r) = self.apart(displacement, own);
+        let r = length(zeta);
         if r < self.distance {
             let (along, size) = if r > 0.0 { (zeta, r) } else { (self.bond, length(self.bond)) };
             let direction = along.map(|x| x / size);

@@ -2,7 +2,6 @@
 //! a time.
 
 use super::Tensor;
-use super::lattice::blocks;
 use crate::field::CHUNK;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -19,6 +18,13 @@ pub struct Tap {
     pub shift: isize,
     /// Its share.
     pub weight: f64,
+}
+
+/// Which blocks of sites hold any of those given.
+pub fn blocks(sites: usize, of: &[u32]) -> Vec<bool> {
+    let mut filled = vec![false; sites.div_ceil(BLOCK)];
+    of.iter().for_each(|&site| filled[site as usize / BLOCK] = true);
+    filled
 }
 
 /// The bonds of one type from every site.

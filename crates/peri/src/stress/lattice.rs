@@ -1,7 +1,7 @@
 //! On a lattice the bond function depends on offsets only: each measure is, bond by bond of the stencil, a convolution
 //! of that bond's forces with fixed weights.
 
-use super::convolution::{BLOCK, Shared, Tap};
+use super::convolution::{BLOCK, Shared, Tap, blocks};
 use super::window::{Averaged, Window, normalise};
 use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, cell_fractions, segment_fraction};
 use crate::bonds::{Bonds, LatticeBonds};
@@ -34,13 +34,6 @@ pub fn piola<const D: usize>(
     let volumes = volumes(bonds, state, measure, ball, window.as_ref());
     let particles = bonds.particles().iter().zip(volumes);
     particles.map(|(&site, volume)| sums[site as usize].map(|row| row.map(|sum| sum / volume))).collect()
-}
-
-/// Which blocks of sites hold any of those given.
-pub(super) fn blocks(sites: usize, of: &[u32]) -> Vec<bool> {
-    let mut filled = vec![false; sites.div_ceil(BLOCK)];
-    of.iter().for_each(|&site| filled[site as usize / BLOCK] = true);
-    filled
 }
 
 /// f V_I V_J, N, of bond `k` from a block of sites; zero where it is not intact.

@@ -12,8 +12,7 @@ use crate::output::hdf5::{Created, write_error};
 
 /// Rows of a compressed chunk: large enough to compress, small enough to read a step without much waste.
 const CHUNK_ROWS: usize = 1 << 16;
-/// Deflate's level for files of one step, which are mostly read once, to be merged, and for others (a sixth smaller, in
-/// twice the time).
+/// Deflate's level for files of one step, which are mostly read once, to be merged, and for others, which get a sixth smaller.
 const QUICK: u32 = 1;
 const SMALL: u32 = 4;
 /// The four kinds of cells of `PolyData`; ours are vertices.
