@@ -325,9 +325,9 @@ fn solve<C: Case>(
     std::thread::scope(|scope| {
         for _ in 0..rayon::current_num_threads().min(runs.len()) {
             // not rayon's own threads: one that waits would take up a second run on top of its first
-            scope.spawn(|| match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
-                Ok(pool) => pool.install(work),
-                Err(_) => work(),
+            // their loops must not wait for this thread, which is one of the program's pool
+            scope.spawn(|| {
+                rayon::ThreadPoolBuilder::new().num_threads(1).build().map(|pool| pool.install(work))
             });
         }
     });

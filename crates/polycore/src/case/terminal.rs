@@ -110,8 +110,9 @@ impl Threads {
     /// # Errors
     /// The system does not give so many threads.
     pub fn apply(&self) -> Result<(), String> {
-        let Some(threads) = self.threads else { return Ok(()) };
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+        let threads = self.threads.map_or(0, usize::from);
+        // the main thread is one of them: a parallel loop that it begins need not wake another to be begun
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread();
         pool.build_global().map_err(|error| format!("--threads {threads}: {error}"))
     }
 }
