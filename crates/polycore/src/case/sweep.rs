@@ -325,9 +325,10 @@ fn solve<C: Case>(
     std::thread::scope(|scope| {
         for _ in 0..rayon::current_num_threads().min(runs.len()) {
             // not rayon's own threads: one that waits would take up a second run on top of its first
-            // their loops must not wait for this thread, which is one of the program's pool
             scope.spawn(|| {
-                rayon::ThreadPoolBuilder::new().num_threads(1).build().map(|pool| pool.install(work))
+                // a pool of this thread alone, which is in no other
+                let _pool = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
+                work();
             });
         }
     });

@@ -12,8 +12,9 @@ use crate::output::hdf5::{Created, write_error};
 
 /// Rows of a compressed chunk: large enough to compress, small enough to read a step without much waste.
 const CHUNK_ROWS: usize = 1 << 16;
-/// Deflate's level: 4 takes two and a half times as long for files that are a sixth smaller.
-const LEVEL: u32 = 1;
+/// Deflate's level for files of one step, which are mostly read once, to be merged, and for others, which get a sixth smaller.
+const QUICK: u32 = 1;
+const SMALL: u32 = 4;
 /// The four kinds of cells of `PolyData`; ours are vertices.
 const KINDS: [&str; 4] = ["Vertices", "Lines", "Polygons", "Strips"];
 
@@ -50,21 +51,25 @@ impl Writer {
         let ascii = DatatypeMessage::FixedString { size: name.len() as u32, padding: 1, charset: 0 };
         group.set_attr_typed("Type", ascii, name.to_vec())?;
         integers(&group, "NumberOfPoints", &[layout.points as i64])?;
-        let points = table::<f64>(&group, "Points", 3, layout.points)?;
+        let level = if steps == 1 { QUICK } else { SMALL };
+        let points = table::<f64>(&group, "Points", 3, layout.points, level)?;
         let points = match mesh {
             Some((places, cells)) => {
                 points.append(places.as_flattened())?;
-                write_cells(&group, cells)?;
+                write_cells(&group, cells, level)?;
                 None
             }
             None => {
-                write_vertices(&group, layout.points)?;
+                write_vertices(&group, layout.points, level)?;
                 Some(points)
             }
         };
         let tables = |name: &str, arrays: &[(String, usize)], rows: usize| {
             let group = group.create_group(name)?;
-            arrays.iter().map(|(name, n)| table::<f64>(&group, name, *n, rows)).collect::<Hdf5<Vec<_>>>()
+            arrays
+                .iter()
+                .map(|(name, n)| table::<f64>(&group, name, *n, rows, level))
+                .collect::<Hdf5<Vec<_>>>()
         };
         let arrays = tables("PointData", &layout.arrays, layout.points)?;
         let cell_arrays =
@@ -151,27 +156,27 @@ impl Writer {
 }
 
 /// Each particle a vertex.
-fn write_vertices(group: &H5Group, points: usize) -> Hdf5<()> {
+fn write_vertices(group: &H5Group, points: usize, level: u32) -> Hdf5<()> {
     for kind in KINDS {
         let count = if kind == "Vertices" { points } else { 0 };
         let subgroup = group.create_group(kind)?;
         integers(&subgroup, "NumberOfCells", &[count as i64])?;
         integers(&subgroup, "NumberOfConnectivityIds", &[count as i64])?;
         let ids: Vec<i64> = (0..=count as i64).collect();
-        table::<i64>(&subgroup, "Connectivity", 1, count.max(1))?.append(&ids[..count])?;
-        table::<i64>(&subgroup, "Offsets", 1, count + 1)?.append(&ids)?;
+        table::<i64>(&subgroup, "Connectivity", 1, count.max(1), level)?.append(&ids[..count])?;
+        table::<i64>(&subgroup, "Offsets", 1, count + 1, level)?.append(&ids)?;
     }
     Ok(())
 }
 
-fn write_cells(group: &H5Group, cells: &Cells) -> Hdf5<()> {
+fn write_cells(group: &H5Group, cells: &Cells, level: u32) -> Hdf5<()> {
     let ids: Vec<i64> = cells.connectivity.iter().map(|&point| i64::from(point)).collect();
     let offsets: Vec<i64> = std::iter::once(0).chain(cells.ends.iter().map(|&end| end as i64)).collect();
     integers(group, "NumberOfCells", &[cells.len() as i64])?;
     integers(group, "NumberOfConnectivityIds", &[ids.len() as i64])?;
-    table::<i64>(group, "Connectivity", 1, ids.len())?.append(&ids)?;
-    table::<i64>(group, "Offsets", 1, offsets.len())?.append(&offsets)?;
-    table::<u8>(group, "Types", 1, cells.len())?.append(&cells.types)
+    table::<i64>(group, "Connectivity", 1, ids.len(), level)?.append(&ids)?;
+    table::<i64>(group, "Offsets", 1, offsets.len(), level)?.append(&offsets)?;
+    table::<u8>(group, "Types", 1, cells.len(), level)?.append(&cells.types)
 }
 
 fn integers(group: &H5Group, name: &str, values: &[i64]) -> Hdf5<()> {
@@ -179,7 +184,13 @@ fn integers(group: &H5Group, name: &str, values: &[i64]) -> Hdf5<()> {
 }
 
 /// An empty compressed dataset with unlimited rows.
-fn table<T: rust_hdf5::H5Type>(group: &H5Group, name: &str, columns: usize, rows: usize) -> Hdf5<H5Dataset> {
+fn table<T: rust_hdf5::H5Type>(
+    group: &H5Group,
+    name: &str,
+    columns: usize,
+    rows: usize,
+    level: u32,
+) -> Hdf5<H5Dataset> {
     let chunk = rows.clamp(1, CHUNK_ROWS);
     let builder = group.new_dataset::<T>();
     let builder = if columns == 1 {
@@ -187,5 +198,5 @@ fn table<T: rust_hdf5::H5Type>(group: &H5Group, name: &str, columns: usize, rows
     } else {
         builder.shape([0, columns]).chunk(&[chunk, columns]).max_shape(&[None, Some(columns)])
     };
-    builder.shuffle_deflate(LEVEL).create(name)
+    builder.shuffle_deflate(level).create(name)
 }
