@@ -113,7 +113,8 @@ impl Threads {
         let threads = self.threads.map_or(0, usize::from);
         // the main thread is one of them: a parallel loop that it begins need not wake another to be begun
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).use_current_thread();
-        pool.build_global().map_err(|error| format!("cannot start threads: {error}; --threads N asks for fewer"))
+        pool.build_global()
+            .map_err(|error| format!("cannot start threads: {error}; --threads N asks for fewer"))
     }
 }
 
