@@ -86,6 +86,15 @@ const SUBJECTS: &[Subject] = &[
         note: "A notched sheet torn apart, against a residual of 1e-8; a point for each tolerance of the residual.",
     },
     Subject {
+        title: "Fracture: load steps",
+        source: Source::Case { case: "ch2/dent-steps", curves: "error_against_time_" },
+        split: "\n",
+        default: "peak_load [m=3.015 refine]",
+        axes: ["s, whole solution", "error of the peak load"],
+        command: "cargo xtask validate --case cases/ch2/dent-steps",
+        note: "The same sheet against 9,600 steps; a point for each number of steps, and for each `refine` of 15 steps.",
+    },
+    Subject {
         title: "Fracture: spacing",
         source: Source::Case { case: "ch2/dent-convergence", curves: "error_against_time_" },
         split: "\n",

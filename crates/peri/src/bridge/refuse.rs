@@ -55,6 +55,12 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &Variant) -> Resul
             "`each-iteration`",
             "`at-equilibrium`: the iterations of LAMMPS are not ours",
         ),
+        (
+            scene.solver.refine > 1,
+            "solver.refine",
+            "load steps that are cut where bonds break",
+            "1: the driver takes the steps that are prescribed",
+        ),
     ];
     if let Some((_, key, found, allowed)) = reasons.into_iter().find(|(refused, ..)| *refused) {
         return Err(source.error(key, found, allowed));

@@ -42,11 +42,12 @@ fn all_intact<const D: usize>(bonds: &dyn Bonds<D>) -> Vec<u32> {
     bonds.particles().iter().map(|&site| bonds.bonded(site as usize)).collect()
 }
 
-/// Whether the fields of the last step of a history are written during the run.
-fn wanted(every: usize, history: &[Record]) -> bool {
-    let step = history.len();
-    let before = step.checked_sub(2).map_or(0, |k| history[k].broken);
-    step > 0 && (step.is_multiple_of(every) || history[step - 1].broken > before)
+/// Whether the fields after the first `rows` of the history are written during the run.
+fn wanted<const D: usize>(every: usize, state: &State<D>, rows: usize) -> bool {
+    let history = &state.history;
+    let before = rows.checked_sub(2).map_or(0, |k| history[k].broken);
+    let prescribed = state.prescribed(rows).is_some_and(|steps| steps.is_multiple_of(every));
+    rows > 0 && (prescribed || history[rows - 1].broken > before)
 }
 
 /// Whether an equilibrium within a step is written: the 1st, 2nd, 3rd, 4th, 6th, 8th, 12th, 16th, 24th, …
@@ -63,7 +64,7 @@ fn in_between(equilibria: u64) -> usize {
 /// Frames written up to a state.
 fn frames_of<const D: usize>(every: usize, state: &State<D>) -> usize {
     let of_step = |step: usize| {
-        let last = wanted(every, &state.history[..=step]);
+        let last = wanted(every, state, step + 1);
         in_between(state.history[step].rounds.saturating_sub(1)) + usize::from(last)
     };
     (0..state.history.len()).map(of_step).sum::<usize>() + in_between(state.round)
@@ -107,7 +108,7 @@ impl<'a, const D: usize> Frames<'a, D> {
             (true, 0) => Some(ParticleSeries::create(&path)?),
             (true, done) => Some(ParticleSeries::resume(&path, done)?),
         };
-        let last = |every| (1..=state.history.len()).rev().find(|&k| wanted(every, &state.history[..k]));
+        let last = |every| (1..=state.history.len()).rev().find(|&k| wanted(every, state, k));
         let written = every.and_then(last);
         Ok(Self { scene, observed, whole, series, path, written, by_window })
     }
@@ -122,7 +123,7 @@ impl<'a, const D: usize> Frames<'a, D> {
             let stresses = self.stresses(bonds, state, phases)?;
             let equilibrium = state.round as f64;
             self.write(bonds, state, &stresses, state.step as f64 + equilibrium / (equilibrium + 1.0))?;
-        } else if state.round == 0 && wanted(every, &state.history) {
+        } else if state.round == 0 && wanted(every, state, state.history.len()) {
             let stresses = self.stresses(bonds, state, phases)?;
             self.write(bonds, state, &stresses, state.step as f64)?;
             self.written = Some(state.step);

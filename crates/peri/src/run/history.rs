@@ -202,10 +202,20 @@ pub fn peak_lines(outcomes: &[Outcome]) -> String {
             .max_by(|&a, &b| outcome.history[a].load.total_cmp(&outcome.history[b].load))?;
         let (at, name) = (outcome.history[peak].displacement, &outcome.name);
         let load = outcome.history[peak].load;
-        let near = [peak.checked_sub(1), Some(peak + 1)].into_iter().flatten();
-        let near: Vec<&Record> = near.filter_map(|step| outcome.history.get(step)).collect();
-        let apart = near.iter().map(|r| (r.displacement - at).abs()).fold(0.0, f64::max);
-        let least = near.iter().map(|r| (r.load - load).abs()).fold(f64::INFINITY, f64::min);
+        let near = [peak.checked_sub(1), Some(peak + 1)];
+        let near: Vec<&Record> = near.into_iter().filter_map(|row| outcome.history.get(row?)).collect();
+        let gap = |r: &&Record| [(r.displacement - at).abs(), (r.load - load).abs()];
+        let gaps: Vec<[f64; 2]> = near.iter().map(gap).collect();
+        let broken = outcome.history[peak].broken;
+        let [apart, least] = match (&near[..], &gaps[..]) {
+            // nothing breaks before the peak and something after: it lies between the two
+            ([before, after], [[back, rise], [ahead, _]])
+                if before.broken == broken && after.broken > broken =>
+            {
+                [*ahead, rise * ahead / back]
+            }
+            _ => gaps.iter().fold([0.0_f64, f64::INFINITY], |[a, l], gap| [a.max(gap[0]), l.min(gap[1])]),
+        };
         (apart > 0.0 && load > 0.0 && !outcome.is_dynamic()).then(|| {
             let (at, apart) = (at * 1e3, apart * 1e3);
             format!("{name}: peak {load:.5} N at {at:.5} mm, ± one load step: {apart:.3} mm, {least:.3} N\n")

@@ -4,6 +4,7 @@ use super::values::{plain, positive};
 use super::variant::{Variant, variants};
 use super::{Method, Parameter, Probe, Scene, Track};
 use crate::calibrate::{Calibration, Space};
+use crate::solver::Policy;
 use crate::stress::Measure;
 use polycore::scene::{SceneError, Source};
 
@@ -379,6 +380,19 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             found,
             "nothing, or `method = \"adr\"`: only it has a fictitious mass",
         ));
+    }
+    within("refine", solver.refine as f64, 1.0, 1e6)?;
+    let refuses = [
+        (scene.material.critical.is_none(), "bonds that never break"),
+        (scene.method() == Method::Verlet, "explicit dynamics"),
+        (solver.breaking == Policy::EachIteration, "`breaking = \"each-iteration\"`"),
+        (scene.material.critical.is_some_and(|critical| critical.strength.is_some()), "bonds that soften"),
+        (scene.contact.as_ref().is_some_and(super::ContactSpec::rubs), "friction"),
+    ];
+    if let Some((_, what)) = refuses.into_iter().find(|(refused, _)| *refused && solver.refine > 1) {
+        let allowed =
+            "1, or a quasi-static scene whose bonds break at once and in equilibrium, without friction";
+        return Err(source.error("solver.refine", format!("{} with {what}", solver.refine), allowed));
     }
     within("accept", solver.accept.unwrap_or(0.0), 0.0, 1.0)?;
     within("stop_below", solver.stop_below.unwrap_or(0.0), 0.0, 1.0)

@@ -28,6 +28,8 @@ pub struct Solver {
     pub mass_safety: Option<f64>,
     /// Go on from a search that has used all its iterations if its residual is below this; default: that is an error.
     pub accept: Option<f64>,
+    /// Where bonds would break in a load step, cut it: they break within this part, 1/`refine`, of a step.
+    pub refine: usize,
     /// When bonds are looked at that may break.
     pub breaking: Policy,
     /// Skip what is left of the load once it has fallen below this part of its peak.
@@ -45,6 +47,7 @@ impl Default for Solver {
             fit_bound: None,
             mass_safety: None,
             accept: None,
+            refine: 1,
             breaking: Policy::default(),
             stop_below: None,
         }

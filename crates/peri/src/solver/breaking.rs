@@ -41,29 +41,39 @@ fn soften(
 }
 
 impl<const D: usize> System<'_, D> {
-    /// Severs all bonds beyond what they bear, and softens those on the way there; the sites of their ends.
-    pub fn break_bonds(&mut self, state: &mut State<D>) -> Vec<u32> {
-        let Some(breaking) = &self.breaking else { return Vec::new() };
-        let free = |site: usize| self.loads.constrained(site) == 0;
-        let mut softened = None;
-        let list = match &breaking.criterion {
-            Criterion::Stretch(stretch) => {
+    /// Bonds beyond what they bear, where they break at once.
+    pub(super) fn beyond(&mut self, state: &State<D>) -> Vec<Overstretched> {
+        match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
+            Some(Criterion::Stretch(stretch)) => {
                 self.material.overstretched(&*self.bonds, &state.displacement, stretch)
             }
-            Criterion::Energy(limit) => {
-                let found = self.material.overloaded(&*self.bonds, &state.displacement, *limit, &free);
-                found.into_iter().map(|(bond, _)| bond).collect()
+            Some(&Criterion::Energy(limit)) => {
+                self.overloaded(state, limit).into_iter().map(|(bond, _)| bond).collect()
             }
-            Criterion::Softening(law) => {
-                let found = self.material.overloaded(&*self.bonds, &state.displacement, law.onset, &free);
+            _ => Vec::new(),
+        }
+    }
+
+    fn overloaded(&mut self, state: &State<D>, limit: f64) -> Vec<(Overstretched, f64)> {
+        let free = |site: usize| self.loads.constrained(site) == 0;
+        self.material.overloaded(&*self.bonds, &state.displacement, limit, &free)
+    }
+
+    /// Severs all bonds beyond what they bear, and softens those on the way there; the sites of their ends.
+    pub fn break_bonds(&mut self, state: &mut State<D>) -> Vec<u32> {
+        let mut softened = None;
+        let list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
+            Some(&Criterion::Softening(law)) => {
+                let found = self.overloaded(state, law.onset);
                 // in dynamics forces follow at once
                 let lag = if state.motion.begun { 0.0 } else { LAG };
-                let changed = soften(*law, &state.softened, found, lag);
+                let changed = soften(law, &state.softened, found, lag);
                 changed.map_or_else(Vec::new, |(list, after)| {
                     softened = Some(after);
                     list
                 })
             }
+            _ => self.beyond(state),
         };
         if list.is_empty() && softened.is_none() {
             return Vec::new();

@@ -25,6 +25,9 @@ impl<const D: usize> System<'_, D> {
         if !state.softened.is_empty() {
             self.bonds.soften(state.softened.clone());
         }
+        if !state.factors.is_empty() {
+            self.factors.to_mut().clone_from(&state.factors);
+        }
         self.rebuild_contact(&state.displacement);
         state.fitted[1] = state.fitted[1].min(most(self.breaking.as_ref()));
         // a bound that depends on the displacement stays that of the run before

@@ -48,8 +48,9 @@ pub fn load_stepping<const D: usize>(
     // of the body as it was built: an interrupted run must guess as if it had not been
     let predictor = system.loads.affine_predictor(&*system.bonds, stiffness);
     system.scale = Scale::new(&*system.bonds, &system.loads, stiffness);
+    let shortest = system.shortest();
     system.restore(state)?;
-    while state.step < system.factors.len() {
+    'steps: while state.step < system.factors.len() {
         if !state.predicted && system.friction().is_some() {
             state.started = Some(state.displacement.clone());
         }
@@ -66,6 +67,9 @@ pub fn load_stepping<const D: usize>(
                 if system.covers_stretches(state, observed)? {
                     break;
                 }
+            }
+            if system.cut(state, shortest) {
+                continue 'steps;
             }
             work_of_loads(system, state);
             let sites = if system.is_overstretched(state.balanced_stretches) {
@@ -87,7 +91,7 @@ pub fn load_stepping<const D: usize>(
         state.step += 1;
         state.predicted = false;
         state.round = 0;
-        state.step_iterations = 0;
+        (state.step_iterations, state.cuts) = (0, 0);
         finished(&*system.bonds, state)?;
         if severed(system, state) {
             break;
@@ -108,7 +112,8 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
     };
     let increment = factor - at(1);
     // flanks that meet turn displacements in their course
-    if state.step > 0 && system.breaking.is_some() && system.repulsion().is_none() {
+    let smooth = system.repulsion().is_none();
+    if state.step > 0 && system.breaking.is_some() && (smooth || system.refine > 1) {
         state.past.push(state.displacement.clone());
         if state.past.len() > 3 {
             state.past.remove(0);
@@ -116,6 +121,7 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
     }
     let even = |back: usize| (at(back) - at(back + 1) - increment).abs() <= 1e-6 * increment.abs();
     let weights: &[f64] = match state.past.len() {
+        _ if !smooth => &[],
         3 if even(1) && even(2) => &[1.0, -3.0, 3.0],
         2 | 3 if even(1) => &[-1.0, 2.0],
         _ => &[],

@@ -6,6 +6,7 @@ mod breaking;
 mod coarse;
 mod covering;
 mod criterion;
+mod cut;
 mod lbfgs;
 mod load;
 mod load_stepping;

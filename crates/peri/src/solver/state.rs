@@ -161,6 +161,11 @@ pub struct State<const D: usize> {
     pub(super) pushing: Vec<[f64; 3]>,
     /// Time and energies of explicit dynamics.
     pub motion: Motion,
+    /// Load factors of all steps, where steps have been cut …
+    pub(super) factors: Vec<f64>,
+    /// … which of them nobody has prescribed, and how often the present one has been.
+    pub(super) inserted: Vec<usize>,
+    pub(super) cuts: u32,
     /// The finished steps.
     pub history: Vec<Record>,
 }
@@ -203,6 +208,9 @@ impl<const D: usize> State<D> {
             started: None,
             pushing: Vec::new(),
             motion: Motion::default(),
+            factors: Vec::new(),
+            inserted: Vec::new(),
+            cuts: 0,
             history: Vec::new(),
         }
     }

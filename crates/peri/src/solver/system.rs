@@ -21,7 +21,9 @@ pub struct System<'a, const D: usize> {
     /// Loads at factor 1. Particles without bonds lose theirs.
     pub loads: Cow<'a, Loads<D>>,
     /// Load factor at the end of each step.
-    pub factors: &'a [f64],
+    pub factors: Cow<'a, [f64]>,
+    /// Parts of a load step to which the load at which bonds break is found; 1: they break at the end of the step.
+    pub refine: usize,
     /// Whether and when bonds break.
     pub breaking: Option<Breaking>,
     /// Stop after the step whose load is below this part of the largest, once bonds broke; 0: never.
@@ -67,7 +69,8 @@ impl<'a, const D: usize> System<'a, D> {
             material,
             bonds,
             loads: Cow::Borrowed(loads),
-            factors,
+            factors: Cow::Borrowed(factors),
+            refine: 1,
             breaking: None,
             stop_below: 0.0,
             fit_bound: 1e-9,

@@ -244,9 +244,54 @@ fn bits_do_not_depend_on_threads() {
     }
 }
 
+/// Ten steps, cut to a 64th where bonds would break, against 640: the same rows around the first break, the same peak, the
+/// same number of broken bonds.
+#[test]
+fn cut_steps_find_what_short_ones_do() {
+    let run = |steps: u32, refine: usize| {
+        let (mut bonds, loads, law, modulus) = dent(4e-3);
+        let factors: Vec<f64> = (1..=steps).map(|k| f64::from(k) / f64::from(steps)).collect();
+        let mut system = System::new(&mut bonds, BondMaterial::new(&*law, modulus), &loads, &factors);
+        system.breaking = Some(Breaking { criterion: 2.9442.into(), policy: Policy::AtEquilibrium });
+        (system.refine, system.stop_below) = (refine, 0.02);
+        let mut state = State::new(system.bonds.sites());
+        let settings = Lbfgs { tolerance: 1e-5, ..Default::default() };
+        settings.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
+        state
+    };
+    let (cut, short) = (run(10, 64), run(640, 1));
+    let step = 1.0 / 640.0;
+    let first = |state: &State<2>| state.history.iter().position(|r| r.broken > 0).unwrap();
+    let (row, of_short) = (first(&cut), first(&short));
+    let [before, at] = [row - 1, row].map(|k| cut.history[k].factor);
+    // each finds the first break within its own shortest step
+    assert!(at - before < 1.3 * step && (at - short.history[of_short].factor).abs() < step, "{before} {at}");
+    let peak = |state: &State<2>| {
+        state.history.iter().max_by(|a, b| a.load.total_cmp(&b.load)).map(|r| (r.load, r.factor)).unwrap()
+    };
+    let ((load, place), (wanted, at)) = (peak(&cut), peak(&short));
+    assert!((place - at).abs() < step && (load / wanted - 1.0).abs() < step, "{load} {wanted} {place} {at}");
+    assert_eq!(cut.broken, short.broken);
+    // every prescribed step is there, and no more than a few others
+    let prescribed: Vec<usize> = (1..=cut.history.len()).filter_map(|rows| cut.prescribed(rows)).collect();
+    assert!(prescribed.iter().copied().eq(1..=prescribed.len()) && prescribed.len() > 3, "{prescribed:?}");
+    let iterations = [cut.total_iterations, short.total_iterations];
+    assert!(
+        2 * iterations[0] < iterations[1] && cut.history.len() < 60,
+        "{iterations:?} {}",
+        cut.history.len()
+    );
+}
+
 /// A run that begins with any state that `watch` calls restartable takes the same way, to the last bit.
 #[test]
 fn restarts_take_the_same_bits() {
+    for refine in [1, 16] {
+        restarts(refine);
+    }
+}
+
+fn restarts(refine: usize) {
     // some steps go on from equilibria without a broken bond, and one begins with a new preconditioner
     let factors: Vec<f64> = (1..=12).map(|k| f64::from(k) / 12.0).collect();
     let build = || {
@@ -261,6 +306,7 @@ fn restarts_take_the_same_bits() {
         let (mut built, loads) = build();
         let mut system = System::new(&mut built.lattice, BondMaterial::new(&*law, MODULUS), &loads, &factors);
         system.breaking.clone_from(&breaking);
+        system.refine = refine;
         let settings = Lbfgs { tolerance: 1e-5, ..Default::default() };
         let mut watch = |status: &peri::solver::Status, state: &State<2>| {
             if status.restartable {

@@ -1,0 +1,91 @@
+//! Load steps that are cut where bonds would break, until the load at which they do is known to a part of a step.
+
+use super::state::State;
+use super::system::System;
+use crate::field::Field;
+
+/// Cuts of one step by stretches; then it is halved.
+const BY_STRETCH: u32 = 3;
+/// Part of the shortest step that is not worth one of its own.
+const CRUMB: f64 = 0.25;
+
+impl<const D: usize> System<'_, D> {
+    /// The shortest load step: the least between two prescribed factors over [`Self::refine`].
+    pub(super) fn shortest(&self) -> f64 {
+        let before = [0.0].into_iter().chain(self.factors.iter().copied());
+        let steps = before.zip(self.factors.iter()).map(|(before, after)| (after - before).abs());
+        steps.filter(|&step| step > 0.0).fold(f64::INFINITY, f64::min) / self.refine.max(1) as f64
+    }
+
+    /// Whether bonds would break in the first equilibrium of a step that may still be cut. The step then is: to factors
+    /// `shortest` apart, between which stretches, taken as linear in the load, come to the critical one; and `state` is
+    /// at the equilibrium before.
+    pub(super) fn cut(&mut self, state: &mut State<D>, shortest: f64) -> bool {
+        let at = state.step;
+        let before = at.checked_sub(1).map_or(0.0, |before| self.factors[before]);
+        let length = self.factors[at] - before;
+        let may = self.refine > 1 && state.round == 0 && length.abs() > (1.0 + CRUMB) * shortest;
+        let stretched = self.is_overstretched(state.balanced_stretches);
+        if !(may && stretched && !self.beyond(state).is_empty()) {
+            return false;
+        }
+        let least = self.breaking_stretch().unwrap_or(1.0);
+        let old = state.history.last().map_or(1.0, |record| record.largest_stretch);
+        let part = (least - old) / ((1.0 + state.balanced_stretches.high).sqrt() - old);
+        let shortest = shortest / length.abs();
+        // parts of the step; 1 is its end
+        let ends = if state.cuts < BY_STRETCH && 0.0 < part && part < 1.0 {
+            let low = part - 0.5 * shortest;
+            [low.min(1.0 - shortest), (low + shortest).max(shortest)]
+        } else {
+            [0.5, 0.5]
+        };
+        let mut new: Vec<f64> =
+            ends.into_iter().filter(|&end| end > CRUMB * shortest && end < 1.0 - CRUMB * shortest).collect();
+        new.dedup();
+        state.insert(&self.factors, new.into_iter().map(|end| before + end * length));
+        self.factors.to_mut().clone_from(&state.factors);
+        state.cuts += 1;
+        let rest = || Field::zeros(state.displacement.sites());
+        state.displacement = if at == 0 { rest() } else { state.past.pop().unwrap_or_else(rest) };
+        (state.predicted, state.iteration) = (false, 0);
+        true
+    }
+}
+
+impl<const D: usize> State<D> {
+    /// Puts factors before that of the present step.
+    fn insert(&mut self, factors: &[f64], new: impl ExactSizeIterator<Item = f64>) {
+        let (at, count) = (self.step, new.len());
+        self.factors = factors.to_vec();
+        self.factors.splice(at..at, new);
+        self.inserted.iter_mut().filter(|row| **row >= at).for_each(|row| *row += count);
+        self.inserted.extend(at..at + count);
+        self.inserted.sort_unstable();
+    }
+
+    /// How many prescribed steps are over after the first `rows` of the history, the last of which is one of them.
+    pub fn prescribed(&self, rows: usize) -> Option<usize> {
+        let last = rows.checked_sub(1)?;
+        let inserted = self.inserted.partition_point(|&row| row < last);
+        (self.inserted.get(inserted) != Some(&last)).then(|| rows - inserted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn prescribed_steps_keep_their_numbers() {
+        let mut state = State::<2>::new(0);
+        state.step = 1;
+        state.insert(&[0.5, 1.0], [0.6, 0.7].into_iter());
+        state.step = 2;
+        let factors = state.factors.clone();
+        state.insert(&factors, [0.65].into_iter());
+        assert_eq!(state.factors, [0.5, 0.6, 0.65, 0.7, 1.0]);
+        let numbers: Vec<_> = (0..=5).map(|rows| state.prescribed(rows)).collect();
+        assert_eq!(numbers, [None, Some(1), None, None, None, Some(2)]);
+    }
+}
