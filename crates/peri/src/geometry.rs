@@ -220,7 +220,7 @@ pub fn recognise<const D: usize>(points: &[[f64; D]], volumes: &[f64], thickness
 }
 
 /// A crack of zero width that severs the bonds crossing it: a segment in 2D, a parallelogram in 3D.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cut<const D: usize> {
     /// One corner.
     pub corner: [f64; D],
@@ -298,10 +298,30 @@ impl<const D: usize> Cut<D> {
         if self.meets(below, above).is_some() { height.abs() } else { f64::INFINITY }
     }
 
+    /// Whether a way of length `reach` from a point may meet it.
+    pub fn is_within(&self, point: [f64; D], reach: f64) -> bool {
+        let reach = reach * (1.0 + 1e-6);
+        let beside = |d: usize| {
+            let along = self.edges.iter().take(D - 1).map(|edge| edge[d]);
+            let (low, high) =
+                along.fold((self.corner[d], self.corner[d]), |(l, h), x| (l + x.min(0.0), h + x.max(0.0)));
+            point[d] < low - reach || point[d] > high + reach
+        };
+        let normal = self.normal();
+        let height: f64 = (0..D).map(|d| (point[d] - self.corner[d]) * normal[d]).sum();
+        // a cut without area has no normal
+        !(0..D).any(beside) && !(height.abs() > reach)
+    }
+
     /// [`severed`] by this cut alone.
     pub fn severs(&self, a: [f64; D], b: [f64; D]) -> bool {
         severed(std::slice::from_ref(self), a, b)
     }
+}
+
+/// The cuts that bonds of length `reach` from a point may meet.
+pub fn cuts_within<const D: usize>(cuts: &[Cut<D>], point: [f64; D], reach: f64) -> Vec<Cut<D>> {
+    cuts.iter().filter(|cut| cut.is_within(point, reach)).copied().collect()
 }
 
 /// Part of a bond's length within which it counts as touching a cut's rim, or as ending on a cut.

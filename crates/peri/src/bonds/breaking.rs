@@ -2,6 +2,7 @@
 
 use super::{Bonds, Property};
 use crate::field::{CHUNK, Field};
+use crate::potential::StretchRange;
 use rayon::prelude::*;
 
 /// A bond, seen from one of its ends, that is to be severed.
@@ -20,16 +21,21 @@ pub struct Overstretched {
 }
 
 /// All intact bonds beyond the `critical` stretch of the weaker of their ends, each from both of them: λ² − 1 =
-/// η·(2ξ + η)/|ξ|² has the same bits from either.
+/// η·(2ξ + η)/|ξ|² has the same bits from either. `seen` are the stretches that [`Bonds::force`] has collected of this
+/// displacement, work item by item; none where it has not.
 pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
     critical: &Property,
+    seen: &[StretchRange],
 ) -> Vec<Overstretched> {
     let sites = bonds.sites();
-    let least = critical.least() * critical.least() - 1.0;
     // vectorised loops find the sites to look into; their last bits may differ from those below
-    let near = |chunk: usize| bonds.suspects(displacement, chunk, least * (1.0 - 1e-9) - 1e-12);
+    let least = (critical.least() * critical.least() - 1.0) * (1.0 - 1e-9) - 1e-12;
+    let near = |chunk: usize| match seen.get(chunk) {
+        Some(range) if range.high <= least => Vec::new(),
+        _ => bonds.suspects(displacement, chunk, least),
+    };
     let near: Vec<Vec<usize>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(near).collect();
     let mut near = near.concat();
     near.sort_unstable();

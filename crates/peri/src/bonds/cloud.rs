@@ -10,7 +10,7 @@ use super::{
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
-use crate::geometry::{Cut, severed};
+use crate::geometry::{Cut, cuts_within, severed};
 use crate::potential::{KernelFit, StretchRange};
 use rayon::prelude::*;
 
@@ -113,6 +113,7 @@ impl<const D: usize> CloudBonds<D> {
             .enumerate()
             .map(|(own, &here)| {
                 let mut list = Vec::new();
+                let cuts = cuts_within(cuts, here, reach);
                 let (mut twin, mut parted) = (None, false);
                 grid.near(here, reach, |other| {
                     let square: f64 = (0..D).map(|d| (sorted[other][d] - here[d]).powi(2)).sum();
@@ -120,7 +121,7 @@ impl<const D: usize> CloudBonds<D> {
                         twin = Some(other);
                     }
                     if other != own && square <= reach * reach {
-                        if severed(cuts, here, sorted[other]) {
+                        if severed(&cuts, here, sorted[other]) {
                             parted = true;
                         } else {
                             list.push(other as u32);

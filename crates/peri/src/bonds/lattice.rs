@@ -10,7 +10,7 @@ use super::{
 };
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
-use crate::geometry::{Cut, Lattice, severed};
+use crate::geometry::{Cut, Lattice, cuts_within, severed};
 use crate::potential::{KernelFit, StretchRange, TangentTable};
 use rayon::prelude::*;
 
@@ -258,9 +258,11 @@ impl<const D: usize> LatticeBonds<D> {
         let bits = |site: usize| -> Vec<u64> {
             let mut bits = vec![0_u64; words];
             let Some(cell) = self.cell_of(site).filter(|_| occupied[site]) else { return bits };
+            let here = self.position(site);
+            let cuts = cuts_within(cuts, here, self.horizon());
             for (k, offset) in self.stencil.offsets.iter().enumerate() {
                 let there = self.cell_at(cell, *offset).filter(|&there| occupied[there]);
-                if there.is_some_and(|there| !severed(cuts, self.position(site), self.position(there))) {
+                if there.is_some_and(|there| cuts.is_empty() || !severed(&cuts, here, self.position(there))) {
                     bits[k / 64] |= 1 << (k % 64);
                 }
             }
@@ -429,7 +431,20 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        let start = chunk_range(chunk, self.sites).start;
+        self.force_from(displacement, chunk_range(chunk, self.sites).start, force, track);
+    }
+
+    fn piece(&self) -> usize {
+        TILE
+    }
+
+    fn force_from(
+        &self,
+        displacement: &Field<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
         if let Some(kernel) = &self.kernel {
             kernel.run(&self.tiles(displacement), start, force, track);
         } else if let Some((fit, modulus)) = &self.table {

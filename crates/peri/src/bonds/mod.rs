@@ -126,6 +126,20 @@ pub trait Bonds<const D: usize>: Send + Sync {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     );
+    /// Sites that [`Bonds::force_from`] may begin with: multiples of this, of which a work item is one.
+    fn piece(&self) -> usize {
+        CHUNK
+    }
+    /// As [`Bonds::force`], of whole pieces from the site `start` on.
+    fn force_from(
+        &self,
+        displacement: &Field<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
+        self.force(displacement, start / CHUNK, force, track);
+    }
     /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are those of the body.
     fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange {
         let length = chunk_range(chunk, self.sites()).len();

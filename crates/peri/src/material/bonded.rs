@@ -138,6 +138,20 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         bonds.force(displacement, chunk, force, track);
     }
 
+    fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
+        bonds.piece()
+    }
+
+    fn force_from(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+    ) {
+        bonds.force_from(displacement, start, force, None);
+    }
+
     /// Σ_I V_I Σ_J w V_J kθ |ξ| φ.
     fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, observed: StretchRange) -> f64 {
         let (law, modulus) = (&*self.material.law, self.material.modulus);

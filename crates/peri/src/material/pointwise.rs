@@ -207,9 +207,11 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
         critical: &Property,
+        _seen: &[StretchRange],
     ) -> Vec<Overstretched> {
+        // passes may collect a bond's stretch in another work item than the one that looks for it here
         if self.material.least_rest() == 1.0 {
-            return overstretched(bonds, displacement, critical);
+            return overstretched(bonds, displacement, critical, &[]);
         }
         let of = |sites: &[u32]| {
             let mut found = Vec::new();

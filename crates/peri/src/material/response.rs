@@ -2,7 +2,7 @@
 
 use crate::bonds::{Bonds, Overstretched, Property, overstretched};
 use crate::error::Error;
-use crate::field::Field;
+use crate::field::{CHUNK, Field};
 use crate::potential::{BondPotential, StretchRange};
 
 /// Stretches over which a law is to be evaluated, and how.
@@ -67,6 +67,23 @@ pub trait Response<const D: usize>: Send + Sync {
         track: Option<&mut StretchRange>,
     );
 
+    /// Sites that [`Response::force_from`] may begin with, see [`Bonds::piece`].
+    fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
+        let _ = bonds;
+        CHUNK
+    }
+
+    /// Force densities, N/m³, of whole pieces from the site `start` on.
+    fn force_from(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+    ) {
+        self.force(bonds, displacement, start / CHUNK, force, None);
+    }
+
     /// Energy of the body, J; `observed` holds the stretches within which the law itself is to be taken.
     fn energy(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, observed: StretchRange) -> f64;
 
@@ -85,8 +102,9 @@ pub trait Response<const D: usize>: Send + Sync {
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
         critical: &Property,
+        seen: &[StretchRange],
     ) -> Vec<Overstretched> {
-        overstretched(bonds, displacement, critical)
+        overstretched(bonds, displacement, critical, seen)
     }
 
     /// Intact bonds of free particles that are stretched, and whose breaking would release more than `limit`, J/m³, with that

@@ -62,16 +62,8 @@ pub(super) fn severed<const D: usize>(
     // bonds as long as the horizon are bonds, whatever the rounding of positions
     let reach = bonds.horizon() * (1.0 + 1e-9);
     let count = |(index, cut): (usize, &Cut<D>)| {
-        let corners = cut.corners();
-        let near = |point: &[f64; D]| {
-            (0..D).all(|d| {
-                let low = corners.iter().map(|c| c[d]).fold(f64::INFINITY, f64::min) - reach;
-                let high = corners.iter().map(|c| c[d]).fold(f64::NEG_INFINITY, f64::max) + reach;
-                (low..=high).contains(&point[d])
-            })
-        };
         let places = bonds.particles().iter().map(|&site| bonds.position(site as usize));
-        let places: Vec<[f64; D]> = places.filter(near).collect();
+        let places: Vec<[f64; D]> = places.filter(|&place| cut.is_within(place, reach)).collect();
         let mut severed = 0;
         if !places.is_empty() {
             let grid = CellGrid::new(&places, reach);

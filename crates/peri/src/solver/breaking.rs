@@ -45,7 +45,8 @@ impl<const D: usize> System<'_, D> {
     pub(super) fn beyond(&mut self, state: &State<D>) -> Vec<Overstretched> {
         match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
             Some(Criterion::Stretch(stretch)) => {
-                self.material.overstretched(&*self.bonds, &state.displacement, stretch)
+                let seen = std::mem::take(&mut self.seen_stretches);
+                self.material.overstretched(&*self.bonds, &state.displacement, stretch, &seen)
             }
             Some(&Criterion::Energy(limit)) => {
                 self.overloaded(state, limit).into_iter().map(|(bond, _)| bond).collect()

@@ -7,7 +7,7 @@ use super::state::State;
 use crate::bonds::{Bonds, not_finite};
 use crate::contact::{Contact, Plane, Resting, Touching};
 use crate::error::Error;
-use crate::field::Field;
+use crate::field::{CHUNK, Field};
 use crate::material::{Material, Response};
 use crate::potential::StretchRange;
 use std::borrow::Cow;
@@ -32,6 +32,8 @@ pub struct System<'a, const D: usize> {
     pub fit_bound: f64,
     /// Repulsion of particles without a bond, or a look at how they overlap, where wanted.
     pub contact: Option<Contact<D>>,
+    /// Stretches of each work item, where they have just been looked at.
+    pub(super) seen_stretches: Vec<StretchRange>,
     /// What forces out of balance are measured by.
     pub(super) scale: Scale,
     /// The load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
@@ -75,6 +77,7 @@ impl<'a, const D: usize> System<'a, D> {
             stop_below: 0.0,
             fit_bound: 1e-9,
             contact: None,
+            seen_stretches: Vec::new(),
             scale: Scale::default(),
             course: None,
             observer: None,
@@ -178,6 +181,19 @@ impl<'a, const D: usize> System<'a, D> {
         if let Some(contact) = self.repulsion() {
             contact.force(displacement, chunk, force);
         }
+    }
+
+    /// Sites that [`Self::force_from`] may begin with: multiples of this.
+    pub(super) fn piece(&self) -> usize {
+        if self.repulsion().is_some() { CHUNK } else { self.material.piece(&*self.bonds) }
+    }
+
+    /// As [`Self::internal_force`], of whole pieces from the site `start` on.
+    pub(super) fn force_from(&self, displacement: &Field<D>, start: usize, force: &mut [&mut [f64]; D]) {
+        if self.repulsion().is_some() {
+            return self.internal_force(displacement, start / CHUNK, force, None);
+        }
+        self.material.force_from(&*self.bonds, displacement, start, force);
     }
 
     /// Energy of the material, whose law is taken over the stretches `observed`, and of contact, J.

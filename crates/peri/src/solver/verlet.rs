@@ -12,9 +12,7 @@ use super::state::{Record, State, Status, Watch};
 use super::system::System;
 use super::time_step::{BondSums, critical, largest_frequency_squared};
 use super::verlet_friction::{friction_pass, plane_pass};
-use super::verlet_step::{
-    Sums, VerletStep, chunks_of, force_pass, kick_pass, leap_pass, refresh, stored, volumes,
-};
+use super::verlet_step::{Sums, VerletStep, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
 use crate::bonds::{StretchRange, stretch_range};
 use crate::contact::Contact;
 use crate::error::Error;
@@ -352,7 +350,7 @@ impl VelocityVerlet {
     ) {
         if system.is_overstretched(observed) {
             let sites = system.break_bonds(state);
-            refresh(system, state, factor, Some(&chunks_of(&sites)));
+            refresh(system, state, factor, Some(&sites));
         }
     }
 

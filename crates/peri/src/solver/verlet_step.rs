@@ -98,24 +98,25 @@ pub fn leap_pass<const D: usize>(
 /// New forces and, where it `kicks`, the second half of the kick in the same pass: unless stretches are looked at first, or
 /// friction follows.
 pub fn force_pass<const D: usize>(
-    system: &System<D>,
+    system: &mut System<D>,
     state: &mut State<D>,
     volumes: &[f64],
     leap: &VerletStep,
     look: bool,
     kicks: bool,
 ) -> (Sums, StretchRange) {
-    let loads = &*system.loads;
-    let displacement = &state.displacement;
+    let (loads, displacement, body) = (&*system.loads, &state.displacement, &*system);
     let (force, velocity) = (state.force.chunks_mut(), state.velocity.chunks_mut());
     let of = |(chunk, (mut f, mut v)): (usize, Two<D>)| {
         let mut observed = StretchRange::REST;
-        system.internal_force(displacement, chunk, &mut f, look.then_some(&mut observed));
-        load(loads, chunk, volumes.len(), leap.factors[1], &mut f);
+        body.internal_force(displacement, chunk, &mut f, look.then_some(&mut observed));
+        load(loads, chunk * CHUNK, leap.factors[1], &mut f);
         let f = f.map(|f| &*f);
         (if kicks { kick(loads, volumes, leap, chunk, f, &mut v) } else { Sums::default() }, observed)
     };
     let parts: Vec<_> = force.into_par_iter().zip(velocity).enumerate().map(of).collect();
+    system.seen_stretches.clear();
+    system.seen_stretches.extend(parts.iter().filter(|_| look).map(|part| part.1));
     parts.into_iter().fold((Sums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
         (sums.add(s), observed.join(m))
     })
@@ -138,45 +139,51 @@ pub fn kick_pass<const D: usize>(
     parts.into_iter().fold(Sums::default(), Sums::add)
 }
 
-/// Forces with loads, and the friction there is, of some work items, or of all; bonds outside of these have not changed.
+/// Forces with loads, and the friction there is, of some sites and those they are computed with, or of all; bonds of others
+/// have not changed.
 pub fn refresh<const D: usize>(
     system: &mut System<D>,
     state: &mut State<D>,
     factor: f64,
-    chunks: Option<&[usize]>,
+    sites: Option<&[u32]>,
 ) {
     system.prepare(&state.displacement);
     // states of particles carry what has changed beyond their bonds
-    let chunks = chunks.filter(|_| !system.material.has_points());
+    let sites = sites.filter(|_| !system.material.has_points());
     let system = &*system;
-    let (loads, displacement, friction) = (&*system.loads, &state.displacement, state.friction.as_ref());
-    let sites = displacement.sites();
-    state.force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut f)| {
-        if chunks.is_none_or(|list| list.binary_search(&chunk).is_ok()) {
-            system.internal_force(displacement, chunk, &mut f, None);
-            load(loads, chunk, sites, factor, &mut f);
-            if let Some(friction) = friction {
-                for (f, rub) in f.iter_mut().zip(friction.components()) {
-                    f.iter_mut().zip(&rub[chunk_range(chunk, sites)]).for_each(|(f, rub)| *f += rub);
-                }
+    let piece = if sites.is_some() { system.piece() } else { CHUNK };
+    let pieces = sites.map(|sites| {
+        let mut pieces: Vec<usize> = sites.iter().map(|&site| site as usize / piece).collect();
+        pieces.sort_unstable();
+        pieces.dedup();
+        pieces
+    });
+    let (displacement, friction) = (&state.displacement, state.friction.as_ref());
+    let of = |start: usize, mut f: [&mut [f64]; D]| {
+        system.force_from(displacement, start, &mut f);
+        load(&system.loads, start, factor, &mut f);
+        if let Some(friction) = friction {
+            for (f, rub) in f.iter_mut().zip(friction.components()) {
+                f.iter_mut().zip(&rub[start..]).for_each(|(f, rub)| *f += rub);
             }
+        }
+    };
+    state.force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut f)| {
+        let (first, length) = (chunk * CHUNK, f[0].len());
+        let Some(pieces) = &pieces else { return of(first, f) };
+        let [from, to] = [first, first + length].map(|site| pieces.partition_point(|&p| p * piece < site));
+        for start in pieces[from..to].iter().map(|p| p * piece - first) {
+            let end = (start + piece).min(length);
+            of(first + start, f.each_mut().map(|f| &mut f[start..end]));
         }
     });
 }
 
-/// Adds the body forces.
-fn load<const D: usize>(
-    loads: &Loads<D>,
-    chunk: usize,
-    sites: usize,
-    factor: f64,
-    force: &mut [&mut [f64]; D],
-) {
+/// Adds the body forces of the sites from `start` on.
+fn load<const D: usize>(loads: &Loads<D>, start: usize, factor: f64, force: &mut [&mut [f64]; D]) {
     let Some(body) = &loads.body_force else { return };
-    for d in 0..D {
-        for (f, b) in force[d].iter_mut().zip(&body.components()[d][chunk_range(chunk, sites)]) {
-            *f += factor * b;
-        }
+    for (force, body) in force.iter_mut().zip(body.components()) {
+        force.iter_mut().zip(&body[start..]).for_each(|(f, b)| *f += factor * b);
     }
 }
 
@@ -293,14 +300,6 @@ fn free_kick(v: &mut [f64], f: &[f64], volumes: &[f64], push: f64) -> f64 {
         }
     }
     square.iter().sum()
-}
-
-/// Sites of the work items that hold some particles, ascending.
-pub fn chunks_of(sites: &[u32]) -> Vec<usize> {
-    let mut chunks: Vec<usize> = sites.iter().map(|&site| site as usize / CHUNK).collect();
-    chunks.sort_unstable();
-    chunks.dedup();
-    chunks
 }
 
 /// The energy of material and contact, J; over all stretches that are fitted, so that the law is sampled once a fit.
