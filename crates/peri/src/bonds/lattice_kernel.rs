@@ -105,11 +105,24 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_,
                 for d in 0..D {
                     out[d] = force[d][offset + sub..].as_mut_ptr();
                 }
+                let bonded = |from: usize| {
+                    self.tiles.intact.iter().any(|w| w[from..from + lanes].iter().any(|&bits| bits != 0))
+                };
                 // SAFETY: see above; `out` has at least `step` elements left in its tile.
                 unsafe {
                     match (class == Class::Full, pair) {
                         (true, true) => self.full::<S, 2>(simd, base + sub, out, tracking, &mut seen),
                         (true, false) => self.full::<S, 1>(simd, base + sub, out, tracking, &mut seen),
+                        // at the end of a row: one vector
+                        (false, true) if !bonded(base + sub) => {
+                            let second = out.map(|out| out.add(lanes));
+                            out.iter().for_each(|out| out.write_bytes(0, lanes));
+                            self.partial::<S, 1>(simd, base + sub + lanes, second, tracking, &mut seen);
+                        }
+                        (false, true) if !bonded(base + sub + lanes) => {
+                            self.partial::<S, 1>(simd, base + sub, out, tracking, &mut seen);
+                            out.iter().for_each(|out| out.add(lanes).write_bytes(0, lanes));
+                        }
                         (false, true) => self.partial::<S, 2>(simd, base + sub, out, tracking, &mut seen),
                         (false, false) => self.partial::<S, 1>(simd, base + sub, out, tracking, &mut seen),
                     }
