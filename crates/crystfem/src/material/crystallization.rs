@@ -4,13 +4,13 @@ use crate::kinetics::{Extent, Kinetics, PANELS, Panels};
 use crate::melting::Melting;
 
 /// Panels of (T∞, T₀) on heating, where growth and melting alternate; PA12: 1.35 K.
-const HEATING_PANELS: usize = 4 * PANELS;
+pub(super) const HEATING_PANELS: usize = 4 * PANELS;
 
 /// A melting below this part of the crystals is none.
-const NOTHING: f64 = -1e-17;
+pub(super) const NOTHING: f64 = -1e-17;
 
 /// Fewer crystals are none: quotients of smaller numbers overflow.
-const FAINT: f64 = 1e-280;
+pub(super) const FAINT: f64 = 1e-280;
 
 /// Kinetics and melting together: dz/dt = K(T) at every temperature, and on heating α falls in proportion to
 /// 1 − X_m(T).
@@ -66,7 +66,7 @@ impl Crystallization {
     }
 
     /// α ← α e^L. Near α = 1 through 1 − α, so that no digit is lost on the way there and back.
-    fn melt(&self, grown: Grown, logarithm: f64, slope: f64) -> Grown {
+    pub(super) fn melt(&self, grown: Grown, logarithm: f64, slope: f64) -> Grown {
         let kinetics = &self.kinetics;
         let Grown { z, slope: z_slope } = grown;
         if z == 0.0 || logarithm > NOTHING {
