@@ -26,6 +26,9 @@ impl Kinetics {
     /// The borders of the panels are fixed temperatures, so that Δz is a continuous function of the end.
     pub fn growth(&self, start: f64, end: f64, dt: f64) -> Growth {
         let mut sum = Growth::default();
+        if dt == 0.0 {
+            return sum;
+        }
         for panel in Panels::new(self, start, end, PANELS) {
             let growth = self.growth_over(&panel, dt);
             sum.z = (sum.z + growth.z).min(LARGEST_Z);
