@@ -36,8 +36,9 @@ impl Simulation {
         let mut sums = [0.0; 2];
         for point in nodal.of(equation) {
             if let Some(value) = self.value(name, points, nodal.stride, point, nodal.material[point]) {
-                sums[0] += nodal.mass[point] * value;
-                sums[1] += nodal.mass[point];
+                let mass = self.system.mass(&self.problem, &self.state.born, equation, point);
+                sums[0] += mass * value;
+                sums[1] += mass;
             }
         }
         sums

@@ -156,11 +156,11 @@ impl Simulation {
         let (problem, system) = (&self.problem, &self.system);
         let Memory { nodal, general } = &mut state.memory;
         let birth_of = |birth: u32| problem.births[birth as usize - 1].temperature;
-        nodal.go(&added.nodal, system.nodal.stride, |nodal, point| {
+        nodal.go(&added.nodal, system.nodal.stride, system.nodal.energies, |nodal, point| {
             let (birth, material) = (system.nodal.birth[point], system.nodal.material[point]);
             nodal.fresh(problem, usize::from(material), system.nodal.stride, point, birth_of(birth));
         });
-        general.go(&added.general, system.general.stride, |general, point| {
+        general.go(&added.general, system.general.stride, true, |general, point| {
             let index = system.general.starts.partition_point(|&first| first as usize <= point) - 1;
             let number = system.general.elements[index] as usize;
             let material = usize::from(problem.material_of[number]);
@@ -188,10 +188,12 @@ impl Simulation {
                 let points = if part.general { &mut state.memory.general } else { &mut state.memory.nodal };
                 let stride = part.state.len();
                 points.state[part.point * stride..(part.point + 1) * stride].copy_from_slice(&part.state);
-                let before = points.energy[part.point];
-                points.energy[part.point] = part.energy;
-                change += part.mass * if part.old { part.energy - before } else { part.energy };
-                new_heat += if part.old { 0.0 } else { part.mass * before };
+                // that of others is in `sum`
+                if part.mass > 0.0 {
+                    let before = std::mem::replace(&mut points.energy[part.point], part.energy);
+                    change += part.mass * if part.old { part.energy - before } else { part.energy };
+                    new_heat += if part.old { 0.0 } else { part.mass * before };
+                }
             }
             stored += change;
             brought += new_heat;
@@ -211,7 +213,7 @@ impl Simulation {
             material: 0,
             mass: 0.0,
             temperature: old,
-            energy: points.energy[point],
+            energy: points.energy.get(point).copied().unwrap_or(0.0),
             state: points.state[point * stride..(point + 1) * stride].to_vec(),
             general: false,
             point,
@@ -317,13 +319,15 @@ impl Part {
 impl Memory {
     /// Room for the points of a system.
     pub(crate) fn empty(system: &System) -> Self {
-        let room = |points: usize, stride: usize| Points {
+        let room = |points: usize, stride: usize, energies: usize| Points {
             state: vec![0.0; points * stride],
-            energy: vec![0.0; points],
+            energy: vec![0.0; energies],
         };
+        let nodal = system.nodal.material.len();
+        let general = system.general.points();
         Self {
-            nodal: room(system.nodal.material.len(), system.nodal.stride),
-            general: room(system.general.points(), system.general.stride),
+            nodal: room(nodal, system.nodal.stride, if system.nodal.energies { nodal } else { 0 }),
+            general: room(general, system.general.stride, general),
         }
     }
 }
@@ -341,22 +345,24 @@ impl Points {
         let material = &problem.materials[material];
         let state = &mut self.state[point * stride..][..material.state_names().len()];
         material.initial_state(temperature, state);
-        self.energy[point] = material.energy(temperature, state);
+        if let Some(energy) = self.energy.get_mut(point) {
+            *energy = material.energy(temperature, state);
+        }
     }
 
-    /// Moves points; `fresh` makes the new ones.
-    fn go(&mut self, moves: &Moves, stride: usize, fresh: impl Fn(&mut Self, usize)) {
-        let (state, energy) =
-            (self.state.split_off(moves.first * stride), self.energy.split_off(moves.first));
+    /// Moves points, with their energies or without; `fresh` makes the new ones.
+    fn go(&mut self, moves: &Moves, stride: usize, energies: bool, fresh: impl Fn(&mut Self, usize)) {
+        let state = self.state.split_off(moves.first * stride);
+        let energy = if energies { self.energy.split_off(moves.first) } else { Vec::new() };
         for (point, &from) in (moves.first..).zip(&moves.from) {
             match (from as usize).checked_sub(moves.first).filter(|_| from != NONE) {
                 Some(from) => {
                     self.state.extend_from_slice(&state[from * stride..(from + 1) * stride]);
-                    self.energy.push(energy[from]);
+                    self.energy.extend(energy.get(from));
                 }
                 None => {
                     self.state.resize((point + 1) * stride, 0.0);
-                    self.energy.push(0.0);
+                    self.energy.resize(if energies { point + 1 } else { 0 }, 0.0);
                     fresh(self, point);
                 }
             }

@@ -32,6 +32,7 @@
 
 pub mod boundary;
 mod element;
+mod elementary;
 pub mod error;
 pub mod exact;
 mod fields;

@@ -1,5 +1,6 @@
 //! Melting: the degree of melting X_m(T) of Richards' curve, and the survival of crystals on heating.
 
+use crate::elementary::{exp, expm1_near, ln, ln_1p};
 use crate::error::Error;
 
 /// Richards' curve, the distribution of melting temperatures. Eq. (4.8) integrates in closed form to
@@ -66,6 +67,20 @@ impl Melting {
         [logarithm, slope * (-depth).exp() / survivors]
     }
 
+    /// [`Self::survival`] without branches and slope, for loops of vectors.
+    #[inline(always)]
+    pub(crate) fn survival_of_all(&self, temperature: f64) -> f64 {
+        let power = self.shape - 1.0;
+        let beyond = self.sharpness * (temperature - self.peak);
+        let exponent = ln(power) - beyond;
+        let depth = (exponent.max(0.0) + ln_1p(exp(-exponent.abs()))) / power;
+        let little = depth < std::f64::consts::LN_2;
+        let solid = ln_1p(-exp(-depth).min(0.5));
+        let molten = ln(-expm1_near((-depth).max(-0.7)));
+        let logarithm = if little { molten } else { solid };
+        if beyond > 600.0 { -beyond } else { logarithm }
+    }
+
     /// −ln X_m = ln(1 + (d−1) e^{−k_m(T−T_p)})/(d−1) and its derivative in T.
     fn depth(&self, temperature: f64) -> [f64; 2] {
         let power = self.shape - 1.0;
@@ -107,6 +122,7 @@ mod tests {
             let printed = k * e * (1.0 + (d - 1.0) * e).powf(d / (1.0 - d));
             assert!((pa12.molten_slope(temperature) / printed - 1.0).abs() < 1e-12, "{temperature}");
             let [log, slope] = pa12.survival(temperature);
+            assert!((pa12.survival_of_all(temperature) / log - 1.0).abs() < 1e-14);
             assert!((log.exp() + pa12.molten(temperature) - 1.0).abs() < 1e-15);
             assert!((slope + printed / (1.0 - pa12.molten(temperature))).abs() < 1e-9 * slope.abs());
         }
@@ -123,6 +139,8 @@ mod tests {
                 log.is_finite() && slope.is_finite() && log <= before && slope <= 0.0,
                 "{step} {log} {slope}"
             );
+            let own = pa12.survival_of_all(f64::from(step) * 0.5);
+            assert!((own - log).abs() <= 1e-13 * log.abs(), "{step} {own:e} {log:e}");
             before = log;
         }
         let [log, slope] = pa12.survival(1e6);

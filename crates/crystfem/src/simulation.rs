@@ -8,11 +8,11 @@ use crate::ledger::{Ledger, Record};
 use crate::problem::Problem;
 use crate::solver::Task;
 pub use crate::solver::{Choice, LinearSolver, Method};
-use crate::system::vector::largest;
 use crate::system::{Behaviour, Exchange, NONE, System};
 pub use crate::system::{Memory, Points};
 use crate::time::{Scheme, Stepper, Steps, Work};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// How a problem is solved.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -104,7 +104,7 @@ pub struct State {
 
 /// A problem being solved.
 pub struct Simulation {
-    pub(crate) problem: Problem,
+    pub(crate) problem: Arc<Problem>,
     pub(crate) settings: Settings,
     pub(crate) behaviours: Vec<Behaviour>,
     pub(crate) system: System,
@@ -114,11 +114,15 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// At time 0, with what exists then.
+    /// At time 0, with what exists then. A problem that others use too is shared by an [`Arc`].
     ///
     /// # Errors
     /// Those of [`Problem::check`] and of the materials.
-    pub fn new(problem: Problem, settings: Settings) -> Result<Self, Error> {
+    pub fn new(problem: impl Into<Arc<Problem>>, settings: Settings) -> Result<Self, Error> {
+        Self::begin(problem.into(), settings)
+    }
+
+    fn begin(problem: Arc<Problem>, settings: Settings) -> Result<Self, Error> {
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
         let mut state = State { born: vec![0; problem.material_of.len()], jump: true, ..State::default() };
         let later = problem.births.iter().flat_map(|birth| &birth.elements);
@@ -149,7 +153,11 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::new`]; [`Error::Mesh`] where the state does not belong to the problem.
-    pub fn resume(problem: Problem, settings: Settings, state: State) -> Result<Self, Error> {
+    pub fn resume(problem: impl Into<Arc<Problem>>, settings: Settings, state: State) -> Result<Self, Error> {
+        Self::go_on(problem.into(), settings, state)
+    }
+
+    fn go_on(problem: Arc<Problem>, settings: Settings, state: State) -> Result<Self, Error> {
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
         if state.born.len() != problem.material_of.len() {
             return Err(Error::Mesh(format!(
@@ -165,7 +173,8 @@ impl Simulation {
         if state.temperature.len() != size
             || !fits(&state.slope)
             || !fits(&state.rate)
-            || memory.nodal.energy.len() != system.nodal.material.len()
+            || memory.nodal.energy.len()
+                != if system.nodal.energies { system.nodal.material.len() } else { 0 }
             || memory.nodal.state.len() != system.nodal.material.len() * system.nodal.stride
             || memory.general.energy.len() != system.general.points()
             || memory.general.state.len() != system.general.points() * system.general.stride
@@ -173,7 +182,7 @@ impl Simulation {
             return Err(Error::Mesh(format!(
                 "state: found {} temperatures and {} + {} points; allowed: {size} and {} + {} of this problem",
                 state.temperature.len(),
-                memory.nodal.energy.len(),
+                memory.nodal.state.len() / system.nodal.stride.max(1),
                 memory.general.energy.len(),
                 system.nodal.material.len(),
                 system.general.points()
@@ -310,7 +319,6 @@ impl Simulation {
         let span = next.map_or(until, |next| next.min(until)) - self.state.time;
         // A_ii of backward Euler over the capacity
         let capacity = |k: usize| self.system.capacity[k];
-        let conduction = self.system.rows.diagonal([0.0, dt]);
         let size = self.system.size();
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for &node in &self.system.nodes {
@@ -322,8 +330,8 @@ impl Simulation {
         let extent = [0, 1, 2].map(|d| (high[d] - low[d]).max(0.0));
         let longest = extent.into_iter().fold(0.0, f64::max);
         let spacing = (extent.iter().product::<f64>() / size as f64).cbrt().max(1e-6 * longest);
-        let stiffness = largest(size, |k| match capacity(k) > 0.0 {
-            true => 1.0 + conduction[k] / capacity(k),
+        let stiffness = self.system.rows.largest(|k, conduction| match capacity(k) > 0.0 {
+            true => 1.0 + dt * conduction / capacity(k),
             false => 1.0,
         });
         Task {

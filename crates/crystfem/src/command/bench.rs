@@ -9,6 +9,7 @@ mod cube;
 mod integrators;
 mod kinetics;
 mod material;
+mod print;
 mod solvers;
 
 /// Timings, of which the median counts.
@@ -48,6 +49,8 @@ enum What {
     },
     /// Seconds per step, iterations and memory of a brick with film and radiation, 20 steps of 0.5 s.
     Brick(brick::Options),
+    /// Seconds of a birth with its step, iterations and memory of a block that is printed in short pieces of line.
+    Print(print::Options),
 }
 
 fn elements(text: &str) -> Result<usize, String> {
@@ -66,6 +69,7 @@ impl Bench {
             What::Integrators { elements } => integrators::measure(elements)?,
             What::Solvers { elements } => solvers::measure(elements)?,
             What::Brick(options) => brick::measure(&options)?,
+            What::Print(options) => print::measure(&options)?,
         };
         print_measurements(&rows, self.json);
         Ok(true)

@@ -1,6 +1,7 @@
 //! The increment Δz = ∫K(T(t)) dt of a temperature that runs linearly in time, with its derivative.
 
-use super::{Kinetics, LARGEST_Z};
+use super::{Constants, Kinetics, LARGEST_Z};
+use crate::elementary::exp;
 
 /// Panels into which (T∞, T₀) is divided; an increment is integrated panel by panel. The error in α of one panel
 /// of PA12 (5.4 K) is about 1e-5 at worst, and of steps of 1 K 3e-8.
@@ -25,6 +26,9 @@ impl Kinetics {
     /// The borders of the panels are fixed temperatures, so that Δz is a continuous function of the end.
     pub fn growth(&self, start: f64, end: f64, dt: f64) -> Growth {
         let mut sum = Growth::default();
+        if dt == 0.0 {
+            return sum;
+        }
         for panel in Panels::new(self, start, end, PANELS) {
             let growth = self.growth_over(&panel, dt);
             sum.z = (sum.z + growth.z).min(LARGEST_Z);
@@ -51,6 +55,67 @@ impl Kinetics {
     }
 }
 
+impl Kinetics {
+    /// Δz of increments that lie each within one of `count` panels; NaN for the others, and for what is not finite.
+    ///
+    /// To inline into functions that `pulp` dispatches: the loop is one of vectors.
+    #[inline(always)]
+    pub(crate) fn growth_of_all(
+        &self,
+        start: &[f64],
+        end: &[f64],
+        dt: f64,
+        counts: [f64; 2],
+        growth: &mut [f64],
+    ) {
+        let (low, high) = (self.constants.frozen, self.constants.equilibrium_melting);
+        let size = growth.len();
+        let (start, end) = (&start[..size], &end[..size]);
+        for k in 0..size {
+            let change = end[k] - start[k];
+            // on heating, or else
+            let count = if change > 0.0 { counts[1] } else { counts[0] };
+            let width = (high - low) / count;
+            let whole = change.abs() <= WHOLE * width;
+            let single = whole || panel(start[k], low, width, count) == panel(end[k], low, width, count);
+            let (middle, reach) = (0.5 * (start[k] + end[k]), 0.5 * change * NODE);
+            let sum = self.rate_of_all(middle - reach) + self.rate_of_all(middle + reach);
+            let inside = whole || (middle > low && middle < high);
+            let own = if inside { 0.5 * dt * sum } else { 0.0 };
+            growth[k] = if single && change.abs() < f64::INFINITY { own.min(LARGEST_Z) } else { f64::NAN };
+        }
+    }
+
+    /// Δz in a second, of increments that each lie within one panel.
+    #[inline(always)]
+    pub(crate) fn growth_of_pieces(&self, start: &[f64], end: &[f64], growth: &mut [f64]) {
+        let size = growth.len();
+        let (start, end) = (&start[..size], &end[..size]);
+        for k in 0..size {
+            let (middle, reach) = (0.5 * (start[k] + end[k]), 0.5 * (end[k] - start[k]) * NODE);
+            growth[k] = 0.5 * (self.rate_of_all(middle - reach) + self.rate_of_all(middle + reach));
+        }
+    }
+
+    /// [`Self::rate`] without branches.
+    #[inline(always)]
+    fn rate_of_all(&self, temperature: f64) -> f64 {
+        let Constants { nucleation, equilibrium_melting, frozen, .. } = self.constants;
+        let (above, below) = (temperature - frozen, equilibrium_melting - temperature);
+        let barrier = 2.0 * temperature * temperature * below;
+        let exponent = nucleation * (temperature + equilibrium_melting) * above;
+        let exponent = self.activation.mul_add(barrier, exponent) / (above * barrier);
+        let rate = self.prefactor * exp(-exponent);
+        if above > 0.0 && below > 0.0 { rate } else { 0.0 }
+    }
+}
+
+/// Number of the panel of a temperature; those below and above all are one each.
+#[inline(always)]
+fn panel(temperature: f64, low: f64, width: f64, count: f64) -> f64 {
+    ((temperature - low) / width).max(-1.0).min(count).floor()
+}
+
 /// 1/√3, the node of Gauss' rule of two points on \[−1, 1\].
 const NODE: f64 = 0.577_350_269_189_625_8;
 
@@ -69,6 +134,13 @@ pub struct Panel {
     share: f64,
     /// ∂share/∂T_end, 1/K.
     share_slope: f64,
+}
+
+impl Panel {
+    /// Its part of the time.
+    pub(crate) fn share(&self) -> f64 {
+        if self.inside { self.share } else { 0.0 }
+    }
 }
 
 /// The panels of an increment, in the order in which they are passed.

@@ -59,7 +59,7 @@ impl Conductor {
 
     /// The response without any state.
     pub(super) fn conduct(&self, at: &Point) -> Result<Response, Error> {
-        let temperature = checked(at)?;
+        let temperature = at.check()?;
         let [conductivity, slope] = self.conductivity.with_slope(temperature);
         let gradient = self.directions.component_mul(&at.gradient);
         Ok(Response {
@@ -73,21 +73,26 @@ impl Conductor {
     }
 }
 
-/// The temperature at the end of an increment, where the increment is one.
-pub(super) fn checked(at: &Point) -> Result<f64, Error> {
-    let end = at.temperature + at.increment;
-    let refuse =
-        |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
-    if !at.temperature.is_finite() {
-        return refuse("temperature, K", at.temperature, "a finite number");
+impl Point {
+    /// The temperature at the end of the increment, K, where it is one.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for temperatures that are not finite and a Δt that is not finite or below 0.
+    pub(crate) fn check(&self) -> Result<f64, Error> {
+        let end = self.temperature + self.increment;
+        let refuse =
+            |name, found, allowed: &str| Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
+        if !self.temperature.is_finite() {
+            return refuse("temperature, K", self.temperature, "a finite number");
+        }
+        if !end.is_finite() {
+            return refuse("increment of temperature, K", self.increment, "a finite number");
+        }
+        if !(self.dt >= 0.0 && self.dt.is_finite()) {
+            return refuse("time increment, s", self.dt, "0 or above, finite");
+        }
+        Ok(end)
     }
-    if !end.is_finite() {
-        return refuse("increment of temperature, K", at.increment, "a finite number");
-    }
-    if !(at.dt >= 0.0 && at.dt.is_finite()) {
-        return refuse("time increment, s", at.dt, "0 or above, finite");
-    }
-    Ok(end)
 }
 
 impl ThermalMaterial for Conductor {

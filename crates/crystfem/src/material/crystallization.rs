@@ -4,13 +4,13 @@ use crate::kinetics::{Extent, Kinetics, PANELS, Panels};
 use crate::melting::Melting;
 
 /// Panels of (T∞, T₀) on heating, where growth and melting alternate; PA12: 1.35 K.
-const HEATING_PANELS: usize = 4 * PANELS;
+pub(super) const HEATING_PANELS: usize = 4 * PANELS;
 
 /// A melting below this part of the crystals is none.
-const NOTHING: f64 = -1e-17;
+pub(super) const NOTHING: f64 = -1e-17;
 
 /// Fewer crystals are none: quotients of smaller numbers overflow.
-const FAINT: f64 = 1e-280;
+pub(super) const FAINT: f64 = 1e-280;
 
 /// Kinetics and melting together: dz/dt = K(T) at every temperature, and on heating α falls in proportion to
 /// 1 − X_m(T).
@@ -52,7 +52,9 @@ impl Crystallization {
             return grown;
         }
         let [mut before, _] = melting.survival(start);
-        for panel in Panels::new(kinetics, start, end, HEATING_PANELS) {
+        // in a jump nothing grows, and what melts is the product of all parts
+        let panels = if dt == 0.0 { 1 } else { HEATING_PANELS };
+        for panel in Panels::new(kinetics, start, end, panels) {
             let growth = kinetics.growth_over(&panel, dt);
             grown.z += 0.5 * growth.z;
             grown.slope += 0.5 * growth.slope;
@@ -66,7 +68,7 @@ impl Crystallization {
     }
 
     /// α ← α e^L. Near α = 1 through 1 − α, so that no digit is lost on the way there and back.
-    fn melt(&self, grown: Grown, logarithm: f64, slope: f64) -> Grown {
+    pub(super) fn melt(&self, grown: Grown, logarithm: f64, slope: f64) -> Grown {
         let kinetics = &self.kinetics;
         let Grown { z, slope: z_slope } = grown;
         if z == 0.0 || logarithm > NOTHING {
@@ -85,5 +87,31 @@ impl Crystallization {
         let change = kinetics.logarithmic_slope_of(z, &before) * z_slope + slope;
         let sensitivity = kinetics.logarithmic_slope_of(z_after, &after);
         Grown { z: z_after, slope: if sensitivity > 0.0 { change / sensitivity } else { 0.0 } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kinetics::Constants;
+
+    /// A jump to a temperature passes all those before it.
+    #[test]
+    fn jumps_follow_each_other() {
+        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+        let law = Crystallization { kinetics, melting: Some(Melting::PA12) };
+        for z in [1e-6, 0.3, 1.2, 3.0] {
+            let to = |z: f64, start: f64, end: f64| law.advance(z, start, end, 0.0).z;
+            for end in [350.0, 430.0, 451.0, 465.0, 480.0] {
+                let parts = (0..100).fold(z, |z, k| {
+                    let at = |k: i32| 300.0 + 0.01 * f64::from(k) * (end - 300.0);
+                    to(z, at(k), at(k + 1))
+                });
+                let whole = to(z, 300.0, end);
+                // a hundred roundings of L, times the slope of ln z, below 1e3 where 1 − α = 5e-9
+                assert!((parts - whole).abs() <= 1e-11 * whole, "{z} {end}: {parts:e} {whole:e}");
+            }
+            assert_eq!(to(z, 480.0, 300.0), z);
+        }
     }
 }

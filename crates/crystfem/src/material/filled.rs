@@ -1,6 +1,6 @@
 //! A material that fills a part of its elements.
 
-use super::{Point, Response, ThermalMaterial};
+use super::{Crystallization, Point, Response, ThermalMaterial};
 use crate::error::Error;
 use std::sync::Arc;
 
@@ -66,6 +66,10 @@ impl ThermalMaterial for Filled {
 
     fn potential(&self, temperature: f64) -> Option<[f64; 2]> {
         self.of.potential(temperature).map(|pair| pair.map(|x| self.fill * x))
+    }
+
+    fn crystals(&self) -> Option<&Crystallization> {
+        self.of.crystals()
     }
 
     fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {

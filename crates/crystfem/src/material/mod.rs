@@ -7,6 +7,7 @@ mod crystallization;
 mod filled;
 mod powder;
 mod property;
+mod rows;
 mod semicrystalline;
 
 pub use as_published::{AsPublished, Sign};
@@ -15,6 +16,7 @@ pub use crystallization::{Crystallization, Grown};
 pub use filled::Filled;
 pub use powder::Powder;
 pub use property::{Property, REFERENCE_TEMPERATURE, Table};
+pub(crate) use rows::{Increments, Scratch};
 pub use semicrystalline::{LARGEST_CHANGE, Polymer, Semicrystalline};
 
 use crate::error::Error;
@@ -84,6 +86,11 @@ pub trait ThermalMaterial: Send + Sync {
     /// of elements must follow from θ at their nodes, f = −D ∇θ (see [`Property::jumps`]); `None`: f is that of
     /// [`Self::respond`].
     fn potential(&self, _temperature: f64) -> Option<[f64; 2]> {
+        None
+    }
+    /// The law by which the state evolves, where the state is its z alone: points of one law and one temperature history then share their
+    /// growth. `None`: only [`Self::respond`] knows.
+    fn crystals(&self) -> Option<&Crystallization> {
         None
     }
     /// The response to an increment; `new` is the state at its end.

@@ -8,7 +8,7 @@ use crate::melting::Melting;
 /// A change of α in one increment at which the suggested step is the one taken.
 pub const LARGEST_CHANGE: f64 = 0.1;
 /// The largest suggested step over the one taken.
-const LONGEST: f64 = 10.0;
+pub(super) const LONGEST: f64 = 10.0;
 
 /// What makes up a [`Semicrystalline`] material, SI.
 #[derive(Clone, Debug, PartialEq)]
@@ -152,6 +152,10 @@ impl ThermalMaterial for Semicrystalline {
 
     fn potential(&self, temperature: f64) -> Option<[f64; 2]> {
         self.conductor.heat_potential(temperature)
+    }
+
+    fn crystals(&self) -> Option<&Crystallization> {
+        Some(&self.crystallization)
     }
 
     fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {

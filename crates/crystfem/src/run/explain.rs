@@ -23,7 +23,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     let task = scene.task(source, built)?;
     lines.extend(task.notes.iter().map(|note| format!("note       {note}")));
     let quantities = scene.quantities(&task);
-    let mut problem = task.problem;
+    let mut problem = std::sync::Arc::unwrap_or_clone(task.problem);
     let births = problem.births.len();
     if births > 0 {
         lines.push(format!(

@@ -42,7 +42,7 @@ pub fn solve(
 fn trial(job: &PartFit, constants: &Constants) -> Result<Vec<[f64; 2]>, Failure> {
     let scene = job.with(constants);
     let task = scene.task(&job.source, scene.mesh.build(&job.source)?)?;
-    let mut simulation = Simulation::new(task.problem.clone(), task.settings)?;
+    let mut simulation = Simulation::new(std::sync::Arc::clone(&task.problem), task.settings)?;
     let names = simulation.field_names();
     let fields = names.len();
     let field = names.iter().position(|name| *name == "alpha").unwrap_or(0);

@@ -16,6 +16,7 @@ use polycore::output::vtkhdf::{Cells, Data, MeshSeries};
 use polycore::report::{Phases, Quantity, Report};
 use polycore::scene::Source;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// Fields written unless the scene says how often.
 const FRAMES: f64 = 50.0;
@@ -49,11 +50,11 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
         run.begin()?;
     }
     if let Some((written, state, rows, body, faces)) = run.reached::<Reached>()? {
-        simulation = Simulation::resume(task.problem.clone(), task.settings, state)?;
+        simulation = Simulation::resume(Arc::clone(&task.problem), task.settings, state)?;
         (frames, probes) = (written, rows);
         (stressed, healed) = (body.unwrap_or_default(), faces.unwrap_or_default());
     } else {
-        simulation = Simulation::new(task.problem.clone(), task.settings)?;
+        simulation = Simulation::new(Arc::clone(&task.problem), task.settings)?;
         scene.refuse_too_large(source, &simulation, task.mechanics.as_ref(), task.end)?;
         if !run.options.resume {
             run.begin()?;

@@ -15,9 +15,11 @@ const ALWAYS: f64 = 20e6;
 const PICTURES: f64 = 40e6;
 const STAGE: f64 = 12e6;
 /// A node: its place, equation, a dozen vectors of a step and its solver, a checkpoint; an element: its nodes, its sets,
-/// outer faces while they are sought.
-const NODE: f64 = 350.0;
-const ELEMENT: f64 = 150.0;
+/// outer faces while they are sought. The mesh is there once.
+const NODE: f64 = 290.0;
+const ELEMENT: f64 = 115.0;
+/// A node with adaptive steps: rates of all stages, what is known before one, the estimate of its error.
+const ADAPTIVE: f64 = 40.0;
 /// An element that is printed: births, layers, equations that are rebuilt.
 const PRINTED: f64 = 300.0;
 /// An element that bears stress: six branches and the stress at eight Gauss points, a copy of them and its bytes while a checkpoint is written; what it does
@@ -29,9 +31,12 @@ const STRESSED_NODE: f64 = 450.0;
 const GROUP: f64 = 64.0;
 /// A stored entry of the conduction matrix, while it is sorted.
 const ENTRY: f64 = 40.0;
-/// A material point, and each of its numbers: old, new, of each stage, rejected, in a checkpoint.
-const POINT: f64 = 64.0;
-const STATE: f64 = 8.0 * 6.0;
+/// A material point: birth and material, both also while points move at a birth. Its mass, where it is stored. Each of its numbers: as it is,
+/// while points move, in a checkpoint; and new, where it is not in its own place.
+const POINT: f64 = 24.0;
+const MASS: f64 = 8.0 * 2.0;
+const STATE: f64 = 8.0 * 4.0;
+const NEW: f64 = 8.0;
 /// A point in an element has a place of its own, gradients, and a share of its element's matrix.
 const POINT_IN_ELEMENT: f64 = 400.0;
 /// An entry of factors: number, place, and its part of the front while they are made.
@@ -116,8 +121,16 @@ impl PartScene {
         }
         bytes += system.rows.stored()[2] as f64 * ENTRY;
         let states = simulation.behaviours.iter().map(|behaviour| behaviour.states).max().unwrap_or(0) as f64;
-        bytes += system.nodal.material.len() as f64 * (POINT + states * STATE);
-        bytes += system.general.points() as f64 * (POINT_IN_ELEMENT + states * STATE);
+        let fixed = matches!(simulation.settings.steps, Steps::Fixed { .. });
+        if !fixed {
+            bytes += nodes * ADAPTIVE;
+        }
+        let nodal = &system.nodal;
+        let numbers = states + f64::from(u8::from(nodal.energies));
+        let number = if fixed && !nodal.energies { STATE } else { STATE + NEW };
+        let mass = if nodal.weighed { MASS } else { 0.0 };
+        bytes += nodal.material.len() as f64 * (POINT + mass + numbers * number);
+        bytes += system.general.points() as f64 * (POINT_IN_ELEMENT + (states + 1.0) * (STATE + NEW));
         bytes += simulation.factors(end) * FACTOR;
         if self.output.fields || self.output.pictures {
             bytes += nodes * (WRITTEN_NODE + fields * FIELD) + elements * WRITTEN_ELEMENT;

@@ -42,7 +42,7 @@ const CONDITION_KEYS: [(&str, &str); 5] = [
 /// What a scene asks to solve.
 pub struct Task {
     /// The problem.
-    pub problem: Problem,
+    pub problem: Arc<Problem>,
     /// How.
     pub settings: Settings,
     /// When to end, s.
@@ -166,7 +166,7 @@ impl PartScene {
         problem.check().map_err(|error| located(source, "mesh", &error))?;
         let settings = self.settings(end, problem.shortest_period());
         Ok(Task {
-            problem,
+            problem: Arc::new(problem),
             settings,
             end,
             printed,

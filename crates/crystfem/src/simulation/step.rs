@@ -1,6 +1,6 @@
 //! One accepted step: its length, its attempts, and what it leaves.
 
-use super::{LinearSolver, Method, Simulation};
+use super::{LinearSolver, Method, Points, Simulation, State};
 use crate::error::Error;
 use crate::ledger::Record;
 use crate::solver::LEVELS;
@@ -153,19 +153,36 @@ impl Simulation {
 
     /// States of materials whose energy does not depend on them, at the end of an attempt.
     fn follow(&mut self, dt: f64) -> Result<Option<f64>, Error> {
+        let in_place = self.in_place();
+        let State { temperature: start, memory, work, time, .. } = &mut self.state;
         let Stepper { temperature, stages, .. } = &mut self.stepper;
-        let at =
-            At { temperature, start: &self.state.temperature, dt, time: self.state.time, tangent: false };
-        let old = &self.state.memory.nodal;
-        let out = &mut stages.evaluation;
-        out.responses = 0;
-        let ratio = self.system.nodal.follow(&self.problem, &at, old, out)?;
-        self.state.work.responses += out.responses;
+        let at = At { temperature, start, dt, time: *time, tangent: false };
+        let nodal = &self.system.nodal;
+        let new = &mut stages.evaluation.memory.nodal;
+        let points = if in_place {
+            *new = Points::default();
+            &mut memory.nodal
+        } else {
+            nodal.keep_followers(&memory.nodal, new);
+            new
+        };
+        let (ratio, count) = nodal.follow(&self.problem, &at, &mut points.state)?;
+        work.responses += count;
         Ok(ratio)
+    }
+
+    /// Whether points at nodes have one state, not an old and a new one: no attempt with steps of one length is rejected, and nothing but
+    /// the state itself depends on it.
+    fn in_place(&self) -> bool {
+        matches!(self.settings.steps, Steps::Fixed { .. }) && !self.system.nodal.coupled
     }
 
     /// Takes the end of the attempt as the new state.
     fn accept(&mut self, [dt, end]: [f64; 2], attempt: &Attempt) -> Record {
+        let in_place = self.in_place();
+        // no step of one length by backward Euler asks for the rate before it
+        let rated = self.settings.scheme != Scheme::BackwardEuler
+            || matches!(self.settings.steps, Steps::Adaptive { .. });
         let Self { state, stepper, system, .. } = self;
         let size = system.size();
         let Stepper { temperature, stages, .. } = stepper;
@@ -186,9 +203,15 @@ impl Simulation {
         state.slope.resize(size, 0.0);
         set(&mut state.slope, |k| (temperature[k] - state.temperature[k]) / dt);
         std::mem::swap(&mut state.temperature, temperature);
-        std::mem::swap(&mut state.rate, &mut stages.evaluation.rate);
+        if rated {
+            std::mem::swap(&mut state.rate, &mut stages.evaluation.rate);
+        }
         state.exchange = stages.evaluation.exchange;
-        std::mem::swap(&mut state.memory, &mut stages.evaluation.memory);
+        let new = &mut stages.evaluation.memory;
+        std::mem::swap(&mut state.memory.general, &mut new.general);
+        if !in_place {
+            std::mem::swap(&mut state.memory.nodal, &mut new.nodal);
+        }
         state.time = end;
         state.jump = false;
         state.work.steps += 1;

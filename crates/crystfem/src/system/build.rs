@@ -139,11 +139,14 @@ impl System {
         let stride = |wanted: &dyn Fn(&Behaviour) -> bool| {
             behaviours.iter().filter(|b| wanted(b)).map(|b| b.states).max().unwrap_or(0)
         };
-        let nodal = Nodal {
+        let mut nodal = Nodal {
             stride: stride(&Behaviour::nodal),
             followers: behaviours.iter().map(|b| b.capacity.is_some()).collect(),
-            ..Nodal::default()
+            energies: behaviours.iter().any(|b| b.nodal() && b.capacity.is_none()),
+            ..Nodal::laws_of(problem, behaviours)
         };
+        let plan = Plan::new(problem, behaviours, born);
+        nodal.weighed = nodal.energies || plan.kinds.contains(&OWN);
         let mut system = Self {
             elements: 0,
             nodes: Vec::new(),
@@ -159,7 +162,7 @@ impl System {
             build: 0,
             generation: 0,
             evaluated_at: f64::NEG_INFINITY,
-            plan: Plan::new(problem, behaviours, born),
+            plan,
         };
         let elements = (0..born.len() as u32).filter(|&e| born[e as usize] != NONE).collect::<Vec<_>>();
         system.add(problem, behaviours, born, births, &elements)?;
@@ -169,6 +172,24 @@ impl System {
     /// Elements of an equation's node that are born, ascending, and its number in each.
     pub fn around(&self, equation: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
         self.plan.around.of(self.nodes[equation as usize], born)
+    }
+
+    /// ρV of a point at a node, kg.
+    pub fn mass(&self, problem: &Problem, born: &[u32], equation: usize, point: usize) -> f64 {
+        let Nodal { birth, material, mass, weighed, .. } = &self.nodal;
+        if *weighed {
+            return mass[point];
+        }
+        let density = problem.materials[usize::from(material[point])].density();
+        let mut sum = 0.0;
+        for (element, corner) in self.around(equation as u32, born) {
+            let own = (born[element as usize], problem.material_of[element as usize]);
+            let class = self.plan.classes.get(usize::from(self.plan.kinds[element as usize]));
+            if let Some(class) = class.filter(|_| own == (birth[point], material[point])) {
+                sum += density * class.volumes[corner];
+            }
+        }
+        sum
     }
 
     /// Adds elements, ascending, that are born with the last of so many births.
@@ -342,7 +363,7 @@ impl System {
                     if let Some(capacity) = behaviour.capacity {
                         self.capacity[node as usize] += capacity * volume;
                     }
-                    if behaviour.nodal() {
+                    if behaviour.nodal() && self.nodal.weighed {
                         let key = (born[element as usize], material);
                         let density = problem.materials[usize::from(material)].density();
                         for point in self.nodal.of(node as usize) {

@@ -100,7 +100,7 @@ impl Behaviour {
 pub struct Points {
     /// State variables, point after point.
     pub state: Vec<f64>,
-    /// U, J/kg.
+    /// U, J/kg; at nodes empty where that of all materials is linear.
     pub energy: Vec<f64>,
 }
 
@@ -135,7 +135,7 @@ pub struct Evaluation {
     pub change: Vec<f64>,
     /// Q_i, W.
     pub rate: Vec<f64>,
-    /// ∂E_i/∂T_i, J/K; row sums with consistent capacity.
+    /// ∂E_i/∂T_i, J/K; row sums with consistent capacity; empty where it is that of the system.
     pub capacity: Vec<f64>,
     /// ∂Q_i/∂T_i of surfaces, W/K; with consistent capacity see `faces`.
     pub conductance: Vec<f64>,
@@ -150,6 +150,13 @@ pub struct Evaluation {
     /// Calls of `respond`.
     pub responses: u64,
     scratch: Vec<f64>,
+}
+
+impl Evaluation {
+    /// ∂E_i/∂T_i, J/K; row sums with consistent capacity.
+    pub fn capacity<'a>(&'a self, system: &'a System) -> &'a [f64] {
+        if self.capacity.is_empty() { &system.capacity } else { &self.capacity }
+    }
 }
 
 /// The equations of what exists.
@@ -225,7 +232,7 @@ impl System {
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         let size = self.size();
-        for field in [&mut out.change, &mut out.rate, &mut out.capacity, &mut out.conductance] {
+        for field in [&mut out.change, &mut out.rate, &mut out.conductance] {
             field.resize(size, 0.0);
         }
         out.step_ratio = None;
@@ -240,7 +247,10 @@ impl System {
             self.rows.flow(at.temperature, &mut out.rate);
             vector::set(&mut out.change, |k| self.capacity[k] * (at.temperature[k] - at.start[k]));
         }
-        out.capacity.copy_from_slice(&self.capacity);
+        out.capacity.clear();
+        if self.nodal.coupled || !self.general.is_empty() {
+            out.capacity.extend_from_slice(&self.capacity);
+        }
         out.conductance.fill(0.0);
         // the others
         self.nodal.evaluate(problem, at, &old.nodal, out)?;

@@ -4,12 +4,14 @@
 //! state; a mesh of hexahedra needs an eighth of the calls that its Gauss points would need.
 
 use super::vector::{CHUNK, items};
-use super::{At, Evaluation, Moves, NONE, Points};
+use super::{At, Behaviour, Evaluation, Moves, NONE, Points};
 use crate::error::Error;
-use crate::material::{Point, ThermalMaterial};
+use crate::material::{Crystallization, Increments, Point, Scratch, ThermalMaterial};
 use crate::problem::Problem;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// Points at nodes, in the order of the nodes.
 #[derive(Clone, Debug, Default)]
@@ -20,17 +22,52 @@ pub struct Nodal {
     pub material: Vec<u16>,
     /// Birth of each point.
     pub birth: Vec<u32>,
-    /// ρV, kg.
+    /// ρV, kg; empty where energies are linear and all elements are of a class: see [`super::System::mass`].
     pub mass: Vec<f64>,
+    /// Whether that is stored.
+    pub weighed: bool,
     /// State variables stored for each point.
     pub stride: usize,
     /// Of each material: whether its energy is linear, so that its state only follows the temperature.
     pub followers: Vec<bool>,
-    /// Whether some material's energy is not.
+    /// Whether some material's energy is not, so that energies are stored.
+    pub energies: bool,
+    /// Whether one of these has a point.
     pub coupled: bool,
+    /// Laws of crystals of materials whose state follows, and of each material its law.
+    pub laws: Vec<Crystallization>,
+    /// See `laws`.
+    pub law_of: Vec<Option<u16>>,
+}
+
+/// Room for one work item of [`Nodal::follow`].
+#[derive(Default)]
+struct Room {
+    /// Points of one law, and their nodes, both within the item.
+    points: Vec<u32>,
+    nodes: Vec<u32>,
+    z: Vec<f64>,
+    scratch: Scratch,
+    before: Vec<f64>,
 }
 
 impl Nodal {
+    /// No points; the laws of the materials whose state follows.
+    pub fn laws_of(problem: &Problem, behaviours: &[Behaviour]) -> Self {
+        let mut laws: Vec<Crystallization> = Vec::new();
+        let mut law = |(material, behaviour): (&Arc<dyn ThermalMaterial>, &Behaviour)| {
+            let own =
+                material.crystals().filter(|_| behaviour.capacity.is_some() && behaviour.states == 1)?;
+            let known = laws.iter().position(|law| law == own);
+            Some(known.unwrap_or_else(|| {
+                laws.push(*own);
+                laws.len() - 1
+            }) as u16)
+        };
+        let law_of = problem.materials.iter().zip(behaviours).map(&mut law).collect();
+        Self { laws, law_of, ..Self::default() }
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.material.is_empty()
@@ -60,8 +97,8 @@ impl Nodal {
         let first = touched.first().map_or(size, |&e| e as usize).min(self.starts.len() - 1);
         let start = self.starts[first] as usize;
         let ends = self.starts.split_off(first + 1);
-        let (birth, material, mass) =
-            (self.birth.split_off(start), self.material.split_off(start), self.mass.split_off(start));
+        let (birth, material) = (self.birth.split_off(start), self.material.split_off(start));
+        let mass = if self.weighed { self.mass.split_off(start) } else { Vec::new() };
         let mut moves = Moves { first: start, from: Vec::new() };
         let mut touched = touched.iter().peekable();
         let mut list = Vec::new();
@@ -80,7 +117,9 @@ impl Nodal {
                 let old = (begin..end).find(|&point| (birth[point], material[point]) == key);
                 self.birth.push(key.0);
                 self.material.push(key.1);
-                self.mass.push(old.filter(|_| !anew).map_or(0.0, |old| mass[old]));
+                if self.weighed {
+                    self.mass.push(old.filter(|_| !anew).map_or(0.0, |old| mass[old]));
+                }
                 self.coupled |= !self.follows(key.1);
                 moves.from.push(old.map_or(NONE, |old| (start + old) as u32));
             }
@@ -99,24 +138,120 @@ impl Nodal {
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         if self.coupled {
-            let ratio = self.respond(problem, at, old, out, false)?;
+            let ratio = self.respond(problem, at, old, out)?;
             out.step_ratio = ratio.into_iter().chain(out.step_ratio).reduce(f64::min);
         }
         Ok(())
     }
 
-    /// Of the others: sets the new points; returns their smallest wish for the next step over this one.
+    /// Of the others: what they are, in the place of what they were to be.
+    pub fn keep_followers(&self, old: &Points, new: &mut Points) {
+        let Points { state, energy } = new;
+        if !self.coupled {
+            state.clone_from(&old.state);
+            energy.clone_from(&old.energy);
+            return;
+        }
+        for (point, _) in self.material.iter().enumerate().filter(|(_, material)| self.follows(**material)) {
+            let own = point * self.stride..(point + 1) * self.stride;
+            state[own.clone()].copy_from_slice(&old.state[own]);
+            energy[point] = old.energy[point];
+        }
+    }
+
+    /// Of the others: takes `states` to the end of the increment; returns their smallest wish for the next step over this one, and how many
+    /// there are.
     pub fn follow(
         &self,
         problem: &Problem,
         at: &At,
-        old: &Points,
-        out: &mut Evaluation,
-    ) -> Result<Option<f64>, Error> {
-        if self.followers.contains(&true) && !self.is_empty() {
-            return self.respond(problem, at, old, out, true);
+        states: &mut [f64],
+    ) -> Result<(Option<f64>, u64), Error> {
+        if !self.followers.contains(&true) || self.is_empty() {
+            return Ok((None, 0));
         }
-        Ok(None)
+        let nodes = self.starts.len() - 1;
+        let mut work = Vec::with_capacity(items(nodes));
+        let mut rest = states;
+        for first in (0..nodes).step_by(CHUNK) {
+            let last = (first + CHUNK).min(nodes);
+            let points = (self.starts[last] - self.starts[first]) as usize;
+            let (here, others) = rest.split_at_mut(points * self.stride);
+            work.push((first..last, here));
+            rest = others;
+        }
+        let found: Vec<(Option<f64>, u64)> = work
+            .into_par_iter()
+            .map_init(Room::default, |room, (nodes, states)| {
+                self.follow_item(problem, at, nodes, states, room)
+            })
+            .collect::<Result<_, Error>>()?;
+        let count = found.iter().map(|found| found.1).sum();
+        Ok((found.into_iter().filter_map(|found| found.0).reduce(f64::min), count))
+    }
+
+    fn follow_item(
+        &self,
+        problem: &Problem,
+        at: &At,
+        range: Range<usize>,
+        states: &mut [f64],
+        room: &mut Room,
+    ) -> Result<(Option<f64>, u64), Error> {
+        let offset = self.starts[range.start] as usize;
+        let place = |node: usize| {
+            let start = at.start[node];
+            let increment = at.temperature[node] - start;
+            Point { temperature: start, increment, gradient: Vector3::zeros(), dt: at.dt }
+        };
+        let Room { points, nodes, z, scratch, before } = room;
+        let (mut ratio, mut count): (Option<f64>, u64) = (None, 0);
+        let law_of = |point: usize| self.law_of[usize::from(self.material[point])];
+        for (number, law) in (0..).zip(&self.laws) {
+            points.clear();
+            nodes.clear();
+            for (k, node) in (0..).zip(range.clone()) {
+                for point in self.of(node).filter(|&point| law_of(point) == Some(number)) {
+                    if nodes.last() != Some(&k) {
+                        place(node).check()?;
+                    }
+                    nodes.push(k);
+                    points.push((point - offset) as u32);
+                }
+            }
+            if points.is_empty() {
+                continue;
+            }
+            z.clear();
+            z.extend(points.iter().map(|&point| states[point as usize * self.stride]));
+            let increments = Increments {
+                start: &at.start[range.clone()],
+                end: &at.temperature[range.clone()],
+                dt: at.dt,
+            };
+            let wish = law.advance_all(increments, nodes, z, scratch);
+            ratio = wish.into_iter().chain(ratio).reduce(f64::min);
+            for (&point, z) in points.iter().zip(&*z) {
+                states[point as usize * self.stride] = *z;
+            }
+            count += points.len() as u64;
+        }
+        for node in range {
+            for point in self.of(node) {
+                let index = self.material[point];
+                if !self.follows(index) || law_of(point).is_some() {
+                    continue;
+                }
+                let material: &dyn ThermalMaterial = &*problem.materials[usize::from(index)];
+                let own = &mut states[(point - offset) * self.stride..][..material.state_names().len()];
+                before.clear();
+                before.extend_from_slice(own);
+                let response = material.respond(&place(node), before, own)?;
+                ratio = response.step_ratio.into_iter().chain(ratio).reduce(f64::min);
+                count += 1;
+            }
+        }
+        Ok((ratio, count))
     }
 
     fn respond(
@@ -125,7 +260,6 @@ impl Nodal {
         at: &At,
         old: &Points,
         out: &mut Evaluation,
-        follow: bool,
     ) -> Result<Option<f64>, Error> {
         let Evaluation { change, capacity, memory, .. } = out;
         let new = &mut memory.nodal;
@@ -146,10 +280,11 @@ impl Nodal {
         let ratios: Vec<Option<f64>> = work
             .into_par_iter()
             .map(|(first, change, capacity, state, energy)| {
-                self.item(problem, at, old, first, change, capacity, state, energy, follow)
+                self.item(problem, at, old, first, change, capacity, state, energy)
             })
             .collect::<Result<_, _>>()?;
-        out.responses += self.material.len() as u64;
+        let coupled = self.material.iter().filter(|&&material| !self.follows(material)).count();
+        out.responses += coupled as u64;
         Ok(ratios.into_iter().flatten().reduce(f64::min))
     }
 
@@ -164,7 +299,6 @@ impl Nodal {
         capacity: &mut [f64],
         state: &mut [f64],
         energy: &mut [f64],
-        follow: bool,
     ) -> Result<Option<f64>, Error> {
         let mut ratio: Option<f64> = None;
         let offset = self.starts[first] as usize;
@@ -177,7 +311,7 @@ impl Nodal {
                 dt: at.dt,
             };
             for point in self.of(first + k) {
-                if self.follows(self.material[point]) != follow {
+                if self.follows(self.material[point]) {
                     continue;
                 }
                 let material: &dyn ThermalMaterial = &*problem.materials[usize::from(self.material[point])];
@@ -190,9 +324,6 @@ impl Nodal {
                 let response = material.respond(&place, &old_state[..count], &mut new_state[..count])?;
                 ratio = response.step_ratio.into_iter().chain(ratio).reduce(f64::min);
                 energy[local] = response.energy;
-                if follow {
-                    continue;
-                }
                 change[k] += self.mass[point] * (response.energy - old.energy[point]);
                 capacity[k] += self.mass[point] * response.d_energy_d_temperature;
             }

@@ -274,18 +274,35 @@ impl Rows {
         }
     }
 
-    /// Diagonal of `capacity`·M + `conduction`·K.
-    pub fn diagonal(&self, [capacity, conduction]: [f64; 2]) -> Vec<f64> {
-        let mut diagonal = vec![0.0; self.size];
-        for segment in self.segments.iter().flatten() {
-            let range = self.stencils.range(segment.stencil);
-            if let Ok(at) = self.stencils.offsets[range.clone()].binary_search(&0) {
-                let value = self.value(range.start + at, [capacity, conduction]);
-                let start = segment.start as usize;
-                diagonal[start..start + segment.length as usize].fill(value);
+    /// Adds the diagonal of `weights[0]`·M + `weights[1]`·K.
+    pub fn add_diagonal(&self, weights: [f64; 2], to: &mut [f64]) {
+        to.par_chunks_mut(CHUNK).enumerate().for_each(|(item, to)| {
+            for segment in &self.segments[item] {
+                let start = segment.start as usize - item * CHUNK;
+                let value = self.diagonal(segment, weights);
+                to[start..start + segment.length as usize].iter_mut().for_each(|to| *to += value);
             }
-        }
-        diagonal
+        });
+    }
+
+    /// The largest of `of(row, K_ii)`.
+    pub fn largest(&self, of: impl Fn(usize, f64) -> f64 + Sync) -> f64 {
+        let item = |segments: &Vec<Segment>| {
+            let mut most = f64::NEG_INFINITY;
+            for segment in segments {
+                let value = self.diagonal(segment, [0.0, 1.0]);
+                let start = segment.start as usize;
+                (start..start + segment.length as usize).for_each(|row| most = most.max(of(row, value)));
+            }
+            most
+        };
+        self.segments.par_iter().map(item).reduce(|| f64::NEG_INFINITY, f64::max)
+    }
+
+    fn diagonal(&self, segment: &Segment, weights: [f64; 2]) -> f64 {
+        let range = self.stencils.range(segment.stencil);
+        let at = self.stencils.offsets[range.clone()].binary_search(&0);
+        at.map_or(0.0, |at| self.value(range.start + at, weights))
     }
 
     /// Columns of a row, ascending.
@@ -432,6 +449,12 @@ mod tests {
         }
         assert!((dot - exact_dot).abs() < 1e-9);
         assert_eq!(rows.row(77, [0.0, 1.0]).collect::<Vec<_>>(), [(76, -1.0), (77, 2.5), (78, 9.0)]);
-        assert_eq!(rows.diagonal([0.0, 1.0])[5000], 7.0);
+        let mut diagonal = vec![1.0; size];
+        rows.add_diagonal([2.0, 3.0], &mut diagonal);
+        assert_eq!(
+            [diagonal[4999], diagonal[5000]],
+            [1.0 + 3.0 * 2.5 + 2.0 * 1.25, 1.0 + 3.0 * 7.0 + 2.0 * 3.5]
+        );
+        assert_eq!(rows.largest(|row, value| if row < 100 { row as f64 } else { value }), 99.0);
     }
 }

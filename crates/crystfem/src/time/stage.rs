@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::ledger::NOTHING;
 use crate::problem::Problem;
 use crate::solver::{Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, Packed, norm_squared};
-use crate::system::vector::{blend, dot, largest, set, sum};
+use crate::system::vector::{blend, combine, dot, largest, set, sum};
 use crate::system::{At, Evaluation, FaceMatrices, Memory, System};
 
 /// Newton iterations at most.
@@ -43,20 +43,20 @@ pub struct Stage<'a> {
 pub struct Stages {
     /// E, Q and tangents at the last temperature.
     pub evaluation: Evaluation,
-    /// E − E(start) + a Q + known at the last temperature, J, prescribed nodes included.
+    /// E − E(start) + a Q + known at the last temperature, J, prescribed nodes included; a correction takes it for its own.
     pub residual: Vec<f64>,
     /// 1·A·1 over the free nodes, J/K.
     pub sensitivity: f64,
+    /// Right-hand side of a filter.
     right: Vec<f64>,
     correction: Vec<f64>,
     trial: Vec<f64>,
     diagonal: Vec<f64>,
     inverse: Vec<f64>,
+    /// A·1 over the free nodes with consistent capacity; else it follows from the diagonal and `free_sums`.
     row_sums: Vec<f64>,
     /// K·1 and M·1 over the free nodes; empty where it is nothing.
     free_sums: [Vec<f64>; 2],
-    /// Diagonals of M and K.
-    diagonals: [Vec<f64>; 2],
     iterative: Iterative,
     packed: Packed,
     /// What is wanted; factors and levels are made when first needed.
@@ -243,7 +243,8 @@ impl Stages {
             return;
         }
         let size = system.size();
-        let Evaluation { capacity, conductance, faces, .. } = &self.evaluation;
+        let Evaluation { conductance, faces, .. } = &self.evaluation;
+        let capacity = self.evaluation.capacity(system);
         let sums_for = Some((system.build, system.rows.versions()[1]));
         if self.sums_for != sums_for {
             self.free_sums = [Vec::new(), Vec::new()];
@@ -252,22 +253,20 @@ impl Stages {
                 self.free_sums[0].resize(size, 0.0);
                 system.rows.product(None, [0.0, 1.0], &system.free, &mut self.free_sums[0]);
             }
-            self.diagonals = [Vec::new(), system.rows.diagonal([0.0, 1.0])];
             if system.consistent {
                 self.free_sums[1].resize(size, 0.0);
                 system.rows.product(None, [1.0, 0.0], &system.free, &mut self.free_sums[1]);
-                self.diagonals[0] = system.rows.diagonal([1.0, 0.0]);
             }
             self.sums_for = sums_for;
         }
         // A's diagonal, until it is inverted
         self.inverse.resize(size, 0.0);
-        self.row_sums.resize(size, 0.0);
-        let [capacities, conductions] = &self.diagonals;
         let [conduction, consistent] = &self.free_sums;
         let whole = &mut self.inverse;
         if system.consistent {
-            blend(whole, capacities, conductions, |_, capacity, conduction| capacity + weight * conduction);
+            whole.fill(0.0);
+            system.rows.add_diagonal([1.0, weight], whole);
+            self.row_sums.resize(size, 0.0);
             set(&mut self.row_sums, |k| consistent[k] + weight * conduction[k]);
             for face in faces.iter() {
                 face.add_product(weight, &system.free, &mut self.row_sums);
@@ -281,13 +280,8 @@ impl Stages {
             blend(&mut self.diagonal, capacity, conductance, |_, capacity, conductance| {
                 capacity + weight * conductance
             });
-            blend(whole, &self.diagonal, conductions, |_, diagonal, conduction| {
-                diagonal + weight * conduction
-            });
-            blend(&mut self.row_sums, &self.diagonal, &system.free, |_, diagonal, free| free * diagonal);
-            if !conduction.is_empty() {
-                blend(&mut self.row_sums, conduction, conduction, |own, sum, _| own + weight * sum);
-            }
+            whole.copy_from_slice(&self.diagonal);
+            system.rows.add_diagonal([0.0, weight], whole);
         }
         // rounding of the residual: 1e-14 of a temperature of 500 K, everywhere
         let rounding = 5e-12_f64;
@@ -299,8 +293,17 @@ impl Stages {
             |whole, free, _| if free == 0.0 { 0.0 } else { 1.0 / whole },
         );
         self.capacity = dot(&system.free, capacity).max(f64::MIN_POSITIVE);
-        self.sensitivity = dot(&system.free, &self.row_sums);
+        self.sensitivity = self.column_sums(system, weight, &system.free);
         self.made_for = made_for;
+    }
+
+    /// 1·A x over the free nodes, of x that is 0 at all others.
+    fn column_sums(&self, system: &System, weight: f64, x: &[f64]) -> f64 {
+        if system.consistent {
+            return dot(&self.row_sums, x);
+        }
+        let [conduction, _] = &self.free_sums;
+        dot(&self.diagonal, x) + if conduction.is_empty() { 0.0 } else { weight * dot(conduction, x) }
     }
 
     /// Levels of multigrid where they are wanted, for the matrix that is prepared.
@@ -320,9 +323,9 @@ impl Stages {
         if let Some(multigrid) = &mut self.iterative.multigrid
             && (self.set_for != made_for || !system.is_linear())
         {
-            let Evaluation { capacity, faces, .. } = &self.evaluation;
+            let Evaluation { faces, .. } = &self.evaluation;
             if system.consistent {
-                let mut lumped = capacity.clone();
+                let mut lumped = self.evaluation.capacity(system).to_vec();
                 let one = vec![1.0; lumped.len()];
                 faces.iter().for_each(|face| face.add_product(weight, &one, &mut lumped));
                 multigrid.set(&lumped, weight);
@@ -344,10 +347,8 @@ impl Stages {
     ) -> Result<(), Error> {
         let size = system.size();
         self.raise(problem, system, stage.weight, work);
-        self.right.resize(size, 0.0);
         self.correction.resize(size, 0.0);
-        let residual = &self.residual;
-        set(&mut self.right, |k| -system.free[k] * residual[k]);
+        combine(&mut self.residual, |k, residual| -system.free[k] * residual);
         let operator = operator(system, &self.diagonal, stage.weight, &self.evaluation);
         let goal = Goal {
             capacity: self.capacity,
@@ -374,12 +375,12 @@ impl Stages {
             self.factors.is_some()
         };
         if factored && let Some(factors) = &mut self.factors {
-            factors.solve(&self.right, &mut self.correction);
+            factors.solve(&self.residual, &mut self.correction);
             work.direct_solves += 1;
             self.trial.resize(size, 0.0);
             operator.product(&self.correction, &mut self.trial);
             let image = &self.trial;
-            for ((right, image), free) in self.right.iter_mut().zip(image).zip(&system.free) {
+            for ((right, image), free) in self.residual.iter_mut().zip(image).zip(&system.free) {
                 *right -= free * image;
             }
         }
@@ -392,9 +393,9 @@ impl Stages {
             work.cg_solves += 1;
             let packed = pack(&mut self.packed, system, stage.weight);
             let operator = Operator { packed, ..operator };
-            let right = &self.right;
+            let right = &self.residual;
             total = sum(size, |k| right[k]);
-            let (inverse, right, found) = (&self.inverse, &mut self.right, &mut self.correction);
+            let (inverse, right, found) = (&self.inverse, &mut self.residual, &mut self.correction);
             self.iterative.solve(&operator, symmetric, inverse, right, found, &goal)
         };
         work.cg_iterations += ended.iterations as u64;
@@ -411,8 +412,10 @@ impl Stages {
             });
         }
         // a uniform shift of the free nodes makes the balance of the whole body exact
-        let (right, sums, found) = (&self.right, &self.row_sums, &self.correction);
-        let left = if symmetric && !factored { total - dot(sums, found) } else { dot(&system.free, right) };
+        let left = match symmetric && !factored {
+            true => total - self.column_sums(system, stage.weight, &self.correction),
+            false => dot(&system.free, &self.residual),
+        };
         let shift = left / self.sensitivity;
         if shift.is_finite() {
             for (correction, free) in self.correction.iter_mut().zip(&system.free) {

@@ -5,6 +5,7 @@ mod bodies;
 mod brick;
 mod extremes;
 mod fields;
+mod followers;
 mod order;
 mod patch;
 #[cfg(feature = "case")]

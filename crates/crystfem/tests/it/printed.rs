@@ -8,6 +8,7 @@ use crystfem::printed::PrintedPart;
 use crystfem::scene::PartScene;
 use crystfem::simulation::{Settings, Simulation};
 use polycore::scene::Source;
+use std::sync::Arc;
 
 const SCENE: &str = include_str!("../../../../cases/ch4/printed-bar/case.toml");
 
@@ -32,7 +33,7 @@ fn equals_the_scene() {
     assert_eq!(part.mesh.element_count(), whole.mesh.element_count());
 
     let settings = Settings::backward_euler(1.0);
-    let temperatures = [part, whole].map(|problem| {
+    let temperatures = [Arc::new(part), whole].map(|problem| {
         let mut simulation = Simulation::new(problem, settings).unwrap();
         simulation.run_until(22.0).unwrap();
         simulation.temperatures(0.0)

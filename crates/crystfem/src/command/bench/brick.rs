@@ -123,7 +123,7 @@ fn problem(options: &Options) -> Result<Problem, crate::Error> {
 }
 
 /// The most memory that this process has had, bytes; `None` where the system does not tell.
-fn peak_memory() -> Option<f64> {
+pub(super) fn peak_memory() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kibibytes: f64 = line.split_whitespace().next()?.parse().ok()?;

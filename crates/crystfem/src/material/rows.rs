@@ -1,0 +1,330 @@
+//! Growth and melting of crystals at many points of one law.
+//!
+//! Points at one node have one temperature history, whatever their z. What depends on that alone is computed once for each node: growth Δz, and
+//! on heating ln (1−X_m(T₂))/(1−X_m(T₁)), by which crystals become less. Both, and the melting of each point, are loops of vectors. Increments
+//! that cross borders of panels are cut there into pieces, which points pass one after another.
+
+use super::Crystallization;
+use super::crystallization::{FAINT, Grown, HEATING_PANELS, NOTHING};
+use super::semicrystalline::{LARGEST_CHANGE, LONGEST};
+use crate::elementary::{SMALL, exp, expm1_small, ln, ln_1p};
+use crate::kinetics::{PANELS, Panels};
+use pulp::{Arch, Simd, WithSimd};
+
+/// z at least for powers of it; zⁿ at most for its exponential, and the logarithm of that.
+const LEAST_Z: f64 = 1e-20;
+const MOST_POWER: f64 = 700.0;
+const MOST_LOGARITHM: f64 = 6.5;
+
+/// Increments of temperature of nodes, in one time.
+#[derive(Clone, Copy)]
+pub(crate) struct Increments<'a> {
+    /// Temperatures at the start, K.
+    pub start: &'a [f64],
+    /// Temperatures at the end, K.
+    pub end: &'a [f64],
+    /// Δt, s.
+    pub dt: f64,
+}
+
+/// Room for one work item.
+#[derive(Default)]
+pub(crate) struct Scratch {
+    /// Δz of each node, NaN where it heats in pieces.
+    growth: Vec<f64>,
+    /// ln (1−X_m(T₂))/(1−X_m(T₁)) of each node; 0 for none.
+    fall: Vec<f64>,
+    /// First and last piece of each node that has them.
+    pieces: Vec<[u32; 2]>,
+    /// Pieces: temperatures at their ends, part of the time, growth and fall.
+    piece: Pieces,
+    queue: Queue,
+    /// Points in nodes that heat in pieces, and their z before.
+    long: Vec<(u32, f64)>,
+    seen: Seen,
+}
+
+#[derive(Default)]
+struct Pieces {
+    start: Vec<f64>,
+    end: Vec<f64>,
+    share: Vec<f64>,
+    growth: Vec<f64>,
+    fall: Vec<f64>,
+}
+
+impl Crystallization {
+    /// z of points over an increment, as [`Self::advance`] does; `node` is that of each point. Returns the wish for the next step over
+    /// this one: [`LARGEST_CHANGE`] over the largest change of α, if there is any.
+    pub(crate) fn advance_all(
+        &self,
+        increments: Increments,
+        node: &[u32],
+        z: &mut [f64],
+        scratch: &mut Scratch,
+    ) -> Option<f64> {
+        self.histories(increments, scratch);
+        let Scratch { growth, fall, pieces, piece, queue, long, seen } = scratch;
+        seen.clear();
+        long.clear();
+        for (point, (own, &node)) in (0..).zip(z.iter_mut().zip(node)) {
+            let (growth, fall) = (growth[node as usize], fall[node as usize]);
+            if growth.is_nan() {
+                long.push((point, *own));
+                continue;
+            }
+            let before = *own;
+            if let Some(after) = queue.offer(self, point, before, growth, fall) {
+                *own = after;
+                seen.see(self, before, after);
+            }
+        }
+        queue.take(self, |point, after| {
+            let before = std::mem::replace(&mut z[point as usize], after);
+            seen.see(self, before, after);
+        });
+        let most = long.iter().map(|&(point, _)| pieces[node[point as usize] as usize]);
+        let most = most.map(|[first, last]| last - first).max().unwrap_or(0);
+        for round in 0..most {
+            for &(point, _) in &*long {
+                let [first, last] = pieces[node[point as usize] as usize];
+                let own = &mut z[point as usize];
+                let at = (first + round) as usize;
+                if first + round < last {
+                    *own = queue.offer(self, point, *own, piece.growth[at], piece.fall[at]).unwrap_or(*own);
+                }
+            }
+            queue.take(self, |point, after| z[point as usize] = after);
+        }
+        for &(point, before) in &*long {
+            seen.see(self, before, z[point as usize]);
+        }
+        seen.wish(self)
+    }
+
+    /// Growth and fall of all nodes and pieces.
+    fn histories(&self, increments: Increments, scratch: &mut Scratch) {
+        let Scratch { growth, fall, pieces, piece, .. } = scratch;
+        let Increments { start, end, dt } = increments;
+        let size = start.len();
+        growth.resize(size, 0.0);
+        fall.resize(size, 0.0);
+        pieces.resize(size, [0; 2]);
+        let arch = Arch::new();
+        arch.dispatch(Histories { law: self, start, end, dt: Some(dt), growth, fall });
+        let Pieces { start: from, end: to, share, growth: parts, fall: falls } = piece;
+        [&mut *from, &mut *to, &mut *share].into_iter().for_each(Vec::clear);
+        let melts = |k: usize| end[k] > start[k] && self.melting.is_some();
+        let crosses = |k: &usize| growth[*k].is_nan() && (end[*k] - start[*k]).is_finite();
+        for k in (0..size).filter(crosses) {
+            let count = if melts(k) { HEATING_PANELS } else { PANELS };
+            let first = from.len() as u32;
+            for panel in Panels::new(&self.kinetics, start[k], end[k], count) {
+                from.push(panel.start);
+                to.push(panel.end);
+                share.push(panel.share());
+            }
+            pieces[k] = [first, from.len() as u32];
+        }
+        parts.resize(from.len(), 0.0);
+        falls.resize(from.len(), 0.0);
+        arch.dispatch(Histories { law: self, start: from, end: to, dt: None, growth: parts, fall: falls });
+        parts.iter_mut().zip(share).for_each(|(growth, share)| *growth *= *share * dt);
+        // without melting pieces add up
+        for k in 0..size {
+            if growth[k].is_nan() && !melts(k) {
+                let [first, last] = pieces[k];
+                growth[k] = parts[first as usize..last as usize].iter().sum();
+                fall[k] = 0.0;
+            }
+        }
+    }
+}
+
+/// Points in which crystals melt: point, z, Δz and fall of each.
+#[derive(Default)]
+struct Queue {
+    points: Vec<u32>,
+    z: Vec<f64>,
+    growth: Vec<f64>,
+    fall: Vec<f64>,
+}
+
+impl Queue {
+    /// z after an increment within one panel, or `None`: it waits for [`Self::take`].
+    #[inline]
+    fn offer(&mut self, law: &Crystallization, point: u32, z: f64, growth: f64, fall: f64) -> Option<f64> {
+        if fall == 0.0 {
+            return Some(z + growth);
+        }
+        let grown = z + 0.5 * growth;
+        if grown < LEAST_Z {
+            return Some(law.melt(Grown { z: grown, slope: 0.0 }, fall, 0.0).z + 0.5 * growth);
+        }
+        self.points.push(point);
+        self.z.push(z);
+        self.growth.push(growth);
+        self.fall.push(fall);
+        None
+    }
+
+    /// Hands out all z that wait.
+    fn take(&mut self, law: &Crystallization, mut to: impl FnMut(u32, f64)) {
+        let Self { points, z, growth, fall } = self;
+        let exponent = law.kinetics.constants().avrami_exponent;
+        Arch::new().dispatch(Melt { exponent, z, growth, fall });
+        points.iter().zip(&*z).for_each(|(&point, &after)| to(point, after));
+        points.clear();
+        [z, growth, fall].into_iter().for_each(Vec::clear);
+    }
+}
+
+/// Changes of α.
+#[derive(Default)]
+struct Seen {
+    /// Some change that asks for no shorter step than the longest.
+    small: bool,
+    /// z before and after, where α changes much.
+    before: Vec<f64>,
+    after: Vec<f64>,
+}
+
+impl Seen {
+    fn clear(&mut self) {
+        self.small = false;
+        self.before.clear();
+        self.after.clear();
+    }
+
+    /// |∂α/∂z| ≤ n: most changes need no look at α.
+    #[inline]
+    fn see(&mut self, law: &Crystallization, before: f64, after: f64) {
+        if after == before {
+            return;
+        }
+        let exponent = law.kinetics.constants().avrami_exponent;
+        if exponent * (after - before).abs() > LARGEST_CHANGE / LONGEST {
+            self.before.push(before);
+            self.after.push(after);
+        } else if !self.small {
+            self.small = after < 1.0 || law.kinetics.degree(before) != law.kinetics.degree(after);
+        }
+    }
+
+    fn wish(&mut self, law: &Crystallization) -> Option<f64> {
+        let Self { before, after, small } = self;
+        let exponent = law.kinetics.constants().avrami_exponent;
+        Arch::new().dispatch(Changes { exponent, before, after });
+        let most = before.iter().copied().fold(0.0, f64::max);
+        match most > 0.0 {
+            true => Some((LARGEST_CHANGE / most).clamp(0.1, LONGEST)),
+            false => small.then_some(LONGEST),
+        }
+    }
+}
+
+/// Growth and fall over increments: of nodes, NaN where borders of panels are crossed, or of pieces, in a second.
+struct Histories<'a> {
+    law: &'a Crystallization,
+    start: &'a [f64],
+    end: &'a [f64],
+    dt: Option<f64>,
+    growth: &'a mut [f64],
+    fall: &'a mut [f64],
+}
+
+impl WithSimd for Histories<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { law: Crystallization { kinetics, melting }, start, end, dt, growth, fall } = self;
+        match dt {
+            Some(dt) => {
+                let heating = if melting.is_some() { HEATING_PANELS } else { PANELS };
+                kinetics.growth_of_all(start, end, dt, [PANELS as f64, heating as f64], growth);
+            }
+            None => kinetics.growth_of_pieces(start, end, growth),
+        }
+        let Some(melting) = melting else {
+            fall.fill(0.0);
+            return;
+        };
+        let size = fall.len();
+        let (start, end) = (&start[..size], &end[..size]);
+        for k in 0..size {
+            let change = melting.survival_of_all(end[k]) - melting.survival_of_all(start[k]);
+            let none = end[k] <= start[k] || change > NOTHING;
+            fall[k] = if none { 0.0 } else { change };
+        }
+    }
+}
+
+/// Half of the growth, α ← α e^L, the other half; z with half of its growth at least [`LEAST_Z`].
+///
+/// With p = zⁿ and u = (1 − e^L)(eᵖ − 1), p becomes p − ln(1 + u), where that is near; else −ln(1 − α).
+struct Melt<'a> {
+    exponent: f64,
+    z: &'a mut [f64],
+    growth: &'a [f64],
+    fall: &'a [f64],
+}
+
+impl WithSimd for Melt<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { exponent, z, growth, fall } = self;
+        let size = z.len();
+        let (growth, fall) = (&growth[..size], &fall[..size]);
+        let root = 1.0 / exponent;
+        for k in 0..size {
+            let grown = z[k] + 0.5 * growth[k];
+            let kept = exp(fall[k]);
+            let lost = if fall[k] > -SMALL { -expm1_small(fall[k].max(-SMALL)) } else { 1.0 - kept };
+            // exp(n ln z) is off by 1e-14: so is what is small beside 1, not z
+            let power = exp(exponent * ln(grown)).min(MOST_POWER);
+            let whole = exp(power);
+            let above = if power < SMALL { expm1_small(power.min(SMALL)) } else { whole - 1.0 };
+            let melted = lost * above;
+            let part = ln_1p(melted.min(1.0)) / power;
+            let near = melted <= 1.0 && part <= 0.5;
+            let degree = above / whole * kept;
+            let logarithm = ln_1p(-(if near { part } else { degree }).min(0.5));
+            let remainder = kept / whole + lost;
+            let far = ln(if degree < 0.5 { -logarithm } else { -ln(remainder) });
+            let factor = exp(root * if near { logarithm } else { far });
+            let after = if near { grown * factor } else { factor };
+            z[k] = if degree < FAINT { 0.0 } else { after } + 0.5 * growth[k];
+        }
+    }
+}
+
+/// `before` becomes |α − α before|.
+struct Changes<'a> {
+    exponent: f64,
+    before: &'a mut [f64],
+    after: &'a [f64],
+}
+
+impl WithSimd for Changes<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { exponent, before, after } = self;
+        let size = before.len();
+        let after = &after[..size];
+        for k in 0..size {
+            before[k] = (remainder(exponent, before[k]) - remainder(exponent, after[k])).abs();
+        }
+    }
+}
+
+/// 1 − α.
+#[inline(always)]
+fn remainder(exponent: f64, z: f64) -> f64 {
+    let held = z.clamp(LEAST_Z, MOST_POWER);
+    exp(-exp((exponent * ln(held)).min(MOST_LOGARITHM)))
+}
+
+#[cfg(test)]
+mod tests;
