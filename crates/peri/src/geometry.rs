@@ -309,8 +309,9 @@ impl<const D: usize> Cut<D> {
         };
         let normal = self.normal();
         let height: f64 = (0..D).map(|d| (point[d] - self.corner[d]) * normal[d]).sum();
-        // a cut without area has no normal
-        !(0..D).any(beside) && !(height.abs() > reach)
+        // a cut without area has no normal, and no height: near as far as its box tells
+        let away = height.abs() > reach;
+        !away && !(0..D).any(beside)
     }
 
     /// [`severed`] by this cut alone.

@@ -1,8 +1,23 @@
 //! The lattice path, the cloud path and a plain loop over all pairs give the same forces.
 
-use crate::bodies::{Body, Random, distance, fit, forces, laws, norm, rms, stretch_range};
-use peri::bonds::Bonds;
+use crate::bodies::{Body, Random, distance, fit, forces, laws, norm, rms, scatter, stretch_range};
+use peri::bonds::{Bonds, force};
+use peri::field::Field;
 use peri::potential::KernelFit;
+
+/// The forces of pieces have the bits of those of work items.
+fn in_pieces<const D: usize>(bonds: &dyn Bonds<D>, u: &Field<D>) {
+    let (mut whole, piece) = (Field::zeros(bonds.sites()), bonds.piece());
+    force(bonds, u, &mut whole);
+    for start in (0..bonds.sites()).step_by(piece) {
+        let size = piece.min(bonds.sites() - start);
+        let mut parts = [(); D].map(|()| vec![f64::NAN; size]);
+        bonds.force_from(u, start, &mut parts.each_mut().map(|part| &mut part[..]), None);
+        for (part, whole) in parts.iter().zip(whole.components()) {
+            assert!(part[..] == whole[start..start + size], "pieces of {piece} from site {start}");
+        }
+    }
+}
 
 /// Every law on one body: both paths against each other and against the plain loop.
 fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
@@ -16,6 +31,7 @@ fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
         built.lattice.set_law(&fit, crate::bodies::MODULUS);
         built.cloud.set_law(&fit, crate::bodies::MODULUS);
         let on_lattice = forces(&built.lattice, &built.on_lattice, &u);
+        in_pieces(&built.lattice, &scatter(built.lattice.sites(), &built.on_lattice, &u));
         let in_cloud = forces(&built.cloud, &built.in_cloud, &u);
         let scale = rms(&on_lattice);
         // sums of up to 200 terms and a law of up to 25 coefficients, each rounded in another order: 1e-12 ≈ 5e3 ε
