@@ -221,7 +221,7 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
 
     /// Pieces that the body has broken into.
     pub fn fragments(&self) -> usize {
-        fragments(&self.bonds)
+        fragments(&self.bonds).len()
     }
 }
 

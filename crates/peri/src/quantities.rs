@@ -19,6 +19,7 @@ polycore::quantities! {
     CRITICAL_STRETCH = "critical_stretch", "", "with `material.critical`: least stretch at which a bond of the body breaks";
     CRITICAL_ENERGY = "critical_energy", "J/m³", "with `fracture_energy` of a `solid`: energy, over a bond's share of a family, beyond which it breaks";
     FRAGMENTS = "fragments", "", "with `material.critical`: pieces of two particles or more that intact bonds hold together";
+    LARGEST_FRAGMENT = "largest_fragment", "", "with `material.critical`: volume of the largest of these over that of the body";
     FIRST_BREAK = "first_break", "m", "displacement of the step in which the first bond breaks";
     LOAD_AT_FIRST_BREAK = "load_at_first_break", "N", "load of the equilibrium before the first bond breaks";
     BROKEN_BONDS = "broken_bonds", "", "broken bonds at the end";

@@ -4,6 +4,7 @@ use super::{Bonds, Property};
 use crate::field::{CHUNK, Field};
 use crate::potential::StretchRange;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// A bond, seen from one of its ends, that is to be severed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,10 +77,18 @@ pub fn fingerprint(bonds: &[Overstretched]) -> u64 {
     words.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// Parts of the body that hang together by intact bonds, single particles not counted.
-pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> usize {
+/// A part of the body that hangs together by intact bonds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fragment {
+    /// Its particles, two or more.
+    pub particles: usize,
+    /// Their volume, m³.
+    pub volume: f64,
+}
+
+/// Parts of the body that hang together by intact bonds, single particles left out; the largest first.
+pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> Vec<Fragment> {
     let mut root: Vec<u32> = (0..bonds.sites() as u32).collect();
-    let mut size = vec![1_u32; bonds.sites()];
     let find = |root: &mut Vec<u32>, mut site: u32| {
         while root[site as usize] != site {
             root[site as usize] = root[root[site as usize] as usize];
@@ -90,13 +99,17 @@ pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> usize {
     for &site in bonds.particles() {
         bonds.neighbours(site as usize, &mut |bond| {
             let (a, b) = (find(&mut root, site), find(&mut root, bond.site as u32));
-            if a != b {
-                let (small, large) = (a.max(b), a.min(b));
-                root[small as usize] = large;
-                size[large as usize] += size[small as usize];
-            }
+            root[a.max(b) as usize] = a.min(b);
         });
     }
-    let is_part = |&&site: &&u32| root[site as usize] == site && size[site as usize] > 1;
-    bonds.particles().iter().filter(is_part).count()
+    // by its first site, which is its root
+    let mut found: BTreeMap<u32, Fragment> = BTreeMap::new();
+    for &site in bonds.particles() {
+        let own = found.entry(find(&mut root, site)).or_insert(Fragment { particles: 0, volume: 0.0 });
+        own.particles += 1;
+        own.volume += bonds.volume(site as usize);
+    }
+    let mut fragments: Vec<Fragment> = found.into_values().filter(|own| own.particles > 1).collect();
+    fragments.sort_by(|a, b| b.volume.total_cmp(&a.volume));
+    fragments
 }

@@ -307,6 +307,15 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
         let columns = [("step", "", &step[..]), ("load_before", "N", &load), ("bonds", "", &bonds)];
         csv::write(output.join(format!("events_{}.csv", outcome.file_name())), &columns)?;
     }
+    for outcome in outcomes.iter().filter(|outcome| outcome.fragments.len() > 1) {
+        let particles: Vec<f64> = outcome.fragments.iter().map(|own| own.0 as f64).collect();
+        let volume: Vec<f64> = outcome.fragments.iter().map(|own| own.1).collect();
+        let density = scene.dynamics.as_ref().map(|dynamics| dynamics.density.si());
+        let mass: Option<Vec<f64>> = density.map(|density| volume.iter().map(|v| density * v).collect());
+        let mut columns = vec![("particles", "", &particles[..]), ("volume", "m^3", &volume)];
+        columns.extend(mass.iter().map(|mass| ("mass", "kg", &mass[..])));
+        csv::write(output.join(format!("fragments_{}.csv", outcome.file_name())), &columns)?;
+    }
     if several.is_empty() || !scene.output.pictures {
         return Ok(());
     }

@@ -26,6 +26,8 @@ pub struct Outcome {
     pub history: Vec<Record>,
     /// Bonds that broke together, in their order.
     pub events: Vec<Event>,
+    /// Particles and volume, m³, of each fragment.
+    pub fragments: Vec<(usize, f64)>,
     /// Names of the regions of prescribed displacement.
     pub regions: Vec<String>,
     /// Names of rigid planes.
@@ -67,6 +69,7 @@ impl Outcome {
             profiles: Vec::new(),
             history: Vec::new(),
             events: Vec::new(),
+            fragments: Vec::new(),
             regions: Vec::new(),
             planes: Vec::new(),
             probes: Vec::new(),

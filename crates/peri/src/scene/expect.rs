@@ -19,7 +19,10 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     add(records > 1, &[q::PEAK_LOAD, q::DISPLACEMENT_AT_PEAK]);
     add(scene.dynamics.is_none(), &q::BALANCES);
     let critical = scene.material.critical.is_some();
-    add(critical, &[q::FRAGMENTS, q::FIRST_BREAK, q::LOAD_AT_FIRST_BREAK, q::BROKEN_BONDS]);
+    add(
+        critical,
+        &[q::FRAGMENTS, q::LARGEST_FRAGMENT, q::FIRST_BREAK, q::LOAD_AT_FIRST_BREAK, q::BROKEN_BONDS],
+    );
     add(scene.is_learnt(), &[q::OUTSIDE_SHARE, q::FLAGGED_SHARE, q::FIRST_STEP_OUTSIDE]);
     let energy = scene.material.solid.is_some()
         && scene.material.critical.is_some_and(|critical| critical.fracture_energy.is_some());

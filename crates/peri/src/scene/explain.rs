@@ -69,6 +69,12 @@ pub fn explain<const D: usize>(
     if scene.method() == Method::Lbfgs {
         builds("ten pairs of steps and gradient changes, a coarse level with its factors".to_owned());
     }
+    if scene.solver.refine > 1 {
+        builds(format!(
+            "load steps cut where bonds would break, down to 1/{} of a step",
+            scene.solver.refine
+        ));
+    }
     if let Some(dynamics) = &scene.dynamics {
         let method = dynamics.method();
         builds(format!("explicit dynamics up to {} s, {} rows of history", method.end_time, method.records));
