@@ -332,6 +332,23 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         }
     }
 
+    fn suspects(&self, displacement: &Field<D>, chunk: usize, least: f64) -> Vec<usize> {
+        let (position, moved) = (self.position.components(), displacement.components());
+        let stretched = |&site: &usize| {
+            (self.starts[site]..self.starts[site + 1]).any(|k| {
+                let (other, inverse) = (self.neighbours[k] as usize, self.inverse_length[k]);
+                let mut e = 0.0;
+                for d in 0..D {
+                    let bond = position[d][other] - position[d][site];
+                    let eta = moved[d][other] - moved[d][site];
+                    e += eta * (2.0 * bond + eta);
+                }
+                e * inverse * inverse > least
+            })
+        };
+        chunk_range(chunk, self.sites()).filter(stretched).collect()
+    }
+
     fn sever(&mut self, bonds: &[Overstretched]) {
         for bond in bonds {
             // as the padding of the lists: a bond of no stiffness to itself
