@@ -1,11 +1,13 @@
 """The brick of `crystfem bench brick` by scikit-fem, on the same nodes and elements.
 
-brick.py MESH.inp STEPS TEMPERATURES.csv: prints one line of JSON, writes the temperature of each node.
+brick.py MESH.inp STEPS TEMPERATURES.csv [STEP NEWTON SOLVES]: prints one line of JSON, writes the temperature of each
+node. STEP: length of a step, s; NEWTON, SOLVES: tolerances.
 Consistent capacity, 2 x 2 x 2 Gauss points, backward Euler, Newton's iteration with conjugate gradients (diagonal
 preconditioner).
 """
 
 import json
+import os
 import resource
 import sys
 import time
@@ -20,9 +22,8 @@ from skfem.refdom import RefHex
 CONDUCTIVITY, DENSITY, SPECIFIC_HEAT = 0.25, 1010.0, 2200.0
 HOT, COLD = 493.15, 353.15
 FILM, EMISSIVITY, STEFAN_BOLTZMANN = 15.0, 0.9, 5.670374419e-8
-STEP = 0.5
-# of a residual's norm over the first one of its step, and of a linear solve
-NEWTON, SOLVES = 1e-10, 1e-6
+# length of a step; of a residual's norm over the first one of its step, and of a linear solve
+STEP, NEWTON, SOLVES = map(float, sys.argv[4:7] or (0.5, 1e-10, 1e-6))
 
 # corners of C3D8 in the order of Abaqus and CalculiX
 CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
@@ -48,7 +49,7 @@ def main():
     path, steps, output = sys.argv[1], int(sys.argv[2]), sys.argv[3]
     nodes, elements, bottom = read(path)
 
-    start = time.perf_counter()
+    start, user = time.perf_counter(), os.times().user
     order = [CORNERS.index(tuple(int(x) for x in corner)) for corner in RefHex.p.T]
     mesh = skfem.MeshHex(np.ascontiguousarray(nodes.T), np.ascontiguousarray(elements[:, order].T))
     basis = skfem.Basis(mesh, skfem.ElementHex1(), intorder=2)
@@ -66,10 +67,10 @@ def main():
     linear = (conduction + capacity).tocsr()
     free = np.flatnonzero(~held)
     temperature = np.where(held, COLD, HOT)
-    set_up = time.perf_counter() - start
+    set_up, user_set_up = time.perf_counter() - start, os.times().user - user
 
-    start = time.perf_counter()
-    newton, iterations = 0, 0
+    start, user = time.perf_counter(), os.times().user
+    newton, iterations, first_step = 0, 0, None
     for _ in range(steps):
         before, first = temperature.copy(), None
         while True:
@@ -96,11 +97,13 @@ def main():
                 sys.exit(f"conjugate gradients failed: {failed}")
             temperature[free] -= change
             newton, iterations = newton + 1, iterations + count[0]
-    loop = time.perf_counter() - start
+        first_step = os.times().user - user if first_step is None else first_step
+    loop, user_loop = time.perf_counter() - start, os.times().user - user
 
     np.savetxt(output, temperature, header="temperature [K]", comments="")
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     figures = {"version": skfem.__version__, "set_up": set_up, "loop": loop, "memory": memory}
+    figures |= {"user_set_up": user_set_up, "user_first": first_step, "user_loop": user_loop}
     print(json.dumps(figures | {"newton": newton, "iterations": iterations}))
 
 
