@@ -80,9 +80,9 @@ fn memory_of_the_process() {
                  conductivity = \"1 W/(m K)\"\nspecific_heat = \"1000 J/(kg K)\"\n[[region]]\nmaterial = \"a\"\n\
                  temperature = \"20 degC\"\n[time]\nend = \"10 s\"\nstep = \"1 s\"\n";
     fs::write(here.join("brick.toml"), brick).unwrap();
-    // 5e8 bytes are needed
+    // 4.1e8 bytes are needed
     let ended = limited("crystfem", "check brick.toml", "ulimit -v 450000", here).with_code(2);
-    ended.tells("`mesh.brick.elements`: found 1.030e6 nodes, which need about 0.5 GiB");
+    ended.tells("`mesh.brick.elements`: found 1.030e6 nodes, which need about 0.4 GiB");
     ended.tells("(the available memory)");
 }
 
