@@ -321,6 +321,8 @@ fn restarts(refine: usize) {
     run(&mut whole, &mut saved);
     eprintln!("{} broken, {} restartable moments", whole.broken, saved.len());
     assert!(saved.len() >= 4 && whole.broken > 0);
+    let is_cut = (1..=whole.history.len()).any(|rows| whole.prescribed(rows).is_none());
+    assert_eq!(is_cut, refine > 1);
     for mut state in saved {
         let (step, round, iteration) = (state.step, state.round, state.iteration);
         run(&mut state, &mut Vec::new());
