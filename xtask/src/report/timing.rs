@@ -95,6 +95,15 @@ const SUBJECTS: &[Subject] = &[
         note: "The same sheet against 9,600 steps; a point for each number of steps, and for each `refine` of 15 steps.",
     },
     Subject {
+        title: "Fracture: a response that snaps back",
+        source: Source::Case { case: "ch2/dent-snap-back", curves: "error_against_time_" },
+        split: "\n",
+        default: "released_energy [m=3.015 refine]",
+        axes: ["s, whole solution", "error of the energy of broken bonds"],
+        command: "cargo xtask validate --case cases/ch2/dent-snap-back",
+        note: "The same sheet torn along its equilibria, against an independent program; a point for each `refine`, and one for a displacement that is held.",
+    },
+    Subject {
         title: "Fracture: spacing",
         source: Source::Case { case: "ch2/dent-convergence", curves: "error_against_time_" },
         split: "\n",

@@ -218,7 +218,11 @@ pub fn peak_lines(outcomes: &[Outcome]) -> String {
         };
         (apart > 0.0 && load > 0.0 && !outcome.is_dynamic()).then(|| {
             let (at, apart) = (at * 1e3, apart * 1e3);
-            format!("{name}: peak {load:.5} N at {at:.5} mm, ± one load step: {apart:.3} mm, {least:.3} N\n")
+            // where the load was lowered behind the peak, the step in which bonds broke is no row
+            let lowered =
+                outcome.history.get(peak + 1).is_some_and(|r| r.factor < outcome.history[peak].factor);
+            let within = format!(", ± one load step: {apart:.3} mm, {least:.3} N");
+            format!("{name}: peak {load:.5} N at {at:.5} mm{}\n", if lowered { "" } else { within.as_str() })
         })
     };
     outcomes.iter().filter_map(line).collect()

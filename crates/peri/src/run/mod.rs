@@ -349,7 +349,7 @@ fn solve<const D: usize>(
     system.breaking =
         criterion.map(|criterion| Breaking { criterion: criterion.clone(), policy: scene.solver.breaking });
     system.contact = contact;
-    system.refine = scene.solver.refine;
+    (system.refine, system.snap_back) = (scene.solver.refine, scene.solver.snap_back);
     system.stop_below = scene.solver.stop_below.unwrap_or(0.0);
     phases.start("solve");
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {

@@ -394,6 +394,15 @@ fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             "1, or a quasi-static scene whose bonds break at once and in equilibrium, without friction";
         return Err(source.error("solver.refine", format!("{} with {what}", solver.refine), allowed));
     }
+    let found = match (solver.refine, &solver.path) {
+        (1, _) => Some("`snap_back` without `refine`"),
+        (_, Some(_)) => Some("`snap_back` along a `path`"),
+        _ => None,
+    };
+    if let Some(found) = found.filter(|_| solver.snap_back) {
+        let allowed = "`refine` above 1 and a load that grows in proportion";
+        return Err(source.error("solver.snap_back", found, allowed));
+    }
     within("accept", solver.accept.unwrap_or(0.0), 0.0, 1.0)?;
     within("stop_below", solver.stop_below.unwrap_or(0.0), 0.0, 1.0)
 }

@@ -75,6 +75,9 @@ pub fn explain<const D: usize>(
             scene.solver.refine
         ));
     }
+    if scene.solver.snap_back {
+        builds("loads that are lowered after bonds broke, until no others would at once".to_owned());
+    }
     if let Some(dynamics) = &scene.dynamics {
         let method = dynamics.method();
         builds(format!("explicit dynamics up to {} s, {} rows of history", method.end_time, method.records));

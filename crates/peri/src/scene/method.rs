@@ -30,6 +30,8 @@ pub struct Solver {
     pub accept: Option<f64>,
     /// Where bonds would break in a load step, cut it: they break within this part, 1/`refine`, of a step.
     pub refine: usize,
+    /// Lower the load after bonds broke, until no others would break at once; needs `refine`.
+    pub snap_back: bool,
     /// When bonds are looked at that may break.
     pub breaking: Policy,
     /// Skip what is left of the load once it has fallen below this part of its peak.
@@ -48,6 +50,7 @@ impl Default for Solver {
             mass_safety: None,
             accept: None,
             refine: 1,
+            snap_back: false,
             breaking: Policy::default(),
             stop_below: None,
         }

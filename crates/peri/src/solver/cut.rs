@@ -29,21 +29,13 @@ impl<const D: usize> System<'_, D> {
         if !(may && stretched && !self.beyond(state).is_empty()) {
             return false;
         }
-        let least = self.breaking_stretch().unwrap_or(1.0);
         let old = state.history.last().map_or(1.0, |record| record.largest_stretch);
-        let part = (least - old) / ((1.0 + state.balanced_stretches.high).sqrt() - old);
-        let shortest = shortest / length.abs();
-        // parts of the step; 1 is its end
-        let ends = if state.cuts < BY_STRETCH && 0.0 < part && part < 1.0 {
-            let low = part - 0.5 * shortest;
-            [low.min(1.0 - shortest), (low + shortest).max(shortest)]
+        let new = if state.cuts < BY_STRETCH {
+            self.around([before, old], [self.factors[at], state.largest_stretch()], shortest)
         } else {
-            [0.5, 0.5]
+            vec![before + 0.5 * length]
         };
-        let mut new: Vec<f64> =
-            ends.into_iter().filter(|&end| end > CRUMB * shortest && end < 1.0 - CRUMB * shortest).collect();
-        new.dedup();
-        state.insert(&self.factors, new.into_iter().map(|end| before + end * length));
+        state.insert(&self.factors, &new);
         self.factors.to_mut().clone_from(&state.factors);
         state.cuts += 1;
         let rest = || Field::zeros(state.displacement.sites());
@@ -51,14 +43,38 @@ impl<const D: usize> System<'_, D> {
         (state.predicted, state.iteration) = (false, 0);
         true
     }
+
+    /// Load factors `shortest` apart between those of two equilibria, of which the second has overstretched bonds: the largest
+    /// stretch, taken as linear in the load, becomes critical between them. Each equilibrium is a factor and a stretch.
+    pub(super) fn around(&self, before: [f64; 2], after: [f64; 2], shortest: f64) -> Vec<f64> {
+        let length = after[0] - before[0];
+        let part = (self.breaking_stretch().unwrap_or(1.0) - before[1]) / (after[1] - before[1]);
+        let shortest = shortest / length.abs();
+        // parts of the step; 1 is its end
+        let ends = if 0.0 < part && part < 1.0 {
+            let low = part - 0.5 * shortest;
+            [low.min(1.0 - shortest), (low + shortest).max(shortest)]
+        } else {
+            [0.5, 0.5]
+        };
+        let apart = |end: &f64| *end > CRUMB * shortest && *end < 1.0 - CRUMB * shortest;
+        let mut new: Vec<f64> = ends.into_iter().filter(apart).map(|end| before[0] + end * length).collect();
+        new.dedup();
+        new
+    }
 }
 
 impl<const D: usize> State<D> {
+    /// Of the last equilibrium.
+    pub(super) fn largest_stretch(&self) -> f64 {
+        (1.0 + self.balanced_stretches.high).sqrt()
+    }
+
     /// Puts factors before that of the present step.
-    fn insert(&mut self, factors: &[f64], new: impl ExactSizeIterator<Item = f64>) {
+    pub(super) fn insert(&mut self, factors: &[f64], new: &[f64]) {
         let (at, count) = (self.step, new.len());
         self.factors = factors.to_vec();
-        self.factors.splice(at..at, new);
+        self.factors.splice(at..at, new.iter().copied());
         self.inserted.iter_mut().filter(|row| **row >= at).for_each(|row| *row += count);
         self.inserted.extend(at..at + count);
         self.inserted.sort_unstable();
@@ -80,10 +96,10 @@ mod tests {
     fn prescribed_steps_keep_their_numbers() {
         let mut state = State::<2>::new(0);
         state.step = 1;
-        state.insert(&[0.5, 1.0], [0.6, 0.7].into_iter());
+        state.insert(&[0.5, 1.0], &[0.6, 0.7]);
         state.step = 2;
         let factors = state.factors.clone();
-        state.insert(&factors, [0.65].into_iter());
+        state.insert(&factors, &[0.65]);
         assert_eq!(state.factors, [0.5, 0.6, 0.65, 0.7, 1.0]);
         let numbers: Vec<_> = (0..=5).map(|rows| state.prescribed(rows)).collect();
         assert_eq!(numbers, [None, Some(1), None, None, None, Some(2)]);

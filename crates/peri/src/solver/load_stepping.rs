@@ -72,6 +72,10 @@ pub fn load_stepping<const D: usize>(
                 continue 'steps;
             }
             work_of_loads(system, state);
+            if system.lower(state, shortest) {
+                state.iteration = 0;
+                continue;
+            }
             let sites = if system.is_overstretched(state.balanced_stretches) {
                 system.break_bonds(state)
             } else {
@@ -82,6 +86,7 @@ pub fn load_stepping<const D: usize>(
             if sites.is_empty() {
                 break;
             }
+            state.cuts = 0;
             method.broke(system, &sites);
             finished(&*system.bonds, state)?;
             let particles = system.bonds.particles();
@@ -92,6 +97,7 @@ pub fn load_stepping<const D: usize>(
         state.predicted = false;
         state.round = 0;
         (state.step_iterations, state.cuts) = (0, 0);
+        system.raise(state, shortest);
         finished(&*system.bonds, state)?;
         if severed(system, state) {
             break;

@@ -18,6 +18,7 @@ mod passes;
 mod places;
 mod preconditioner;
 mod scale;
+mod snap_back;
 mod state;
 mod system;
 mod time_step;

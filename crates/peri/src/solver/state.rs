@@ -166,6 +166,8 @@ pub struct State<const D: usize> {
     /// … which of them nobody has prescribed, and how often the present one has been.
     pub(super) inserted: Vec<usize>,
     pub(super) cuts: u32,
+    /// Factor and largest stretch of the equilibrium from which the load was lowered, see [`System::snap_back`](super::System::snap_back).
+    pub(super) lowered: Option<[f64; 2]>,
     /// The finished steps.
     pub history: Vec<Record>,
 }
@@ -211,6 +213,7 @@ impl<const D: usize> State<D> {
             factors: Vec::new(),
             inserted: Vec::new(),
             cuts: 0,
+            lowered: None,
             history: Vec::new(),
         }
     }

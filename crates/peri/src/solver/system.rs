@@ -24,6 +24,8 @@ pub struct System<'a, const D: usize> {
     pub factors: Cow<'a, [f64]>,
     /// Parts of a load step to which the load at which bonds break is found; 1: they break at the end of the step.
     pub refine: usize,
+    /// Lower the load after bonds broke, until no others would break at once; with [`Self::refine`] above 1.
+    pub snap_back: bool,
     /// Whether and when bonds break.
     pub breaking: Option<Breaking>,
     /// Stop after the step whose load is below this part of the largest, once bonds broke; 0: never.
@@ -73,6 +75,7 @@ impl<'a, const D: usize> System<'a, D> {
             loads: Cow::Borrowed(loads),
             factors: Cow::Borrowed(factors),
             refine: 1,
+            snap_back: false,
             breaking: None,
             stop_below: 0.0,
             fit_bound: 1e-9,

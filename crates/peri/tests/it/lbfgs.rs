@@ -1,11 +1,12 @@
 //! Preconditioned L-BFGS against dynamic relaxation: the same equilibria, for less work.
 
 use crate::bodies::{Body, Built, MODULUS, distance, hold, rms};
+use crate::load_steps::dent;
 use peri::Error;
 use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::field::Field;
-use peri::geometry::{Cut, Operation, Shape, lattice};
+use peri::geometry::{Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};
 use peri::solver::{
@@ -164,24 +165,6 @@ fn same_equilibrium_as_relaxation() {
     check([12, 10, 9], 150);
 }
 
-/// Double-edge-notched tension as in `relaxation.rs`: 80 × 200 × 3 mm, cracks of 20 mm, pulled apart until it breaks.
-fn dent(spacing: f64) -> (LatticeBonds<2>, Loads<2>, Box<dyn BondPotential>, f64) {
-    let (width, height, notch, thickness) = (0.08, 0.2, 0.02, 3e-3);
-    let body =
-        [Operation::Add(Shape::Box { min: [-width / 2.0, -height / 2.0], max: [width / 2.0, height / 2.0] })];
-    let crack = |side: f64| Cut {
-        corner: [side * (width / 2.0 + 1e-3), 0.0],
-        edges: [[-side * (notch + 1e-3 - 1e-9), 0.0], [0.0; 2]],
-    };
-    let cells = lattice(&body, spacing, thickness).unwrap();
-    let bonds = LatticeBonds::new(cells, 3.015, VolumeCorrection::None, &[crack(1.0), crack(-1.0)]).unwrap();
-    let grip = height / 2.0 - 3.0 * spacing;
-    let loads = hold(&bonds, |x| (x[1].abs() > grip).then(|| (3, [0.0, 0.1 * x[1].signum()])));
-    let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-    let modulus = modulus(Space::PlaneStress, 0.6e6, 3.015 * spacing, thickness);
-    (bonds, loads, law, modulus)
-}
-
 /// Twenty steps to rupture and beyond: the same load curve, fewer evaluations.
 #[test]
 fn dent_through_breaking() {
@@ -189,7 +172,7 @@ fn dent_through_breaking() {
     let factors: Vec<f64> = (1..=20).map(|k| f64::from(k) / 20.0).collect();
     let mut states = Vec::new();
     for fast in [false, true] {
-        let (mut bonds, loads, law, modulus) = dent(spacing);
+        let (mut bonds, loads, law, modulus) = dent(spacing, 0.02);
         let mut problem = Problem::new(&*law, modulus, &loads, &factors);
         problem.breaking = Some(Breaking { criterion: 2.9442.into(), policy: Policy::AtEquilibrium });
         let start = std::time::Instant::now();
@@ -244,54 +227,15 @@ fn bits_do_not_depend_on_threads() {
     }
 }
 
-/// Ten steps, cut to a 64th where bonds would break, against 640: the same rows around the first break, the same peak, the
-/// same number of broken bonds.
-#[test]
-fn cut_steps_find_what_short_ones_do() {
-    let run = |steps: u32, refine: usize| {
-        let (mut bonds, loads, law, modulus) = dent(4e-3);
-        let factors: Vec<f64> = (1..=steps).map(|k| f64::from(k) / f64::from(steps)).collect();
-        let mut system = System::new(&mut bonds, BondMaterial::new(&*law, modulus), &loads, &factors);
-        system.breaking = Some(Breaking { criterion: 2.9442.into(), policy: Policy::AtEquilibrium });
-        (system.refine, system.stop_below) = (refine, 0.02);
-        let mut state = State::new(system.bonds.sites());
-        let settings = Lbfgs { tolerance: 1e-5, ..Default::default() };
-        settings.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
-        state
-    };
-    let (cut, short) = (run(10, 64), run(640, 1));
-    let step = 1.0 / 640.0;
-    let first = |state: &State<2>| state.history.iter().position(|r| r.broken > 0).unwrap();
-    let (row, of_short) = (first(&cut), first(&short));
-    let [before, at] = [row - 1, row].map(|k| cut.history[k].factor);
-    // each finds the first break within its own shortest step
-    assert!(at - before < 1.3 * step && (at - short.history[of_short].factor).abs() < step, "{before} {at}");
-    let peak = |state: &State<2>| {
-        state.history.iter().max_by(|a, b| a.load.total_cmp(&b.load)).map(|r| (r.load, r.factor)).unwrap()
-    };
-    let ((load, place), (wanted, at)) = (peak(&cut), peak(&short));
-    assert!((place - at).abs() < step && (load / wanted - 1.0).abs() < step, "{load} {wanted} {place} {at}");
-    assert_eq!(cut.broken, short.broken);
-    // every prescribed step is there, and no more than a few others
-    let prescribed: Vec<usize> = (1..=cut.history.len()).filter_map(|rows| cut.prescribed(rows)).collect();
-    assert!(prescribed.iter().copied().eq(1..=prescribed.len()) && prescribed.len() > 3, "{prescribed:?}");
-    let iterations = [cut.total_iterations, short.total_iterations];
-    assert!(
-        2 * iterations[0] < iterations[1] && cut.history.len() < 60,
-        "{iterations:?} {}",
-        cut.history.len()
-    );
-}
-
 /// A run that begins with any state that `watch` calls restartable takes the same way, to the last bit.
 #[test]
 fn restarts_take_the_same_bits() {
-    for refine in [1, 16] {
-        restarts(refine);
+    for (refine, snap_back) in [(1, false), (16, false), (16, true)] {
+        restarts(refine, snap_back);
     }
 }
 
-fn restarts(refine: usize) {
+fn restarts(refine: usize, snap_back: bool) {
     // some steps go on from equilibria without a broken bond, and one begins with a new preconditioner
     let factors: Vec<f64> = (1..=12).map(|k| f64::from(k) / 12.0).collect();
     let build = || {
@@ -306,7 +250,7 @@ fn restarts(refine: usize) {
         let (mut built, loads) = build();
         let mut system = System::new(&mut built.lattice, BondMaterial::new(&*law, MODULUS), &loads, &factors);
         system.breaking.clone_from(&breaking);
-        system.refine = refine;
+        (system.refine, system.snap_back) = (refine, snap_back);
         let settings = Lbfgs { tolerance: 1e-5, ..Default::default() };
         let mut watch = |status: &peri::solver::Status, state: &State<2>| {
             if status.restartable {
@@ -323,7 +267,10 @@ fn restarts(refine: usize) {
     assert!(saved.len() >= 4 && whole.broken > 0);
     let is_cut = (1..=whole.history.len()).any(|rows| whole.prescribed(rows).is_none());
     assert_eq!(is_cut, refine > 1);
-    for mut state in saved {
+    assert_eq!(whole.history.windows(2).any(|rows| rows[1].factor < rows[0].factor), snap_back);
+    // a long path restarts from a few places
+    let every = saved.len().div_ceil(8);
+    for mut state in saved.into_iter().step_by(every) {
         let (step, round, iteration) = (state.step, state.round, state.iteration);
         run(&mut state, &mut Vec::new());
         assert!(state == whole, "from step {step}, round {round}, iteration {iteration}");

@@ -21,6 +21,7 @@ mod learnt;
 mod limits;
 #[path = "../../examples/linear_solid.rs"]
 mod linear_solid;
+mod load_steps;
 mod looks;
 mod materials;
 mod model;
