@@ -41,8 +41,8 @@ fn loops(function: &[(u64, &str)]) -> Vec<Loop> {
     found
 }
 
-/// With AVX-512 no bond of a full tile goes to the stack. With AVX2, which has 16 registers, at most what two vectors of bonds in the
-/// plane need: ζ of one of them, and the least and largest stretch.
+/// With AVX-512 no vector goes to the stack. With AVX2, which has 16 registers, at most four do: the components of ζ until the law is
+/// evaluated, the least and the largest stretch.
 #[test]
 #[cfg(target_arch = "x86_64")]
 fn inner_loops_do_not_spill() {
