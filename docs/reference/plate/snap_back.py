@@ -21,7 +21,7 @@ def equilibrium(U, u):
 
 
 def energy(l):
-    """Of a bond, J with lengths in mm and forces in N: its density over both ends, t integrated from 1 by the table's trapezia."""
+    """The integral of t from 1 to a stretch, by trapezia in the table."""
     fine = np.linspace(1.0, l, 20001)
     t = np.interp(fine, b.l, b.t)
     return float(((t[1:] + t[:-1]) / 2 * np.diff(fine)).sum())

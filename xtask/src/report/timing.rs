@@ -92,7 +92,7 @@ const SUBJECTS: &[Subject] = &[
         default: "peak_load [m=3.015 refine]",
         axes: ["s, whole solution", "error of the peak load"],
         command: "cargo xtask validate --case cases/ch2/dent-steps",
-        note: "The same sheet against 9,600 steps; a point for each number of steps, and for each `refine` of 15 steps.",
+        note: "The same sheet against an independent program; a point for each number of steps, and for each `refine` of 15 steps.",
     },
     Subject {
         title: "Fracture: a response that snaps back",

@@ -4,6 +4,7 @@ use super::{Bonds, Property};
 use crate::field::{CHUNK, Field};
 use crate::potential::StretchRange;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// A bond, seen from one of its ends, that is to be severed.
@@ -78,7 +79,7 @@ pub fn fingerprint(bonds: &[Overstretched]) -> u64 {
 }
 
 /// A part of the body that hangs together by intact bonds.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fragment {
     /// Its particles, two or more.
     pub particles: usize,

@@ -311,11 +311,10 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     fn force(
         &self,
         displacement: &Field<D>,
-        chunk: usize,
+        start: usize,
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        let start = chunk_range(chunk, self.volumes.len()).start;
         if let Some(kernel) = &self.kernel {
             let data = CloudData {
                 position: self.position.components(),

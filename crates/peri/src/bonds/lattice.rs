@@ -361,21 +361,11 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.classify();
     }
 
-    fn force(
-        &self,
-        displacement: &Field<D>,
-        chunk: usize,
-        force: &mut [&mut [f64]; D],
-        track: Option<&mut StretchRange>,
-    ) {
-        self.force_from(displacement, chunk_range(chunk, self.sites).start, force, track);
-    }
-
     fn piece(&self) -> usize {
         TILE
     }
 
-    fn force_from(
+    fn force(
         &self,
         displacement: &Field<D>,
         start: usize,

@@ -117,28 +117,18 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
     /// Sets per-particle surface-correction factors (one field of `D` components over the sites).
     fn set_factors(&mut self, factors: Field<D>);
-    /// Force densities Σ_J f V_J, N/m³, of work item `chunk`; collects the stretches observed if asked, of every bond in at least
-    /// one of the items that hold its ends.
+    /// Force densities Σ_J f V_J, N/m³, of whole [`Bonds::piece`]s from the site `start` on; collects the stretches observed if
+    /// asked, of every bond in at least one of the work items that hold its ends.
     fn force(
-        &self,
-        displacement: &Field<D>,
-        chunk: usize,
-        force: &mut [&mut [f64]; D],
-        track: Option<&mut StretchRange>,
-    );
-    /// Sites that [`Bonds::force_from`] may begin with: multiples of this, of which a work item is one.
-    fn piece(&self) -> usize {
-        CHUNK
-    }
-    /// As [`Bonds::force`], of whole pieces from the site `start` on.
-    fn force_from(
         &self,
         displacement: &Field<D>,
         start: usize,
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
-    ) {
-        self.force(displacement, start / CHUNK, force, track);
+    );
+    /// Sites that [`Bonds::force`] may begin with: multiples of this, of which a work item is one.
+    fn piece(&self) -> usize {
+        CHUNK
     }
     /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are those of the body.
     fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange {
@@ -147,7 +137,7 @@ pub trait Bonds<const D: usize>: Send + Sync {
         let mut parts = scratch.chunks_mut(length);
         let mut out: [&mut [f64]; D] = std::array::from_fn(|_| parts.next().unwrap_or_default());
         let mut range = StretchRange::REST;
-        self.force(displacement, chunk, &mut out, Some(&mut range));
+        self.force(displacement, chunk * CHUNK, &mut out, Some(&mut range));
         range
     }
     /// Sites which, for all work items together, contain both ends of every bond with e > `least`.
@@ -210,7 +200,7 @@ pub fn force<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B, displacement: &Fie
     let sites = bonds.sites();
     force.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
         debug_assert_eq!(chunk_range(chunk, sites).len(), out[0].len());
-        bonds.force(displacement, chunk, &mut out, None);
+        bonds.force(displacement, chunk * CHUNK, &mut out, None);
     });
 }
 

@@ -135,7 +135,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        bonds.force(displacement, chunk, force, track);
+        bonds.force(displacement, chunk * CHUNK, force, track);
     }
 
     fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
@@ -149,7 +149,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         start: usize,
         force: &mut [&mut [f64]; D],
     ) {
-        bonds.force_from(displacement, start, force, None);
+        bonds.force(displacement, start, force, None);
     }
 
     /// Σ_I V_I Σ_J w V_J kθ |ξ| φ.

@@ -221,8 +221,11 @@ pub fn peak_lines(outcomes: &[Outcome]) -> String {
             // where the load was lowered behind the peak, the step in which bonds broke is no row
             let lowered =
                 outcome.history.get(peak + 1).is_some_and(|r| r.factor < outcome.history[peak].factor);
-            let within = format!(", ± one load step: {apart:.3} mm, {least:.3} N");
-            format!("{name}: peak {load:.5} N at {at:.5} mm{}\n", if lowered { "" } else { within.as_str() })
+            let within = match lowered {
+                true => String::new(),
+                false => format!(", ± one load step: {apart:.3} mm, {least:.3} N"),
+            };
+            format!("{name}: peak {load:.5} N at {at:.5} mm{within}\n")
         })
     };
     outcomes.iter().filter_map(line).collect()
@@ -312,8 +315,8 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
         csv::write(output.join(format!("events_{}.csv", outcome.file_name())), &columns)?;
     }
     for outcome in outcomes.iter().filter(|outcome| outcome.fragments.len() > 1) {
-        let particles: Vec<f64> = outcome.fragments.iter().map(|own| own.0 as f64).collect();
-        let volume: Vec<f64> = outcome.fragments.iter().map(|own| own.1).collect();
+        let particles: Vec<f64> = outcome.fragments.iter().map(|own| own.particles as f64).collect();
+        let volume: Vec<f64> = outcome.fragments.iter().map(|own| own.volume).collect();
         let density = scene.dynamics.as_ref().map(|dynamics| dynamics.density.si());
         let mass: Option<Vec<f64>> = density.map(|density| volume.iter().map(|v| density * v).collect());
         let mut columns = vec![("particles", "", &particles[..]), ("volume", "m^3", &volume)];

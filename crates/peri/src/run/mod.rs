@@ -194,11 +194,13 @@ fn run_variant<const D: usize>(
                 outcome.value(q::CRITICAL_ENERGY, *limit);
             }
         }
-        outcome.fragments = fragments(&*body.bonds).iter().map(|f| (f.particles, f.volume)).collect();
+        outcome.fragments = fragments(&*body.bonds);
         outcome.value(q::FRAGMENTS, outcome.fragments.len() as f64);
         let volume: f64 = body.bonds.particles().iter().map(|&site| body.bonds.volume(site as usize)).sum();
-        outcome
-            .value(q::LARGEST_FRAGMENT, outcome.fragments.first().map_or(0.0, |largest| largest.1 / volume));
+        outcome.value(
+            q::LARGEST_FRAGMENT,
+            outcome.fragments.first().map_or(0.0, |largest| largest.volume / volume),
+        );
     }
     if scene.dynamics.is_some() {
         // a body that is held everywhere has none

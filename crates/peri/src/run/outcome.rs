@@ -1,6 +1,6 @@
 //! Results of one variant.
 
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, Fragment};
 use crate::quantities as q;
 use crate::scene::Variant;
 use crate::solver::{Event, Loads, Record, State};
@@ -26,8 +26,8 @@ pub struct Outcome {
     pub history: Vec<Record>,
     /// Bonds that broke together, in their order.
     pub events: Vec<Event>,
-    /// Particles and volume, m³, of each fragment.
-    pub fragments: Vec<(usize, f64)>,
+    /// The fragments, the largest first.
+    pub fragments: Vec<Fragment>,
     /// Names of the regions of prescribed displacement.
     pub regions: Vec<String>,
     /// Names of rigid planes.

@@ -4,8 +4,8 @@ use super::state::State;
 use super::system::System;
 use crate::field::Field;
 
-/// Cuts of one step by stretches; then it is halved.
-const BY_STRETCH: u32 = 3;
+/// Cuts of one step, or lowerings of its load, by stretches; then it is halved.
+pub(super) const BY_STRETCH: u32 = 3;
 /// Part of the shortest step that is not worth one of its own.
 const CRUMB: f64 = 0.25;
 
@@ -35,8 +35,7 @@ impl<const D: usize> System<'_, D> {
         } else {
             vec![before + 0.5 * length]
         };
-        state.insert(&self.factors, &new);
-        self.factors.to_mut().clone_from(&state.factors);
+        self.insert(state, &new);
         state.cuts += 1;
         let rest = || Field::zeros(state.displacement.sites());
         state.displacement = if at == 0 { rest() } else { state.past.pop().unwrap_or_else(rest) };
@@ -62,6 +61,12 @@ impl<const D: usize> System<'_, D> {
         new.dedup();
         new
     }
+
+    /// Puts load factors before that of the present step.
+    pub(super) fn insert(&mut self, state: &mut State<D>, new: &[f64]) {
+        state.insert(&self.factors, new);
+        self.factors.to_mut().clone_from(&state.factors);
+    }
 }
 
 impl<const D: usize> State<D> {
@@ -70,8 +75,8 @@ impl<const D: usize> State<D> {
         (1.0 + self.balanced_stretches.high).sqrt()
     }
 
-    /// Puts factors before that of the present step.
-    pub(super) fn insert(&mut self, factors: &[f64], new: &[f64]) {
+    /// As [`System::insert`].
+    fn insert(&mut self, factors: &[f64], new: &[f64]) {
         let (at, count) = (self.step, new.len());
         self.factors = factors.to_vec();
         self.factors.splice(at..at, new.iter().copied());

@@ -73,7 +73,6 @@ pub fn load_stepping<const D: usize>(
             }
             work_of_loads(system, state);
             if system.lower(state, shortest) {
-                state.iteration = 0;
                 continue;
             }
             let sites = if system.is_overstretched(state.balanced_stretches) {

@@ -1,16 +1,14 @@
 //! Responses that snap back: where bonds break and others would follow at once, the load is lowered until none would. The next
 //! break then controls the load, so that a crack advances event by event through equilibria.
 
+use super::cut::BY_STRETCH;
 use super::state::State;
 use super::system::System;
 
-/// Lowerings of one step by stretches; then the load is halved.
-const BY_STRETCH: u32 = 3;
-
 impl<const D: usize> System<'_, D> {
-    /// Whether bonds would break in an equilibrium that others have left by breaking. The load of the step then is lowered to
-    /// half a `shortest` step below where the largest stretch, less one taken as proportional to the load, is critical; and
-    /// `state` is near the equilibrium there.
+    /// Whether more bonds would break in the equilibrium after some broke. The load of the step then is lowered to half a
+    /// `shortest` step below that at which the largest stretch is critical, λ − 1 taken as proportional to the load; and `state`
+    /// is near the equilibrium there.
     pub(super) fn lower(&mut self, state: &mut State<D>, shortest: f64) -> bool {
         let at = state.step;
         let factor = self.factors[at];
@@ -24,11 +22,11 @@ impl<const D: usize> System<'_, D> {
         let part = if state.cuts < BY_STRETCH && part > 0.0 { part.min(1.0 - margin) } else { 0.5 };
         if state.inserted.binary_search(&at).is_ok() {
             state.factors[at] = part * factor;
+            self.factors.to_mut()[at] = part * factor;
         } else {
-            state.insert(&self.factors, &[part * factor]);
+            self.insert(state, &[part * factor]);
         }
-        self.factors.to_mut().clone_from(&state.factors);
-        state.cuts += 1;
+        (state.cuts, state.iteration) = (state.cuts + 1, 0);
         state.lowered = Some([factor, stretch]);
         for &site in self.bonds.particles() {
             let site = site as usize;
@@ -47,7 +45,6 @@ impl<const D: usize> System<'_, D> {
         }
         let below = [self.factors[state.step - 1], state.largest_stretch()];
         let new = self.around(below, above, shortest);
-        state.insert(&self.factors, &new);
-        self.factors.to_mut().clone_from(&state.factors);
+        self.insert(state, &new);
     }
 }

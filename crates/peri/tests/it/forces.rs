@@ -12,7 +12,7 @@ fn in_pieces<const D: usize>(bonds: &dyn Bonds<D>, u: &Field<D>) {
     for start in (0..bonds.sites()).step_by(piece) {
         let size = piece.min(bonds.sites() - start);
         let mut parts = [(); D].map(|()| vec![f64::NAN; size]);
-        bonds.force_from(u, start, &mut parts.each_mut().map(|part| &mut part[..]), None);
+        bonds.force(u, start, &mut parts.each_mut().map(|part| &mut part[..]), None);
         for (part, whole) in parts.iter().zip(whole.components()) {
             assert!(part[..] == whole[start..start + size], "pieces of {piece} from site {start}");
         }

@@ -11,7 +11,7 @@ use peri::solver::{Breaking, Lbfgs, Loads, Method, Policy, State, System};
 /// Critical stretch of [`dent`].
 const CRITICAL: f64 = 2.9442;
 
-/// Double-edge-notched tension as in `relaxation.rs`: 80 × 200 × 3 mm, cracks of 20 mm, pulled apart until it breaks.
+/// Double-edge-notched tension as in `relaxation.rs`: 80 × 200 × 3 mm, cracks of length `notch`, pulled apart until it breaks.
 pub fn dent(spacing: f64, notch: f64) -> (LatticeBonds<2>, Loads<2>, Box<dyn BondPotential>, f64) {
     let (width, height, thickness) = (0.08, 0.2, 3e-3);
     let body =
@@ -70,8 +70,8 @@ fn cut_steps_find_what_short_ones_do() {
     );
 }
 
-/// The sheet that snaps back: each of its equilibria is one of a sheet that had longer notches from the start, and what breaks
-/// releases the energy of the bonds across the ligament at the critical stretch.
+/// The sheet that snaps back: the peaks of sheets that had longer notches from the start lie on its way, and what breaks releases
+/// the energy of the bonds across the ligament at the critical stretch.
 #[test]
 fn snap_back_follows_equilibria() {
     let (steps, refine) = (20, 64);
@@ -105,7 +105,7 @@ fn snap_back_follows_equilibria() {
         });
     }
     assert_eq!(state.broken, crossing.0);
-    // a bond breaks up to a shortest step beyond the critical stretch
+    // a bond breaks up to 1¼ shortest steps late, at about half of the full load, and its energy grows with the load's square
     let beyond = state.released / crossing.1 - 1.0;
     assert!((0.0..4e-3).contains(&beyond), "{} J of {} J", state.released, crossing.1);
     // what was loaded to a peak at once is unloaded to where it parts
