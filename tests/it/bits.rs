@@ -63,6 +63,26 @@ fn fracture() {
     }
 }
 
+/// A sheet that cracks in explicit dynamics, in both precisions: the same to what single precision leaves.
+#[test]
+fn explicit_dynamics() {
+    let [double, mixed] = ["double", "mixed"].map(|precision| {
+        let directory = tempfile::tempdir().unwrap();
+        let here = directory.path();
+        fs::write(here.join("scene.toml"), scenes::cracking("2 mm", precision)).unwrap();
+        on_any_number_of_threads(here);
+        report(&here.join("out1"))
+    });
+    let of = |name: &str| [&double, &mixed].map(|report| scalar(report, name));
+    let broken = of("broken_bonds");
+    assert!(broken[0] > 100.0 && broken[1] == broken[0], "{broken:?}");
+    let [peak, in_mixed] = of("peak_load");
+    assert!((in_mixed / peak - 1.0).abs() < 1e-5, "{peak} N, {in_mixed} N");
+    let error = scalar(&mixed, "mixed_error");
+    assert!(error > 0.0 && error < 1e-4, "{error}");
+    assert!(double["quantities"].get("mixed_error").is_none());
+}
+
 #[test]
 fn strip_of_scattered_points() {
     let directory = tempfile::tempdir().unwrap();

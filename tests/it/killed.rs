@@ -69,6 +69,12 @@ fn killed_while_it_breaks() {
     survives_kills(&scenes::fracture("2 mm", "method = \"lbfgs\""));
 }
 
+/// Explicit dynamics in mixed precision, whose rounded displacements are no part of a checkpoint.
+#[test]
+fn killed_while_it_cracks() {
+    survives_kills(&scenes::cracking("0.5 mm", "mixed"));
+}
+
 /// Friction, which is a part of the forces of a state, and planes that move.
 #[test]
 fn killed_while_it_rubs() {

@@ -125,6 +125,46 @@ pub fn points() -> String {
     text
 }
 
+/// A sheet with a notch, pulled apart in explicit dynamics.
+pub fn cracking(spacing: &str, precision: &str) -> String {
+    format!(
+        r#"version = 1
+program = "peri"
+
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "{spacing}"
+shapes = [{{ add = "box", min = ["-40 mm", "-60 mm"], max = ["40 mm", "60 mm"] }}]
+cracks = [{{ from = ["-41 mm", "0 mm"], to = ["0 mm", "0 mm"] }}]
+
+[material]
+youngs_modulus = "32 GPa"
+law = "linear"
+critical = {{ fracture_energy = "100 J/m^2" }}
+
+[[boundary]]
+side = "y+"
+displacement = ["free", "0.06 mm"]
+
+[[boundary]]
+side = "y-"
+displacement = ["free", "-0.06 mm"]
+
+[solver]
+method = "verlet"
+fit_bound = 1e-6
+
+[dynamics]
+density = "2500 kg/m^3"
+end_time = "0.1 ms"
+ramp = "0.1 ms"
+precision = "{precision}"
+records = 20
+"#
+    )
+}
+
 /// A cracked sheet that is pulled apart, with fields of its stages; `solver` adds lines to its settings.
 pub fn fracture(spacing: &str, solver: &str) -> String {
     format!(

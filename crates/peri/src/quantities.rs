@@ -39,6 +39,7 @@ polycore::quantities! {
     TIME_STEP = "time_step", "s", "time step at the end";
     KINETIC_ENERGY = "kinetic_energy", "J", "kinetic energy at the end";
     ENERGY_ERROR = "energy_error", "", "largest error of the energy balance, over the energy turned over";
+    MIXED_ERROR = "mixed_error", "", "with `precision = \"mixed\"`: root mean square of what forces differ by from those in double precision at the end, over that of the latter; 0 where the law needs double precision there";
     FORCE_IMBALANCE = "force_imbalance", "", "without `[dynamics]`: largest sum of the internal forces in any step, over half the sum of their magnitudes; zero but for rounding, whatever the residual";
     MOMENT_IMBALANCE = "moment_imbalance", "", "the same of their moments about the body's middle, in deformed positions, over half the body's diagonal as well";
     REACTION_IMBALANCE = "reaction_imbalance", "", "the same of reactions and loads: what free particles still have out of balance";

@@ -1,11 +1,12 @@
 //! Which bonds are stretched beyond what they bear.
 
 use super::{Bonds, Property};
-use crate::field::{CHUNK, Field};
+use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::StretchRange;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// A bond, seen from one of its ends, that is to be severed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,21 +23,51 @@ pub struct Overstretched {
     pub weight: f64,
 }
 
+/// Stretches that forces of a displacement have met; empty where none were looked for.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    /// Sites that were looked at together, a divisor of a work item.
+    pub part: usize,
+    /// Their extremes, in order.
+    pub ranges: Vec<StretchRange>,
+}
+
+impl Seen {
+    /// Those of `sites`, a work item, among which bonds beyond e = `least` may begin.
+    fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<Range<usize>> {
+        if self.ranges.is_empty() {
+            return vec![sites];
+        }
+        let mut found: Vec<Range<usize>> = Vec::new();
+        for start in sites.clone().step_by(self.part) {
+            let borne = self.ranges.get(start / self.part).is_some_and(|range| range.high <= least);
+            // a stretch that is not a number is one to look at
+            if !borne {
+                let end = (start + self.part).min(sites.end);
+                match found.last_mut().filter(|last| last.end == start) {
+                    Some(last) => last.end = end,
+                    None => found.push(start..end),
+                }
+            }
+        }
+        found
+    }
+}
+
 /// All intact bonds beyond the `critical` stretch of the weaker of their ends, each from both of them: λ² − 1 =
-/// η·(2ξ + η)/|ξ|² has the same bits from either. `seen` are the stretches that [`Bonds::force`] has collected of this
-/// displacement, work item by item; none where it has not.
+/// η·(2ξ + η)/|ξ|² has the same bits from either. `seen` is what [`Bonds::force`] has collected of this displacement.
 pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
     critical: &Property,
-    seen: &[StretchRange],
+    seen: &Seen,
 ) -> Vec<Overstretched> {
     let sites = bonds.sites();
     // vectorised loops find the sites to look into; their last bits may differ from those below
     let least = (critical.least() * critical.least() - 1.0) * (1.0 - 1e-9) - 1e-12;
-    let near = |chunk: usize| match seen.get(chunk) {
-        Some(range) if range.high <= least => Vec::new(),
-        _ => bonds.suspects(displacement, chunk, least),
+    let near = |chunk: usize| {
+        let parts = seen.beyond(chunk_range(chunk, sites), least).into_iter();
+        parts.flat_map(|sites| bonds.suspects(displacement, sites, least)).collect::<Vec<usize>>()
     };
     let near: Vec<Vec<usize>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(near).collect();
     let mut near = near.concat();

@@ -9,10 +9,11 @@ use super::{
     Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
-use crate::field::{Field, chunk_range};
+use crate::field::Field;
 use crate::geometry::{Cut, cuts_within, severed};
 use crate::potential::{KernelFit, StretchRange};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The bonds of a cloud.
 pub struct CloudBonds<const D: usize> {
@@ -331,7 +332,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         }
     }
 
-    fn suspects(&self, displacement: &Field<D>, chunk: usize, least: f64) -> Vec<usize> {
+    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<usize> {
         let (position, moved) = (self.position.components(), displacement.components());
         let stretched = |&site: &usize| {
             (self.starts[site]..self.starts[site + 1]).any(|k| {
@@ -345,7 +346,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
                 e * inverse * inverse > least
             })
         };
-        chunk_range(chunk, self.sites()).filter(stretched).collect()
+        sites.filter(stretched).collect()
     }
 
     fn sever(&mut self, bonds: &[Overstretched]) {

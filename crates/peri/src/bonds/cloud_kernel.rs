@@ -1,6 +1,7 @@
 //! The cloud kernel: the neighbours of one particle gathered in groups.
 
-use super::kernel::{Pass, law, load};
+use super::kernel::{Pass, law};
+use super::real::Real;
 use crate::potential::StretchRange;
 use pulp::Simd;
 
@@ -73,21 +74,22 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
                 }
                 for sub in (0..GROUP).step_by(S::F64_LANES) {
                     // SAFETY: sub + lanes ≤ GROUP, the length of the arrays and of the slices cut here
-                    let inverse = unsafe { load::<S>(&inverse_length[first..first + GROUP], sub) };
+                    let inverse = unsafe { f64::load::<S>(&inverse_length[first..first + GROUP], sub) };
                     let mut factor = simd.mul_f64s(inverse, simd.splat_f64s(stiffness));
                     if !weights.is_empty() {
                         // SAFETY: as above
-                        let weight = unsafe { load::<S>(&weights[first..first + GROUP], sub) };
+                        let weight = unsafe { f64::load::<S>(&weights[first..first + GROUP], sub) };
                         factor = simd.mul_f64s(factor, weight);
                     }
                     let (mut zeta, mut e) = ([zero; D], zero);
                     for d in 0..D {
-                        let (xi, eta) = unsafe { (load::<S>(&bond[d], sub), load::<S>(&change[d], sub)) };
+                        let (xi, eta) =
+                            unsafe { (f64::load::<S>(&bond[d], sub), f64::load::<S>(&change[d], sub)) };
                         zeta[d] = simd.add_f64s(xi, eta);
                         e = simd.mul_add_f64s(eta, simd.add_f64s(zeta[d], xi), e);
                     }
                     e = simd.mul_f64s(e, simd.mul_f64s(inverse, inverse));
-                    let q = law::<S, P, Q>(simd, e, self.clamp, self.law.0, &self.law.1, &self.law.2);
+                    let q = law::<f64, S, P, Q>(simd, e, self.clamp, self.law.0, &self.law.1, &self.law.2);
                     let q = simd.mul_f64s(q, factor);
                     for d in 0..D {
                         sum[d] = simd.mul_add_f64s(q, zeta[d], sum[d]);

@@ -4,6 +4,7 @@
 //! the force density Σ_J c_IJ q(e) (ξ + η), q = t/(kθ λ), c = 2kθ w V_J/|ξ|, as in Eqs (2.6), (2.47).
 //! q is the rational fit of [`crate::potential::KernelFit`]: no square root, and no division where it is a polynomial.
 
+use super::real::Real;
 use crate::potential::StretchRange;
 use pulp::{Arch, Simd, WithSimd};
 
@@ -46,36 +47,26 @@ pub fn dispatch<const D: usize>(
 
 /// constant + E·N(E)/D(E) by Horner's rule, E clamped to two ends.
 #[inline(always)]
-pub fn law<S: Simd, const P: usize, const Q: usize>(
+pub fn law<T: Real, S: Simd, const P: usize, const Q: usize>(
     simd: S,
-    e: S::f64s,
-    clamp: [f64; 2],
-    constant: f64,
-    numerator: &[f64; P],
-    denominator: &[f64; Q],
-) -> S::f64s {
-    let e = simd.max_f64s(simd.splat_f64s(clamp[0]), simd.min_f64s(e, simd.splat_f64s(clamp[1])));
-    let mut n = simd.splat_f64s(numerator[P - 1]);
+    e: T::Vector<S>,
+    clamp: [T; 2],
+    constant: T,
+    numerator: &[T; P],
+    denominator: &[T; Q],
+) -> T::Vector<S> {
+    let e = T::max(simd, T::splat(simd, clamp[0]), T::min(simd, e, T::splat(simd, clamp[1])));
+    let mut n = T::splat(simd, numerator[P - 1]);
     for k in (0..P - 1).rev() {
-        n = simd.mul_add_f64s(n, e, simd.splat_f64s(numerator[k]));
+        n = T::mul_add(simd, n, e, T::splat(simd, numerator[k]));
     }
     if Q > 0 {
-        let mut d = simd.splat_f64s(denominator[Q - 1]);
+        let mut d = T::splat(simd, denominator[Q - 1]);
         for k in (0..Q - 1).rev() {
-            d = simd.mul_add_f64s(d, e, simd.splat_f64s(denominator[k]));
+            d = T::mul_add(simd, d, e, T::splat(simd, denominator[k]));
         }
-        d = simd.mul_add_f64s(d, e, simd.splat_f64s(1.0));
-        n = simd.div_f64s(n, d);
+        d = T::mul_add(simd, d, e, T::splat(simd, T::of(1.0)));
+        n = T::div(simd, n, d);
     }
-    simd.mul_add_f64s(n, e, simd.splat_f64s(constant))
-}
-
-/// A vector of consecutive sites.
-///
-/// # Safety
-/// `at + lanes ≤ slice.len()`.
-#[inline(always)]
-pub unsafe fn load<S: Simd>(slice: &[f64], at: usize) -> S::f64s {
-    debug_assert!(at + S::F64_LANES <= slice.len());
-    unsafe { slice.as_ptr().add(at).cast::<S::f64s>().read_unaligned() }
+    T::mul_add(simd, n, e, T::splat(simd, constant))
 }

@@ -1,6 +1,7 @@
 //! A regular lattice of particles: one stencil of offsets, a bit mask of intact bonds per particle, no neighbour list.
 
 mod connect;
+mod mixed;
 
 use super::lattice_kernel::{Class, TILE, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans};
@@ -14,7 +15,9 @@ use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use crate::geometry::{Cut, Lattice};
 use crate::potential::{KernelFit, StretchRange, TangentTable};
+use mixed::Mixed;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The bonds of a lattice.
 pub struct LatticeBonds<const D: usize> {
@@ -37,6 +40,7 @@ pub struct LatticeBonds<const D: usize> {
     table: Option<(KernelFit, f64)>,
     directed_bonds: u64,
     softening: Softening,
+    mixed: Option<Mixed<D>>,
 }
 
 impl<const D: usize> LatticeBonds<D> {
@@ -84,6 +88,7 @@ impl<const D: usize> LatticeBonds<D> {
             table: None,
             directed_bonds: 0,
             softening: Softening::default(),
+            mixed: None,
             lattice,
         };
         bonds.spans = bonds.measure();
@@ -200,6 +205,21 @@ impl<const D: usize> LatticeBonds<D> {
     ) -> Option<Vec<f64>> {
         let (sites, volume) = (chunk_range(chunk, self.sites), self.lattice.volume);
         self.is_uniform().then(|| self.spans(displacement).stiffness(sites, volume, table, least))
+    }
+
+    /// [`Bonds::force`] in double precision.
+    fn double_force(
+        &self,
+        displacement: &Field<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+        track: Option<&mut StretchRange>,
+    ) {
+        if let Some(kernel) = &self.kernel {
+            kernel.run(&self.tiles(displacement), start, force, track);
+        } else if let Some((fit, modulus)) = &self.table {
+            plain_force(self, fit, *modulus, displacement, start, force, track);
+        }
     }
 
     /// Which sites hold a particle.
@@ -337,7 +357,11 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     }
 
     fn set_law(&mut self, fit: &KernelFit, modulus: f64) {
-        self.kernel = lattice_kernel(fit, &self.stencil_bonds(modulus));
+        let stencil = self.stencil_bonds(modulus);
+        if let Some(mixed) = &mut self.mixed {
+            mixed.set_law(fit, &stencil, self.lattice.spacing);
+        }
+        self.kernel = lattice_kernel(fit, &stencil);
         self.table = self.kernel.is_none().then(|| (fit.clone(), modulus));
     }
 
@@ -357,6 +381,9 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
             });
             factors.set(site, relative);
         }
+        if let Some(mixed) = &mut self.mixed {
+            mixed.set_factors(&factors);
+        }
         self.factors = Some(factors);
         self.classify();
     }
@@ -365,17 +392,21 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         TILE
     }
 
+    fn round(&mut self, displacement: &Field<D>) {
+        if let Some(mixed) = &mut self.mixed {
+            mixed.round(displacement, self.lattice.spacing);
+        }
+    }
+
     fn force(
         &self,
         displacement: &Field<D>,
         start: usize,
         force: &mut [&mut [f64]; D],
-        track: Option<&mut StretchRange>,
+        mut track: Option<&mut StretchRange>,
     ) {
-        if let Some(kernel) = &self.kernel {
-            kernel.run(&self.tiles(displacement), start, force, track);
-        } else if let Some((fit, modulus)) = &self.table {
-            plain_force(self, fit, *modulus, displacement, start, force, track);
+        if !self.mixed_force(start, force, track.as_deref_mut()) {
+            self.double_force(displacement, start, force, track);
         }
     }
 
@@ -383,8 +414,8 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.spans(displacement).range(chunk_range(chunk, self.sites))
     }
 
-    fn suspects(&self, displacement: &Field<D>, chunk: usize, least: f64) -> Vec<usize> {
-        self.spans(displacement).beyond(chunk_range(chunk, self.sites), least)
+    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<usize> {
+        self.spans(displacement).beyond(sites, least)
     }
 
     fn sever(&mut self, bonds: &[Overstretched]) {
@@ -431,7 +462,8 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
 
     fn bytes(&self) -> usize {
         let factors = self.factors.as_ref().map_or(0, |_| D * self.sites * 8);
-        self.sites * 8 * self.intact.len() + self.classes.len() + self.particles.len() * 4 + factors
+        let mixed = self.mixed.as_ref().map_or(0, Mixed::bytes);
+        self.sites * 8 * self.intact.len() + self.classes.len() + self.particles.len() * 4 + factors + mixed
     }
 
     fn kind(&self) -> Kind<'_, D> {

@@ -1,6 +1,7 @@
 //! The lattice kernel: vectors of neighbouring particles, one bond of the stencil at a time, no gather.
 
-use super::kernel::{Pass, law, load};
+use super::kernel::{Pass, law};
+use super::real::Real;
 use crate::potential::StretchRange;
 use pulp::Simd;
 
@@ -10,21 +11,21 @@ pub const TILE: usize = 16;
 /// One bond of the stencil with the law's coefficients scaled to its length and stiffness, for `P` numerator and
 /// `Q` denominator coefficients: q·c = E·ΣₖaₖEᵏ/(1 + ΣₖbₖEᵏ⁺¹), E = η·(2ξ + η).
 #[derive(Clone, Copy, Debug)]
-pub struct Row<const D: usize, const P: usize, const Q: usize> {
+pub struct Row<T, const D: usize, const P: usize, const Q: usize> {
     /// Distance to the neighbour in sites.
     pub shift: isize,
     /// Reference bond ξ.
-    pub bond: [f64; D],
+    pub bond: [T; D],
     /// 1/|ξ|².
-    pub inverse_square: f64,
+    pub inverse_square: T,
     /// Ends of the law in E; outside of them q stays what it is there.
-    pub clamp: [f64; 2],
+    pub clamp: [T; 2],
     /// Value at E = 0 (0 for stress-free laws).
-    pub constant: f64,
+    pub constant: T,
     /// Scaled numerator.
-    pub numerator: [f64; P],
+    pub numerator: [T; P],
     /// Scaled denominator beyond its leading 1.
-    pub denominator: [f64; Q],
+    pub denominator: [T; Q],
 }
 
 /// What a tile's particles need.
@@ -40,28 +41,30 @@ pub enum Class {
 }
 
 /// What the lattice kernel reads, beside its rows.
-pub struct Tiles<'a, const D: usize> {
+pub struct Tiles<'a, const D: usize, T = f64> {
     /// Displacement.
-    pub displacement: [&'a [f64]; D],
+    pub displacement: [&'a [T]; D],
     /// Bit k of word w at a site: bond 64w + k is intact.
     pub intact: &'a [Vec<u64>],
     /// Class of each tile.
     pub classes: &'a [Class],
     /// Per-particle correction factors g (see [`super::correction`]), where the scene asks for them.
-    pub factors: Option<[&'a [f64]; D]>,
+    pub factors: Option<[&'a [T]; D]>,
     /// Largest |shift|: sites closer than this to either end hold no particle.
     pub guard: usize,
 }
 
 /// The lattice kernel: tiles under a set of rows.
-pub struct LatticePass<'a, const D: usize, const P: usize, const Q: usize> {
+pub struct LatticePass<'a, T, const D: usize, const P: usize, const Q: usize> {
     /// The stencil.
-    pub rows: &'a [Row<D, P, Q>],
-    /// The storage.
-    pub tiles: &'a Tiles<'a, D>,
+    pub rows: &'a [Row<T, D, P, Q>],
+    /// The storage, in units of the rows.
+    pub tiles: &'a Tiles<'a, D, T>,
+    /// Unit of the rows' forces.
+    pub unit: f64,
 }
 
-impl<const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_, D, P, Q> {
+impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_, T, D, P, Q> {
     /// `start` and the length are multiples of [`TILE`].
     #[inline(always)]
     fn run<S: Simd>(
@@ -85,18 +88,18 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_,
         assert!(self.tiles.factors.is_none_or(|g| g.iter().all(|c| c.len() == sites)));
         assert!(self.rows.iter().all(|r| r.shift.unsigned_abs() <= self.tiles.guard));
         let tracking = track.is_some();
-        let mut seen = [simd.splat_f64s(0.0); 2];
+        let mut seen = [T::splat(simd, T::of(0.0)); 2];
         for offset in (0..length).step_by(TILE) {
             let base = start + offset;
             let class = self.tiles.classes[base / TILE];
+            for f in force.iter_mut() {
+                f[offset..offset + TILE].fill(0.0);
+            }
             if class == Class::Empty {
-                for f in force.iter_mut() {
-                    f[offset..offset + TILE].fill(0.0);
-                }
                 continue;
             }
             assert!(base >= self.tiles.guard && base + TILE + self.tiles.guard <= sites);
-            let lanes = S::F64_LANES;
+            let lanes = T::lanes::<S>();
             // two vectors at once share the loads of coefficients, where registers hold both
             let pair = 2 * lanes <= TILE && (D < 3 || S::REGISTER_COUNT >= 32);
             let step = if pair { 2 * lanes } else { lanes };
@@ -116,12 +119,10 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_,
                         // at the end of a row: one vector
                         (false, true) if !bonded(base + sub) => {
                             let second = out.map(|out| out.add(lanes));
-                            out.iter().for_each(|out| out.write_bytes(0, lanes));
                             self.partial::<S, 1>(simd, base + sub + lanes, second, tracking, &mut seen);
                         }
                         (false, true) if !bonded(base + sub + lanes) => {
                             self.partial::<S, 1>(simd, base + sub, out, tracking, &mut seen);
-                            out.iter().for_each(|out| out.add(lanes).write_bytes(0, lanes));
                         }
                         (false, true) => self.partial::<S, 2>(simd, base + sub, out, tracking, &mut seen),
                         (false, false) => self.partial::<S, 1>(simd, base + sub, out, tracking, &mut seen),
@@ -131,13 +132,13 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for LatticePass<'_,
         }
         if let Some(range) = track {
             let [low, high] = seen;
-            let seen = StretchRange { low: simd.reduce_min_f64s(low), high: simd.reduce_max_f64s(high) };
+            let seen = StretchRange { low: T::least(simd, low), high: T::greatest(simd, high) };
             *range = range.join(seen);
         }
     }
 }
 
-impl<const D: usize, const P: usize, const Q: usize> LatticePass<'_, D, P, Q> {
+impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T, D, P, Q> {
     /// Rows whose stretches are tracked: those of one direction see every bond of the body once.
     #[inline(always)]
     fn tracked(&self, tracking: bool) -> usize {
@@ -155,42 +156,51 @@ impl<const D: usize, const P: usize, const Q: usize> LatticePass<'_, D, P, Q> {
         base: usize,
         out: [*mut f64; D],
         tracking: bool,
-        seen: &mut [S::f64s; 2],
+        seen: &mut [T::Vector<S>; 2],
     ) {
-        let zero = simd.splat_f64s(0.0);
-        let mut sum = [[zero; V]; D];
         let (tracked, others) = self.rows.split_at(self.tracked(tracking));
         let [mut low, mut high] = *seen;
-        for row in tracked {
-            let inverse = simd.splat_f64s(row.inverse_square);
-            for v in 0..V {
-                // SAFETY: as above
-                let (zeta, e) = unsafe { self.stretch(simd, row, base + v * S::F64_LANES) };
-                let relative = simd.mul_f64s(e, inverse);
-                low = simd.min_f64s(low, relative);
-                high = simd.max_f64s(high, relative);
-                let q = law::<S, P, Q>(simd, e, row.clamp, row.constant, &row.numerator, &row.denominator);
-                for d in 0..D {
-                    sum[d][v] = simd.mul_add_f64s(q, zeta[d], sum[d][v]);
+        let displacement = self.tiles.displacement;
+        // SAFETY: as above
+        let own = unsafe { self.own::<S, V>(simd, base) };
+        let mut sum = [[T::splat(simd, T::of(0.0)); V]; D];
+        for rows in tracked.chunks(T::RUN) {
+            for row in rows {
+                let inverse = T::splat(simd, row.inverse_square);
+                for v in 0..V {
+                    // SAFETY: as above
+                    let (zeta, e) =
+                        unsafe { row.stretch(simd, displacement, &own[v], base + v * T::lanes::<S>()) };
+                    let relative = T::mul(simd, e, inverse);
+                    low = T::min(simd, low, relative);
+                    high = T::max(simd, high, relative);
+                    let q = row.law(simd, e);
+                    for d in 0..D {
+                        sum[d][v] = T::mul_add(simd, q, zeta[d], sum[d][v]);
+                    }
                 }
             }
+            // SAFETY: as above
+            sum = unsafe { self.pass_on(simd, out, sum, false) };
         }
         *seen = [low, high];
-        for row in others {
-            for v in 0..V {
-                // SAFETY: as above
-                let (zeta, e) = unsafe { self.stretch(simd, row, base + v * S::F64_LANES) };
-                let q = law::<S, P, Q>(simd, e, row.clamp, row.constant, &row.numerator, &row.denominator);
-                for d in 0..D {
-                    sum[d][v] = simd.mul_add_f64s(q, zeta[d], sum[d][v]);
+        for rows in others.chunks(T::RUN) {
+            for row in rows {
+                for v in 0..V {
+                    // SAFETY: as above
+                    let (zeta, e) =
+                        unsafe { row.stretch(simd, displacement, &own[v], base + v * T::lanes::<S>()) };
+                    let q = row.law(simd, e);
+                    for d in 0..D {
+                        sum[d][v] = T::mul_add(simd, q, zeta[d], sum[d][v]);
+                    }
                 }
             }
+            // SAFETY: as above
+            sum = unsafe { self.pass_on(simd, out, sum, false) };
         }
-        for d in 0..D {
-            for v in 0..V {
-                unsafe { out[d].add(v * S::F64_LANES).cast::<S::f64s>().write_unaligned(sum[d][v]) };
-            }
-        }
+        // SAFETY: as above
+        unsafe { self.pass_on(simd, out, sum, true) };
     }
 
     /// Bonds masked by their bits, weighted by their ends' factors; those that no particle of the block has are left out.
@@ -204,120 +214,158 @@ impl<const D: usize, const P: usize, const Q: usize> LatticePass<'_, D, P, Q> {
         base: usize,
         out: [*mut f64; D],
         tracking: bool,
-        seen: &mut [S::f64s; 2],
+        seen: &mut [T::Vector<S>; 2],
     ) {
-        let zero = simd.splat_f64s(0.0);
-        let mut sum = [[zero; V]; D];
+        let lanes = T::lanes::<S>();
         let [mut low, mut high] = *seen;
         let tracked = self.tracked(tracking);
+        let displacement = self.tiles.displacement;
+        // SAFETY: as above
+        let own = unsafe { self.own::<S, V>(simd, base) };
+        let mut sum = [[T::splat(simd, T::of(0.0)); V]; D];
         for (word, rows) in self.rows.chunks(64).enumerate() {
-            let own = &self.tiles.intact[word][base..base + V * S::F64_LANES];
+            let words = &self.tiles.intact[word][base..base + V * lanes];
             let mut present = 0;
-            for bits in own {
+            for bits in words {
                 present |= bits;
             }
             while present != 0 {
-                let k = present.trailing_zeros() as usize;
-                present &= present - 1;
-                let row = &rows[k];
-                let bit = simd.splat_u64s(1 << k);
-                for v in 0..V {
-                    let here = base + v * S::F64_LANES;
-                    // SAFETY: as above
-                    let (zeta, e, bits) = unsafe {
-                        let bits = own.as_ptr().add(v * S::F64_LANES).cast::<S::u64s>().read_unaligned();
-                        let (zeta, e) = self.stretch(simd, row, here);
-                        (zeta, e, bits)
-                    };
-                    let has = simd.equal_u64s(simd.and_u64s(bits, bit), bit);
-                    let mut q =
-                        law::<S, P, Q>(simd, e, row.clamp, row.constant, &row.numerator, &row.denominator);
-                    if let Some(factors) = self.tiles.factors {
-                        let there = here.wrapping_add_signed(row.shift);
-                        let inverse = row.inverse_square;
+                let mut left = T::RUN;
+                while present != 0 && left > 0 {
+                    left -= 1;
+                    let k = present.trailing_zeros() as usize;
+                    present &= present - 1;
+                    let row = &rows[k];
+                    for v in 0..V {
+                        let here = base + v * lanes;
                         // SAFETY: as above
-                        let weight = unsafe {
-                            directional_weight::<S, D>(simd, factors, here, there, &row.bond, inverse)
-                        };
-                        q = simd.mul_f64s(q, weight);
+                        let (zeta, e) = unsafe { row.stretch(simd, displacement, &own[v], here) };
+                        let mut q = row.law(simd, e);
+                        if let Some(factors) = self.tiles.factors {
+                            let there = here.wrapping_add_signed(row.shift);
+                            // SAFETY: as above
+                            q = T::mul(simd, q, unsafe { row.weight(simd, factors, here, there) });
+                        }
+                        // SAFETY: as above
+                        q = unsafe { T::keep(simd, q, words.as_ptr().add(v * lanes), 1 << k) };
+                        for d in 0..D {
+                            sum[d][v] = T::mul_add(simd, q, zeta[d], sum[d][v]);
+                        }
+                        if 64 * word + k < tracked {
+                            let relative = T::mul(simd, e, T::splat(simd, row.inverse_square));
+                            // SAFETY: as above
+                            let relative =
+                                unsafe { T::keep(simd, relative, words.as_ptr().add(v * lanes), 1 << k) };
+                            low = T::min(simd, low, relative);
+                            high = T::max(simd, high, relative);
+                        }
                     }
-                    q = simd.select_f64s(has, q, zero);
-                    for d in 0..D {
-                        sum[d][v] = simd.mul_add_f64s(q, zeta[d], sum[d][v]);
-                    }
-                    if 64 * word + k < tracked {
-                        let relative = simd.mul_f64s(e, simd.splat_f64s(row.inverse_square));
-                        let relative = simd.select_f64s(has, relative, zero);
-                        low = simd.min_f64s(low, relative);
-                        high = simd.max_f64s(high, relative);
-                    }
+                }
+                // SAFETY: as above
+                sum = unsafe { self.pass_on(simd, out, sum, false) };
+            }
+        }
+        // SAFETY: as above
+        unsafe { self.pass_on(simd, out, sum, true) };
+        *seen = [low, high];
+    }
+
+    /// Adds forces to those of V vectors: after each run where it has an end, else at the end of all; what is left to add.
+    ///
+    /// # Safety
+    /// `out` takes V·lanes values.
+    #[inline(always)]
+    unsafe fn pass_on<S: Simd, const V: usize>(
+        &self,
+        simd: S,
+        out: [*mut f64; D],
+        mut sum: [[T::Vector<S>; V]; D],
+        end: bool,
+    ) -> [[T::Vector<S>; V]; D] {
+        if end == (T::RUN == usize::MAX) {
+            for d in 0..D {
+                for v in 0..V {
+                    // SAFETY: as above
+                    unsafe { T::add_to(simd, out[d].add(v * T::lanes::<S>()), self.unit, sum[d][v]) };
+                    sum[d][v] = T::splat(simd, T::of(0.0));
                 }
             }
         }
-        *seen = [low, high];
-        for d in 0..D {
-            for v in 0..V {
-                unsafe { out[d].add(v * S::F64_LANES).cast::<S::f64s>().write_unaligned(sum[d][v]) };
-            }
-        }
+        sum
     }
 
-    /// ζ of a bond of the particles from `here` on, and E.
+    /// Displacements of V vectors of particles.
     ///
     /// # Safety
-    /// As [`Self::full`] with V = 1.
+    /// As [`Self::full`].
     #[inline(always)]
-    unsafe fn stretch<S: Simd>(&self, simd: S, row: &Row<D, P, Q>, here: usize) -> ([S::f64s; D], S::f64s) {
-        let zero = simd.splat_f64s(0.0);
-        let there = here.wrapping_add_signed(row.shift);
-        let (mut eta, mut zeta) = ([zero; D], [zero; D]);
+    unsafe fn own<S: Simd, const V: usize>(&self, simd: S, base: usize) -> [[T::Vector<S>; D]; V] {
+        let mut own = [[T::splat(simd, T::of(0.0)); D]; V];
+        for v in 0..V {
+            for d in 0..D {
+                // SAFETY: as above
+                own[v][d] = unsafe { T::load::<S>(self.tiles.displacement[d], base + v * T::lanes::<S>()) };
+            }
+        }
+        own
+    }
+}
+
+impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
+    /// ζ of a bond of the particles from `here` on, and E = η·(2ξ + η) = |ζ|² − |ξ|².
+    ///
+    /// # Safety
+    /// The sites `here` and `here + shift` are followed by a vector's width in every slice.
+    #[inline(always)]
+    unsafe fn stretch<S: Simd>(
+        &self,
+        simd: S,
+        displacement: [&[T]; D],
+        own: &[T::Vector<S>; D],
+        here: usize,
+    ) -> ([T::Vector<S>; D], T::Vector<S>) {
+        let zero = T::splat(simd, T::of(0.0));
+        let there = here.wrapping_add_signed(self.shift);
+        let (mut e, mut zeta) = (zero, [zero; D]);
         for d in 0..D {
             // SAFETY: as above
-            let (own, other) = unsafe {
-                (load::<S>(self.tiles.displacement[d], here), load::<S>(self.tiles.displacement[d], there))
-            };
-            eta[d] = simd.sub_f64s(other, own);
-            zeta[d] = simd.add_f64s(eta[d], simd.splat_f64s(row.bond[d]));
+            let other = unsafe { T::load::<S>(displacement[d], there) };
+            // few registers are for sums
+            // SAFETY: as above
+            let own =
+                if S::REGISTER_COUNT >= 32 { own[d] } else { unsafe { T::load::<S>(displacement[d], here) } };
+            let (eta, bond) = (T::sub(simd, other, own), T::splat(simd, self.bond[d]));
+            zeta[d] = T::add(simd, eta, bond);
+            let twice = T::add(simd, zeta[d], bond);
+            e = if d == 0 { T::mul(simd, eta, twice) } else { T::mul_add(simd, eta, twice, e) };
         }
-        let e = elongation::<S, D>(simd, &eta, &zeta, &row.bond);
         (zeta, e)
     }
-}
 
-/// Weight of a bond from the correction factors g of its two ends, (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J).
-///
-/// # Safety
-/// `here` and `there` are followed by a vector's width in every slice.
-#[inline(always)]
-unsafe fn directional_weight<S: Simd, const D: usize>(
-    simd: S,
-    factors: [&[f64]; D],
-    here: usize,
-    there: usize,
-    bond: &[f64; D],
-    inverse_square: f64,
-) -> S::f64s {
-    let mut sum = simd.splat_f64s(0.0);
-    for d in 0..D {
-        // 4/(g_I + g_J)² = 1/ḡ²
-        let pair = unsafe { simd.add_f64s(load::<S>(factors[d], here), load::<S>(factors[d], there)) };
-        let cosine = simd.splat_f64s(4.0 * bond[d] * bond[d] * inverse_square);
-        sum = simd.add_f64s(sum, simd.div_f64s(cosine, simd.mul_f64s(pair, pair)));
+    /// q·c.
+    #[inline(always)]
+    fn law<S: Simd>(&self, simd: S, e: T::Vector<S>) -> T::Vector<S> {
+        law::<T, S, P, Q>(simd, e, self.clamp, self.constant, &self.numerator, &self.denominator)
     }
-    simd.div_f64s(simd.splat_f64s(1.0), simd.sqrt_f64s(sum))
-}
 
-/// E = η·(2ξ + η) = |ζ|² − |ξ|².
-#[inline(always)]
-fn elongation<S: Simd, const D: usize>(
-    simd: S,
-    eta: &[S::f64s; D],
-    zeta: &[S::f64s; D],
-    bond: &[f64; D],
-) -> S::f64s {
-    let mut e = simd.mul_f64s(eta[0], simd.add_f64s(zeta[0], simd.splat_f64s(bond[0])));
-    for d in 1..D {
-        e = simd.mul_add_f64s(eta[d], simd.add_f64s(zeta[d], simd.splat_f64s(bond[d])), e);
+    /// Weight of a bond from the correction factors g of its two ends, (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J).
+    ///
+    /// # Safety
+    /// `here` and `there` are followed by a vector's width in every slice.
+    #[inline(always)]
+    unsafe fn weight<S: Simd>(&self, simd: S, factors: [&[T]; D], here: usize, there: usize) -> T::Vector<S> {
+        let four = T::splat(simd, T::of(4.0));
+        let inverse = T::mul(simd, four, T::splat(simd, self.inverse_square));
+        let mut sum = T::splat(simd, T::of(0.0));
+        for d in 0..D {
+            let bond = T::splat(simd, self.bond[d]);
+            // 4/(g_I + g_J)² = 1/ḡ²
+            // SAFETY: as above
+            let pair =
+                unsafe { T::add(simd, T::load::<S>(factors[d], here), T::load::<S>(factors[d], there)) };
+            let cosine = T::mul(simd, T::mul(simd, bond, bond), inverse);
+            sum = T::add(simd, sum, T::div(simd, cosine, T::mul(simd, pair, pair)));
+        }
+        T::div(simd, T::splat(simd, T::of(1.0)), T::sqrt(simd, sum))
     }
-    e
 }

@@ -2,8 +2,9 @@
 //!
 //! Fields of `N` = 1 + D² components hold a scalar and then a tensor, rows first.
 
-use super::kernel::{Pass, load};
+use super::kernel::Pass;
 use super::lattice_kernel::{Class, TILE, Tiles};
+use super::real::Real;
 use crate::potential::StretchRange;
 use pulp::{Arch, Simd, WithSimd};
 
@@ -114,7 +115,7 @@ unsafe fn sums<S: Simd, const D: usize, const N: usize, const FULL: bool>(
     let mut sums = [zero; N];
     let mut own = [zero; D];
     for d in 0..D {
-        own[d] = unsafe { load::<S>(tiles.displacement[d], base) };
+        own[d] = unsafe { f64::load::<S>(tiles.displacement[d], base) };
     }
     for (k, row) in rows.iter().enumerate() {
         let there = base.wrapping_add_signed(row.shift);
@@ -125,7 +126,7 @@ unsafe fn sums<S: Simd, const D: usize, const N: usize, const FULL: bool>(
             simd.select_f64s(unsafe { present::<S>(simd, tiles.intact, k, base) }, share, zero)
         };
         for a in 0..D {
-            let other = unsafe { load::<S>(tiles.displacement[a], there) };
+            let other = unsafe { f64::load::<S>(tiles.displacement[a], there) };
             let eta = simd.sub_f64s(other, own[a]);
             let weighted = simd.mul_f64s(share, eta);
             sums[0] = simd.mul_add_f64s(weighted, eta, sums[0]);
@@ -196,10 +197,10 @@ impl<const D: usize, const N: usize> LinearPass<'_, D, N> {
         let (mut low, mut high) = (simd.splat_f64s(seen.low), simd.splat_f64s(seen.high));
         let (mut own, mut terms) = ([zero; D], [zero; N]);
         for d in 0..D {
-            own[d] = unsafe { load::<S>(self.tiles.displacement[d], base) };
+            own[d] = unsafe { f64::load::<S>(self.tiles.displacement[d], base) };
         }
         for n in 0..N {
-            terms[n] = unsafe { load::<S>(self.terms[n], base) };
+            terms[n] = unsafe { f64::load::<S>(self.terms[n], base) };
         }
         for (k, row) in self.rows.iter().enumerate() {
             let there = base.wrapping_add_signed(row.shift);
@@ -207,14 +208,14 @@ impl<const D: usize, const N: usize> LinearPass<'_, D, N> {
             let present =
                 if FULL { None } else { Some(unsafe { present::<S>(simd, self.tiles.intact, k, base) }) };
             let share = present.map_or(share, |present| simd.select_f64s(present, share, zero));
-            let slope = simd.add_f64s(terms[0], unsafe { load::<S>(self.terms[0], there) });
+            let slope = simd.add_f64s(terms[0], unsafe { f64::load::<S>(self.terms[0], there) });
             let mut e = zero;
             for a in 0..D {
-                let eta = simd.sub_f64s(unsafe { load::<S>(self.tiles.displacement[a], there) }, own[a]);
+                let eta = simd.sub_f64s(unsafe { f64::load::<S>(self.tiles.displacement[a], there) }, own[a]);
                 let mut density = simd.mul_f64s(slope, eta);
                 for b in 0..D {
                     let at = 1 + a * D + b;
-                    let stress = simd.add_f64s(terms[at], unsafe { load::<S>(self.terms[at], there) });
+                    let stress = simd.add_f64s(terms[at], unsafe { f64::load::<S>(self.terms[at], there) });
                     density = simd.mul_add_f64s(stress, simd.splat_f64s(row.bond[b]), density);
                 }
                 sum[a] = simd.mul_add_f64s(share, density, sum[a]);

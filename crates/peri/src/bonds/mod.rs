@@ -12,13 +12,14 @@ mod lattice_sums;
 mod linear;
 mod linear_kernel;
 mod property;
+mod real;
 mod rows;
 mod softening;
 mod stencil;
 
 pub use crate::geometry::Lattice;
 pub use crate::potential::StretchRange;
-pub use breaking::{Fragment, Overstretched, fingerprint, fragments, overstretched};
+pub use breaking::{Fragment, Overstretched, Seen, fingerprint, fragments, overstretched};
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;
@@ -38,6 +39,7 @@ use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::KernelFit;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A neighbour J of a particle I, as set-up code sees it.
 #[derive(Clone, Copy, Debug)]
@@ -117,6 +119,11 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
     /// Sets per-particle surface-correction factors (one field of `D` components over the sites).
     fn set_factors(&mut self, factors: Field<D>);
+    /// Takes in a displacement before [`Bonds::force`] of it, where that reads it in single precision
+    /// ([`LatticeBonds::set_mixed`]).
+    fn round(&mut self, displacement: &Field<D>) {
+        let _ = displacement;
+    }
     /// Force densities Σ_J f V_J, N/m³, of whole [`Bonds::piece`]s from the site `start` on; collects the stretches observed if
     /// asked, of every bond in at least one of the work items that hold its ends.
     fn force(
@@ -140,10 +147,14 @@ pub trait Bonds<const D: usize>: Send + Sync {
         self.force(displacement, chunk * CHUNK, &mut out, Some(&mut range));
         range
     }
-    /// Sites which, for all work items together, contain both ends of every bond with e > `least`.
-    fn suspects(&self, displacement: &Field<D>, chunk: usize, least: f64) -> Vec<usize> {
-        let range = chunk_range(chunk, self.sites());
-        if self.stretches(displacement, chunk).high > least { range.collect() } else { Vec::new() }
+    /// Sites which, for all sites together, contain both ends of every bond with e > `least`: what some of them add, whole pieces of
+    /// one work item.
+    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<usize> {
+        if self.stretches(displacement, sites.start / CHUNK).high > least {
+            sites.collect()
+        } else {
+            Vec::new()
+        }
     }
     /// Severs bonds, each named from both of its ends.
     fn sever(&mut self, bonds: &[Overstretched]);

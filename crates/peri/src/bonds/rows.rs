@@ -3,6 +3,7 @@
 use super::cloud_kernel::{CloudData, CloudPass};
 use super::kernel::dispatch;
 use super::lattice_kernel::{LatticePass, Row, Tiles};
+use super::real::Real;
 use crate::potential::{KernelFit, StretchRange};
 use std::any::Any;
 
@@ -18,11 +19,11 @@ pub struct StencilBond<const D: usize> {
 }
 
 /// A lattice kernel with its law in place.
-pub trait LatticeKernel<const D: usize>: Send + Sync {
-    /// See [`super::kernel::Pass::run`].
+pub trait LatticeKernel<const D: usize, T = f64>: Send + Sync {
+    /// See [`super::kernel::Pass::run`]; `tiles` in the unit of length of the stencil.
     fn run(
         &self,
-        tiles: &Tiles<D>,
+        tiles: &Tiles<D, T>,
         start: usize,
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
@@ -41,17 +42,22 @@ pub trait CloudKernel<const D: usize>: Send + Sync {
     );
 }
 
-struct LatticeRows<const D: usize, const P: usize, const Q: usize>(Vec<Row<D, P, Q>>);
+struct LatticeRows<T, const D: usize, const P: usize, const Q: usize> {
+    rows: Vec<Row<T, D, P, Q>>,
+    unit: f64,
+}
 
-impl<const D: usize, const P: usize, const Q: usize> LatticeKernel<D> for LatticeRows<D, P, Q> {
+impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticeKernel<D, T>
+    for LatticeRows<T, D, P, Q>
+{
     fn run(
         &self,
-        tiles: &Tiles<D>,
+        tiles: &Tiles<D, T>,
         start: usize,
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        dispatch(LatticePass { rows: &self.0, tiles }, start, force, track);
+        dispatch(LatticePass { rows: &self.rows, tiles, unit: self.unit }, start, force, track);
     }
 }
 
@@ -134,8 +140,8 @@ pub fn scaled_laws<const D: usize>(fit: &KernelFit, stencil: &[StencilBond<D>]) 
     Some(stencil.iter().map(|bond| law.scaled(bond)).collect())
 }
 
-fn padded<const N: usize>(values: &[f64]) -> [f64; N] {
-    std::array::from_fn(|k| values.get(k).copied().unwrap_or(0.0))
+fn padded<T: Real, const N: usize>(values: &[f64]) -> [T; N] {
+    std::array::from_fn(|k| T::of(values.get(k).copied().unwrap_or(0.0)))
 }
 
 /// Sizes (numerator, denominator) that are compiled; a fit is padded with zeros to the first that holds it.
@@ -144,6 +150,11 @@ macro_rules! for_size {
         for_size!(@try $d, $rational, $make $arguments;
             (3, 0) (4, 0) (5, 0) (6, 0) (7, 0) (8, 0) (9, 0) (10, 0) (12, 0)
             (3, 3) (4, 4) (5, 5) (7, 6) (8, 7) (9, 8) (11, 10))
+    };
+    // laws fitted to a part in 10⁶, as is enough for single precision
+    (single $d:literal, $rational:expr, $make:ident $arguments:tt) => {
+        for_size!(@try $d, $rational, $make $arguments;
+            (3, 0) (4, 0) (5, 0) (6, 0) (8, 0) (10, 0) (12, 0) (4, 4) (5, 5) (7, 6) (11, 10))
     };
     (@try $d:literal, $rational:expr, $make:ident $arguments:tt; $(($p:literal, $q:literal))*) => {{
         $(if $rational.numerator.len() <= $p && $rational.denominator.len() <= $q {
@@ -166,20 +177,57 @@ pub fn lattice_kernel<const D: usize>(
     }
 }
 
+/// The same in single precision, of displacements over `spacing`.
+pub fn single_kernel<const D: usize>(
+    fit: &KernelFit,
+    stencil: &[StencilBond<D>],
+    spacing: f64,
+) -> Option<Box<dyn LatticeKernel<D, f32>>> {
+    let stiffest = stencil.iter().map(|bond| bond.stiffness.abs()).fold(f64::MIN_POSITIVE, f64::max);
+    let scaled = |bond: &StencilBond<D>| StencilBond {
+        shift: bond.shift,
+        bond: bond.bond.map(|x| x / spacing),
+        stiffness: bond.stiffness / stiffest,
+    };
+    let (rational, unit) = (Rational::new(fit)?, stiffest * spacing);
+    let stencil: Vec<StencilBond<D>> = stencil.iter().map(scaled).collect();
+    if D == 2 {
+        same(plane_single(&rational, same(stencil)?, unit)?)
+    } else {
+        same(solid_single(&rational, same(stencil)?, unit)?)
+    }
+}
+
 /// The cloud kernel for a fitted law; `None` as in [`lattice_kernel`].
 pub fn cloud_kernel<const D: usize>(fit: &KernelFit) -> Option<Box<dyn CloudKernel<D>>> {
     let rational = Rational::new(fit)?;
     if D == 2 { same(plane_cloud(&rational)?) } else { same(solid_cloud(&rational)?) }
 }
 
-// these four are not generic, so that the kernels are compiled in this crate alone and not in every program that makes bonds
+// these six are not generic, so that the kernels are compiled in this crate alone and not in every program that makes bonds
 
 fn plane_lattice(law: &Rational, stencil: Vec<StencilBond<2>>) -> Option<Box<dyn LatticeKernel<2>>> {
-    for_size!(2, law, lattice_rows(law, &stencil))
+    for_size!(2, law, double_rows(law, &stencil))
 }
 
 fn solid_lattice(law: &Rational, stencil: Vec<StencilBond<3>>) -> Option<Box<dyn LatticeKernel<3>>> {
-    for_size!(3, law, lattice_rows(law, &stencil))
+    for_size!(3, law, double_rows(law, &stencil))
+}
+
+fn plane_single(
+    law: &Rational,
+    stencil: Vec<StencilBond<2>>,
+    unit: f64,
+) -> Option<Box<dyn LatticeKernel<2, f32>>> {
+    for_size!(single 2, law, single_rows(law, &stencil, unit))
+}
+
+fn solid_single(
+    law: &Rational,
+    stencil: Vec<StencilBond<3>>,
+    unit: f64,
+) -> Option<Box<dyn LatticeKernel<3, f32>>> {
+    for_size!(single 3, law, single_rows(law, &stencil, unit))
 }
 
 fn plane_cloud(law: &Rational) -> Option<Box<dyn CloudKernel<2>>> {
@@ -196,16 +244,39 @@ fn same<A: 'static, B: 'static>(value: A) -> Option<B> {
     (&mut value as &mut dyn Any).downcast_mut::<Option<B>>()?.take()
 }
 
-fn lattice_rows<const D: usize, const P: usize, const Q: usize>(
+fn lattice_rows<T: Real, const D: usize, const P: usize, const Q: usize>(
+    law: &Rational,
+    stencil: &[StencilBond<D>],
+    unit: f64,
+) -> Box<dyn LatticeKernel<D, T>> {
+    let row = |bond: &StencilBond<D>| {
+        let scaled = law.scaled(bond);
+        Row {
+            shift: bond.shift,
+            bond: bond.bond.map(T::of),
+            inverse_square: T::of(scaled.inverse_square),
+            clamp: scaled.clamp.map(T::of),
+            constant: T::of(scaled.constant),
+            numerator: padded(&scaled.numerator),
+            denominator: padded(&scaled.denominator),
+        }
+    };
+    Box::new(LatticeRows::<T, D, P, Q> { rows: stencil.iter().map(row).collect(), unit })
+}
+
+fn double_rows<const D: usize, const P: usize, const Q: usize>(
     law: &Rational,
     stencil: &[StencilBond<D>],
 ) -> Box<dyn LatticeKernel<D>> {
-    let row = |bond: &StencilBond<D>| {
-        let ScaledLaw { inverse_square, clamp, constant, numerator, denominator } = law.scaled(bond);
-        let (numerator, denominator) = (padded(&numerator), padded(&denominator));
-        Row { shift: bond.shift, bond: bond.bond, inverse_square, clamp, constant, numerator, denominator }
-    };
-    Box::new(LatticeRows::<D, P, Q>(stencil.iter().map(row).collect()))
+    lattice_rows::<f64, D, P, Q>(law, stencil, 1.0)
+}
+
+fn single_rows<const D: usize, const P: usize, const Q: usize>(
+    law: &Rational,
+    stencil: &[StencilBond<D>],
+    unit: f64,
+) -> Box<dyn LatticeKernel<D, f32>> {
+    lattice_rows::<f32, D, P, Q>(law, stencil, unit)
 }
 
 fn cloud_law<const D: usize, const P: usize, const Q: usize>(law: &Rational) -> Box<dyn CloudKernel<D>> {

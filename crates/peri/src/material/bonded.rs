@@ -131,25 +131,15 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         &self,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        chunk: usize,
+        start: usize,
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        bonds.force(displacement, chunk * CHUNK, force, track);
+        bonds.force(displacement, start, force, track);
     }
 
     fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
         bonds.piece()
-    }
-
-    fn force_from(
-        &self,
-        bonds: &dyn Bonds<D>,
-        displacement: &Field<D>,
-        start: usize,
-        force: &mut [&mut [f64]; D],
-    ) {
-        bonds.force(displacement, start, force, None);
     }
 
     /// Σ_I V_I Σ_J w V_J kθ |ξ| φ.

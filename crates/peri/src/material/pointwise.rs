@@ -1,7 +1,7 @@
 //! Materials by plain loops over families: any [`Material`] at work, with the states of all particles.
 
 use super::{Bond, Cover, Family, LawRange, Material, Response};
-use crate::bonds::{Bonds, Overstretched, Property, overstretched};
+use crate::bonds::{Bonds, Overstretched, Property, Seen, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::{BondPotential, KernelFit, LinearBond, StretchRange};
@@ -155,10 +155,11 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         &self,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
-        chunk: usize,
+        start: usize,
         force: &mut [&mut [f64]; D],
         mut track: Option<&mut StretchRange>,
     ) {
+        let chunk = start / CHUNK;
         if let Some(passes) = &self.passes {
             return passes.force(&self.material, bonds, displacement, &self.points, chunk, force, track);
         }
@@ -176,7 +177,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
                 }
             });
             for d in 0..D {
-                force[d][site - chunk * CHUNK] = sum[d];
+                force[d][site - start] = sum[d];
             }
         }
     }
@@ -207,11 +208,11 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
         critical: &Property,
-        _seen: &[StretchRange],
+        _seen: &Seen,
     ) -> Vec<Overstretched> {
         // passes may collect a bond's stretch in another work item than the one that looks for it here
         if self.material.least_rest() == 1.0 {
-            return overstretched(bonds, displacement, critical, &[]);
+            return overstretched(bonds, displacement, critical, &Seen::default());
         }
         let of = |sites: &[u32]| {
             let mut found = Vec::new();

@@ -1,6 +1,6 @@
 //! What solvers ask of a material at work in a body.
 
-use crate::bonds::{Bonds, Overstretched, Property, overstretched};
+use crate::bonds::{Bonds, Overstretched, Property, Seen, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
 use crate::potential::{BondPotential, StretchRange};
@@ -57,31 +57,20 @@ pub trait Response<const D: usize>: Send + Sync {
     /// Whether forces of a particle depend on more than its own bonds.
     fn has_points(&self) -> bool;
 
-    /// Force densities, N/m³, of work item `chunk`; collects the stretches observed if asked.
+    /// Force densities, N/m³, of whole pieces from the site `start` on; collects the stretches observed if asked.
     fn force(
-        &self,
-        bonds: &dyn Bonds<D>,
-        displacement: &Field<D>,
-        chunk: usize,
-        force: &mut [&mut [f64]; D],
-        track: Option<&mut StretchRange>,
-    );
-
-    /// Sites that [`Response::force_from`] may begin with, see [`Bonds::piece`].
-    fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
-        let _ = bonds;
-        CHUNK
-    }
-
-    /// Force densities, N/m³, of whole pieces from the site `start` on.
-    fn force_from(
         &self,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
         start: usize,
         force: &mut [&mut [f64]; D],
-    ) {
-        self.force(bonds, displacement, start / CHUNK, force, None);
+        track: Option<&mut StretchRange>,
+    );
+
+    /// Sites that [`Response::force`] may begin with, see [`Bonds::piece`].
+    fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
+        let _ = bonds;
+        CHUNK
     }
 
     /// Energy of the body, J; `observed` holds the stretches within which the law itself is to be taken.
@@ -102,7 +91,7 @@ pub trait Response<const D: usize>: Send + Sync {
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
         critical: &Property,
-        seen: &[StretchRange],
+        seen: &Seen,
     ) -> Vec<Overstretched> {
         overstretched(bonds, displacement, critical, seen)
     }

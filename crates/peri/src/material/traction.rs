@@ -3,7 +3,7 @@
 use super::deformation::{Deformation, NonlocalSolid, PointLaw, PointStress, Tensor};
 use super::{Pointwise, Response};
 use crate::bonds::Bonds;
-use crate::field::Field;
+use crate::field::{CHUNK, Field};
 
 /// A uniform stress, whatever the deformation.
 struct Uniform<const D: usize>(Tensor<D>);
@@ -35,7 +35,7 @@ pub fn surface_load<const D: usize>(bonds: &dyn Bonds<D>, piola: Tensor<D>) -> F
     solid.prepare(bonds, &rest);
     let mut force = Field::zeros(bonds.sites());
     for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
-        solid.force(bonds, &rest, chunk, &mut part, None);
+        solid.force(bonds, &rest, chunk * CHUNK, &mut part, None);
     }
     for &site in bonds.particles() {
         let inner = force.get(site as usize);

@@ -165,6 +165,27 @@ impl KernelFit {
         self.numerator.len() + self.denominator.len() + if self.denominator.is_empty() { 0 } else { DIVISION }
     }
 
+    /// Largest relative error of q over the range where single precision evaluates it; infinite for a table. Ratios that cover bonds
+    /// crushed to less than half of their length lose all digits.
+    pub fn single_error(&self) -> f64 {
+        if self.numerator.is_empty() {
+            return f64::INFINITY;
+        }
+        let single = |coefficients: &[f64], x: f32| {
+            coefficients.iter().rev().fold(0.0, |sum: f32, &c| sum.mul_add(x, c as f32))
+        };
+        let [low, high] = self.range.map(|stretch| stretch * stretch - 1.0);
+        let error = |k: usize| {
+            let e = (low + (high - low) * k as f64 / DENSE as f64) as f32;
+            let ratio = single(&self.numerator, e) / (1.0 + e * single(&self.denominator, e));
+            let found = f64::from(if self.stress_free { e * ratio } else { ratio });
+            let exact = self.value(e.into());
+            if found == exact { 0.0 } else { (found / exact - 1.0).abs() }
+        };
+        // a value that is not a number is no small error
+        (0..=DENSE).map(error).fold(0.0, |most: f64, error| if error <= most { most } else { error })
+    }
+
     /// Largest relative deviation from the samples (e, q or q/e).
     fn error(&self, samples: &[(f64, f64)]) -> f64 {
         samples

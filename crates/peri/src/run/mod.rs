@@ -42,6 +42,9 @@ use std::cell::RefCell;
 /// What stops a run: a fault in the scene, or one on the way.
 pub type Failure = polycore::scene::Failure<Error>;
 
+/// Error of forces in mixed precision beyond which a run warns.
+const MIXED: f64 = 1e-2;
+
 /// A finished run.
 pub struct Finished {
     /// As written to `report.json`.
@@ -209,6 +212,16 @@ fn run_variant<const D: usize>(
         }
         outcome.value(q::TIME_STEP, state.motion.time_step);
         outcome.value(q::KINETIC_ENERGY, state.motion.kinetic);
+        body.bonds.round(&state.displacement);
+        let lattice = body.bonds.as_lattice();
+        if let Some(error) = lattice.and_then(|lattice| lattice.mixed_error(&state.displacement)) {
+            outcome.value(q::MIXED_ERROR, error);
+            if error > MIXED {
+                outcome.warnings.push(format!(
+                    "forces in mixed precision are wrong by {error:.1e} of their mean: take double precision"
+                ));
+            }
+        }
     }
     let stresses = frames.stresses(&*body.bonds, &state, &mut phases)?;
     outcome.history.clone_from(&state.history);

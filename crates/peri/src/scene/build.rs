@@ -57,7 +57,7 @@ fn filled<const D: usize>(
         let found = format!("{} m, with which the volume of a particle is {volume} m³", variant.spacing);
         return Err(source.error(spacing_key(scene), found, "a spacing whose cells have a volume"));
     }
-    let bonds = LatticeBonds::new(lattice, variant.horizon_ratio, variant.volume, cuts)
+    let mut bonds = LatticeBonds::new(lattice, variant.horizon_ratio, variant.volume, cuts)
         .map_err(|error| source.error("body.horizon_ratio", error, "a horizon that reaches a neighbour"))?;
     if bonds.directed_bonds() == 0 {
         let found = format!(
@@ -70,6 +70,9 @@ fn filled<const D: usize>(
             found,
             "smaller: a body of at least two bonded particles",
         ));
+    }
+    if scene.is_mixed() {
+        bonds.set_mixed();
     }
     memory::refuse_too_large(source, scene, spacing_key(scene), &bonds)?;
     let (severed, cuts) = (Vec::new(), Vec::new());

@@ -123,6 +123,15 @@ fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
                     return Err(source.error(&format!("dynamics.{key}"), plain(value), allowed));
                 }
             }
+            let elsewhere = [
+                (scene.body.has_points(), "a body of points"),
+                (scene.material.solid.is_some(), "a `solid`"),
+                (scene.material.is_prestrained(), "prestrained bonds"),
+            ];
+            if let Some((_, what)) = elsewhere.iter().find(|(has, _)| scene.is_mixed() && *has) {
+                let allowed = "\"double\"; \"mixed\" is for bond laws in bodies of shapes";
+                return Err(source.error("dynamics.precision", format!("\"mixed\" of {what}"), allowed));
+            }
             if let Some(factor) = &dynamics.factor {
                 if dynamics.ramp.is_some() {
                     return Err(source.error(

@@ -35,6 +35,7 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     add(rubs && scene.dynamics.is_some(), &[q::SLIP_VELOCITY]);
     let motion = [q::CRITICAL_TIME_STEP, q::TIME_STEP, q::KINETIC_ENERGY, q::ENERGY_ERROR];
     add(scene.dynamics.is_some(), &motion);
+    add(scene.is_mixed(), &[q::MIXED_ERROR]);
     let axes = if scene.body.space == Space::Solid { &["x", "y", "z"][..] } else { &["x", "y"] };
     let mut along = |given: bool, quantity: Quantity| {
         all.extend(axes.iter().filter(|_| given).map(|axis| quantity.of(&[axis])));

@@ -61,6 +61,10 @@ fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
     if scene.material.critical.is_some() {
         each += BREAKING;
     }
+    if scene.is_mixed() {
+        // displacement and surface factors in single precision
+        each += vector;
+    }
     sites * each
 }
 

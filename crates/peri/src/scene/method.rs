@@ -22,7 +22,7 @@ pub struct Solver {
     pub path: Option<Vec<f64>>,
     /// Iterations a step may take.
     pub max_iterations: u64,
-    /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break.
+    /// Largest relative error of the fitted bond law; default 1e-9, or 1e-6 where bonds break or forces are in mixed precision.
     pub fit_bound: Option<f64>,
     /// Factor on the fictitious mass of dynamic relaxation; default by law.
     pub mass_safety: Option<f64>,
@@ -153,6 +153,21 @@ pub struct Dynamics {
     pub damping: Option<Rate>,
     /// Rows of history, equally far apart; default 100.
     pub records: Option<usize>,
+    /// Precision of the forces of bonds; default: double.
+    #[serde(default)]
+    pub precision: Precision,
+}
+
+/// Precision of the forces of bonds in a lattice; all else is in double precision.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Precision {
+    /// Double precision.
+    #[default]
+    Double,
+    /// Bonds in single precision, the sums of their forces in double precision; `mixed_error` of the report says what that costs.
+    /// Double precision while bonds are stretched or crushed so far that single precision would miss the law by more than 1e-5.
+    Mixed,
 }
 
 impl Dynamics {

@@ -38,7 +38,7 @@ pub use inclusion::{Inclusion, Inclusions};
 pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, region_names, velocities_of};
 pub use memory::needed as memory_needed;
-pub use method::{Dynamics, Method, Solver};
+pub use method::{Dynamics, Method, Precision, Solver};
 pub use placement::{check_placement, exact_plate};
 pub use probe::{Probe, Track};
 pub use solid::{SolidKind, SolidLaw};
@@ -460,7 +460,13 @@ impl Scene {
 
     /// Largest relative error of the fitted bond law.
     pub fn fit_bound(&self) -> f64 {
-        self.solver.fit_bound.unwrap_or(if self.material.critical.is_some() { 1e-6 } else { 1e-9 })
+        let rough = self.material.critical.is_some() || self.is_mixed();
+        self.solver.fit_bound.unwrap_or(if rough { 1e-6 } else { 1e-9 })
+    }
+
+    /// Whether forces of bonds are evaluated in mixed precision.
+    pub fn is_mixed(&self) -> bool {
+        self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == Precision::Mixed)
     }
 }
 

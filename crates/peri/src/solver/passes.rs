@@ -61,7 +61,7 @@ pub fn force_pass<const D: usize>(
                 let mut new: [&mut [f64]; D] =
                     std::array::from_fn(|_| &mut parts.next().unwrap_or_default()[..range.len()]);
                 let mut observed = StretchRange::REST;
-                system.internal_force(displacement, chunk, &mut new, look.then_some(&mut observed));
+                system.internal_force(displacement, chunk * CHUNK, &mut new, look.then_some(&mut observed));
                 let mut sums = Sums::default();
                 let constrained = loads.constrained.get(range.clone()).unwrap_or_default();
                 for d in 0..D {
@@ -120,7 +120,7 @@ pub fn gradient_pass<const D: usize>(
     let results: Vec<(Sums, StretchRange, f64)> = items
         .map(|(item, (mut force, gradient))| {
             let mut observed = StretchRange::REST;
-            system.internal_force(displacement, item, &mut force, Some(&mut observed));
+            system.internal_force(displacement, item * CHUNK, &mut force, Some(&mut observed));
             let (mut sums, mut slope) = (Sums::default(), 0.0);
             let particles = places.of_item(item);
             let held = places.held(particles.clone());

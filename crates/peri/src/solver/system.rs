@@ -4,7 +4,7 @@ use super::criterion::Breaking;
 use super::load::Loads;
 use super::scale::Scale;
 use super::state::State;
-use crate::bonds::{Bonds, not_finite};
+use crate::bonds::{Bonds, Seen, not_finite};
 use crate::contact::{Contact, Plane, Resting, Touching};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
@@ -34,8 +34,8 @@ pub struct System<'a, const D: usize> {
     pub fit_bound: f64,
     /// Repulsion of particles without a bond, or a look at how they overlap, where wanted.
     pub contact: Option<Contact<D>>,
-    /// Stretches of each work item, where they have just been looked at.
-    pub(super) seen_stretches: Vec<StretchRange>,
+    /// Stretches, where they have just been looked at.
+    pub(super) seen_stretches: Seen,
     /// What forces out of balance are measured by.
     pub(super) scale: Scale,
     /// The load factor and its rate over the time, s, in explicit dynamics, instead of the ramp.
@@ -80,20 +80,21 @@ impl<'a, const D: usize> System<'a, D> {
             stop_below: 0.0,
             fit_bound: 1e-9,
             contact: None,
-            seen_stretches: Vec::new(),
+            seen_stretches: Seen::default(),
             scale: Scale::default(),
             course: None,
             observer: None,
         }
     }
 
-    /// The first pass over a new displacement, or over bonds that have changed: states of particles, and pairs in contact
-    /// where particles have moved far. To be called before the forces, once; how often pairs are looked for makes no difference
+    /// The first pass over a new displacement, or over bonds that have changed: states of particles, what kernels of mixed precision
+    /// read, and pairs in contact where particles have moved far. To be called before the forces, once; how often pairs are looked for makes no difference
     /// to any bit.
     pub fn prepare(&mut self, displacement: &Field<D>) {
         if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
             contact.update(&*self.bonds, displacement);
         }
+        self.bonds.round(displacement);
         self.material.prepare(&*self.bonds, displacement);
     }
 
@@ -171,32 +172,24 @@ impl<'a, const D: usize> System<'a, D> {
         Some(contact.touching(&state.displacement))
     }
 
-    /// Force densities of a work item, without loads: the material, and all that acts between particles beside it. After
-    /// [`Self::prepare`].
+    /// Force densities of whole pieces from the site `start` on, without loads: the material, and all that acts between particles
+    /// beside it. After [`Self::prepare`].
     pub fn internal_force(
         &self,
         displacement: &Field<D>,
-        chunk: usize,
+        start: usize,
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
-        self.material.force(&*self.bonds, displacement, chunk, force, track);
+        self.material.force(&*self.bonds, displacement, start, force, track);
         if let Some(contact) = self.repulsion() {
-            contact.force(displacement, chunk, force);
+            contact.force(displacement, start / CHUNK, force);
         }
     }
 
-    /// Sites that [`Self::force_from`] may begin with: multiples of this.
+    /// Sites that [`Self::internal_force`] may begin with: multiples of this.
     pub(super) fn piece(&self) -> usize {
         if self.repulsion().is_some() { CHUNK } else { self.material.piece(&*self.bonds) }
-    }
-
-    /// As [`Self::internal_force`], of whole pieces from the site `start` on.
-    pub(super) fn force_from(&self, displacement: &Field<D>, start: usize, force: &mut [&mut [f64]; D]) {
-        if self.repulsion().is_some() {
-            return self.internal_force(displacement, start / CHUNK, force, None);
-        }
-        self.material.force_from(&*self.bonds, displacement, start, force);
     }
 
     /// Energy of the material, whose law is taken over the stretches `observed`, and of contact, J.

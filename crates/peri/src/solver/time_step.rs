@@ -142,7 +142,7 @@ fn tangent<const D: usize>(
         system.prepare(moved);
         let system = &*system;
         out.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut out)| {
-            system.internal_force(moved, chunk, &mut out, None);
+            system.internal_force(moved, chunk * CHUNK, &mut out, None);
         });
         system.count_evaluation(state);
     }

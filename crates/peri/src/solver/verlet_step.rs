@@ -4,7 +4,7 @@
 use super::load::Loads;
 use super::state::State;
 use super::system::System;
-use crate::bonds::StretchRange;
+use crate::bonds::{Seen, StretchRange};
 use crate::field::{CHUNK, chunk_range};
 use rayon::prelude::*;
 
@@ -46,6 +46,10 @@ impl Sums {
         }
     }
 }
+
+/// Sites whose stretches are looked at together where bonds may break, a divisor of [`CHUNK`]: near a crack, few such parts hold bonds
+/// beyond what they bear, many work items do.
+const LOOK: usize = 256;
 
 /// A work item of two fields.
 pub type Two<'a, const D: usize> = ([&'a mut [f64]; D], [&'a mut [f64]; D]);
@@ -107,19 +111,26 @@ pub fn force_pass<const D: usize>(
 ) -> (Sums, StretchRange) {
     let (loads, displacement, body) = (&*system.loads, &state.displacement, &*system);
     let (force, velocity) = (state.force.chunks_mut(), state.velocity.chunks_mut());
+    let part = if look { body.piece().max(LOOK) } else { CHUNK };
     let of = |(chunk, (mut f, mut v)): (usize, Two<D>)| {
-        let mut observed = StretchRange::REST;
-        body.internal_force(displacement, chunk, &mut f, look.then_some(&mut observed));
-        load(loads, chunk * CHUNK, leap.factors[1], &mut f);
+        let (start, length) = (chunk * CHUNK, f[0].len());
+        let mut seen = Vec::new();
+        for from in (0..length).step_by(part) {
+            let mut observed = StretchRange::REST;
+            let mut f = f.each_mut().map(|f| &mut f[from..(from + part).min(length)]);
+            body.internal_force(displacement, start + from, &mut f, look.then_some(&mut observed));
+            seen.extend(look.then_some(observed));
+        }
+        load(loads, start, leap.factors[1], &mut f);
         let f = f.map(|f| &*f);
-        (if kicks { kick(loads, volumes, leap, chunk, f, &mut v) } else { Sums::default() }, observed)
+        (if kicks { kick(loads, volumes, leap, chunk, f, &mut v) } else { Sums::default() }, seen)
     };
-    let parts: Vec<_> = force.into_par_iter().zip(velocity).enumerate().map(of).collect();
-    system.seen_stretches.clear();
-    system.seen_stretches.extend(parts.iter().filter(|_| look).map(|part| part.1));
-    parts.into_iter().fold((Sums::default(), StretchRange::REST), |(sums, observed), (s, m)| {
-        (sums.add(s), observed.join(m))
-    })
+    let (sums, seen): (Vec<Sums>, Vec<Vec<StretchRange>>) =
+        force.into_par_iter().zip(velocity).enumerate().map(of).unzip();
+    let seen = Seen { part, ranges: seen.concat() };
+    let observed = seen.ranges.iter().copied().fold(StretchRange::REST, StretchRange::join);
+    system.seen_stretches = seen;
+    (sums.into_iter().fold(Sums::default(), Sums::add), observed)
 }
 
 /// The second half of the kick: v ← v + ½Δt a with the new a; constrained components have the rate of F d.
@@ -160,7 +171,7 @@ pub fn refresh<const D: usize>(
     });
     let (displacement, friction) = (&state.displacement, state.friction.as_ref());
     let of = |start: usize, mut f: [&mut [f64]; D]| {
-        system.force_from(displacement, start, &mut f);
+        system.internal_force(displacement, start, &mut f, None);
         load(&system.loads, start, factor, &mut f);
         if let Some(friction) = friction {
             for (f, rub) in f.iter_mut().zip(friction.components()) {

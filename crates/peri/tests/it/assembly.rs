@@ -8,8 +8,9 @@ fn spills(function: &[(u64, &str)]) -> Vec<usize> {
     let jump = |text: &str| text.starts_with('j') || text.starts_with("call");
     let is_law = |body: &[(u64, &str)]| {
         let count = |what: &dyn Fn(&str) -> bool| body.iter().filter(|(_, text)| what(text)).count();
-        count(&|text| text.starts_with("vdivpd")) > 0
-            && count(&|text| text.starts_with("vfmadd") && text.contains("pd ")) >= 10
+        count(&|text| text.starts_with("vdivp")) > 0
+            && count(&|text| text.starts_with("vfmadd") && (text.contains("pd ") || text.contains("ps ")))
+                >= 10
     };
     let mut found = Vec::new();
     for (end, &(from, text)) in function.iter().enumerate() {

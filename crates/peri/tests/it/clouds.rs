@@ -128,7 +128,13 @@ fn kernels_are_plain_loops<const D: usize>(space: Space, side: usize, correction
                 material.prepare(&bonds, &displacement);
                 let (mut force, mut seen) = (Field::<D>::zeros(bonds.sites()), StretchRange::REST);
                 for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
-                    material.force(&bonds, &displacement, chunk, &mut part, Some(&mut seen));
+                    material.force(
+                        &bonds,
+                        &displacement,
+                        chunk * peri::field::CHUNK,
+                        &mut part,
+                        Some(&mut seen),
+                    );
                 }
                 found.push((force, seen, material.energy(&bonds, &displacement, StretchRange::REST)));
             }

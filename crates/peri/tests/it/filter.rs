@@ -48,7 +48,7 @@ fn a_homogeneous_deformation_is_left_as_it_is() {
         material.prepare(&bonds, &moved);
         let mut force = Field::<2>::zeros(bonds.sites());
         for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
-            material.force(&bonds, &moved, chunk, &mut part, None);
+            material.force(&bonds, &moved, chunk * peri::field::CHUNK, &mut part, None);
         }
         force
     });

@@ -3,7 +3,7 @@
 use crate::bodies::{Body, Random, distance, fit, forces, laws, norm, rms, scatter, stretch_range};
 use peri::bonds::{Bonds, force};
 use peri::field::Field;
-use peri::potential::KernelFit;
+use peri::potential::{KernelFit, StretchRange};
 
 /// The forces of pieces have the bits of those of work items.
 fn in_pieces<const D: usize>(bonds: &dyn Bonds<D>, u: &Field<D>) {
@@ -16,6 +16,46 @@ fn in_pieces<const D: usize>(bonds: &dyn Bonds<D>, u: &Field<D>) {
         for (part, whole) in parts.iter().zip(whole.components()) {
             assert!(part[..] == whole[start..start + size], "pieces of {piece} from site {start}");
         }
+    }
+}
+
+/// Forces in mixed precision against those in double precision: each bond is wrong by roundings of single precision, and so is
+/// what the kernel sees of stretches.
+fn in_mixed_precision<const D: usize>(
+    body: &Body<D>,
+    fit: &KernelFit,
+    u: &[[f64; D]],
+    double: &[[f64; D]],
+    sizes: &[f64],
+    name: &str,
+) {
+    let built = body.build();
+    let (mut bonds, scale) = (built.lattice, rms(double));
+    bonds.set_mixed();
+    bonds.set_law(fit, crate::bodies::MODULUS);
+    let displacement = scatter(bonds.sites(), &built.on_lattice, u);
+    bonds.round(&displacement);
+    in_pieces(&bonds, &displacement);
+    let mixed = forces(&bonds, &built.on_lattice, u);
+    let unit = f64::from(f32::EPSILON);
+    for (particle, (found, exact)) in mixed.iter().zip(double).enumerate() {
+        let error = norm::<D>(std::array::from_fn(|d| found[d] - exact[d]));
+        let allowed = 8.0 * unit * (sizes[particle] + scale);
+        assert!(error <= allowed, "{name}, particle {particle}: off by {error:.1e} of {allowed:.1e} allowed");
+    }
+    let error = distance(&mixed, double) / scale;
+    let stated = bonds.mixed_error(&displacement).unwrap();
+    assert!(
+        stated > 0.0 && stated < 10.0 * unit && error >= 0.5 * stated,
+        "{name}: {stated:.1e} {error:.1e}"
+    );
+    let (mut seen, mut out) = (StretchRange::REST, Field::<D>::zeros(bonds.sites()));
+    for (chunk, mut part) in out.chunks_mut().into_iter().enumerate() {
+        bonds.force(&displacement, chunk * peri::field::CHUNK, &mut part, Some(&mut seen));
+    }
+    let range = peri::bonds::stretch_range(&bonds, &displacement);
+    for (seen, exact) in [(seen.low, range.low), (seen.high, range.high)] {
+        assert!((seen - exact).abs() < 8.0 * unit * (1.0 + exact.abs()), "{name}: {seen} {exact}");
     }
 }
 
@@ -38,6 +78,7 @@ fn compare<const D: usize>(body: &Body<D>, size: f64, name: &str) {
         let apart = distance(&on_lattice, &in_cloud) / scale;
         assert!(apart <= 1e-12, "{name}, {}: paths differ by {apart:.1e} of the rms", law.name());
         let (plain, sizes) = body.plain_forces(&pairs, &*potential, &u);
+        in_mixed_precision(body, &fit, &u, &on_lattice, &sizes, &format!("{name}, {}", law.name()));
         for (particle, (found, exact)) in on_lattice.iter().zip(&plain).enumerate() {
             let error = norm::<D>(std::array::from_fn(|d| found[d] - exact[d]));
             // each bond's force is off by at most the fit's own error, 1e-9 or less; samples may miss its peak by a

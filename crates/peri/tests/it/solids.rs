@@ -116,7 +116,7 @@ impl<const D: usize> Block<D> {
         material.prepare(&self.bonds, &self.displacement);
         let mut force = Field::zeros(self.bonds.sites());
         for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
-            material.force(&self.bonds, &self.displacement, chunk, &mut part, None);
+            material.force(&self.bonds, &self.displacement, chunk * peri::field::CHUNK, &mut part, None);
         }
         let (mut off, mut most) = ([0.0_f64; 4], [1e-300_f64; 4]);
         let mut note = |k: usize, found: f64, truth: f64| {
@@ -195,7 +195,7 @@ fn long_chains_are_neo_hookean() {
         material.prepare(&built.lattice, &displacement);
         let mut force = Field::<2>::zeros(built.lattice.sites());
         for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
-            material.force(&built.lattice, &displacement, chunk, &mut part, None);
+            material.force(&built.lattice, &displacement, chunk * peri::field::CHUNK, &mut part, None);
         }
         force
     };
@@ -438,7 +438,7 @@ fn kernels_are_plain_loops<const D: usize>(space: Space, side: usize, volume: Vo
             material.prepare(&bonds, &displacement);
             let (mut force, mut seen) = (Field::<D>::zeros(bonds.sites()), rest);
             for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {
-                material.force(&bonds, &displacement, chunk, &mut part, Some(&mut seen));
+                material.force(&bonds, &displacement, chunk * peri::field::CHUNK, &mut part, Some(&mut seen));
             }
             found.push((force, seen, material.energy(&bonds, &displacement, rest)));
         }

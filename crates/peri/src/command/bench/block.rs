@@ -47,6 +47,9 @@ pub struct Options {
     /// Largest relative error of the fitted law, 1e-15 to 1e-3.
     #[arg(long, requires = "block", default_value_t = 1e-9, value_parser = fit_bound)]
     fit_bound: f64,
+    /// Bonds in single precision, the sums of their forces in double precision.
+    #[arg(long, requires = "block")]
+    mixed: bool,
     /// Write positions, displacements and force densities at the end (CSV).
     #[arg(long, requires = "block", value_name = "FILE")]
     state: Option<PathBuf>,
@@ -95,6 +98,9 @@ pub fn measure(cells: u16, options: &Options) -> Result<Vec<Measurement>, Error>
         rows.push(row("forces", rate * bonds as f64, "directed bonds/s"));
         rows.push(row("steps", rate * particles as f64, "particle·steps/s"));
     }
+    if let Some(error) = block.bonds.mixed_error(&block.displacement) {
+        rows.push(row("error of forces in mixed precision", error, "of their root mean square"));
+    }
     Ok(rows)
 }
 
@@ -116,6 +122,9 @@ impl Block {
         };
         let volumes = if options.partial_volumes { VolumeCorrection::Linear } else { VolumeCorrection::None };
         let mut bonds = LatticeBonds::new(lattice, RATIO, volumes, &[])?;
+        if options.mixed {
+            bonds.set_mixed();
+        }
         let law = Law::Linear.build(1.0, 1.0, false)?;
         let range = [1.0 - 4.0 * options.strain, 1.0 + 4.0 * options.strain];
         let fit = KernelFit::new(&*law, range, options.fit_bound)?;
@@ -129,6 +138,7 @@ impl Block {
                 .set(site as usize, initial_displacement(position, options.strain, cells as f64 * SPACING));
         }
         let mut block = Self { bonds, displacement, velocity: zero.clone(), force: zero };
+        block.bonds.round(&block.displacement);
         force(&block.bonds, &block.displacement, &mut block.force);
         Ok(block)
     }
@@ -146,6 +156,7 @@ impl Block {
                 }
             }
         });
+        self.bonds.round(&self.displacement);
         force(&self.bonds, &self.displacement, &mut self.force);
         let forces = self.force.components();
         self.velocity.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, v)| {
@@ -201,6 +212,7 @@ mod tests {
             strain: 0.01,
             partial_volumes: true,
             fit_bound: 1e-9,
+            mixed: false,
             state: None,
         };
         let mut block = Block::new(6, &options).unwrap();

@@ -3,7 +3,7 @@
 use peri::Error;
 use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
-use peri::field::Field;
+use peri::field::{CHUNK, Field};
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{Correspondence, EightChain, Material, NonlocalSolid, Response};
 use peri::potential::{KernelFit, Law};
@@ -81,5 +81,5 @@ pub fn both_passes<const D: usize>(
     out.chunks_mut()
         .into_par_iter()
         .enumerate()
-        .for_each(|(chunk, mut force)| solid.force(bonds, displacement, chunk, &mut force, None));
+        .for_each(|(chunk, mut force)| solid.force(bonds, displacement, chunk * CHUNK, &mut force, None));
 }
