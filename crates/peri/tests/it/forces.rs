@@ -117,6 +117,36 @@ fn paths_agree_in_space() {
     }
 }
 
+/// What mixed precision costs a body that has moved: single precision knows a displacement of n spacings to n·2⁻²⁴ of them. And a
+/// law over stretches so wide that single precision would miss it stays in double precision.
+#[test]
+fn limits_of_mixed_precision() {
+    let built = Body::<3>::solid([9, 8, 7], 0.1, 3.015).build();
+    let mut bonds = built.lattice;
+    bonds.set_mixed();
+    let law = peri::potential::Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
+    let u = Random(11).vectors(built.points.len(), 0.002);
+    let error_at = |bonds: &mut peri::bonds::LatticeBonds<3>, range: [f64; 2], way: f64| {
+        bonds.set_law(&KernelFit::new(&*law, range, 1e-6).unwrap(), crate::bodies::MODULUS);
+        let moved: Vec<[f64; 3]> = u.iter().map(|u| u.map(|x| x + 0.1 * way)).collect();
+        let displacement = scatter(bonds.sites(), &built.on_lattice, &moved);
+        bonds.round(&displacement);
+        bonds.mixed_error(&displacement).unwrap()
+    };
+    // displacements of 2 % of the spacing, which differ by as much
+    let unit = 0.5 * f64::from(f32::EPSILON);
+    for way in [1e2, 1e3, 1e4] {
+        let error = error_at(&mut bonds, [0.9, 1.1], way);
+        let expected = way / 0.02 * unit;
+        assert!(
+            error > 0.05 * expected && error < 2.0 * expected,
+            "{way} spacings: {error:.1e} {expected:.1e}"
+        );
+    }
+    assert!(error_at(&mut bonds, [0.5, 2.0], 0.0) > 0.0);
+    assert_eq!(error_at(&mut bonds, [0.1, 3.0], 0.0), 0.0);
+}
+
 /// A law that only the table holds runs the plain loops of both paths.
 #[test]
 fn paths_agree_on_a_tabulated_law() {
