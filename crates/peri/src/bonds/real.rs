@@ -6,7 +6,7 @@ use pulp::Simd;
 pub trait Real: Copy + Send + Sync + 'static {
     /// A vector with instructions `S`.
     type Vector<S: Simd>: Copy;
-    /// Bonds whose forces are added in this precision before the sum goes on in double precision.
+    /// Number of bonds whose forces are summed in this precision; the sum is then added in double precision.
     const RUN: usize;
     /// Numbers in a vector.
     fn lanes<S: Simd>() -> usize;

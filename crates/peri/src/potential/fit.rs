@@ -165,8 +165,8 @@ impl KernelFit {
         self.numerator.len() + self.denominator.len() + if self.denominator.is_empty() { 0 } else { DIVISION }
     }
 
-    /// Largest relative error of q over the range where single precision evaluates it; infinite for a table. Ratios that cover bonds
-    /// crushed to less than half of their length lose all digits.
+    /// Largest relative error of q over the range where single precision evaluates it; infinite for a table. The ratio of
+    /// a chain law over stretches of 0.1 to 3 loses all digits.
     pub fn single_error(&self) -> f64 {
         if self.numerator.is_empty() {
             return f64::INFINITY;
