@@ -17,10 +17,20 @@ const MOST_SPREAD: f64 = 1.3;
 /// Rows of M and K for given factors, packed.
 #[derive(Default)]
 pub struct Packed {
-    /// Of each work item; `None` where rows are mostly equal.
-    items: Vec<Option<Item>>,
-    /// For which rows the pattern, and for which values and factors the entries were made.
+    items: Vec<Kept>,
+    /// For which rows and factors it was made.
+    made_for: Option<([u64; 2], [u64; 2])>,
+    any: bool,
+}
+
+/// A work item, and for what it was made: births change few of them.
+#[derive(Default)]
+struct Kept {
+    /// `None` where rows are mostly equal.
+    item: Option<Item>,
+    /// For which pattern.
     shaped_for: Option<u64>,
+    /// For which values and factors.
     filled_for: Option<(u64, [u64; 2])>,
 }
 
@@ -50,22 +60,24 @@ struct Block {
 impl Packed {
     /// Makes it of these rows, as far as it is not yet; false where no rows are packed.
     pub fn update(&mut self, rows: &Rows, weights: [f64; 2]) -> bool {
-        let [shape, values] = rows.versions();
-        if self.shaped_for != Some(shape) {
-            let item = |item: usize| rows.is_unequal(item).then(|| Item::new(rows, item));
-            self.items = (0..rows.items()).into_par_iter().map(item).collect();
-            (self.shaped_for, self.filled_for) = (Some(shape), None);
-        }
-        let made_for = Some((values, weights.map(f64::to_bits)));
-        if self.filled_for != made_for {
-            self.items.par_iter_mut().enumerate().for_each(|(index, item)| {
-                if let Some(item) = item {
-                    item.fill(rows, index, weights);
+        let factors = weights.map(f64::to_bits);
+        let made_for = Some((rows.versions(), factors));
+        if self.made_for != made_for {
+            self.items.resize_with(rows.items(), Kept::default);
+            self.items.par_iter_mut().enumerate().for_each(|(index, kept)| {
+                let [shape, values] = rows.versions_of(index);
+                if kept.shaped_for != Some(shape) {
+                    kept.item = rows.is_unequal(index).then(|| Item::new(rows, index));
+                    (kept.shaped_for, kept.filled_for) = (Some(shape), None);
+                }
+                if kept.filled_for != Some((values, factors)) {
+                    kept.item.iter_mut().for_each(|item| item.fill(rows, index, weights));
+                    kept.filled_for = Some((values, factors));
                 }
             });
-            self.filled_for = made_for;
+            (self.made_for, self.any) = (made_for, self.items.iter().any(|kept| kept.item.is_some()));
         }
-        self.items.iter().any(Option::is_some)
+        self.any
     }
 
     /// y = (diagonal + `factor`·A) x; returns x·y. `weights` are `factor` times those of A.
@@ -78,7 +90,7 @@ impl Packed {
         y: &mut [f64],
     ) -> f64 {
         let arch = Arch::new();
-        let part = |(index, y): (usize, &mut [f64])| match self.items.get(index) {
+        let part = |(index, y): (usize, &mut [f64])| match self.items.get(index).map(|kept| &kept.item) {
             Some(Some(item)) => {
                 let first = index * CHUNK;
                 let diagonal = diagonal.map(|diagonal| &diagonal[first..first + y.len()]);
@@ -200,7 +212,7 @@ impl WithSimd for Product<'_> {
     type Output = f64;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> f64 {
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
         let Self { item, diagonal, factor, x, y, first } = self;
         let mut values = item.values.as_slice();
         let mut dots = [0.0; LANES];
@@ -209,22 +221,32 @@ impl WithSimd for Product<'_> {
             values = rest;
             let begin = LANES * place;
             let row = first + begin;
-            let mut sums = [0.0; LANES];
+            // two sums at a time hide the latency of additions
+            let (mut even, mut odd) = ([simd.splat_f64s(0.0); LANES], [simd.splat_f64s(0.0); LANES]);
+            let pairs = own.len() / 2;
             if block.banded {
-                for (value, offset) in own.iter().zip(&item.offsets[block.range()]) {
-                    let start = row.wrapping_add_signed(*offset as isize);
-                    if let Some(other) = x[start..].first_chunk::<LANES>() {
-                        for lane in 0..LANES {
-                            sums[lane] += f64::from(value[lane]) * other[lane];
-                        }
-                    }
+                let offsets = &item.offsets[block.range()];
+                for pair in 0..pairs {
+                    add(simd, &own[2 * pair], band(x, row, offsets[2 * pair]), &mut even);
+                    add(simd, &own[2 * pair + 1], band(x, row, offsets[2 * pair + 1]), &mut odd);
+                }
+                if 2 * pairs < own.len() {
+                    add(simd, &own[2 * pairs], band(x, row, offsets[2 * pairs]), &mut even);
                 }
             } else {
-                for (value, columns) in own.iter().zip(&item.columns[block.range()]) {
+                let columns = &item.columns[block.range()];
+                for k in 0..own.len() {
+                    let mut other = [0.0; LANES];
                     for lane in 0..LANES {
-                        sums[lane] += f64::from(value[lane]) * x[columns[lane] as usize];
+                        other[lane] = x[columns[k][lane] as usize];
                     }
+                    add(simd, &own[k], &other, &mut even);
                 }
+            }
+            let mut sums = [0.0; LANES];
+            let (parts, _) = S::as_mut_simd_f64s(&mut sums);
+            for v in 0..parts.len() {
+                parts[v] = simd.add_f64s(even[v], odd[v]);
             }
             let range = begin..(begin + LANES).min(y.len());
             let (out, core, x) = (&mut y[range.clone()], &item.core[range.clone()], &x[row..]);
@@ -244,6 +266,26 @@ impl WithSimd for Product<'_> {
             }
         }
         dots.iter().sum()
+    }
+}
+
+/// What entries at a distance from the diagonals of eight rows are multiplied by.
+#[inline(always)]
+fn band(x: &[f64], row: usize, offset: i32) -> &[f64] {
+    let start = row.wrapping_add_signed(offset as isize);
+    &x[start..start + LANES]
+}
+
+/// Adds an entry of eight rows times those of a vector.
+#[inline(always)]
+fn add<S: Simd>(simd: S, entry: &[f32; LANES], x: &[f64], sums: &mut [S::f64s; LANES]) {
+    let mut wide = [0.0; LANES];
+    for lane in 0..LANES {
+        wide[lane] = f64::from(entry[lane]);
+    }
+    let ((entry, _), (x, _)) = (S::as_simd_f64s(&wide), S::as_simd_f64s(x));
+    for v in 0..entry.len() {
+        sums[v] = simd.mul_add_f64s(entry[v], x[v], sums[v]);
     }
 }
 
@@ -287,8 +329,8 @@ mod tests {
             let x: Vec<f64> = (0..size).map(|k| (k as f64).sin()).collect();
             let one = vec![1.0; size];
             for weights in [[0.0, 1.0], [1.0, 1e6]] {
-                assert!(packed.update(&rows, weights) && packed.items.iter().all(Option::is_some));
-                let banded = packed.items.iter().flatten().flat_map(|item| &item.blocks);
+                assert!(packed.update(&rows, weights) && packed.items.iter().all(|kept| kept.item.is_some()));
+                let banded = packed.items.iter().flat_map(|kept| &kept.item).flat_map(|item| &item.blocks);
                 let banded = banded.filter(|block| block.banded).count();
                 assert!(if scattered { banded == 0 } else { banded * LANES > size * 9 / 10 }, "{banded}");
                 let [mut found, mut exact] = [vec![0.0; size], vec![0.0; size]];

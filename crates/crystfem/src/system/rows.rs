@@ -80,6 +80,8 @@ pub struct Rows {
     base: Option<[Vec<f64>; 2]>,
     /// Counts changes of the pattern, and of values.
     versions: [u64; 2],
+    /// The versions in which each work item last changed.
+    changed: Vec<[u64; 2]>,
 }
 
 /// Rows of a run on average where runs count as short.
@@ -108,6 +110,7 @@ impl Rows {
             dead: 0,
             base: None,
             versions: [0; 2],
+            changed: Vec::new(),
         }
     }
 
@@ -124,6 +127,11 @@ impl Rows {
     /// What changes with the pattern, and what changes with the values.
     pub fn versions(&self) -> [u64; 2] {
         self.versions
+    }
+
+    /// The same of the rows of one work item.
+    pub fn versions_of(&self, item: usize) -> [u64; 2] {
+        self.changed[item]
     }
 
     /// Whether most rows of a work item stand alone.
@@ -154,6 +162,7 @@ impl Rows {
         let before = self.size;
         self.size = size.max(before);
         self.segments.resize_with(items(self.size), Vec::new);
+        self.changed.resize(self.segments.len(), self.versions);
         if !self.own.is_empty() || parts.iter().any(|part| part.runs.iter().any(|run| run.1)) {
             self.own.resize(self.size, SHARED);
         }
@@ -166,6 +175,7 @@ impl Rows {
             if part.is_none() && end <= before {
                 continue;
             }
+            self.changed[item] = self.versions;
             of.clear();
             of.resize(end - first, SHARED);
             for segment in &self.segments[item] {
@@ -247,6 +257,7 @@ impl Rows {
         let range = self.stencils.range(stencil);
         let offset = column as i64 - row as i64;
         self.versions[1] += 1;
+        self.changed[row / CHUNK][1] = self.versions[1];
         if let Ok(at) = self.stencils.offsets[range.clone()].binary_search_by_key(&offset, |&o| i64::from(o))
         {
             self.stencils.conduction[range.start + at] += conduction;
@@ -271,6 +282,7 @@ impl Rows {
             self.stencils.conduction.copy_from_slice(conduction);
             self.stencils.capacity.copy_from_slice(capacity);
             self.versions[1] += 1;
+            self.changed.iter_mut().for_each(|changed| changed[1] = self.versions[1]);
         }
     }
 
@@ -300,9 +312,7 @@ impl Rows {
     }
 
     fn diagonal(&self, segment: &Segment, weights: [f64; 2]) -> f64 {
-        let range = self.stencils.range(segment.stencil);
-        let at = self.stencils.offsets[range.clone()].binary_search(&0);
-        at.map_or(0.0, |at| self.value(range.start + at, weights))
+        self.stencils.diagonal(segment.stencil).map_or(0.0, |at| self.value(at, weights))
     }
 
     /// Columns of a row, ascending.

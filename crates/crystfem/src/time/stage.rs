@@ -57,6 +57,9 @@ pub struct Stages {
     row_sums: Vec<f64>,
     /// K·1 and M·1 over the free nodes; empty where it is nothing.
     free_sums: [Vec<f64>; 2],
+    /// Diagonal of the rows where Newton's iteration needs it often, and for which rows and weights it was made.
+    own: Vec<f64>,
+    own_for: Option<([u64; 2], [u64; 2])>,
     iterative: Iterative,
     packed: Packed,
     /// What is wanted; factors and levels are made when first needed.
@@ -263,9 +266,29 @@ impl Stages {
         self.inverse.resize(size, 0.0);
         let [conduction, consistent] = &self.free_sums;
         let whole = &mut self.inverse;
+        let weights = [if system.consistent { 1.0 } else { 0.0 }, weight];
         if system.consistent {
             whole.fill(0.0);
-            system.rows.add_diagonal([1.0, weight], whole);
+        } else {
+            self.diagonal.resize(size, 0.0);
+            blend(&mut self.diagonal, capacity, conductance, |_, capacity, conductance| {
+                capacity + weight * conductance
+            });
+            whole.copy_from_slice(&self.diagonal);
+        }
+        if system.is_linear() {
+            system.rows.add_diagonal(weights, whole);
+        } else {
+            let own_for = Some((system.rows.versions(), weights.map(f64::to_bits)));
+            if self.own_for != own_for {
+                self.own.clear();
+                self.own.resize(size, 0.0);
+                system.rows.add_diagonal(weights, &mut self.own);
+                self.own_for = own_for;
+            }
+            combine(whole, |k, whole| whole + self.own[k]);
+        }
+        if system.consistent {
             self.row_sums.resize(size, 0.0);
             set(&mut self.row_sums, |k| consistent[k] + weight * conduction[k]);
             for face in faces.iter() {
@@ -275,13 +298,6 @@ impl Stages {
                     whole[equation as usize] += weight * value;
                 }
             }
-        } else {
-            self.diagonal.resize(size, 0.0);
-            blend(&mut self.diagonal, capacity, conductance, |_, capacity, conductance| {
-                capacity + weight * conductance
-            });
-            whole.copy_from_slice(&self.diagonal);
-            system.rows.add_diagonal([0.0, weight], whole);
         }
         // rounding of the residual: 1e-14 of a temperature of 500 K, everywhere
         let rounding = 5e-12_f64;

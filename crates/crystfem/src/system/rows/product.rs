@@ -32,15 +32,13 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
                 Runs { rows, segment, diagonal, y: &mut *y, first }.run::<S, FLOW>(simd, weights, x);
             } else {
                 for row in start..start + length {
-                    let mut sums = [0.0; 4];
-                    for (k, at) in range.clone().enumerate() {
-                        let mut other = x[row.wrapping_add_signed(stencils.offsets[at] as isize)];
-                        if FLOW {
-                            other -= x[row];
-                        }
-                        sums[k & 3] += rows.value(at, weights) * other;
-                    }
-                    let mut sum = (sums[0] + sums[1]) + (sums[2] + sums[3]);
+                    let mut sum = if FLOW {
+                        let offsets = &stencils.offsets[range.clone()];
+                        flow(offsets, &stencils.conduction[range.clone()], x, row)
+                    } else {
+                        let other = |at: usize| x[row.wrapping_add_signed(stencils.offsets[at] as isize)];
+                        range.clone().map(|at| rows.value(at, weights) * other(at)).sum()
+                    };
                     if let Some(diagonal) = diagonal {
                         sum += diagonal[row] * x[row];
                     }
@@ -50,6 +48,25 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
         }
         if FLOW { 0.0 } else { dot_simd(simd, &x[first..first + y.len()], y) }
     }
+}
+
+/// Σ K_ij (x_j − x_i) of a row, in four sums and the rest.
+#[inline(always)]
+fn flow(offsets: &[i32], values: &[f64], x: &[f64], row: usize) -> f64 {
+    let own = x[row];
+    let mut sums = [0.0; 4];
+    let ((offsets, last_offsets), (values, last_values)) =
+        (offsets.as_chunks::<4>(), values.as_chunks::<4>());
+    for at in 0..offsets.len() {
+        for k in 0..4 {
+            sums[k] += values[at][k] * (x[row.wrapping_add_signed(offsets[at][k] as isize)] - own);
+        }
+    }
+    let mut rest = 0.0;
+    for k in 0..last_offsets.len() {
+        rest += last_values[k] * (x[row.wrapping_add_signed(last_offsets[k] as isize)] - own);
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 /// One work item of K x and M u, in one look at each row.
@@ -80,15 +97,28 @@ impl WithSimd for Both<'_> {
                 continue;
             }
             let offsets = &stencils.offsets[range.clone()];
-            let values = stencils.conduction[range.clone()].iter().zip(&stencils.capacity[range]);
+            let conduction = &stencils.conduction[range.clone()][..offsets.len()];
+            let capacity = &stencils.capacity[range][..offsets.len()];
             for row in start..start + length {
-                let (own, mut sums) = (x[row], [[0.0; 2]; 2]);
-                for (k, (offset, (conduction, capacity))) in offsets.iter().zip(values.clone()).enumerate() {
-                    let other = row.wrapping_add_signed(*offset as isize);
-                    sums[k & 1][0] += conduction * (x[other] - own);
-                    sums[k & 1][1] += capacity * u[other];
+                let own = x[row];
+                // K x and M u, twice each
+                let mut sums = [0.0; 4];
+                let pairs = offsets.len() / 2;
+                for pair in 0..pairs {
+                    for half in 0..2 {
+                        let at = 2 * pair + half;
+                        let other = row.wrapping_add_signed(offsets[at] as isize);
+                        sums[half] += conduction[at] * (x[other] - own);
+                        sums[2 + half] += capacity[at] * u[other];
+                    }
                 }
-                [flow[row - first], stored[row - first]] = [0, 1].map(|k| sums[0][k] + sums[1][k]);
+                if let Some(at) = (2 * pairs < offsets.len()).then_some(2 * pairs) {
+                    let other = row.wrapping_add_signed(offsets[at] as isize);
+                    sums[0] += conduction[at] * (x[other] - own);
+                    sums[2] += capacity[at] * u[other];
+                }
+                flow[row - first] = sums[0] + sums[1];
+                stored[row - first] = sums[2] + sums[3];
             }
         }
     }

@@ -1,5 +1,6 @@
 //! Distinct rows, and how equal ones are found.
 
+use crate::system::NONE;
 use std::collections::HashMap;
 
 /// Distinct rows, flat.
@@ -10,6 +11,8 @@ pub(super) struct Stencils {
     pub(super) conduction: Vec<f64>,
     /// Empty with lumped capacity.
     pub(super) capacity: Vec<f64>,
+    /// The entry on the diagonal of each; [`NONE`] where there is none.
+    diagonal: Vec<u32>,
 }
 
 impl Stencils {
@@ -25,6 +28,12 @@ impl Stencils {
         self.starts[stencil as usize] as usize..self.starts[stencil as usize + 1] as usize
     }
 
+    /// The entry on the diagonal.
+    pub(super) fn diagonal(&self, stencil: u32) -> Option<usize> {
+        let at = self.diagonal[stencil as usize];
+        (at != NONE).then_some(at as usize)
+    }
+
     pub(super) fn push(&mut self, entries: &[(i32, f64, f64)], consistent: bool) -> u32 {
         for &(offset, conduction, capacity) in entries {
             self.offsets.push(offset);
@@ -33,6 +42,9 @@ impl Stencils {
                 self.capacity.push(capacity);
             }
         }
+        let before = self.offsets.len() - entries.len();
+        let diagonal = entries.iter().position(|entry| entry.0 == 0);
+        self.diagonal.push(diagonal.map_or(NONE, |at| (before + at) as u32));
         self.starts.push(self.offsets.len() as u32);
         (self.count() - 1) as u32
     }
