@@ -109,19 +109,23 @@ impl Item {
         let mut item = Self::default();
         let (start, end) = (index * CHUNK, ((index + 1) * CHUNK).min(rows.size()));
         item.core.resize(end - start, 0.0);
-        let mut offsets: Vec<i32> = Vec::new();
+        let (mut offsets, mut own): (Vec<i32>, Vec<i32>) = (Vec::new(), Vec::new());
         for first in (start..end).step_by(LANES) {
             let lanes = first..(first + LANES).min(end);
             offsets.clear();
             let mut most = 0;
             for row in lanes.clone() {
-                let before = offsets.len();
                 let others = rows.columns(row).filter(|&column| column != row);
-                offsets.extend(others.map(|column| (column as i64 - row as i64) as i32));
-                most = most.max(offsets.len() - before);
+                own.clear();
+                own.extend(others.map(|column| (column as i64 - row as i64) as i32));
+                most = most.max(own.len());
+                // most rows have the distances of the row before
+                if own != offsets {
+                    offsets.extend_from_slice(&own);
+                    offsets.sort_unstable();
+                    offsets.dedup();
+                }
             }
-            offsets.sort_unstable();
-            offsets.dedup();
             let inside = |offset: &i32| {
                 let to = first as i64 + i64::from(*offset);
                 to >= 0 && to as usize + LANES <= rows.size()
@@ -292,6 +296,7 @@ fn add<S: Simd>(simd: S, entry: &[f32; LANES], x: &[f64], sums: &mut [S::f64s; L
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::system::Row;
 
     /// A grid of 90 × 70 with unequal entries, of neighbours in order and of neighbours anywhere: products as with f64 to the rounding of
     /// f32, and exactly so on uniform vectors.
@@ -344,6 +349,44 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Rows that change or come at the end have their work items packed anew, others not; the products are those of rows made at once.
+    #[test]
+    fn what_has_not_changed_is_kept() {
+        let fill = |scale: f64| {
+            move |row: usize, out: &mut Row| {
+                out.begin(std::iter::once(row as u32));
+                let own = scale + 0.1 * (row as f64).sin();
+                out.add(0, 2.0 * own, 0.0);
+                (0..row.min(3)).for_each(|k| out.add(-1 - k as i32, -0.3 * own, 0.0));
+            }
+        };
+        let (before, size) = (3 * CHUNK - 5, 4 * CHUNK + 17);
+        let changed: Vec<u32> =
+            (CHUNK as u32 + 3..CHUNK as u32 + 9).chain(before as u32..size as u32).collect();
+        let mut rows = Rows::build(before, false, fill(1.0));
+        let mut packed = Packed::default();
+        assert!(packed.update(&rows, [0.0, 1.0]));
+        let made = |packed: &Packed| -> Vec<Option<u64>> {
+            packed.items.iter().map(|kept| kept.shaped_for).collect()
+        };
+        let first = made(&packed);
+        rows.update(size, &changed, fill(2.0));
+        assert!(packed.update(&rows, [0.0, 1.0]));
+        let second = made(&packed);
+        assert_eq!(second.iter().zip(&first).map(|(a, b)| a == b).collect::<Vec<_>>(), [true, false, false]);
+        assert_eq!(second.len(), 5);
+        let whole = Rows::build(size, false, |row, out: &mut Row| {
+            fill(if changed.binary_search(&(row as u32)).is_ok() { 2.0 } else { 1.0 })(row, out);
+        });
+        let mut fresh = Packed::default();
+        assert!(fresh.update(&whole, [0.0, 1.0]));
+        let x: Vec<f64> = (0..size).map(|k| (k as f64).cos()).collect();
+        let [mut kept, mut exact] = [vec![0.0; size], vec![0.0; size]];
+        let dots = [(&packed, &rows, &mut kept), (&fresh, &whole, &mut exact)]
+            .map(|(packed, rows, y)| packed.product(rows, None, (1.0, [0.0, 1.0]), &x, y));
+        assert!(kept == exact && dots[0] == dots[1]);
     }
 
     /// Where rows are equal nothing is packed.

@@ -21,6 +21,8 @@ pub mod vector;
 pub use build::{Added, Moves};
 pub use general::General;
 pub use nodal::Nodal;
+#[cfg(test)]
+pub use rows::Row;
 pub use rows::Rows;
 pub use surfaces::{Exchange, FaceMatrices, Surfaces};
 

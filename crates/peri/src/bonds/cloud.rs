@@ -1,7 +1,7 @@
 //! A cloud of particles of any position and volume: neighbour lists in compressed rows, sorted for locality.
 
 use super::cells::CellGrid;
-use super::cloud_kernel::{CloudData, GROUP};
+use super::cloud_kernel::{CloudData, GROUP, Rows};
 use super::cloud_linear::CloudPlaces;
 use super::rows::{CloudKernel, cloud_kernel};
 use super::softening::{Softened, Softening, integrity};
@@ -9,7 +9,7 @@ use super::{
     Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
-use crate::field::Field;
+use crate::field::{Field, chunk_range};
 use crate::geometry::{Cut, cuts_within, severed};
 use crate::potential::{KernelFit, StretchRange};
 use rayon::prelude::*;
@@ -34,6 +34,8 @@ pub struct CloudBonds<const D: usize> {
     weights: Vec<f64>,
     /// 2kθ, times the common w V_J.
     stiffness: f64,
+    /// All particles in the displacement last given to [`Bonds::round`]; none before.
+    rows: Rows,
     factors: Option<Field<D>>,
     kernel: Option<Box<dyn CloudKernel<D>>>,
     /// A law that only a table represents, and kθ.
@@ -176,6 +178,7 @@ impl<const D: usize> CloudBonds<D> {
             inverse_length,
             weights: Vec::new(),
             stiffness: 0.0,
+            rows: Rows::default(),
             factors: None,
             kernel: None,
             table: None,
@@ -218,6 +221,32 @@ impl<const D: usize> CloudBonds<D> {
     /// A bond of a site by its [`Neighbour::index`], as if it were not softened.
     pub fn whole_bond(&self, site: usize, index: u32) -> Neighbour<D> {
         self.bond(site, self.starts[site] + index as usize)
+    }
+
+    /// The bonds of a site, and what its list is padded with.
+    fn row(&self, site: usize) -> Range<usize> {
+        self.starts[site]..self.starts[site + 1]
+    }
+
+    /// e = λ² − 1 of a bond; 0 of one that is broken.
+    fn excess(&self, displacement: &Field<D>, site: usize, k: usize) -> f64 {
+        let (other, inverse) = (self.neighbours[k] as usize, self.inverse_length[k]);
+        let (position, moved) = (self.position.components(), displacement.components());
+        let mut e = 0.0;
+        for d in 0..D {
+            let bond = position[d][other] - position[d][site];
+            let eta = moved[d][other] - moved[d][site];
+            e += eta * (2.0 * bond + eta);
+        }
+        e * inverse * inverse
+    }
+
+    /// All sites from the first to the last that bonds of these have as ends.
+    fn met_by(&self, sites: Range<usize>) -> Range<usize> {
+        let met = &self.neighbours[self.starts[sites.start]..self.starts[sites.end]];
+        let first = met.iter().min().map_or(sites.start, |&first| sites.start.min(first as usize));
+        let last = met.iter().max().map_or(sites.end, |&last| sites.end.max(last as usize + 1));
+        first..last
     }
 
     fn bond(&self, site: usize, k: usize) -> Neighbour<D> {
@@ -309,6 +338,16 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         self.factors = Some(factors);
     }
 
+    fn round(&mut self, displacement: &Field<D>) {
+        match self.kernel {
+            Some(_) if self.rows.is_empty() => {
+                self.rows = Rows::new(&self.position, displacement, 0..self.volumes.len());
+            }
+            Some(_) => self.rows.load(displacement),
+            None => {}
+        }
+    }
+
     fn force(
         &self,
         displacement: &Field<D>,
@@ -317,9 +356,15 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         track: Option<&mut StretchRange>,
     ) {
         if let Some(kernel) = &self.kernel {
+            let own;
+            let rows = if self.rows.is_empty() {
+                own = Rows::new(&self.position, displacement, self.met_by(start..start + force[0].len()));
+                &own
+            } else {
+                &self.rows
+            };
             let data = CloudData {
-                position: self.position.components(),
-                displacement: displacement.components(),
+                rows,
                 starts: &self.starts,
                 neighbours: &self.neighbours,
                 inverse_length: &self.inverse_length,
@@ -332,20 +377,15 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         }
     }
 
+    fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange {
+        let sites = chunk_range(chunk, self.volumes.len());
+        let bonds = sites.flat_map(|site| self.row(site).map(move |k| (site, k)));
+        let e = bonds.map(|(site, k)| self.excess(displacement, site, k));
+        e.fold(StretchRange::REST, |range, e| range.join(StretchRange { low: e, high: e }))
+    }
+
     fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<usize> {
-        let (position, moved) = (self.position.components(), displacement.components());
-        let stretched = |&site: &usize| {
-            (self.starts[site]..self.starts[site + 1]).any(|k| {
-                let (other, inverse) = (self.neighbours[k] as usize, self.inverse_length[k]);
-                let mut e = 0.0;
-                for d in 0..D {
-                    let bond = position[d][other] - position[d][site];
-                    let eta = moved[d][other] - moved[d][site];
-                    e += eta * (2.0 * bond + eta);
-                }
-                e * inverse * inverse > least
-            })
-        };
+        let stretched = |&site: &usize| self.row(site).any(|k| self.excess(displacement, site, k) > least);
         sites.filter(stretched).collect()
     }
 
@@ -407,6 +447,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         bonds
             + self.volumes.len() * (8 * D + 8 + 4 + 4 + 8)
             + self.parted.len() * 4
+            + self.rows.bytes()
             + [&self.factors, &self.relief].into_iter().flatten().map(|f| 8 * D * f.sites()).sum::<usize>()
     }
 

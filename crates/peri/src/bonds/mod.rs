@@ -119,8 +119,9 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn set_law(&mut self, fit: &KernelFit, modulus: f64);
     /// Sets per-particle surface-correction factors (one field of `D` components over the sites).
     fn set_factors(&mut self, factors: Field<D>);
-    /// Takes in a displacement before [`Bonds::force`] of it, where that reads it in single precision
-    /// ([`LatticeBonds::set_mixed`]).
+    /// Takes in a displacement before [`Bonds::force`] of it, where that reads a copy: in mixed precision
+    /// ([`LatticeBonds::set_mixed`]), and in clouds, where forces without a copy take longer. From the first call on, both give the forces of
+    /// the displacement last taken in.
     fn round(&mut self, displacement: &Field<D>) {
         let _ = displacement;
     }

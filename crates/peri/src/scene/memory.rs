@@ -121,7 +121,9 @@ pub fn needed<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> f64 {
 /// Bytes of a cloud: points as they are read, sorted and kept; bonds, where they differ in weight, and their lists.
 pub(super) fn of_cloud<const D: usize>(particles: f64, bonds: f64) -> f64 {
     let padded = bonds + 8.0 * particles;
-    particles * (6.0 * 8.0 * D as f64 + 96.0) + padded * (4.0 + 8.0 + 8.0 + BOND_LISTS)
+    // and the rows that the kernel reads
+    particles * (6.0 * 8.0 * D as f64 + 96.0 + 32.0 * (D as f64 - 1.0))
+        + padded * (4.0 + 8.0 + 8.0 + BOND_LISTS)
 }
 
 /// Bytes of a solid in a cloud beside those of one on a lattice: θ, what it adds to states, and what the kernels read of a particle.

@@ -6,7 +6,7 @@
 use super::brick::peak_memory;
 use crate::boundary::{Condition, Schedule, Where};
 use crate::kinetics::{Constants, Kinetics};
-use crate::material::{Polymer, Property, Semicrystalline};
+use crate::material::{Polymer, Property, Semicrystalline, ThermalMaterial};
 use crate::melting::Melting;
 use crate::mesh::Grid;
 use crate::problem::{Birth, Problem};
@@ -49,6 +49,9 @@ pub struct Options {
     /// Crystals release latent heat.
     #[arg(long)]
     latent: bool,
+    /// Parts to which cells are filled, in no order, as along G-code: with several most rows are unequal.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+    fills: u16,
 }
 
 /// Rows of one run.
@@ -107,17 +110,22 @@ fn problem(options: &Options) -> Result<Problem, crate::Error> {
     let side = EDGE * count as f64;
     let mesh =
         Grid::uniform([0.0; 3], [side, side, EDGE * layers as f64], [count, count, layers])?.mesh("block")?;
-    let property = Property::constant;
-    let material = Semicrystalline::new(Polymer {
-        density: 1010.0,
-        conductivity: property("k", 0.25)?,
-        specific_heat: property("c", 2200.0)?,
-        kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?,
-        melting: Some(Melting::PA12),
-        ultimate_crystallinity: 0.25,
-        latent_heat: options.latent.then_some(209e3),
-        seed: 0.0,
-    })?;
+    let filled = |part: f64| -> Result<Arc<dyn ThermalMaterial>, crate::Error> {
+        Ok(Arc::new(Semicrystalline::new(Polymer {
+            density: 1010.0 * part,
+            conductivity: Property::constant("k", 0.25 * part)?,
+            specific_heat: Property::constant("c", 2200.0)?,
+            kinetics: Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?,
+            melting: Some(Melting::PA12),
+            ultimate_crystallinity: 0.25,
+            latent_heat: options.latent.then_some(209e3),
+            seed: 0.0,
+        })?))
+    };
+    // from half to whole
+    let parts = (1..=options.fills).map(|k| 0.5 + 0.5 * f64::from(k) / f64::from(options.fills));
+    let materials = parts.map(filled).collect::<Result<Vec<_>, _>>()?;
+    let of = |element: usize| ((element as u64 * 2_654_435_761) >> 16) as u16 % options.fills;
     let mut births = Vec::new();
     for layer in 0..layers {
         for line in (0..count).step_by(options.width) {
@@ -147,5 +155,7 @@ fn problem(options: &Options) -> Result<Problem, crate::Error> {
     let bottom = mesh.surfaces["bottom"].clone();
     let outer = Where::Outer { except: bottom.clone() };
     let conditions = vec![film(Where::Faces(bottom), 300.0), film(outer, 15.0)];
-    Ok(Problem { conditions, births, ..Problem::new(mesh, Arc::new(material), cold) })
+    let material_of = (0..mesh.element_count()).map(of).collect();
+    let whole = materials[0].clone();
+    Ok(Problem { conditions, births, materials, material_of, ..Problem::new(mesh, whole, cold) })
 }
