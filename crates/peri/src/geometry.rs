@@ -329,6 +329,7 @@ pub fn cuts_within<const D: usize>(cuts: &[Cut<D>], point: [f64; D], reach: f64)
 const NEAR: f64 = 1e-9;
 
 /// ‖x‖.
+#[inline]
 pub(crate) fn length<const D: usize>(x: [f64; D]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }

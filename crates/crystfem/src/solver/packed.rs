@@ -225,17 +225,12 @@ impl WithSimd for Product<'_> {
             values = rest;
             let begin = LANES * place;
             let row = first + begin;
-            // two sums at a time hide the latency of additions
-            let (mut even, mut odd) = ([simd.splat_f64s(0.0); LANES], [simd.splat_f64s(0.0); LANES]);
-            let pairs = own.len() / 2;
+            let mut vectors = [simd.splat_f64s(0.0); LANES];
             if block.banded {
                 let offsets = &item.offsets[block.range()];
-                for pair in 0..pairs {
-                    add(simd, &own[2 * pair], band(x, row, offsets[2 * pair]), &mut even);
-                    add(simd, &own[2 * pair + 1], band(x, row, offsets[2 * pair + 1]), &mut odd);
-                }
-                if 2 * pairs < own.len() {
-                    add(simd, &own[2 * pairs], band(x, row, offsets[2 * pairs]), &mut even);
+                for k in 0..own.len() {
+                    let start = row.wrapping_add_signed(offsets[k] as isize);
+                    add(simd, &own[k], &x[start..start + LANES], &mut vectors);
                 }
             } else {
                 let columns = &item.columns[block.range()];
@@ -244,13 +239,14 @@ impl WithSimd for Product<'_> {
                     for lane in 0..LANES {
                         other[lane] = x[columns[k][lane] as usize];
                     }
-                    add(simd, &own[k], &other, &mut even);
+                    add(simd, &own[k], &other, &mut vectors);
                 }
             }
             let mut sums = [0.0; LANES];
             let (parts, _) = S::as_mut_simd_f64s(&mut sums);
+            #[expect(clippy::manual_memcpy, reason = "a slice of the vectors would keep them in memory")]
             for v in 0..parts.len() {
-                parts[v] = simd.add_f64s(even[v], odd[v]);
+                parts[v] = vectors[v];
             }
             let range = begin..(begin + LANES).min(y.len());
             let (out, core, x) = (&mut y[range.clone()], &item.core[range.clone()], &x[row..]);
@@ -271,13 +267,6 @@ impl WithSimd for Product<'_> {
         }
         dots.iter().sum()
     }
-}
-
-/// What entries at a distance from the diagonals of eight rows are multiplied by.
-#[inline(always)]
-fn band(x: &[f64], row: usize, offset: i32) -> &[f64] {
-    let start = row.wrapping_add_signed(offset as isize);
-    &x[start..start + LANES]
 }
 
 /// Adds an entry of eight rows times those of a vector.

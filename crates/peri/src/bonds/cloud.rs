@@ -228,17 +228,21 @@ impl<const D: usize> CloudBonds<D> {
         self.starts[site]..self.starts[site + 1]
     }
 
-    /// e = λ² − 1 of a bond; 0 of one that is broken.
-    fn excess(&self, displacement: &Field<D>, site: usize, k: usize) -> f64 {
-        let (other, inverse) = (self.neighbours[k] as usize, self.inverse_length[k]);
+    /// e = λ² − 1 of the bonds of a site; 0 of those that are broken.
+    fn excesses<'a>(&'a self, displacement: &'a Field<D>, site: usize) -> impl Iterator<Item = f64> + 'a {
         let (position, moved) = (self.position.components(), displacement.components());
-        let mut e = 0.0;
-        for d in 0..D {
-            let bond = position[d][other] - position[d][site];
-            let eta = moved[d][other] - moved[d][site];
-            e += eta * (2.0 * bond + eta);
-        }
-        e * inverse * inverse
+        let (here, own) = (self.position.get(site), displacement.get(site));
+        let row = self.row(site);
+        let bonds = self.neighbours[row.clone()].iter().zip(&self.inverse_length[row]);
+        bonds.map(move |(&other, inverse)| {
+            let mut e = 0.0;
+            for d in 0..D {
+                let bond = position[d][other as usize] - here[d];
+                let eta = moved[d][other as usize] - own[d];
+                e += eta * (2.0 * bond + eta);
+            }
+            e * inverse * inverse
+        })
     }
 
     /// All sites from the first to the last that bonds of these have as ends.
@@ -379,13 +383,12 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
 
     fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange {
         let sites = chunk_range(chunk, self.volumes.len());
-        let bonds = sites.flat_map(|site| self.row(site).map(move |k| (site, k)));
-        let e = bonds.map(|(site, k)| self.excess(displacement, site, k));
-        e.fold(StretchRange::REST, |range, e| range.join(StretchRange { low: e, high: e }))
+        let bonds = sites.flat_map(|site| self.excesses(displacement, site));
+        bonds.fold(StretchRange::REST, |range, e| range.join(StretchRange { low: e, high: e }))
     }
 
     fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<usize> {
-        let stretched = |&site: &usize| self.row(site).any(|k| self.excess(displacement, site, k) > least);
+        let stretched = |&site: &usize| self.excesses(displacement, site).any(|e| e > least);
         sites.filter(stretched).collect()
     }
 

@@ -164,10 +164,13 @@ impl<const D: usize> List<D> {
         let near = |own: usize, found: &mut Vec<u32>| {
             found.clear();
             let site = particles[own] as usize;
-            let radius = OF_RADII * (self.radius(site) + self.largest) + reach;
             // a little more: far from the origin places are rounded to 2⁻¹⁴ of an edge
-            grid.near(places[own], radius + 1e-3 * edge, |other| {
-                if other != own {
+            let radius = OF_RADII * (self.radius(site) + self.largest) + reach + 1e-3 * edge;
+            let here = places[own];
+            grid.near(here, radius, |other| {
+                let there = places[other];
+                let square: f64 = (0..D).map(|d| (there[d] - here[d]) * (there[d] - here[d])).sum();
+                if other != own && square <= radius * radius {
                     found.push(particles[other]);
                 }
             });
