@@ -23,7 +23,7 @@ pub use general::General;
 pub use nodal::Nodal;
 #[cfg(test)]
 pub use rows::Row;
-pub use rows::Rows;
+pub use rows::{Diagonal, Rows};
 pub use surfaces::{Exchange, FaceMatrices, Surfaces};
 
 use crate::error::Error;

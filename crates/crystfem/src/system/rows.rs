@@ -84,6 +84,27 @@ pub struct Rows {
     changed: Vec<[u64; 2]>,
 }
 
+/// The diagonal of rows, made anew where they or the factors of M and K have changed.
+#[derive(Default)]
+pub struct Diagonal {
+    values: Vec<f64>,
+    made_for: Option<([u64; 2], [u64; 2])>,
+}
+
+impl Diagonal {
+    /// That of `weights[0]`·M + `weights[1]`·K.
+    pub fn of(&mut self, rows: &Rows, weights: [f64; 2]) -> &[f64] {
+        let made_for = Some((rows.versions, weights.map(f64::to_bits)));
+        if self.made_for != made_for {
+            self.values.clear();
+            self.values.resize(rows.size, 0.0);
+            rows.add_diagonal(weights, &mut self.values);
+            self.made_for = made_for;
+        }
+        &self.values
+    }
+}
+
 /// Rows of a run on average where runs count as short.
 const MOST_ALONE: usize = 4;
 /// No stencil of its own.

@@ -6,7 +6,7 @@ use crate::ledger::NOTHING;
 use crate::problem::Problem;
 use crate::solver::{Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, Packed, norm_squared};
 use crate::system::vector::{blend, combine, dot, largest, set, sum};
-use crate::system::{At, Evaluation, FaceMatrices, Memory, System};
+use crate::system::{At, Diagonal, Evaluation, FaceMatrices, Memory, System};
 
 /// Newton iterations at most.
 const MOST_ITERATIONS: usize = 60;
@@ -57,9 +57,8 @@ pub struct Stages {
     row_sums: Vec<f64>,
     /// K·1 and M·1 over the free nodes; empty where it is nothing.
     free_sums: [Vec<f64>; 2],
-    /// Diagonal of the rows where Newton's iteration needs it often, and for which rows and weights it was made.
-    own: Vec<f64>,
-    own_for: Option<([u64; 2], [u64; 2])>,
+    /// That of the rows, which Newton's iteration needs often.
+    own: Diagonal,
     iterative: Iterative,
     packed: Packed,
     /// What is wanted; factors and levels are made when first needed.
@@ -279,14 +278,8 @@ impl Stages {
         if system.is_linear() {
             system.rows.add_diagonal(weights, whole);
         } else {
-            let own_for = Some((system.rows.versions(), weights.map(f64::to_bits)));
-            if self.own_for != own_for {
-                self.own.clear();
-                self.own.resize(size, 0.0);
-                system.rows.add_diagonal(weights, &mut self.own);
-                self.own_for = own_for;
-            }
-            combine(whole, |k, whole| whole + self.own[k]);
+            let own = self.own.of(&system.rows, weights);
+            combine(whole, |k, whole| whole + own[k]);
         }
         if system.consistent {
             self.row_sums.resize(size, 0.0);
