@@ -378,6 +378,39 @@ mod tests {
         assert!(kept == exact && dots[0] == dots[1]);
     }
 
+    /// What is added to a row of its own, and taken back, is packed again with its work item.
+    #[test]
+    fn rows_of_their_own() {
+        let fill = |own: bool| {
+            move |row: usize, out: &mut Row| {
+                out.begin(std::iter::once(row as u32));
+                out.add(0, 2.0 + (row as f64).sin(), 0.0);
+                (0..row.min(2)).for_each(|k| out.add(-1 - k as i32, -0.3, 0.0));
+                out.own = own && row == 77;
+            }
+        };
+        let size = 2 * CHUNK;
+        let x: Vec<f64> = (0..size).map(|k| (k as f64).cos()).collect();
+        let product = |packed: &mut Packed, rows: &Rows| {
+            assert!(packed.update(rows, [0.0, 1.0]));
+            let mut y = vec![0.0; size];
+            packed.product(rows, None, (1.0, [0.0, 1.0]), &x, &mut y);
+            y
+        };
+        let mut rows = Rows::build(size, false, fill(true));
+        rows.keep();
+        let mut packed = Packed::default();
+        let first = product(&mut packed, &rows);
+        assert_eq!(first, product(&mut Packed::default(), &Rows::build(size, false, fill(false))));
+        rows.add(77, 76, 10.0, 0.0);
+        let added = product(&mut packed, &rows);
+        assert_eq!(added, product(&mut Packed::default(), &rows));
+        let differ: Vec<usize> = (0..size).filter(|&row| added[row] != first[row]).collect();
+        assert_eq!(differ, [77]);
+        rows.restore();
+        assert_eq!(first, product(&mut packed, &rows));
+    }
+
     /// Where rows are equal nothing is packed.
     #[test]
     fn equal_rows_are_left() {

@@ -57,7 +57,7 @@ pub struct Stages {
     row_sums: Vec<f64>,
     /// K·1 and M·1 over the free nodes; empty where it is nothing.
     free_sums: [Vec<f64>; 2],
-    /// That of the rows, which Newton's iteration needs often.
+    /// The diagonal of the rows, which Newton's iteration needs often.
     own: Diagonal,
     iterative: Iterative,
     packed: Packed,
@@ -275,7 +275,8 @@ impl Stages {
             });
             whole.copy_from_slice(&self.diagonal);
         }
-        if system.is_linear() {
+        // rows that every evaluation changes have another diagonal each time
+        if system.is_linear() || !system.general.is_empty() {
             system.rows.add_diagonal(weights, whole);
         } else {
             let own = self.own.of(&system.rows, weights);

@@ -365,6 +365,11 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
                 own = Rows::new(&self.position, displacement, self.met_by(start..start + force[0].len()));
                 &own
             } else {
+                assert!(self.rows.are_of::<D>(self.volumes.len()));
+                debug_assert!(
+                    self.rows.holds(displacement, start..start + force[0].len()),
+                    "of another displacement"
+                );
                 &self.rows
             };
             let data = CloudData {

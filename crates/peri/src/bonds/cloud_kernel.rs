@@ -1,7 +1,7 @@
 //! The cloud kernel: the neighbours of one particle gathered a vector at a time.
 //!
 //! A particle lies in one or two rows of four numbers. Rows of as many bonds as a vector has lanes are loaded whole and turned into
-//! columns by shuffles, which takes half of the time that gathering number by number takes.
+//! columns by shuffles: with AVX2 and AVX-512 the kernel takes 0.7 of the time that it takes number by number.
 
 use super::kernel::{Pass, law};
 use super::real::Real;
@@ -42,6 +42,20 @@ impl Rows {
     /// Bytes that it holds.
     pub fn bytes(&self) -> usize {
         size_of_val(self.rows.as_slice())
+    }
+
+    /// Whether they are those of so many particles from the first on.
+    pub fn are_of<const D: usize>(&self, particles: usize) -> bool {
+        self.first == 0 && self.rows.len() == particles * (D - 1)
+    }
+
+    /// Whether they are those of these particles in this displacement.
+    pub fn holds<const D: usize>(&self, displacement: &Field<D>, sites: Range<usize>) -> bool {
+        let rows = self.rows.as_flattened().chunks_exact(ROW * (D - 1)).skip(sites.start - self.first);
+        sites.zip(rows).all(|(site, row)| {
+            let moved = &row[ROW * (D - 1) / 2..][..D];
+            moved.iter().zip(displacement.get(site)).all(|(a, b)| a.to_bits() == b.to_bits())
+        })
     }
 
     /// Takes another displacement.
@@ -98,6 +112,7 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     ) {
+        const { assert!(S::F64_LANES <= GROUP) };
         let (zero, lanes) = (simd.splat_f64s(0.0), S::F64_LANES);
         let (mut low, mut high) = (zero, zero);
         let tracking = track.is_some();
@@ -116,7 +131,8 @@ impl<const D: usize, const P: usize, const Q: usize> Pass<D> for CloudPass<'_, D
             let mut sum = [zero; D];
             for first in (starts[own]..starts[own + 1]).step_by(lanes) {
                 let group = &neighbours[first..first + lanes];
-                // SAFETY: the rows hold every neighbour of this work item (`CloudBonds::force`)
+                // SAFETY: the rows hold every neighbour of this work item: those of all particles, of which there is one row or two each
+                // (asserted in `CloudBonds::force`), or those of `met_by`
                 let (x, u) = unsafe {
                     let whole = columns::<S, D>(simd, rows, 0, group, &order);
                     let (mut x, mut u) = ([zero; D], [zero; D]);

@@ -139,24 +139,10 @@ pub trait Bonds<const D: usize>: Send + Sync {
         CHUNK
     }
     /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are those of the body.
-    fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange {
-        let length = chunk_range(chunk, self.sites()).len();
-        let mut scratch = vec![0.0; D * length];
-        let mut parts = scratch.chunks_mut(length);
-        let mut out: [&mut [f64]; D] = std::array::from_fn(|_| parts.next().unwrap_or_default());
-        let mut range = StretchRange::REST;
-        self.force(displacement, chunk * CHUNK, &mut out, Some(&mut range));
-        range
-    }
+    fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange;
     /// Sites which, for all sites together, contain both ends of every bond with e > `least`: what some of them add, whole pieces of
     /// one work item.
-    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<usize> {
-        if self.stretches(displacement, sites.start / CHUNK).high > least {
-            sites.collect()
-        } else {
-            Vec::new()
-        }
-    }
+    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<usize>;
     /// Severs bonds, each named from both of its ends.
     fn sever(&mut self, bonds: &[Overstretched]);
     /// Sets θ of solids of the mean deformation of a family, see [`crate::material::relief`]: before any bond breaks. Lattices have none.

@@ -4,7 +4,7 @@ use super::{Bond, Cover, Family, LawRange, Material, Response};
 use crate::bonds::{Bonds, Overstretched, Property, Seen, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
-use crate::potential::{BondPotential, KernelFit, LinearBond, StretchRange};
+use crate::potential::{BondPotential, LinearBond, StretchRange};
 use rayon::prelude::*;
 
 /// Both passes of a material over a whole body, for one that has something faster than plain loops over bonds. The states and
@@ -121,9 +121,6 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         displacement: &Field<D>,
         cover: &Cover,
     ) -> Result<f64, Error> {
-        // the kernels find stretches, whatever their law
-        let fit = KernelFit::new(&LinearBond, cover.stretches, cover.bound)?;
-        bonds.set_law(&fit, self.modulus);
         self.prepare(bonds, displacement);
         if let Some(known) = cover.known {
             self.tangent = known;

@@ -87,8 +87,8 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// The first pass over a new displacement, or over bonds that have changed: states of particles, what kernels of mixed precision
-    /// read, and pairs in contact where particles have moved far. To be called before the forces, once; how often pairs are looked for makes no difference
+    /// The first pass over a new displacement, or over bonds that have changed: states of particles, the copy that kernels of clouds and of mixed
+    /// precision read, and pairs in contact where particles have moved far. To be called before the forces, once; how often pairs are looked for makes no difference
     /// to any bit.
     pub fn prepare(&mut self, displacement: &Field<D>) {
         if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
