@@ -275,8 +275,8 @@ impl Stages {
             });
             whole.copy_from_slice(&self.diagonal);
         }
-        // rows that every evaluation changes have another diagonal each time
         if system.is_linear() || !system.general.is_empty() {
+            // of rows that every evaluation changes, too
             system.rows.add_diagonal(weights, whole);
         } else {
             let own = self.own.of(&system.rows, weights);
@@ -294,8 +294,7 @@ impl Stages {
             }
         }
         // rounding of the residual: 1e-14 of a temperature of 500 K, everywhere
-        let rounding = 5e-12_f64;
-        self.floor = rounding * rounding * dot(&system.free, whole);
+        self.floor = 5e-12_f64.powi(2) * dot(&system.free, whole);
         blend(
             whole,
             &system.free,
