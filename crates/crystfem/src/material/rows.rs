@@ -16,9 +16,6 @@ const LEAST_Z: f64 = 1e-20;
 const MOST_POWER: f64 = 700.0;
 const MOST_LOGARITHM: f64 = 6.5;
 
-/// Nodes that are asked together whether any of them heats.
-const TOGETHER: usize = 32;
-
 /// Increments of temperature of nodes, in one time.
 #[derive(Clone, Copy)]
 pub(crate) struct Increments<'a> {
@@ -252,20 +249,12 @@ impl WithSimd for Histories<'_> {
             fall.fill(0.0);
             return;
         };
-        let (start, end) = (start.chunks(TOGETHER), end.chunks(TOGETHER));
-        for (fall, (start, end)) in fall.chunks_mut(TOGETHER).zip(start.zip(end)) {
-            let size = fall.len();
-            let (start, end) = (&start[..size], &end[..size]);
-            // most parts only cool
-            if !start.iter().zip(end).any(|(start, end)| end > start) {
-                fall.fill(0.0);
-                continue;
-            }
-            for k in 0..size {
-                let change = melting.survival_of_all(end[k]) - melting.survival_of_all(start[k]);
-                let none = end[k] <= start[k] || change > NOTHING;
-                fall[k] = if none { 0.0 } else { change };
-            }
+        let size = fall.len();
+        let (start, end) = (&start[..size], &end[..size]);
+        for k in 0..size {
+            let change = melting.survival_of_all(end[k]) - melting.survival_of_all(start[k]);
+            let none = end[k] <= start[k] || change > NOTHING;
+            fall[k] = if none { 0.0 } else { change };
         }
     }
 }
