@@ -63,44 +63,30 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
     seen: &Seen,
 ) -> Vec<Overstretched> {
     let sites = bonds.sites();
-    // vectorised loops find the sites to look into; their last bits may differ from those below
+    // vectorised loops find the bonds to look at; their last bits may differ from those below
     let least = (critical.least() * critical.least() - 1.0) * (1.0 - 1e-9) - 1e-12;
     let near = |chunk: usize| {
         let parts = seen.beyond(chunk_range(chunk, sites), least).into_iter();
-        parts.flat_map(|sites| bonds.suspects(displacement, sites, least)).collect::<Vec<usize>>()
+        parts.flat_map(|sites| bonds.suspects(displacement, sites, least)).collect::<Vec<[u32; 2]>>()
     };
-    let near: Vec<Vec<usize>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(near).collect();
+    let near: Vec<Vec<[u32; 2]>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(near).collect();
     let mut near = near.concat();
     near.sort_unstable();
     near.dedup();
-    let beyond = |sites: &[usize]| {
-        let mut found = Vec::new();
-        for &site in sites {
-            let own = displacement.get(site);
-            bonds.neighbours(site, &mut |bond| {
-                let other = displacement.get(bond.site);
-                let mut e = 0.0;
-                for d in 0..D {
-                    let eta = other[d] - own[d];
-                    e += eta * (2.0 * bond.bond[d] + eta);
-                }
-                let e = e / (bond.length * bond.length);
-                let critical = critical.weaker(site, bond.site);
-                if e > critical * critical - 1.0 {
-                    found.push(Overstretched {
-                        site: site as u32,
-                        index: bond.index,
-                        elongation: e,
-                        length: bond.length,
-                        weight: bond.weight,
-                    });
-                }
-            });
+    let beyond = |&[site, index]: &[u32; 2]| {
+        let bond = bonds.bond(site as usize, index);
+        let (own, other) = (displacement.get(site as usize), displacement.get(bond.site));
+        let mut e = 0.0;
+        for d in 0..D {
+            let eta = other[d] - own[d];
+            e += eta * (2.0 * bond.bond[d] + eta);
         }
-        found
+        let e = e / (bond.length * bond.length);
+        let critical = critical.weaker(site as usize, bond.site);
+        let (length, weight) = (bond.length, bond.weight);
+        (e > critical * critical - 1.0).then_some(Overstretched { site, index, elongation: e, length, weight })
     };
-    let parts: Vec<Vec<Overstretched>> = near.par_chunks(256).map(beyond).collect();
-    parts.concat()
+    near.par_iter().with_min_len(1024).filter_map(beyond).collect()
 }
 
 /// One number for a set of bonds: FNV-1a over their ends, in the order of [`overstretched`].

@@ -220,7 +220,7 @@ impl<const D: usize> CloudBonds<D> {
 
     /// A bond of a site by its [`Neighbour::index`], as if it were not softened.
     pub fn whole_bond(&self, site: usize, index: u32) -> Neighbour<D> {
-        self.bond(site, self.starts[site] + index as usize)
+        self.whole(site, self.starts[site] + index as usize)
     }
 
     /// The bonds of a site, and what its list is padded with.
@@ -253,7 +253,7 @@ impl<const D: usize> CloudBonds<D> {
         first..last
     }
 
-    fn bond(&self, site: usize, k: usize) -> Neighbour<D> {
+    fn whole(&self, site: usize, k: usize) -> Neighbour<D> {
         let other = self.neighbours[k] as usize;
         let (here, there) = (self.position.get(site), self.position.get(other));
         let bond: [f64; D] = std::array::from_fn(|d| there[d] - here[d]);
@@ -296,18 +296,18 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     }
 
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
-        let soft = self.softening.among(site..site + 1);
-        for k in self.starts[site]..self.starts[site + 1] {
-            if self.neighbours[k] as usize != site {
-                let bond = self.bond(site, k);
-                let part = integrity(soft, bond.index);
-                visit(Neighbour { volume: part * bond.volume, weight: part * bond.weight, ..bond });
+        let row = self.row(site);
+        for (index, &other) in self.neighbours[row].iter().enumerate() {
+            if other as usize != site {
+                visit(self.bond(site, index as u32));
             }
         }
     }
 
-    fn other_end(&self, site: usize, index: u32) -> usize {
-        self.neighbours[self.starts[site] + index as usize] as usize
+    fn bond(&self, site: usize, index: u32) -> Neighbour<D> {
+        let bond = self.whole(site, self.starts[site] + index as usize);
+        let part = integrity(self.softening.among(site..site + 1), index);
+        Neighbour { volume: part * bond.volume, weight: part * bond.weight, ..bond }
     }
 
     fn bonded(&self, site: usize) -> u32 {
@@ -328,7 +328,7 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         self.weights = Vec::new();
         if !alike {
             let weight = |site: usize, k: usize| {
-                if self.neighbours[k] as usize == site { 0.0 } else { self.bond(site, k).weight }
+                if self.neighbours[k] as usize == site { 0.0 } else { self.whole(site, k).weight }
             };
             let of_site = |site: usize| (self.starts[site]..self.starts[site + 1]).map(move |k| (site, k));
             self.weights =
@@ -392,9 +392,12 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         bonds.fold(StretchRange::REST, |range, e| range.join(StretchRange { low: e, high: e }))
     }
 
-    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<usize> {
-        let stretched = |&site: &usize| self.excesses(displacement, site).any(|e| e > least);
-        sites.filter(stretched).collect()
+    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<[u32; 2]> {
+        let of = |site: usize| {
+            let numbered = self.excesses(displacement, site).enumerate();
+            numbered.filter(move |(_, e)| *e > least).map(move |(k, _)| [site as u32, k as u32])
+        };
+        sites.flat_map(of).collect()
     }
 
     fn sever(&mut self, bonds: &[Overstretched]) {

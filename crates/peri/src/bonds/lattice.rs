@@ -307,37 +307,33 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     }
 
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
-        let soft = self.softening.among(site..site + 1);
         for (word, words) in self.intact.iter().enumerate() {
             let mut present = words[site];
             while present != 0 {
-                let k = 64 * word + present.trailing_zeros() as usize;
+                visit(self.bond(site, 64 * word as u32 + present.trailing_zeros()));
                 present &= present - 1;
-                let Span { shift, bond, length, share, .. } = self.spans[k];
-                let whole = integrity(soft, k as u32) * self.lattice.volume;
-                visit(Neighbour {
-                    index: k as u32,
-                    site: site.wrapping_add_signed(shift),
-                    bond,
-                    length,
-                    volume: whole * share,
-                    weight: whole * self.weight(site, k),
-                    relief: [0.0; D],
-                });
             }
         }
     }
 
-    fn other_end(&self, site: usize, index: u32) -> usize {
-        site.wrapping_add_signed(self.spans[index as usize].shift)
+    fn bond(&self, site: usize, index: u32) -> Neighbour<D> {
+        let Span { shift, bond, length, share, .. } = self.spans[index as usize];
+        let whole = integrity(self.softening.among(site..site + 1), index) * self.lattice.volume;
+        Neighbour {
+            index,
+            site: site.wrapping_add_signed(shift),
+            bond,
+            length,
+            volume: whole * share,
+            weight: whole * self.weight(site, index as usize),
+            relief: [0.0; D],
+        }
     }
 
     fn is_bonded(&self, site: usize, other: usize) -> bool {
-        let (Some(own), Some(there)) = (self.cell_of(site), self.cell_of(other)) else { return false };
-        let offset: [i32; D] = std::array::from_fn(|d| there[d] as i32 - own[d] as i32);
-        // offsets ascend, last axis slowest
-        let found = self.stencil.offsets.binary_search_by(|o| o.iter().rev().cmp(offset.iter().rev()));
-        found.is_ok_and(|k| self.is_intact(site, k))
+        // offsets ascend, last axis slowest, and rows are far enough apart for their distances in sites to do so, too
+        let shift = other as isize - site as isize;
+        self.spans.binary_search_by_key(&shift, |span| span.shift).is_ok_and(|k| self.is_intact(site, k))
     }
 
     fn bonded(&self, site: usize) -> u32 {
@@ -414,7 +410,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.spans(displacement).range(chunk_range(chunk, self.sites))
     }
 
-    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<usize> {
+    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<[u32; 2]> {
         self.spans(displacement).beyond(sites, least)
     }
 

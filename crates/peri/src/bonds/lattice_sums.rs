@@ -65,8 +65,9 @@ impl<const D: usize> Spans<'_, D> {
         }
         let words = &self.tiles.intact[k / 64][base..base + TILE];
         for i in 0..TILE {
-            let present = words[i] >> (k % 64) & 1 == 1;
-            out[i] = if present { out[i] * span.inverse_square } else { 0.0 };
+            // all bits of what is present: a condition would be a branch for each particle
+            let present = 0_u64.wrapping_sub(words[i] >> (k % 64) & 1);
+            out[i] = f64::from_bits((out[i] * span.inverse_square).to_bits() & present);
         }
         out
     }
@@ -82,11 +83,11 @@ impl<const D: usize> Spans<'_, D> {
         }
     }
 
-    /// Both ends of the bonds beyond e = `least` that begin in these sites, of one direction each; an end may come more than once.
-    pub fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<usize> {
-        let mut found = Beyond { least, sites: Vec::new() };
+    /// The bonds beyond e = `least` that begin in these sites, of one direction each: by site and bond of the stencil, from both ends.
+    pub fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<[u32; 2]> {
+        let mut found = Beyond { least, bonds: Vec::new() };
         self.sum(sites, self.spans.len() / 2, &mut found);
-        found.sites
+        found.bonds
     }
 
     /// Σ share·|ξ|·φ(e) over the bonds that begin in these sites, of one direction each.
@@ -160,25 +161,26 @@ impl<const D: usize> Add<D> for Extremes {
 
 struct Beyond {
     least: f64,
-    sites: Vec<usize>,
+    bonds: Vec<[u32; 2]>,
 }
 
 impl<const D: usize> Add<D> for Beyond {
     #[inline(always)]
     fn tile(&mut self, spans: &Spans<D>, base: usize, present: &[usize]) {
-        let mut high = [0.0; TILE];
         for &k in present {
             let e = spans.elongations(base, k);
+            let mut lanes = 0_u32;
             for i in 0..TILE {
-                high[i] = if e[i] > high[i] { e[i] } else { high[i] };
+                lanes |= u32::from(e[i] > self.least) << i;
             }
-        }
-        if high.iter().any(|&e| e > self.least) {
-            for &k in present {
-                let e = spans.elongations(base, k);
-                for i in (0..TILE).filter(|&i| e[i] > self.least) {
-                    let there = (base + i).wrapping_add_signed(spans.spans[k].shift);
-                    self.sites.extend([base + i, there]);
+            while lanes != 0 {
+                let site = base + lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                // below no stretch, broken bonds have 0
+                if spans.tiles.intact[k / 64][site] >> (k % 64) & 1 == 1 {
+                    let there = site.wrapping_add_signed(spans.spans[k].shift);
+                    let opposite = spans.spans.len() - 1 - k;
+                    self.bonds.extend([[site as u32, k as u32], [there as u32, opposite as u32]]);
                 }
             }
         }

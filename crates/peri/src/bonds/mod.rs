@@ -85,8 +85,8 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn spacing(&self) -> f64;
     /// Visits the intact bonds of a site.
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>));
-    /// Site of the other end of an intact bond by its [`Neighbour::index`].
-    fn other_end(&self, site: usize, index: u32) -> usize;
+    /// The intact bond of a site with a [`Neighbour::index`].
+    fn bond(&self, site: usize, index: u32) -> Neighbour<D>;
     /// Whether an intact bond leads from a site to another.
     fn is_bonded(&self, site: usize, other: usize) -> bool {
         let mut bonded = false;
@@ -140,9 +140,9 @@ pub trait Bonds<const D: usize>: Send + Sync {
     }
     /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are those of the body.
     fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange;
-    /// Sites which, for all sites together, contain both ends of every bond with e > `least`: what some of them add, whole pieces of
-    /// one work item.
-    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<usize>;
+    /// Intact bonds, by site and [`Neighbour::index`], which for all sites together contain every bond with e > `least` from both of
+    /// its ends, up to rounding: what some sites add, whole pieces of one work item.
+    fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<[u32; 2]>;
     /// Severs bonds, each named from both of its ends.
     fn sever(&mut self, bonds: &[Overstretched]);
     /// Sets θ of solids of the mean deformation of a family, see [`crate::material::relief`]: before any bond breaks. Lattices have none.

@@ -85,7 +85,7 @@ impl<const D: usize> System<'_, D> {
         let bonds = list.len() as u64 / 2;
         let touches = self.contact.as_ref().is_some_and(Contact::has_pairs);
         let pair =
-            |bond: &Overstretched| [bond.site, self.bonds.other_end(bond.site as usize, bond.index) as u32];
+            |bond: &Overstretched| [bond.site, self.bonds.bond(bond.site as usize, bond.index).site as u32];
         let parted: Vec<[u32; 2]> = if touches { list.iter().map(pair).collect() } else { Vec::new() };
         state.broken += bonds;
         let [factor, pull, push] = state.balanced;

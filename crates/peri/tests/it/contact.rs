@@ -162,7 +162,7 @@ fn check_parted<const D: usize>(cells: [usize; D]) {
             });
         }
         for (bond, pair) in list.iter().zip(&pairs) {
-            assert_eq!(bonds.other_end(bond.site as usize, bond.index), pair[1] as usize);
+            assert_eq!(bonds.bond(bond.site as usize, bond.index).site, pair[1] as usize);
         }
         bonds.sever(&list);
         contact.part(bonds, &pairs);
