@@ -84,7 +84,13 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
         let e = e / (bond.length * bond.length);
         let critical = critical.weaker(site as usize, bond.site);
         let (length, weight) = (bond.length, bond.weight);
-        (e > critical * critical - 1.0).then_some(Overstretched { site, index, elongation: e, length, weight })
+        (e > critical * critical - 1.0).then_some(Overstretched {
+            site,
+            index,
+            elongation: e,
+            length,
+            weight,
+        })
     };
     near.par_iter().with_min_len(1024).filter_map(beyond).collect()
 }

@@ -32,7 +32,7 @@ pub enum Other {
 pub struct Lagged<const D: usize> {
     /// Displacement at the start of the step.
     pub start: Field<D>,
-    /// Work item by work item, as they are found.
+    /// Work item by work item, by their sites.
     pub grips: Vec<Vec<Grip<D>>>,
     /// ε, m.
     pub slip: f64,
@@ -55,21 +55,23 @@ impl<const D: usize> Lagged<D> {
         across(&grip.normal, std::array::from_fn(|d| own[d] - other[d]))
     }
 
-    /// Adds the force densities on a work item: all, or those of planes alone.
+    /// Adds the force densities on the sites from `start` on, of one work item: all, or those of planes alone.
     pub fn force(
         &self,
         displacement: &Field<D>,
         moved: &[[f64; D]],
-        chunk: usize,
+        start: usize,
         planes_only: bool,
         force: &mut [&mut [f64]; D],
     ) {
-        let grips = self.grips[chunk].iter();
+        let grips = &self.grips[start / CHUNK];
+        let at = |site: usize| grips.partition_point(|grip| (grip.site as usize) < site);
+        let grips = grips[at(start)..at(start + force[0].len())].iter();
         for grip in grips.filter(|grip| !planes_only || matches!(grip.other, Other::Plane(_))) {
             let slipped = self.slipped(grip, displacement, moved);
             let rub = tangential(grip.bound, self.slip, &grip.normal, slipped);
             for d in 0..D {
-                force[d][grip.site as usize - chunk * CHUNK] += rub[d];
+                force[d][grip.site as usize - start] += rub[d];
             }
         }
     }

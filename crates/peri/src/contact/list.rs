@@ -4,12 +4,15 @@ use crate::bonds::{Bonds, CellGrid};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::geometry::length;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Largest contact distance over the reference distance, and over the sum of the radii.
 const OF_REFERENCE: f64 = 0.9;
 const OF_RADII: f64 = 1.35;
 /// Skin of the list, in spacings.
 const SKIN: f64 = 0.5;
+/// Above the part of a squared length by which single precision rounds it.
+const ROUNDED: f64 = 1e-6;
 /// Farther than this many cells from the origin, particles are looked for in one place.
 const FAR: f64 = (1_u64 << 38) as f64;
 
@@ -18,6 +21,7 @@ pub struct List<const D: usize> {
     /// Particles' radii, m; empty where all are `largest`.
     radii: Vec<f64>,
     largest: f64,
+    spacing: f64,
     gap: f64,
     skin: f64,
     /// Displacement at which the list was made.
@@ -32,24 +36,46 @@ pub struct List<const D: usize> {
 }
 
 /// A particle that others are near to.
+#[derive(Clone, Copy)]
 pub struct Listed {
     pub site: u32,
     /// Ends of its candidates, of which the first begin where those of the particle before it end.
     end: usize,
-    pub volume: f64,
     /// Whether it has no bonds.
     pub alone: bool,
 }
 
-/// A particle near another, seen from there.
+/// A particle near another, seen from there. Lists are long and most of their pairs apart: it holds no more than shows that.
 #[derive(Clone, Copy)]
-pub struct Candidate<const D: usize> {
+struct Candidate<const D: usize> {
+    site: u32,
+    /// ξ in spacings, rounded.
+    bond: [f32; D],
+}
+
+/// A particle that is near enough to another, seen from there.
+pub struct Near<const D: usize> {
     pub site: u32,
     /// ξ, m.
     bond: [f64; D],
     /// d, m.
     pub distance: f64,
-    pub volume: f64,
+    /// ζ, m, and r = |ζ|: the same bits from either side, but for the sign of ζ.
+    pub zeta: [f64; D],
+    pub r: f64,
+}
+
+impl<const D: usize> Near<D> {
+    /// ζ/r; of two particles in one place ξ/|ξ|.
+    pub fn direction(&self) -> [f64; D] {
+        let (along, size) = if self.r > 0.0 { (self.zeta, self.r) } else { (self.bond, length(self.bond)) };
+        along.map(|x| x / size)
+    }
+
+    /// d − r, m.
+    pub fn overlap(&self) -> f64 {
+        self.distance - self.r
+    }
 }
 
 impl<const D: usize> List<D> {
@@ -68,6 +94,7 @@ impl<const D: usize> List<D> {
         let mut list = Self {
             radii,
             largest,
+            spacing: bonds.spacing(),
             gap,
             skin: SKIN * bonds.spacing(),
             listed_at: Field::zeros(0),
@@ -117,9 +144,9 @@ impl<const D: usize> List<D> {
         }
         let reach = self.gap + self.skin;
         let near = |&[own, other]: &[u32; 2]| {
-            let candidate = self.candidate(bonds, own as usize, other as usize);
-            let (_, r) = candidate.apart(&self.listed_at, own as usize);
-            (r < candidate.distance + reach).then_some((own, candidate))
+            let bond = difference(bonds.position(own as usize), bonds.position(other as usize));
+            let near = self.near(own as usize, other as usize, bond, &self.listed_at, reach)?;
+            Some((own, self.candidate(&near)))
         };
         let mut found: Vec<(u32, Candidate<D>)> = pairs.par_iter().filter_map(near).collect();
         found.sort_unstable_by_key(|(own, candidate)| (*own, candidate.site));
@@ -140,8 +167,11 @@ impl<const D: usize> List<D> {
                 self.candidates.extend(new.iter().map(|new| new.1));
                 self.candidates[from..].sort_unstable_by_key(|candidate| candidate.site);
             }
-            let (volume, alone) = (bonds.volume(site as usize), bonds.is_alone(site as usize));
-            self.listed.push(Listed { site, end: self.candidates.len(), volume, alone });
+            self.listed.push(Listed {
+                site,
+                end: self.candidates.len(),
+                alone: bonds.is_alone(site as usize),
+            });
         }
         let alone = pairs.iter().map(|pair| pair[0]).filter(|&site| bonds.is_alone(site as usize));
         self.alone.extend(alone);
@@ -155,11 +185,12 @@ impl<const D: usize> List<D> {
         let reach = self.gap + self.skin;
         let edge = 2.0 * OF_RADII * self.largest + reach;
         let far = FAR * edge;
-        let place = |&site: &u32| {
-            let (position, moved) = (bonds.position(site as usize), displacement.get(site as usize));
-            std::array::from_fn(|d| (position[d] + moved[d]).clamp(-far, far))
+        let home: Vec<[f64; D]> = particles.par_iter().map(|&site| bonds.position(site as usize)).collect();
+        let place = |(&site, home): (&u32, &[f64; D])| {
+            let moved = displacement.get(site as usize);
+            std::array::from_fn(|d| (home[d] + moved[d]).clamp(-far, far))
         };
-        let places: Vec<[f64; D]> = particles.par_iter().map(place).collect();
+        let places: Vec<[f64; D]> = particles.par_iter().zip(&home).map(place).collect();
         let grid = CellGrid::with_edge(&places, edge);
         let near = |own: usize, found: &mut Vec<u32>| {
             found.clear();
@@ -171,7 +202,7 @@ impl<const D: usize> List<D> {
                 let there = places[other];
                 let square: f64 = (0..D).map(|d| (there[d] - here[d]) * (there[d] - here[d])).sum();
                 if other != own && square <= radius * radius {
-                    found.push(particles[other]);
+                    found.push(other as u32);
                 }
             });
             found.sort_unstable();
@@ -183,15 +214,16 @@ impl<const D: usize> List<D> {
                 near(own, &mut found);
                 let before = candidates.len();
                 for &other in &found {
-                    let candidate = self.candidate(bonds, site, other as usize);
-                    let (_, r) = candidate.apart(displacement, site);
-                    if r < candidate.distance + reach && !bonds.is_bonded(site, other as usize) {
-                        candidates.push(candidate);
-                    }
+                    let there = particles[other as usize] as usize;
+                    let bond = difference(home[own], home[other as usize]);
+                    let near = self.near(site, there, bond, displacement, reach);
+                    candidates.extend(
+                        near.filter(|_| !bonds.is_bonded(site, there)).map(|near| self.candidate(&near)),
+                    );
                 }
                 if candidates.len() > before {
-                    let (volume, alone) = (bonds.volume(site), bonds.is_alone(site));
-                    listed.push(Listed { site: site as u32, end: candidates.len(), volume, alone });
+                    let alone = bonds.is_alone(site);
+                    listed.push(Listed { site: site as u32, end: candidates.len(), alone });
                 }
             }
             (listed, candidates)
@@ -215,59 +247,67 @@ impl<const D: usize> List<D> {
         self.radii.get(site).copied().unwrap_or(self.largest)
     }
 
-    fn candidate(&self, bonds: &dyn Bonds<D>, site: usize, other: usize) -> Candidate<D> {
-        let (here, there) = (bonds.position(site), bonds.position(other));
-        let bond: [f64; D] = std::array::from_fn(|d| there[d] - here[d]);
-        let distance = (OF_REFERENCE * length(bond)).min(OF_RADII * (self.radius(site) + self.radius(other)));
-        Candidate { site: other as u32, bond, distance, volume: bonds.volume(other) }
+    /// What two particles with the reference bond ξ are to each other where r < d + `gap`.
+    fn near(
+        &self,
+        own: usize,
+        other: usize,
+        bond: [f64; D],
+        displacement: &Field<D>,
+        gap: f64,
+    ) -> Option<Near<D>> {
+        let radii = OF_RADII * (self.radius(own) + self.radius(other));
+        let distance = (OF_REFERENCE * length(bond)).min(radii);
+        let (here, there) = (displacement.get(own), displacement.get(other));
+        let zeta = std::array::from_fn(|d| bond[d] + (there[d] - here[d]));
+        let r = length(zeta);
+        (r < distance + gap).then_some(Near { site: other as u32, bond, distance, zeta, r })
     }
 
-    /// The particles of a work item that have candidates, with them.
-    pub fn in_chunk(&self, chunk: usize) -> impl Iterator<Item = (&Listed, &[Candidate<D>])> {
-        let at = |chunk: usize| self.listed.partition_point(|own| (own.site as usize) < chunk * CHUNK);
-        (at(chunk)..at(chunk + 1)).map(|k| {
+    fn candidate(&self, near: &Near<D>) -> Candidate<D> {
+        Candidate { site: near.site, bond: near.bond.map(|x| (x / self.spacing) as f32) }
+    }
+
+    /// The particles of `sites` that others are near to, each with those at r < d + `gap`, up to the gap of the list.
+    pub fn pairs<'a>(
+        &'a self,
+        bonds: &'a dyn Bonds<D>,
+        displacement: &'a Field<D>,
+        sites: Range<usize>,
+        gap: f64,
+    ) -> impl Iterator<Item = (Listed, impl Iterator<Item = Near<D>> + 'a)> + 'a {
+        let at = |site: usize| self.listed.partition_point(|own| (own.site as usize) < site);
+        let most = 2.0 * OF_RADII * self.largest;
+        (at(sites.start)..at(sites.end)).map(move |k| {
             let start = k.checked_sub(1).map_or(0, |before| self.listed[before].end);
-            (&self.listed[k], &self.candidates[start..self.listed[k].end])
+            let listed = self.listed[k];
+            let own = listed.site as usize;
+            let here = displacement.get(own);
+            let near = move |candidate: &Candidate<D>| {
+                let other = candidate.site as usize;
+                let there = displacement.get(other);
+                let (mut reference, mut square) = (0.0, 0.0);
+                for d in 0..D {
+                    let bond = self.spacing * f64::from(candidate.bond[d]);
+                    let zeta = bond + (there[d] - here[d]);
+                    reference += bond * bond;
+                    square += zeta * zeta;
+                }
+                // most are farther apart by much more than rounding of ξ to single precision, which costs no root to see
+                let closest = (OF_REFERENCE * OF_REFERENCE * reference).min(most * most);
+                if square
+                    > 2.0 * gap * gap + (1.0 + f64::from(gap > 0.0) + ROUNDED) * closest + ROUNDED * reference
+                {
+                    return None;
+                }
+                let bond = difference(bonds.position(own), bonds.position(other));
+                self.near(own, other, bond, displacement, gap)
+            };
+            (listed, self.candidates[start..listed.end].iter().filter_map(near))
         })
     }
 }
 
-/// A pair in contact, seen from one side.
-pub struct Touch<const D: usize> {
-    /// ζ/r.
-    pub direction: [f64; D],
-    /// d − r > 0, m.
-    pub overlap: f64,
-    /// V_J, m³.
-    pub volume: f64,
-}
-
-impl<const D: usize> Candidate<D> {
-    fn zeta(&self, displacement: &Field<D>, own: usize) -> [f64; D] {
-        let (here, there) = (displacement.get(own), displacement.get(self.site as usize));
-        std::array::from_fn(|d| self.bond[d] + (there[d] - here[d]))
-    }
-
-    /// ζ and r; both have the same bits from either side, but for the sign of ζ.
-    pub fn apart(&self, displacement: &Field<D>, own: usize) -> ([f64; D], f64) {
-        let zeta = self.zeta(displacement, own);
-        (zeta, length(zeta))
-    }
-
-    /// Where it touches.
-    pub fn touch(&self, displacement: &Field<D>, own: usize) -> Option<Touch<D>> {
-        let zeta = self.zeta(displacement, own);
-        // most are farther apart by much more than rounding, which costs no root to see
-        if zeta.iter().map(|x| x * x).sum::<f64>() > (1.0 + 1e-9) * self.distance * self.distance {
-            return None;
-        }
-        let r = length(zeta);
-        if r < self.distance {
-            let (along, size) = if r > 0.0 { (zeta, r) } else { (self.bond, length(self.bond)) };
-            let direction = along.map(|x| x / size);
-            Some(Touch { direction, overlap: self.distance - r, volume: self.volume })
-        } else {
-            None
-        }
-    }
+fn difference<const D: usize>(from: [f64; D], to: [f64; D]) -> [f64; D] {
+    std::array::from_fn(|d| to[d] - from[d])
 }

@@ -32,11 +32,12 @@ use crate::field::{CHUNK, Field, chunk_range};
 use friction::tangential;
 pub use friction::{Rubbed, Rubbing};
 use lagged::{Grip, Lagged, Other};
-use list::{Candidate, List, Listed};
+use list::{List, Listed, Near};
 use plane::{Placed, Planes};
 pub use plane::{Plane, Resting};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// κ of Macek & Silling (2007).
 pub const STIFFNESS: f64 = 15.0;
@@ -193,9 +194,9 @@ impl<const D: usize> Contact<D> {
         let mut field = Field::zeros(displacement.sites());
         let moved = self.moves();
         field.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut force)| {
-            self.planes.force(displacement, chunk, &mut force);
+            self.planes.force(displacement, chunk * CHUNK, &mut force);
             if let Some(lagged) = &self.lagged {
-                lagged.force(displacement, &moved, chunk, true, &mut force);
+                lagged.force(displacement, &moved, chunk * CHUNK, true, &mut force);
             }
         });
         Some(field)
@@ -212,25 +213,26 @@ impl<const D: usize> Contact<D> {
             self.list.rebuild(bonds, start);
         }
         let of = |chunk: usize| {
-            let mut grips = Vec::new();
+            let (mut grips, sites) = (Vec::new(), chunk_range(chunk, start.sites()));
             for (number, plane) in self.planes.each.iter().enumerate() {
                 let mu = plane.plane.friction;
-                plane.visit(start, chunk, 0.0, &mut |site, overlap| {
+                plane.visit(start, sites.clone(), 0.0, &mut |site, overlap| {
                     let volume = self.planes.volumes[site];
                     let bound = mu * plane.push(volume) * overlap;
                     let (site, other) = (site as u32, Other::Plane(number));
                     grips.push(Grip { site, other, bound, normal: plane.plane.normal, volume });
                 });
             }
-            for (own, candidates) in self.pairs_in(chunk).filter(|_| self.friction > 0.0) {
-                for candidate in candidates {
-                    let Some(touch) = candidate.touch(start, own.site as usize) else { continue };
-                    let bound = self.friction * self.stiffness * touch.overlap * touch.volume;
-                    let (site, other) = (own.site, Other::Site(candidate.site));
-                    grips.push(Grip { site, other, bound, normal: touch.direction, volume: own.volume });
+            for (own, touching) in self.pairs(bonds, start, sites, 0.0).filter(|_| self.friction > 0.0) {
+                for touch in touching {
+                    let volume = bonds.volume(touch.site as usize);
+                    let bound = self.friction * self.stiffness * touch.overlap() * volume;
+                    let (site, other, normal) = (own.site, Other::Site(touch.site), touch.direction());
+                    grips.push(Grip { site, other, bound, normal, volume: bonds.volume(site as usize) });
                 }
             }
             grips.retain(|grip| grip.bound > 0.0);
+            grips.sort_by_key(|grip| grip.site);
             grips
         };
         let grips = (0..start.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
@@ -274,47 +276,59 @@ impl<const D: usize> Contact<D> {
         self.list.rebuild(bonds, displacement);
     }
 
-    /// The particles of a work item with what they may touch; none where particles do not repel each other.
-    fn pairs_in(&self, chunk: usize) -> impl Iterator<Item = (&Listed, &[Candidate<D>])> {
-        self.has_pairs().then(|| self.list.in_chunk(chunk)).into_iter().flatten()
+    /// Of `sites`, the particles with those at r < d + `gap` from them; none where particles do not repel each other.
+    fn pairs<'a>(
+        &'a self,
+        bonds: &'a dyn Bonds<D>,
+        displacement: &'a Field<D>,
+        sites: Range<usize>,
+        gap: f64,
+    ) -> impl Iterator<Item = (Listed, impl Iterator<Item = Near<D>> + 'a)> + 'a {
+        self.has_pairs().then(|| self.list.pairs(bonds, displacement, sites, gap)).into_iter().flatten()
     }
 
-    /// Adds the force densities −Σ_J κ(c/δ)(d − r) V_J ζ/r, N/m³, on the particles of work item `chunk`.
-    pub fn force(&self, displacement: &Field<D>, chunk: usize, force: &mut [&mut [f64]; D]) {
-        self.planes.force(displacement, chunk, force);
+    /// Adds the force densities −Σ_J κ(c/δ)(d − r) V_J ζ/r, N/m³, on the particles from the site `start` on, of one work item.
+    pub fn force(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        start: usize,
+        force: &mut [&mut [f64]; D],
+    ) {
+        self.planes.force(displacement, start, force);
         if let Some(lagged) = &self.lagged {
-            lagged.force(displacement, &self.moves(), chunk, false, force);
+            lagged.force(displacement, &self.moves(), start, false, force);
         }
-        for (own, candidates) in self.pairs_in(chunk) {
+        for (own, touching) in self.pairs(bonds, displacement, start..start + force[0].len(), 0.0) {
             let mut sum = None;
-            for touch in candidates.iter().filter_map(|c| c.touch(displacement, own.site as usize)) {
-                let push = self.stiffness * touch.overlap * touch.volume;
-                let sum = sum.get_or_insert([0.0; D]);
+            for touch in touching {
+                let push = self.stiffness * touch.overlap() * bonds.volume(touch.site as usize);
+                let (sum, direction) = (sum.get_or_insert([0.0; D]), touch.direction());
                 for d in 0..D {
-                    sum[d] -= push * touch.direction[d];
+                    sum[d] -= push * direction[d];
                 }
             }
             // what is listed but does not touch must not even turn −0 into 0
             let Some(sum) = sum else { continue };
             for d in 0..D {
-                force[d][own.site as usize - chunk * CHUNK] += sum[d];
+                force[d][own.site as usize - start] += sum[d];
             }
         }
     }
 
     /// What touches.
-    pub fn touching(&self, displacement: &Field<D>) -> Touching {
+    pub fn touching(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Touching {
         let none = Touching { pairs: 0, overlap: 0.0, energy: 0.0 };
         let of = |chunk: usize| {
-            let mut part = none;
-            for (own, candidates) in self.list.in_chunk(chunk) {
-                for candidate in candidates {
-                    let Some(touch) = candidate.touch(displacement, own.site as usize) else { continue };
-                    part.pairs += u64::from(own.site < candidate.site);
-                    part.overlap = part.overlap.max(touch.overlap / candidate.distance);
+            let (mut part, sites) = (none, chunk_range(chunk, displacement.sites()));
+            for (own, touching) in self.list.pairs(bonds, displacement, sites, 0.0) {
+                for touch in touching {
+                    let overlap = touch.overlap();
+                    let [volume, other] = [own.site, touch.site].map(|site| bonds.volume(site as usize));
+                    part.pairs += u64::from(own.site < touch.site);
+                    part.overlap = part.overlap.max(overlap / touch.distance);
                     // half of a pair's from either side
-                    part.energy +=
-                        0.25 * self.stiffness * touch.overlap * touch.overlap * touch.volume * own.volume;
+                    part.energy += 0.25 * self.stiffness * overlap * overlap * other * volume;
                 }
             }
             part
@@ -341,6 +355,7 @@ impl<const D: usize> Contact<D> {
     /// number of particles of a facing row in reach; a plane's with m_eff = ρV and n = 1.
     pub fn friction(
         &self,
+        bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
         velocity: &Field<D>,
         rubbing: &Rubbing,
@@ -354,16 +369,17 @@ impl<const D: usize> Contact<D> {
             return rubbed;
         }
         let touches = if D == 2 { 3.0 } else { 9.0 };
-        for (own, candidates) in self.pairs_in(chunk) {
+        for (own, touching) in self.pairs(bonds, displacement, chunk_range(chunk, displacement.sites()), 0.0)
+        {
             let site = own.site as usize;
-            for candidate in candidates {
-                let Some(touch) = candidate.touch(displacement, site) else { continue };
-                let bound = self.friction * self.stiffness * touch.overlap;
-                let slip = rubbing.slip(self.slip, bound * (own.volume + touch.volume), touches);
+            for touch in touching {
+                let bound = self.friction * self.stiffness * touch.overlap();
+                let [volume, other] = [own.site, touch.site].map(|site| bonds.volume(site as usize));
+                let slip = rubbing.slip(self.slip, bound * (volume + other), touches);
                 rubbed.slip = rubbed.slip.max(slip);
-                let (here, there) = (velocity.get(site), velocity.get(candidate.site as usize));
+                let (here, there) = (velocity.get(site), velocity.get(touch.site as usize));
                 let relative = std::array::from_fn(|d| here[d] - there[d]);
-                let rub = tangential(bound * touch.volume, slip, &touch.direction, relative);
+                let rub = tangential(bound * other, slip, &touch.direction(), relative);
                 for d in 0..D {
                     force[d][site - chunk * CHUNK] += rub[d];
                 }
@@ -374,16 +390,15 @@ impl<const D: usize> Contact<D> {
 
     /// max_I Σ_J κ(c/δ) V_J over what touches, N/m⁴: twice that over the density bounds what contact adds to the squared
     /// greatest frequency.
-    pub fn greatest_stiffness(&self, displacement: &Field<D>) -> f64 {
+    pub fn greatest_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> f64 {
+        let sites = displacement.sites();
         let of = |chunk: usize| {
-            let sums = self.pairs_in(chunk).map(|(own, candidates)| {
-                let touches = candidates.iter().filter_map(|c| c.touch(displacement, own.site as usize));
-                touches.map(|touch| self.stiffness * touch.volume).sum::<f64>()
-            });
+            let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), 0.0);
+            let volume = |touch: Near<D>| bonds.volume(touch.site as usize);
+            let sums = pairs.map(|(_, touching)| touching.map(|t| self.stiffness * volume(t)).sum::<f64>());
             sums.fold(0.0, f64::max)
         };
-        let pairs =
-            (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max);
+        let pairs = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max);
         pairs + self.of_plane_stiffness()
     }
 
@@ -402,29 +417,30 @@ impl<const D: usize> Contact<D> {
     /// Σ_J κ(c/δ) V_J (1 + max_{d≠e} |n_d n_e|). A particle that became heavy only in touch would be driven far into
     /// another as a light one, out again as a heavy one, and so on indefinitely. A particle without bonds has twice that alone:
     /// it starts each step from rest, see [`Contact::still`], and so must not go farther than a gradient step may.
-    pub fn add_stiffness(&self, displacement: &Field<D>, tangent: f64, masses: &mut [f64]) {
-        let of = |own: &Listed, candidates: &[Candidate<D>]| {
-            let mut sum = 0.0;
-            for candidate in candidates {
-                let (zeta, r) = candidate.apart(displacement, own.site as usize);
-                if r < candidate.distance + self.near {
-                    let mut mixed = 0.0_f64;
-                    for d in 0..D {
-                        for e in 0..d {
-                            mixed = mixed.max((zeta[d] * zeta[e]).abs());
-                        }
-                    }
-                    sum += self.stiffness * candidate.volume * (1.0 + mixed / (r * r).max(f64::MIN_POSITIVE));
+    pub fn add_stiffness(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        tangent: f64,
+        masses: &mut [f64],
+    ) {
+        let of = |Near { site, zeta, r, .. }: Near<D>| {
+            let mut mixed = 0.0_f64;
+            for d in 0..D {
+                for e in 0..d {
+                    mixed = mixed.max((zeta[d] * zeta[e]).abs());
                 }
             }
-            sum / tangent
+            let direction = 1.0 + mixed / (r * r).max(f64::MIN_POSITIVE);
+            self.stiffness * bonds.volume(site as usize) * direction
         };
-        let chunks = masses.len().div_ceil(CHUNK);
-        let sums = (0..chunks).into_par_iter().map(|chunk| {
-            let all = self.pairs_in(chunk).map(|(own, candidates)| (own, of(own, candidates)));
+        let sites = masses.len();
+        let sums = (0..sites.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
+            let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), self.near);
+            let all = pairs.map(|(own, near)| (own, near.map(of).sum::<f64>() / tangent));
             all.filter(|(_, sum)| *sum > 0.0).collect()
         });
-        let sums: Vec<Vec<(&Listed, f64)>> = sums.collect();
+        let sums: Vec<Vec<(Listed, f64)>> = sums.collect();
         for (own, sum) in sums.into_iter().flatten() {
             let mass = &mut masses[own.site as usize];
             *mass = if own.alone { 2.0 * sum } else { *mass + sum };
@@ -437,7 +453,7 @@ impl<const D: usize> Contact<D> {
 
     /// How far a step along a direction may go so that none leaps past another: by a quarter of a spacing against each
     /// other where they touch or are about to, by half of one at all. ∞ along a direction of zeros.
-    pub fn longest_step(&self, displacement: &Field<D>, direction: &Field<D>) -> f64 {
+    pub fn longest_step(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, direction: &Field<D>) -> f64 {
         if !self.has_pairs() {
             // nothing leaps past a plane
             return f64::INFINITY;
@@ -445,18 +461,16 @@ impl<const D: usize> Contact<D> {
         let sites = displacement.sites();
         let of = |chunk: usize| {
             let (mut farthest, mut closing) = (0.0_f64, 0.0_f64);
-            let parts = direction.components().map(|d| &d[chunk_range(chunk, sites)]);
+            let range = chunk_range(chunk, sites);
+            let parts = direction.components().map(|d| &d[range.clone()]);
             for k in 0..parts[0].len() {
                 farthest = farthest.max((0..D).map(|d| parts[d][k] * parts[d][k]).sum());
             }
-            for (own, candidates) in self.pairs_in(chunk) {
-                let site = own.site as usize;
-                let here = direction.get(site);
-                for candidate in candidates {
-                    if candidate.apart(displacement, site).1 < candidate.distance + self.near {
-                        let there = direction.get(candidate.site as usize);
-                        closing = closing.max((0..D).map(|d| (there[d] - here[d]).powi(2)).sum());
-                    }
+            for (own, near) in self.pairs(bonds, displacement, range, self.near) {
+                let here = direction.get(own.site as usize);
+                for other in near {
+                    let there = direction.get(other.site as usize);
+                    closing = closing.max((0..D).map(|d| (there[d] - here[d]).powi(2)).sum());
                 }
             }
             [farthest, closing]

@@ -8,6 +8,10 @@ use crate::field::{CHUNK, Field, chunk_range};
 use crate::geometry::length;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// Sites whose heights are computed together.
+const BLOCK: usize = 256;
 
 /// A rigid half-space behind a plane. A particle of radius r at the height h < r above it is pushed out with the force density
 /// κ(c/δ)V(r − h) along the normal: the face of a lattice, half a spacing from its particles, may lie on a plane without force.
@@ -109,26 +113,28 @@ impl<const D: usize> Placed<D> {
         std::array::from_fn(|d| self.now[d] - self.before[d])
     }
 
-    /// Visits what is nearer to it than `reach`, m, in a work item: site, and r − h.
+    /// Visits those of some sites that are nearer to it than `reach`, m: site, and r − h.
     pub fn visit(
         &self,
         displacement: &Field<D>,
-        chunk: usize,
+        sites: Range<usize>,
         reach: f64,
         visit: &mut dyn FnMut(usize, f64),
     ) {
-        let range = chunk_range(chunk, self.heights.len());
-        let mut gaps = [0.0; CHUNK];
-        let gaps = &mut gaps[..range.len()];
         let shift: f64 = (0..D).map(|d| self.now[d] * self.plane.normal[d]).sum();
-        gaps.iter_mut().zip(&self.heights[range.clone()]).for_each(|(gap, h)| *gap = h - shift);
-        for (d, u) in displacement.components().iter().enumerate() {
-            let normal = self.plane.normal[d];
-            gaps.iter_mut().zip(&u[range.clone()]).for_each(|(gap, u)| *gap += normal * u);
-        }
-        for (k, &gap) in gaps.iter().enumerate() {
-            if gap < reach {
-                visit(range.start + k, -gap);
+        for start in sites.clone().step_by(BLOCK) {
+            let range = start..(start + BLOCK).min(sites.end);
+            let mut gaps = [0.0; BLOCK];
+            let gaps = &mut gaps[..range.len()];
+            gaps.iter_mut().zip(&self.heights[range.clone()]).for_each(|(gap, h)| *gap = h - shift);
+            for (d, u) in displacement.components().iter().enumerate() {
+                let normal = self.plane.normal[d];
+                gaps.iter_mut().zip(&u[range.clone()]).for_each(|(gap, u)| *gap += normal * u);
+            }
+            for (k, &gap) in gaps.iter().enumerate() {
+                if gap < reach {
+                    visit(start + k, -gap);
+                }
             }
         }
     }
@@ -138,12 +144,12 @@ impl<const D: usize> Placed<D> {
         self.stiffness * volume
     }
 
-    /// Adds its force densities on a work item.
-    pub fn force(&self, volumes: &[f64], displacement: &Field<D>, chunk: usize, force: &mut [&mut [f64]; D]) {
-        self.visit(displacement, chunk, 0.0, &mut |site, overlap| {
+    /// Adds its force densities on the sites from `start` on.
+    pub fn force(&self, volumes: &[f64], displacement: &Field<D>, start: usize, force: &mut [&mut [f64]; D]) {
+        self.visit(displacement, start..start + force[0].len(), 0.0, &mut |site, overlap| {
             let push = self.push(volumes[site]) * overlap;
             for d in 0..D {
-                force[d][site - chunk * CHUNK] += push * self.plane.normal[d];
+                force[d][site - start] += push * self.plane.normal[d];
             }
         });
     }
@@ -166,7 +172,8 @@ impl<const D: usize> Placed<D> {
         if mu == 0.0 {
             return (sum, most);
         }
-        self.visit(displacement, chunk, 0.0, &mut |site, overlap| {
+        let sites = chunk_range(chunk, volumes.len());
+        self.visit(displacement, sites, 0.0, &mut |site, overlap| {
             let bound = mu * self.push(volumes[site]) * overlap;
             let slip = rubbing.slip(slip_velocity, bound, 1.0);
             most = most.max(slip);
@@ -185,8 +192,8 @@ impl<const D: usize> Placed<D> {
     pub fn resting(&self, volumes: &[f64], displacement: &Field<D>, bonds: &dyn Bonds<D>) -> Resting {
         // N, area, N x, N x², of x from the plane's point
         let of = |chunk: usize| {
-            let mut sums = [0.0; 8];
-            self.visit(displacement, chunk, 0.0, &mut |site, overlap| {
+            let (mut sums, sites) = ([0.0; 8], chunk_range(chunk, volumes.len()));
+            self.visit(displacement, sites, 0.0, &mut |site, overlap| {
                 let push = self.push(volumes[site]) * overlap * volumes[site];
                 let (rest, u) = (bonds.position(site), displacement.get(site));
                 let place: [f64; D] = std::array::from_fn(|d| rest[d] + u[d] - self.plane.point[d]);
@@ -222,9 +229,9 @@ pub struct Planes<const D: usize> {
 }
 
 impl<const D: usize> Planes<D> {
-    /// Adds the force densities on a work item.
-    pub fn force(&self, displacement: &Field<D>, chunk: usize, force: &mut [&mut [f64]; D]) {
-        self.each.iter().for_each(|plane| plane.force(&self.volumes, displacement, chunk, force));
+    /// Adds the force densities on the sites from `start` on.
+    pub fn force(&self, displacement: &Field<D>, start: usize, force: &mut [&mut [f64]; D]) {
+        self.each.iter().for_each(|plane| plane.force(&self.volumes, displacement, start, force));
     }
 
     /// Sums what `of` makes of each touch, a particle's volume and its overlap, N/m⁴ and so on: particles, and the sum.
@@ -232,10 +239,15 @@ impl<const D: usize> Planes<D> {
         let part = |chunk: usize| {
             let mut sums = [0.0; 2];
             for plane in &self.each {
-                plane.visit(displacement, chunk, 0.0, &mut |site, overlap| {
-                    sums[0] += 1.0;
-                    sums[1] += of(plane, self.volumes[site], overlap);
-                });
+                plane.visit(
+                    displacement,
+                    chunk_range(chunk, self.volumes.len()),
+                    0.0,
+                    &mut |site, overlap| {
+                        sums[0] += 1.0;
+                        sums[1] += of(plane, self.volumes[site], overlap);
+                    },
+                );
             }
             sums
         };
@@ -259,9 +271,14 @@ impl<const D: usize> Planes<D> {
         let part = |chunk: usize| {
             let mut deepest = 0.0_f64;
             for plane in &self.each {
-                plane.visit(displacement, chunk, 0.0, &mut |site, overlap| {
-                    deepest = deepest.max(overlap / radius(site));
-                });
+                plane.visit(
+                    displacement,
+                    chunk_range(chunk, self.volumes.len()),
+                    0.0,
+                    &mut |site, overlap| {
+                        deepest = deepest.max(overlap / radius(site));
+                    },
+                );
             }
             deepest
         };
@@ -285,7 +302,8 @@ impl<const D: usize> Planes<D> {
             let mixed = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
             let mixed = mixed.map(|(d, e)| (normal[d] * normal[e]).abs()).fold(0.0, f64::max);
             masses.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, masses)| {
-                plane.visit(displacement, chunk, near, &mut |site, _| {
+                let sites = chunk_range(chunk, self.volumes.len());
+                plane.visit(displacement, sites, near, &mut |site, _| {
                     masses[site - chunk * CHUNK] += plane.push(self.volumes[site]) * (1.0 + mixed) / tangent;
                 });
             });

@@ -112,7 +112,7 @@ impl RelaxationSolver {
         let tangent = if own { system.material.bond_law().1 } else { state.tangent };
         if let Some(contact) = system.repulsion() {
             self.contact_mass.clone_from(if own { &self.own_mass } else { &self.unit_mass });
-            contact.add_stiffness(&state.displacement, tangent, &mut self.contact_mass);
+            contact.add_stiffness(&*system.bonds, &state.displacement, tangent, &mut self.contact_mass);
         }
         let mass = 0.5 * settings.mass_safety * tangent;
         let (sums, observed) = force_pass(system, state, self.masses(system, own), mass, factor, look);

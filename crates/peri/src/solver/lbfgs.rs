@@ -297,7 +297,8 @@ impl<const D: usize> LbfgsSolver<D> {
             self.places.add_scaled(&mut field, factor, &self.direction);
             field
         };
-        let touching = |contact: &Contact<D>| contact.longest_step(&state.displacement, &spread(1.0));
+        let touching =
+            |contact: &Contact<D>| contact.longest_step(&*system.bonds, &state.displacement, &spread(1.0));
         let longest = system.repulsion().map_or(f64::INFINITY, touching);
         if !softens {
             return longest;

@@ -59,7 +59,7 @@ impl<const D: usize> Preconditioner<D> {
         let particles = bonds.particles().iter().map(|&site| site as usize);
         particles.filter(|&site| survey.bonded[site] == 0).for_each(|site| springs[site] = 0.0);
         if let Some(contact) = system.repulsion() {
-            contact.add_stiffness(&state.displacement, tangent, &mut springs);
+            contact.add_stiffness(&*system.bonds, &state.displacement, tangent, &mut springs);
         }
         springs.iter_mut().for_each(|m| *m *= 0.5 * tangent);
         let local = |(&site, volume): (&u32, &f64)| {

@@ -7,7 +7,7 @@ use super::state::State;
 use crate::bonds::{Bonds, Seen, not_finite};
 use crate::contact::{Contact, Plane, Resting, Touching};
 use crate::error::Error;
-use crate::field::{CHUNK, Field};
+use crate::field::Field;
 use crate::material::{Material, Response};
 use crate::potential::StretchRange;
 use std::borrow::Cow;
@@ -169,7 +169,7 @@ impl<'a, const D: usize> System<'a, D> {
         if !contact.has_pairs() {
             contact.rebuild(&*self.bonds, &state.displacement);
         }
-        Some(contact.touching(&state.displacement))
+        Some(contact.touching(&*self.bonds, &state.displacement))
     }
 
     /// Force densities of whole pieces from the site `start` on, without loads: the material, and all that acts between particles
@@ -183,20 +183,20 @@ impl<'a, const D: usize> System<'a, D> {
     ) {
         self.material.force(&*self.bonds, displacement, start, force, track);
         if let Some(contact) = self.repulsion() {
-            contact.force(displacement, start / CHUNK, force);
+            contact.force(&*self.bonds, displacement, start, force);
         }
     }
 
     /// Sites that [`Self::internal_force`] may begin with: multiples of this.
     pub(super) fn piece(&self) -> usize {
-        if self.repulsion().is_some() { CHUNK } else { self.material.piece(&*self.bonds) }
+        self.material.piece(&*self.bonds)
     }
 
     /// Energy of the material, whose law is taken over the stretches `observed`, and of contact, J.
     pub fn stored_energy(&mut self, state: &State<D>, observed: StretchRange) -> f64 {
         let bonds = self.material.energy(&*self.bonds, &state.displacement, observed);
         match self.repulsion() {
-            Some(contact) => bonds + contact.touching(&state.displacement).energy,
+            Some(contact) => bonds + contact.touching(&*self.bonds, &state.displacement).energy,
             None => bonds,
         }
     }

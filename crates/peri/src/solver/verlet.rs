@@ -185,7 +185,7 @@ impl VelocityVerlet {
         let BondSums { stiffness, shortest, extent } = BondSums::new(system);
         let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
         let contact = system.repulsion().map_or(0.0, |contact| {
-            contact.greatest_stiffness(&state.displacement).max(contact.pair_stiffness())
+            contact.greatest_stiffness(&*system.bonds, &state.displacement).max(contact.pair_stiffness())
         });
         state.motion = Motion {
             contact,
@@ -247,7 +247,7 @@ impl VelocityVerlet {
     /// Allows for more contact where more particles touch than so far.
     fn cover_contact<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
         let Some(contact) = system.repulsion() else { return };
-        let greatest = contact.greatest_stiffness(&state.displacement);
+        let greatest = contact.greatest_stiffness(&*system.bonds, &state.displacement);
         if greatest > state.motion.contact {
             state.motion.contact = GROWTH * greatest;
             self.cover(system, state);

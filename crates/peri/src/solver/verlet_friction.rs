@@ -41,7 +41,7 @@ pub fn friction_pass<const D: usize>(
     let of = |(chunk, (mut own, total)): (usize, Two<D>)| {
         let before = work(chunk, &own);
         own.iter_mut().for_each(|part| part.fill(0.0));
-        let rubbed = contact.friction(displacement, velocity, &rubbing, chunk, &mut own);
+        let rubbed = contact.friction(&*system.bonds, displacement, velocity, &rubbing, chunk, &mut own);
         for d in 0..D {
             total[d].iter_mut().zip(&*own[d]).for_each(|(f, rub)| *f += rub);
         }

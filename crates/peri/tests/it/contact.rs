@@ -4,7 +4,7 @@
 use crate::bodies::{Body, Built, MODULUS, Random, distance, norm, rms, scatter};
 use peri::bonds::{Bonds, CloudBonds, Overstretched, VolumeCorrection};
 use peri::contact::{Contact, STIFFNESS};
-use peri::field::Field;
+use peri::field::{CHUNK, Field};
 
 /// Contact forces on particles in input order, and the energy.
 fn contact<const D: usize>(bonds: &dyn Bonds<D>, sites: &[usize], u: &[[f64; D]]) -> (Vec<[f64; D]>, f64) {
@@ -13,9 +13,9 @@ fn contact<const D: usize>(bonds: &dyn Bonds<D>, sites: &[usize], u: &[[f64; D]]
     contact.update(bonds, &field);
     let mut force = Field::zeros(bonds.sites());
     for (chunk, mut out) in force.chunks_mut().into_iter().enumerate() {
-        contact.force(&field, chunk, &mut out);
+        contact.force(bonds, &field, chunk * CHUNK, &mut out);
     }
-    (sites.iter().map(|&site| force.get(site)).collect(), contact.touching(&field).energy)
+    (sites.iter().map(|&site| force.get(site)).collect(), contact.touching(bonds, &field).energy)
 }
 
 /// The same by comparing all pairs: volumes and radii given, `bonded` by (I, J), I < J.
@@ -176,13 +176,13 @@ fn check_parted<const D: usize>(cells: [usize; D]) {
         let forces = |contact: &Contact<D>| {
             let mut force = Field::zeros(bonds.sites());
             for (chunk, mut out) in force.chunks_mut().into_iter().enumerate() {
-                contact.force(&field, chunk, &mut out);
+                contact.force(bonds, &field, chunk * CHUNK, &mut out);
             }
             force
         };
         assert_eq!(forces(&contact), forces(&fresh));
-        assert_eq!(contact.touching(&field), fresh.touching(&field));
-        assert!(contact.touching(&field).pairs > 50);
+        assert_eq!(contact.touching(bonds, &field), fresh.touching(bonds, &field));
+        assert!(contact.touching(bonds, &field).pairs > 50);
     }
     let built = Body::damaged(cells, 0.1, 2.015).build();
     let Built { mut lattice, mut cloud, points, on_lattice, in_cloud } = built;

@@ -211,7 +211,7 @@ fn friction_of_a_heap<const D: usize>(cells: [usize; D]) {
     let rubbing = Rubbing { density: DENSITY, step: 0.0 };
     let mut force = Field::zeros(bonds.sites());
     for (chunk, mut out) in force.chunks_mut().into_iter().enumerate() {
-        contact.friction(&u, &v, &rubbing, chunk, &mut out);
+        contact.friction(bonds, &u, &v, &rubbing, chunk, &mut out);
     }
     let sites: Vec<usize> = bonds.particles().iter().map(|&s| s as usize).collect();
     let stiffness = STIFFNESS * 6.0 * MODULUS / bonds.horizon();
