@@ -52,6 +52,37 @@ impl<const D: usize> CellGrid<D> {
         &self.members
     }
 
+    /// The members of every cell, in the order of the cells.
+    pub fn members(&self) -> impl Iterator<Item = &[u32]> {
+        self.starts.windows(2).map(|ends| &self.members[ends[0]..ends[1]])
+    }
+
+    /// Visits the cells from one on, by their numbers, that are at most `rings` cells away from it, with how many.
+    pub fn around(&self, number: usize, rings: i64, mut visit: impl FnMut(usize, i64)) {
+        let own = self.cells[number];
+        let away = |cell: &[i64; D]| (0..D).map(|d| (cell[d] - own[d]).abs()).max().unwrap_or(0);
+        let mut at = number;
+        while let Some(cell) = self.cells.get(at) {
+            // the first axis on which it is too far away, and where the next cell that is not may be
+            let Some(d) = (0..D).find(|&d| (cell[d] - own[d]).abs() > rings) else {
+                visit(at, away(cell));
+                at += 1;
+                continue;
+            };
+            let mut next = *cell;
+            if cell[d] < own[d] {
+                next[d] = own[d] - rings;
+            } else if d == 0 {
+                return;
+            } else {
+                next[d - 1] += 1;
+                next[d] = own[d] - rings;
+            }
+            next[d + 1..].fill(i64::MIN);
+            at += self.cells[at..].partition_point(|cell| *cell < next);
+        }
+    }
+
     /// The cell of a point, last axis first; that of NaN is the first.
     fn cell(&self, point: [f64; D]) -> [i64; D] {
         std::array::from_fn(|d| {

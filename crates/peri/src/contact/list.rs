@@ -1,5 +1,6 @@
 //! Which particles without a bond are near each other, and how near.
 
+use super::vicinity::Vicinity;
 use crate::bonds::{Bonds, CellGrid};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::geometry::length;
@@ -24,8 +25,8 @@ pub struct List<const D: usize> {
     spacing: f64,
     gap: f64,
     skin: f64,
-    /// Displacement at which the list was made.
-    listed_at: Field<D>,
+    /// Where particles were when the list was made; `None` before, and where it is to be made anew.
+    vicinity: Option<Vicinity<D>>,
     /// Particles with candidates, ascending, and where each one's end.
     listed: Vec<Listed>,
     candidates: Vec<Candidate<D>>,
@@ -97,7 +98,7 @@ impl<const D: usize> List<D> {
             spacing: bonds.spacing(),
             gap,
             skin: SKIN * bonds.spacing(),
-            listed_at: Field::zeros(0),
+            vicinity: None,
             listed: Vec::new(),
             candidates: Vec::new(),
             alone: Vec::new(),
@@ -110,27 +111,12 @@ impl<const D: usize> List<D> {
     /// Sets the skin, m; the list is made at the next update.
     pub fn set_skin(&mut self, skin: f64) {
         self.skin = skin.max(0.0).min(FAR * self.largest);
-        self.listed_at = Field::zeros(0);
+        self.vicinity = None;
     }
 
-    /// Rebuilds the list where a particle has moved by half of the skin since it was made.
+    /// Rebuilds the list where pairs that it lacks may have come near since it was made.
     pub fn update(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
-        // a little less, for rounding
-        let limit = (0.49 * self.skin).powi(2);
-        let (now, then) = (displacement.components(), self.listed_at.components());
-        let sites = bonds.sites();
-        let moved = |chunk: usize| {
-            let range = chunk_range(chunk, sites);
-            let mut square = [0.0; CHUNK];
-            for d in 0..D {
-                let parts = now[d][range.clone()].iter().zip(&then[d][range.clone()]);
-                square.iter_mut().zip(parts).for_each(|(s, (a, b))| *s += (a - b) * (a - b));
-            }
-            // NaN has moved, too
-            !square[..range.len()].iter().all(|&s| s <= limit)
-        };
-        let stale = self.skin == 0.0 || self.listed_at.sites() != sites;
-        if stale || (0..sites.div_ceil(CHUNK)).into_par_iter().any(moved) {
+        if !self.vicinity.as_mut().is_some_and(|vicinity| vicinity.holds(displacement)) {
             self.rebuild(bonds, displacement);
         }
     }
@@ -138,14 +124,12 @@ impl<const D: usize> List<D> {
     /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends: the list is then that which would
     /// have been made of the bonds that are left.
     pub fn part(&mut self, bonds: &dyn Bonds<D>, pairs: &[[u32; 2]]) {
-        if self.listed_at.sites() != bonds.sites() {
-            // the next update makes it anew
-            return;
-        }
+        // else the next update makes it anew
+        let Some(vicinity) = &self.vicinity else { return };
         let reach = self.gap + self.skin;
         let near = |&[own, other]: &[u32; 2]| {
             let bond = difference(bonds.position(own as usize), bonds.position(other as usize));
-            let near = self.near(own as usize, other as usize, bond, &self.listed_at, reach)?;
+            let near = self.near(own as usize, other as usize, bond, &vicinity.listed_at, reach)?;
             Some((own, self.candidate(&near)))
         };
         let mut found: Vec<(u32, Candidate<D>)> = pairs.par_iter().filter_map(near).collect();
@@ -238,7 +222,7 @@ impl<const D: usize> List<D> {
             self.candidates.extend(candidates);
         }
         self.alone = particles.iter().copied().filter(|&site| bonds.is_alone(site as usize)).collect();
-        self.listed_at.clone_from(displacement);
+        self.vicinity = Some(Vicinity::new(grid, particles, displacement, edge, self.skin));
         self.rebuilds += 1;
     }
 

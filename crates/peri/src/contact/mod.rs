@@ -25,6 +25,7 @@ mod friction;
 mod lagged;
 mod list;
 mod plane;
+mod vicinity;
 
 use crate::bonds::Bonds;
 use crate::error::Error;

@@ -196,6 +196,46 @@ fn broken_bonds_join_the_list() {
     check_parted([12, 9, 8]);
 }
 
+/// Two blocks that fly at each other, a spacing in five steps, and shake: the list is made where they meet, not all along the way,
+/// and the forces are at any time those of a list made then.
+#[test]
+fn a_list_holds_while_bodies_fly() {
+    let block = |low: f64| (0..36).map(move |k| [low + f64::from(k % 6), f64::from(k / 6)]);
+    let points: Vec<[f64; 2]> = block(0.0).chain(block(40.0)).collect();
+    let cloud = CloudBonds::new(&points, &[1.0; 72], 1.0, 1.5, VolumeCorrection::None, &[]).unwrap();
+    let mut sites = vec![0; 72];
+    for (site, &particle) in cloud.input_order().iter().enumerate() {
+        sites[particle as usize] = site;
+    }
+    let forces = |contact: &Contact<2>, u: &Field<2>| {
+        let mut force = Field::zeros(cloud.sites());
+        for (chunk, mut out) in force.chunks_mut().into_iter().enumerate() {
+            contact.force(&cloud, u, chunk * CHUNK, &mut out);
+        }
+        force
+    };
+    let mut contact = Contact::new(&cloud, MODULUS, STIFFNESS).unwrap();
+    let (first, mut far, mut random) = (contact.rebuilds(), 0, Random(5));
+    for step in 0..220 {
+        let shaken = random.vectors::<2>(72, 0.02);
+        let flown = |k: usize| if k < 36 { 1.0 } else { -1.0 } * 0.1 * f64::from(step);
+        let u: Vec<[f64; 2]> = (0..72).map(|k| [flown(k) + shaken[k][0], 300.0 + shaken[k][1]]).collect();
+        let u = scatter(cloud.sites(), &sites, &u);
+        contact.update(&cloud, &u);
+        let mut fresh = Contact::new(&cloud, MODULUS, STIFFNESS).unwrap();
+        fresh.rebuild(&cloud, &u);
+        assert_eq!(forces(&contact, &u), forces(&fresh, &u), "{step}");
+        assert_eq!(contact.touching(&cloud, &u), fresh.touching(&cloud, &u), "{step}");
+        let gap = 35.0 - 0.2 * f64::from(step);
+        if gap > 8.0 {
+            far = contact.rebuilds() - first;
+        }
+    }
+    // 27 spacings against each other, of which a skin takes half of one
+    assert!(far <= 8, "{far} lists on the way");
+    assert!(contact.rebuilds() - first > far, "none where they met");
+}
+
 /// Scattered points with volumes from 1 to 5 times the least.
 #[test]
 fn unequal_volumes() {

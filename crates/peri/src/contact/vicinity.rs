@@ -1,0 +1,101 @@
+//! How long a list of close pairs holds: as long as particles near each other move together, however far.
+
+use crate::bonds::CellGrid;
+use crate::field::{CHUNK, Field, chunk_range};
+use rayon::prelude::*;
+
+/// Cells within this many of each other are compared one by one, those farther apart all at once.
+const RINGS: i64 = 3;
+/// A list is made anew where less than this part of its skin is left.
+const LEAST: f64 = 0.2;
+
+/// The particles of a list in cells, and how far they have moved against each other.
+pub struct Vicinity<const D: usize> {
+    grid: CellGrid<D>,
+    edge: f64,
+    skin: f64,
+    /// Sites of the particles.
+    sites: Vec<u32>,
+    /// Displacement at which the list was made.
+    pub listed_at: Field<D>,
+    /// The last displacement at which cells were compared, and what any two particles may move against each other from there on, m.
+    compared_at: Field<D>,
+    left: f64,
+}
+
+impl<const D: usize> Vicinity<D> {
+    /// Of a list that holds all pairs which may touch until two particles have moved by `skin` against each other; pairs that do not share
+    /// a cell of the grid or neighbouring ones are `edge` or more apart.
+    pub fn new(grid: CellGrid<D>, sites: &[u32], displacement: &Field<D>, edge: f64, skin: f64) -> Self {
+        let (listed_at, compared_at) = (displacement.clone(), displacement.clone());
+        Self { grid, edge, skin, sites: sites.to_vec(), listed_at, compared_at, left: skin }
+    }
+
+    /// Whether the list holds for a displacement.
+    pub fn holds(&mut self, displacement: &Field<D>) -> bool {
+        let sites = self.compared_at.sites();
+        // half of what is left; a little less, for rounding
+        let limit = (0.49 * self.left).powi(2);
+        let (now, then) = (displacement.components(), self.compared_at.components());
+        let moved = |chunk: usize| {
+            let range = chunk_range(chunk, sites);
+            let mut square = [0.0; CHUNK];
+            for d in 0..D {
+                let parts = now[d][range.clone()].iter().zip(&then[d][range.clone()]);
+                square.iter_mut().zip(parts).for_each(|(s, (a, b))| *s += (a - b) * (a - b));
+            }
+            // NaN has moved, too
+            !square[..range.len()].iter().all(|&s| s <= limit)
+        };
+        if self.left > 0.0 && displacement.sites() == sites && !(0..sites.div_ceil(CHUNK)).into_par_iter().any(moved) {
+            return true;
+        }
+        if self.skin == 0.0 || displacement.sites() != sites {
+            return false;
+        }
+        self.left = self.compare(displacement);
+        self.compared_at.clone_from(displacement);
+        self.left > LEAST * self.skin
+    }
+
+    /// What any two particles that the list lacks may still move against each other, m; below 0 where that was too much, or is not known.
+    fn compare(&self, displacement: &Field<D>) -> f64 {
+        // least and greatest components of the moves in every cell
+        let of = |members: &[u32]| {
+            let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+            for &member in members {
+                let site = self.sites[member as usize] as usize;
+                let (now, then) = (displacement.get(site), self.listed_at.get(site));
+                for d in 0..D {
+                    let moved = now[d] - then[d];
+                    // NaN stays
+                    low[d] = if moved < low[d] || moved.is_nan() { moved } else { low[d] };
+                    high[d] = if moved > high[d] || moved.is_nan() { moved } else { high[d] };
+                }
+            }
+            [low, high]
+        };
+        let members: Vec<&[u32]> = self.grid.members().collect();
+        let moves: Vec<[[f64; D]; 2]> = members.into_par_iter().map(of).collect();
+        let against = |a: &[[f64; D]; 2], b: &[[f64; D]; 2]| {
+            let along = |d: usize| (a[1][d] - b[0][d]).max(b[1][d] - a[0][d]);
+            (0..D).map(|d| along(d) * along(d)).sum::<f64>().sqrt()
+        };
+        // pairs `rings` cells apart were (rings − 1) edges apart, of which the last is used up where they touch
+        let allowed = |rings: i64| (rings - 2).max(0) as f64 * self.edge + self.skin;
+        let left = |number: usize| {
+            let mut left = f64::INFINITY;
+            self.grid.around(number, RINGS, |other, rings| {
+                left = left.min(allowed(rings) - against(&moves[number], &moves[other]));
+            });
+            left
+        };
+        let near = (0..moves.len()).into_par_iter().map(left).reduce(|| f64::INFINITY, f64::min);
+        let all = moves.iter().fold([[f64::INFINITY; D], [f64::NEG_INFINITY; D]], |[low, high], [l, h]| {
+            [std::array::from_fn(|d| low[d].min(l[d])), std::array::from_fn(|d| high[d].max(h[d]))]
+        });
+        let left = near.min(allowed(RINGS + 1) - against(&all, &all));
+        let known = moves.iter().flatten().flatten().all(|moved| moved.is_finite());
+        if known { left } else { f64::NEG_INFINITY }
+    }
+}
