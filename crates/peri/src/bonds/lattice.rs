@@ -7,7 +7,7 @@ use super::lattice_kernel::{Class, TILE, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, Softening, integrity};
-use super::stencil::{Stencil, layout};
+use super::stencil::{Stencil, fullest, layout};
 use super::{
     Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
 };
@@ -26,6 +26,8 @@ pub struct LatticeBonds<const D: usize> {
     spans: Vec<Span<D>>,
     ratio: f64,
     volume_correction: VolumeCorrection,
+    /// Axes, from that on which neighbours are neighbours in storage; steps in sites along each.
+    order: [usize; D],
     strides: [usize; D],
     guard: usize,
     sites: usize,
@@ -66,16 +68,19 @@ impl<const D: usize> LatticeBonds<D> {
                 return Err(Error::geometry(format!("{name}: found {value}; allowed: above 0, finite")));
             }
         }
-        let stencil = Stencil::<D>::new(ratio);
+        let mut stencil = Stencil::<D>::new(ratio);
         if stencil.offsets.is_empty() {
             return Err(Error::geometry(format!("a horizon of {ratio} spacings reaches no neighbour")));
         }
-        let (strides, guard, sites) = layout(lattice.cells, ratio);
+        let order = fullest(lattice.cells, &lattice.occupied, ratio);
+        let (strides, guard, sites) = layout(lattice.cells, ratio, order);
+        stencil.offsets.sort_by_key(|&offset| shift(strides, offset));
         let mut bonds = Self {
             stencil,
             spans: Vec::new(),
             ratio,
             volume_correction,
+            order,
             strides,
             guard,
             sites,
@@ -124,7 +129,7 @@ impl<const D: usize> LatticeBonds<D> {
 
     /// Distance in sites of an offset in cells.
     pub fn shift(&self, offset: [i32; D]) -> isize {
-        (0..D).map(|d| self.strides[d] as isize * offset[d] as isize).sum()
+        shift(self.strides, offset)
     }
 
     /// Whether bond `k` of the particle in `site` is intact.
@@ -245,7 +250,7 @@ impl<const D: usize> LatticeBonds<D> {
     pub fn cell_of(&self, site: usize) -> Option<[usize; D]> {
         let mut rest = site.checked_sub(self.guard)?;
         let mut cell = [0; D];
-        for d in (0..D).rev() {
+        for &d in self.order.iter().rev() {
             cell[d] = rest / self.strides[d];
             rest %= self.strides[d];
         }
@@ -275,6 +280,10 @@ impl<const D: usize> LatticeBonds<D> {
     }
 }
 
+fn shift<const D: usize>(strides: [usize; D], offset: [i32; D]) -> isize {
+    (0..D).map(|d| strides[d] as isize * offset[d] as isize).sum()
+}
+
 impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     fn sites(&self) -> usize {
         self.sites
@@ -287,7 +296,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     fn position(&self, site: usize) -> [f64; D] {
         let mut rest = site - self.guard;
         let mut position = self.lattice.origin;
-        for d in (0..D).rev() {
+        for &d in self.order.iter().rev() {
             position[d] += self.lattice.spacing * (rest / self.strides[d]) as f64;
             rest %= self.strides[d];
         }
@@ -331,7 +340,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     }
 
     fn is_bonded(&self, site: usize, other: usize) -> bool {
-        // offsets ascend, last axis slowest, and rows are far enough apart for their distances in sites to do so, too
+        // offsets ascend by their distance in sites
         let shift = other as isize - site as isize;
         self.spans.binary_search_by_key(&shift, |span| span.shift).is_ok_and(|k| self.is_intact(site, k))
     }

@@ -47,7 +47,10 @@ impl<const D: usize> Vicinity<D> {
             // NaN has moved, too
             !square[..range.len()].iter().all(|&s| s <= limit)
         };
-        if self.left > 0.0 && displacement.sites() == sites && !(0..sites.div_ceil(CHUNK)).into_par_iter().any(moved) {
+        if self.left > 0.0
+            && displacement.sites() == sites
+            && !(0..sites.div_ceil(CHUNK)).into_par_iter().any(moved)
+        {
             return true;
         }
         if self.skin == 0.0 || displacement.sites() != sites {

@@ -137,6 +137,7 @@ fn check_plainly<const D: usize>(cells: [usize; D]) {
 fn lattice_and_cloud_equal_plain_sums() {
     check_plainly([22, 17]);
     check_plainly([9, 8, 7]);
+    check_plainly([4, 5, 24]);
 }
 
 /// Pairs whose bonds break are taken into a list that stays, and later moves within its skin need no other.

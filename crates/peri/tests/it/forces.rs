@@ -120,6 +120,8 @@ fn paths_agree_in_space() {
             &format!("plain block, m = {ratio}"),
         );
         compare(&Body::damaged([cells, cells, 8], spacing, ratio), 0.1, &format!("block, m = {ratio}"));
+        // stored along its axis
+        compare(&Body::damaged([5, 4, 26], spacing, ratio), 0.1, &format!("bar, m = {ratio}"));
     }
 }
 

@@ -320,6 +320,7 @@ fn hardy_is_the_sum_over_all_crossing_bonds() {
     check_definition([17, 14], 3.015);
     check_definition([13, 15], 2.6);
     check_definition([8, 7, 6], 3.015);
+    check_definition([3, 4, 27], 3.015);
 }
 
 /// div P(hardy) is the ball's average of the force density (formulation.md: to 1e-7 where the loads vary smoothly; asked
@@ -387,6 +388,7 @@ fn deformation_gradients_of_torn_bodies() {
     }
     check([40, 33]);
     check([14, 13, 9]);
+    check([5, 30, 4]);
 }
 
 /// Cauchy stress and deformation gradient of a large homogeneous strain: F as imposed, σ = P Fᵀ/J symmetric inside.

@@ -49,6 +49,38 @@ fn bonds_of_a_box() {
     check([1, 5, 3], 4.015);
 }
 
+/// A bar takes as much room and as many vectors of particles along any axis: its own axis is that along which it is stored.
+#[test]
+fn bars_are_stored_along_their_axis() {
+    fn check<const D: usize>(bars: [[usize; D]; D]) {
+        let stored = bars.map(|cells| {
+            let bonds = boxed(cells, 3.015);
+            let sites: Vec<usize> = bonds.particles().iter().map(|&site| site as usize).collect();
+            let mut vectors: Vec<usize> = sites.iter().map(|site| site / 8).collect();
+            vectors.dedup();
+            // neighbours lie where the bonds say
+            for &site in &sites {
+                let (here, mut count) = (bonds.position(site), 0);
+                bonds.neighbours(site, &mut |bond| {
+                    let there = bonds.position(bond.site);
+                    assert!(
+                        (0..D).all(|d| there[d] - here[d] == bond.bond[d]),
+                        "{cells:?}: {here:?} {there:?}"
+                    );
+                    assert!(bonds.is_bonded(site, bond.site));
+                    count += 1;
+                });
+                let bonded = sites.iter().filter(|&&other| bonds.is_bonded(site, other));
+                assert_eq!(bonded.count(), count, "{cells:?}");
+            }
+            (bonds.sites(), vectors.len())
+        });
+        assert!(stored.iter().all(|&one| one == stored[0]), "{bars:?}: {stored:?}");
+    }
+    check([[90, 6], [6, 90]]);
+    check([[60, 5, 5], [5, 60, 5], [5, 5, 60]]);
+}
+
 /// 200 bytes per particle: displacement, velocity and force (3D doubles), the mass, and what the bonds hold.
 #[test]
 fn bytes_per_particle() {
