@@ -393,11 +393,15 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     }
 
     fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<[u32; 2]> {
-        let of = |site: usize| {
-            let numbered = self.excesses(displacement, site).enumerate();
-            numbered.filter(move |(_, e)| *e > least).map(move |(k, _)| [site as u32, k as u32])
-        };
-        sites.flat_map(of).collect()
+        let mut found = Vec::new();
+        for site in sites {
+            for (k, e) in self.excesses(displacement, site).enumerate() {
+                if e > least {
+                    found.push([site as u32, k as u32]);
+                }
+            }
+        }
+        found
     }
 
     fn sever(&mut self, bonds: &[Overstretched]) {
@@ -431,6 +435,11 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
             part.iter().enumerate().fold(0, |word, (k, inverse)| word | u64::from(*inverse > 0.0) << k)
         };
         self.inverse_length.chunks(64).map(bits).collect()
+    }
+
+    fn bit(&self, site: usize, index: u32) -> (usize, u64) {
+        let k = self.starts[site] + index as usize;
+        (k / 64, 1 << (k % 64))
     }
 
     fn restore(&mut self, words: &[u64]) -> bool {

@@ -449,6 +449,10 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
         self.intact.concat()
     }
 
+    fn bit(&self, site: usize, index: u32) -> (usize, u64) {
+        (index as usize / 64 * self.sites + site, 1 << (index % 64))
+    }
+
     fn restore(&mut self, words: &[u64]) -> bool {
         if words.len() != self.intact.len() * self.sites {
             return false;

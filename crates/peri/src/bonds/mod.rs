@@ -160,6 +160,8 @@ pub trait Bonds<const D: usize>: Send + Sync {
     fn soften(&mut self, bonds: Vec<Softened>);
     /// Which bonds are intact, for checkpoints: as many words as [`Bonds::restore`] takes.
     fn intact(&self) -> Vec<u64>;
+    /// Where [`Bonds::intact`] has the bond of a site with a [`Neighbour::index`]: word and bit.
+    fn bit(&self, site: usize, index: u32) -> (usize, u64);
     /// Severs what is not intact in `words`; false where their number does not fit these bonds.
     fn restore(&mut self, words: &[u64]) -> bool;
     /// Intact bonds, each counted from both ends: the work of one force evaluation.

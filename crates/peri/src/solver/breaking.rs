@@ -112,7 +112,11 @@ impl<const D: usize> System<'_, D> {
             contact.part(&*self.bonds, &parted);
         }
         if bonds > 0 {
-            state.intact = Some(self.bonds.intact());
+            let words = state.intact.get_or_insert_with(|| self.bonds.intact());
+            for bond in &list {
+                let (word, bit) = self.bonds.bit(bond.site as usize, bond.index);
+                words[word] &= !bit;
+            }
         }
         sites.dedup();
         state.detached += self.release(sites.iter().copied());
