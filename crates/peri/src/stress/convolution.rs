@@ -5,6 +5,7 @@ use super::Tensor;
 use crate::field::CHUNK;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Sites that are summed at a time, in registers.
 pub const BLOCK: usize = 16;
@@ -12,12 +13,52 @@ pub const BLOCK: usize = 16;
 /// is always aligned, wherever the bond begins; vectors of neighbouring sites cross cache lines at nearly every shift.
 const LANES: usize = 4;
 
+/// Most taps whose vectors are loaded once for all of them.
+const RUN: usize = 4;
+
 /// Where a bond must begin, relative to the point of interest, and the weight with which it counts there.
 pub struct Tap {
     /// In sites.
     pub shift: isize,
     /// Its share.
     pub weight: f64,
+}
+
+/// Taps of which each reads the vectors of the one before from the second on: what V + N − 1 vectors hold serves N taps.
+struct Run {
+    /// The first tap's.
+    shift: isize,
+    weights: [f64; RUN],
+}
+
+/// The taps of a bond in runs of one, two, … [`RUN`], where a vector holds `lanes` numbers.
+fn runs(taps: &[Tap], lanes: usize) -> [Vec<Run>; RUN] {
+    // vectors that hold less than a site do not overlap like this
+    let (ahead, most) = if lanes < LANES { (1, 1) } else { ((lanes / LANES) as isize, RUN) };
+    let mut left: BTreeMap<isize, f64> = taps.iter().map(|tap| (tap.shift, tap.weight)).collect();
+    let mut runs: [Vec<Run>; RUN] = Default::default();
+    while let Some((shift, first)) = left.pop_first() {
+        let (mut weights, mut count) = ([0.0; RUN], 1);
+        weights[0] = first;
+        while count < most
+            && let Some(weight) = left.remove(&(shift + count as isize * ahead))
+        {
+            weights[count] = weight;
+            count += 1;
+        }
+        runs[count - 1].push(Run { shift, weights });
+    }
+    runs
+}
+
+/// Numbers in a vector of this machine.
+struct Lanes;
+
+impl WithSimd for Lanes {
+    type Output = usize;
+    fn with_simd<S: Simd>(self, _simd: S) -> usize {
+        S::F64_LANES
+    }
 }
 
 /// Which blocks of sites hold any of those given.
@@ -92,11 +133,13 @@ impl Shared {
     /// sums += (Σ weight·force over the taps of a bond) ⊗ edge, site by site.
     pub fn add<const D: usize>(&self, taps: &[Tap], filled: &[bool], edge: [f64; D], sums: &mut [Tensor<D>]) {
         let arch = Arch::new();
+        let runs = runs(taps, arch.dispatch(Lanes));
+        let runs = &runs;
         sums.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, sums)| {
             for (block, sums) in sums.chunks_mut(BLOCK).enumerate() {
                 let start = chunk * CHUNK + block * BLOCK;
                 if filled[start / BLOCK] {
-                    arch.dispatch(Block { shared: self, taps, start, edge, sums });
+                    arch.dispatch(Block { shared: self, runs, start, edge, sums });
                 }
             }
         });
@@ -106,7 +149,7 @@ impl Shared {
 /// A block of [`Shared::add`].
 struct Block<'a, const D: usize> {
     shared: &'a Shared,
-    taps: &'a [Tap],
+    runs: &'a [Vec<Run>; RUN],
     start: usize,
     edge: [f64; D],
     sums: &'a mut [Tensor<D>],
@@ -138,24 +181,47 @@ impl<const D: usize> Block<'_, D> {
     /// Σ weight·number over the taps, V vectors at a time.
     #[inline(always)]
     fn average<S: Simd, const V: usize>(&self, simd: S, averages: &mut [f64; BLOCK * LANES]) {
-        let Shared { bonds, first, margin, .. } = self.shared;
         let width = V * S::F64_LANES;
         for (part, out) in averages.chunks_mut(width).enumerate() {
-            let here = first + (margin + self.start) * LANES + part * width;
+            let here = self.shared.first + (self.shared.margin + self.start) * LANES + part * width;
             let mut sums = [simd.splat_f64s(0.0); V];
-            for tap in self.taps {
-                let from = here.wrapping_add_signed(tap.shift * LANES as isize);
-                let values = &S::as_simd_f64s(&bonds[from..from + width]).0[..V];
-                let weight = simd.splat_f64s(tap.weight);
-                for v in 0..V {
-                    sums[v] = simd.mul_add_f64s(weight, values[v], sums[v]);
-                }
-            }
+            sums = self.sum::<S, V, 4>(simd, here, sums);
+            sums = self.sum::<S, V, 3>(simd, here, sums);
+            sums = self.sum::<S, V, 2>(simd, here, sums);
+            sums = self.sum::<S, V, 1>(simd, here, sums);
             let out = &mut S::as_mut_simd_f64s(out).0[..V];
             #[expect(clippy::manual_memcpy, reason = "a slice of the sums would keep them in memory")]
             for v in 0..V {
                 out[v] = sums[v];
             }
         }
+    }
+
+    /// Adds the runs of N taps to V vectors from the number `here` on.
+    #[inline(always)]
+    fn sum<S: Simd, const V: usize, const N: usize>(
+        &self,
+        simd: S,
+        here: usize,
+        mut sums: [S::f64s; V],
+    ) -> [S::f64s; V] {
+        for run in &self.runs[N - 1] {
+            let from = here.wrapping_add_signed(run.shift * LANES as isize);
+            let bonds = &self.shared.bonds[from..from + (V + N - 1) * S::F64_LANES];
+            let values = &S::as_simd_f64s(bonds).0[..V + N - 1];
+            let mut weights = [simd.splat_f64s(0.0); N];
+            for i in 0..N {
+                weights[i] = simd.splat_f64s(run.weights[i]);
+            }
+            for j in 0..V + N - 1 {
+                let value = values[j];
+                for i in 0..N {
+                    if i <= j && j - i < V {
+                        sums[j - i] = simd.mul_add_f64s(weights[i], value, sums[j - i]);
+                    }
+                }
+            }
+        }
+        sums
     }
 }
