@@ -203,7 +203,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
         unsafe { self.pass_on(simd, out, sum, true) };
     }
 
-    /// Bonds masked by their bits, weighted by their ends' factors; those that no particle of the block has are left out.
+    /// Bonds masked by their bits, where particles differ in them, and weighted by their ends' factors; those that no particle of the block has are left out.
     ///
     /// # Safety
     /// As [`Self::full`].
@@ -222,22 +222,64 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
         let displacement = self.tiles.displacement;
         // SAFETY: as above
         let own = unsafe { self.own::<S, V>(simd, base) };
-        let mut sum = [[T::splat(simd, T::of(0.0)); V]; D];
+        let zero = T::splat(simd, T::of(0.0));
+        let mut sum = [[zero; V]; D];
         for (word, rows) in self.rows.chunks(64).enumerate() {
             let words = &self.tiles.intact[word][base..base + V * lanes];
-            let mut present = 0;
-            for bits in words {
+            let (mut present, mut common) = (0, u64::MAX);
+            for &bits in words {
                 present |= bits;
+                common &= if bits == 0 { u64::MAX } else { bits };
+            }
+            // what all particles have that have any bond of this word needs no mask, bond by bond
+            common &= if self.tiles.factors.is_none() { present } else { 0 };
+            present &= !common;
+            let (one, mut left) = (common & common.wrapping_neg(), common);
+            while left != 0 {
+                let (mut part, mut run) = ([[zero; V]; D], T::RUN);
+                while left != 0 && run > 0 {
+                    run -= 1;
+                    let k = left.trailing_zeros() as usize;
+                    left &= left - 1;
+                    let row = &rows[k];
+                    let mut stretches = [zero; V];
+                    for v in 0..V {
+                        // SAFETY: as above
+                        let (zeta, e) = unsafe { row.stretch(simd, displacement, &own[v], base + v * lanes) };
+                        stretches[v] = e;
+                        let q = row.law(simd, e);
+                        for d in 0..D {
+                            part[d][v] = T::mul_add(simd, q, zeta[d], part[d][v]);
+                        }
+                    }
+                    if 64 * word + k < tracked {
+                        for v in 0..V {
+                            // SAFETY: as above
+                            let e =
+                                unsafe { row.relative(simd, stretches[v], words[v * lanes..].as_ptr(), one) };
+                            (low, high) = (T::min(simd, low, e), T::max(simd, high, e));
+                        }
+                    }
+                }
+                for v in 0..V {
+                    for d in 0..D {
+                        // SAFETY: as above
+                        let kept = unsafe { T::keep(simd, part[d][v], words[v * lanes..].as_ptr(), one) };
+                        sum[d][v] = T::add(simd, sum[d][v], kept);
+                    }
+                }
+                // SAFETY: as above
+                sum = unsafe { self.pass_on(simd, out, sum, false) };
             }
             while present != 0 {
-                let mut left = T::RUN;
-                while present != 0 && left > 0 {
-                    left -= 1;
+                let mut run = T::RUN;
+                while present != 0 && run > 0 {
+                    run -= 1;
                     let k = present.trailing_zeros() as usize;
                     present &= present - 1;
                     let row = &rows[k];
                     for v in 0..V {
-                        let here = base + v * lanes;
+                        let (here, words) = (base + v * lanes, words[v * lanes..].as_ptr());
                         // SAFETY: as above
                         let (zeta, e) = unsafe { row.stretch(simd, displacement, &own[v], here) };
                         let mut q = row.law(simd, e);
@@ -247,17 +289,14 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
                             q = T::mul(simd, q, unsafe { row.weight(simd, factors, here, there) });
                         }
                         // SAFETY: as above
-                        q = unsafe { T::keep(simd, q, words.as_ptr().add(v * lanes), 1 << k) };
+                        q = unsafe { T::keep(simd, q, words, 1 << k) };
                         for d in 0..D {
                             sum[d][v] = T::mul_add(simd, q, zeta[d], sum[d][v]);
                         }
                         if 64 * word + k < tracked {
-                            let relative = T::mul(simd, e, T::splat(simd, row.inverse_square));
                             // SAFETY: as above
-                            let relative =
-                                unsafe { T::keep(simd, relative, words.as_ptr().add(v * lanes), 1 << k) };
-                            low = T::min(simd, low, relative);
-                            high = T::max(simd, high, relative);
+                            let e = unsafe { row.relative(simd, e, words, 1 << k) };
+                            (low, high) = (T::min(simd, low, e), T::max(simd, high, e));
                         }
                     }
                 }
@@ -340,6 +379,23 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
             e = if d == 0 { T::mul(simd, eta, twice) } else { T::mul_add(simd, eta, twice, e) };
         }
         (zeta, e)
+    }
+
+    /// λ² − 1 = E/|ξ|² of the particles that have all bits of `bit` in their words; 0 of others.
+    ///
+    /// # Safety
+    /// `words` are as many as a vector has lanes.
+    #[inline(always)]
+    unsafe fn relative<S: Simd>(
+        &self,
+        simd: S,
+        e: T::Vector<S>,
+        words: *const u64,
+        bit: u64,
+    ) -> T::Vector<S> {
+        let relative = T::mul(simd, e, T::splat(simd, self.inverse_square));
+        // SAFETY: as above
+        unsafe { T::keep(simd, relative, words, bit) }
     }
 
     /// q·c.
