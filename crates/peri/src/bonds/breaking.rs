@@ -65,15 +65,7 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
     let sites = bonds.sites();
     // vectorised loops find the bonds to look at; their last bits may differ from those below
     let least = (critical.least() * critical.least() - 1.0) * (1.0 - 1e-9) - 1e-12;
-    let near = |chunk: usize| {
-        let parts = seen.beyond(chunk_range(chunk, sites), least).into_iter();
-        parts.flat_map(|sites| bonds.suspects(displacement, sites, least)).collect::<Vec<[u32; 2]>>()
-    };
-    let near: Vec<Vec<[u32; 2]>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(near).collect();
-    let mut near = near.concat();
-    near.sort_unstable();
-    near.dedup();
-    let beyond = |&[site, index]: &[u32; 2]| {
+    let beyond = |[site, index]: [u32; 2]| {
         let bond = bonds.bond(site as usize, index);
         let (own, other) = (displacement.get(site as usize), displacement.get(bond.site));
         let mut e = 0.0;
@@ -92,7 +84,15 @@ pub fn overstretched<const D: usize, B: Bonds<D> + ?Sized>(
             weight,
         })
     };
-    near.par_iter().with_min_len(1024).filter_map(beyond).collect()
+    let of = |chunk: usize| {
+        let parts = seen.beyond(chunk_range(chunk, sites), least).into_iter();
+        let suspects = parts.flat_map(|sites| bonds.suspects(displacement, sites, least));
+        suspects.filter_map(beyond).collect::<Vec<Overstretched>>()
+    };
+    let found: Vec<Vec<Overstretched>> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).collect();
+    let mut found = found.concat();
+    found.par_sort_unstable_by_key(|bond| (bond.site, bond.index));
+    found
 }
 
 /// One number for a set of bonds: FNV-1a over their ends, in the order of [`overstretched`].

@@ -396,7 +396,8 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
         let mut found = Vec::new();
         for site in sites {
             for (k, e) in self.excesses(displacement, site).enumerate() {
-                if e > least {
+                // below no stretch, broken bonds have 0
+                if e > least && self.inverse_length[self.starts[site] + k] > 0.0 {
                     found.push([site as u32, k as u32]);
                 }
             }

@@ -26,8 +26,9 @@ pub struct LatticeBonds<const D: usize> {
     spans: Vec<Span<D>>,
     ratio: f64,
     volume_correction: VolumeCorrection,
-    /// Axes, from that on which neighbours are neighbours in storage; steps in sites along each.
+    /// Axes, from that on which neighbours are neighbours in storage.
     order: [usize; D],
+    /// Steps in sites along each axis.
     strides: [usize; D],
     guard: usize,
     sites: usize,
@@ -74,6 +75,7 @@ impl<const D: usize> LatticeBonds<D> {
         }
         let order = fullest(lattice.cells, &lattice.occupied, ratio);
         let (strides, guard, sites) = layout(lattice.cells, ratio, order);
+        // bond k and bond (n − 1 − k) stay opposite, and a bond is found by its distance in sites
         stencil.offsets.sort_by_key(|&offset| shift(strides, offset));
         let mut bonds = Self {
             stencil,

@@ -234,6 +234,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> LatticePass<'_, T,
             // what all particles have that have any bond of this word needs no mask, bond by bond
             common &= if self.tiles.factors.is_none() { present } else { 0 };
             present &= !common;
+            // a particle has all common bonds, or none of this word: one bit tells
             let (one, mut left) = (common & common.wrapping_neg(), common);
             while left != 0 {
                 let (mut part, mut run) = ([[zero; V]; D], T::RUN);

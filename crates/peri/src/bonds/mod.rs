@@ -134,14 +134,15 @@ pub trait Bonds<const D: usize>: Send + Sync {
         force: &mut [&mut [f64]; D],
         track: Option<&mut StretchRange>,
     );
-    /// Sites that [`Bonds::force`] may begin with: multiples of this, of which a work item is one.
+    /// Sites that [`Bonds::force`] may begin with: multiples of this, of which a work item is one. The bits of a force may depend on which
+    /// bonds the other sites of its piece have, and on no others.
     fn piece(&self) -> usize {
         CHUNK
     }
     /// Extremes of e = λ² − 1 over bonds with an end in work item `chunk`; those of all items together are those of the body.
     fn stretches(&self, displacement: &Field<D>, chunk: usize) -> StretchRange;
-    /// Intact bonds, by site and [`Neighbour::index`], which for all sites together contain every bond with e > `least` from both of
-    /// its ends, up to rounding: what some sites add, whole pieces of one work item.
+    /// The intact bonds with e > `least`, up to rounding, by site and [`Neighbour::index`]; for all sites together each once from both
+    /// of its ends: what some sites add, whole pieces of one work item.
     fn suspects(&self, displacement: &Field<D>, sites: Range<usize>, least: f64) -> Vec<[u32; 2]>;
     /// Severs bonds, each named from both of its ends.
     fn sever(&mut self, bonds: &[Overstretched]);

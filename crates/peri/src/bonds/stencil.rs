@@ -16,7 +16,7 @@ impl<const D: usize> Stencil<D> {
         let side = (2 * reach + 1) as usize;
         let offsets = (0..side.pow(D as u32))
             .map(|index| {
-                // last axis slowest, so that consecutive offsets read consecutive sites
+                // last axis slowest
                 std::array::from_fn(|d| (index / side.pow(d as u32) % side) as i32 - reach)
             })
             .filter(|o: &[i32; D]| {

@@ -140,15 +140,19 @@ impl<const D: usize> List<D> {
         loop {
             let next = [listed.get(at).map(|own| own.site), found.first().map(|new| new.0)];
             let Some(site) = next.into_iter().flatten().min() else { break };
-            let from = self.candidates.len();
+            let (from, mut known) = (self.candidates.len(), &[][..]);
             if let Some(own) = listed.get(at).filter(|own| own.site == site) {
-                self.candidates.extend_from_slice(&candidates[start..own.end]);
+                known = &candidates[start..own.end];
+                self.candidates.extend_from_slice(known);
                 (at, start) = (at + 1, own.end);
             }
             let (new, others) = found.split_at(found.partition_point(|new| new.0 == site));
             found = others;
             if !new.is_empty() {
-                self.candidates.extend(new.iter().map(|new| new.1));
+                // a list made since the bonds broke has them
+                let lacks =
+                    |new: &&(u32, Candidate<D>)| known.binary_search_by_key(&new.1.site, |c| c.site).is_err();
+                self.candidates.extend(new.iter().filter(lacks).map(|new| new.1));
                 self.candidates[from..].sort_unstable_by_key(|candidate| candidate.site);
             }
             self.listed.push(Listed {
@@ -165,6 +169,8 @@ impl<const D: usize> List<D> {
 
     /// Makes the list for a displacement.
     pub fn rebuild(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
+        // frees its memory first
+        self.vicinity = None;
         let particles = bonds.particles();
         let reach = self.gap + self.skin;
         let edge = 2.0 * OF_RADII * self.largest + reach;

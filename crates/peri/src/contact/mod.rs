@@ -9,9 +9,9 @@
 //! Other than there, intact bonds never repel: their own law resists compression. Particles have their whole volume,
 //! whatever the corrections of bonds.
 //!
-//! The pairs come from a list of all that are within d, what is about to touch, and a skin, rebuilt where particles
-//! near each other have moved against each other by the skin; where a bond breaks its pair is added. Pairs beyond d add nothing, not even a rounding:
-//! the list is no part of the state, and how often it is made makes no difference to any bit.
+//! The pairs come from a list of all that are within d, what is about to touch, and a skin, rebuilt where particles near
+//! each other have moved against each other by the skin; where a bond breaks its pair is added. Pairs beyond d add
+//! nothing, not even a rounding: the list is no part of the state, and how often it is made makes no difference to any bit.
 //!
 //! Limits. Contact knows distances only: a particle that leaps past another in one step stays there. Force and energy
 //! are finite in full overlap (r = 0: κcd/δ along the reference ξ, the direction it came from; energy ½κcd²/δ V_I V_J),
@@ -260,7 +260,7 @@ impl<const D: usize> Contact<D> {
         self.list.rebuilds
     }
 
-    /// Rebuilds the list where a particle has moved by half of the skin since it was made.
+    /// Rebuilds the list where particles near each other may have moved against each other by the skin since it was made.
     pub fn update(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
         if self.has_pairs() {
             self.list.update(bonds, displacement);

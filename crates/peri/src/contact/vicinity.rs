@@ -34,7 +34,7 @@ impl<const D: usize> Vicinity<D> {
     /// Whether the list holds for a displacement.
     pub fn holds(&mut self, displacement: &Field<D>) -> bool {
         let sites = self.compared_at.sites();
-        // half of what is left; a little less, for rounding
+        // half of what is left; a little less, for the rounding of places far from the origin
         let limit = (0.49 * self.left).powi(2);
         let (now, then) = (displacement.components(), self.compared_at.components());
         let moved = |chunk: usize| {
@@ -84,7 +84,8 @@ impl<const D: usize> Vicinity<D> {
             let along = |d: usize| (a[1][d] - b[0][d]).max(b[1][d] - a[0][d]);
             (0..D).map(|d| along(d) * along(d)).sum::<f64>().sqrt()
         };
-        // pairs `rings` cells apart were (rings − 1) edges apart, of which the last is used up where they touch
+        // pairs k ≥ 2 cells apart were at least (k − 1) edges apart, and an edge is no less than a contact distance, the gap of the list
+        // and the skin: they may move by (k − 2) edges and a skin against each other
         let allowed = |rings: i64| (rings - 2).max(0) as f64 * self.edge + self.skin;
         let left = |number: usize| {
             let mut left = f64::INFINITY;

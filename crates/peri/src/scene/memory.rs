@@ -22,7 +22,7 @@ const PAST: f64 = 6.0;
 const FIELDS_OF_LBFGS: f64 = 8.0;
 const COARSE: f64 = 150.0;
 /// Sites and particles of contact: cells, their order, the list of near pairs.
-const CONTACT: f64 = 160.0;
+const CONTACT: f64 = 190.0;
 /// Damage: bonds at the start, what breaks.
 const BREAKING: f64 = 24.0;
 /// A particle in a field file: place, displacement, damage, line; two tensors of nine for each measure; what is packed.

@@ -35,7 +35,8 @@ struct Run {
 fn runs(taps: &[Tap], lanes: usize) -> [Vec<Run>; RUN] {
     // vectors that hold less than a site do not overlap like this
     let (ahead, most) = if lanes < LANES { (1, 1) } else { ((lanes / LANES) as isize, RUN) };
-    let mut left: BTreeMap<isize, f64> = taps.iter().map(|tap| (tap.shift, tap.weight)).collect();
+    let mut left = BTreeMap::new();
+    taps.iter().for_each(|tap| *left.entry(tap.shift).or_insert(0.0) += tap.weight);
     let mut runs: [Vec<Run>; RUN] = Default::default();
     while let Some((shift, first)) = left.pop_first() {
         let (mut weights, mut count) = ([0.0; RUN], 1);
