@@ -270,6 +270,12 @@ impl<const D: usize> CloudBonds<D> {
     }
 }
 
+/// A whole bond, as it is among the softened ones of its site.
+fn weakened<const D: usize>(bond: Neighbour<D>, soft: &[Softened]) -> Neighbour<D> {
+    let part = integrity(soft, bond.index);
+    Neighbour { volume: part * bond.volume, weight: part * bond.weight, ..bond }
+}
+
 impl<const D: usize> Bonds<D> for CloudBonds<D> {
     fn sites(&self) -> usize {
         self.volumes.len()
@@ -296,18 +302,16 @@ impl<const D: usize> Bonds<D> for CloudBonds<D> {
     }
 
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
-        let row = self.row(site);
-        for (index, &other) in self.neighbours[row].iter().enumerate() {
-            if other as usize != site {
-                visit(self.bond(site, index as u32));
+        let soft = self.softening.among(site..site + 1);
+        for k in self.row(site) {
+            if self.neighbours[k] as usize != site {
+                visit(weakened(self.whole(site, k), soft));
             }
         }
     }
 
     fn bond(&self, site: usize, index: u32) -> Neighbour<D> {
-        let bond = self.whole(site, self.starts[site] + index as usize);
-        let part = integrity(self.softening.among(site..site + 1), index);
-        Neighbour { volume: part * bond.volume, weight: part * bond.weight, ..bond }
+        weakened(self.whole_bond(site, index), self.softening.among(site..site + 1))
     }
 
     fn bonded(&self, site: usize) -> u32 {

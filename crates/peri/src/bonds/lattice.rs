@@ -147,6 +147,21 @@ impl<const D: usize> LatticeBonds<D> {
         share * self.interior_factor * surface_weight(bond, length, factors.get(site), factors.get(other))
     }
 
+    /// A bond of a site with the softened ones `soft`.
+    fn bond_among(&self, soft: &[Softened], site: usize, index: u32) -> Neighbour<D> {
+        let Span { shift, bond, length, share, .. } = self.spans[index as usize];
+        let whole = integrity(soft, index) * self.lattice.volume;
+        Neighbour {
+            index,
+            site: site.wrapping_add_signed(shift),
+            bond,
+            length,
+            volume: whole * share,
+            weight: whole * self.weight(site, index as usize),
+            relief: [0.0; D],
+        }
+    }
+
     /// The bonds of the stencil, measured once.
     fn measure(&self) -> Vec<Span<D>> {
         let spacing = self.lattice.spacing;
@@ -318,27 +333,18 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
     }
 
     fn neighbours(&self, site: usize, visit: &mut dyn FnMut(Neighbour<D>)) {
+        let soft = self.softening.among(site..site + 1);
         for (word, words) in self.intact.iter().enumerate() {
             let mut present = words[site];
             while present != 0 {
-                visit(self.bond(site, 64 * word as u32 + present.trailing_zeros()));
+                visit(self.bond_among(soft, site, 64 * word as u32 + present.trailing_zeros()));
                 present &= present - 1;
             }
         }
     }
 
     fn bond(&self, site: usize, index: u32) -> Neighbour<D> {
-        let Span { shift, bond, length, share, .. } = self.spans[index as usize];
-        let whole = integrity(self.softening.among(site..site + 1), index) * self.lattice.volume;
-        Neighbour {
-            index,
-            site: site.wrapping_add_signed(shift),
-            bond,
-            length,
-            volume: whole * share,
-            weight: whole * self.weight(site, index as usize),
-            relief: [0.0; D],
-        }
+        self.bond_among(self.softening.among(site..site + 1), site, index)
     }
 
     fn is_bonded(&self, site: usize, other: usize) -> bool {

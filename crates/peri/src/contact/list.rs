@@ -116,7 +116,7 @@ impl<const D: usize> List<D> {
 
     /// Rebuilds the list where pairs that it lacks may have come near since it was made.
     pub fn update(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
-        if !self.vicinity.as_mut().is_some_and(|vicinity| vicinity.holds(displacement)) {
+        if !self.vicinity.as_mut().is_some_and(|vicinity| vicinity.holds(bonds.particles(), displacement)) {
             self.rebuild(bonds, displacement);
         }
     }
@@ -228,7 +228,7 @@ impl<const D: usize> List<D> {
             self.candidates.extend(candidates);
         }
         self.alone = particles.iter().copied().filter(|&site| bonds.is_alone(site as usize)).collect();
-        self.vicinity = Some(Vicinity::new(grid, particles, displacement, edge, self.skin));
+        self.vicinity = Some(Vicinity::new(grid, displacement, edge, self.skin));
         self.rebuilds += 1;
     }
 

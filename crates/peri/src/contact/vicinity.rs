@@ -14,8 +14,6 @@ pub struct Vicinity<const D: usize> {
     grid: CellGrid<D>,
     edge: f64,
     skin: f64,
-    /// Sites of the particles.
-    sites: Vec<u32>,
     /// Displacement at which the list was made.
     pub listed_at: Field<D>,
     /// The last displacement at which cells were compared, and what any two particles may move against each other from there on, m.
@@ -26,13 +24,16 @@ pub struct Vicinity<const D: usize> {
 impl<const D: usize> Vicinity<D> {
     /// Of a list that holds all pairs which may touch until two particles have moved by `skin` against each other; pairs that do not share
     /// a cell of the grid or neighbouring ones are `edge` or more apart.
-    pub fn new(grid: CellGrid<D>, sites: &[u32], displacement: &Field<D>, edge: f64, skin: f64) -> Self {
+    pub fn new(grid: CellGrid<D>, displacement: &Field<D>, edge: f64, skin: f64) -> Self {
         let (listed_at, compared_at) = (displacement.clone(), displacement.clone());
-        Self { grid, edge, skin, sites: sites.to_vec(), listed_at, compared_at, left: skin }
+        Self { grid, edge, skin, listed_at, compared_at, left: skin }
     }
 
-    /// Whether the list holds for a displacement.
-    pub fn holds(&mut self, displacement: &Field<D>) -> bool {
+    /// Whether the list holds for a displacement; `particles` are the sites that the grid was made of.
+    pub fn holds(&mut self, particles: &[u32], displacement: &Field<D>) -> bool {
+        if self.skin == 0.0 {
+            return false;
+        }
         let sites = self.compared_at.sites();
         // half of what is left; a little less, for the rounding of places far from the origin
         let limit = (0.49 * self.left).powi(2);
@@ -47,27 +48,21 @@ impl<const D: usize> Vicinity<D> {
             // NaN has moved, too
             !square[..range.len()].iter().all(|&s| s <= limit)
         };
-        if self.left > 0.0
-            && displacement.sites() == sites
-            && !(0..sites.div_ceil(CHUNK)).into_par_iter().any(moved)
-        {
+        if !(0..sites.div_ceil(CHUNK)).into_par_iter().any(moved) {
             return true;
         }
-        if self.skin == 0.0 || displacement.sites() != sites {
-            return false;
-        }
-        self.left = self.compare(displacement);
+        self.left = self.compare(particles, displacement);
         self.compared_at.clone_from(displacement);
         self.left > LEAST * self.skin
     }
 
     /// What any two particles that the list lacks may still move against each other, m; below 0 where that was too much, or is not known.
-    fn compare(&self, displacement: &Field<D>) -> f64 {
+    fn compare(&self, particles: &[u32], displacement: &Field<D>) -> f64 {
         // least and greatest components of the moves in every cell
         let of = |members: &[u32]| {
             let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
             for &member in members {
-                let site = self.sites[member as usize] as usize;
+                let site = particles[member as usize] as usize;
                 let (now, then) = (displacement.get(site), self.listed_at.get(site));
                 for d in 0..D {
                     let moved = now[d] - then[d];

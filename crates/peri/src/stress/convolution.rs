@@ -134,8 +134,7 @@ impl Shared {
     /// sums += (Σ weight·force over the taps of a bond) ⊗ edge, site by site.
     pub fn add<const D: usize>(&self, taps: &[Tap], filled: &[bool], edge: [f64; D], sums: &mut [Tensor<D>]) {
         let arch = Arch::new();
-        let runs = runs(taps, arch.dispatch(Lanes));
-        let runs = &runs;
+        let runs = &runs(taps, arch.dispatch(Lanes));
         sums.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, sums)| {
             for (block, sums) in sums.chunks_mut(BLOCK).enumerate() {
                 let start = chunk * CHUNK + block * BLOCK;
