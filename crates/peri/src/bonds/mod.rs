@@ -177,6 +177,14 @@ pub trait Bonds<const D: usize>: Send + Sync {
     }
 }
 
+/// How many bonds a particle has whose family is whole, where all such families are alike: in a lattice without weights of single bonds.
+pub(crate) fn whole_family<const D: usize>(bonds: &dyn Bonds<D>) -> Option<u32> {
+    bonds
+        .as_lattice()
+        .filter(|lattice| lattice.is_uniform())
+        .map(|lattice| lattice.stencil().offsets.len() as u32)
+}
+
 /// Refuses a body in which a bond pulls at one of its ends only: its forces would not sum to zero.
 fn refuse_one_sided<const D: usize>(bonds: &dyn Bonds<D>) -> Result<(), Error> {
     let Some(pair) = bonds.one_sided() else { return Ok(()) };

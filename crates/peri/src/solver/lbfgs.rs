@@ -329,8 +329,8 @@ impl<const D: usize> LbfgsSolver<D> {
                 );
                 self.memory.add(
                     step,
-                    &mut self.direction,
-                    (&self.trial, &mut self.image),
+                    &self.direction,
+                    (&self.trial, &self.image),
                     (&self.gradient, &self.trial_image),
                     CURVATURE * step * slope.abs(),
                 );

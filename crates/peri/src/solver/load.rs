@@ -1,6 +1,6 @@
 //! Loads and supports: body forces and prescribed displacement components, proportional to one load factor.
 
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, whole_family};
 use crate::field::{CHUNK, Field};
 use rayon::prelude::*;
 
@@ -241,29 +241,46 @@ impl<const D: usize> Loads<D> {
         // components (a, b) of H, a ≤ b; off the diagonal each stands for two
         let pairs: Vec<(usize, usize)> = (0..D).flat_map(|a| (a..D).map(move |b| (a, b))).collect();
         let twice = |(a, b): (usize, usize)| if a == b { 1.0 } else { 2.0 };
+        let of_site = |site: usize, matrix: &mut [[f64; 6]; 6]| {
+            let volume = bonds.volume(site);
+            bonds.neighbours(site, &mut |bond| {
+                let mut dyad = [0.0; 6];
+                for (value, &(a, b)) in dyad.iter_mut().zip(&pairs) {
+                    *value = twice((a, b)) * bond.bond[a] * bond.bond[b] / (bond.length * bond.length);
+                }
+                let factor = stiffness * volume * bond.weight * bond.length;
+                for row in 0..pairs.len() {
+                    for column in 0..pairs.len() {
+                        matrix[row][column] += factor * dyad[row] * dyad[column];
+                    }
+                }
+            });
+        };
+        let whole = whole_family(bonds);
+        let is_whole = |site: usize| whole.is_some_and(|whole| bonds.bonded(site) == whole);
+        let mut of_whole = [[0.0; 6]; 6];
+        let some = bonds.particles().iter().find(|&&site| is_whole(site as usize));
+        some.iter().for_each(|&&site| of_site(site as usize, &mut of_whole));
         let part = |sites: &[u32]| {
             let mut matrix = [[0.0; 6]; 6];
             let mut right = [0.0; 6];
+            let mut alike = 0.0;
             for &site in sites {
                 let site = site as usize;
-                let volume = bonds.volume(site);
-                bonds.neighbours(site, &mut |bond| {
-                    let mut dyad = [0.0; 6];
-                    for (value, &(a, b)) in dyad.iter_mut().zip(&pairs) {
-                        *value = twice((a, b)) * bond.bond[a] * bond.bond[b] / (bond.length * bond.length);
-                    }
-                    let factor = stiffness * volume * bond.weight * bond.length;
-                    for row in 0..pairs.len() {
-                        for column in 0..pairs.len() {
-                            matrix[row][column] += factor * dyad[row] * dyad[column];
-                        }
-                    }
-                });
+                if is_whole(site) {
+                    alike += 1.0;
+                } else {
+                    of_site(site, &mut matrix);
+                }
                 let (force, position) = (body_force.get(site), bonds.position(site));
+                let volume = bonds.volume(site);
                 for (value, &(a, b)) in right.iter_mut().zip(&pairs) {
                     *value +=
                         0.5 * twice((a, b)) * volume * (force[a] * position[b] + force[b] * position[a]);
                 }
+            }
+            for (row, own) in matrix.iter_mut().zip(&of_whole) {
+                row.iter_mut().zip(own).for_each(|(sum, own)| *sum += alike * own);
             }
             (matrix, right)
         };

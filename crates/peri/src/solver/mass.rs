@@ -2,7 +2,7 @@
 
 use super::state::State;
 use super::system::System;
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, whole_family};
 use rayon::prelude::*;
 
 /// Whether bonds differ so much in their tangent that every particle has the mass of its own.
@@ -13,19 +13,21 @@ pub fn has_own_mass<const D: usize>(system: &System<D>, state: &State<D>) -> boo
 /// Σ_J (2 w V_J/|ξ|)(1 + max_{d≠e} |n_d n_e|): the Gershgorin sum of a particle for a unit bond tangent.
 /// 1 where there is no bond, so that empty sites and detached particles stay at rest.
 pub fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, sites: &[u32], mass: &mut [f64]) {
-    let sums: Vec<f64> = sites
-        .par_iter()
-        .map(|&site| {
-            let mut sum = 0.0;
-            bonds.neighbours(site as usize, &mut |bond| {
-                let cosine: [f64; D] = bond.bond.map(|x| (x / bond.length).abs());
-                let mixed = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
-                let mixed = mixed.map(|(d, e)| cosine[d] * cosine[e]).fold(0.0, f64::max);
-                sum += 2.0 * bond.weight / bond.length * (1.0 + mixed);
-            });
-            if sum > 0.0 { sum } else { 1.0 }
-        })
-        .collect();
+    let sum = |site: u32| {
+        let mut sum = 0.0;
+        bonds.neighbours(site as usize, &mut |bond| {
+            let cosine: [f64; D] = bond.bond.map(|x| (x / bond.length).abs());
+            let mixed = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
+            let mixed = mixed.map(|(d, e)| cosine[d] * cosine[e]).fold(0.0, f64::max);
+            sum += 2.0 * bond.weight / bond.length * (1.0 + mixed);
+        });
+        if sum > 0.0 { sum } else { 1.0 }
+    };
+    let whole = whole_family(bonds);
+    let is_whole = |site: u32| whole.is_some_and(|whole| bonds.bonded(site as usize) == whole);
+    let alike = sites.iter().find(|&&site| is_whole(site)).map(|&site| sum(site));
+    let of = |&site: &u32| alike.filter(|_| is_whole(site)).unwrap_or_else(|| sum(site));
+    let sums: Vec<f64> = sites.par_iter().map(of).collect();
     for (&site, sum) in sites.iter().zip(sums) {
         mass[site as usize] = sum;
     }

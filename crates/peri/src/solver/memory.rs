@@ -2,23 +2,27 @@
 //! doi:10.1090/S0025-5718-1980-0572855-7, with the recursion carried out on inner products (Chen, Wang & Zhou 2014, NIPS 27),
 //! so that stored fields are read twice an iteration.
 //!
-//! With an initial inverse γB, B the preconditioner, only s and w = B y are stored.
+//! With an initial inverse γB, B the preconditioner, only s and w = B y are stored, in single precision: the pairs make up most of what an
+//! iteration reads, and a direction needs no more. All sums are in double precision.
 
 use super::passes::{LANES, sum};
 use super::places::in_order;
-use crate::field::{Field, chunk_range};
-use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
+use crate::field::{CHUNK, Field, chunk_range};
+use pulp::{Arch, NullaryFnOnce};
 use std::collections::VecDeque;
 
 /// Entries that are worked on at a time, so that what several pairs need of them stays in the cache.
 const BLOCK: usize = 512;
 
+/// A vector field in single precision.
+type Single<const D: usize> = [Vec<f32>; D];
+
 /// A step, and what it did to the gradient.
 struct Pair<const D: usize> {
     /// s.
-    step: Field<D>,
+    step: Single<D>,
     /// w = B y.
-    image: Field<D>,
+    image: Single<D>,
     /// s·y and y·w of this pair.
     curvature: f64,
     size: f64,
@@ -33,7 +37,7 @@ pub struct Memory<const D: usize> {
     most: usize,
     pairs: VecDeque<Pair<D>>,
     /// Fields to use again.
-    spare: Vec<Field<D>>,
+    spare: Vec<Single<D>>,
     /// Scale of the initial inverse; 1 until a pair is known.
     scale: f64,
 }
@@ -102,8 +106,7 @@ impl<const D: usize> Memory<D> {
                         out[k] = -scale * z[k];
                     }
                     for (pair, (a, weight)) in self.pairs.iter().zip(back.iter().zip(&weights)) {
-                        let (s, w) = (pair.step.components()[c], pair.image.components()[c]);
-                        let (s, w) = (&s[place.clone()], &w[place.clone()]);
+                        let (s, w) = (&pair.step[c][place.clone()], &pair.image[c][place.clone()]);
                         arch.dispatch(Combine { out: &mut *out, scaled: scale * a, w, weight: *weight, s });
                     }
                     sum += arch.dispatch(Product { a: out, b: g });
@@ -114,23 +117,25 @@ impl<const D: usize> Memory<D> {
         parts.iter().sum()
     }
 
-    /// Takes note of an accepted step: `direction` and `old_image` become s = α d and w = z − z_old, y = g − g_old.
-    /// Both fields come back with other content. Pairs without curvature are not kept.
+    /// Takes note of an accepted step α: s = α d, w = z − z_old, y = g − g_old. Pairs without curvature are not kept.
     pub fn add(
         &mut self,
         step: f64,
-        direction: &mut Field<D>,
-        (old_gradient, old_image): (&Field<D>, &mut Field<D>),
+        direction: &Field<D>,
+        (old_gradient, old_image): (&Field<D>, &Field<D>),
         (gradient, image): (&Field<D>, &Field<D>),
         least: f64,
     ) {
         let sites = gradient.sites();
-        let (g0, g1, z1) = (old_gradient.components(), gradient.components(), image.components());
+        let (g0, g1) = (old_gradient.components(), gradient.components());
+        let (d, z0, z1) = (direction.components(), old_image.components(), image.components());
+        let mut fresh = || self.spare.pop().unwrap_or_else(|| std::array::from_fn(|_| vec![0.0; sites]));
+        let (mut new_step, mut new_image) = (fresh(), fresh());
         let pairs = &self.pairs;
         // s·y, w·y, s·g, w·g of the new pair, then of each other with the new y and g
-        let items = direction.chunks_mut().into_iter().zip(old_image.chunks_mut()).collect();
+        let items = chunks(&mut new_step).into_iter().zip(chunks(&mut new_image)).collect();
         let arch = Arch::new();
-        let parts = in_order(items, |chunk, (s, w)| {
+        let parts = in_order(items, |chunk, (s, w): ([&mut [f32]; D], [&mut [f32]; D])| {
             let range = chunk_range(chunk, sites);
             let mut sums = vec![0.0; 4 * (pairs.len() + 1)];
             let mut change = [0.0; BLOCK];
@@ -140,14 +145,15 @@ impl<const D: usize> Memory<D> {
                     let start = range.start + block * BLOCK;
                     let place = start..start + s.len();
                     let change = &mut change[..s.len()];
-                    let (g, old, z) = (&g1[c][place.clone()], &g0[c][place.clone()], &z1[c][place.clone()]);
+                    let (g, old) = (&g1[c][place.clone()], &g0[c][place.clone()]);
+                    let (d, z, z_old) = (&d[c][place.clone()], &z1[c][place.clone()], &z0[c][place.clone()]);
                     for k in 0..s.len() {
                         change[k] = g[k] - old[k];
-                        s[k] *= step;
-                        w[k] = z[k] - w[k];
+                        s[k] = (step * d[k]) as f32;
+                        w[k] = (z[k] - z_old[k]) as f32;
                     }
                     let y = &*change;
-                    let add = |s: &[f64], w: &[f64], sums: &mut [f64]| {
+                    let add = |s: &[f32], w: &[f32], sums: &mut [f64]| {
                         let products = arch.dispatch(Products { s, w, y, g });
                         for k in 0..4 {
                             sums[k] += products[k];
@@ -155,8 +161,7 @@ impl<const D: usize> Memory<D> {
                     };
                     add(s, w, &mut sums[..4]);
                     for (pair, sums) in pairs.iter().zip(sums[4..].chunks_mut(4)) {
-                        let (s, w) = (pair.step.components()[c], pair.image.components()[c]);
-                        add(&s[place.clone()], &w[place.clone()], sums);
+                        add(&pair.step[c][place.clone()], &pair.image[c][place.clone()], sums);
                     }
                 }
             }
@@ -175,6 +180,7 @@ impl<const D: usize> Memory<D> {
             }
         }
         if !keep || self.most == 0 {
+            self.spare.extend([new_step, new_image]);
             return;
         }
         self.scale = curvature / size;
@@ -183,49 +189,51 @@ impl<const D: usize> Memory<D> {
         {
             self.spare.extend([oldest.step, oldest.image]);
         }
-        let mut fresh = || self.spare.pop().unwrap_or_else(|| Field::zeros(sites));
-        let (step, image) = (std::mem::replace(direction, fresh()), std::mem::replace(old_image, fresh()));
         let (later, gradient) = (VecDeque::new(), [sums[2], sums[3]]);
-        self.pairs.push_back(Pair { step, image, curvature, size, later, gradient });
+        self.pairs.push_back(Pair { step: new_step, image: new_image, curvature, size, later, gradient });
     }
+}
+
+/// A field cut into its work items, in order.
+fn chunks<const D: usize>(field: &mut Single<D>) -> Vec<[&mut [f32]; D]> {
+    let mut iterators = field.each_mut().map(|component| component.chunks_mut(CHUNK));
+    let count = iterators[0].len();
+    (0..count).map(|_| iterators.each_mut().map(|i| i.next().unwrap_or_default())).collect()
 }
 
 /// s·y, w·y, s·g, w·g.
 struct Products<'a> {
-    s: &'a [f64],
-    w: &'a [f64],
+    s: &'a [f32],
+    w: &'a [f32],
     y: &'a [f64],
     g: &'a [f64],
 }
 
-impl WithSimd for Products<'_> {
+impl NullaryFnOnce for Products<'_> {
     type Output = [f64; 4];
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> [f64; 4] {
-        let ((s, s_last), (w, w_last)) = (S::as_simd_f64s(self.s), S::as_simd_f64s(self.w));
-        let ((y, y_last), (g, g_last)) = (S::as_simd_f64s(self.y), S::as_simd_f64s(self.g));
+    fn call(self) -> [f64; 4] {
+        let ((s, s_last), (w, w_last)) = (self.s.as_chunks::<LANES>(), self.w.as_chunks::<LANES>());
+        let ((y, y_last), (g, g_last)) = (self.y.as_chunks::<LANES>(), self.g.as_chunks::<LANES>());
         let (w, y, g) = (&w[..s.len()], &y[..s.len()], &g[..s.len()]);
-        let zero = simd.splat_f64s(0.0);
-        let (mut sy, mut wy, mut sg, mut wg) = (zero, zero, zero, zero);
+        let mut lanes = [[0.0; LANES]; 4];
         for k in 0..s.len() {
-            sy = simd.mul_add_f64s(s[k], y[k], sy);
-            wy = simd.mul_add_f64s(w[k], y[k], wy);
-            sg = simd.mul_add_f64s(s[k], g[k], sg);
-            wg = simd.mul_add_f64s(w[k], g[k], wg);
+            for lane in 0..LANES {
+                let (s, w) = (f64::from(s[k][lane]), f64::from(w[k][lane]));
+                lanes[0][lane] += s * y[k][lane];
+                lanes[1][lane] += w * y[k][lane];
+                lanes[2][lane] += s * g[k][lane];
+                lanes[3][lane] += w * g[k][lane];
+            }
         }
-        let mut sums = [
-            simd.reduce_sum_f64s(sy),
-            simd.reduce_sum_f64s(wy),
-            simd.reduce_sum_f64s(sg),
-            simd.reduce_sum_f64s(wg),
-        ];
-        for k in 0..s_last.len() {
-            sums[0] += s_last[k] * y_last[k];
-            sums[1] += w_last[k] * y_last[k];
-            sums[2] += s_last[k] * g_last[k];
-            sums[3] += w_last[k] * g_last[k];
+        for lane in 0..s_last.len() {
+            let (s, w) = (f64::from(s_last[lane]), f64::from(w_last[lane]));
+            lanes[0][lane] += s * y_last[lane];
+            lanes[1][lane] += w * y_last[lane];
+            lanes[2][lane] += s * g_last[lane];
+            lanes[3][lane] += w * g_last[lane];
         }
-        sums
+        [sum(&lanes[0]), sum(&lanes[1]), sum(&lanes[2]), sum(&lanes[3])]
     }
 }
 
@@ -233,9 +241,9 @@ impl WithSimd for Products<'_> {
 struct Combine<'a> {
     out: &'a mut [f64],
     scaled: f64,
-    w: &'a [f64],
+    w: &'a [f32],
     weight: f64,
-    s: &'a [f64],
+    s: &'a [f32],
 }
 
 impl NullaryFnOnce for Combine<'_> {
@@ -245,7 +253,7 @@ impl NullaryFnOnce for Combine<'_> {
         let Self { out, scaled, w, weight, s } = self;
         let (w, s) = (&w[..out.len()], &s[..out.len()]);
         for k in 0..out.len() {
-            out[k] += scaled * w[k] - weight * s[k];
+            out[k] += scaled * f64::from(w[k]) - weight * f64::from(s[k]);
         }
     }
 }

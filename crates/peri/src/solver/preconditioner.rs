@@ -9,8 +9,11 @@ use super::system::System;
 use crate::bonds::Bonds;
 use crate::field::{CHUNK, Field, chunk_range};
 
-/// Degrees of freedom of the coarse level at most, in two and three dimensions.
-const MOST: [usize; 2] = [30_000, 8_000];
+/// Degrees of freedom of the coarse level at most, in two and three dimensions: so many in any body, one for so many particles, and so many
+/// however large the body is.
+const LEAST: [usize; 2] = [30_000, 8_000];
+const SHARE: [usize; 2] = [8, 40];
+const MOST: [usize; 2] = [125_000, 30_000];
 
 /// The approximate inverse.
 pub struct Preconditioner<const D: usize> {
@@ -81,7 +84,8 @@ impl<const D: usize> Preconditioner<D> {
             survey: &survey,
         };
         let old = self.coarse.take();
-        self.coarse = Coarse::new(&body, coarsening * bonds.spacing(), MOST[D - 2], old);
+        let most = (self.volumes.len() / SHARE[D - 2]).clamp(LEAST[D - 2], MOST[D - 2]);
+        self.coarse = Coarse::new(&body, coarsening * bonds.spacing(), most, old);
     }
 
     /// Brings the local part up to date where bonds broke; the coarse one stays.

@@ -34,34 +34,40 @@ impl Pattern {
     }
 }
 
-/// The factors, and the analysis behind them.
+/// The factors in single precision, which a preconditioner needs no more than, and the analysis behind them.
 pub struct Factor {
     pattern: Pattern,
     symbolic: SymbolicCholesky<usize>,
-    values: Vec<f64>,
+    values: Vec<f32>,
+    /// Power of 2 that the matrix was divided by, so that its entries are about 1.
+    scale: f64,
+    right: Vec<f32>,
     scratch: MemBuffer,
 }
 
 impl Factor {
     /// Factors the matrix with `entries` in the places of `pattern`, in the order of elimination that its rows are in;
     /// goes on from `old` where the pattern has not changed. `None` where the matrix is not positive definite to
-    /// working precision, or too large for the memory.
+    /// double precision, or too large for the memory.
     pub fn new(pattern: Pattern, entries: &[f64], old: Option<Self>) -> Option<Self> {
         let mut factor = match old {
             Some(old) if old.pattern == pattern => old,
             _ => Self::analyse(pattern)?,
         };
         let size = factor.pattern.size();
-        let matrix = SparseColMatRef::new(symbolic(&factor.pattern, size), entries);
+        let scale = power_of_two(entries);
+        let entries: Vec<f64> = entries.iter().map(|x| x / scale).collect();
+        let matrix = SparseColMatRef::new(symbolic(&factor.pattern, size), &entries[..]);
         let parameters = Default::default();
         let needed = factor.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, parameters);
         let mut memory = MemBuffer::try_new(needed).ok()?;
+        let mut values = vec![0.0; factor.symbolic.len_val()];
         let none =
             LltRegularization { dynamic_regularization_delta: 0.0, dynamic_regularization_epsilon: 0.0 };
         factor
             .symbolic
             .factorize_numeric_llt(
-                &mut factor.values,
+                &mut values,
                 matrix,
                 Side::Upper,
                 none,
@@ -70,6 +76,9 @@ impl Factor {
                 parameters,
             )
             .ok()?;
+        factor.values.clear();
+        factor.values.extend(values.iter().map(|&x| x as f32));
+        factor.scale = scale;
         factor.values.iter().all(|x| x.is_finite()).then_some(factor)
     }
 
@@ -81,27 +90,35 @@ impl Factor {
         let order = SymmetricOrdering::Identity;
         let matrix = symbolic(&pattern, pattern.size());
         let symbolic = factorize_symbolic_cholesky(matrix, Side::Upper, order, parameters).ok()?;
-        let values = vec![0.0; symbolic.len_val()];
-        let scratch = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq)).ok()?;
-        Some(Self { pattern, symbolic, values, scratch })
+        let scratch = MemBuffer::try_new(symbolic.solve_in_place_scratch::<f32>(1, Par::Seq)).ok()?;
+        let right = vec![0.0; pattern.size()];
+        Some(Self { pattern, symbolic, values: Vec::new(), scale: 1.0, right, scratch })
     }
 
-    /// Overwrites b by A⁻¹ b.
+    /// Overwrites b by A⁻¹ b, to single precision.
     pub fn solve(&mut self, right: &mut [f64]) {
-        let size = right.len();
-        let right = MatMut::from_column_major_slice_mut(right, size, 1);
+        let scale = power_of_two(right);
+        self.right.iter_mut().zip(&*right).for_each(|(single, x)| *single = (x / scale) as f32);
         LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
             Conj::No,
-            right,
+            MatMut::from_column_major_slice_mut(&mut self.right, right.len(), 1),
             Par::Seq,
             MemStack::new(&mut self.scratch),
         );
+        let back = scale / self.scale;
+        right.iter_mut().zip(&self.right).for_each(|(x, &single)| *x = back * f64::from(single));
     }
 
     /// Entries of the factors.
     pub fn entries(&self) -> usize {
         self.values.len()
     }
+}
+
+/// The power of 2 at or below the largest magnitude; 1 of nothing.
+fn power_of_two(values: &[f64]) -> f64 {
+    let largest = values.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    if largest > 0.0 && largest.is_finite() { largest.log2().floor().exp2() } else { 1.0 }
 }
 
 fn symbolic(pattern: &Pattern, size: usize) -> SymbolicSparseColMatRef<'_, usize> {
@@ -146,14 +163,14 @@ mod tests {
             product
         };
         let mut factor = None;
-        // the second time the analysis is kept
-        for scale in [1.0, 3.0] {
+        // from the second time on the analysis is kept; no single number holds these scales
+        for scale in [1.0, 3e60, 3e-60] {
             let scaled: Vec<f64> = entries.iter().map(|x| scale * x).collect();
             let mut found = product(&scaled);
             let mut made = Factor::new(pattern.clone(), &scaled, factor.take()).unwrap();
             made.solve(&mut found);
-            // condition below 100
-            assert!(found.iter().zip(&exact).all(|(f, e)| (f - e).abs() < 1e-13), "{found:?}");
+            // condition below 100, in single precision
+            assert!(found.iter().zip(&exact).all(|(f, e)| (f - e).abs() < 1e-5), "{found:?}");
             factor = Some(made);
         }
         let negative: Vec<f64> = entries.iter().map(|x| -x).collect();

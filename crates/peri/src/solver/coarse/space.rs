@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 
 /// Corners of a cell in three dimensions.
 pub const CORNERS: usize = 8;
+/// Sites between those of a window whose bonds are followed one after the other.
+const STRIDE: usize = 32;
 /// Marks a site without element.
 pub const NONE: u32 = u32::MAX;
 
@@ -113,40 +115,22 @@ impl<const D: usize> Grid<D> {
     }
 }
 
-/// Parts of a hat's support: the part of each site in it, sites ascending.
-struct Split {
-    parts: u32,
-    part_of: Vec<(u32, u32)>,
+/// The bonded particles of each cell.
+struct Filled<const D: usize> {
+    /// Where each cell begins in `members`, and the end.
+    starts: Vec<usize>,
+    /// Sites, ascending in each cell.
+    members: Vec<u32>,
+    /// Whether every particle of a cell has all bonds around it.
+    is_whole: Vec<bool>,
+    /// Coordinates of each site in its cell, 0 to 1.
+    local: Field<D>,
 }
 
-impl<const D: usize> Space<D> {
-    /// Cells of about `edge`, more if there would be more than `most` functions; `None` where even that does not help.
-    /// `bonded` has the number of bonds of each site, `whole` that from which on nothing is missing around a particle.
-    pub fn new(bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32, edge: f64, most: usize) -> Option<Self> {
-        let mut edge = edge;
-        for _ in 0..24 {
-            let grid = Grid::new(bonds, edge);
-            let nodes: f64 = grid.node_counts().iter().map(|&n| n as f64).product();
-            // bodies that fill little of their box may have more nodes than functions, but not without end
-            if nodes <= 64.0 * most as f64 {
-                let space = Self::on(&grid, bonds, bonded, whole);
-                if (1..=most).contains(&space.functions) {
-                    return Some(space);
-                }
-                if space.functions == 0 || grid.cells == [1; D] {
-                    return None;
-                }
-            }
-            edge *= 1.3;
-        }
-        None
-    }
-
-    fn on(grid: &Grid<D>, bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32) -> Self {
-        let sites = bonds.sites();
-        let mut local = Field::zeros(sites);
+impl<const D: usize> Filled<D> {
+    fn new(grid: &Grid<D>, bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32) -> Self {
+        let mut local = Field::zeros(bonds.sites());
         let cells: usize = grid.cells.iter().product();
-        // particles of each cell, sites ascending
         let mut starts = vec![0_usize; cells + 1];
         let mut cell_of = Vec::with_capacity(bonds.particles().len());
         let mut is_whole = vec![true; cells];
@@ -173,11 +157,63 @@ impl<const D: usize> Space<D> {
                 next[cell as usize] += 1;
             }
         }
-        let of_cell = |cell: usize| &members[starts[cell]..starts[cell + 1]];
+        Self { starts, members, is_whole, local }
+    }
+
+    fn of_cell(&self, cell: usize) -> &[u32] {
+        &self.members[self.starts[cell]..self.starts[cell + 1]]
+    }
+
+    /// Nodes beside a particle: that many functions at least.
+    fn nodes(&self, grid: &Grid<D>) -> usize {
+        let nodes: usize = grid.node_counts().iter().product();
+        let used = |&node: &usize| grid.cells_around(node).any(|cell| !self.of_cell(cell).is_empty());
+        (0..nodes).filter(used).count()
+    }
+}
+
+/// Parts of a hat's support: the part of each site in it, sites ascending.
+struct Split {
+    parts: u32,
+    part_of: Vec<(u32, u32)>,
+}
+
+impl<const D: usize> Space<D> {
+    /// Cells of about `edge`, larger ones if there would be more than `most` functions; `None` where even that does not help.
+    /// `bonded` has the number of bonds of each site, `whole` that from which on nothing is missing around a particle.
+    pub fn new(bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32, edge: f64, most: usize) -> Option<Self> {
+        let mut edge = edge;
+        for _ in 0..24 {
+            let grid = Grid::new(bonds, edge);
+            let nodes: f64 = grid.node_counts().iter().map(|&n| n as f64).product();
+            // bodies that fill little of their box may have more nodes than functions, but not without end
+            let mut excess = nodes / (64.0 * most as f64);
+            if excess <= 1.0 {
+                let filled = Filled::new(&grid, bonds, bonded, whole);
+                let mut functions = filled.nodes(&grid);
+                if (1..=most).contains(&functions) {
+                    let space = Self::on(&grid, filled, bonds);
+                    functions = space.functions;
+                    if functions <= most {
+                        return Some(space);
+                    }
+                }
+                if functions == 0 || grid.cells == [1; D] {
+                    return None;
+                }
+                excess = functions as f64 / most as f64;
+            }
+            edge *= excess.powf(1.0 / D as f64).max(1.05);
+        }
+        None
+    }
+
+    fn on(grid: &Grid<D>, filled: Filled<D>, bonds: &dyn Bonds<D>) -> Self {
+        let (sites, cells) = (bonds.sites(), filled.is_whole.len());
         // what hangs together around each node
         let nodes: usize = grid.node_counts().iter().product();
         let suspects: Vec<usize> =
-            (0..nodes).filter(|&node| !grid.cells_around(node).all(|cell| is_whole[cell])).collect();
+            (0..nodes).filter(|&node| !grid.cells_around(node).all(|cell| filled.is_whole[cell])).collect();
         // few batches: each looks sites up in a table of its own
         let batch = suspects.len().div_ceil(4 * rayon::current_num_threads()).max(1);
         let found: Vec<Vec<(usize, Split)>> = suspects
@@ -185,7 +221,7 @@ impl<const D: usize> Space<D> {
             .map(|batch| {
                 let mut place = vec![NONE; sites];
                 let window = |node: usize| -> Vec<u32> {
-                    grid.cells_around(node).flat_map(|cell| of_cell(cell).iter().copied()).collect()
+                    grid.cells_around(node).flat_map(|cell| filled.of_cell(cell).iter().copied()).collect()
                 };
                 let split = |&node: &usize| Some((node, split(bonds, window(node), &mut place)?));
                 batch.iter().filter_map(split).collect()
@@ -195,7 +231,7 @@ impl<const D: usize> Space<D> {
         let mut first = vec![0_u32; nodes];
         let mut functions = 0_u32;
         for node in elimination_order(grid.node_counts()) {
-            if grid.cells_around(node).any(|cell| starts[cell] < starts[cell + 1]) {
+            if grid.cells_around(node).any(|cell| !filled.of_cell(cell).is_empty()) {
                 first[node] = functions;
                 functions += splits.get(&node).map_or(1, |split| split.parts);
             }
@@ -204,15 +240,14 @@ impl<const D: usize> Space<D> {
             edge: grid.edge,
             functions: functions as usize,
             elements: Vec::new(),
-            members: Vec::with_capacity(members.len()),
+            members: Vec::with_capacity(filled.members.len()),
             element_of: vec![NONE; sites],
-            local,
+            local: Field::zeros(0),
         };
-        for cell in 0..cells {
-            if starts[cell] < starts[cell + 1] {
-                space.add_cell(grid, cell, of_cell(cell), &splits, &first);
-            }
+        for cell in (0..cells).filter(|&cell| !filled.of_cell(cell).is_empty()) {
+            space.add_cell(grid, cell, filled.of_cell(cell), &splits, &first);
         }
+        space.local = filled.local;
         space
     }
 
@@ -282,11 +317,13 @@ fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut
     }
     let mut parent: Vec<u32> = (0..window.len() as u32).collect();
     let mut parts = window.len();
-    for (index, &site) in window.iter().enumerate() {
+    // sites far from each other first: few families hold a window together
+    let far = |start: usize| (start..window.len()).step_by(STRIDE);
+    for index in (0..STRIDE).flat_map(far) {
         if parts == 1 {
             break;
         }
-        bonds.neighbours(site as usize, &mut |bond| {
+        bonds.neighbours(window[index] as usize, &mut |bond| {
             let other = place[bond.site];
             if other != NONE {
                 let (a, b) = (root(&mut parent, index as u32), root(&mut parent, other));

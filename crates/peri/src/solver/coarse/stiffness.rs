@@ -19,6 +19,8 @@ const LEAST: f64 = 0.05;
 /// Part of the stiffness of its particles that the empty part of a cell has (the finite cell method of Parvizian, Düster &
 /// Rank 2007, doi:10.1007/s00466-007-0173-y): a few particles in a cell do not hold all its functions.
 const FICTITIOUS: f64 = 0.1;
+/// Particles of an element whose C is computed for all that have every bond.
+const SAMPLES: usize = 4;
 /// Bonds that turn and stretch by less are taken as at rest.
 const SMALL: f64 = 0.1;
 
@@ -37,23 +39,28 @@ pub struct Survey {
     pub bonded: Vec<u32>,
     /// The most bonds of any particle.
     pub most: u32,
-    /// Largest |η|/|ξ|: how much bonds have turned or stretched.
+    /// Largest |η|/|ξ| of a lattice's bonds of one spacing: how much bonds have turned or stretched.
     pub moved: f64,
 }
 
 impl Survey {
-    /// Looks at every bond.
+    /// Counts the bonds of every particle, and looks at those of a lattice to the nearest particles.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Self {
+        let lattice = bonds.as_lattice();
+        let is_unit = |offset: &[i32; D]| offset.iter().map(|o| o.abs()).sum::<i32>() == 1;
+        let nearest: Vec<(usize, isize)> = lattice.map_or(Vec::new(), |lattice| {
+            let units = lattice.stencil().offsets.iter().enumerate().filter(|(_, offset)| is_unit(offset));
+            units.map(|(k, &offset)| (k, lattice.shift(offset))).collect()
+        });
         let of = |&site: &u32| {
-            let own = displacement.get(site as usize);
-            let (mut count, mut most) = (0_u32, 0.0_f64);
-            bonds.neighbours(site as usize, &mut |bond| {
-                let other = displacement.get(bond.site);
-                let eta: f64 = (0..D).map(|d| (other[d] - own[d]).powi(2)).sum();
-                count += 1;
-                most = most.max(eta / (bond.length * bond.length));
-            });
-            (count, most)
+            let (site, mut most) = (site as usize, 0.0_f64);
+            let own = displacement.get(site);
+            let intact = |k: usize| lattice.is_some_and(|lattice| lattice.is_intact(site, k));
+            for (_, shift) in nearest.iter().filter(|(k, _)| intact(*k)) {
+                let other = displacement.get(site.wrapping_add_signed(*shift));
+                most = most.max((0..D).map(|d| (other[d] - own[d]).powi(2)).sum());
+            }
+            (bonds.bonded(site), most)
         };
         let each: Vec<(u32, f64)> = bonds.particles().par_iter().map(of).collect();
         let mut bonded = vec![0; bonds.sites()];
@@ -63,7 +70,7 @@ impl Survey {
             most = most.max(count);
             moved = moved.max(square);
         }
-        Self { bonded, most, moved: moved.sqrt() }
+        Self { bonded, most, moved: moved.sqrt() / bonds.spacing() }
     }
 }
 
@@ -101,6 +108,8 @@ pub struct Assembly<'a, const D: usize> {
     modulus: f64,
     /// Stiffness density M_I at constrained components, N/m⁵.
     springs: &'a [f64],
+    /// Whether the body is a lattice.
+    lattice: bool,
     /// C of particles without a bond missing, where bonds are as at rest.
     interior: Option<Tangent>,
     /// Volume of a cell (2D: times the thickness), m³, and Σ V ∂φ_a ∂φ_b over all of it.
@@ -142,12 +151,13 @@ impl<'a, const D: usize> Assembly<'a, D> {
             tangents,
             modulus,
             springs,
+            lattice: bonds.as_lattice().is_some(),
             interior,
             cell,
             full,
             volumetric,
         };
-        if bonds.as_lattice().is_some() && survey.moved < SMALL {
+        if assembly.lattice && survey.moved < SMALL {
             let whole = |&&site: &&u32| survey.bonded[site as usize] == survey.most;
             let site = bonds.particles().iter().find(whole);
             assembly.interior = site.map(|&site| assembly.tangent(site as usize));
@@ -191,16 +201,39 @@ impl<'a, const D: usize> Assembly<'a, D> {
         result
     }
 
+    /// Whether the particle in a site has every bond of its lattice: its C is that of others beside it.
+    fn is_full(&self, site: usize) -> bool {
+        self.lattice && self.survey.bonded[site] == self.survey.most
+    }
+
+    /// C that stands for the particles of an element that have every bond: that at rest, or the mean of a few.
+    fn shared(&self, members: &[u32]) -> Option<Tangent> {
+        if self.interior.is_some() {
+            return self.interior;
+        }
+        let full: Vec<usize> = members.iter().map(|&s| s as usize).filter(|&s| self.is_full(s)).collect();
+        let samples = full.len().min(SAMPLES);
+        let mut mean = [[0.0; SYMMETRIC]; SYMMETRIC];
+        for k in 0..samples {
+            // in the middle of each of the parts
+            let site = full[(2 * k + 1) * full.len() / (2 * samples)];
+            add_tangent(&mut mean, &self.tangent(site), 1.0 / samples as f64);
+        }
+        (samples > 0).then_some(mean)
+    }
+
     /// Stiffness of an element, and for each corner Σ V φ over its particles.
     pub fn element(&self, space: &Space<D>, element: &Element) -> (ElementMatrix, [f64; CORNERS]) {
         let corners = 1 << D;
         let mut matrix = [[0.0; 9]; PAIRS];
         let mut measure = [0.0; CORNERS];
-        // Σ V ∂φ_a ∂φ_b of the particles that share the interior's C, and Σ V C
-        let mut shared = [[0.0; SYMMETRIC]; PAIRS];
+        let members = &space.members[element.members[0]..element.members[1]];
+        let shared = self.shared(members);
+        // Σ V ∂φ_a ∂φ_b of the particles that share a C, and Σ V C
+        let mut products = [[0.0; SYMMETRIC]; PAIRS];
         let mut sum = [[0.0; SYMMETRIC]; SYMMETRIC];
         let (mut filled, mut common) = (0.0, 0.0);
-        for &site in &space.members[element.members[0]..element.members[1]] {
+        for &site in members {
             let site = site as usize;
             let volume = self.bonds.volume(site);
             let (values, slopes) = hats::<D>(space.local.get(site), space.edge);
@@ -211,24 +244,21 @@ impl<'a, const D: usize> Assembly<'a, D> {
             if self.volumetric > 0.0 {
                 add_volumetric(&mut matrix, self.volumetric * volume, &slopes);
             }
-            match &self.interior {
-                Some(_) if self.survey.bonded[site] == self.survey.most => {
-                    add_products(&mut shared, volume, &slopes);
-                    common += volume;
-                }
-                _ => {
-                    let tangent = self.tangent(site);
-                    let mut own = [[0.0; SYMMETRIC]; PAIRS];
-                    add_products(&mut own, volume, &slopes);
-                    contract::<D>(&mut matrix, &tangent, &own);
-                    add_tangent(&mut sum, &tangent, volume);
-                }
+            if self.is_full(site) {
+                add_products(&mut products, volume, &slopes);
+                common += volume;
+            } else {
+                let tangent = self.tangent(site);
+                let mut own = [[0.0; SYMMETRIC]; PAIRS];
+                add_products(&mut own, volume, &slopes);
+                contract::<D>(&mut matrix, &tangent, &own);
+                add_tangent(&mut sum, &tangent, volume);
             }
             self.hold(&mut matrix, site, volume, &values);
         }
-        if let Some(interior) = &self.interior {
-            contract::<D>(&mut matrix, interior, &shared);
-            add_tangent(&mut sum, interior, common);
+        if let Some(shared) = &shared {
+            contract::<D>(&mut matrix, shared, &products);
+            add_tangent(&mut sum, shared, common);
         }
         let empty = (1.0 - filled / self.cell).max(0.0);
         if empty > 0.0 && filled > 0.0 {

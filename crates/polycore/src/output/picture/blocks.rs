@@ -45,7 +45,9 @@ struct Neighbours<'a> {
     spacing: f64,
     farthest: f64,
     /// To the left, right, down and up.
-    next: Vec<[Option<usize>; 4]>,
+    next: Vec<[Option<u32>; 4]>,
+    /// Those of them without a crack between.
+    joined: Vec<[Option<u32>; 4]>,
 }
 
 impl<'a> Neighbours<'a> {
@@ -58,14 +60,18 @@ impl<'a> Neighbours<'a> {
                 for (side, step) in [[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]].iter().enumerate() {
                     let off = |d: usize| (there[d] - here[d] - step[d] * spacing).abs() < OFF * spacing;
                     if off(0) && off(1) {
-                        next[side] = Some(other);
+                        next[side] = Some(other as u32);
                     }
                 }
             });
             next
         };
         let farthest = spacing * bridge.max(1.0) * (1.0 + 1e-9);
-        Self { positions, spacing, farthest, next: reference.iter().map(next).collect() }
+        let next = reference.iter().map(next).collect();
+        let mut all = Self { positions, spacing, farthest, next, joined: Vec::new() };
+        let joined = |particle| [0, 1, 2, 3].map(|side| all.unbroken(particle, side));
+        all.joined = (0..positions.len()).map(joined).collect();
+        all
     }
 
     fn is_on_it(&self, particle: usize) -> bool {
@@ -78,19 +84,25 @@ impl<'a> Neighbours<'a> {
 
     /// The neighbour at a side, unless a crack is between.
     fn joined(&self, particle: usize, side: usize) -> Option<usize> {
-        let other = self.next[particle][side]?;
+        self.joined[particle][side].map(|other| other as usize)
+    }
+
+    fn unbroken(&self, particle: usize, side: usize) -> Option<u32> {
+        let other = self.next[particle][side]? as usize;
         let gap = |a: usize, b: usize| {
             let [x, y] = self.between(a, b);
             x.hypot(y)
         };
         let behind = |particle: usize, side: usize| {
-            self.next[particle][side].map(|next| gap(particle, next)).filter(|&gap| gap <= self.farthest)
+            self.next[particle][side]
+                .map(|next| gap(particle, next as usize))
+                .filter(|&gap| gap <= self.farthest)
         };
         let most = match (behind(particle, side ^ 1), behind(other, side)) {
             (None, None) => self.farthest,
             (a, b) => (JUMP * a.unwrap_or(0.0).max(b.unwrap_or(0.0)).max(self.spacing)).min(self.farthest),
         };
-        (gap(particle, other) <= most).then_some(other)
+        (gap(particle, other) <= most).then_some(other as u32)
     }
 
     /// From a particle to the middle of its cell's side.

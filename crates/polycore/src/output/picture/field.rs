@@ -97,6 +97,22 @@ impl<'a> Panel<'a> {
         self
     }
 
+    fn outline(&self) -> Blocks {
+        Blocks::new(self.positions, self.reference, self.spacing, self.bridge)
+    }
+
+    /// Whether it shows the same particles in the same places.
+    fn has_outline_of(&self, other: &Self) -> bool {
+        let same = |a: &[[f64; 2]], b: &[[f64; 2]]| std::ptr::eq(a, b);
+        let reference = match (self.reference, other.reference) {
+            (Some(a), Some(b)) => same(a, b),
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        reference
+            && same(self.positions, other.positions)
+            && (self.spacing, self.bridge) == (other.spacing, other.bridge)
+    }
+
     fn limits(&self) -> (f64, f64) {
         if let Some(range) = self.range {
             return range;
@@ -214,7 +230,20 @@ impl<'a> FieldMap<'a> {
         if self.panels.is_empty() {
             return Err("there is no panel".to_owned());
         }
-        let drawn = self.panels.iter().map(|panel| self.draw(panel)).collect::<Result<Vec<_>, _>>()?;
+        let mut drawn = Vec::with_capacity(self.panels.len());
+        // panels of the same particles share their outlines
+        let mut last: Option<(&Panel<'_>, Blocks)> = None;
+        for panel in &self.panels {
+            panel.check()?;
+            let window =
+                Window::around(panel.positions, panel.spacing, self.size as f64).ok_or_else(|| {
+                    format!("panel `{}`: positions are not finite or too far apart", panel.title)
+                })?;
+            let kept = last.take().filter(|(other, _)| panel.has_outline_of(other));
+            let blocks = kept.map_or_else(|| panel.outline(), |(_, blocks)| blocks);
+            drawn.push(self.draw(panel, &window, &blocks)?);
+            last = Some((panel, blocks));
+        }
         let columns = self.columns.unwrap_or(drawn.len()).min(drawn.len());
         let rows = drawn.len().div_ceil(columns);
         let size_of = |index: usize, row: bool| {
@@ -233,17 +262,13 @@ impl<'a> FieldMap<'a> {
         Ok(canvas)
     }
 
-    fn draw(&self, panel: &Panel<'_>) -> Result<Canvas, String> {
-        panel.check()?;
-        let window = Window::around(panel.positions, panel.spacing, self.size as f64)
-            .ok_or_else(|| format!("panel `{}`: positions are not finite or too far apart", panel.title))?;
-        let blocks = Blocks::new(panel.positions, panel.reference, panel.spacing, panel.bridge);
-        let raster = window.draw(panel.positions, panel.values, &blocks);
+    fn draw(&self, panel: &Panel<'_>, window: &Window, blocks: &Blocks) -> Result<Canvas, String> {
+        let raster = window.draw(panel.positions, panel.values, blocks);
         let (low, high) = panel.limits();
         let beyond =
             [panel.values.iter().any(|value| *value < low), panel.values.iter().any(|value| *value > high)];
         let bar = Bar::new(&panel.label, (low, high), beyond, raster.height.max(220))?;
-        let axes = self.lengths.as_ref().map(|lengths| Axes::new(&window, &raster, lengths, self.names));
+        let axes = self.lengths.as_ref().map(|lengths| Axes::new(window, &raster, lengths, self.names));
         let axes = axes.transpose()?;
         let title = Text::new(&panel.title, TITLE)?;
         let head = MARGIN + if panel.title.is_empty() { 0 } else { TITLE as usize * 3 / 2 + 10 };
@@ -365,7 +390,7 @@ mod tests {
         for (half, width) in [(9.0, 70), (10.5, 62), (10.5, 100), (40.0, 240), (0.9, 120), (1e5, 120)] {
             let window = Window { low: [-half, 0.0], high: [half, half], scale: width as f64 / (2.0 * half) };
             let raster = Raster { width, height: width / 2, values: Vec::new() };
-            let axes = Axes::new(&window, &raster, &("mm".to_owned(), 1.0), ["x", "y"]).unwrap();
+            let axes = Axes::new(window, &raster, &("mm".to_owned(), 1.0), ["x", "y"]).unwrap();
             let across = &axes.ticks[0];
             assert!(across.len() >= 2, "{half} {width}: {}", across.len());
             for pair in across.windows(2) {
