@@ -61,6 +61,11 @@ impl Packed {
     /// Makes it of these rows, as far as it is not yet; false where no rows are packed.
     pub fn update(&mut self, rows: &Rows, weights: [f64; 2]) -> bool {
         let factors = weights.map(f64::to_bits);
+        // few distinct rows stay in caches as they are
+        if rows.are_few() {
+            *self = Self::default();
+            return false;
+        }
         let made_for = Some((rows.versions(), factors));
         if self.made_for != made_for {
             self.items.resize_with(rows.items(), Kept::default);
