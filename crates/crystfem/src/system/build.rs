@@ -176,17 +176,17 @@ impl System {
 
     /// ρV of a point at a node, kg.
     pub fn mass(&self, problem: &Problem, born: &[u32], equation: usize, point: usize) -> f64 {
-        let Nodal { birth, material, mass, weighed, .. } = &self.nodal;
+        let Nodal { birth, material, mass, weighed, like, .. } = &self.nodal;
         if *weighed {
             return mass[point];
         }
-        let density = problem.materials[usize::from(material[point])].density();
         let mut sum = 0.0;
         for (element, corner) in self.around(equation as u32, born) {
-            let own = (born[element as usize], problem.material_of[element as usize]);
+            let own = usize::from(problem.material_of[element as usize]);
+            let key = (born[element as usize], like[own]);
             let class = self.plan.classes.get(usize::from(self.plan.kinds[element as usize]));
-            if let Some(class) = class.filter(|_| own == (birth[point], material[point])) {
-                sum += density * class.volumes[corner];
+            if let Some(class) = class.filter(|_| key == (birth[point], material[point])) {
+                sum += problem.materials[own].density() * class.volumes[corner];
             }
         }
         sum
@@ -247,10 +247,12 @@ impl System {
         self.connect(mesh, born, size, &touched);
         let Self { plan, nodes, nodal, .. } = self;
         if behaviours.iter().any(Behaviour::nodal) {
+            let like = nodal.like.clone();
             added.nodal = nodal.replace(size, &touched.list, |equation, keys| {
                 for (element, _) in plan.around.of(nodes[equation as usize], born) {
-                    let key = (born[element as usize], problem.material_of[element as usize]);
-                    if behaviours[usize::from(key.1)].nodal() && !keys.contains(&key) {
+                    let material = usize::from(problem.material_of[element as usize]);
+                    let key = (born[element as usize], like[material]);
+                    if behaviours[material].nodal() && !keys.contains(&key) {
                         keys.push(key);
                     }
                 }
@@ -364,7 +366,7 @@ impl System {
                         self.capacity[node as usize] += capacity * volume;
                     }
                     if behaviour.nodal() && self.nodal.weighed {
-                        let key = (born[element as usize], material);
+                        let key = (born[element as usize], self.nodal.like[usize::from(material)]);
                         let density = problem.materials[usize::from(material)].density();
                         for point in self.nodal.of(node as usize) {
                             if (self.nodal.birth[point], self.nodal.material[point]) == key {

@@ -303,10 +303,16 @@ impl Rows {
         self.base = kept;
     }
 
-    /// Distinct lists of values, segments of equal rows, and values of K stored.
+    /// Lists of values that rows have, segments of equal rows, and entries of K in these lists: of the rows alone, not of how they came about.
     pub fn stored(&self) -> [usize; 3] {
         let Stencils { values, .. } = &self.stencils;
-        [values.count(), self.segments.iter().map(Vec::len).sum(), values.entries()]
+        [values.used, self.segments.iter().map(Vec::len).sum(), values.entries() - values.dead]
+    }
+
+    /// Bytes of what is stored.
+    pub fn bytes(&self) -> usize {
+        let segments: usize = self.segments.iter().map(Vec::len).sum();
+        segments * size_of::<Segment>() + self.own.len() * size_of::<u32>() + self.stencils.bytes()
     }
 
     /// Adds to an entry of a row of its own; without effect elsewhere.

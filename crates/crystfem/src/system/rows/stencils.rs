@@ -140,6 +140,17 @@ impl Stencils {
         (at != NONE).then_some(self.values.range(stencil.values).start + at as usize)
     }
 
+    /// Bytes of all lists.
+    pub(super) fn bytes(&self) -> usize {
+        // start, rows, hash and name; place of the diagonal and threes
+        const LIST: usize = 4 + 4 + 16;
+        let values = self.conduction.len() + self.capacity.len();
+        (self.patterns.count() + self.values.count()) * LIST
+            + self.patterns.count() * 5
+            + self.offsets.len() * size_of::<i32>()
+            + values * size_of::<f64>()
+    }
+
     pub(super) fn entries(&self, stencil: Stencil) -> Entries<'_> {
         let range = self.values.range(stencil.values);
         Entries {
