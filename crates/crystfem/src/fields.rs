@@ -69,7 +69,7 @@ impl Simulation {
             return (0..nodes as u32).map(|node| self.mean_at(name, node)).collect();
         }
         let (mut sum, mut mass) = (vec![0.0; nodes], vec![0.0; nodes]);
-        for (equation, &node) in system.nodes.iter().enumerate() {
+        for (equation, &node) in system.nodes().iter().enumerate() {
             let [own, of_mass] = self.at_node(name, equation);
             sum[node as usize] += own;
             mass[node as usize] += of_mass;
@@ -164,7 +164,7 @@ impl Simulation {
             Err(Error::NotFinite { quantity, place, time: state.time })
         };
         if let Some(wrong) = state.temperature.iter().position(|t| !t.is_finite()) {
-            return fail("temperature", system.nodes[wrong]);
+            return fail("temperature", system.nodes()[wrong]);
         }
         let wrong = |points: &Points, stride: usize| -> Option<(usize, Option<usize>)> {
             let in_state = points.state.iter().position(|x| !x.is_finite());
@@ -179,7 +179,7 @@ impl Simulation {
         if let Some((point, variable)) = wrong(nodal, system.nodal.stride) {
             let equation = system.nodal.starts.partition_point(|&first| first as usize <= point) - 1;
             let material = usize::from(system.nodal.material[point]);
-            return fail(named(material, variable), system.nodes[equation]);
+            return fail(named(material, variable), system.nodes()[equation]);
         }
         if let Some((point, variable)) = wrong(general, system.general.stride) {
             let index = system.general.starts.partition_point(|&first| first as usize <= point) - 1;

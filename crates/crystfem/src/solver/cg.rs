@@ -110,6 +110,11 @@ pub struct ConjugateGradients {
 }
 
 impl ConjugateGradients {
+    /// See [`super::Iterative::lend`].
+    pub fn lend(&mut self, room: &mut Vec<f64>) {
+        std::mem::swap(&mut self.image, room);
+    }
+
     /// Solves A x = r from x = 0. `inverse` is one over A's diagonal, 0 where x stays 0; `residual` becomes r − A x.
     pub fn solve(
         &mut self,

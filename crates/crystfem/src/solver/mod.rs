@@ -70,6 +70,11 @@ pub struct Iterative {
 }
 
 impl Iterative {
+    /// Exchanges room for A times a direction with a vector that nobody reads meanwhile.
+    pub fn lend(&mut self, room: &mut Vec<f64>) {
+        self.conjugate.lend(room);
+    }
+
     /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0 where x stays 0;
     /// `residual` becomes r − A x, as the iterations know it.
     pub fn solve(

@@ -1,4 +1,4 @@
-//! A matrix for the iterations alone, where rows are unequal: entries combined for one step, in single precision, eight rows side by side.
+//! A matrix for the iterations alone, where most rows are distinct: entries combined for one step, in single precision, eight rows side by side.
 //!
 //! Iterations on unequal rows take as long as reading them from memory does. Entries beside the diagonal are rounded to f32, and the diagonal
 //! takes what that leaves, so that sums of rows stay those of f64. The energy xᵀAx is then that of A to about 2⁻²⁴ in long and short

@@ -1,8 +1,8 @@
-//! The conduction matrix (and the consistent capacity matrix) row by row, each distinct row stored once.
+//! The conduction matrix (and the consistent capacity matrix) row by row, each distinct list of distances and of values stored once.
 //!
-//! A row is a list of (column − row, value). On a mesh with lines of equal elements most consecutive rows are equal;
+//! A row is a list of distances, column − row, and a list of values. On a mesh with lines of equal elements most consecutive rows are equal;
 //! a run of them is one segment, y_i = Σ_k v_k x_{i+o_k}, a stencil without any indices to gather. Elsewhere this is
-//! plain compressed rows. Each row is written once: no colouring and no sums between threads, so the bits do not
+//! plain compressed rows: cells that a path fills in part have few distinct lists, which caches hold. Each row is written once: no colouring and no sums between threads, so the bits do not
 //! depend on them; gathering costs nothing over scattering because a stencil has 27 products where the elements
 //! around a node have 64.
 
@@ -87,8 +87,8 @@ pub struct Rows {
     /// Runs of equal rows of each work item, as long as they can be.
     segments: Vec<Vec<Segment>>,
     stencils: Stencils,
-    /// Values of each row that has one of its own; empty where no row has.
-    own: Vec<u32>,
+    /// Stencil of each row that has values of its own; empty where no row has.
+    own: Vec<Stencil>,
     /// Values without what is added in each evaluation.
     base: Option<[Vec<f64>; 2]>,
     /// Counts changes of the pattern, and of values.
@@ -120,8 +120,8 @@ impl Diagonal {
 
 /// Rows of a run on average where runs count as short.
 const MOST_ALONE: usize = 4;
-/// No stencil of its own.
-const SHARED: u32 = u32::MAX;
+/// A list that has no name yet.
+const UNNAMED: u32 = u32::MAX;
 /// The part of the entries that may be of stencils that no row has.
 const MOST_DEAD: usize = 4;
 /// Rows for each distinct one at least where distinct ones count as few.
@@ -204,7 +204,7 @@ impl Rows {
         self.segments.resize_with(items(self.size), Vec::new);
         self.changed.resize(self.segments.len(), self.versions);
         if !self.own.is_empty() || parts.iter().any(|part| part.runs.iter().any(|run| run.1)) {
-            self.own.resize(self.size, SHARED);
+            self.own.resize(self.size, Stencil::NONE);
         }
         let mut of = Vec::with_capacity(CHUNK);
         let mut parts = groups.iter().map(|group| group[0] as usize / CHUNK).zip(parts).peekable();
@@ -224,16 +224,16 @@ impl Rows {
                 self.stencils.values.release(segment.stencil.values, segment.length);
             }
             if let Some(part) = part {
-                let mut patterns = vec![SHARED; part.stencils.patterns.count()];
-                let mut values = vec![SHARED; part.stencils.values.count()];
+                let mut patterns = vec![UNNAMED; part.stencils.patterns.count()];
+                let mut values = vec![UNNAMED; part.stencils.values.count()];
                 for (run, own) in &part.runs {
                     let entries = part.stencils.entries(run.stencil);
                     let pattern = &mut patterns[run.stencil.pattern as usize];
-                    if *pattern == SHARED {
+                    if *pattern == UNNAMED {
                         *pattern = self.stencils.pattern(entries.offsets);
                     }
                     let values = &mut values[run.stencil.values as usize];
-                    if *values == SHARED {
+                    if *values == UNNAMED {
                         *values = self.stencils.list(entries, *own);
                     }
                     let stencil = Stencil { pattern: *pattern, values: *values };
@@ -241,7 +241,7 @@ impl Rows {
                     if let Some(place) = self.own.get_mut(first + usize::from(run.start))
                         && *own
                     {
-                        *place = stencil.values;
+                        *place = stencil;
                     }
                 }
             }
@@ -274,20 +274,21 @@ impl Rows {
     fn compact(&mut self) {
         let old = std::mem::take(&mut self.stencils);
         let base = self.base.take();
-        let mut patterns = vec![SHARED; old.patterns.count()];
-        let mut values = vec![SHARED; old.values.count()];
+        let mut patterns = vec![UNNAMED; old.patterns.count()];
+        let mut values = vec![UNNAMED; old.values.count()];
         let mut kept = base.as_ref().map(|_| [Vec::new(), Vec::new()]);
         for item in 0..self.segments.len() {
             for at in 0..self.segments[item].len() {
                 let Segment { start, stencil, .. } = self.segments[item][at];
-                let own = self.own.get_mut(item * CHUNK + usize::from(start)).filter(|own| **own != SHARED);
+                let own = self.own.get_mut(item * CHUNK + usize::from(start));
+                let own = own.filter(|own| **own != Stencil::NONE);
                 let entries = old.entries(stencil);
                 let pattern = &mut patterns[stencil.pattern as usize];
-                if *pattern == SHARED {
+                if *pattern == UNNAMED {
                     *pattern = self.stencils.pattern(entries.offsets);
                 }
                 let values = &mut values[stencil.values as usize];
-                if *values == SHARED {
+                if *values == UNNAMED {
                     *values = self.stencils.list(entries, own.is_some());
                     for (kept, base) in kept.iter_mut().flatten().zip(base.iter().flatten()) {
                         kept.extend_from_slice(
@@ -295,8 +296,9 @@ impl Rows {
                         );
                     }
                 }
-                own.into_iter().for_each(|own| *own = *values);
-                self.segments[item][at].stencil = Stencil { pattern: *pattern, values: *values };
+                let stencil = Stencil { pattern: *pattern, values: *values };
+                own.into_iter().for_each(|own| *own = stencil);
+                self.segments[item][at].stencil = stencil;
                 self.hold(self.segments[item][at]);
             }
         }
@@ -312,13 +314,15 @@ impl Rows {
     /// Bytes of what is stored.
     pub fn bytes(&self) -> usize {
         let segments: usize = self.segments.iter().map(Vec::len).sum();
-        segments * size_of::<Segment>() + self.own.len() * size_of::<u32>() + self.stencils.bytes()
+        segments * size_of::<Segment>() + self.own.len() * size_of::<Stencil>() + self.stencils.bytes()
     }
 
     /// Adds to an entry of a row of its own; without effect elsewhere.
     pub fn add(&mut self, row: usize, column: usize, conduction: f64, capacity: f64) {
-        let Some(&values) = self.own.get(row).filter(|&&values| values != SHARED) else { return };
-        let Some(pattern) = self.segment(row).map(|segment| segment.stencil.pattern) else { return };
+        let Some(&Stencil { pattern, values }) = self.own.get(row).filter(|own| **own != Stencil::NONE)
+        else {
+            return;
+        };
         let start = self.stencils.values.range(values).start;
         let offset = column as i64 - row as i64;
         self.versions[1] += 1;
