@@ -70,9 +70,9 @@ pub struct Iterative {
 }
 
 impl Iterative {
-    /// Exchanges room for A times a direction with a vector that nobody reads meanwhile.
-    pub fn lend(&mut self, room: &mut Vec<f64>) {
-        self.conjugate.lend(room);
+    /// Exchanges room for a direction and for A times it with vectors that nobody reads meanwhile.
+    pub fn lend(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
+        self.conjugate.lend(direction, image);
     }
 
     /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0 where x stays 0;

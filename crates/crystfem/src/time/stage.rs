@@ -352,8 +352,8 @@ impl Stages {
         work: &mut Work,
     ) -> Result<(), Error> {
         let size = system.size();
-        // the rate is in the residual, and evaluated anew after the correction
-        self.iterative.lend(&mut self.evaluation.rate);
+        // both are in the residual, and evaluated anew after the correction
+        self.iterative.lend(&mut self.evaluation.change, &mut self.evaluation.rate);
         self.raise(problem, system, stage.weight, work);
         self.correction.resize(size, 0.0);
         combine(&mut self.residual, |k, residual| -system.free[k] * residual);
@@ -430,7 +430,7 @@ impl Stages {
                 *correction += shift * free;
             }
         }
-        self.iterative.lend(&mut self.evaluation.rate);
+        self.iterative.lend(&mut self.evaluation.change, &mut self.evaluation.rate);
         Ok(())
     }
 

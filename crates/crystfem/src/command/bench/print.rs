@@ -197,7 +197,6 @@ mod tests {
             })
         };
         let ([equal, _], [unequal, whole]) = (run(1), run(8));
-        println!("{equal:?} {unequal:?} {whole:?}");
         assert_eq!(equal[1], unequal[1]);
         assert!(whole[0] <= 60.0 && unequal[0] <= 60.0 + 12.0, "{unequal:?} {whole:?}");
     }

@@ -47,3 +47,48 @@ fn a_line_has_few_stencils_and_the_right_product() {
     assert_eq!([diagonal[4999], diagonal[5000]], [1.0 + 3.0 * 2.5 + 2.0 * 1.25, 1.0 + 3.0 * 7.0 + 2.0 * 3.5]);
     assert_eq!(rows.largest(|row, value| if row < 100 { row as f64 } else { value }), 99.0);
 }
+
+/// Rows of a grid 40 wide that alternate between seven lists of values: their products by vectors of four, up to the last row, whose columns
+/// end where the numbers do; births change values again and again, and lists that no row has any more are dropped.
+#[test]
+fn rows_that_alternate_share_their_values() {
+    let (width, size) = (40_i64, 2 * CHUNK + 100);
+    let kind = |row: usize, turn: usize| (row * row + turn * 1000) % 7 + 7 * turn;
+    let entries = |row: usize, turn: usize| {
+        let own = 1.0 + 0.1 * kind(row, turn) as f64;
+        let around = (-1..=1).flat_map(move |j| (-1..=1).map(move |i| j * width + i));
+        let inside = around.filter(move |offset| (0..size as i64).contains(&(row as i64 + offset)));
+        inside.map(move |offset| {
+            (offset as i32, if offset == 0 { 8.0 * own } else { -own - 1e-3 * offset as f64 })
+        })
+    };
+    let fill = |turn: usize| {
+        move |row: usize, out: &mut Row| {
+            out.begin([row as u32, turn as u32].into_iter());
+            entries(row, turn).for_each(|(offset, value)| out.add(offset, value, 0.0));
+        }
+    };
+    let mut rows = Rows::build(size, false, fill(0));
+    assert!(rows.are_few() && (0..rows.items()).all(|item| rows.is_unequal(item)));
+    let all: Vec<u32> = (0..size as u32).collect();
+    for turn in 1..40 {
+        rows.update(size, &all, fill(turn));
+        // seven lists, fewer at the ends; no more wait than a quarter, or one a row
+        assert!(
+            rows.stencils.values.count() * 9 <= size + 400 * 9,
+            "{turn}: {}",
+            rows.stencils.values.count()
+        );
+    }
+    let x: Vec<f64> = (0..size).map(|k| (0.3 * k as f64).sin()).collect();
+    let [mut y, mut flow] = [vec![0.0; size], vec![0.0; size]];
+    rows.product(None, [0.0, 2.0], &x, &mut y);
+    rows.flow(&x, &mut flow);
+    for row in 0..size {
+        let other = |offset: i32| x[row.wrapping_add_signed(offset as isize)];
+        let exact: f64 = entries(row, 39).map(|(offset, value)| 2.0 * value * other(offset)).sum();
+        let exact_flow: f64 = entries(row, 39).map(|(offset, value)| value * (other(offset) - x[row])).sum();
+        // nine products of order 1000
+        assert!((y[row] - exact).abs() < 1e-11 && (flow[row] - exact_flow).abs() < 1e-11, "{row}");
+    }
+}
