@@ -44,18 +44,20 @@ impl Simulation {
         sums
     }
 
+    /// [`Self::field`] at a node where all points are at nodes.
+    fn mean_at(&self, name: &str, node: u32) -> Option<f64> {
+        let equation = self.system.equation.get(node as usize).filter(|equation| **equation != NONE)?;
+        let [sum, mass] = self.at_node(name, *equation as usize);
+        (mass > 0.0).then(|| sum / mass)
+    }
+
     /// [`Self::field`] at some nodes; looks at no others where all points are at nodes.
     pub fn field_of(&self, name: &str, nodes: &[u32]) -> Vec<Option<f64>> {
         if !self.system.general.is_empty() {
             let field = self.field(name);
             return nodes.iter().map(|&node| field[node as usize]).collect();
         }
-        let of = |&node: &u32| {
-            let equation = self.system.equation.get(node as usize).filter(|equation| **equation != NONE)?;
-            let [sum, mass] = self.at_node(name, *equation as usize);
-            (mass > 0.0).then(|| sum / mass)
-        };
-        nodes.iter().map(of).collect()
+        nodes.iter().map(|&node| self.mean_at(name, node)).collect()
     }
 
     /// A quantity of the materials at all nodes of the mesh: the mean of the points there, weighted by mass; `None` where no
@@ -63,8 +65,11 @@ impl Simulation {
     pub fn field(&self, name: &str) -> Vec<Option<f64>> {
         let (problem, system) = (&self.problem, &self.system);
         let nodes = problem.mesh.points.len();
+        if system.general.is_empty() {
+            return (0..nodes as u32).map(|node| self.mean_at(name, node)).collect();
+        }
         let (mut sum, mut mass) = (vec![0.0; nodes], vec![0.0; nodes]);
-        for (equation, &node) in system.nodes.iter().enumerate() {
+        for (equation, &node) in system.nodes().iter().enumerate() {
             let [own, of_mass] = self.at_node(name, equation);
             sum[node as usize] += own;
             mass[node as usize] += of_mass;
@@ -114,11 +119,13 @@ impl Simulation {
             means.iter_mut().enumerate().filter(|(element, _)| self.is_born(*element as u32))
         {
             let (material, birth) = (problem.material_of[element], self.state.born[element]);
+            // general materials have no points at nodes, alike or not
+            let like = system.nodal.like[usize::from(material)];
             let (mut sum, mut count) = (0.0, 0);
             for &node in problem.mesh.nodes(element as u32) {
                 let equation = system.equation[node as usize];
                 let own = |point: &usize| {
-                    system.nodal.material[*point] == material && system.nodal.birth[*point] == birth
+                    system.nodal.material[*point] == like && system.nodal.birth[*point] == birth
                 };
                 let found = system.nodal.of(equation as usize).find(own);
                 let (points, stride) = (&self.state.memory.nodal, system.nodal.stride);
@@ -157,7 +164,7 @@ impl Simulation {
             Err(Error::NotFinite { quantity, place, time: state.time })
         };
         if let Some(wrong) = state.temperature.iter().position(|t| !t.is_finite()) {
-            return fail("temperature", system.nodes[wrong]);
+            return fail("temperature", system.nodes()[wrong]);
         }
         let wrong = |points: &Points, stride: usize| -> Option<(usize, Option<usize>)> {
             let in_state = points.state.iter().position(|x| !x.is_finite());
@@ -172,7 +179,7 @@ impl Simulation {
         if let Some((point, variable)) = wrong(nodal, system.nodal.stride) {
             let equation = system.nodal.starts.partition_point(|&first| first as usize <= point) - 1;
             let material = usize::from(system.nodal.material[point]);
-            return fail(named(material, variable), system.nodes[equation]);
+            return fail(named(material, variable), system.nodes()[equation]);
         }
         if let Some((point, variable)) = wrong(general, system.general.stride) {
             let index = system.general.starts.partition_point(|&first| first as usize <= point) - 1;

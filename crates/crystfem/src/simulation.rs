@@ -134,8 +134,11 @@ impl Simulation {
         }
         let system = System::build(&problem, &behaviours, &state.born, 0)?;
         (state.work.builds, state.work.visited) = (1, system.elements as u64);
-        state.temperature =
-            system.nodes.iter().map(|&n| problem.initial.at(problem.mesh.points[n as usize], 0.0)).collect();
+        state.temperature = system
+            .nodes()
+            .iter()
+            .map(|&n| problem.initial.at(problem.mesh.points[n as usize], 0.0))
+            .collect();
         if let Some(found) = state.temperature.iter().copied().find(|t| !(*t >= 0.0 && t.is_finite())) {
             let allowed = "an absolute temperature, 0 K or above".into();
             return Err(Error::Parameter { name: "initial temperature", found, allowed });
@@ -321,7 +324,7 @@ impl Simulation {
         let capacity = |k: usize| self.system.capacity[k];
         let size = self.system.size();
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for &node in &self.system.nodes {
+        for &node in self.system.nodes() {
             let point = self.problem.mesh.points[node as usize];
             for d in 0..3 {
                 (low[d], high[d]) = (low[d].min(point[d]), high[d].max(point[d]));

@@ -72,6 +72,10 @@ impl ThermalMaterial for Filled {
         self.of.crystals()
     }
 
+    fn filling(&self) -> Option<&Arc<dyn ThermalMaterial>> {
+        Some(&self.of)
+    }
+
     fn respond(&self, at: &Point, old: &[f64], new: &mut [f64]) -> Result<Response, Error> {
         let own = self.of.respond(at, old, new)?;
         Ok(Response {

@@ -21,6 +21,7 @@ pub use semicrystalline::{LARGEST_CHANGE, Polymer, Semicrystalline};
 
 use crate::error::Error;
 use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
 
 /// Where a material is asked, at one integration point. Temperatures in K.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,6 +92,10 @@ pub trait ThermalMaterial: Send + Sync {
     /// The law by which the state evolves, where the state is its z alone: points of one law and one temperature history then share their
     /// growth. `None`: only [`Self::respond`] knows.
     fn crystals(&self) -> Option<&Crystallization> {
+        None
+    }
+    /// The material of which this one fills a part: per mass, energies, states and their fields are the same.
+    fn filling(&self) -> Option<&Arc<dyn ThermalMaterial>> {
         None
     }
     /// The response to an increment; `new` is the state at its end.

@@ -34,7 +34,7 @@ pub(crate) struct Scratch {
     growth: Vec<f64>,
     /// ln (1−X_m(T₂))/(1−X_m(T₁)) of each node; 0 for none.
     fall: Vec<f64>,
-    /// First and last piece of each node that has them.
+    /// First and last piece of each node that has them; a node whose increment is not finite has none.
     pieces: Vec<[u32; 2]>,
     /// Pieces: temperatures at their ends, part of the time, growth and fall.
     piece: Pieces,
@@ -55,7 +55,7 @@ struct Pieces {
 
 impl Crystallization {
     /// z of points over an increment, as [`Self::advance`] does; `node` is that of each point. Returns the wish for the next step over
-    /// this one: [`LARGEST_CHANGE`] over the largest change of α, if there is any.
+    /// this one: [`LARGEST_CHANGE`] over the largest change of α, if there is any. z becomes NaN where an increment is not finite.
     pub(crate) fn advance_all(
         &self,
         increments: Increments,
@@ -70,6 +70,8 @@ impl Crystallization {
         for (point, (own, &node)) in (0..).zip(z.iter_mut().zip(node)) {
             let (growth, fall) = (growth[node as usize], fall[node as usize]);
             if growth.is_nan() {
+                let [first, last] = pieces[node as usize];
+                *own = if first < last { *own } else { f64::NAN };
                 long.push((point, *own));
                 continue;
             }
@@ -109,6 +111,7 @@ impl Crystallization {
         let size = start.len();
         growth.resize(size, 0.0);
         fall.resize(size, 0.0);
+        pieces.clear();
         pieces.resize(size, [0; 2]);
         let arch = Arch::new();
         arch.dispatch(Histories { law: self, start, end, dt: Some(dt), growth, fall });
@@ -132,8 +135,8 @@ impl Crystallization {
         parts.iter_mut().zip(share).for_each(|(growth, share)| *growth *= *share * dt);
         // without melting pieces add up
         for k in 0..size {
-            if growth[k].is_nan() && !melts(k) {
-                let [first, last] = pieces[k];
+            let [first, last] = pieces[k];
+            if first < last && !melts(k) {
                 growth[k] = parts[first as usize..last as usize].iter().sum();
                 fall[k] = 0.0;
             }

@@ -182,6 +182,9 @@ impl Grid {
         let filled = |i: usize, j: usize, k: usize, element_of: &[u32]| {
             i < nx && j < ny && k < nz && element_of[i + nx * (j + ny * k)] != u32::MAX
         };
+        let cells = element_of.iter().filter(|&&element| element != u32::MAX).count();
+        mesh.hexahedra.reserve_exact(cells);
+        odd.reserve_exact(cells);
         let mut count = 0;
         for k in 0..=nz {
             layers.swap(0, 1);
@@ -211,6 +214,7 @@ impl Grid {
                 }
             }
         }
+        mesh.points.shrink_to_fit();
     }
 
     /// Surfaces and node sets on the sides of the box around the filled cells.

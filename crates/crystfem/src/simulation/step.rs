@@ -183,7 +183,7 @@ impl Simulation {
         // no step of one length by backward Euler asks for the rate before it
         let rated = self.settings.scheme != Scheme::BackwardEuler
             || matches!(self.settings.steps, Steps::Adaptive { .. });
-        let Self { state, stepper, system, .. } = self;
+        let Self { problem, state, stepper, system, .. } = self;
         let size = system.size();
         let Stepper { temperature, stages, .. } = stepper;
         let residual = &stages.residual;
@@ -200,8 +200,13 @@ impl Simulation {
             error: attempt.error,
             step_ratio: attempt.step_ratio,
         };
-        state.slope.resize(size, 0.0);
-        set(&mut state.slope, |k| (temperature[k] - state.temperature[k]) / dt);
+        // a birth that is due makes the next step one after a jump, which begins from where it is
+        if problem.births.get(state.births).is_some_and(|birth| birth.time <= end) {
+            state.slope.clear();
+        } else {
+            state.slope.resize(size, 0.0);
+            set(&mut state.slope, |k| (temperature[k] - state.temperature[k]) / dt);
+        }
         std::mem::swap(&mut state.temperature, temperature);
         if rated {
             std::mem::swap(&mut state.rate, &mut stages.evaluation.rate);

@@ -110,6 +110,12 @@ pub struct ConjugateGradients {
 }
 
 impl ConjugateGradients {
+    /// See [`super::Iterative::lend`].
+    pub fn lend(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
+        std::mem::swap(&mut self.direction, direction);
+        std::mem::swap(&mut self.image, image);
+    }
+
     /// Solves A x = r from x = 0. `inverse` is one over A's diagonal, 0 where x stays 0; `residual` becomes r − A x.
     pub fn solve(
         &mut self,

@@ -70,6 +70,11 @@ pub struct Iterative {
 }
 
 impl Iterative {
+    /// Exchanges room for a direction and for A times it with vectors that nobody reads meanwhile.
+    pub fn lend(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
+        self.conjugate.lend(direction, image);
+    }
+
     /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0 where x stays 0;
     /// `residual` becomes r − A x, as the iterations know it.
     pub fn solve(

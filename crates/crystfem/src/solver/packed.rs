@@ -1,4 +1,4 @@
-//! A matrix for the iterations alone, where rows are unequal: entries combined for one step, in single precision, eight rows side by side.
+//! A matrix for the iterations alone, where most rows are distinct: entries combined for one step, in single precision, eight rows side by side.
 //!
 //! Iterations on unequal rows take as long as reading them from memory does. Entries beside the diagonal are rounded to f32, and the diagonal
 //! takes what that leaves, so that sums of rows stay those of f64. The energy xᵀAx is then that of A to about 2⁻²⁴ in long and short
@@ -61,6 +61,11 @@ impl Packed {
     /// Makes it of these rows, as far as it is not yet; false where no rows are packed.
     pub fn update(&mut self, rows: &Rows, weights: [f64; 2]) -> bool {
         let factors = weights.map(f64::to_bits);
+        // few distinct rows stay in caches as they are
+        if rows.are_few() {
+            *self = Self::default();
+            return false;
+        }
         let made_for = Some((rows.versions(), factors));
         if self.made_for != made_for {
             self.items.resize_with(rows.items(), Kept::default);

@@ -46,7 +46,7 @@ pub struct Added {
 
 /// What of a problem never changes, as building needs it.
 pub struct Plan {
-    numbering: Numbering,
+    pub(super) numbering: Numbering,
     around: Around,
     /// Class of each element.
     kinds: Vec<u16>,
@@ -149,7 +149,6 @@ impl System {
         nodal.weighed = nodal.energies || plan.kinds.contains(&OWN);
         let mut system = Self {
             elements: 0,
-            nodes: Vec::new(),
             equation: vec![NONE; problem.mesh.points.len()],
             rows: Rows::new(consistent),
             capacity: Vec::new(),
@@ -171,22 +170,22 @@ impl System {
 
     /// Elements of an equation's node that are born, ascending, and its number in each.
     pub fn around(&self, equation: u32, born: &[u32]) -> impl Iterator<Item = (u32, usize)> {
-        self.plan.around.of(self.nodes[equation as usize], born)
+        self.plan.around.of(self.nodes()[equation as usize], born)
     }
 
     /// ρV of a point at a node, kg.
     pub fn mass(&self, problem: &Problem, born: &[u32], equation: usize, point: usize) -> f64 {
-        let Nodal { birth, material, mass, weighed, .. } = &self.nodal;
+        let Nodal { birth, material, mass, weighed, like, .. } = &self.nodal;
         if *weighed {
             return mass[point];
         }
-        let density = problem.materials[usize::from(material[point])].density();
         let mut sum = 0.0;
         for (element, corner) in self.around(equation as u32, born) {
-            let own = (born[element as usize], problem.material_of[element as usize]);
+            let own = usize::from(problem.material_of[element as usize]);
+            let key = (born[element as usize], like[own]);
             let class = self.plan.classes.get(usize::from(self.plan.kinds[element as usize]));
-            if let Some(class) = class.filter(|_| own == (birth[point], material[point])) {
-                sum += density * class.volumes[corner];
+            if let Some(class) = class.filter(|_| key == (birth[point], material[point])) {
+                sum += problem.materials[own].density() * class.volumes[corner];
             }
         }
         sum
@@ -206,7 +205,6 @@ impl System {
     ) -> Result<Added, Error> {
         let (mesh, old) = (&problem.mesh, self.size());
         let size = self.plan.numbering.end(births);
-        self.nodes.extend_from_slice(&self.plan.numbering.nodes[old..size]);
         self.capacity.resize(size, 0.0);
         self.free.resize(size, 0.0);
         let mut touched = Touched::new(size);
@@ -237,7 +235,7 @@ impl System {
         if old == 0 {
             ring.extend_from_slice(new);
         } else {
-            let around = |&e: &u32| self.plan.around.of(self.nodes[e as usize], born);
+            let around = |&e: &u32| self.plan.around.of(self.nodes()[e as usize], born);
             ring.extend(touched.list.iter().flat_map(around).map(|(element, _)| element));
             ring.sort_unstable();
             ring.dedup();
@@ -245,12 +243,14 @@ impl System {
         added.visited = ring.len() as u64;
         self.elements += new.len();
         self.connect(mesh, born, size, &touched);
-        let Self { plan, nodes, nodal, .. } = self;
+        let Self { plan, nodal, .. } = self;
         if behaviours.iter().any(Behaviour::nodal) {
+            let like = nodal.like.clone();
             added.nodal = nodal.replace(size, &touched.list, |equation, keys| {
-                for (element, _) in plan.around.of(nodes[equation as usize], born) {
-                    let key = (born[element as usize], problem.material_of[element as usize]);
-                    if behaviours[usize::from(key.1)].nodal() && !keys.contains(&key) {
+                for (element, _) in plan.around.of(plan.numbering.nodes[equation as usize], born) {
+                    let material = usize::from(problem.material_of[element as usize]);
+                    let key = (born[element as usize], like[material]);
+                    if behaviours[material].nodal() && !keys.contains(&key) {
                         keys.push(key);
                     }
                 }
@@ -268,7 +268,7 @@ impl System {
         }
         self.act(problem, born, &ring, &touched, &volumes);
         for &equation in &fresh {
-            if let Some(&condition) = self.plan.held.get(&self.nodes[equation as usize]) {
+            if let Some(&condition) = self.plan.held.get(&self.nodes()[equation as usize]) {
                 self.fixed.push((equation, condition));
                 self.free[equation as usize] = 0.0;
             }
@@ -282,10 +282,10 @@ impl System {
 
     /// Rows of the equations that are touched.
     fn connect(&mut self, mesh: &Mesh, born: &[u32], size: usize, touched: &Touched) {
-        let Self { rows, plan, nodes, equation, .. } = self;
-        let Plan { around, kinds, classes, .. } = plan;
+        let Self { rows, plan, equation, .. } = self;
+        let Plan { around, kinds, classes, numbering, .. } = plan;
         rows.update(size, &touched.list, |index, row: &mut Row| {
-            let around = || around.of(nodes[index], born);
+            let around = || around.of(numbering.nodes[index], born);
             // corners, classes and relative nodes of the elements around say all, but for elements of no class
             let repeated = row.begin(around().flat_map(|(element, corner)| {
                 let here = [corner as u32, u32::from(kinds[element as usize])];
@@ -364,7 +364,7 @@ impl System {
                         self.capacity[node as usize] += capacity * volume;
                     }
                     if behaviour.nodal() && self.nodal.weighed {
-                        let key = (born[element as usize], material);
+                        let key = (born[element as usize], self.nodal.like[usize::from(material)]);
                         let density = problem.materials[usize::from(material)].density();
                         for point in self.nodal.of(node as usize) {
                             if (self.nodal.birth[point], self.nodal.material[point]) == key {

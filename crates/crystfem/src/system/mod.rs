@@ -139,8 +139,8 @@ pub struct Evaluation {
     pub rate: Vec<f64>,
     /// ∂E_i/∂T_i, J/K; row sums with consistent capacity; empty where it is that of the system.
     pub capacity: Vec<f64>,
-    /// ∂Q_i/∂T_i of surfaces, W/K; with consistent capacity see `faces`.
-    pub conductance: Vec<f64>,
+    /// Equations with ∂Q_i/∂T_i of a surface, W/K, which add up; with consistent capacity see `faces`.
+    pub conductance: Vec<(u32, f64)>,
     /// ∂Q/∂T of surfaces with consistent capacity.
     pub faces: FaceMatrices,
     /// Heat that goes through surfaces and sources, W.
@@ -165,8 +165,6 @@ impl Evaluation {
 pub struct System {
     /// Number of elements.
     pub elements: usize,
-    /// Node of the mesh of each equation, also of those out of use, which are not free and have no capacity.
-    pub nodes: Vec<u32>,
     /// Equation of each node of the mesh, or [`NONE`].
     pub equation: Vec<u32>,
     /// K, and M where it is consistent.
@@ -197,7 +195,12 @@ pub struct System {
 impl System {
     /// Number of equations, those out of use included.
     pub fn size(&self) -> usize {
-        self.nodes.len()
+        self.capacity.len()
+    }
+
+    /// Node of the mesh of each equation, also of those out of use, which are not free and have no capacity.
+    pub fn nodes(&self) -> &[u32] {
+        &self.plan.numbering.nodes[..self.size()]
     }
 
     /// Whether no Newton iteration is needed.
@@ -216,7 +219,7 @@ impl System {
             if let crate::boundary::Condition::Temperature { value, .. } =
                 &problem.conditions[condition as usize]
             {
-                let node = self.nodes[equation as usize];
+                let node = self.nodes()[equation as usize];
                 temperature[equation as usize] = value.at(problem.mesh.points[node as usize], time);
             }
         }
@@ -234,7 +237,7 @@ impl System {
         out: &mut Evaluation,
     ) -> Result<(), Error> {
         let size = self.size();
-        for field in [&mut out.change, &mut out.rate, &mut out.conductance] {
+        for field in [&mut out.change, &mut out.rate] {
             field.resize(size, 0.0);
         }
         out.step_ratio = None;
@@ -253,7 +256,7 @@ impl System {
         if self.nodal.coupled || !self.general.is_empty() {
             out.capacity.extend_from_slice(&self.capacity);
         }
-        out.conductance.fill(0.0);
+        out.conductance.clear();
         // the others
         self.nodal.evaluate(problem, at, &old.nodal, out)?;
         if !self.general.is_empty() {
@@ -262,7 +265,7 @@ impl System {
         }
         self.generation += u64::from(self.surfaces.varies(problem, [self.evaluated_at, at.time]));
         self.evaluated_at = at.time;
-        self.surfaces.evaluate(problem, &self.nodes, at, out);
+        self.surfaces.evaluate(problem, &self.plan.numbering.nodes, at, out);
         Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! Material points at nodes: one for each node, material and birth, for materials with constant conductivity.
 //!
 //! All corners of elements of one material that were born together have one temperature history at a node, hence one
-//! state; a mesh of hexahedra needs an eighth of the calls that its Gauss points would need.
+//! state, whatever parts of these elements the material fills; a mesh of hexahedra needs an eighth of the calls that its Gauss points would need.
 
 use super::vector::{CHUNK, items};
 use super::{At, Behaviour, Evaluation, Moves, NONE, Points};
@@ -18,7 +18,7 @@ use std::sync::Arc;
 pub struct Nodal {
     /// First point of each node, and the number of points.
     pub starts: Vec<u32>,
-    /// Material of each point.
+    /// Material of each point, one of `like`.
     pub material: Vec<u16>,
     /// Birth of each point.
     pub birth: Vec<u32>,
@@ -38,6 +38,8 @@ pub struct Nodal {
     pub laws: Vec<Crystallization>,
     /// See `laws`.
     pub law_of: Vec<Option<u16>>,
+    /// Of each material the first one that has the same states, whatever part of the elements it fills: they share points.
+    pub like: Vec<u16>,
 }
 
 /// Room for one work item of [`Nodal::follow`].
@@ -65,7 +67,12 @@ impl Nodal {
             }) as u16)
         };
         let law_of = problem.materials.iter().zip(behaviours).map(&mut law).collect();
-        Self { laws, law_of, ..Self::default() }
+        let whole = |material: &Arc<dyn ThermalMaterial>| {
+            Arc::as_ptr(material.filling().unwrap_or(material)).cast::<()>()
+        };
+        let first = |own| problem.materials.iter().position(|other| whole(other) == whole(own));
+        let like = problem.materials.iter().map(|own| first(own).unwrap_or(0) as u16).collect();
+        Self { laws, law_of, like, ..Self::default() }
     }
 
     /// Whether there is none.

@@ -1,8 +1,8 @@
-//! The conduction matrix (and the consistent capacity matrix) row by row, each distinct row stored once.
+//! The conduction matrix (and the consistent capacity matrix) row by row, each distinct list of distances and of values stored once.
 //!
-//! A row is a list of (column − row, value). On a mesh with lines of equal elements most consecutive rows are equal;
+//! A row is a list of distances, column − row, and a list of values. On a mesh with lines of equal elements most consecutive rows are equal;
 //! a run of them is one segment, y_i = Σ_k v_k x_{i+o_k}, a stencil without any indices to gather. Elsewhere this is
-//! plain compressed rows. Each row is written once: no colouring and no sums between threads, so the bits do not
+//! plain compressed rows: cells that a path fills in part have few distinct lists, which caches hold. Each row is written once: no colouring and no sums between threads, so the bits do not
 //! depend on them; gathering costs nothing over scattering because a stencil has 27 products where the elements
 //! around a node have 64.
 
@@ -13,20 +13,23 @@ use super::vector::{CHUNK, items};
 use product::{Both, Product};
 use pulp::Arch;
 use rayon::prelude::*;
-use stencils::{Finder, Stencils};
+use stencils::{Entries, Stencil, Stencils};
 
-/// Consecutive equal rows, within one work item.
+/// Consecutive equal rows of one work item; the first is counted within it.
 #[derive(Clone, Copy, Debug)]
 struct Segment {
-    start: u32,
-    length: u32,
-    stencil: u32,
+    start: u16,
+    length: u16,
+    stencil: Stencil,
 }
 
 /// One row under construction.
 #[derive(Debug, Default)]
 pub struct Row {
     entries: Vec<(i32, f64, f64)>,
+    /// The same, sorted, list by list.
+    offsets: Vec<i32>,
+    values: [Vec<f64>; 2],
     /// Whether the row has entries that are set later, so that it cannot be shared.
     pub own: bool,
     key: Vec<u32>,
@@ -51,6 +54,19 @@ impl Row {
         self.repeated
     }
 
+    /// Sorts what was added.
+    fn sorted(&mut self, consistent: bool) -> Entries<'_> {
+        let Self { entries, offsets, values: [conduction, capacity], .. } = self;
+        entries.sort_unstable_by_key(|entry| entry.0);
+        offsets.clear();
+        offsets.extend(entries.iter().map(|entry| entry.0));
+        conduction.clear();
+        conduction.extend(entries.iter().map(|entry| entry.1));
+        capacity.clear();
+        capacity.extend(entries.iter().filter(|_| consistent).map(|entry| entry.2));
+        Entries { offsets, conduction, capacity }
+    }
+
     /// Adds to the entry at a distance from the diagonal.
     pub fn add(&mut self, offset: i32, conduction: f64, capacity: f64) {
         match self.entries.iter_mut().find(|entry| entry.0 == offset) {
@@ -71,11 +87,8 @@ pub struct Rows {
     /// Runs of equal rows of each work item, as long as they can be.
     segments: Vec<Vec<Segment>>,
     stencils: Stencils,
-    finder: Finder,
-    /// Stencil of each row that has one of its own; empty where no row has.
-    own: Vec<u32>,
-    /// Entries of stencils of their own that no row has any more.
-    dead: usize,
+    /// Stencil of each row that has values of its own; empty where no row has.
+    own: Vec<Stencil>,
     /// Values without what is added in each evaluation.
     base: Option<[Vec<f64>; 2]>,
     /// Counts changes of the pattern, and of values.
@@ -107,10 +120,12 @@ impl Diagonal {
 
 /// Rows of a run on average where runs count as short.
 const MOST_ALONE: usize = 4;
-/// No stencil of its own.
-const SHARED: u32 = u32::MAX;
-/// The part of the entries that may be dead.
+/// A list that has no name yet.
+const UNNAMED: u32 = u32::MAX;
+/// The part of the entries that may be of stencils that no row has.
 const MOST_DEAD: usize = 4;
+/// Rows for each distinct one at least where distinct ones count as few.
+const FEW: usize = 4;
 
 /// New rows of one work item: runs with stencils of their own numbering, and whether each is a row's own.
 struct Part {
@@ -125,10 +140,8 @@ impl Rows {
             size: 0,
             consistent,
             segments: Vec::new(),
-            stencils: Stencils::new(),
-            finder: Finder::default(),
+            stencils: Stencils::default(),
             own: Vec::new(),
-            dead: 0,
             base: None,
             versions: [0; 2],
             changed: Vec::new(),
@@ -157,8 +170,13 @@ impl Rows {
 
     /// Whether most rows of a work item stand alone.
     pub fn is_unequal(&self, item: usize) -> bool {
-        let rows: u32 = self.segments[item].iter().map(|segment| segment.length).sum();
-        MOST_ALONE * self.segments[item].len() > rows as usize
+        let rows = (self.size - item * CHUNK).min(CHUNK);
+        MOST_ALONE * self.segments[item].len() > rows
+    }
+
+    /// Whether the distinct rows are so few that caches hold them, however they alternate.
+    pub fn are_few(&self) -> bool {
+        FEW * self.stencils.values.used <= self.size
     }
 
     /// Of `size` rows; `fill` begins each row and says what is in it.
@@ -172,7 +190,8 @@ impl Rows {
     /// Makes these rows, ascending, and empty ones up to `size`; `fill` begins each row and says what is in it. Other rows stay. What it
     /// leaves depends on the rows alone, not on how they came about, but for stencils that no row has any more.
     pub fn update(&mut self, size: usize, changed: &[u32], fill: impl Fn(usize, &mut Row) + Sync) {
-        if self.dead * MOST_DEAD > self.stencils.offsets.len() {
+        let Stencils { values, patterns, .. } = &self.stencils;
+        if values.dead + patterns.dead > (values.entries() / MOST_DEAD).max(self.size) {
             self.compact();
         }
         self.versions = self.versions.map(|version| version + 1);
@@ -185,7 +204,7 @@ impl Rows {
         self.segments.resize_with(items(self.size), Vec::new);
         self.changed.resize(self.segments.len(), self.versions);
         if !self.own.is_empty() || parts.iter().any(|part| part.runs.iter().any(|run| run.1)) {
-            self.own.resize(self.size, SHARED);
+            self.own.resize(self.size, Stencil::NONE);
         }
         let mut of = Vec::with_capacity(CHUNK);
         let mut parts = groups.iter().map(|group| group[0] as usize / CHUNK).zip(parts).peekable();
@@ -198,92 +217,121 @@ impl Rows {
             }
             self.changed[item] = self.versions;
             of.clear();
-            of.resize(end - first, SHARED);
+            of.resize(end - first, Stencil::NONE);
             for segment in &self.segments[item] {
-                of[segment.start as usize - first..][..segment.length as usize].fill(segment.stencil);
+                of[segment.rows()].fill(segment.stencil);
+                self.stencils.patterns.release(segment.stencil.pattern, segment.length);
+                self.stencils.values.release(segment.stencil.values, segment.length);
             }
             if let Some(part) = part {
-                let mut global = vec![SHARED; part.stencils.count()];
+                let mut patterns = vec![UNNAMED; part.stencils.patterns.count()];
+                let mut values = vec![UNNAMED; part.stencils.values.count()];
                 for (run, own) in &part.runs {
-                    let name = &mut global[run.stencil as usize];
-                    if *name == SHARED {
-                        let entries = part.stencils.entries(run.stencil);
-                        *name = match own {
-                            true => self.stencils.push(&entries, self.consistent),
-                            false => self.finder.find_or_add(&mut self.stencils, &entries, self.consistent),
-                        };
+                    let entries = part.stencils.entries(run.stencil);
+                    let pattern = &mut patterns[run.stencil.pattern as usize];
+                    if *pattern == UNNAMED {
+                        *pattern = self.stencils.pattern(entries.offsets);
                     }
-                    of[run.start as usize - first..][..run.length as usize].fill(*name);
-                    if let Some(place) = self.own.get_mut(run.start as usize)
+                    let values = &mut values[run.stencil.values as usize];
+                    if *values == UNNAMED {
+                        *values = self.stencils.list(entries, *own);
+                    }
+                    let stencil = Stencil { pattern: *pattern, values: *values };
+                    of[run.rows()].fill(stencil);
+                    if let Some(place) = self.own.get_mut(first + usize::from(run.start))
                         && *own
                     {
-                        let old = std::mem::replace(place, *name);
-                        self.dead += if old == SHARED { 0 } else { self.stencils.range(old).len() };
+                        *place = stencil;
                     }
                 }
             }
             // rows out of use
-            if of.contains(&SHARED) {
-                let empty = self.finder.find_or_add(&mut self.stencils, &[], false);
-                of.iter_mut().filter(|stencil| **stencil == SHARED).for_each(|stencil| *stencil = empty);
+            if of.contains(&Stencil::NONE) {
+                let none = Entries { offsets: &[], conduction: &[], capacity: &[] };
+                let empty = self.stencils.find_or_add(none, false);
+                of.iter_mut()
+                    .filter(|stencil| **stencil == Stencil::NONE)
+                    .for_each(|stencil| *stencil = empty);
             }
-            let runs = of.chunk_by(|a, b| a == b);
             self.segments[item].clear();
-            let mut start = first as u32;
-            for run in runs {
-                let length = run.len() as u32;
-                self.segments[item].push(Segment { start, length, stencil: run[0] });
-                start += length;
+            let mut start = 0;
+            for run in of.chunk_by(|a, b| a == b) {
+                let segment = Segment { start, length: run.len() as u16, stencil: run[0] };
+                self.hold(segment);
+                self.segments[item].push(segment);
+                start += segment.length;
             }
             self.segments[item].shrink_to_fit();
         }
     }
 
-    /// Drops stencils that no row has.
-    fn compact(&mut self) {
-        let old = std::mem::replace(&mut self.stencils, Stencils::new());
-        let base = self.base.take();
-        self.finder = Finder::default();
-        let mut names = vec![SHARED; old.count()];
-        let mut kept = base.as_ref().map(|_| [Vec::new(), Vec::new()]);
-        for segment in self.segments.iter_mut().flatten() {
-            let name = &mut names[segment.stencil as usize];
-            if *name == SHARED {
-                let entries = old.entries(segment.stencil);
-                let own = self.own.get(segment.start as usize).is_some_and(|&own| own != SHARED);
-                *name = match own {
-                    true => self.stencils.push(&entries, self.consistent),
-                    false => self.finder.find_or_add(&mut self.stencils, &entries, self.consistent),
-                };
-                for (kept, base) in kept.iter_mut().flatten().zip(base.iter().flatten()) {
-                    kept.extend_from_slice(base.get(old.range(segment.stencil)).unwrap_or_default());
-                }
-            }
-            segment.stencil = *name;
-            if let Some(own) = self.own.get_mut(segment.start as usize).filter(|own| **own != SHARED) {
-                *own = *name;
-            }
-        }
-        (self.base, self.dead) = (kept, 0);
+    fn hold(&mut self, Segment { length, stencil, .. }: Segment) {
+        self.stencils.patterns.hold(stencil.pattern, length);
+        self.stencils.values.hold(stencil.values, length);
     }
 
-    /// Distinct rows stored, segments of equal rows, and stored entries.
+    /// Drops lists that no row has.
+    fn compact(&mut self) {
+        let old = std::mem::take(&mut self.stencils);
+        let base = self.base.take();
+        let mut patterns = vec![UNNAMED; old.patterns.count()];
+        let mut values = vec![UNNAMED; old.values.count()];
+        let mut kept = base.as_ref().map(|_| [Vec::new(), Vec::new()]);
+        for item in 0..self.segments.len() {
+            for at in 0..self.segments[item].len() {
+                let Segment { start, stencil, .. } = self.segments[item][at];
+                let own = self.own.get_mut(item * CHUNK + usize::from(start));
+                let own = own.filter(|own| **own != Stencil::NONE);
+                let entries = old.entries(stencil);
+                let pattern = &mut patterns[stencil.pattern as usize];
+                if *pattern == UNNAMED {
+                    *pattern = self.stencils.pattern(entries.offsets);
+                }
+                let values = &mut values[stencil.values as usize];
+                if *values == UNNAMED {
+                    *values = self.stencils.list(entries, own.is_some());
+                    for (kept, base) in kept.iter_mut().flatten().zip(base.iter().flatten()) {
+                        kept.extend_from_slice(
+                            base.get(old.values.range(stencil.values)).unwrap_or_default(),
+                        );
+                    }
+                }
+                let stencil = Stencil { pattern: *pattern, values: *values };
+                own.into_iter().for_each(|own| *own = stencil);
+                self.segments[item][at].stencil = stencil;
+                self.hold(self.segments[item][at]);
+            }
+        }
+        self.base = kept;
+    }
+
+    /// Lists of values that rows have, segments of equal rows, and entries of K in these lists: of the rows alone, not of how they came about.
     pub fn stored(&self) -> [usize; 3] {
-        [self.stencils.count(), self.segments.iter().map(Vec::len).sum(), self.stencils.offsets.len()]
+        let Stencils { values, .. } = &self.stencils;
+        [values.used, self.segments.iter().map(Vec::len).sum(), values.entries() - values.dead]
+    }
+
+    /// Bytes of what is stored.
+    pub fn bytes(&self) -> usize {
+        let segments: usize = self.segments.iter().map(Vec::len).sum();
+        segments * size_of::<Segment>() + self.own.len() * size_of::<Stencil>() + self.stencils.bytes()
     }
 
     /// Adds to an entry of a row of its own; without effect elsewhere.
     pub fn add(&mut self, row: usize, column: usize, conduction: f64, capacity: f64) {
-        let Some(&stencil) = self.own.get(row).filter(|&&stencil| stencil != SHARED) else { return };
-        let range = self.stencils.range(stencil);
+        let Some(&Stencil { pattern, values }) = self.own.get(row).filter(|own| **own != Stencil::NONE)
+        else {
+            return;
+        };
+        let start = self.stencils.values.range(values).start;
         let offset = column as i64 - row as i64;
         self.versions[1] += 1;
         self.changed[row / CHUNK][1] = self.versions[1];
-        if let Ok(at) = self.stencils.offsets[range.clone()].binary_search_by_key(&offset, |&o| i64::from(o))
-        {
-            self.stencils.conduction[range.start + at] += conduction;
+        let offsets = self.stencils.offsets(pattern);
+        if let Ok(at) = offsets.binary_search_by_key(&offset, |&o| i64::from(o)) {
+            self.stencils.conduction[start + at] += conduction;
             if !self.stencils.capacity.is_empty() {
-                self.stencils.capacity[range.start + at] += capacity;
+                self.stencils.capacity[start + at] += capacity;
             }
         }
     }
@@ -311,25 +359,23 @@ impl Rows {
     pub fn add_diagonal(&self, weights: [f64; 2], to: &mut [f64]) {
         to.par_chunks_mut(CHUNK).enumerate().for_each(|(item, to)| {
             for segment in &self.segments[item] {
-                let start = segment.start as usize - item * CHUNK;
                 let value = self.diagonal(segment, weights);
-                to[start..start + segment.length as usize].iter_mut().for_each(|to| *to += value);
+                to[segment.rows()].iter_mut().for_each(|to| *to += value);
             }
         });
     }
 
     /// The largest of `of(row, K_ii)`.
     pub fn largest(&self, of: impl Fn(usize, f64) -> f64 + Sync) -> f64 {
-        let item = |segments: &Vec<Segment>| {
+        let item = |(item, segments): (usize, &Vec<Segment>)| {
             let mut most = f64::NEG_INFINITY;
             for segment in segments {
                 let value = self.diagonal(segment, [0.0, 1.0]);
-                let start = segment.start as usize;
-                (start..start + segment.length as usize).for_each(|row| most = most.max(of(row, value)));
+                segment.rows().for_each(|row| most = most.max(of(item * CHUNK + row, value)));
             }
             most
         };
-        self.segments.par_iter().map(item).reduce(|| f64::NEG_INFINITY, f64::max)
+        self.segments.par_iter().enumerate().map(item).reduce(|| f64::NEG_INFINITY, f64::max)
     }
 
     fn diagonal(&self, segment: &Segment, weights: [f64; 2]) -> f64 {
@@ -343,12 +389,19 @@ impl Rows {
 
     /// Entries (column, value) of a row of `capacity`·M + `conduction`·K, columns ascending.
     pub fn row(&self, row: usize, weights: [f64; 2]) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let segments = self.segments.get(row / CHUNK).map_or(&[][..], Vec::as_slice);
-        let segment = segments.partition_point(|s| s.start as usize <= row).saturating_sub(1);
-        let range = segments.get(segment).map_or(0..0, |s| self.stencils.range(s.stencil));
-        range.map(move |at| {
-            (row.wrapping_add_signed(self.stencils.offsets[at] as isize), self.value(at, weights))
-        })
+        let stencil = self.segment(row).map(|segment| segment.stencil);
+        let offsets = stencil.map_or(&[][..], |stencil| self.stencils.offsets(stencil.pattern));
+        let start = stencil.map_or(0, |stencil| self.stencils.values.range(stencil.values).start);
+        (start..)
+            .zip(offsets)
+            .map(move |(at, &offset)| (row.wrapping_add_signed(offset as isize), self.value(at, weights)))
+    }
+
+    /// The run that a row belongs to.
+    fn segment(&self, row: usize) -> Option<&Segment> {
+        let segments = self.segments.get(row / CHUNK)?;
+        let next = segments.partition_point(|segment| usize::from(segment.start) <= row % CHUNK);
+        segments.get(next.saturating_sub(1))
     }
 
     fn value(&self, at: usize, [capacity, conduction]: [f64; 2]) -> f64 {
@@ -406,30 +459,33 @@ impl Rows {
     }
 }
 
+impl Segment {
+    /// Its rows, within the work item.
+    #[inline(always)]
+    fn rows(self) -> std::ops::Range<usize> {
+        let start = self.start as usize;
+        start..start + self.length as usize
+    }
+}
+
 impl Part {
     /// Of rows of one work item, ascending.
     fn new(changed: &[u32], consistent: bool, fill: &(impl Fn(usize, &mut Row) + Sync)) -> Self {
-        let mut part = Self { runs: Vec::new(), stencils: Stencils::new() };
-        let (mut finder, mut row) = (Finder::default(), Row::default());
+        let mut part = Self { runs: Vec::new(), stencils: Stencils::default() };
+        let mut row = Row::default();
         for &index in changed {
             fill(index as usize, &mut row);
-            if !row.repeated {
-                row.entries.sort_unstable_by_key(|entry| entry.0);
-            }
-            let last = part.runs.last_mut().filter(|last| !row.own && !last.1);
-            let same = last.filter(|last| row.repeated || part.stencils.equals(last.0.stencil, &row.entries));
-            match same {
-                Some((last, _)) if last.start + last.length == index => last.length += 1,
-                Some(&mut (last, own)) => {
-                    part.runs.push((Segment { start: index, length: 1, stencil: last.stencil }, own));
+            let start = (index as usize % CHUNK) as u16;
+            let (repeated, own) = (row.repeated, row.own);
+            let stencil = match part.runs.last() {
+                Some((last, _)) if repeated => last.stencil,
+                _ => part.stencils.find_or_add(row.sorted(consistent), own),
+            };
+            match part.runs.last_mut() {
+                Some((last, false)) if last.stencil == stencil && last.start + last.length == start => {
+                    last.length += 1;
                 }
-                None => {
-                    let stencil = match row.own {
-                        true => part.stencils.push(&row.entries, consistent),
-                        false => finder.find_or_add(&mut part.stencils, &row.entries, consistent),
-                    };
-                    part.runs.push((Segment { start: index, length: 1, stencil }, row.own));
-                }
+                _ => part.runs.push((Segment { start, length: 1, stencil }, own)),
             }
         }
         part
@@ -437,55 +493,4 @@ impl Part {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// −1, 2.5, −1 on a line of 10 000 with one different row, against the plain sum.
-    #[test]
-    fn a_line_has_few_stencils_and_the_right_product() {
-        let size = 10_000;
-        let values = |row: usize| if row == 5000 { [-2.0, 7.0, -3.0] } else { [-1.0, 2.5, -1.0] };
-        let mut rows = Rows::build(size, true, |row, out| {
-            out.begin(std::iter::empty());
-            let v = values(row);
-            for (k, offset) in [-1_i32, 0, 1].into_iter().enumerate() {
-                if (0..size as i64).contains(&(row as i64 + i64::from(offset))) {
-                    out.add(offset, v[k], 0.5 * v[k]);
-                }
-            }
-            out.own = row == 77;
-        });
-        assert_eq!(rows.stored()[0], 5);
-        rows.add(77, 78, 10.0, 20.0);
-        rows.add(78, 79, 1e9, 1e9);
-        let x: Vec<f64> = (0..size).map(|k| ((k * k) as f64).sin()).collect();
-        let d: Vec<f64> = (0..size).map(|k| 1.0 + (k as f64).cos()).collect();
-        let mut y = vec![0.0; size];
-        let dot = rows.product(Some(&d), [2.0, 3.0], &x, &mut y);
-        let mut exact_dot = 0.0;
-        for row in 0..size {
-            let v = values(row);
-            let mut sum = d[row] * x[row];
-            for k in 0..3 {
-                if let Some(other) = (row + k).checked_sub(1).filter(|&other| other < size) {
-                    sum += 4.0 * v[k] * x[other];
-                }
-            }
-            if row == 77 {
-                sum += 70.0 * x[78];
-            }
-            exact_dot += x[row] * sum;
-            // three products of order 10
-            assert!((y[row] - sum).abs() < 1e-13, "{row}");
-        }
-        assert!((dot - exact_dot).abs() < 1e-9);
-        assert_eq!(rows.row(77, [0.0, 1.0]).collect::<Vec<_>>(), [(76, -1.0), (77, 2.5), (78, 9.0)]);
-        let mut diagonal = vec![1.0; size];
-        rows.add_diagonal([2.0, 3.0], &mut diagonal);
-        assert_eq!(
-            [diagonal[4999], diagonal[5000]],
-            [1.0 + 3.0 * 2.5 + 2.0 * 1.25, 1.0 + 3.0 * 7.0 + 2.0 * 3.5]
-        );
-        assert_eq!(rows.largest(|row, value| if row < 100 { row as f64 } else { value }), 99.0);
-    }
-}
+mod tests;

@@ -363,7 +363,7 @@ impl Part {
         for &(equation, area) in &self.nodes {
             let (q, slope) = loss(at.temperature[equation as usize]);
             out.rate[equation as usize] += area * q;
-            out.conductance[equation as usize] += area * slope;
+            out.conductance.push((equation, area * slope));
             total += area * q;
         }
         total = self.faces.iter().fold(total, |total, face| face.lose(at, out, &loss, total));

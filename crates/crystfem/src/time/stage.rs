@@ -270,9 +270,10 @@ impl Stages {
             whole.fill(0.0);
         } else {
             self.diagonal.resize(size, 0.0);
-            blend(&mut self.diagonal, capacity, conductance, |_, capacity, conductance| {
-                capacity + weight * conductance
-            });
+            self.diagonal.copy_from_slice(capacity);
+            for &(equation, conductance) in conductance {
+                self.diagonal[equation as usize] += weight * conductance;
+            }
             whole.copy_from_slice(&self.diagonal);
         }
         if system.is_linear() || !system.general.is_empty() {
@@ -295,12 +296,8 @@ impl Stages {
         }
         // rounding of the residual: 1e-14 of a temperature of 500 K, everywhere
         self.floor = 5e-12_f64.powi(2) * dot(&system.free, whole);
-        blend(
-            whole,
-            &system.free,
-            &system.free,
-            |whole, free, _| if free == 0.0 { 0.0 } else { 1.0 / whole },
-        );
+        let inverted = |whole: f64, free: f64, _: f64| if free == 0.0 { 0.0 } else { 1.0 / whole };
+        blend(whole, &system.free, &system.free, inverted);
         self.capacity = dot(&system.free, capacity).max(f64::MIN_POSITIVE);
         self.sensitivity = self.column_sums(system, weight, &system.free);
         self.made_for = made_for;
@@ -323,7 +320,7 @@ impl Stages {
         }
         if self.levels_for != Some(system.build) || self.iterative.multigrid.is_none() {
             let operator = operator(system, &self.diagonal, weight, &self.evaluation);
-            let place = |k: usize| problem.mesh.points[system.nodes[k] as usize];
+            let place = |k: usize| problem.mesh.points[system.nodes()[k] as usize];
             self.iterative.multigrid = Some(Multigrid::new(&operator, &system.free, place));
             (self.levels_for, self.set_for) = (Some(system.build), None);
             work.levels += 1;
@@ -355,6 +352,8 @@ impl Stages {
         work: &mut Work,
     ) -> Result<(), Error> {
         let size = system.size();
+        // both are in the residual, and evaluated anew after the correction
+        self.iterative.lend(&mut self.evaluation.change, &mut self.evaluation.rate);
         self.raise(problem, system, stage.weight, work);
         self.correction.resize(size, 0.0);
         combine(&mut self.residual, |k, residual| -system.free[k] * residual);
@@ -369,7 +368,7 @@ impl Stages {
         let factored = self.method == Method::Factors && system.is_symmetric() && {
             let made_for = Some((system.generation, stage.weight.to_bits()));
             if self.analysed_for != Some(system.build) {
-                let place = |e: u32| problem.mesh.points[system.nodes[e as usize] as usize];
+                let place = |e: u32| problem.mesh.points[system.nodes()[e as usize] as usize];
                 self.factors = Direct::analyse(&operator, &system.free, place);
                 (self.analysed_for, self.factored_for) = (Some(system.build), None);
             }
@@ -431,6 +430,7 @@ impl Stages {
                 *correction += shift * free;
             }
         }
+        self.iterative.lend(&mut self.evaluation.change, &mut self.evaluation.rate);
         Ok(())
     }
 
@@ -491,7 +491,7 @@ fn operator<'a>(
 fn not_finite(problem: &Problem, system: &System, stage: &Stage, found: &[f64]) -> Error {
     let place = match found.iter().position(|t| !t.is_finite()) {
         Some(k) => {
-            let node = system.nodes[k];
+            let node = system.nodes()[k];
             format!("node {node} at {:?} m", problem.mesh.points[node as usize])
         }
         None => "some node".into(),

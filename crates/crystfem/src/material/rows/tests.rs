@@ -75,3 +75,25 @@ fn rows_are_points() {
         }
     }
 }
+
+/// Increments that are not finite, after others in pieces and in a shorter item: z tells of them, and others do not notice.
+#[test]
+fn increments_that_are_not_finite() {
+    for melting in [Some(Melting::PA12), None] {
+        let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1).unwrap();
+        let law = Crystallization { kinetics, melting };
+        let mut scratch = Scratch::default();
+        let mut advance = |start: &[f64], end: &[f64]| {
+            let node: Vec<u32> = (0..start.len() as u32).collect();
+            let mut z = vec![0.5; start.len()];
+            law.advance_all(Increments { start, end, dt: 0.5 }, &node, &mut z, &mut scratch);
+            z
+        };
+        let long = advance(&[380.0, 390.0, 400.0, 410.0, 300.0], &[450.0, 320.0, 460.0, 310.0, 480.0]);
+        assert!(long.iter().all(|z| z.is_finite()));
+        let (nan, infinite) = (f64::NAN, f64::INFINITY);
+        let z = advance(&[380.0, nan, 400.0, 410.0], &[nan, 320.0, infinite, 310.0]);
+        assert_eq!(z.iter().map(|z| z.is_nan()).collect::<Vec<_>>(), [true, true, true, false]);
+        assert_eq!(z[3], long[3]);
+    }
+}

@@ -1,5 +1,6 @@
 //! Rows times a vector: runs of equal rows by vectors of the processor, others one by one.
 
+use super::stencils::Stencil;
 use super::{Rows, Segment};
 use crate::system::vector::dot_simd;
 use pulp::{Simd, WithSimd};
@@ -26,18 +27,31 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
         let Self { rows, segments, weights, diagonal, x, y, first } = self;
         let stencils = &rows.stencils;
         for segment in segments {
-            let range = stencils.range(segment.stencil);
-            let (start, length) = (segment.start as usize, segment.length as usize);
+            let Stencil { pattern, values } = segment.stencil;
+            let (range, offsets) = (stencils.values.range(values), stencils.offsets(pattern));
+            let start = first + segment.start as usize;
+            let length = segment.length as usize;
             if length >= S::F64_LANES && range.len() <= MOST_ENTRIES {
                 Runs { rows, segment, diagonal, y: &mut *y, first }.run::<S, FLOW>(simd, weights, x);
             } else {
+                // vectors of four reach one number further than a row whose columns come in threes
+                let threes = stencils.in_threes(pattern)
+                    && stencils.capacity.is_empty()
+                    && range.end < stencils.conduction.len()
+                    && (start + length).wrapping_add_signed(offsets[offsets.len() - 1] as isize) < x.len();
                 for row in start..start + length {
-                    let mut sum = if FLOW {
-                        let offsets = &stencils.offsets[range.clone()];
+                    let mut sum = if threes {
+                        let own = if FLOW { x[row] } else { 0.0 };
+                        weights[1] * in_threes(offsets, &stencils.conduction[range.start..], x, row, own)
+                    } else if FLOW {
                         flow(offsets, &stencils.conduction[range.clone()], x, row)
                     } else {
-                        let other = |at: usize| x[row.wrapping_add_signed(stencils.offsets[at] as isize)];
-                        range.clone().map(|at| rows.value(at, weights) * other(at)).sum()
+                        let mut sum = 0.0;
+                        for k in 0..offsets.len() {
+                            let other = x[row.wrapping_add_signed(offsets[k] as isize)];
+                            sum += rows.value(range.start + k, weights) * other;
+                        }
+                        sum
                     };
                     if let Some(diagonal) = diagonal {
                         sum += diagonal[row] * x[row];
@@ -48,6 +62,22 @@ impl<const FLOW: bool> WithSimd for Product<'_, FLOW> {
         }
         if FLOW { 0.0 } else { dot_simd(simd, &x[first..first + y.len()], y) }
     }
+}
+
+/// Σ v_j (x_j − `own`) of a row whose columns come in threes: vectors of four numbers, whose last one belongs to no sum.
+#[inline(always)]
+fn in_threes(offsets: &[i32], values: &[f64], x: &[f64], row: usize, own: f64) -> f64 {
+    let mut sums = [0.0; 4];
+    let mut at = 0;
+    while at < offsets.len() {
+        let start = row.wrapping_add_signed(offsets[at] as isize);
+        let (other, value) = (&x[start..start + 4], &values[at..at + 4]);
+        for k in 0..4 {
+            sums[k] += value[k] * (other[k] - own);
+        }
+        at += 3;
+    }
+    sums[0] + sums[1] + sums[2]
 }
 
 /// Σ K_ij (x_j − x_i) of a row, in four sums and the rest.
@@ -88,15 +118,16 @@ impl WithSimd for Both<'_> {
         let Self { rows, segments, x, u, flow, stored, first } = self;
         let stencils = &rows.stencils;
         for segment in segments {
-            let range = stencils.range(segment.stencil);
-            let (start, length) = (segment.start as usize, segment.length as usize);
+            let Stencil { pattern, values } = segment.stencil;
+            let (range, offsets) = (stencils.values.range(values), stencils.offsets(pattern));
+            let start = first + segment.start as usize;
+            let length = segment.length as usize;
             if length >= S::F64_LANES && range.len() <= MOST_ENTRIES {
                 let rows_of = |y| Runs { rows, segment, diagonal: None, y, first };
                 rows_of(&mut *flow).run::<S, true>(simd, [0.0, 1.0], x);
                 rows_of(&mut *stored).run::<S, false>(simd, [1.0, 0.0], u);
                 continue;
             }
-            let offsets = &stencils.offsets[range.clone()];
             let conduction = &stencils.conduction[range.clone()][..offsets.len()];
             let capacity = &stencils.capacity[range][..offsets.len()];
             for row in start..start + length {
@@ -138,14 +169,14 @@ impl Runs<'_> {
     fn run<S: Simd, const FLOW: bool>(self, simd: S, weights: [f64; 2], x: &[f64]) {
         let Self { rows, segment, diagonal, y, first } = self;
         let lanes = S::F64_LANES;
-        let range = rows.stencils.range(segment.stencil);
+        let range = rows.stencils.values.range(segment.stencil.values);
         let mut values = [0.0; MOST_ENTRIES];
-        let offsets = &rows.stencils.offsets[range.clone()];
+        let offsets = rows.stencils.offsets(segment.stencil.pattern);
         let values = &mut values[..offsets.len()];
         for (value, at) in values.iter_mut().zip(range) {
             *value = rows.value(at, weights);
         }
-        let mut row = segment.start as usize;
+        let mut row = first + segment.start as usize;
         let end = row + segment.length as usize;
         while row + 4 * lanes <= end {
             block::<S, 4, FLOW>(simd, offsets, values, diagonal, x, y, row, first);
