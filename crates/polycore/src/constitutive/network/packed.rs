@@ -8,6 +8,7 @@
 use super::real::{Lanes, Real};
 use aligned_vec::{AVec, ConstAlign};
 use pulp::Simd;
+use std::ops::Range;
 
 /// Numbers that begin where a cache line does: a vector that lies across two lines costs two loads.
 type Lines<T> = AVec<T, ConstAlign<64>>;
@@ -19,6 +20,7 @@ pub(super) const MOST_COLUMNS: usize = 9;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Packed<T> {
     inputs: usize,
+    outputs: usize,
     padded: usize,
     weights: Lines<T>,
     bias: Lines<T>,
@@ -46,7 +48,22 @@ impl<T: Real> Packed<T> {
         }
         let mut filled = zeros(padded);
         filled[..bias.len()].copy_from_slice(bias);
-        Self { inputs, padded, weights, bias: filled }
+        Self { inputs, outputs, padded, weights, bias: filled }
+    }
+
+    /// Column j of W: its product with the unit vector j.
+    #[inline(always)]
+    pub fn column<S: Simd>(&self, j: usize, out: &mut [T]) {
+        let (weights, out) = (T::vectors::<S>(&self.weights), T::vectors_mut::<S>(out));
+        let in_panel = in_panel::<T, S>();
+        for panel in 0..self.padded / T::PANEL {
+            let row = &weights[(panel * self.inputs + j) * in_panel..][..in_panel];
+            let out = &mut out[panel * in_panel..][..in_panel];
+            #[expect(clippy::manual_memcpy, reason = "a call of memcpy costs more than the copy")]
+            for r in 0..in_panel {
+                out[r] = row[r];
+            }
+        }
     }
 
     /// W x + b for each column of x, b only in the first `biased` of them; columns lie `stride` apart, those of the
@@ -60,32 +77,38 @@ impl<T: Real> Packed<T> {
         (columns, biased): (usize, usize),
         out: &mut [T],
     ) {
+        let all = 0..self.padded / T::PANEL;
         match columns {
-            1 => self.columns::<S, 1>(simd, active, x, stride, biased, out),
-            2..=4 => self.columns::<S, 4>(simd, active, x, stride, biased, out),
-            5 | 6 => self.columns::<S, 6>(simd, active, x, stride, biased, out),
-            // sixteen registers: two vectors of outputs for six columns at most, or loads are the limit
+            1 => self.columns::<S, 1>(simd, active, x, stride, biased, all, out),
+            2..=4 => self.columns::<S, 4>(simd, active, x, stride, biased, all, out),
+            5 | 6 => self.columns::<S, 6>(simd, active, x, stride, biased, all, out),
+            // sixteen registers: two vectors of outputs for six columns at most, or loads are the limit; two panels after one another,
+            // which further columns find in the nearest cache
             _ if in_panel::<T, S>() == 4 => {
-                let mut first = 0;
-                while first < columns {
-                    let (x, out) = (&x[first * stride..], &mut out[first * self.padded..]);
-                    let biased = biased.saturating_sub(first);
-                    match columns - first {
-                        7 => first += self.columns::<S, 6>(simd, active, x, stride, biased, out),
-                        4.. => first += self.columns::<S, 4>(simd, active, x, stride, biased, out),
-                        _ => first += self.columns::<S, 1>(simd, active, x, stride, biased, out),
+                for panel in all.clone().step_by(2) {
+                    let pair = panel..all.end.min(panel + 2);
+                    let mut first = 0;
+                    while first < columns {
+                        let (x, out) = (&x[first * stride..], &mut out[first * self.padded..]);
+                        let (biased, pair) = (biased.saturating_sub(first), pair.clone());
+                        match columns - first {
+                            7 => first += self.columns::<S, 6>(simd, active, x, stride, biased, pair, out),
+                            4.. => first += self.columns::<S, 4>(simd, active, x, stride, biased, pair, out),
+                            _ => first += self.columns::<S, 1>(simd, active, x, stride, biased, pair, out),
+                        }
                     }
                 }
                 columns
             }
-            7 => self.columns::<S, 7>(simd, active, x, stride, biased, out),
-            8 => self.columns::<S, 8>(simd, active, x, stride, biased, out),
-            _ => self.columns::<S, MOST_COLUMNS>(simd, active, x, stride, biased, out),
+            7 => self.columns::<S, 7>(simd, active, x, stride, biased, all, out),
+            8 => self.columns::<S, 8>(simd, active, x, stride, biased, all, out),
+            _ => self.columns::<S, MOST_COLUMNS>(simd, active, x, stride, biased, all, out),
         };
     }
 
-    /// The number of columns.
+    /// A product of some panels; the number of columns.
     #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "what `product` was given, and which part of it")]
     fn columns<S: Simd, const COLUMNS: usize>(
         &self,
         simd: S,
@@ -93,14 +116,14 @@ impl<T: Real> Packed<T> {
         x: &[T],
         stride: usize,
         biased: usize,
+        panels: Range<usize>,
         out: &mut [T],
     ) -> usize {
         let mut lists: [&[T]; COLUMNS] = [&[]; COLUMNS];
         for c in 0..COLUMNS {
             lists[c] = &x[c * stride..c * stride + self.inputs];
         }
-        let panels = self.padded / T::PANEL;
-        let mut panel = 0;
+        let Range { start: mut panel, end: panels } = panels;
         // one column: several panels at a time, to hide the latency of the sums
         if COLUMNS == 1 && in_panel::<T, S>() == 2 {
             while panel + 4 <= panels {
@@ -168,6 +191,8 @@ impl<T: Real> Packed<T> {
                 }
             }
         }
+        // vectors of nothing but padding have no sums
+        let active = if at * lanes < self.outputs { active } else { &[] };
         for &j in active {
             let j = j as usize;
             let mut weight = [[zero; REGISTERS]; PANELS];

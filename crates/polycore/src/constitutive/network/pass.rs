@@ -15,7 +15,7 @@ pub(in crate::constitutive) const BATCH: usize = 8;
 #[derive(Debug, Clone, Default)]
 pub struct Tape<T> {
     widths: Vec<usize>,
-    /// Columns of inputs: the value, then unit vectors; or points.
+    /// Inputs, one column a point.
     input: Vec<T>,
     layers: Vec<Record<T>>,
     /// 0, 1, 2, …
@@ -134,14 +134,7 @@ fn forward<T: Real, S: Simd, const FUSED: bool>(
     let inputs = tape.widths[0];
     let (columns, points) = match want {
         Want::Points { count, .. } => (count, count),
-        Want::Slopes | Want::Curvature => {
-            for i in 0..inputs {
-                for j in 0..inputs {
-                    tape.input[(i + 1) * inputs + j] = if i == j { T::ONE } else { T::ZERO };
-                }
-            }
-            (1 + inputs, 1)
-        }
+        Want::Slopes | Want::Curvature => (1 + inputs, 1),
     };
     for (index, (layer, packed)) in network.layers.iter().zip(&network.packed).enumerate() {
         let (before, after) = tape.layers.split_at_mut(index);
@@ -155,7 +148,16 @@ fn forward<T: Real, S: Simd, const FUSED: bool>(
         // the slopes of a `relu` are 0 where its value is
         let active = find_active(&x[..width], sparse, &tape.all, &mut tape.active);
         let record = &mut after[0];
-        packed.product(simd, active, (x, stride), (columns, points), &mut record.sums);
+        if index == 0 {
+            packed.product(simd, active, (x, stride), (points, points), &mut record.sums);
+            // slopes by the inputs themselves
+            for c in points..columns {
+                let out = &mut record.sums[c * record.stride..(c + 1) * record.stride];
+                packed.column::<S>(c - points, out);
+            }
+        } else {
+            packed.product(simd, active, (x, stride), (columns, points), &mut record.sums);
+        }
         activate::<T, FUSED>(layer, want, points, columns, record);
     }
 }
