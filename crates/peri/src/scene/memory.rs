@@ -18,9 +18,9 @@ const ALWAYS: f64 = 20e6;
 const FIELDS: f64 = 10.0;
 /// Equilibria before the last, from which the next is guessed, and their copies in a checkpoint; springs, in a component.
 const PAST: f64 = 6.0;
-/// Fields of L-BFGS beside its pairs, and bytes of its coarse level a particle.
+/// Fields of L-BFGS beside its pairs, and bytes of its coarse level a particle: factors in both precisions while they are made.
 const FIELDS_OF_LBFGS: f64 = 8.0;
-const COARSE: f64 = 150.0;
+const COARSE: f64 = 300.0;
 /// Sites and particles of contact: cells, their order, the list of near pairs.
 const CONTACT: f64 = 190.0;
 /// Damage: bonds at the start, what breaks.
@@ -47,7 +47,8 @@ fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
     let mut each = masks + 8.0 + 2.0 * vector;
     each += FIELDS * vector + if scene.material.critical.is_some() { PAST * vector } else { 8.0 };
     if scene.method() == Method::Lbfgs {
-        each += (FIELDS_OF_LBFGS + 2.0 * Lbfgs::default().memory as f64) * vector + COARSE;
+        // both fields of a pair are in single precision
+        each += (FIELDS_OF_LBFGS + Lbfgs::default().memory as f64) * vector + COARSE;
     }
     if let Some(contact) = &scene.contact {
         each += CONTACT + 8.0 * (2 * contact.plane.len()) as f64;

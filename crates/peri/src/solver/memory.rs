@@ -8,7 +8,7 @@
 use super::passes::{LANES, sum};
 use super::places::in_order;
 use crate::field::{CHUNK, Field, chunk_range};
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, NullaryFnOnce, Simd, WithSimd};
 use std::collections::VecDeque;
 
 /// Entries that are worked on at a time, so that what several pairs need of them stays in the cache.
@@ -138,7 +138,7 @@ impl<const D: usize> Memory<D> {
         let parts = in_order(items, |chunk, (s, w): ([&mut [f32]; D], [&mut [f32]; D])| {
             let range = chunk_range(chunk, sites);
             let mut sums = vec![0.0; 4 * (pairs.len() + 1)];
-            let mut change = [0.0; BLOCK];
+            let (mut change, mut wide) = ([0.0; BLOCK], [[0.0; BLOCK]; 2]);
             for c in 0..D {
                 let blocks = s[c].chunks_mut(BLOCK).zip(w[c].chunks_mut(BLOCK)).enumerate();
                 for (block, (s, w)) in blocks {
@@ -153,8 +153,11 @@ impl<const D: usize> Memory<D> {
                         w[k] = (z[k] - z_old[k]) as f32;
                     }
                     let y = &*change;
-                    let add = |s: &[f32], w: &[f32], sums: &mut [f64]| {
-                        let products = arch.dispatch(Products { s, w, y, g });
+                    let mut add = |s: &[f32], w: &[f32], sums: &mut [f64]| {
+                        let [wide_s, wide_w] = wide.each_mut().map(|wide| &mut wide[..y.len()]);
+                        arch.dispatch(Widen { from: s, to: &mut *wide_s });
+                        arch.dispatch(Widen { from: w, to: &mut *wide_w });
+                        let products = arch.dispatch(Products { s: wide_s, w: wide_w, y, g });
                         for k in 0..4 {
                             sums[k] += products[k];
                         }
@@ -201,39 +204,59 @@ fn chunks<const D: usize>(field: &mut Single<D>) -> Vec<[&mut [f32]; D]> {
     (0..count).map(|_| iterators.each_mut().map(|i| i.next().unwrap_or_default())).collect()
 }
 
+/// Numbers in double precision; sums that widen as they go are not vectorised.
+struct Widen<'a> {
+    from: &'a [f32],
+    to: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Widen<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let from = &self.from[..self.to.len()];
+        for k in 0..from.len() {
+            self.to[k] = f64::from(from[k]);
+        }
+    }
+}
+
 /// s·y, w·y, s·g, w·g.
 struct Products<'a> {
-    s: &'a [f32],
-    w: &'a [f32],
+    s: &'a [f64],
+    w: &'a [f64],
     y: &'a [f64],
     g: &'a [f64],
 }
 
-impl NullaryFnOnce for Products<'_> {
+impl WithSimd for Products<'_> {
     type Output = [f64; 4];
     #[inline(always)]
-    fn call(self) -> [f64; 4] {
-        let ((s, s_last), (w, w_last)) = (self.s.as_chunks::<LANES>(), self.w.as_chunks::<LANES>());
-        let ((y, y_last), (g, g_last)) = (self.y.as_chunks::<LANES>(), self.g.as_chunks::<LANES>());
+    fn with_simd<S: Simd>(self, simd: S) -> [f64; 4] {
+        let ((s, s_last), (w, w_last)) = (S::as_simd_f64s(self.s), S::as_simd_f64s(self.w));
+        let ((y, y_last), (g, g_last)) = (S::as_simd_f64s(self.y), S::as_simd_f64s(self.g));
         let (w, y, g) = (&w[..s.len()], &y[..s.len()], &g[..s.len()]);
-        let mut lanes = [[0.0; LANES]; 4];
+        let zero = simd.splat_f64s(0.0);
+        let (mut sy, mut wy, mut sg, mut wg) = (zero, zero, zero, zero);
         for k in 0..s.len() {
-            for lane in 0..LANES {
-                let (s, w) = (f64::from(s[k][lane]), f64::from(w[k][lane]));
-                lanes[0][lane] += s * y[k][lane];
-                lanes[1][lane] += w * y[k][lane];
-                lanes[2][lane] += s * g[k][lane];
-                lanes[3][lane] += w * g[k][lane];
-            }
+            sy = simd.mul_add_f64s(s[k], y[k], sy);
+            wy = simd.mul_add_f64s(w[k], y[k], wy);
+            sg = simd.mul_add_f64s(s[k], g[k], sg);
+            wg = simd.mul_add_f64s(w[k], g[k], wg);
         }
-        for lane in 0..s_last.len() {
-            let (s, w) = (f64::from(s_last[lane]), f64::from(w_last[lane]));
-            lanes[0][lane] += s * y_last[lane];
-            lanes[1][lane] += w * y_last[lane];
-            lanes[2][lane] += s * g_last[lane];
-            lanes[3][lane] += w * g_last[lane];
+        let mut sums = [
+            simd.reduce_sum_f64s(sy),
+            simd.reduce_sum_f64s(wy),
+            simd.reduce_sum_f64s(sg),
+            simd.reduce_sum_f64s(wg),
+        ];
+        for k in 0..s_last.len() {
+            sums[0] += s_last[k] * y_last[k];
+            sums[1] += w_last[k] * y_last[k];
+            sums[2] += s_last[k] * g_last[k];
+            sums[3] += w_last[k] * g_last[k];
         }
-        [sum(&lanes[0]), sum(&lanes[1]), sum(&lanes[2]), sum(&lanes[3])]
+        sums
     }
 }
 

@@ -73,6 +73,7 @@ impl<const D: usize> Coarse<D> {
         let shift = SHIFT * assembly.stiffness() * (std::f64::consts::PI / extent).powi(2);
         let (pattern, blocks) = pattern::<D>(&space);
         let entries = assemble::<D>(&space, &pattern, &blocks, &matrices, shift);
+        drop(matrices);
         let factor = Factor::new(pattern, &entries, old.map(|old| old.factor))?;
         let places = space.renumber(bonds.particles());
         let moved = Field::zeros(space.members.len());

@@ -14,7 +14,7 @@ use crate::output::hdf5::{Created, write_error};
 const CHUNK_ROWS: usize = 1 << 16;
 /// Deflate's level for files of one step, which are mostly read once, to be merged, and for others, which get a sixth smaller.
 const QUICK: u32 = 1;
-const SMALL: u32 = 4;
+const SMALL: u32 = 2;
 /// The four kinds of cells of `PolyData`; ours are vertices.
 const KINDS: [&str; 4] = ["Vertices", "Lines", "Polygons", "Strips"];
 
