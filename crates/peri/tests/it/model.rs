@@ -126,9 +126,11 @@ fn a_law_of_the_caller() {
     let (ours, theirs) = (torn(Rubber::of_law(Springs(0.7), 1e6)), torn(Rubber::new(Law::Linear, 1e6)));
     assert!(theirs.state.broken > 0);
     assert_eq!(ours.bonds.intact(), theirs.bonds.intact());
+    let peak = theirs.history().iter().map(|record| record.load.abs()).fold(0.0, f64::max);
     for (a, b) in ours.history().iter().zip(theirs.history()) {
-        // both to residuals of 1e-4
-        assert!((a.load - b.load).abs() <= 2e-4 * b.load.abs(), "{} {}", a.load, b.load);
+        // in balance to the same digits; of the torn sheet, which bears a millionth of the peak, to a residual
+        let allowed = 1e-8 * b.load.abs() + 1e-8 * peak;
+        assert!((a.load - b.load).abs() <= allowed, "{} {}", a.load, b.load);
     }
     let slack = Model::new(sheet(), Rubber::of_law(Springs(0.0), 1e6)).build();
     let message = slack.err().map(|error| error.to_string()).unwrap_or_default();
