@@ -390,7 +390,7 @@ mod tests {
         for (half, width) in [(9.0, 70), (10.5, 62), (10.5, 100), (40.0, 240), (0.9, 120), (1e5, 120)] {
             let window = Window { low: [-half, 0.0], high: [half, half], scale: width as f64 / (2.0 * half) };
             let raster = Raster { width, height: width / 2, values: Vec::new() };
-            let axes = Axes::new(window, &raster, &("mm".to_owned(), 1.0), ["x", "y"]).unwrap();
+            let axes = Axes::new(&window, &raster, &("mm".to_owned(), 1.0), ["x", "y"]).unwrap();
             let across = &axes.ticks[0];
             assert!(across.len() >= 2, "{half} {width}: {}", across.len());
             for pair in across.windows(2) {
