@@ -70,7 +70,7 @@ pub struct Iterative {
 }
 
 impl Iterative {
-    /// Exchanges room for a direction and for A times it with vectors that nobody reads meanwhile.
+    /// Swaps the work vectors of conjugate gradients, the direction and A times it, with two vectors that are free until the next call.
     pub fn lend(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
         self.conjugate.lend(direction, image);
     }

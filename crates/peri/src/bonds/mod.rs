@@ -177,12 +177,11 @@ pub trait Bonds<const D: usize>: Send + Sync {
     }
 }
 
-/// How many bonds a particle has whose family is whole, where all such families are alike: in a lattice without weights of single bonds.
-pub(crate) fn whole_family<const D: usize>(bonds: &dyn Bonds<D>) -> Option<u32> {
-    bonds
-        .as_lattice()
-        .filter(|lattice| lattice.is_uniform())
-        .map(|lattice| lattice.stencil().offsets.len() as u32)
+/// Whether a site of a lattice without weights of single bonds has every bond of the stencil: all such families are alike.
+pub(crate) fn has_whole_family<const D: usize>(bonds: &dyn Bonds<D>, site: usize) -> bool {
+    bonds.as_lattice().is_some_and(|lattice| {
+        lattice.is_uniform() && lattice.bonded(site) as usize == lattice.stencil().offsets.len()
+    })
 }
 
 /// Refuses a body in which a bond pulls at one of its ends only: its forces would not sum to zero.

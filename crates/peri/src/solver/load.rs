@@ -1,6 +1,6 @@
 //! Loads and supports: body forces and prescribed displacement components, proportional to one load factor.
 
-use crate::bonds::{Bonds, whole_family};
+use crate::bonds::{Bonds, has_whole_family};
 use crate::field::{CHUNK, Field};
 use rayon::prelude::*;
 
@@ -256,8 +256,7 @@ impl<const D: usize> Loads<D> {
                 }
             });
         };
-        let whole = whole_family(bonds);
-        let is_whole = |site: usize| whole.is_some_and(|whole| bonds.bonded(site) == whole);
+        let is_whole = |site: usize| has_whole_family(bonds, site);
         let mut of_whole = [[0.0; 6]; 6];
         let some = bonds.particles().iter().find(|&&site| is_whole(site as usize));
         some.iter().for_each(|&&site| of_site(site as usize, &mut of_whole));

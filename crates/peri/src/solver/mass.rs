@@ -2,7 +2,7 @@
 
 use super::state::State;
 use super::system::System;
-use crate::bonds::{Bonds, whole_family};
+use crate::bonds::{Bonds, has_whole_family};
 use rayon::prelude::*;
 
 /// Whether bonds differ so much in their tangent that every particle has the mass of its own.
@@ -23,8 +23,7 @@ pub fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, sites: &[u32], mas
         });
         if sum > 0.0 { sum } else { 1.0 }
     };
-    let whole = whole_family(bonds);
-    let is_whole = |site: u32| whole.is_some_and(|whole| bonds.bonded(site as usize) == whole);
+    let is_whole = |site: u32| has_whole_family(bonds, site as usize);
     let alike = sites.iter().find(|&&site| is_whole(site)).map(|&site| sum(site));
     let of = |&site: &u32| alike.filter(|_| is_whole(site)).unwrap_or_else(|| sum(site));
     let sums: Vec<f64> = sites.par_iter().map(of).collect();

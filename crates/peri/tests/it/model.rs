@@ -128,7 +128,7 @@ fn a_law_of_the_caller() {
     assert_eq!(ours.bonds.intact(), theirs.bonds.intact());
     let peak = theirs.history().iter().map(|record| record.load.abs()).fold(0.0, f64::max);
     for (a, b) in ours.history().iter().zip(theirs.history()) {
-        // in balance to the same digits; of the torn sheet, which bears a millionth of the peak, to a residual
+        // the torn sheet is free of load: what is left is a residual, and is judged by the peak
         let allowed = 1e-8 * b.load.abs() + 1e-8 * peak;
         assert!((a.load - b.load).abs() <= allowed, "{} {}", a.load, b.load);
     }

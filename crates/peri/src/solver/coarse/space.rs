@@ -164,11 +164,15 @@ impl<const D: usize> Filled<D> {
         &self.members[self.starts[cell]..self.starts[cell + 1]]
     }
 
+    /// Whether a particle lies beside a node.
+    fn is_beside(&self, grid: &Grid<D>, node: usize) -> bool {
+        grid.cells_around(node).any(|cell| !self.of_cell(cell).is_empty())
+    }
+
     /// Nodes beside a particle: that many functions at least.
     fn nodes(&self, grid: &Grid<D>) -> usize {
         let nodes: usize = grid.node_counts().iter().product();
-        let used = |&node: &usize| grid.cells_around(node).any(|cell| !self.of_cell(cell).is_empty());
-        (0..nodes).filter(used).count()
+        (0..nodes).filter(|&node| self.is_beside(grid, node)).count()
     }
 }
 
@@ -231,7 +235,7 @@ impl<const D: usize> Space<D> {
         let mut first = vec![0_u32; nodes];
         let mut functions = 0_u32;
         for node in elimination_order(grid.node_counts()) {
-            if grid.cells_around(node).any(|cell| !filled.of_cell(cell).is_empty()) {
+            if filled.is_beside(grid, node) {
                 first[node] = functions;
                 functions += splits.get(&node).map_or(1, |split| split.parts);
             }
