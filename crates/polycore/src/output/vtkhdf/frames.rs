@@ -3,10 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::packed::{Rows, Table};
 use super::read::{Series, read};
 use super::write::Writer;
 use super::{Layout, data_error, mesh::Cells, remove, temporary_name, whole_file};
 use crate::Error;
+use crate::output::{parent, sync_directory};
 
 /// The frames of a series.
 #[derive(Debug)]
@@ -23,9 +25,9 @@ pub struct Frames {
 /// A step: time, points where they move, arrays on points and on cells.
 pub struct Step<'a> {
     pub time: f64,
-    pub points: Option<&'a [f64]>,
-    pub arrays: Vec<&'a [f64]>,
-    pub cell_arrays: Vec<&'a [f64]>,
+    pub points: Option<Rows<'a>>,
+    pub arrays: Vec<Rows<'a>>,
+    pub cell_arrays: Vec<Rows<'a>>,
     /// In the order of the layout.
     pub moments: Vec<f64>,
 }
@@ -81,7 +83,7 @@ impl Frames {
     }
 
     /// Writes the next step as a complete file.
-    pub fn step(&mut self, layout: &Layout, step: &Step<'_>) -> Result<(), Error> {
+    pub fn step(&mut self, layout: &Layout, step: Step<'_>) -> Result<(), Error> {
         self.check(layout, step.time)?;
         let target = self.frame(self.steps);
         whole_file(&target, |temporary| {
@@ -98,6 +100,13 @@ impl Frames {
         let Some(layout) = &self.layout else {
             return Err(data_error(&self.path, "there is no step to write".into()));
         };
+        if self.steps == 1 {
+            // it is the whole series
+            fs::rename(self.frame(0), &self.path).map_err(Error::io("rename to", &self.path))?;
+            sync_directory(parent(&self.path));
+            remove(&self.frames)?;
+            return Ok(self.path);
+        }
         whole_file(&self.path, |temporary| {
             let mut writer = Writer::create(temporary, layout, self.mesh.as_ref(), self.steps)?;
             for step in 0..self.steps {
@@ -175,16 +184,17 @@ impl Frames {
 /// Copies a step of a series.
 fn append(writer: &mut Writer, from: &Series, step: usize) -> Result<(), Error> {
     let layout = from.layout();
-    let points = if from.moves() { Some(from.points(step)?) } else { None };
-    let arrays = layout.arrays.iter().map(|(name, _)| from.data(step, name));
-    let arrays = arrays.collect::<Result<Vec<_>, _>>()?;
-    let cells = layout.cell_arrays.iter().map(|(name, _)| from.cell_data(step, name));
-    let cells = cells.collect::<Result<Vec<_>, _>>()?;
-    writer.step(&Step {
+    let [points, arrays, cells] = writer.tables();
+    let all = |tables: &[Table], names: &[(String, usize)], kind| {
+        let rows = tables.iter().zip(names).map(|(table, (name, _))| from.packed(table, kind, name, step));
+        rows.collect::<Result<Vec<_>, _>>()
+    };
+    let copied = Step {
         time: from.times()[step],
-        points: points.as_ref().map(|points| points.as_flattened()),
-        arrays: arrays.iter().map(Vec::as_slice).collect(),
-        cell_arrays: cells.iter().map(Vec::as_slice).collect(),
+        points: points.first().map(|table| from.packed(table, "", "Points", step)).transpose()?,
+        arrays: all(arrays, &layout.arrays, "PointData")?,
+        cell_arrays: all(cells, &layout.cell_arrays, "CellData")?,
         moments: layout.moments.iter().map(|name| from.moment(step, name).unwrap_or(f64::NAN)).collect(),
-    })
+    };
+    writer.step(copied)
 }

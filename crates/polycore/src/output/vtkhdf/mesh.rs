@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::frames::{Frames, Step};
+use super::packed::Rows;
 use super::{Data, Layout, check_points};
 use crate::Error;
 
@@ -94,9 +95,9 @@ impl MeshSeries {
     /// [`Error::Data`] if the arrays do not fit the mesh, [`Error::Io`] or [`Error::Format`] if writing fails.
     pub fn step(&mut self, time: f64, point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<(), Error> {
         let layout = Layout::of(self.counts, point_data, cell_data)?;
-        let [arrays, cell_arrays] =
-            [point_data, cell_data].map(|data| data.iter().map(|(_, _, values)| *values).collect());
-        self.frames.step(&layout, &Step { time, points: None, arrays, cell_arrays, moments: Vec::new() })
+        let [arrays, cell_arrays] = [point_data, cell_data]
+            .map(|data| data.iter().map(|(_, _, values)| Rows::Values(values)).collect());
+        self.frames.step(&layout, Step { time, points: None, arrays, cell_arrays, moments: Vec::new() })
     }
 
     /// Merges all steps into the one transient file and removes the frames; returns its path.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::frames::{Frames, Step};
+use super::packed::{Rows, is_single};
 use super::{Data, Layout, Moment, check_points};
 use crate::Error;
 
@@ -59,16 +60,17 @@ impl ParticleSeries {
         let of = |name: &String| moments.iter().find(|m| m.0 == name).map_or(f64::NAN, |m| m.1);
         let moments = layout.moments.iter().map(of).collect();
         for (name, components, values) in point_data {
-            if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+            let stored = |value: f64| if is_single(*components) { f64::from(value as f32) } else { value };
+            if let Some(at) = values.iter().position(|&value| !stored(value).is_finite()) {
                 let point = at / components;
                 let place = points.get(point).copied().unwrap_or_default();
                 let reason = format!("{} at point {point}, {place:?} m, time {time}", values[at]);
                 return Err(Error::Data { what: format!("point array `{name}` is not finite"), reason });
             }
         }
-        let arrays = point_data.iter().map(|(_, _, values)| *values).collect();
-        let points = Some(points.as_flattened());
-        self.frames.step(&layout, &Step { time, points, arrays, cell_arrays: Vec::new(), moments })
+        let arrays = point_data.iter().map(|(_, _, values)| Rows::Values(values)).collect();
+        let points = Some(Rows::Values(points.as_flattened()));
+        self.frames.step(&layout, Step { time, points, arrays, cell_arrays: Vec::new(), moments })
     }
 
     /// Merges all steps into the one transient file and removes the frames; returns its path.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rust_hdf5::{H5Dataset, H5File};
 
+use super::packed::{Rows, Table};
 use super::{Cells, Layout, OF_THE_FORMAT, format_error};
 use crate::Error;
 use crate::output::hdf5::dataset as checked;
@@ -203,6 +204,25 @@ impl Series {
         self.rows(&format!("{group}/{name}"), *components, step * count, count)
     }
 
+    /// An array at a step for a table of another file: packed as it is where both store it in the same way.
+    pub(super) fn packed(
+        &self,
+        table: &Table,
+        kind: &str,
+        name: &str,
+        step: usize,
+    ) -> Result<Rows<'static>, Error> {
+        if let Some(bytes) = table.same_of(&self.file, &format!("VTKHDF/{kind}/{name}"), step) {
+            return Ok(Rows::Packed(bytes));
+        }
+        let values = match kind {
+            "PointData" => self.data(step, name),
+            "CellData" => self.cell_data(step, name),
+            _ => self.points(step).map(Vec::into_flattened),
+        };
+        values.map(Rows::Read)
+    }
+
     pub(super) fn layout(&self) -> Layout {
         self.layout.clone()
     }
@@ -214,8 +234,8 @@ impl Series {
 
     fn rows(&self, name: &str, columns: usize, start: usize, count: usize) -> Result<Vec<f64>, Error> {
         let slice = |dataset: H5Dataset| match dataset.ndims() {
-            1 => dataset.read_slice::<f64>(&[start], &[count]),
-            _ => dataset.read_slice::<f64>(&[start, 0], &[count, columns]),
+            1 => dataset.read_numeric_slice_as::<f64>(&[start], &[count]),
+            _ => dataset.read_numeric_slice_as::<f64>(&[start, 0], &[count, columns]),
         };
         let read = self.file.dataset(&format!("VTKHDF/{name}")).and_then(slice);
         read.map_err(|error| format_error(&self.path, error))

@@ -139,21 +139,27 @@ fn arrays_that_do_not_fit_are_refused() {
     assert!(ParticleSeries::create(directory.path().join("body.h5")).is_err());
 }
 
-/// Larger than a chunk, so that steps straddle chunk boundaries.
+/// Tensors have seven digits; what does not fit into them is an error, not infinity in a file.
 #[test]
-fn steps_larger_than_a_chunk() {
+fn large_steps_and_tensors() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("large.vtkhdf");
     let count = 100_003;
     let mut series = ParticleSeries::create(&path).unwrap();
     for step in 0..3 {
         let points: Vec<[f64; 3]> = (0..count).map(|index| position(step, index)).collect();
-        series.step(step as f64, &points, &[]).unwrap();
+        let stress: Vec<f64> = (0..9 * count).map(|k| (step + k) as f64 / 3.0).collect();
+        series.step(step as f64, &points, &[("stress", 9, &stress)]).unwrap();
+        let large = vec![1e39; 9 * count];
+        let error = series.step(step as f64 + 0.5, &points, &[("stress", 9, &large)]).unwrap_err();
+        assert!(error.to_string().contains("`stress` is not finite: 1000000"), "{error}");
     }
     let read = read(series.finish().unwrap()).unwrap();
     for step in [2, 0, 1] {
         let points = read.points(step).unwrap();
         assert!((0..count).all(|index| points[index] == position(step, index)));
+        let stress = read.data(step, "stress").unwrap();
+        assert!((0..9 * count).all(|k| stress[k] == f64::from(((step + k) as f64 / 3.0) as f32)));
     }
 }
 

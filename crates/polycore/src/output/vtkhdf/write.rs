@@ -7,14 +7,10 @@ use rust_hdf5::{DatatypeMessage, H5Dataset, H5Group};
 use super::Layout;
 use super::frames::Step;
 use super::mesh::Cells;
+use super::packed::{LEVEL, Rows, Table, is_single};
 use crate::Error;
 use crate::output::hdf5::{Created, write_error};
 
-/// Rows of a compressed chunk: large enough to compress, small enough to read a step without much waste.
-const CHUNK_ROWS: usize = 1 << 16;
-/// Deflate's level for files of one step, which are mostly read once, to be merged, and for others, which get a sixth smaller.
-const QUICK: u32 = 1;
-const SMALL: u32 = 2;
 /// The four kinds of cells of `PolyData`; ours are vertices.
 const KINDS: [&str; 4] = ["Vertices", "Lines", "Polygons", "Strips"];
 
@@ -24,9 +20,9 @@ pub struct Writer {
     group: H5Group,
     layout: Layout,
     /// Where points move.
-    points: Option<H5Dataset>,
-    arrays: Vec<H5Dataset>,
-    cell_arrays: Vec<H5Dataset>,
+    points: Option<Table>,
+    arrays: Vec<Table>,
+    cell_arrays: Vec<Table>,
     times: Vec<f64>,
     /// Step by step, in the order of the layout.
     moments: Vec<Vec<f64>>,
@@ -51,25 +47,25 @@ impl Writer {
         let ascii = DatatypeMessage::FixedString { size: name.len() as u32, padding: 1, charset: 0 };
         group.set_attr_typed("Type", ascii, name.to_vec())?;
         integers(&group, "NumberOfPoints", &[layout.points as i64])?;
-        let level = if steps == 1 { QUICK } else { SMALL };
-        let points = table::<f64>(&group, "Points", 3, layout.points, level)?;
+        let points = Table::new(table::<f64>(&group, "Points", 3, layout.points)?, layout.points, 3);
         let points = match mesh {
             Some((places, cells)) => {
-                points.append(places.as_flattened())?;
-                write_cells(&group, cells, level)?;
+                points.dataset.append(places.as_flattened())?;
+                write_cells(&group, cells)?;
                 None
             }
             None => {
-                write_vertices(&group, layout.points, level)?;
+                write_vertices(&group, layout.points)?;
                 Some(points)
             }
         };
         let tables = |name: &str, arrays: &[(String, usize)], rows: usize| {
             let group = group.create_group(name)?;
-            arrays
-                .iter()
-                .map(|(name, n)| table::<f64>(&group, name, *n, rows, level))
-                .collect::<Hdf5<Vec<_>>>()
+            let create = |(name, n): &(String, usize)| {
+                let table = if is_single(*n) { table::<f32> } else { table::<f64> };
+                Ok(Table::new(table(&group, name, *n, rows)?, rows, *n))
+            };
+            arrays.iter().map(create).collect::<Hdf5<Vec<_>>>()
         };
         let arrays = tables("PointData", &layout.arrays, layout.points)?;
         let cell_arrays =
@@ -89,23 +85,19 @@ impl Writer {
         })
     }
 
-    pub fn step(&mut self, step: &Step<'_>) -> Result<(), Error> {
-        let write = || -> Hdf5<()> {
-            if let (Some(dataset), Some(points)) = (&self.points, step.points) {
-                dataset.append(points)?;
-            }
-            for (dataset, values) in self.arrays.iter().zip(&step.arrays) {
-                dataset.append(values)?;
-            }
-            for (dataset, values) in self.cell_arrays.iter().zip(&step.cell_arrays) {
-                dataset.append(values)?;
-            }
-            Ok(())
-        };
-        write().map_err(|error| write_error(&self.path, error))?;
+    pub fn step(&mut self, step: Step<'_>) -> Result<(), Error> {
+        let tables = self.points.iter().chain(&self.arrays).chain(&self.cell_arrays);
+        let rows = step.points.into_iter().chain(step.arrays).chain(step.cell_arrays);
+        let all: Vec<(&Table, Rows<'_>)> = tables.zip(rows).collect();
+        Table::write(all, self.times.len()).map_err(|error| write_error(&self.path, error))?;
         self.times.push(step.time);
-        self.moments.push(step.moments.clone());
+        self.moments.push(step.moments);
         Ok(())
+    }
+
+    /// The datasets of points, arrays on points and arrays on cells, in their order in a step.
+    pub fn tables(&self) -> [&[Table]; 3] {
+        [self.points.as_slice(), &self.arrays, &self.cell_arrays]
     }
 
     pub fn close(self) -> Result<(), Error> {
@@ -156,47 +148,41 @@ impl Writer {
 }
 
 /// Each particle a vertex.
-fn write_vertices(group: &H5Group, points: usize, level: u32) -> Hdf5<()> {
+fn write_vertices(group: &H5Group, points: usize) -> Hdf5<()> {
     for kind in KINDS {
         let count = if kind == "Vertices" { points } else { 0 };
         let subgroup = group.create_group(kind)?;
         integers(&subgroup, "NumberOfCells", &[count as i64])?;
         integers(&subgroup, "NumberOfConnectivityIds", &[count as i64])?;
         let ids: Vec<i64> = (0..=count as i64).collect();
-        table::<i64>(&subgroup, "Connectivity", 1, count.max(1), level)?.append(&ids[..count])?;
-        table::<i64>(&subgroup, "Offsets", 1, count + 1, level)?.append(&ids)?;
+        table::<i64>(&subgroup, "Connectivity", 1, count.max(1))?.append(&ids[..count])?;
+        table::<i64>(&subgroup, "Offsets", 1, count + 1)?.append(&ids)?;
     }
     Ok(())
 }
 
-fn write_cells(group: &H5Group, cells: &Cells, level: u32) -> Hdf5<()> {
+fn write_cells(group: &H5Group, cells: &Cells) -> Hdf5<()> {
     let ids: Vec<i64> = cells.connectivity.iter().map(|&point| i64::from(point)).collect();
     let offsets: Vec<i64> = std::iter::once(0).chain(cells.ends.iter().map(|&end| end as i64)).collect();
     integers(group, "NumberOfCells", &[cells.len() as i64])?;
     integers(group, "NumberOfConnectivityIds", &[ids.len() as i64])?;
-    table::<i64>(group, "Connectivity", 1, ids.len(), level)?.append(&ids)?;
-    table::<i64>(group, "Offsets", 1, offsets.len(), level)?.append(&offsets)?;
-    table::<u8>(group, "Types", 1, cells.len(), level)?.append(&cells.types)
+    table::<i64>(group, "Connectivity", 1, ids.len())?.append(&ids)?;
+    table::<i64>(group, "Offsets", 1, offsets.len())?.append(&offsets)?;
+    table::<u8>(group, "Types", 1, cells.len())?.append(&cells.types)
 }
 
 fn integers(group: &H5Group, name: &str, values: &[i64]) -> Hdf5<()> {
     group.new_dataset::<i64>().shape([values.len()]).create(name)?.write_raw(values)
 }
 
-/// An empty compressed dataset with unlimited rows.
-fn table<T: rust_hdf5::H5Type>(
-    group: &H5Group,
-    name: &str,
-    columns: usize,
-    rows: usize,
-    level: u32,
-) -> Hdf5<H5Dataset> {
-    let chunk = rows.clamp(1, CHUNK_ROWS);
+/// An empty compressed dataset with unlimited rows; a step is a chunk.
+fn table<T: rust_hdf5::H5Type>(group: &H5Group, name: &str, columns: usize, rows: usize) -> Hdf5<H5Dataset> {
+    let chunk = rows.max(1);
     let builder = group.new_dataset::<T>();
     let builder = if columns == 1 {
         builder.shape([0]).chunk(&[chunk]).max_shape(&[None])
     } else {
         builder.shape([0, columns]).chunk(&[chunk, columns]).max_shape(&[None, Some(columns)])
     };
-    builder.shuffle_deflate(level).create(name)
+    builder.shuffle_deflate(LEVEL).create(name)
 }
