@@ -39,6 +39,16 @@ fn cracked_bar_in_three_dimensions() {
     assert_eq!((&work["particles"], &work["steps"]), (&320.into(), &3.into()));
 }
 
+/// Variants, several at a time where there are several threads.
+#[test]
+fn variants() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let spacings = "[[study]]\nspacing = [\"20 mm\", \"10 mm\", \"8 mm\", \"16 mm\"]\n";
+    fs::write(here.join("scene.toml"), format!("{}{spacings}", scenes::bar())).unwrap();
+    on_any_number_of_threads(here);
+}
+
 /// A sheet torn apart, its bonds looked at in equilibrium or in every iteration, with contact or without.
 #[test]
 fn fracture() {

@@ -69,6 +69,35 @@ fn killed_while_it_breaks() {
     survives_kills(&scenes::fracture("2 mm", "method = \"lbfgs\""));
 }
 
+/// Variants solved side by side, some finished, some under way, some not begun.
+#[test]
+fn killed_with_several_variants() {
+    survives_kills(&several());
+}
+
+/// A bar of four spacings with a crack.
+fn several() -> String {
+    let scene = relaxed(&scenes::bar().replace("1e-4", "1e-8"));
+    scene + "[[study]]\nspacing = [\"20 mm\", \"10 mm\", \"8 mm\", \"16 mm\"]\n"
+}
+
+/// The error is that of the first variant that fails, whichever does so earlier; what the others reached can be continued.
+#[test]
+fn several_variants_of_which_one_fails() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let short =
+        "[[study]]\nname = \"short\"\nsolver = { method = \"adr\", tolerance = 1e-8, max_iterations = 40 }\n";
+    let shorter = short.replace("40", "20").replace("\"short\"", "\"shorter\"");
+    fs::write(here.join("scene.toml"), format!("{}{short}{shorter}", several())).unwrap();
+    for threads in 1..=3 {
+        let ended =
+            peri(&format!("run scene.toml --output out{threads} --threads {threads}"), here).with_code(1);
+        ended.tells("short: not converged after 40 iterations");
+        assert!(here.join(format!("out{threads}/checkpoint.bin")).is_file());
+    }
+}
+
 /// Explicit dynamics in mixed precision, whose rounded displacements are no part of a checkpoint.
 #[test]
 fn killed_while_it_cracks() {
@@ -117,7 +146,7 @@ fn survives_kills_of(program: &str, scene: &str) {
             } else {
                 format!("run plate.toml --output {output}")
             };
-            format!("{verb} --checkpoint-every 0.02 --threads 1")
+            format!("{verb} --checkpoint-every 0.02 --threads {}", 1 + round % 2)
         };
         for _ in 0..12 {
             let delay = Duration::from_secs_f64(0.5 * random.next());

@@ -14,6 +14,7 @@ mod scale;
 mod sections;
 mod solid;
 mod stages;
+mod variants;
 
 pub use outcome::{Outcome, Profile};
 pub use program::Peri;
@@ -23,6 +24,7 @@ use material::Observed;
 pub(crate) use material::{Acting, Bonded};
 use probes::Probes;
 use sections::Sections;
+use variants::UnderWay;
 
 use crate::bonds::{Bonds, covered_stretches, fragments};
 use crate::calibrate::Space;
@@ -37,11 +39,13 @@ use crate::solver::{
 use polycore::case::{Fault, Run, Step, StepField};
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
-use std::cell::RefCell;
+use std::path::Path;
 
 /// What stops a run: a fault in the scene, or one on the way.
 pub type Failure = polycore::scene::Failure<Error>;
 
+/// Particles of a body from which on its own loops keep all threads busy: such variants are solved one after another.
+const LARGE: usize = 100_000;
 /// Error of forces in mixed precision beyond which a run warns.
 const MIXED: f64 = 1e-2;
 
@@ -83,24 +87,25 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     let (output, quick) = (run.options.output, run.options.quick);
     let variants = scene::check(source, scene, quick)?;
     // every body is built once before anything is computed or written: faults show at once
-    if !run.options.resume {
-        for variant in variants.iter().filter(|variant| expected_error(scene, variant).is_none()) {
-            let (source, scene) = variant.resolve(source, scene)?;
-            Built::<D>::new(&source, &scene, variant)?;
-        }
+    let mut largest = 0;
+    for variant in variants.iter().filter(|variant| expected_error(scene, variant).is_none()) {
+        let (source, scene) = variant.resolve(source, scene)?;
+        let built = Built::<D>::new(&source, &scene, variant)?;
+        largest = largest.max(built.bonded.body.bonds.particles().len());
     }
     run.begin()?;
-    // the checkpoint: results of the finished variants, and the state of the one under way
-    let (mut finished, mut state): (Vec<Outcome>, Option<State<D>>) = run.reached()?.unwrap_or_default();
-    for variant in &variants[finished.len().min(variants.len())..] {
-        let state = state.take();
-        let done = Done { finished: &finished, of: variants.len() };
+    // one after another where steps are watched and where errors are drawn against run times
+    let alone = run.options.on_step.is_some() || scene.exact.is_some() || largest > LARGE;
+    let at_once = if alone { 1 } else { rayon::current_num_threads() };
+    let names: Vec<String> = variants.iter().map(Variant::name).collect();
+    let finished = variants::all::<D>(run, &names, at_once, |index, under_way, state| {
+        let variant = &variants[index];
         let (own_source, own_scene) = variant.resolve(source, scene)?;
         let study = variant.study.and_then(|index| scene.study.get(index));
         let expected = expected_error(scene, variant);
         let mut outcome = match scene::check_variant(&own_source, &own_scene)
             .map_err(Failure::from)
-            .and_then(|()| run_variant::<D>(&own_source, &own_scene, variant, run, &done, state))
+            .and_then(|()| run_variant::<D>(&own_source, &own_scene, variant, output, under_way, state))
         {
             Err(failure) if expected.is_some_and(|text| failure.to_string().contains(text)) => {
                 let mut outcome = Outcome::new(variant.name(), variant);
@@ -116,9 +121,8 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
             outcome.value(q::FAILED_AS_EXPECTED, f64::from(u8::from(outcome.error.is_some())));
         }
         outcome.description = study.and_then(|study| study.description.clone());
-        finished.push(outcome);
-        run.save(&(&finished, None::<&State<D>>))?;
-    }
+        Ok(outcome)
+    })?;
     let mut report = compare::report(source, scene, &finished, quick);
     history::write(scene, &finished, output)?;
     compare::study(&finished, output)?;
@@ -138,11 +142,10 @@ fn run_variant<const D: usize>(
     source: &Source,
     scene: &Scene,
     variant: &Variant,
-    run: &mut Run,
-    done: &Done,
+    output: &Path,
+    under_way: &UnderWay<D>,
     state: Option<State<D>>,
 ) -> Result<Outcome, Failure> {
-    let output = run.options.output;
     let mut phases = Phases::new();
     phases.start("build");
     let Built { bonded, loads, loaded, probes, sections } = Built::<D>::new(source, scene, variant)?;
@@ -175,8 +178,6 @@ fn run_variant<const D: usize>(
     let observed = Observed::new(scene, &material, &*body.bonds);
     let mut frames = Frames::new(scene, &observed, &*body.bonds, &state, path, by_window)?;
     let solution = Solution {
-        variant,
-        done,
         material: &material,
         observed: &observed,
         loads: &loads,
@@ -184,7 +185,7 @@ fn run_variant<const D: usize>(
         sections: &sections,
         criterion: criterion.as_ref(),
     };
-    solve((source, scene), &solution, run, &mut body, &mut state, &mut phases, &mut frames)?;
+    solve((source, scene), &solution, under_way, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
     if let Acting::Bonds(bonded) = &material {
         let stretches = covered_stretches(&*body.bonds, &state.displacement);
@@ -270,12 +271,6 @@ fn run_variant<const D: usize>(
     Ok(outcome)
 }
 
-/// The variants before one, and how many there are.
-struct Done<'a> {
-    finished: &'a [Outcome],
-    of: usize,
-}
-
 /// All that a variant is before it is solved.
 struct Built<const D: usize> {
     bonded: Bonded<D>,
@@ -307,8 +302,6 @@ impl<const D: usize> Built<D> {
 
 /// What is solved and does not change.
 struct Solution<'a, const D: usize> {
-    variant: &'a Variant,
-    done: &'a Done<'a>,
     material: &'a Acting<D>,
     observed: &'a Observed<'a, D>,
     loads: &'a Loads<D>,
@@ -320,26 +313,15 @@ struct Solution<'a, const D: usize> {
 fn solve<const D: usize>(
     (source, scene): (&Source, &Scene),
     solution: &Solution<D>,
-    run: &mut Run,
+    under_way: &UnderWay<D>,
     body: &mut scene::Body<D>,
     state: &mut State<D>,
     phases: &mut Phases,
     frames: &mut Frames<D>,
 ) -> Result<(), Failure> {
-    let Solution { variant, done, material, observed, loads, probes, sections, criterion } = *solution;
+    let Solution { material, observed, loads, probes, sections, criterion } = *solution;
     let factors = scene.solver.factors();
-    let name = variant.name();
-    // iterations and finished steps are both shown
-    let run = &RefCell::new(run);
-    let mut watch = |status: &Status, state: &State<D>| -> Result<(), Error> {
-        let mut run = run.borrow_mut();
-        if status.iteration.is_multiple_of(20) {
-            let part = (done.finished.len() as f64 + part_of(status)) / done.of as f64;
-            run.show(part, &|| format!("{name}  {}", line_of(status)));
-        }
-        let reached = || (done.finished, Some(state));
-        Ok(run.pause(|| status.restartable.then(reached))?)
-    };
+    let mut watch = |status: &Status, state: &State<D>| under_way.watch(status, state);
     let modulus = material.micromodulus(&*body.bonds);
     let contact = match &scene.contact {
         Some(contact) => {
@@ -371,7 +353,7 @@ fn solve<const D: usize>(
         phases.stop();
         frames.step(bonds, state, phases)?;
         if state.round == 0 {
-            run.borrow_mut().step(|| seen(bonds, state));
+            under_way.step(|| seen(bonds, state));
         }
         phases.start("solve");
         Ok(())
