@@ -147,6 +147,32 @@ impl<const D: usize> LatticeBonds<D> {
         share * self.interior_factor * surface_weight(bond, length, factors.get(site), factors.get(other))
     }
 
+    /// Weights of bond `k` of the particles in a tile from `start` on; 0 where it is not intact.
+    #[inline(always)]
+    pub(crate) fn weights(&self, start: usize, k: usize) -> [f64; TILE] {
+        let Span { shift, bond, length, share, .. } = self.spans[k];
+        let mut weights = [share; TILE];
+        if let Some(factors) = &self.factors {
+            let there = start.wrapping_add_signed(shift);
+            let mut sums = [0.0; TILE];
+            for (d, factors) in factors.components().into_iter().enumerate() {
+                let (own, other) = (&factors[start..start + TILE], &factors[there..there + TILE]);
+                for i in 0..TILE {
+                    let cosine = bond[d] / (length * (0.5 * (own[i] + other[i])));
+                    sums[i] += cosine * cosine;
+                }
+            }
+            for i in 0..TILE {
+                weights[i] = share * self.interior_factor / sums[i].sqrt();
+            }
+        }
+        let intact = &self.intact[k / 64][start..start + TILE];
+        for i in 0..TILE {
+            weights[i] = if intact[i] >> (k % 64) & 1 == 1 { weights[i] } else { 0.0 };
+        }
+        weights
+    }
+
     /// A bond of a site with the softened ones `soft`.
     fn bond_among(&self, soft: &[Softened], site: usize, index: u32) -> Neighbour<D> {
         let Span { shift, bond, length, share, .. } = self.spans[index as usize];
