@@ -4,7 +4,7 @@ mod connect;
 mod mixed;
 
 use super::lattice_kernel::{Class, TILE, Tiles};
-use super::lattice_sums::{GradientSums, Span, Spans};
+use super::lattice_sums::{GradientSums, Span, Spans, Weights};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, Softening, integrity};
 use super::stencil::{Stencil, fullest, layout};
@@ -147,30 +147,11 @@ impl<const D: usize> LatticeBonds<D> {
         share * self.interior_factor * surface_weight(bond, length, factors.get(site), factors.get(other))
     }
 
-    /// Weights of bond `k` of the particles in a tile from `start` on; 0 where it is not intact.
-    #[inline(always)]
-    pub(crate) fn weights(&self, start: usize, k: usize) -> [f64; TILE] {
-        let Span { shift, bond, length, share, .. } = self.spans[k];
-        let mut weights = [share; TILE];
-        if let Some(factors) = &self.factors {
-            let there = start.wrapping_add_signed(shift);
-            let mut sums = [0.0; TILE];
-            for (d, factors) in factors.components().into_iter().enumerate() {
-                let (own, other) = (&factors[start..start + TILE], &factors[there..there + TILE]);
-                for i in 0..TILE {
-                    let cosine = bond[d] / (length * (0.5 * (own[i] + other[i])));
-                    sums[i] += cosine * cosine;
-                }
-            }
-            for i in 0..TILE {
-                weights[i] = share * self.interior_factor / sums[i].sqrt();
-            }
-        }
-        let intact = &self.intact[k / 64][start..start + TILE];
-        for i in 0..TILE {
-            weights[i] = if intact[i] >> (k % 64) & 1 == 1 { weights[i] } else { 0.0 };
-        }
-        weights
+    /// What [`Self::weight`] and [`Self::is_intact`] of bond `k` come from.
+    pub(crate) fn weights(&self, k: usize) -> Weights<'_, D> {
+        let factors = self.factors.as_ref().map(Field::components);
+        let share = self.spans[k].share * self.interior_factor;
+        Weights { share, factors, words: &self.intact[k / 64], bit: 1 << (k % 64) }
     }
 
     /// A bond of a site with the softened ones `soft`.

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 const BLOCK: usize = 64;
 
 /// Most taps whose vectors are loaded once for all of them.
-const RUN: usize = 4;
+const RUN: usize = 6;
 
 /// Numbers a site: the force, and in solids 1 where both particles of the bond exist, which fills a vector of four. That
 /// is always aligned, wherever the bond begins; vectors of neighbouring sites cross cache lines at nearly every shift.
@@ -130,26 +130,22 @@ impl<const D: usize> Shared<D> {
         Self { sites, margin, forces, occupied: there, filled, shift: 0 }
     }
 
-    /// Takes the bonds to the sites `shift` farther on, whose forces `force` writes for tiles with particles, from a site on
-    /// ([`lanes`] numbers a site).
-    pub fn set(&mut self, shift: isize, force: impl Fn(usize, &mut [f64]) + Sync) {
+    /// Takes the bonds to the sites `shift` farther on, whose forces `force` writes for a chunk from a site on, in the tiles
+    /// that have particles ([`lanes`] numbers a site).
+    pub fn set(&mut self, shift: isize, force: impl Fn(usize, &[bool], &mut [f64]) + Sync) {
         self.shift = shift;
         let lanes = lanes::<D>();
         let (filled, margin, occupied) = (&self.filled, self.margin, &self.occupied);
         let stored = &mut self.forces.get_mut()[margin * lanes..][..self.sites * lanes];
-        stored.par_chunks_mut(CHUNK * lanes).enumerate().for_each(|(chunk, stored)| {
-            for (tile, stored) in stored.chunks_mut(TILE * lanes).enumerate() {
-                let start = chunk * CHUNK + tile * TILE;
-                if !filled[start / TILE] {
-                    continue;
-                }
-                force(start, stored);
-                if D < lanes {
-                    let here = &occupied[margin + start..][..TILE];
-                    let there = &occupied[(margin + start).wrapping_add_signed(shift)..][..TILE];
-                    for ((site, here), there) in stored.chunks_exact_mut(lanes).zip(here).zip(there) {
-                        site[D] = here * there;
-                    }
+        let tiles = filled.par_chunks(CHUNK / TILE);
+        stored.par_chunks_mut(CHUNK * lanes).zip(tiles).enumerate().for_each(|(chunk, (stored, filled))| {
+            let start = chunk * CHUNK;
+            force(start, filled, stored);
+            if D < lanes {
+                let here = &occupied[margin + start..];
+                let there = &occupied[(margin + start).wrapping_add_signed(shift)..];
+                for ((site, here), there) in stored.chunks_exact_mut(lanes).zip(here).zip(there) {
+                    site[D] = here * there;
                 }
             }
         });
@@ -160,7 +156,8 @@ impl<const D: usize> Shared<D> {
         let arch = Arch::new();
         let width = arch.dispatch(Width);
         let apart = D == lanes::<D>() && to.rim.contains(&true);
-        let runs = [runs(taps, width, lanes::<D>()), if apart { runs(taps, width, 1) } else { Runs::default() }];
+        let runs =
+            [runs(taps, width, lanes::<D>()), if apart { runs(taps, width, 1) } else { Runs::default() }];
         let Shares { sums, completed, rim } = to;
         let sums = &mut sums.get_mut()[..self.sites.next_multiple_of(CHUNK) * lanes::<D>() * D];
         sums.par_chunks_mut(CHUNK * lanes::<D>() * D).enumerate().for_each(|(chunk, sums)| {
@@ -319,6 +316,8 @@ impl Source<'_> {
         here: usize,
     ) -> [S::f64s; V] {
         let mut sums = [simd.splat_f64s(0.0); V];
+        sums = self.sum::<S, V, 6, ENDS>(simd, runs, here, sums);
+        sums = self.sum::<S, V, 5, ENDS>(simd, runs, here, sums);
         sums = self.sum::<S, V, 4, ENDS>(simd, runs, here, sums);
         sums = self.sum::<S, V, 3, ENDS>(simd, runs, here, sums);
         sums = self.sum::<S, V, 2, ENDS>(simd, runs, here, sums);
@@ -338,18 +337,16 @@ impl Source<'_> {
             let from = here.wrapping_add_signed(run.shift * self.lanes as isize);
             let count = (V + N - 1) * S::F64_LANES;
             let values = &S::as_simd_f64s(&self.numbers[from..from + count]).0[..V + N - 1];
-            let from = from.wrapping_add_signed(self.bond * self.lanes as isize);
+            let from = if ENDS { from.wrapping_add_signed(self.bond * self.lanes as isize) } else { from };
             let ends = &S::as_simd_f64s(&self.numbers[from..from + count]).0[..V + N - 1];
             let mut weights = [simd.splat_f64s(0.0); N];
             for i in 0..N {
                 weights[i] = simd.splat_f64s(run.weights[i]);
             }
-            for j in 0..V + N - 1 {
-                let value = if ENDS { simd.mul_f64s(values[j], ends[j]) } else { values[j] };
-                for i in 0..N {
-                    if i <= j && j - i < V {
-                        sums[j - i] = simd.mul_add_f64s(weights[i], value, sums[j - i]);
-                    }
+            for i in 0..N {
+                for v in 0..V {
+                    let value = if ENDS { simd.mul_f64s(values[v + i], ends[v + i]) } else { values[v + i] };
+                    sums[v] = simd.mul_add_f64s(weights[i], value, sums[v]);
                 }
             }
         }

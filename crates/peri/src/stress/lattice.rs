@@ -26,8 +26,7 @@ impl<const D: usize> Sums<D> {
         let window = measure.is_partition().then(|| Averaged::<D>::new(Window::of(measure), bonds.ratio()));
         let mut alike = BTreeMap::new();
         let half = half(bonds).iter();
-        let taps =
-            half.map(|&offset| taps(bonds, offset, measure, window.as_ref(), &mut alike)).collect();
+        let taps = half.map(|&offset| taps(bonds, offset, measure, window.as_ref(), &mut alike)).collect();
         let shares = Shares::new(bonds.sites(), &rim(bonds, state, measure));
         Self { measure, window, taps, shares, seconds: started.elapsed().as_secs_f64() }
     }
@@ -37,9 +36,8 @@ impl<const D: usize> Sums<D> {
         let started = Instant::now();
         let volumes = volumes(bonds, state, self.measure, ball, self.window.as_ref());
         let particles = bonds.particles().iter().zip(volumes);
-        let piola = particles.map(|(&site, volume)| {
-            self.shares.get(site as usize).map(|row| row.map(|sum| sum / volume))
-        });
+        let piola = particles
+            .map(|(&site, volume)| self.shares.get(site as usize).map(|row| row.map(|sum| sum / volume)));
         let piola = piola.collect();
         Measured { piola, seconds: self.seconds + started.elapsed().as_secs_f64() }
     }
@@ -67,7 +65,7 @@ pub fn piolas<const D: usize>(
     let mut seconds = started.elapsed().as_secs_f64();
     for (k, &offset) in half(bonds).iter().enumerate() {
         let started = Instant::now();
-        shared.set(bonds.shift(offset), |start, out| forces(bonds, state, k, start, out));
+        shared.set(bonds.shift(offset), |start, filled, out| forces(bonds, state, k, start, filled, out));
         seconds += started.elapsed().as_secs_f64();
         let edge = offset.map(|o| f64::from(o) * bonds.lattice().spacing);
         for sums in &mut all {

@@ -2,83 +2,153 @@
 
 use super::Loaded;
 use super::convolution::lanes;
-use crate::bonds::{Bonds, LatticeBonds, TILE};
+use crate::bonds::{Bonds, LatticeBonds, TILE, Weights};
 use crate::potential::KernelFit;
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, Simd, WithSimd};
 
-/// f V_I V_J, N, of bond `k` from a tile of sites; zero where it is not intact. `out` has [`lanes`] numbers a site.
+/// Vectors at a time: those of a tile where they are widest.
+const VECTORS: usize = 2;
+
+/// f V_I V_J, N, of bond `k` from the sites of a chunk on, in tiles that are `filled`; zero where it is not intact. `out` has
+/// [`lanes`] numbers a site.
 pub fn forces<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &Loaded<D>,
     k: usize,
     start: usize,
+    filled: &[bool],
     out: &mut [f64],
 ) {
     let offset = bonds.stencil().offsets[k];
     let bond = offset.map(|o| f64::from(o) * bonds.lattice().spacing);
     let square: f64 = bond.iter().map(|x| x * x).sum();
-    let there = start.wrapping_add_signed(bonds.shift(offset));
-    // rows are padded: a bond that leaves the storage is never intact
-    if there.checked_add(TILE).is_none_or(|end| end > bonds.sites()) {
-        out.fill(0.0);
-        return;
-    }
     let volume = bonds.lattice().volume;
-    let scale = 2.0 * state.modulus * volume * volume / square.sqrt();
-    let displacement = state.displacement.components();
-    Arch::new().dispatch(Pull { bonds, k, start, there, fit: state.fit, displacement, bond, square, scale, out });
+    let pull = Pull {
+        fit: state.fit,
+        displacement: state.displacement.components(),
+        weights: bonds.weights(k),
+        sites: bonds.sites(),
+        shift: bonds.shift(offset),
+        bond,
+        inverse_square: 1.0 / square,
+        inverse_length: 1.0 / square.sqrt(),
+        scale: 2.0 * state.modulus * volume * volume / square.sqrt(),
+    };
+    Arch::new().dispatch(Chunk { pull, start, filled, out });
 }
 
-/// scale·weight·q(e) ζ of a tile of bonds, from the displacements of both ends.
+/// scale·weight·q(e) ζ, from the displacements of both ends.
 struct Pull<'a, const D: usize> {
-    bonds: &'a LatticeBonds<D>,
-    k: usize,
-    start: usize,
-    there: usize,
     fit: &'a KernelFit,
     displacement: [&'a [f64]; D],
+    weights: Weights<'a, D>,
+    sites: usize,
+    shift: isize,
     bond: [f64; D],
-    square: f64,
+    inverse_square: f64,
+    inverse_length: f64,
     scale: f64,
+}
+
+/// A chunk of [`forces`].
+struct Chunk<'a, const D: usize> {
+    pull: Pull<'a, D>,
+    start: usize,
+    filled: &'a [bool],
     out: &'a mut [f64],
 }
 
-/// The numbers of a tile.
-#[inline(always)]
-fn tile(numbers: &[f64], start: usize) -> [f64; TILE] {
-    let mut tile = [0.0; TILE];
-    tile.copy_from_slice(&numbers[start..start + TILE]);
-    tile
-}
-
-impl<const D: usize> NullaryFnOnce for Pull<'_, D> {
+impl<const D: usize> WithSimd for Chunk<'_, D> {
     type Output = ();
     #[inline(always)]
-    fn call(self) {
-        let weights = self.bonds.weights(self.start, self.k);
-        let (mut q, mut zeta) = ([0.0; TILE], [[0.0; TILE]; D]);
-        for d in 0..D {
-            let (own, other) = (tile(self.displacement[d], self.start), tile(self.displacement[d], self.there));
+    fn with_simd<S: Simd>(self, simd: S) {
+        let lanes = lanes::<D>();
+        for tile in 0..self.filled.len() {
+            if !self.filled[tile] {
+                continue;
+            }
+            let out = &mut self.out[tile * TILE * lanes..][..TILE * lanes];
+            let start = self.start + tile * TILE;
+            let there = start.wrapping_add_signed(self.pull.shift);
+            let mut forces = [[0.0; TILE]; D];
+            // rows are padded: a bond that leaves the storage is never intact
+            if there < self.pull.sites && there + TILE <= self.pull.sites {
+                for part in (0..TILE).step_by(VECTORS * S::F64_LANES) {
+                    self.pull.some::<S>(simd, start, there, part, &mut forces);
+                }
+            }
             for i in 0..TILE {
-                let eta = other[i] - own[i];
-                q[i] += eta * (2.0 * self.bond[d] + eta);
-                zeta[d][i] = self.bond[d] + eta;
+                for d in 0..D {
+                    out[i * lanes + d] = forces[d][i];
+                }
             }
         }
-        let inverse = 1.0 / self.square;
-        for i in 0..TILE {
-            q[i] *= inverse;
+    }
+}
+
+/// Vectors from a number on. A function of arrays in place of the loop would not become part of code for vectors.
+#[inline(always)]
+fn vectors<S: Simd>(simd: S, numbers: &[f64], from: usize) -> [S::f64s; VECTORS] {
+    let vectors = &S::as_simd_f64s(&numbers[from..from + VECTORS * S::F64_LANES]).0[..VECTORS];
+    let mut found = [simd.splat_f64s(0.0); VECTORS];
+    for v in 0..VECTORS {
+        found[v] = vectors[v];
+    }
+    found
+}
+
+impl<const D: usize> Pull<'_, D> {
+    /// Some vectors of a tile, from its site `part` on.
+    #[inline(always)]
+    fn some<S: Simd>(&self, simd: S, start: usize, there: usize, part: usize, forces: &mut [[f64; TILE]; D]) {
+        let zero = simd.splat_f64s(0.0);
+        let (mut e, mut zeta) = ([zero; VECTORS], [[zero; VECTORS]; D]);
+        for d in 0..D {
+            let own = vectors::<S>(simd, self.displacement[d], start + part);
+            let other = vectors::<S>(simd, self.displacement[d], there + part);
+            let bond = simd.splat_f64s(self.bond[d]);
+            for v in 0..VECTORS {
+                let eta = simd.sub_f64s(other[v], own[v]);
+                zeta[d][v] = simd.add_f64s(bond, eta);
+                e[v] = simd.mul_add_f64s(eta, simd.add_f64s(bond, zeta[d][v]), e[v]);
+            }
         }
-        self.fit.values(&mut q);
-        let mut scale = [0.0; TILE];
-        for i in 0..TILE {
-            // what lies where there is no particle may be anything
-            scale[i] = if weights[i] == 0.0 { 0.0 } else { self.scale * weights[i] * q[i] };
+        let inverse = simd.splat_f64s(self.inverse_square);
+        for v in 0..VECTORS {
+            e[v] = simd.mul_f64s(e[v], inverse);
         }
-        let out = &mut self.out[..TILE * lanes::<D>()];
-        for i in 0..TILE {
+        let mut q = self.fit.vectors(simd, e);
+        let scale = simd.splat_f64s(self.scale * self.weights.share);
+        for v in 0..VECTORS {
+            q[v] = simd.mul_f64s(q[v], scale);
+        }
+        if let Some(factors) = &self.weights.factors {
+            let mut sums = [zero; VECTORS];
             for d in 0..D {
-                out[i * lanes::<D>() + d] = scale[i] * zeta[d][i];
+                let own = vectors::<S>(simd, factors[d], start + part);
+                let other = vectors::<S>(simd, factors[d], there + part);
+                let cosine = simd.splat_f64s(2.0 * self.bond[d] * self.inverse_length);
+                for v in 0..VECTORS {
+                    let ratio = simd.div_f64s(cosine, simd.add_f64s(own[v], other[v]));
+                    sums[v] = simd.mul_add_f64s(ratio, ratio, sums[v]);
+                }
+            }
+            for v in 0..VECTORS {
+                q[v] = simd.div_f64s(q[v], simd.sqrt_f64s(sums[v]));
+            }
+        }
+        let words = &self.weights.words[start + part..][..VECTORS * S::F64_LANES];
+        let (words, bit) = (&S::as_simd_u64s(words).0[..VECTORS], simd.splat_u64s(self.weights.bit));
+        for v in 0..VECTORS {
+            // what lies where there is no particle may be anything
+            let intact = simd.equal_u64s(simd.and_u64s(words[v], bit), bit);
+            q[v] = simd.select_f64s(intact, q[v], zero);
+        }
+        for d in 0..D {
+            let out = &mut forces[d][part..][..VECTORS * S::F64_LANES];
+            let out = &mut S::as_mut_simd_f64s(out).0[..VECTORS];
+            for v in 0..VECTORS {
+                out[v] = simd.mul_f64s(q[v], zeta[d][v]);
             }
         }
     }
