@@ -91,6 +91,7 @@ impl<const D: usize> WithSimd for Chunk<'_, D> {
 fn vectors<S: Simd>(simd: S, numbers: &[f64], from: usize) -> [S::f64s; VECTORS] {
     let vectors = &S::as_simd_f64s(&numbers[from..from + VECTORS * S::F64_LANES]).0[..VECTORS];
     let mut found = [simd.splat_f64s(0.0); VECTORS];
+    #[expect(clippy::manual_memcpy, reason = "a slice of them would keep them in memory")]
     for v in 0..VECTORS {
         found[v] = vectors[v];
     }
