@@ -4,7 +4,7 @@ mod connect;
 mod mixed;
 
 use super::lattice_kernel::{Class, TILE, Tiles};
-use super::lattice_sums::{GradientSums, Span, Spans};
+use super::lattice_sums::{GradientSums, Span, Spans, Weights};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, Softening, integrity};
 use super::stencil::{Stencil, fullest, layout};
@@ -145,6 +145,13 @@ impl<const D: usize> LatticeBonds<D> {
         let Some(factors) = &self.factors else { return share };
         let other = site.wrapping_add_signed(shift);
         share * self.interior_factor * surface_weight(bond, length, factors.get(site), factors.get(other))
+    }
+
+    /// What [`Self::weight`] and [`Self::is_intact`] of bond `k` come from.
+    pub(crate) fn weights(&self, k: usize) -> Weights<'_, D> {
+        let factors = self.factors.as_ref().map(Field::components);
+        let share = self.spans[k].share * self.interior_factor;
+        Weights { share, factors, words: &self.intact[k / 64], bit: 1 << (k % 64) }
     }
 
     /// A bond of a site with the softened ones `soft`.

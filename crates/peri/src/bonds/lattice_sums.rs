@@ -21,6 +21,17 @@ pub struct Span<const D: usize> {
     pub inverse_square: f64,
 }
 
+/// The weights of all particles' bonds of one type.
+pub(crate) struct Weights<'a, const D: usize> {
+    /// That of bonds without surface correction.
+    pub share: f64,
+    /// Factors g of the surface correction, site by site.
+    pub factors: Option<[&'a [f64]; D]>,
+    /// Words with the bit `bit` set where the bond is intact, site by site.
+    pub words: &'a [u64],
+    pub bit: u64,
+}
+
 /// A stencil over a displacement.
 pub struct Spans<'a, const D: usize> {
     /// All bonds of the stencil; bond k and bond (n − 1 − k) are opposite.

@@ -26,7 +26,7 @@ pub use cloud_kernel::GROUP;
 pub use cloud_linear::{CloudMoments, CloudPlaces, Columns};
 pub use lattice::LatticeBonds;
 pub use lattice_kernel::TILE;
-pub(crate) use lattice_sums::GradientSums;
+pub(crate) use lattice_sums::{GradientSums, Weights};
 pub use linear_kernel::{LinearRow, Moments};
 pub use property::Property;
 pub use softening::{Softened, Softening, among};

@@ -5,6 +5,10 @@
 
 use super::{BondPotential, ratio};
 use crate::error::Error;
+use pulp::Simd;
+
+/// Most numbers in a vector.
+const WIDEST: usize = 8;
 
 /// Intervals between the points at which a candidate is judged.
 const DENSE: usize = 4096;
@@ -122,31 +126,49 @@ impl KernelFit {
         if self.stress_free { e * ratio } else { ratio }
     }
 
-    /// q of several e at once, with the bits of [`Self::value`].
+    /// q of several vectors of e.
     #[inline(always)]
-    pub fn values<const N: usize>(&self, e: &mut [f64; N]) {
+    pub(crate) fn vectors<S: Simd, const V: usize>(&self, simd: S, mut e: [S::f64s; V]) -> [S::f64s; V] {
         if !self.table.is_empty() {
-            e.iter_mut().for_each(|e| *e = self.value(*e));
-            return;
+            for v in 0..V {
+                let mut numbers = [0.0; WIDEST];
+                let numbers = &mut numbers[..S::F64_LANES];
+                S::as_mut_simd_f64s(numbers).0[0] = e[v];
+                for k in 0..S::F64_LANES {
+                    numbers[k] = self.value(numbers[k]);
+                }
+                e[v] = S::as_simd_f64s(numbers).0[0];
+            }
+            return e;
         }
-        let (mut above, mut below) = ([0.0; N], [0.0; N]);
-        for e in e.iter_mut() {
-            *e = e.clamp(self.clamp[0], self.clamp[1]);
+        let (low, high) = (simd.splat_f64s(self.clamp[0]), simd.splat_f64s(self.clamp[1]));
+        let (mut q, mut below) = ([simd.splat_f64s(0.0); V], [simd.splat_f64s(0.0); V]);
+        for v in 0..V {
+            e[v] = simd.min_f64s(simd.max_f64s(e[v], low), high);
         }
-        for c in self.numerator.iter().rev() {
-            for k in 0..N {
-                above[k] = above[k] * e[k] + c;
+        // iterators, closures and functions of arrays would not become part of code for vectors
+        for k in (0..self.numerator.len()).rev() {
+            let c = simd.splat_f64s(self.numerator[k]);
+            for v in 0..V {
+                q[v] = simd.mul_add_f64s(q[v], e[v], c);
             }
         }
-        for c in self.denominator.iter().rev() {
-            for k in 0..N {
-                below[k] = below[k] * e[k] + c;
+        for k in (0..self.denominator.len()).rev() {
+            let c = simd.splat_f64s(self.denominator[k]);
+            for v in 0..V {
+                below[v] = simd.mul_add_f64s(below[v], e[v], c);
             }
         }
-        for k in 0..N {
-            let ratio = above[k] / (1.0 + e[k] * below[k]);
-            e[k] = if self.stress_free { e[k] * ratio } else { ratio };
+        for v in 0..V {
+            if !self.denominator.is_empty() {
+                let one = simd.splat_f64s(1.0);
+                q[v] = simd.div_f64s(q[v], simd.mul_add_f64s(e[v], below[v], one));
+            }
+            if self.stress_free {
+                q[v] = simd.mul_f64s(q[v], e[v]);
+            }
         }
+        q
     }
 
     /// What is fitted: `polynomial of degree 6`, `rational 3/2`, `table of 2000 nodes`.

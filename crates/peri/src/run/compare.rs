@@ -101,7 +101,7 @@ fn profile(name: &str, column: &[(f64, Vec<usize>)], values: &[f64]) -> Profile 
     }
 }
 
-/// Seconds that a stress field of one measure takes from the scene on.
+/// Seconds that a stress field of one measure takes from the scene on, as if it were the only one.
 pub fn run_time(outcome: &Outcome, measure: &str) -> f64 {
     ["build", "solve", "deformation gradient", &format!("stress {measure}")]
         .map(|phase| outcome.seconds_of(phase))

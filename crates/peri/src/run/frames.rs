@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::potential::KernelFit;
 use crate::scene::Scene;
 use crate::solver::{Record, State};
-use crate::stress::{self, Loaded, Measure, Missing, Tensor, cauchy, deformation_gradients};
+use crate::stress::{self, Loaded, Measure, Measured, Missing, Tensor, cauchy, deformation_gradients};
 use polycore::constitutive::Flags;
 use polycore::output::vtkhdf::ParticleSeries;
 use polycore::report::Phases;
@@ -160,7 +160,7 @@ impl<'a, const D: usize> Frames<'a, D> {
         Some(whole.iter().zip(&now).map(part).collect())
     }
 
-    /// Stresses of a state.
+    /// Stresses of a state. The phase of a measure is what it would take alone ([`Measured::seconds`]).
     ///
     /// # Errors
     /// As [`KernelFit::new`].
@@ -187,13 +187,14 @@ impl<'a, const D: usize> Frames<'a, D> {
         let fit = KernelFit::new(law, covered_stretches(bonds, &state.displacement), self.scene.fit_bound())?;
         let gradients =
             phases.time("deformation gradient", || deformation_gradients(bonds, &state.displacement));
-        for &measure in &spec.measures {
-            let missing = Missing::WindowAt(&self.by_window);
-            let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing };
+        let missing = Missing::WindowAt(&self.by_window);
+        let loaded = Loaded { displacement: &state.displacement, fit: &fit, modulus, missing };
+        let measured = stress::piolas(bonds, &loaded, &spec.measures, spec.ball);
+        for (&measure, Measured { piola, seconds }) in spec.measures.iter().zip(measured) {
             let started = Instant::now();
-            let piola = stress::piola(bonds, &loaded, measure, spec.ball);
             stresses.cauchy.push((measure, cauchy(&piola, &gradients)));
-            phases.add(&format!("stress {}", measure.name()), started.elapsed().as_secs_f64());
+            let seconds = seconds + started.elapsed().as_secs_f64();
+            phases.add(&format!("stress {}", measure.name()), seconds);
             if keeps {
                 stresses.piola.push((measure, piola));
             }

@@ -2,19 +2,29 @@
 //! a time.
 
 use super::Tensor;
+use crate::bonds::TILE;
 use crate::field::CHUNK;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Sites that are summed at a time, in registers.
-pub const BLOCK: usize = 16;
-/// Numbers a site: the force, and 1 where both particles of the bond exist. Together they fill a vector of four, which
-/// is always aligned, wherever the bond begins; vectors of neighbouring sites cross cache lines at nearly every shift.
-const LANES: usize = 4;
+/// Numbers that are summed at a time, in registers: a block.
+const BLOCK: usize = 64;
 
 /// Most taps whose vectors are loaded once for all of them.
-const RUN: usize = 4;
+const RUN: usize = 6;
+
+/// Numbers a site: the force, and in solids 1 where both particles of the bond exist, which fills a vector of four. That
+/// is always aligned, wherever the bond begins; vectors of neighbouring sites cross cache lines at nearly every shift.
+/// In a plane a fourth number would be nothing but work, and a third is needed near surfaces only.
+pub const fn lanes<const D: usize>() -> usize {
+    if D == 2 { 2 } else { 4 }
+}
+
+/// Sites of a block.
+const fn sites_of_block<const D: usize>() -> usize {
+    BLOCK / lanes::<D>()
+}
 
 /// Where a bond must begin, relative to the point of interest, and the weight with which it counts there.
 pub struct Tap {
@@ -31,13 +41,16 @@ struct Run {
     weights: [f64; RUN],
 }
 
-/// The taps of a bond in runs of one, two, … [`RUN`], where a vector holds `lanes` numbers.
-fn runs(taps: &[Tap], lanes: usize) -> [Vec<Run>; RUN] {
+/// Taps in runs of one, two, … [`RUN`].
+type Runs = [Vec<Run>; RUN];
+
+/// The taps of a bond in runs, where a vector holds `width` numbers and a site `lanes`.
+fn runs(taps: &[Tap], width: usize, lanes: usize) -> Runs {
     // vectors that hold less than a site do not overlap like this
-    let (ahead, most) = if lanes < LANES { (1, 1) } else { ((lanes / LANES) as isize, RUN) };
+    let (ahead, most) = if width < lanes { (1, 1) } else { ((width / lanes) as isize, RUN) };
     let mut left = BTreeMap::new();
     taps.iter().for_each(|tap| *left.entry(tap.shift).or_insert(0.0) += tap.weight);
-    let mut runs: [Vec<Run>; RUN] = Default::default();
+    let mut runs: Runs = Default::default();
     while let Some((shift, first)) = left.pop_first() {
         let (mut weights, mut count) = ([0.0; RUN], 1);
         weights[0] = first;
@@ -53,143 +66,192 @@ fn runs(taps: &[Tap], lanes: usize) -> [Vec<Run>; RUN] {
 }
 
 /// Numbers in a vector of this machine.
-struct Lanes;
+struct Width;
 
-impl WithSimd for Lanes {
+impl WithSimd for Width {
     type Output = usize;
     fn with_simd<S: Simd>(self, _simd: S) -> usize {
         S::F64_LANES
     }
 }
 
-/// Which blocks of sites hold any of those given.
-pub fn blocks(sites: usize, of: &[u32]) -> Vec<bool> {
-    let mut filled = vec![false; sites.div_ceil(BLOCK)];
-    of.iter().for_each(|&site| filled[site as usize / BLOCK] = true);
+/// Which tiles of sites hold any of those given.
+pub fn tiles(sites: usize, of: &[u32]) -> Vec<bool> {
+    let mut filled = vec![false; sites.div_ceil(TILE)];
+    of.iter().for_each(|&site| filled[site as usize / TILE] = true);
     filled
 }
 
-/// The bonds of one type from every site.
-pub struct Shared {
-    sites: usize,
-    /// [`LANES`] numbers a site from `first` on; a margin of zeros before and behind the sites, whole chunks of them.
-    bonds: Vec<f64>,
+/// Numbers of all sites, from the first of a cache line on.
+struct Aligned {
+    numbers: Vec<f64>,
     first: usize,
+}
+
+impl Aligned {
+    fn zeros(count: usize) -> Self {
+        let numbers = vec![0.0; count + 8];
+        let first = numbers.as_ptr().align_offset(64).min(8);
+        Self { numbers, first }
+    }
+
+    fn get(&self) -> &[f64] {
+        &self.numbers[self.first..]
+    }
+
+    fn get_mut(&mut self) -> &mut [f64] {
+        &mut self.numbers[self.first..]
+    }
+}
+
+/// The bonds of one type from every site.
+pub struct Shared<const D: usize> {
+    sites: usize,
+    /// Zeros before and behind the sites, so many of them: whole chunks.
     margin: usize,
+    /// [`lanes`] numbers a site.
+    forces: Aligned,
     /// 1 where there is a particle.
     occupied: Vec<f64>,
-    /// Sites whose averages are divided by the weights of the bonds whose two particles exist, and their blocks.
+    /// Tiles with particles.
+    filled: Vec<bool>,
+    /// From a bond's site to its other one.
+    shift: isize,
+}
+
+impl<const D: usize> Shared<D> {
+    /// No bonds yet. No tap reaches farther than `reach` sites, no bond farther than `bond`.
+    pub fn new(occupied: &[bool], filled: Vec<bool>, reach: usize, bond: usize) -> Self {
+        let (sites, margin) = (occupied.len(), (reach + bond).next_multiple_of(CHUNK));
+        let stored = sites.next_multiple_of(CHUNK) + 2 * margin;
+        let mut there = vec![0.0; stored];
+        occupied.iter().zip(&mut there[margin..]).for_each(|(&is, there)| *there = f64::from(u8::from(is)));
+        let forces = Aligned::zeros(stored * lanes::<D>());
+        Self { sites, margin, forces, occupied: there, filled, shift: 0 }
+    }
+
+    /// Takes the bonds to the sites `shift` farther on, whose forces `force` writes for a chunk from a site on, in the tiles
+    /// that have particles ([`lanes`] numbers a site).
+    pub fn set(&mut self, shift: isize, force: impl Fn(usize, &[bool], &mut [f64]) + Sync) {
+        self.shift = shift;
+        let lanes = lanes::<D>();
+        let (filled, margin, occupied) = (&self.filled, self.margin, &self.occupied);
+        let stored = &mut self.forces.get_mut()[margin * lanes..][..self.sites * lanes];
+        let tiles = filled.par_chunks(CHUNK / TILE);
+        stored.par_chunks_mut(CHUNK * lanes).zip(tiles).enumerate().for_each(|(chunk, (stored, filled))| {
+            let start = chunk * CHUNK;
+            force(start, filled, stored);
+            if D < lanes {
+                let here = &occupied[margin + start..];
+                let there = &occupied[(margin + start).wrapping_add_signed(shift)..];
+                for ((site, here), there) in stored.chunks_exact_mut(lanes).zip(here).zip(there) {
+                    site[D] = here * there;
+                }
+            }
+        });
+    }
+
+    /// Adds the bonds' averages by a measure's taps ⊗ edge to its sums.
+    pub fn add(&self, taps: &[Tap], edge: [f64; D], to: &mut Shares<D>) {
+        let arch = Arch::new();
+        let width = arch.dispatch(Width);
+        let apart = D == lanes::<D>() && to.rim.contains(&true);
+        let runs =
+            [runs(taps, width, lanes::<D>()), if apart { runs(taps, width, 1) } else { Runs::default() }];
+        let Shares { sums, completed, rim } = to;
+        let sums = &mut sums.get_mut()[..self.sites.next_multiple_of(CHUNK) * lanes::<D>() * D];
+        sums.par_chunks_mut(CHUNK * lanes::<D>() * D).enumerate().for_each(|(chunk, sums)| {
+            let start = chunk * CHUNK;
+            arch.dispatch(Chunk { shared: self, runs: &runs, completed, rim, start, edge, sums });
+        });
+    }
+}
+
+/// Sums of a measure, site by site.
+pub struct Shares<const D: usize> {
+    /// Block by block, for each component of the edge [`lanes`] numbers a site.
+    sums: Aligned,
+    /// 1 in sites whose averages are divided by the weights of the bonds whose two particles exist; and their tiles.
     completed: Vec<bool>,
     rim: Vec<bool>,
 }
 
-impl Shared {
-    /// No bonds yet; `rim` are the sites whose averages are completed.
-    pub fn new(sites: usize, occupied: Vec<bool>, rim: &[u32]) -> Self {
-        let mut completed = vec![false; sites];
+impl<const D: usize> Shares<D> {
+    /// Nothing yet; `rim` are the sites whose averages are completed.
+    pub fn new(sites: usize, rim: &[u32]) -> Self {
+        let stored = sites.next_multiple_of(CHUNK);
+        let mut completed = vec![false; stored];
         rim.iter().for_each(|&site| completed[site as usize] = true);
-        let occupied = occupied.into_iter().map(|there| f64::from(u8::from(there))).collect();
-        let rim = blocks(sites, rim);
-        Self { sites, bonds: Vec::new(), first: 0, margin: 0, occupied, completed, rim }
+        Self { sums: Aligned::zeros(stored * lanes::<D>() * D), completed, rim: tiles(stored, rim) }
     }
 
-    /// Takes the bonds to the sites `shift` farther on, whose forces `force` writes for the block from a site on, in the
-    /// blocks that are `filled`.
-    pub fn set<const D: usize>(
-        &mut self,
-        shift: isize,
-        filled: &[bool],
-        taps: &[Tap],
-        force: impl Fn(usize, [&mut [f64]; D]) + Sync,
-    ) {
-        let reach = taps.iter().map(|tap| tap.shift.unsigned_abs()).max().unwrap_or(0);
-        if self.bonds.is_empty() || reach > self.margin {
-            self.margin = reach.next_multiple_of(CHUNK);
-            let stored = self.sites.next_multiple_of(BLOCK) + 2 * self.margin;
-            self.bonds = vec![0.0; (stored + 2) * LANES];
-            self.first = self.bonds.as_ptr().align_offset(64).min(2 * LANES);
-        }
-        let (sites, occupied) = (self.sites, &self.occupied);
-        let stored = &mut self.bonds[self.first + self.margin * LANES..][..sites * LANES];
-        stored.par_chunks_mut(CHUNK * LANES).enumerate().for_each(|(chunk, stored)| {
-            for (block, stored) in stored.chunks_mut(BLOCK * LANES).enumerate() {
-                let start = chunk * CHUNK + block * BLOCK;
-                if !filled[start / BLOCK] {
-                    continue;
-                }
-                let mut forces = [[0.0; BLOCK]; D];
-                force(start, forces.each_mut().map(|force| &mut force[..stored.len() / LANES]));
-                for (index, stored) in stored.chunks_exact_mut(LANES).enumerate() {
-                    let site = start + index;
-                    let there = occupied.get(site.wrapping_add_signed(shift)).copied();
-                    for d in 0..D {
-                        stored[d] = forces[d][index];
-                    }
-                    stored[D] = occupied[site] * there.unwrap_or(0.0);
-                }
-            }
-        });
-    }
-
-    /// sums += (Σ weight·force over the taps of a bond) ⊗ edge, site by site.
-    pub fn add<const D: usize>(&self, taps: &[Tap], filled: &[bool], edge: [f64; D], sums: &mut [Tensor<D>]) {
-        let arch = Arch::new();
-        let runs = &runs(taps, arch.dispatch(Lanes));
-        sums.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, sums)| {
-            for (block, sums) in sums.chunks_mut(BLOCK).enumerate() {
-                let start = chunk * CHUNK + block * BLOCK;
-                if filled[start / BLOCK] {
-                    arch.dispatch(Block { shared: self, runs, start, edge, sums });
-                }
-            }
-        });
+    /// The sum of a site.
+    pub fn get(&self, site: usize) -> Tensor<D> {
+        let (block, site) = (site / sites_of_block::<D>(), site % sites_of_block::<D>());
+        let sums = &self.sums.get()[block * BLOCK * D..];
+        std::array::from_fn(|a| std::array::from_fn(|b| sums[b * BLOCK + site * lanes::<D>() + a]))
     }
 }
 
-/// A block of [`Shared::add`].
-struct Block<'a, const D: usize> {
-    shared: &'a Shared,
-    runs: &'a [Vec<Run>; RUN],
+/// A chunk of [`Shared::add`].
+struct Chunk<'a, const D: usize> {
+    shared: &'a Shared<D>,
+    /// For the numbers of the bonds, and in a plane for whether they exist.
+    runs: &'a [Runs; 2],
+    completed: &'a [bool],
+    rim: &'a [bool],
     start: usize,
     edge: [f64; D],
-    sums: &'a mut [Tensor<D>],
+    sums: &'a mut [f64],
 }
 
-impl<const D: usize> WithSimd for Block<'_, D> {
+impl<const D: usize> WithSimd for Chunk<'_, D> {
     type Output = ();
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let mut averages = [0.0; BLOCK * LANES];
-        // eight sums at a time hide the latency of additions, and leave registers for the rest
-        self.average::<S, 8>(simd, &mut averages);
-        let rim = self.shared.rim[self.start / BLOCK];
-        let completed = &self.shared.completed[self.start..][..self.sums.len()];
-        let averages = averages.as_chunks::<LANES>().0;
-        for ((sum, average), completed) in self.sums.iter_mut().zip(averages).zip(completed) {
-            // where no such bond exists, the average is zero
-            let scale = if rim && *completed && average[D] > 0.0 { 1.0 / average[D] } else { 1.0 };
-            for a in 0..D {
-                for b in 0..D {
-                    sum[a][b] += scale * average[a] * self.edge[b];
+        let (sites, tiles) = (sites_of_block::<D>(), sites_of_block::<D>() / TILE);
+        let mut edge = [simd.splat_f64s(0.0); D];
+        for d in 0..D {
+            edge[d] = simd.splat_f64s(self.edge[d]);
+        }
+        for block in 0..self.sums.len() / (BLOCK * D) {
+            let start = self.start + block * sites;
+            let (mut filled, mut rim) = (false, false);
+            for tile in start / TILE..start / TILE + tiles {
+                filled |= tile < self.shared.filled.len() && self.shared.filled[tile];
+                rim |= self.rim[tile];
+            }
+            if !filled {
+                continue;
+            }
+            let mut averages = [0.0; BLOCK];
+            // eight sums at a time hide the latency of additions, and leave registers for the rest
+            self.average::<S, 8>(simd, start, &mut averages);
+            if rim {
+                self.complete(simd, start, &mut averages);
+            }
+            let averages = S::as_simd_f64s(&averages).0;
+            for d in 0..D {
+                let sums = &mut self.sums[(block * D + d) * BLOCK..][..BLOCK];
+                let sums = S::as_mut_simd_f64s(sums).0;
+                for v in 0..BLOCK / S::F64_LANES {
+                    sums[v] = simd.mul_add_f64s(averages[v], edge[d], sums[v]);
                 }
             }
         }
     }
 }
 
-impl<const D: usize> Block<'_, D> {
+impl<const D: usize> Chunk<'_, D> {
     /// Σ weight·number over the taps, V vectors at a time.
     #[inline(always)]
-    fn average<S: Simd, const V: usize>(&self, simd: S, averages: &mut [f64; BLOCK * LANES]) {
-        let width = V * S::F64_LANES;
-        for (part, out) in averages.chunks_mut(width).enumerate() {
-            let here = self.shared.first + (self.shared.margin + self.start) * LANES + part * width;
-            let mut sums = [simd.splat_f64s(0.0); V];
-            sums = self.sum::<S, V, 4>(simd, here, sums);
-            sums = self.sum::<S, V, 3>(simd, here, sums);
-            sums = self.sum::<S, V, 2>(simd, here, sums);
-            sums = self.sum::<S, V, 1>(simd, here, sums);
-            let out = &mut S::as_mut_simd_f64s(out).0[..V];
+    fn average<S: Simd, const V: usize>(&self, simd: S, start: usize, averages: &mut [f64; BLOCK]) {
+        let (lanes, width) = (lanes::<D>(), V * S::F64_LANES);
+        let source = Source { numbers: self.shared.forces.get(), lanes, bond: 0 };
+        for part in 0..BLOCK / width {
+            let here = (self.shared.margin + start) * lanes + part * width;
+            let sums = source.total::<S, V, false>(simd, &self.runs[0], here);
+            let out = &mut S::as_mut_simd_f64s(&mut averages[part * width..][..width]).0[..V];
             #[expect(clippy::manual_memcpy, reason = "a slice of the sums would keep them in memory")]
             for v in 0..V {
                 out[v] = sums[v];
@@ -197,28 +259,94 @@ impl<const D: usize> Block<'_, D> {
         }
     }
 
-    /// Adds the runs of N taps to V vectors from the number `here` on.
+    /// Divides the averages of completed sites by the weights of the bonds that exist.
     #[inline(always)]
-    fn sum<S: Simd, const V: usize, const N: usize>(
+    fn complete<S: Simd>(&self, simd: S, start: usize, averages: &mut [f64; BLOCK]) {
+        let (lanes, sites) = (lanes::<D>(), sites_of_block::<D>());
+        let mut weights = [0.0; BLOCK];
+        if D < lanes {
+            for k in 0..sites {
+                weights[k] = averages[k * lanes + D];
+            }
+        } else {
+            self.existing::<S, 4>(simd, start, &mut weights[..sites]);
+        }
+        for k in 0..sites {
+            // where no such bond exists, the average is zero
+            if self.completed[start + k] && weights[k] > 0.0 {
+                for lane in 0..D {
+                    averages[k * lanes + lane] /= weights[k];
+                }
+            }
+        }
+    }
+
+    /// Weights of the bonds whose two particles exist, V vectors at a time.
+    #[inline(always)]
+    fn existing<S: Simd, const V: usize>(&self, simd: S, start: usize, weights: &mut [f64]) {
+        let Shared { occupied, shift, margin, .. } = self.shared;
+        let (source, width) = (Source { numbers: occupied, lanes: 1, bond: *shift }, V * S::F64_LANES);
+        for part in 0..weights.len() / width {
+            let sums = source.total::<S, V, true>(simd, &self.runs[1], margin + start + part * width);
+            let out = &mut S::as_mut_simd_f64s(&mut weights[part * width..][..width]).0[..V];
+            #[expect(clippy::manual_memcpy, reason = "a slice of the sums would keep them in memory")]
+            for v in 0..V {
+                out[v] = sums[v];
+            }
+        }
+    }
+}
+
+/// What taps weigh: numbers, or the product of those at a bond's two ends.
+struct Source<'a> {
+    numbers: &'a [f64],
+    /// Of a site.
+    lanes: usize,
+    /// Sites from one end to the other.
+    bond: isize,
+}
+
+impl Source<'_> {
+    /// Sums over all taps of V vectors from the number `here` on.
+    #[inline(always)]
+    fn total<S: Simd, const V: usize, const ENDS: bool>(
         &self,
         simd: S,
+        runs: &Runs,
+        here: usize,
+    ) -> [S::f64s; V] {
+        let mut sums = [simd.splat_f64s(0.0); V];
+        sums = self.sum::<S, V, 6, ENDS>(simd, runs, here, sums);
+        sums = self.sum::<S, V, 5, ENDS>(simd, runs, here, sums);
+        sums = self.sum::<S, V, 4, ENDS>(simd, runs, here, sums);
+        sums = self.sum::<S, V, 3, ENDS>(simd, runs, here, sums);
+        sums = self.sum::<S, V, 2, ENDS>(simd, runs, here, sums);
+        self.sum::<S, V, 1, ENDS>(simd, runs, here, sums)
+    }
+
+    /// Adds the runs of N taps.
+    #[inline(always)]
+    fn sum<S: Simd, const V: usize, const N: usize, const ENDS: bool>(
+        &self,
+        simd: S,
+        runs: &Runs,
         here: usize,
         mut sums: [S::f64s; V],
     ) -> [S::f64s; V] {
-        for run in &self.runs[N - 1] {
-            let from = here.wrapping_add_signed(run.shift * LANES as isize);
-            let bonds = &self.shared.bonds[from..from + (V + N - 1) * S::F64_LANES];
-            let values = &S::as_simd_f64s(bonds).0[..V + N - 1];
+        for run in &runs[N - 1] {
+            let from = here.wrapping_add_signed(run.shift * self.lanes as isize);
+            let count = (V + N - 1) * S::F64_LANES;
+            let values = &S::as_simd_f64s(&self.numbers[from..from + count]).0[..V + N - 1];
+            let from = if ENDS { from.wrapping_add_signed(self.bond * self.lanes as isize) } else { from };
+            let ends = &S::as_simd_f64s(&self.numbers[from..from + count]).0[..V + N - 1];
             let mut weights = [simd.splat_f64s(0.0); N];
             for i in 0..N {
                 weights[i] = simd.splat_f64s(run.weights[i]);
             }
-            for j in 0..V + N - 1 {
-                let value = values[j];
-                for i in 0..N {
-                    if i <= j && j - i < V {
-                        sums[j - i] = simd.mul_add_f64s(weights[i], value, sums[j - i]);
-                    }
+            for i in 0..N {
+                for v in 0..V {
+                    let value = if ENDS { simd.mul_f64s(values[v + i], ends[v + i]) } else { values[v + i] };
+                    sums[v] = simd.mul_add_f64s(weights[i], value, sums[v]);
                 }
             }
         }

@@ -1,105 +1,84 @@
 //! On a lattice the bond function depends on offsets only: each measure is, bond by bond of the stencil, a convolution
-//! of that bond's forces with fixed weights.
+//! of that bond's forces with fixed weights. The forces are the same for all measures.
 
-use super::convolution::{BLOCK, Shared, Tap, blocks};
+use super::convolution::{Shared, Shares, Tap, tiles};
+use super::pull::forces;
 use super::window::{Averaged, Window, normalise};
-use super::{BallVolume, Loaded, Measure, Tensor, ball_volume, cell_fractions, segment_fraction};
+use super::{BallVolume, Loaded, Measure, Measured, ball_volume, cell_fractions, segment_fraction};
 use crate::bonds::{Bonds, LatticeBonds};
-use crate::potential::KernelFit;
-use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::time::Instant;
 
-pub fn piola<const D: usize>(
-    bonds: &LatticeBonds<D>,
-    state: &Loaded<D>,
+/// What a measure sums up, and what it took.
+struct Sums<const D: usize> {
     measure: Measure,
-    ball: BallVolume,
-) -> Vec<Tensor<D>> {
-    let sites = bonds.sites();
-    let mut sums = vec![[[0.0; D]; D]; sites];
-    let window = measure.is_partition().then(|| Averaged::<D>::new(Window::of(measure), bonds.ratio()));
-    let (filled, rim) = (blocks(sites, bonds.particles()), rim(bonds, state, measure));
-    let mut shared = Shared::new(sites, bonds.occupancy(), &rim);
-    let mut alike = BTreeMap::new();
-    // one direction of every bond; the other adds the same f ⊗ ξ, which the factor ½ of the definition undoes
-    for k in 0..bonds.stencil().offsets.len() / 2 {
-        let offset = bonds.stencil().offsets[k];
-        let taps = taps(bonds, offset, measure, window.as_ref(), &mut alike);
-        let edge = offset.map(|o| f64::from(o) * bonds.lattice().spacing);
-        shared
-            .set(bonds.shift(offset), &filled, &taps, |start, out| bond_forces(bonds, state, k, start, out));
-        shared.add(&taps, &filled, edge, &mut sums);
-    }
-    let volumes = volumes(bonds, state, measure, ball, window.as_ref());
-    let particles = bonds.particles().iter().zip(volumes);
-    particles.map(|(&site, volume)| sums[site as usize].map(|row| row.map(|sum| sum / volume))).collect()
+    window: Option<Averaged<D>>,
+    /// Of each bond of half the stencil.
+    taps: Vec<Vec<Tap>>,
+    shares: Shares<D>,
+    seconds: f64,
 }
 
-/// f V_I V_J, N, of bond `k` from a block of sites; zero where it is not intact.
-fn bond_forces<const D: usize>(
+impl<const D: usize> Sums<D> {
+    fn new(bonds: &LatticeBonds<D>, state: &Loaded<D>, measure: Measure) -> Self {
+        let started = Instant::now();
+        let window = measure.is_partition().then(|| Averaged::<D>::new(Window::of(measure), bonds.ratio()));
+        let mut alike = BTreeMap::new();
+        let half = half(bonds).iter();
+        let taps = half.map(|&offset| taps(bonds, offset, measure, window.as_ref(), &mut alike)).collect();
+        let shares = Shares::new(bonds.sites(), &rim(bonds, state, measure));
+        Self { measure, window, taps, shares, seconds: started.elapsed().as_secs_f64() }
+    }
+
+    /// The sums over the volumes.
+    fn finish(self, bonds: &LatticeBonds<D>, state: &Loaded<D>, ball: BallVolume) -> Measured<D> {
+        let started = Instant::now();
+        let volumes = volumes(bonds, state, self.measure, ball, self.window.as_ref());
+        let one = |(&site, volume): (&u32, f64)| {
+            self.shares.get(site as usize).map(|row| row.map(|sum| sum / volume))
+        };
+        let piola = bonds.particles().par_iter().zip(volumes).map(one).collect();
+        Measured { piola, seconds: self.seconds + started.elapsed().as_secs_f64() }
+    }
+}
+
+/// One direction of every bond; the other adds the same f ⊗ ξ, which the factor ½ of the definition undoes.
+fn half<const D: usize>(bonds: &LatticeBonds<D>) -> &[[i32; D]] {
+    let offsets = &bonds.stencil().offsets;
+    &offsets[..offsets.len() / 2]
+}
+
+pub fn piolas<const D: usize>(
     bonds: &LatticeBonds<D>,
     state: &Loaded<D>,
-    k: usize,
-    start: usize,
-    mut out: [&mut [f64]; D],
-) {
-    let (offset, count) = (bonds.stencil().offsets[k], out[0].len());
-    let bond = offset.map(|o| f64::from(o) * bonds.lattice().spacing);
-    let square: f64 = bond.iter().map(|x| x * x).sum();
-    let (volume, length) = (bonds.lattice().volume, square.sqrt());
-    let mut scale = [0.0; BLOCK];
-    for (index, scale) in scale[..count].iter_mut().enumerate() {
-        if bonds.is_intact(start + index, k) {
-            let weight = bonds.weight(start + index, k) * volume;
-            *scale = 2.0 * state.modulus * weight * volume / length;
+    measures: &[Measure],
+    ball: BallVolume,
+) -> Vec<Measured<D>> {
+    let mut all: Vec<Sums<D>> = measures.iter().map(|&measure| Sums::new(bonds, state, measure)).collect();
+    let started = Instant::now();
+    let reach = all.iter().flat_map(|sums| sums.taps.iter().flatten()).map(|tap| tap.shift.unsigned_abs());
+    let longest = half(bonds).iter().map(|&offset| bonds.shift(offset).unsigned_abs());
+    let (reach, longest) = (reach.max().unwrap_or(0), longest.max().unwrap_or(0));
+    let filled = tiles(bonds.sites(), bonds.particles());
+    let mut shared = Shared::new(&bonds.occupancy(), filled, reach, longest);
+    let mut seconds = started.elapsed().as_secs_f64();
+    for (k, &offset) in half(bonds).iter().enumerate() {
+        let started = Instant::now();
+        shared.set(bonds.shift(offset), |start, filled, out| forces(bonds, state, k, start, filled, out));
+        seconds += started.elapsed().as_secs_f64();
+        let edge = offset.map(|o| f64::from(o) * bonds.lattice().spacing);
+        for sums in &mut all {
+            let started = Instant::now();
+            shared.add(&sums.taps[k], edge, &mut sums.shares);
+            sums.seconds += started.elapsed().as_secs_f64();
         }
     }
-    let there = start.wrapping_add_signed(bonds.shift(offset));
-    // rows are padded: a bond that leaves the storage is never intact
-    if there.checked_add(count).is_none_or(|end| end > bonds.sites()) {
-        out.iter_mut().for_each(|out| out.fill(0.0));
-        return;
-    }
-    let ends = state.displacement.components().map(|u| [&u[start..start + count], &u[there..there + count]]);
-    Arch::new().dispatch(Pull { fit: state.fit, bond, square, scale: &scale, ends, out });
-}
-
-/// scale·q(e) ζ of a block of bonds, from the displacements of both ends.
-struct Pull<'a, const D: usize> {
-    fit: &'a KernelFit,
-    bond: [f64; D],
-    square: f64,
-    scale: &'a [f64; BLOCK],
-    ends: [[&'a [f64]; 2]; D],
-    out: [&'a mut [f64]; D],
-}
-
-impl<const D: usize> NullaryFnOnce for Pull<'_, D> {
-    type Output = ();
-    #[inline(always)]
-    fn call(self) {
-        let count = self.out[0].len();
-        let mut q = [0.0; BLOCK];
-        for d in 0..D {
-            let [own, other] = self.ends[d];
-            for k in 0..count {
-                let eta = other[k] - own[k];
-                q[k] += eta * (2.0 * self.bond[d] + eta);
-            }
-        }
-        for q in &mut q {
-            *q /= self.square;
-        }
-        self.fit.values(&mut q);
-        for d in 0..D {
-            let ([own, other], out) = (self.ends[d], &mut *self.out[d]);
-            for k in 0..count {
-                let force = self.scale[k] * q[k] * (self.bond[d] + (other[k] - own[k]));
-                out[k] = if self.scale[k] == 0.0 { 0.0 } else { force };
-            }
-        }
-    }
+    let finish = |sums: Sums<D>| {
+        let measured = sums.finish(bonds, state, ball);
+        Measured { seconds: measured.seconds + seconds, ..measured }
+    };
+    all.into_iter().map(finish).collect()
 }
 
 /// Bond functions of offsets that are the same but for order and signs of their components.
