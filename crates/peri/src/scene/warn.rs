@@ -1,7 +1,7 @@
 //! What is allowed and yet most likely not meant.
 
 use super::{Body, Scene};
-use crate::bonds::{Bonds, CellGrid};
+use crate::bonds::{Bonds, CellGrid, has_whole_family};
 use crate::geometry::{Cut, Operation, inside};
 
 /// Grips that move so many horizons in one step jump over what breaks on the way.
@@ -61,6 +61,9 @@ fn thin<const D: usize>(bonds: &dyn Bonds<D>) -> Option<String> {
     let lattice = bonds.as_lattice()?;
     let spacing = lattice.spacing();
     let lonely = |&&site: &&u32| {
+        if has_whole_family(bonds, site as usize) {
+            return false;
+        }
         let mut beside = [false; D];
         lattice.neighbours(site as usize, &mut |bond| {
             for d in 0..D {

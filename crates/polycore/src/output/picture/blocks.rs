@@ -1,5 +1,7 @@
 //! The outline of each particle: an upright block, or the deformed cell of a lattice.
 
+use rayon::prelude::*;
+
 /// What a particle covers.
 #[derive(Clone, Debug)]
 pub(super) enum Block {
@@ -35,7 +37,7 @@ impl Blocks {
             Some(lattice) => Block::Cell(lattice.cell(particle)),
             None => Block::Upright(reach),
         };
-        Self(reach.into_iter().enumerate().map(block).collect())
+        Self(reach.into_par_iter().enumerate().map(block).collect())
     }
 }
 
@@ -67,10 +69,10 @@ impl<'a> Neighbours<'a> {
             next
         };
         let farthest = spacing * bridge.max(1.0) * (1.0 + 1e-9);
-        let next = reference.iter().map(next).collect();
+        let next = reference.par_iter().map(next).collect();
         let mut all = Self { positions, spacing, farthest, next, joined: Vec::new() };
         let joined = |particle| [0, 1, 2, 3].map(|side| all.unbroken(particle, side));
-        all.joined = (0..positions.len()).map(joined).collect();
+        all.joined = (0..positions.len()).into_par_iter().map(joined).collect();
         all
     }
 

@@ -2,6 +2,9 @@
 
 use std::io::Write;
 use std::path::Path;
+use std::sync::Arc;
+
+use rayon::prelude::*;
 
 use super::axis::{labels, ticks};
 use super::bar::{Bar, LABEL, LINE, TICK, TICK_LENGTH};
@@ -232,17 +235,22 @@ impl<'a> FieldMap<'a> {
         }
         let mut drawn = Vec::with_capacity(self.panels.len());
         // panels of the same particles share their outlines
-        let mut last: Option<(&Panel<'_>, Blocks)> = None;
-        for panel in &self.panels {
-            panel.check()?;
-            let window =
-                Window::around(panel.positions, panel.spacing, self.size as f64).ok_or_else(|| {
-                    format!("panel `{}`: positions are not finite or too far apart", panel.title)
-                })?;
-            let kept = last.take().filter(|(other, _)| panel.has_outline_of(other));
-            let blocks = kept.map_or_else(|| panel.outline(), |(_, blocks)| blocks);
-            drawn.push(self.draw(panel, &window, &blocks)?);
-            last = Some((panel, blocks));
+        let mut last: Option<(&Panel<'_>, Arc<Blocks>)> = None;
+        for panels in self.panels.chunks(rayon::current_num_threads()) {
+            let mut outlined = Vec::with_capacity(panels.len());
+            for panel in panels {
+                panel.check()?;
+                let window =
+                    Window::around(panel.positions, panel.spacing, self.size as f64).ok_or_else(|| {
+                        format!("panel `{}`: positions are not finite or too far apart", panel.title)
+                    })?;
+                let kept = last.take().filter(|(other, _)| panel.has_outline_of(other));
+                let blocks = kept.map_or_else(|| Arc::new(panel.outline()), |(_, blocks)| blocks);
+                outlined.push((panel, window, Arc::clone(&blocks)));
+                last = Some((panel, blocks));
+            }
+            let draw = |(panel, window, blocks): (_, Window, Arc<Blocks>)| self.draw(panel, &window, &blocks);
+            drawn.extend(outlined.into_par_iter().map(draw).collect::<Result<Vec<Canvas>, String>>()?);
         }
         let columns = self.columns.unwrap_or(drawn.len()).min(drawn.len());
         let rows = drawn.len().div_ceil(columns);
