@@ -95,7 +95,8 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     }
     run.begin()?;
     // one after another where steps are watched and where errors are drawn against run times
-    let alone = run.options.on_step.is_some() || scene.exact.is_some() || largest > LARGE;
+    let timed = scene.exact.is_some() || scene.output.compare.is_some();
+    let alone = run.options.on_step.is_some() || timed || largest > LARGE;
     let at_once = if alone { 1 } else { rayon::current_num_threads() };
     let names: Vec<String> = variants.iter().map(Variant::name).collect();
     let finished = variants::all::<D>(run, &names, at_once, |index, under_way, state| {

@@ -113,7 +113,9 @@ pub fn all<const D: usize>(
             solve(index, &UnderWay { shared: &shared, index, name, kept: Cell::new(Instant::now()) }, state)?;
         let mut reached = shared.lock();
         let Reached { run, finished, states, parts } = &mut *reached;
-        (states.remove(&index), parts.remove(&index), finished.insert(index, outcome));
+        states.remove(&index);
+        parts.remove(&index);
+        finished.insert(index, outcome);
         Ok(run.save(&(&*finished, &*states))?)
     };
     let one_after_another = || {
