@@ -3,7 +3,7 @@
 mod connect;
 mod mixed;
 
-use super::lattice_kernel::{Class, TILE, Tiles};
+use super::lattice_kernel::{Class, Factors, TILE, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans, Weights};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, Softening, integrity};
@@ -36,6 +36,8 @@ pub struct LatticeBonds<const D: usize> {
     intact: Vec<Vec<u64>>,
     classes: Vec<Class>,
     factors: Option<Field<D>>,
+    /// Whether they are the same along all axes.
+    even: bool,
     /// Interior value of the factors, a part of every stencil bond's weight; the stored factors are relative to it.
     interior_factor: f64,
     kernel: Option<Box<dyn LatticeKernel<D>>>,
@@ -90,6 +92,7 @@ impl<const D: usize> LatticeBonds<D> {
             intact: Vec::new(),
             classes: vec![Class::Empty; sites / TILE],
             factors: None,
+            even: true,
             interior_factor: 1.0,
             kernel: None,
             table: None,
@@ -208,7 +211,7 @@ impl<const D: usize> LatticeBonds<D> {
             displacement: displacement.components(),
             intact: &self.intact,
             classes: &self.classes,
-            factors: self.factors.as_ref().map(Field::components),
+            factors: self.factors.as_ref().map(|factors| Factors::new(factors.components(), self.even)),
             guard: self.guard,
         }
     }
@@ -401,6 +404,7 @@ impl<const D: usize> Bonds<D> for LatticeBonds<D> {
             });
             factors.set(site, relative);
         }
+        self.even = (0..self.sites).all(|site| factors.get(site) == [factors.get(site)[0]; D]);
         if let Some(mixed) = &mut self.mixed {
             mixed.set_factors(&factors);
         }

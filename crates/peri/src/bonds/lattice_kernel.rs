@@ -49,9 +49,32 @@ pub struct Tiles<'a, const D: usize, T = f64> {
     /// Class of each tile.
     pub classes: &'a [Class],
     /// Per-particle correction factors g (see [`super::correction`]), where the scene asks for them.
-    pub factors: Option<[&'a [T]; D]>,
+    pub factors: Option<Factors<'a, D, T>>,
     /// Largest |shift|: sites closer than this to either end hold no particle.
     pub guard: usize,
+}
+
+/// Factors of particles.
+#[derive(Clone, Copy)]
+pub enum Factors<'a, const D: usize, T = f64> {
+    /// The same along all axes: the weight of a bond is their mean.
+    Even(&'a [T]),
+    /// Along each axis.
+    Along([&'a [T]; D]),
+}
+
+impl<'a, const D: usize, T> Factors<'a, D, T> {
+    /// Of the components of a field, which are `even` where all are the same.
+    pub fn new(components: [&'a [T]; D], even: bool) -> Self {
+        if even { Self::Even(components[0]) } else { Self::Along(components) }
+    }
+
+    fn are_of(&self, sites: usize) -> bool {
+        match self {
+            Self::Even(factors) => factors.len() == sites,
+            Self::Along(factors) => factors.iter().all(|component| component.len() == sites),
+        }
+    }
 }
 
 /// The lattice kernel: tiles under a set of rows.
@@ -85,7 +108,7 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Pass<D> for Lattic
             self.tiles.intact.iter().all(|w| w.len() == sites)
                 && self.tiles.intact.len() * 64 >= self.rows.len()
         );
-        assert!(self.tiles.factors.is_none_or(|g| g.iter().all(|c| c.len() == sites)));
+        assert!(self.tiles.factors.is_none_or(|factors| factors.are_of(sites)));
         assert!(self.rows.iter().all(|r| r.shift.unsigned_abs() <= self.tiles.guard));
         let tracking = track.is_some();
         let mut seen = [T::splat(simd, T::of(0.0)); 2];
@@ -405,12 +428,27 @@ impl<T: Real, const D: usize, const P: usize, const Q: usize> Row<T, D, P, Q> {
         law::<T, S, P, Q>(simd, e, self.clamp, self.constant, &self.numerator, &self.denominator)
     }
 
-    /// Weight of a bond from the correction factors g of its two ends, (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J).
+    /// Weight of a bond from the correction factors g of its two ends, (Σ_d (n_d/ḡ_d)²)^(−1/2), ḡ = ½(g_I + g_J); ḡ where
+    /// they are even.
     ///
     /// # Safety
     /// `here` and `there` are followed by a vector's width in every slice.
     #[inline(always)]
-    unsafe fn weight<S: Simd>(&self, simd: S, factors: [&[T]; D], here: usize, there: usize) -> T::Vector<S> {
+    unsafe fn weight<S: Simd>(
+        &self,
+        simd: S,
+        factors: Factors<D, T>,
+        here: usize,
+        there: usize,
+    ) -> T::Vector<S> {
+        let factors = match factors {
+            Factors::Even(factors) => {
+                // SAFETY: as above
+                let pair = unsafe { T::add(simd, T::load::<S>(factors, here), T::load::<S>(factors, there)) };
+                return T::mul(simd, pair, T::splat(simd, T::of(0.5)));
+            }
+            Factors::Along(factors) => factors,
+        };
         let four = T::splat(simd, T::of(4.0));
         let inverse = T::mul(simd, four, T::splat(simd, self.inverse_square));
         let mut sum = T::splat(simd, T::of(0.0));

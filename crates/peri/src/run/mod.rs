@@ -37,6 +37,7 @@ use crate::solver::{
     Bilinear, Breaking, Criterion, Loads, Method, Record, State, Status, System, load_stepping,
 };
 use polycore::case::{Fault, Run, Step, StepField};
+use polycore::memory::available;
 use polycore::report::{Phases, Report};
 use polycore::scene::Source;
 use std::path::Path;
@@ -87,17 +88,19 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     let (output, quick) = (run.options.output, run.options.quick);
     let variants = scene::check(source, scene, quick)?;
     // every body is built once before anything is computed or written: faults show at once
-    let mut largest = 0;
+    let (mut largest, mut memory) = (0, f64::MIN_POSITIVE);
     for variant in variants.iter().filter(|variant| expected_error(scene, variant).is_none()) {
         let (source, scene) = variant.resolve(source, scene)?;
-        let built = Built::<D>::new(&source, &scene, variant)?;
-        largest = largest.max(built.bonded.body.bonds.particles().len());
+        let bonds = Built::<D>::new(&source, &scene, variant)?.bonded.body.bonds;
+        largest = largest.max(bonds.particles().len());
+        memory = memory.max(scene::memory_needed(&scene, &*bonds));
     }
     run.begin()?;
     // one after another where steps are watched and where errors are drawn against run times
     let timed = scene.exact.is_some() || scene.output.compare.is_some();
     let alone = run.options.on_step.is_some() || timed || largest > LARGE;
-    let at_once = if alone { 1 } else { rayon::current_num_threads() };
+    let fitting = (available() / memory) as usize;
+    let at_once = if alone { 1 } else { rayon::current_num_threads().min(fitting).max(1) };
     let names: Vec<String> = variants.iter().map(Variant::name).collect();
     let finished = variants::all::<D>(run, &names, at_once, |index, under_way, state| {
         let variant = &variants[index];

@@ -5,7 +5,7 @@
 
 use super::LatticeBonds;
 use crate::bonds::Bonds;
-use crate::bonds::lattice_kernel::Tiles;
+use crate::bonds::lattice_kernel::{Factors, Tiles};
 use crate::bonds::rows::{LatticeKernel, StencilBond, single_kernel};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::{KernelFit, StretchRange};
@@ -92,7 +92,9 @@ impl<const D: usize> LatticeBonds<D> {
             displacement: displacement.each_ref().map(Vec::as_slice),
             intact: &self.intact,
             classes: &self.classes,
-            factors: factors.as_ref().map(|factors| factors.each_ref().map(Vec::as_slice)),
+            factors: factors
+                .as_ref()
+                .map(|factors| Factors::new(factors.each_ref().map(Vec::as_slice), self.even)),
             guard: self.guard,
         };
         kernel.run(&tiles, start, force, track);
