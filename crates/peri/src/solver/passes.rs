@@ -73,7 +73,8 @@ pub fn force_pass<const D: usize>(
                     }
                     let (v, m) = (&velocity[d][range.clone()], &unit_mass[range.clone()]);
                     if constrained.iter().all(|h| h >> d & 1 == 0) {
-                        sums = sums.add(free_sums(&new[d][..], old[d], v, m, mass));
+                        let free = FreeSums { new: &new[d][..], old: old[d], v, m, mass };
+                        sums = sums.add(Arch::new().dispatch(free));
                         old[d].copy_from_slice(new[d]);
                         continue;
                     }
@@ -205,21 +206,40 @@ pub fn sum(lanes: &[f64; LANES]) -> f64 {
 }
 
 /// The sums over components that are all free, in eight interleaved parts so that they vectorise.
-fn free_sums(new: &[f64], old: &[f64], v: &[f64], m: &[f64], mass: f64) -> Sums {
-    let (mut top, mut bottom, mut square) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    let parts = new.chunks(LANES).zip(old.chunks(LANES)).zip(v.chunks(LANES).zip(m.chunks(LANES)));
-    for ((new, old), (v, m)) in parts {
-        for lane in 0..new.len() {
-            top[lane] += v[lane] * (new[lane] - old[lane]);
-            bottom[lane] += v[lane] * v[lane] * m[lane];
-            square[lane] += new[lane] * new[lane];
+struct FreeSums<'a> {
+    new: &'a [f64],
+    old: &'a [f64],
+    v: &'a [f64],
+    m: &'a [f64],
+    mass: f64,
+}
+
+impl NullaryFnOnce for FreeSums<'_> {
+    type Output = Sums;
+    #[inline(always)]
+    fn call(self) -> Sums {
+        let (mut top, mut bottom, mut square) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let [(new, last), (old, last_old), (v, last_v), (m, last_m)] =
+            [self.new, self.old, self.v, self.m].map(|numbers| numbers.as_chunks::<LANES>());
+        let (old, v, m) = (&old[..new.len()], &v[..new.len()], &m[..new.len()]);
+        for k in 0..new.len() {
+            for lane in 0..LANES {
+                top[lane] += v[k][lane] * (new[k][lane] - old[k][lane]);
+                bottom[lane] += v[k][lane] * v[k][lane] * m[k][lane];
+                square[lane] += new[k][lane] * new[k][lane];
+            }
         }
-    }
-    Sums {
-        quotient_top: top.iter().sum(),
-        quotient_bottom: bottom.iter().sum::<f64>() * mass,
-        free: square.iter().sum(),
-        ..Sums::default()
+        for lane in 0..last.len() {
+            top[lane] += last_v[lane] * (last[lane] - last_old[lane]);
+            bottom[lane] += last_v[lane] * last_v[lane] * last_m[lane];
+            square[lane] += last[lane] * last[lane];
+        }
+        Sums {
+            quotient_top: sum(&top),
+            quotient_bottom: sum(&bottom) * self.mass,
+            free: sum(&square),
+            ..Sums::default()
+        }
     }
 }
 
@@ -245,13 +265,44 @@ pub fn move_pass<const D: usize>(
         for d in 0..D {
             let (f, m) = (&force[d][range.clone()], &unit_mass[range.clone()]);
             let (u, v) = (&mut *u[d], &mut *v[d]);
-            let free = constrained.iter().all(|h| h >> d & 1 == 0);
-            for k in 0..f.len() {
-                if free || constrained[k] >> d & 1 == 0 {
-                    v[k] = keep * v[k] + push * f[k] / m[k];
-                    u[k] += v[k];
-                }
-            }
+            let held = if constrained.iter().all(|h| h >> d & 1 == 0) { &[] } else { constrained };
+            Arch::new().dispatch(Move { f, m, u, v, held, bit: 1 << d, keep, push });
         }
     });
+}
+
+/// [`move_pass`] of a component of a work item. Where any is `held`, so are those with the `bit`.
+struct Move<'a> {
+    f: &'a [f64],
+    m: &'a [f64],
+    u: &'a mut [f64],
+    v: &'a mut [f64],
+    held: &'a [u8],
+    bit: u8,
+    keep: f64,
+    push: f64,
+}
+
+impl NullaryFnOnce for Move<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn call(self) {
+        let Self { f, m, u, v, held, bit, keep, push } = self;
+        let count = f.len();
+        let (m, u, v) = (&m[..count], &mut u[..count], &mut v[..count]);
+        if held.is_empty() {
+            for k in 0..count {
+                v[k] = keep * v[k] + push * f[k] / m[k];
+                u[k] += v[k];
+            }
+            return;
+        }
+        let held = &held[..count];
+        for k in 0..count {
+            // a product with 0 or 1, no branch: v of what is held is and stays 0
+            let free = f64::from(u8::from(held[k] & bit == 0));
+            v[k] = free * (keep * v[k] + push * f[k] / m[k]);
+            u[k] += v[k];
+        }
+    }
 }
