@@ -6,8 +6,8 @@
 //!
 //! A run can be killed at any moment: each step becomes a complete file `NAME.frames/000k.vtkhdf` of its own, written
 //! under another name and renamed. `finish` merges them into `NAME.vtkhdf` in the same way and removes the frames. A
-//! resumed run goes on with the frame after its checkpoint. A step is a chunk of each dataset, and frames are merged without
-//! unpacking them. Second-order tensors are stored in single precision, all other numbers in double.
+//! resumed run goes on with the frame after its checkpoint. Each dataset stores a step as one chunk, and the merge copies
+//! chunks without unpacking them. Second-order tensors are stored in single precision, all other numbers in double.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -96,7 +96,7 @@ impl MeshSeries {
     pub fn step(&mut self, time: f64, point_data: &[Data<'_>], cell_data: &[Data<'_>]) -> Result<(), Error> {
         let layout = Layout::of(self.counts, point_data, cell_data)?;
         let [arrays, cell_arrays] = [point_data, cell_data]
-            .map(|data| data.iter().map(|(_, _, values)| Rows::Values(values)).collect());
+            .map(|data| data.iter().map(|(_, _, values)| Rows::Values((*values).into())).collect());
         self.frames.step(&layout, Step { time, points: None, arrays, cell_arrays, moments: Vec::new() })
     }
 

@@ -30,9 +30,7 @@ pub struct Table {
 /// What is written of a step.
 pub enum Rows<'a> {
     /// As they are.
-    Values(&'a [f64]),
-    /// The same, read from a file.
-    Read(Vec<f64>),
+    Values(Cow<'a, [f64]>),
     /// Packed as [`Table::write`] does it.
     Packed(Vec<u8>),
 }
@@ -84,7 +82,6 @@ impl Rows<'_> {
     fn packed(&self, components: usize) -> Cow<'_, [u8]> {
         let values = match self {
             Rows::Values(values) => values,
-            Rows::Read(values) => values.as_slice(),
             Rows::Packed(bytes) => return Cow::Borrowed(bytes),
         };
         Cow::Owned(match is_single(components) {
@@ -137,8 +134,8 @@ mod tests {
             let create = if is_single(columns) { begun::<f32> } else { begun::<f64> };
             let (file, table) = create(&path, 4, columns);
             let (first, second) = values.split_at(4 * columns);
-            Table::write(vec![(&table, Rows::Read(second.to_vec()))], 1).unwrap();
-            Table::write(vec![(&table, Rows::Values(first))], 0).unwrap();
+            Table::write(vec![(&table, Rows::Values(second.into()))], 1).unwrap();
+            Table::write(vec![(&table, Rows::Values(first.into()))], 0).unwrap();
             file.close().unwrap();
             let found = read(&path);
             let far = found.iter().zip(&values).map(|(a, b)| ((a - b) / b).abs()).fold(0.0, f64::max);
@@ -156,8 +153,11 @@ mod tests {
             let (file, table) =
                 if single { begun::<f32>(&from, rows, 9) } else { begun::<f64>(&from, rows, 9) };
             let values = &values[..9 * rows];
-            let rows =
-                if single { Rows::Values(values) } else { Rows::Packed(packed(values, f64::to_le_bytes)) };
+            let rows = if single {
+                Rows::Values(values.into())
+            } else {
+                Rows::Packed(packed(values, f64::to_le_bytes))
+            };
             Table::write(vec![(&table, rows)], 0).unwrap();
             file.close().unwrap();
             let (file, table) = begun::<f32>(&to, 4, 9);

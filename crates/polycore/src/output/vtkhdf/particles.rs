@@ -68,8 +68,8 @@ impl ParticleSeries {
                 return Err(Error::Data { what: format!("point array `{name}` is not finite"), reason });
             }
         }
-        let arrays = point_data.iter().map(|(_, _, values)| Rows::Values(values)).collect();
-        let points = Some(Rows::Values(points.as_flattened()));
+        let arrays = point_data.iter().map(|(_, _, values)| Rows::Values((*values).into())).collect();
+        let points = Some(Rows::Values(points.as_flattened().into()));
         self.frames.step(&layout, Step { time, points, arrays, cell_arrays: Vec::new(), moments })
     }
 

@@ -220,7 +220,7 @@ impl Series {
             "CellData" => self.cell_data(step, name),
             _ => self.points(step).map(Vec::into_flattened),
         };
-        values.map(Rows::Read)
+        values.map(|values| Rows::Values(values.into()))
     }
 
     pub(super) fn layout(&self) -> Layout {
