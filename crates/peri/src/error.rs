@@ -73,6 +73,23 @@ pub enum Error {
         /// Estimate of the critical one for all stretches observed, s.
         critical: f64,
     },
+    /// Loads press a body through a plane, or particles through each other.
+    #[error(
+        "{what} overlap by {overlap:.3e} m at step {step}, time {time:.4e} s; allowed: {allowed:.3e} m; raise `contact.stiffness`, \
+         take more or shorter steps, or a smaller load"
+    )]
+    Penetration {
+        /// Bodies or planes.
+        what: String,
+        /// Load step, or row of the history.
+        step: usize,
+        /// Time, s; 0 without dynamics.
+        time: f64,
+        /// Overlap found, m.
+        overlap: f64,
+        /// Overlap allowed, m.
+        allowed: f64,
+    },
     /// A device lacks what is asked of it, or fails; see [`crate::gpu`].
     #[cfg(feature = "gpu")]
     #[error("device: {0}")]

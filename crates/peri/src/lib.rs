@@ -48,6 +48,7 @@ pub mod potential;
 mod quadrature;
 pub mod solver;
 pub mod stress;
+pub mod surface;
 
 // `cargo bench` compiles a file of `command`, in which this crate has its name
 #[cfg(feature = "case")]

@@ -7,7 +7,7 @@ pub use body::Body;
 pub use rubber::Rubber;
 
 use crate::bonds::{Bonds, LatticeBonds, Property, covered_stretches, fragments};
-use crate::contact::Contact;
+use crate::contact::{Contact, Plane};
 use crate::error::Error;
 use crate::material::{BondMaterial, Material};
 use crate::potential::KernelFit;
@@ -51,13 +51,14 @@ pub struct Model<const D: usize, M> {
     factors: Vec<f64>,
     critical_stretch: Option<Property>,
     contact: Option<f64>,
+    planes: Vec<Plane<D>>,
 }
 
 impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
     /// A body without loads: one load step, bonds that break only where the material says so, no contact.
     pub fn new(body: Body<D>, material: M) -> Self {
         let (regions, factors) = (Vec::new(), vec![1.0]);
-        Self { body, material, regions, factors, critical_stretch: None, contact: None }
+        Self { body, material, regions, factors, critical_stretch: None, contact: None, planes: Vec::new() }
     }
 
     /// Fixes all components of a region.
@@ -103,10 +104,17 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
         self
     }
 
-    /// Particles without a bond repel each other with the stiffness κ of [`Contact::new`], where kθ is
-    /// [`Material::micromodulus`].
+    /// Particles without a bond repel each other with the stiffness s of [`Contact::new`];
+    /// [`PAIR_STIFFNESS`](crate::contact::PAIR_STIFFNESS) suits.
     pub fn contact(mut self, stiffness: f64) -> Self {
         self.contact = Some(stiffness);
+        self
+    }
+
+    /// A rigid plane that the body cannot pass, or to which it is tied. Explicit dynamics take larger steps with a
+    /// [`Plane::stiffness`] of 2.
+    pub fn plane(mut self, plane: Plane<D>) -> Self {
+        self.planes.push(plane);
         self
     }
 
@@ -140,9 +148,15 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
             regions.push((members, support));
         }
         let loads = Loads::new(bonds.sites(), &regions);
-        let micromodulus = material.micromodulus(&bonds);
-        let contact =
-            self.contact.map(|stiffness| Contact::new(&bonds, micromodulus, stiffness)).transpose()?;
+        let modulus = material.longitudinal_modulus(&bonds);
+        let contact = match (self.contact, self.planes.is_empty()) {
+            (None, true) => None,
+            (stiffness, _) => {
+                let surface = self.body.surface();
+                let contact = Contact::new(&bonds, modulus, stiffness.unwrap_or(0.0))?;
+                Some(contact.with_planes(&bonds, &surface, modulus, self.planes)?)
+            }
+        };
         let stretch = self.critical_stretch.or(critical.map(Property::from));
         let breaking =
             stretch.map(|stretch| Breaking { criterion: stretch.into(), policy: Policy::default() });

@@ -22,6 +22,9 @@ pub struct List<const D: usize> {
     /// Particles' radii, m; empty where all are `largest`.
     radii: Vec<f64>,
     largest: f64,
+    /// Volumes, m³, likewise; empty where all are `volume`.
+    volumes: Vec<f64>,
+    volume: f64,
     spacing: f64,
     gap: f64,
     skin: f64,
@@ -77,6 +80,12 @@ impl<const D: usize> Near<D> {
     pub fn overlap(&self) -> f64 {
         self.distance - self.r
     }
+
+    /// d − r at another displacement, m; `own` is the site of the first particle.
+    pub fn overlap_at(&self, displacement: &Field<D>, own: usize) -> f64 {
+        let (here, there) = (displacement.get(own), displacement.get(self.site as usize));
+        self.distance - length(std::array::from_fn::<f64, D, _>(|d| self.bond[d] + (there[d] - here[d])))
+    }
 }
 
 impl<const D: usize> List<D> {
@@ -87,14 +96,19 @@ impl<const D: usize> List<D> {
         let alike = volumes.iter().all(|&volume| volume == volumes[0]);
         let radius = |volume: f64| 0.5 * bonds.spacing() * (volume / mean).powf(1.0 / D as f64);
         let (mut radii, mut largest) = (Vec::new(), 0.5 * bonds.spacing());
+        let (volume, mut of_sites) = (volumes.first().copied().unwrap_or(0.0), Vec::new());
         if !alike {
-            radii = vec![0.0; bonds.sites()];
-            bonds.particles().iter().zip(volumes).for_each(|(&site, v)| radii[site as usize] = radius(v));
+            (radii, of_sites) = (vec![0.0; bonds.sites()], vec![0.0; bonds.sites()]);
+            for (&site, v) in bonds.particles().iter().zip(volumes) {
+                (radii[site as usize], of_sites[site as usize]) = (radius(v), v);
+            }
             largest = radii.iter().copied().fold(0.0, f64::max);
         }
         let mut list = Self {
             radii,
             largest,
+            volumes: of_sites,
+            volume,
             spacing: bonds.spacing(),
             gap,
             skin: SKIN * bonds.spacing(),
@@ -230,6 +244,11 @@ impl<const D: usize> List<D> {
         self.alone = particles.iter().copied().filter(|&site| bonds.is_alone(site as usize)).collect();
         self.vicinity = Some(Vicinity::new(grid, displacement, edge, self.skin));
         self.rebuilds += 1;
+    }
+
+    /// Volume of a particle, m³.
+    pub fn volume(&self, site: usize) -> f64 {
+        self.volumes.get(site).copied().unwrap_or(self.volume)
     }
 
     /// Radius of a particle, m.

@@ -1,82 +1,90 @@
-//! Contact: short-range repulsion between particles that no intact bond joins, rigid planes, friction.
+//! Contact: repulsion of particles that no intact bond joins, rigid planes, friction.
 //!
-//! Two particles at the distance r = |ζ| < d repel each other along ζ = ξ + η with the force density pair
-//! κ (c/δ)(d − r), c = 6kθ: the bond constant of the linear bond as a dual force, f = 2t = c(l − 1). κ = 15 and
-//! d = min(0.9|ξ|, 1.35(r_I + r_J)) are those of Macek & Silling (2007), doi:10.1016/j.finel.2007.08.012 (their
-//! c_s = 15c), and Parks et al. (2008), doi:10.1016/j.cpc.2008.06.011, with the radius r = ½(V/thickness)^(1/D), half
-//! the distance of neighbours on a lattice. 0.9|ξ| makes the reference state free of contact, and a bond that breaks in
-//! tension leaves no force behind; 1.35·2r exceeds the distance of neighbours, so that no particle slips between two.
-//! Other than there, intact bonds never repel: their own law resists compression. Particles have their whole volume,
-//! whatever the corrections of bonds.
+//! Two particles at the distance r = |ζ| < d repel each other along ζ = ξ + η with the force density pair k(d − r) and
+//! d = min(0.9|ξ|, 1.35(r_I + r_J)), radius r = ½(V/thickness)^(1/D), half the distance of neighbours on a lattice. 0.9|ξ| makes
+//! the reference state free of contact, and a bond that breaks in tension leaves no force behind; 1.35·2r exceeds the
+//! distance of neighbours, so that no particle slips between two. The stiffness is
 //!
-//! The pairs come from a list of all that are within d, what is about to touch, and a skin, rebuilt where particles near
-//! each other have moved against each other by the skin; where a bond breaks its pair is added. Pairs beyond d add
-//! nothing, not even a rounding: the list is no part of the state, and how often it is made makes no difference to any bit.
+//! - k = ½s M_IJ/(Δx²V̄), M_IJ = 2M_I M_J/(M_I + M_J), of [`Contact::new`], with the longitudinal modulus M and the mean volume V̄: an
+//!   interface is as compliant as 2/s layers of confined material;
+//! - k = κ(c/δ), c = 6kθ, of [`Contact::short_range`]: the bond constant of the linear bond as a dual force. κ = 15 is that of Macek &
+//!   Silling (2007), doi:10.1016/j.finel.2007.08.012 (their c_s = 15c), and Parks et al. (2008), doi:10.1016/j.cpc.2008.06.011.
 //!
-//! Limits. Contact knows distances only: a particle that leaps past another in one step stays there. Force and energy
-//! are finite in full overlap (r = 0: κcd/δ along the reference ξ, the direction it came from; energy ½κcd²/δ V_I V_J),
-//! so that loads beyond that press particles through each other.
+//! Intact bonds do not repel otherwise: their own law resists compression. Particles have their whole volume, whatever the
+//! corrections of bonds.
 //!
-//! Friction acts across the pair, −μN f₁(|v_t|/v_ε) v_t/|v_t| with the repulsion N and the relative velocity v_t, see
-//! [`Contact::friction`]. It is equal and opposite, but not along the pair: particles have no spin, so that it does not
-//! conserve angular momentum.
+//! The pairs come from a list of all that are within d, a gap, and a skin, rebuilt where particles near each other have
+//! moved against each other by the skin; where a bond breaks its pair is added. Pairs beyond d add nothing, not even a
+//! rounding: the list is no part of the state, and how often it is made makes no difference to any bit.
+//!
+//! Limits. Contact of particles knows distances only: a particle that leaps past another in one step stays there. Force and energy
+//! are finite in full overlap (r = 0: kd along the reference ξ; energy ½kd² V_I V_J), so that loads beyond that press particles
+//! through each other.
+//!
+//! Planes act on faces, see `faces`. Friction is Coulomb's with an elastic slip, see `grip`: of pairs equal and opposite, but not along
+//! the pair: particles have no spin, so that it does not conserve angular momentum.
 
-mod friction;
-mod lagged;
+mod faces;
+mod grip;
 mod list;
 mod plane;
+mod planes;
 mod vicinity;
 
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
-use friction::tangential;
-pub use friction::{Rubbed, Rubbing};
-use lagged::{Grip, Lagged, Other};
+use crate::surface::Surface;
+pub use grip::{Drag, Grip, Pair};
 use list::{List, Listed, Near};
-use plane::{Placed, Planes};
 pub use plane::{Plane, Resting};
+use planes::Planes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// κ of Macek & Silling (2007).
-pub const STIFFNESS: f64 = 15.0;
+pub const SHORT_RANGE: f64 = 15.0;
+/// Stiffness s of planes in equilibria: at most 2 % of the compliance of a confined body of ten layers.
+pub const PLANE_STIFFNESS: f64 = 10.0;
+/// Stiffness s of pairs, and of planes in explicit dynamics.
+pub const PAIR_STIFFNESS: f64 = 2.0;
 /// Largest gap, in spacings, over which two particles may be about to touch.
 const NEAR: f64 = 0.25;
 
-/// Contact between the particles of a body.
+/// Contact of a body.
 pub struct Contact<const D: usize> {
-    /// κc/δ, the force density on a particle per volume of the other and per overlap.
+    /// Force density on a particle per volume of the other and per overlap, N/m⁷, where M is the greatest.
     stiffness: f64,
+    /// M of each particle over the greatest, where they differ.
+    moduli: Option<Property>,
     /// Volume of the largest particle, m³.
     largest_volume: f64,
     /// Largest gap of particles about to touch, m.
     near: f64,
     list: List<D>,
-    /// c/δ, N/m⁷.
-    unit: f64,
-    planes: Planes<D>,
-    /// μ of pairs of particles; v_ε, m/s, or ε, m.
+    planes: Option<Planes<D>>,
+    /// μ of pairs of particles, and γ, m.
     friction: f64,
-    slip: f64,
-    /// Friction between equilibria.
-    lagged: Option<Lagged<D>>,
+    elastic_slip: Option<f64>,
+    /// Friction in force, sorted by pair, and the displacement from which it counts.
+    held: Vec<Grip>,
+    start: Option<Field<D>>,
 }
 
-/// How particles touch.
+/// Bodies and planes in touch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Touching {
-    /// Pairs with r < d, and particles that touch a plane.
+    /// Pairs with r < d, and faces that touch a plane.
     pub pairs: u64,
-    /// Greatest 1 − r/d: 0 where nothing touches, 1 for two particles in one place, or for one whose middle is on a plane.
+    /// Greatest overlap: 1 − r/d of a pair, over half a spacing of a face; 0 where nothing touches.
     pub overlap: f64,
-    /// Energy Σ ½κ(c/δ)(d − r)² V_I V_J over pairs, and that of planes, J.
+    /// Energy of pairs, planes and elastic slip, J.
     pub energy: f64,
 }
 
 /// Checks that a factor of contact is finite and not negative.
-fn push_is_valid(name: &'static str, found: f64) -> Result<(), Error> {
+fn non_negative(name: &'static str, found: f64) -> Result<(), Error> {
     if found >= 0.0 && found.is_finite() {
         return Ok(());
     }
@@ -84,57 +92,88 @@ fn push_is_valid(name: &'static str, found: f64) -> Result<(), Error> {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Contact of a body with the bond modulus `modulus` = kθ and κ = `stiffness`, see [`STIFFNESS`]. κ = 0 repels
-    /// nothing: overlaps are looked at only.
+    /// Contact of a body of the longitudinal modulus M = `modulus`, Pa, with the stiffness s = `stiffness`, see [`PAIR_STIFFNESS`]. s = 0
+    /// repels nothing: overlaps are looked at only.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where s is negative, M is not positive, or either is not finite.
+    pub fn new(bonds: &dyn Bonds<D>, modulus: impl Into<Property>, stiffness: f64) -> Result<Self, Error> {
+        let modulus = modulus.into();
+        positive("modulus of contact", modulus.least())?;
+        positive("modulus of contact", modulus.greatest())?;
+        let count = bonds.particles().len().max(1) as f64;
+        let mean = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).sum::<f64>() / count;
+        let unit = 0.5 * modulus.greatest() / (bonds.spacing().powi(2) * mean);
+        let moduli = modulus
+            .uniform()
+            .is_none()
+            .then(|| Property::new(bonds, |site, _| modulus.at(site) / modulus.greatest()));
+        Ok(Self { moduli, ..Self::of_pairs(bonds, unit, stiffness)? })
+    }
+
+    /// Contact of a body with the bond modulus `modulus` = kθ, N/m⁶, and κ = `stiffness`, see [`SHORT_RANGE`].
     ///
     /// # Errors
     /// [`Error::Parameter`] where κ is negative, kθ is not positive, or either is not finite.
-    pub fn new(bonds: &dyn Bonds<D>, modulus: f64, stiffness: f64) -> Result<Self, Error> {
-        push_is_valid("contact.stiffness", stiffness)?;
-        if !(modulus > 0.0 && modulus.is_finite()) {
-            let allowed = "above 0, finite".to_owned();
-            return Err(Error::Parameter { name: "modulus of contact", found: modulus, allowed });
-        }
+    pub fn short_range(bonds: &dyn Bonds<D>, modulus: f64, stiffness: f64) -> Result<Self, Error> {
+        positive("modulus of contact", modulus)?;
+        let unit = 6.0 * modulus / bonds.horizon();
+        // the same bits as κ·6kθ/δ
+        let mut contact = Self::of_pairs(bonds, unit, stiffness)?;
+        contact.stiffness = stiffness * 6.0 * modulus / bonds.horizon();
+        Ok(contact)
+    }
+
+    fn of_pairs(bonds: &dyn Bonds<D>, unit: f64, stiffness: f64) -> Result<Self, Error> {
+        non_negative("contact.stiffness", stiffness)?;
         let volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize));
         let near = NEAR * bonds.spacing();
         Ok(Self {
-            stiffness: stiffness * 6.0 * modulus / bonds.horizon(),
+            stiffness: stiffness * unit,
+            moduli: None,
             largest_volume: volumes.fold(0.0, f64::max),
             near,
             list: List::new(bonds, near),
-            unit: 6.0 * modulus / bonds.horizon(),
-            planes: Planes::default(),
+            planes: None,
             friction: 0.0,
-            slip: 0.0,
-            lagged: None,
+            elastic_slip: None,
+            held: Vec::new(),
+            start: None,
         })
     }
 
-    /// With one more rigid plane.
+    /// With rigid planes beside the faces of `surface`, of a body of the longitudinal modulus M = `modulus`, Pa.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a normal without direction, and for what is not finite or negative.
-    pub fn with_plane(mut self, bonds: &dyn Bonds<D>, plane: Plane<D>) -> Result<Self, Error> {
-        let placed = Placed::new(bonds, plane, self.unit, |site| self.list.radius(site))?;
-        if self.planes.each.is_empty() {
-            self.planes.volumes = vec![0.0; bonds.sites()];
-            let particles = bonds.particles().iter().map(|&site| site as usize);
-            particles.for_each(|site| self.planes.volumes[site] = bonds.volume(site));
+    /// [`Error::Parameter`] for a normal without direction, and for what is not finite or negative; [`Error::Geometry`] for a
+    /// bonded plane that touches nothing.
+    pub fn with_planes(
+        mut self,
+        bonds: &dyn Bonds<D>,
+        surface: &Surface<D>,
+        modulus: impl Into<Property>,
+        planes: Vec<Plane<D>>,
+    ) -> Result<Self, Error> {
+        if !planes.is_empty() {
+            let modulus = modulus.into();
+            positive("modulus of contact", modulus.least())?;
+            let radius = |site: usize| self.list.radius(site);
+            self.planes = Some(Planes::new(bonds, surface, &modulus, planes, radius)?);
         }
-        self.planes.each.push(placed);
         Ok(self)
     }
 
-    /// With friction of the coefficient `friction` between particles, and the slip from which on pairs and planes resist in full: in
-    /// explicit dynamics a velocity v_ε, m/s, where 0 is Coulomb's law without regularisation; for quasi-static methods the length ε > 0, m,
-    /// of the slip in a load step.
+    /// With friction of the coefficient `friction` between particles; `elastic_slip` is the slip γ, m, at which it is Coulomb's,
+    /// `None` that at which tangential and normal stiffness are equal.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where either is negative or not finite.
-    pub fn with_friction(mut self, friction: f64, slip: f64) -> Result<Self, Error> {
-        push_is_valid("contact.friction", friction)?;
-        push_is_valid("slip of friction", slip)?;
-        (self.friction, self.slip) = (friction, slip);
+    /// [`Error::Parameter`] where the coefficient is negative, the slip is not positive, or either is not finite.
+    pub fn with_friction(mut self, friction: f64, elastic_slip: Option<f64>) -> Result<Self, Error> {
+        non_negative("contact.friction", friction)?;
+        if let Some(slip) = elastic_slip {
+            positive("elastic slip", slip)?;
+        }
+        (self.friction, self.elastic_slip) = (friction, elastic_slip);
         Ok(self)
     }
 
@@ -145,114 +184,156 @@ impl<const D: usize> Contact<D> {
         self
     }
 
-    /// Whether it repels: κ > 0, or planes.
+    /// Whether it repels: stiff pairs, or planes.
     pub fn repels(&self) -> bool {
-        self.has_pairs() || !self.planes.each.is_empty()
+        self.has_pairs() || self.has_planes()
     }
 
-    /// Whether particles repel each other: κ > 0.
+    /// Whether particles repel each other.
     pub fn has_pairs(&self) -> bool {
         self.stiffness > 0.0
+    }
+
+    /// Whether there are planes.
+    pub fn has_planes(&self) -> bool {
+        self.planes.is_some()
     }
 
     /// Whether anything rubs: a coefficient of friction above 0.
     pub fn rubs(&self) -> bool {
         (self.has_pairs() && self.friction > 0.0)
-            || self.planes.each.iter().any(|plane| plane.plane.friction > 0.0)
+            || self.planes().any(|plane| plane.friction > 0.0 && !plane.bonded)
     }
 
     /// Moves planes to where they are at a load factor and a time, s.
     pub fn place(&mut self, factor: f64, time: f64) {
-        self.planes.each.iter_mut().for_each(|plane| plane.place(factor, time));
+        if let Some(planes) = &mut self.planes {
+            planes.place(factor, time);
+        }
     }
 
     /// The planes, in their order.
     pub fn planes(&self) -> impl Iterator<Item = &Plane<D>> {
-        self.planes.each.iter().map(|plane| &plane.plane)
+        self.planes.iter().flat_map(Planes::planes)
     }
 
     /// The last move of every plane, m.
     pub fn moved(&self) -> impl Iterator<Item = [f64; D]> {
-        self.planes.each.iter().map(Placed::moved)
+        self.planes.iter().flat_map(Planes::moved)
     }
 
     /// How the body rests on each plane, without friction.
-    pub fn resting(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Vec<Resting> {
-        let each = self.planes.each.iter();
-        each.map(|plane| plane.resting(&self.planes.volumes, displacement, bonds)).collect()
+    pub fn resting(&self, displacement: &Field<D>) -> Vec<Resting> {
+        self.planes.as_ref().map_or_else(Vec::new, |planes| planes.resting(displacement))
     }
 
-    /// Σ of the squares of the planes' force densities, (N/m³)².
-    pub fn square_of_planes(&self, displacement: &Field<D>) -> f64 {
-        if self.planes.each.is_empty() { 0.0 } else { self.planes.square(displacement) }
+    /// Σ of the squares of the planes' force densities at the last update, (N/m³)².
+    pub fn square_of_planes(&self) -> f64 {
+        self.planes.as_ref().map_or(0.0, Planes::square)
     }
 
-    /// Force densities of the planes, N/m³; `None` without any.
-    pub fn of_planes(&self, displacement: &Field<D>) -> Option<Field<D>> {
-        if self.planes.each.is_empty() {
-            return None;
-        }
-        let mut field = Field::zeros(displacement.sites());
-        let moved = self.moves();
-        field.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, mut force)| {
-            self.planes.force(displacement, chunk * CHUNK, &mut force);
-            if let Some(lagged) = &self.lagged {
-                lagged.force(displacement, &moved, chunk * CHUNK, true, &mut force);
-            }
-        });
+    /// Force densities of the planes at the last update, N/m³; `None` without any.
+    pub fn of_planes(&self, sites: usize) -> Option<Field<D>> {
+        let planes = self.planes.as_ref()?;
+        let mut field = Field::zeros(sites);
+        let chunks = field.chunks_mut().into_par_iter().enumerate();
+        chunks.for_each(|(chunk, mut force)| planes.force(chunk * CHUNK, &mut force));
         Some(field)
     }
 
-    fn moves(&self) -> Vec<[f64; D]> {
-        self.moved().collect()
-    }
-
-    /// Begins a load step of friction: the normal forces μN are those at the displacement `start`, with planes where they were last
-    /// placed.
-    pub fn lag(&mut self, bonds: &dyn Bonds<D>, start: &Field<D>) {
-        if self.has_pairs() {
-            self.list.rebuild(bonds, start);
-        }
-        let of = |chunk: usize| {
-            let (mut grips, sites) = (Vec::new(), chunk_range(chunk, start.sites()));
-            for (number, plane) in self.planes.each.iter().enumerate() {
-                let mu = plane.plane.friction;
-                plane.visit(start, sites.clone(), 0.0, &mut |site, overlap| {
-                    let volume = self.planes.volumes[site];
-                    let bound = mu * plane.push(volume) * overlap;
-                    let (site, other) = (site as u32, Other::Plane(number));
-                    grips.push(Grip { site, other, bound, normal: plane.plane.normal, volume });
-                });
-            }
-            for (own, touching) in self.pairs(bonds, start, sites, 0.0).filter(|_| self.friction > 0.0) {
-                for touch in touching {
-                    let volume = bonds.volume(touch.site as usize);
-                    let bound = self.friction * self.stiffness * touch.overlap() * volume;
-                    let (site, other, normal) = (own.site, Other::Site(touch.site), touch.direction());
-                    grips.push(Grip { site, other, bound, normal, volume: bonds.volume(site as usize) });
-                }
-            }
-            grips.retain(|grip| grip.bound > 0.0);
-            grips.sort_by_key(|grip| grip.site);
-            grips
-        };
-        let grips = (0..start.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
-        self.lagged = Some(Lagged { start: start.clone(), grips, slip: self.slip });
+    /// Has friction act as `grips` say, from the displacement `start` on.
+    pub fn hold(&mut self, start: &Field<D>, grips: Vec<Grip>) {
+        self.held = grips;
+        self.start = Some(start.clone());
     }
 
     /// Ends friction between equilibria.
-    pub fn unlag(&mut self) {
-        self.lagged = None;
+    pub fn release(&mut self) {
+        self.held.clear();
+        self.start = None;
     }
 
-    /// The slip from which on it resists in full, see [`Contact::with_friction`].
-    pub fn slip(&self) -> f64 {
-        self.slip
+    /// Friction of all that touches at a displacement, sorted by pair: the slips of `old` go on with the normal forces there. What has
+    /// begun to touch since `start` slips for the rest of its way only.
+    pub fn grips(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        start: &Field<D>,
+        old: &[Grip],
+    ) -> Vec<Grip> {
+        let of = |chunk: usize| {
+            let mut grips = Vec::new();
+            let sites = chunk_range(chunk, displacement.sites());
+            for (own, touching) in self.pairs(bonds, displacement, sites, 0.0).filter(|_| self.friction > 0.0) {
+                for touch in touching {
+                    let pair = Pair::Particles(own.site, touch.site);
+                    let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
+                    let volumes = [own.site, touch.site].map(|site| bonds.volume(site as usize));
+                    let push = self.pair(own.site, touch.site) * volumes[0] * volumes[1];
+                    let bound = self.friction * push * touch.overlap();
+                    let direction = touch.direction();
+                    let normal = std::array::from_fn(|d| direction.get(d).map_or(0.0, |n| -n));
+                    let stiffness = self.elastic_slip.map_or(push, |slip| bound / slip);
+                    let then = touch.overlap_at(start, own.site as usize);
+                    let share = if then >= 0.0 { 1.0 } else { touch.overlap() / (touch.overlap() - then) };
+                    let slip = known.map_or([0.0; 3], |grip| grip.slip);
+                    let mut grip = Grip { pair, slip, bound, stiffness, normal, share };
+                    grip.fit();
+                    if bound > 0.0 {
+                        grips.push(grip);
+                    }
+                }
+            }
+            grips.sort_unstable_by_key(|grip| grip.pair);
+            grips
+        };
+        let parts: Vec<Vec<Grip>> = (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        let mut grips = parts.concat();
+        grips.extend(self.planes.iter().flat_map(|planes| planes.grips(displacement, start, old)));
+        grips
     }
 
-    /// Energy that friction has taken since [`Contact::lag`], J, and its force of each plane, N.
-    pub fn taken(&self, displacement: &Field<D>) -> (f64, Vec<[f64; 3]>) {
-        self.lagged.as_ref().map_or((0.0, Vec::new()), |lagged| lagged.taken(displacement, &self.moves()))
+    /// Friction after a load step, sorted by pair, for the next one; energy dissipated in the step, J, and force of friction of each
+    /// plane, N.
+    pub fn slide(&self, displacement: &Field<D>) -> (Vec<Grip>, f64, Vec<[f64; 3]>) {
+        let mut forces = vec![[0.0; 3]; self.planes().count()];
+        let (mut dissipated, mut grips) = (0.0, self.held.clone());
+        for grip in &mut grips {
+            let drag = grip.drag(self.slipped(grip.pair, displacement));
+            grip.slip = drag.slip;
+            match grip.pair {
+                // the other half is seen from the other side
+                Pair::Particles(..) => dissipated += 0.5 * drag.dissipated,
+                Pair::Face(plane, _) | Pair::Particle(plane, _) => {
+                    dissipated += drag.dissipated;
+                    (0..3).for_each(|d| forces[plane as usize][d] += drag.force[d]);
+                }
+            }
+        }
+        (grips, dissipated, forces)
+    }
+
+    /// Motion of the first side of a pair against the second since friction began to act, m.
+    fn slipped(&self, pair: Pair, displacement: &Field<D>) -> [f64; 3] {
+        let Some(start) = &self.start else { return [0.0; 3] };
+        let Pair::Particles(own, other) = pair else {
+            return self.planes.as_ref().map_or([0.0; 3], |planes| planes.slipped(pair, displacement, start));
+        };
+        let since = |site: u32, d: usize| {
+            displacement.components()[d][site as usize] - start.components()[d][site as usize]
+        };
+        std::array::from_fn(|d| if d < D { since(own, d) - since(other, d) } else { 0.0 })
+    }
+
+    /// Energy of elastic slip, J.
+    fn slip_energy(&self, displacement: &Field<D>) -> f64 {
+        let of = |grip: &Grip| {
+            let slip = grip.drag(self.slipped(grip.pair, displacement)).slip;
+            let part = if matches!(grip.pair, Pair::Particles(..)) { 0.5 } else { 1.0 };
+            part * Grip { slip, ..*grip }.energy()
+        };
+        self.held.iter().map(of).sum()
     }
 
     /// How often the list was made.
@@ -260,21 +341,40 @@ impl<const D: usize> Contact<D> {
         self.list.rebuilds
     }
 
-    /// Rebuilds the list where particles near each other may have moved against each other by the skin since it was made.
+    /// Prepares the forces of a displacement: rebuilds the list where particles near each other may have moved against each other by the
+    /// skin since it was made, and computes the forces of planes.
     pub fn update(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
         if self.has_pairs() {
             self.list.update(bonds, displacement);
+        }
+        if let Some(planes) = &mut self.planes {
+            planes.update(displacement, &self.held, self.start.as_ref());
         }
     }
 
     /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends.
     pub fn part(&mut self, bonds: &dyn Bonds<D>, pairs: &[[u32; 2]]) {
-        self.list.part(bonds, pairs);
+        if self.has_pairs() {
+            self.list.part(bonds, pairs);
+        }
+        if let Some(planes) = &mut self.planes {
+            planes.lose(bonds, pairs.iter().map(|pair| pair[0] as usize));
+        }
     }
 
     /// Makes the list for a displacement; to be called where bonds have changed, otherwise than by [`Self::part`].
     pub fn rebuild(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
         self.list.rebuild(bonds, displacement);
+        if let Some(planes) = &mut self.planes {
+            planes.lose(bonds, bonds.particles().iter().map(|&site| site as usize));
+        }
+    }
+
+    /// Stiffness of a pair, N/m⁷.
+    fn pair(&self, own: u32, other: u32) -> f64 {
+        let Some(moduli) = &self.moduli else { return self.stiffness };
+        let [a, b] = [own, other].map(|site| moduli.at(site as usize));
+        self.stiffness * 2.0 * a * b / (a + b)
     }
 
     /// Of `sites`, the particles with those at r < d + `gap` from them; none where particles do not repel each other.
@@ -288,7 +388,7 @@ impl<const D: usize> Contact<D> {
         self.has_pairs().then(|| self.list.pairs(bonds, displacement, sites, gap)).into_iter().flatten()
     }
 
-    /// Adds the force densities −Σ_J κ(c/δ)(d − r) V_J ζ/r, N/m³, on the particles from the site `start` on, of one work item.
+    /// Adds the force densities of pairs, −Σ_J k(d − r) V_J ζ/r, of planes, and of friction between equilibria, N/m³, on the particles from the site `start` on, of one work item.
     pub fn force(
         &self,
         bonds: &dyn Bonds<D>,
@@ -296,14 +396,14 @@ impl<const D: usize> Contact<D> {
         start: usize,
         force: &mut [&mut [f64]; D],
     ) {
-        self.planes.force(displacement, start, force);
-        if let Some(lagged) = &self.lagged {
-            lagged.force(displacement, &self.moves(), start, false, force);
+        if let Some(planes) = &self.planes {
+            planes.force(start, force);
         }
+        self.hold_pairs(displacement, start, force);
         for (own, touching) in self.pairs(bonds, displacement, start..start + force[0].len(), 0.0) {
             let mut sum = None;
             for touch in touching {
-                let push = self.stiffness * touch.overlap() * bonds.volume(touch.site as usize);
+                let push = self.pair(own.site, touch.site) * touch.overlap() * bonds.volume(touch.site as usize);
                 let (sum, direction) = (sum.get_or_insert([0.0; D]), touch.direction());
                 for d in 0..D {
                     sum[d] -= push * direction[d];
@@ -329,7 +429,8 @@ impl<const D: usize> Contact<D> {
                     part.pairs += u64::from(own.site < touch.site);
                     part.overlap = part.overlap.max(overlap / touch.distance);
                     // half of a pair's from either side
-                    part.energy += 0.25 * self.stiffness * overlap * overlap * other * volume;
+                    let stiffness = self.pair(own.site, touch.site);
+                    part.energy += 0.25 * stiffness * overlap * overlap * other * volume;
                 }
             }
             part
@@ -341,81 +442,130 @@ impl<const D: usize> Contact<D> {
             overlap: a.overlap.max(b.overlap),
             energy: a.energy + b.energy,
         });
-        if !self.planes.each.is_empty() {
-            let [count, energy] = self.planes.energy(displacement);
-            all.pairs += count as u64;
+        if let Some(planes) = &self.planes {
+            let (count, overlap, energy) = planes.touching(displacement);
+            all.pairs += count;
             all.energy += energy;
-            all.overlap = all.overlap.max(self.planes.deepest(displacement, |site| self.list.radius(site)));
+            all.overlap = all.overlap.max(overlap);
         }
+        all.energy += self.slip_energy(displacement);
         all
     }
 
-    /// Adds the force densities of friction, N/m³, on the particles of work item `chunk`, in explicit dynamics:
-    /// −Σ_J μ κ(c/δ)(d − r) V_J f₁(|v_t|/v_ε) v_t/|v_t| with the relative velocity v_t across the pair at the half step, and
-    /// likewise of planes. A pair's v_ε is no less than 2μN nΔt/m_eff with the reduced mass m_eff = ρV_I V_J/(V_I + V_J) and n = 3^(D−1), about the
-    /// number of particles of a facing row in reach; a plane's with m_eff = ρV and n = 1.
-    pub fn friction(
-        &self,
+    /// Adds the force densities of friction between particles, N/m³, on the sites from `start` on, of one work item.
+    fn hold_pairs(&self, displacement: &Field<D>, start: usize, force: &mut [&mut [f64]; D]) {
+        if self.start.is_none() {
+            return;
+        }
+        let end = start + force[0].len();
+        for grip in self.held_by(start..end) {
+            let Pair::Particles(own, _) = grip.pair else { continue };
+            let drag = grip.drag(self.slipped(grip.pair, displacement)).force;
+            let volume = self.list.volume(own as usize);
+            (0..D).for_each(|d| force[d][own as usize - start] += drag[d] / volume);
+        }
+    }
+
+    /// Friction in force between particles, of those of some sites.
+    fn held_by(&self, sites: Range<usize>) -> &[Grip] {
+        let before = |end: usize| {
+            self.held.partition_point(
+                |grip| matches!(grip.pair, Pair::Particles(own, _) if (own as usize) < end),
+            )
+        };
+        &self.held[before(sites.start)..before(sites.end)]
+    }
+
+    /// Friction after a step of explicit dynamics, s, with the velocity at the half step, m/s: the slips of `old` go on with the
+    /// present normal forces. Takes effect in [`Self::add_friction`].
+    pub fn slide_on(
+        &mut self,
         bonds: &dyn Bonds<D>,
         displacement: &Field<D>,
         velocity: &Field<D>,
-        rubbing: &Rubbing,
-        chunk: usize,
-        force: &mut [&mut [f64]; D],
-    ) -> Rubbed {
-        let mut rubbed = Rubbed::new(self.planes.each.len());
-        let fields = [displacement, velocity];
-        self.planes.friction(fields, self.slip, rubbing, chunk, force, &mut rubbed);
-        if self.friction == 0.0 {
-            return rubbed;
-        }
-        let touches = if D == 2 { 3.0 } else { 9.0 };
-        for (own, touching) in self.pairs(bonds, displacement, chunk_range(chunk, displacement.sites()), 0.0)
-        {
-            let site = own.site as usize;
-            for touch in touching {
-                let bound = self.friction * self.stiffness * touch.overlap();
-                let [volume, other] = [own.site, touch.site].map(|site| bonds.volume(site as usize));
-                let slip = rubbing.slip(self.slip, bound * (volume + other), touches);
-                rubbed.slip = rubbed.slip.max(slip);
-                let (here, there) = (velocity.get(site), velocity.get(touch.site as usize));
-                let relative = std::array::from_fn(|d| here[d] - there[d]);
-                let rub = tangential(bound * other, slip, &touch.direction(), relative);
-                for d in 0..D {
-                    force[d][site - chunk * CHUNK] += rub[d];
+        step: f64,
+        old: &[Grip],
+    ) -> Sliding {
+        let mut grips = self.grips(bonds, displacement, displacement, old);
+        let mut sliding = Sliding { planes: vec![[0.0; 3]; self.planes().count()], ..Sliding::default() };
+        let at = |site: u32| velocity.get(site as usize);
+        for grip in &mut grips {
+            grip.share = 1.0;
+            let moved = match (grip.pair, &self.planes) {
+                (Pair::Particles(own, other), _) => {
+                    let (own, other) = (at(own), at(other));
+                    std::array::from_fn(|d| if d < D { step * (own[d] - other[d]) } else { 0.0 })
                 }
+                (pair, Some(planes)) => planes.carried(pair, velocity, step),
+                (_, None) => [0.0; 3],
+            };
+            let drag = grip.drag(moved);
+            grip.slip = drag.slip;
+            let part = if matches!(grip.pair, Pair::Particles(..)) { 0.5 } else { 1.0 };
+            sliding.stored += part * grip.energy();
+            if let Pair::Face(plane, _) | Pair::Particle(plane, _) = grip.pair {
+                (0..3).for_each(|d| sliding.planes[plane as usize][d] += drag.force[d]);
             }
         }
-        rubbed
+        self.held = grips;
+        if let Some(planes) = &mut self.planes {
+            planes.drag(&self.held);
+        }
+        sliding
     }
 
-    /// max_I Σ_J κ(c/δ) V_J over what touches, N/m⁴: twice that over the density bounds what contact adds to the squared
-    /// greatest frequency.
+    /// Friction in force, sorted by pair.
+    pub fn held(&self) -> &[Grip] {
+        &self.held
+    }
+
+    /// Has friction of explicit dynamics act as `grips` say.
+    pub fn resume(&mut self, grips: &[Grip]) {
+        self.held = grips.to_vec();
+        self.start = None;
+    }
+
+    /// Adds the force densities of friction after [`Self::slide_on`], N/m³, on the particles of work item `chunk`.
+    pub fn add_friction(&self, chunk: usize, force: &mut [&mut [f64]; D]) {
+        let start = chunk * CHUNK;
+        for grip in self.held_by(start..start + force[0].len()) {
+            let Pair::Particles(own, _) = grip.pair else { continue };
+            let volume = self.list.volume(own as usize);
+            (0..D).for_each(|d| force[d][own as usize - start] -= grip.stiffness * grip.slip[d] / volume);
+        }
+        if let Some(planes) = &self.planes {
+            planes.friction(start, force);
+        }
+    }
+
+    /// max_I Σ_J k V_J over what touches, with half of what planes add, N/m⁴: twice that over the density bounds what contact adds to
+    /// the squared greatest frequency.
     pub fn greatest_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> f64 {
         let sites = displacement.sites();
         let of = |chunk: usize| {
             let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), 0.0);
-            let volume = |touch: Near<D>| bonds.volume(touch.site as usize);
-            let sums = pairs.map(|(_, touching)| touching.map(|t| self.stiffness * volume(t)).sum::<f64>());
+            let stiffness = |own: u32, touch: Near<D>| {
+                self.pair(own, touch.site) * bonds.volume(touch.site as usize)
+            };
+            let sums = pairs.map(|(own, touching)| touching.map(|t| stiffness(own.site, t)).sum::<f64>());
             sums.fold(0.0, f64::max)
         };
         let pairs = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max);
-        pairs + self.of_plane_stiffness()
+        pairs + self.half_of_planes()
     }
 
-    /// Half of the planes' stiffness on a particle, whose other side does not give way.
-    fn of_plane_stiffness(&self) -> f64 {
-        if self.planes.each.is_empty() { 0.0 } else { self.planes.stiffness(self.largest_volume) }
+    fn half_of_planes(&self) -> f64 {
+        self.planes.as_ref().map_or(0.0, |planes| 0.5 * planes.stiffness())
     }
 
-    /// κ(c/δ) V of the largest particle: the least that [`Contact::greatest_stiffness`] is where anything touches, if all
-    /// are alike.
+    /// k V of the largest particle, and half of what planes add: the least that [`Contact::greatest_stiffness`] is where anything
+    /// touches, if all are alike.
     pub fn pair_stiffness(&self) -> f64 {
-        self.stiffness * self.largest_volume + self.of_plane_stiffness()
+        self.stiffness * self.largest_volume + self.half_of_planes()
     }
 
     /// Adds to the Gershgorin sums of dynamic relaxation, in units of `tangent`, those of what touches or is about to:
-    /// Σ_J κ(c/δ) V_J (1 + max_{d≠e} |n_d n_e|). A particle that became heavy only in touch would be driven far into
+    /// Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and of planes. A particle that became heavy only in touch would be driven far into
     /// another as a light one, out again as a heavy one, and so on indefinitely. A particle without bonds has twice that alone:
     /// it starts each step from rest, see [`Contact::still`], and so must not go farther than a gradient step may.
     pub fn add_stiffness(
@@ -425,20 +575,36 @@ impl<const D: usize> Contact<D> {
         tangent: f64,
         masses: &mut [f64],
     ) {
-        let of = |Near { site, zeta, r, .. }: Near<D>| {
-            let mut mixed = 0.0_f64;
-            for d in 0..D {
-                for e in 0..d {
-                    mixed = mixed.max((zeta[d] * zeta[e]).abs());
-                }
+        self.add_pairs(bonds, displacement, tangent, masses);
+        let Some(planes) = &self.planes else { return };
+        planes.springs(displacement, self.near, &mut |below, normal, stiffness| {
+            let sum: f64 = below.iter().map(|(_, weight)| weight.abs()).sum();
+            let mixed = 1.0 + normal.map_or(0.0, mixed);
+            for &(site, weight) in below {
+                let row = stiffness * weight.abs() * sum / bonds.volume(site);
+                masses[site] += 0.5 * row * mixed / tangent;
             }
-            let direction = 1.0 + mixed / (r * r).max(f64::MIN_POSITIVE);
-            self.stiffness * bonds.volume(site as usize) * direction
+        });
+    }
+
+    /// As [`Self::add_stiffness`], of pairs alone.
+    pub fn add_pairs(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        tangent: f64,
+        masses: &mut [f64],
+    ) {
+        let of = |own: u32, Near { site, zeta, r, .. }: Near<D>| {
+            let unit = zeta.map(|x| x / r.max(f64::MIN_POSITIVE));
+            // friction holds in all directions
+            let mixed = if self.friction > 0.0 { 1.0 } else { mixed(unit) };
+            self.pair(own, site) * bonds.volume(site as usize) * (1.0 + mixed)
         };
         let sites = masses.len();
         let sums = (0..sites.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
             let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), self.near);
-            let all = pairs.map(|(own, near)| (own, near.map(of).sum::<f64>() / tangent));
+            let all = pairs.map(|(own, near)| (own, near.map(|near| of(own.site, near)).sum::<f64>() / tangent));
             all.filter(|(_, sum)| *sum > 0.0).collect()
         });
         let sums: Vec<Vec<(Listed, f64)>> = sums.collect();
@@ -446,10 +612,23 @@ impl<const D: usize> Contact<D> {
             let mass = &mut masses[own.site as usize];
             *mass = if own.alone { 2.0 * sum } else { *mass + sum };
         }
-        self.planes.add_stiffness(displacement, tangent, self.near, masses);
-        if let Some(lagged) = &self.lagged {
-            lagged.add_stiffness(tangent, masses);
+    }
+
+    /// Visits faces that touch planes or are about to: particles below with weights, the normal of a plane without friction, the
+    /// stiffness, N/m.
+    pub fn springs(
+        &self,
+        displacement: &Field<D>,
+        visit: &mut dyn FnMut(&[(usize, f64)], Option<[f64; D]>, f64),
+    ) {
+        if let Some(planes) = &self.planes {
+            planes.springs(displacement, 0.0, visit);
         }
+    }
+
+    /// Numbers of the faces in touch with planes, plane by plane.
+    pub fn in_touch(&self, displacement: &Field<D>) -> Vec<[u32; 2]> {
+        self.planes.as_ref().map_or_else(Vec::new, |planes| planes.in_touch(displacement))
     }
 
     /// How far a step along a direction may go so that none leaps past another: by a quarter of a spacing against each
@@ -485,4 +664,27 @@ impl<const D: usize> Contact<D> {
     pub fn still(&self, velocity: &mut Field<D>) {
         self.list.alone.iter().for_each(|&site| velocity.set(site as usize, [0.0; D]));
     }
+}
+
+/// Friction after a step of explicit dynamics.
+#[derive(Clone, Debug, Default)]
+pub struct Sliding {
+    /// Force on the body by each plane, N.
+    pub planes: Vec<[f64; 3]>,
+    /// Energy of elastic slip, J.
+    pub stored: f64,
+}
+
+/// Checks that a quantity is positive and finite.
+fn positive(name: &'static str, found: f64) -> Result<(), Error> {
+    if found > 0.0 && found.is_finite() {
+        return Ok(());
+    }
+    Err(Error::Parameter { name, found, allowed: "above 0, finite".into() })
+}
+
+/// max_{d≠e} |n_d n_e|.
+fn mixed<const D: usize>(n: [f64; D]) -> f64 {
+    let pairs = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
+    pairs.map(|(d, e)| (n[d] * n[e]).abs()).fold(0.0, f64::max)
 }

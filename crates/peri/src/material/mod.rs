@@ -42,6 +42,7 @@ pub use traction::surface_load;
 pub use crate::bonds::Property;
 
 use crate::bonds::Bonds;
+use crate::calibrate::{Space, modulus_in, stiffness_1111};
 
 /// A material: the forces between particles follow from an energy E = Σ_I V_I W_I.
 ///
@@ -103,6 +104,14 @@ pub trait Material<const D: usize>: Send + Sync {
     /// bulk modulus needs it for fast solutions, not for right ones.
     fn volumetric(&self) -> f64 {
         0.0
+    }
+
+    /// Longitudinal modulus C₁₁₁₁ at rest, Pa, which scales contact; default: that of bonds of [`Self::micromodulus`], and
+    /// [`Self::volumetric`].
+    fn longitudinal_modulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+        let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
+        let youngs_modulus = self.micromodulus(bonds) / modulus_in(bonds, 1.0);
+        stiffness_1111(space, youngs_modulus) + self.volumetric()
     }
 
     /// The stretch λ* at which a bond is at rest; it breaks at a multiple of it.

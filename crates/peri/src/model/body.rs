@@ -4,6 +4,7 @@ use crate::bonds::{LatticeBonds, VolumeCorrection};
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::geometry::{Cut, Operation, Shape, lattice};
+use crate::surface::Surface;
 
 /// Shapes filled with particles on a regular lattice; lengths in m.
 #[derive(Clone, Debug)]
@@ -60,6 +61,11 @@ impl<const D: usize> Body<D> {
     pub fn volume_correction(mut self, correction: VolumeCorrection) -> Self {
         self.correction = correction;
         self
+    }
+
+    /// Face points of its surface.
+    pub fn surface(&self) -> Surface<D> {
+        Surface::of_shapes(&self.operations, self.spacing)
     }
 
     /// Its particles and bonds.

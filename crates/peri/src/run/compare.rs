@@ -6,7 +6,7 @@ use crate::exact;
 use crate::quantities as q;
 use crate::scene::{ExactSpec, Scene};
 use crate::stress::{Measure, Tensor};
-use polycore::report::{Named, Report};
+use polycore::report::{Bound, Expect, Kind, Named, Report};
 use polycore::scene::Source;
 use rayon::prelude::*;
 use std::path::Path;
@@ -192,8 +192,27 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
     for (family, change) in super::history::peak_changes(outcomes) {
         report.value(q::PEAK_LOAD_CHANGE.of(&[&family]), change);
     }
-    report.judge(&scene.expect, quick);
+    let mut expectations = scene.expect.clone();
+    expectations.extend(outcomes.iter().filter_map(|outcome| stiff_contact(scene, outcome, several)));
+    report.judge(&expectations, quick);
     report
+}
+
+/// Part of the stored energy that contact may hold in equilibrium.
+const SOFTEST: f64 = 0.1;
+
+/// The expectation that contact is stiff enough for its load to be right, of a variant in equilibrium.
+fn stiff_contact(scene: &Scene, outcome: &Outcome, several: bool) -> Option<Expect> {
+    let judged = scene.contact.as_ref().is_some_and(|contact| contact.short_range.is_none());
+    outcome.get(q::CONTACT_SHARE.name).filter(|_| judged && scene.dynamics.is_none())?;
+    let name = q::CONTACT_SHARE.name;
+    Some(Expect {
+        quantity: if several { format!("{name}[{}]", outcome.name) } else { name.to_owned() },
+        bound: Bound::Range { at_least: None, at_most: Some(SOFTEST) },
+        kind: Kind::Bound,
+        source: "of every scene with contact: the load is about this part too low".to_owned(),
+        quick: true,
+    })
 }
 
 /// The scene with everything that it left to defaults, as comments behind its text.

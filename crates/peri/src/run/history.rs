@@ -3,7 +3,7 @@
 use super::outcome::Outcome;
 use crate::quantities as q;
 use crate::scene::{ContactSpec, Scene, of_plane};
-use crate::solver::{Balance, Event, Record, State};
+use crate::solver::{Balance, Event, Record};
 use polycore::Error;
 use polycore::output::csv;
 use polycore::output::picture::{LegendPlace, LinePlot, Series};
@@ -15,6 +15,12 @@ const LEGEND: usize = 8;
 
 /// A column: name, unit, values.
 type Column = (String, String, Vec<f64>);
+
+/// Part of the stored energy that contact may hold before a run warns, and the part that its advice is for.
+const SOFT: f64 = 0.02;
+const WANTED: f64 = 0.01;
+/// Stored energy over the work below which a body is at rest.
+const AT_REST: f64 = 1e-12;
 
 impl Outcome {
     pub(super) fn is_dynamic(&self) -> bool {
@@ -76,6 +82,7 @@ impl Outcome {
             }
             columns.push((format!("area {plane}"), "m²".to_owned(), each(&|r| resting(r).area)));
             columns.push((format!("spread {plane}"), "m".to_owned(), each(&|r| resting(r).spread)));
+            columns.push((format!("width {plane}"), "m".to_owned(), each(&|r| resting(r).width)));
         }
         let touching: Vec<_> = self.history.iter().filter_map(|r| r.contact).collect();
         if !touching.is_empty() {
@@ -152,23 +159,49 @@ impl Outcome {
         self.value(q::LARGEST_RESIDUAL, residual);
     }
 
-    /// What touches and rubs at the end, and how the body rests on planes.
-    pub fn values_of_contact<const D: usize>(&mut self, scene: &Scene, state: &State<D>) {
+    /// Contact and friction at the end, the planes that the body rests on, and warnings where contact is soft or never begins.
+    pub fn values_of_contact<const D: usize>(&mut self, scene: &Scene) {
         let Some(last) = self.history.last().cloned() else { return };
+        let Some(contact) = &scene.contact else { return };
+        let explicit = self.is_dynamic();
+        let of_plane_or_pairs = contact.plane.first().map(|plane| contact.stiffness_of(plane, explicit));
+        let stiffness = of_plane_or_pairs.or(contact.short_range).unwrap_or(contact.pair_stiffness());
+        self.value(q::CONTACT_STIFFNESS, stiffness);
         if let Some(touching) = last.contact {
             self.value(q::CONTACT_ENERGY, touching.energy);
             self.value(q::CONTACTS, touching.pairs as f64);
             let deepest = self.history.iter().filter_map(|r| Some(r.contact?.overlap)).fold(0.0, f64::max);
             self.value(q::DEEPEST_OVERLAP, deepest);
+            let at_rest = last.stored <= AT_REST * last.work.abs();
+            let share = if at_rest || last.stored <= 0.0 { 0.0 } else { touching.energy / last.stored };
+            self.value(q::CONTACT_SHARE, share);
+            if share > SOFT && !explicit && contact.short_range.is_none() {
+                self.warnings.push(format!(
+                    "contact holds {:.1} % of the stored energy, and the load is about as much too low: raise `stiffness` from {stiffness} to {:.0}",
+                    100.0 * share,
+                    stiffness * share / WANTED
+                ));
+            }
+            if deepest > 0.5 && contact.short_range.is_none() {
+                self.warnings.push(format!(
+                    "a contact overlaps by {deepest:.2} of half a spacing: raise `contact.stiffness`, or take a finer spacing"
+                ));
+            }
+        }
+        for (plane, name) in contact.plane.iter().zip(self.planes.clone()).filter(|(plane, _)| !plane.bonded) {
+            let index = self.planes.iter().position(|other| *other == name).unwrap_or(0);
+            let gaps = self.history.iter().filter_map(|row| row.resting.get(index)).map(|resting| resting.gap);
+            let least = gaps.fold(f64::INFINITY, f64::min);
+            let wanted = plane.displacement.is_some() || plane.friction.is_some_and(|mu| mu > 0.0);
+            if least > 0.0 && wanted {
+                self.warnings.push(format!("nothing has touched plane `{name}`: the least gap was {least:.3e} m"));
+            }
         }
         if scene.contact.as_ref().is_some_and(ContactSpec::rubs) {
             self.value(q::FRICTION_WORK, last.rubbed);
-            if self.is_dynamic() {
-                self.value(q::SLIP_VELOCITY, state.motion.slip);
-            }
         }
         for (name, resting) in self.planes.clone().iter().zip(&last.resting) {
-            let values = resting.force[..D].iter().copied().chain([resting.area, resting.spread]);
+            let values = resting.force[..D].iter().copied().chain([resting.area, resting.spread, resting.width]);
             of_plane(name, D).into_iter().zip(values).for_each(|(named, value)| self.value(named, value));
         }
     }

@@ -1,6 +1,6 @@
 //! A body with its material, as a variant of a scene asks for them.
 
-use crate::bonds::Bonds;
+use crate::bonds::{Bonds, Property};
 use crate::calibrate;
 use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, Critical, bilinear, energy_limit};
@@ -41,6 +41,15 @@ impl<const D: usize> Acting<D> {
         }
     }
 
+    /// Longitudinal modulus at rest, Pa.
+    pub fn longitudinal_modulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+        match self {
+            Self::Bonds(bonded) => bonded.longitudinal_modulus(bonds),
+            Self::Prestrained(prestrained) => prestrained.longitudinal_modulus(bonds),
+            Self::Solid(solid) => solid.longitudinal_modulus(bonds),
+        }
+    }
+
     /// kθ, N/m⁶, of linear bonds about as stiff.
     pub fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
         match self {
@@ -61,6 +70,8 @@ pub struct Bonded<const D: usize> {
     pub criterion: Option<Criterion>,
     /// The parameters that follow fields.
     pub followed: Vec<Followed>,
+    /// Stiffness of the material over what it is without inclusions.
+    pub stiffness: Property,
 }
 
 impl<const D: usize> Bonded<D> {
@@ -77,7 +88,7 @@ impl<const D: usize> Bonded<D> {
         let (space, spec) = (scene.body.space, &scene.material);
         let (horizon, thickness) = (body.bonds.horizon(), body.thickness);
         if let Some(solid) = &spec.solid {
-            let law = solid.build::<D>(source, space)?;
+            let law = solid.build::<D>(source, space, scene.body.points.is_none())?;
             let criterion = match spec.critical {
                 Some(Critical { stretch: Some(stretch), .. }) => Some(stretch.into()),
                 Some(Critical { fracture_energy: Some(energy), strength: Some(strength), .. }) => {
@@ -103,7 +114,7 @@ impl<const D: usize> Bonded<D> {
                 _ => None,
             };
             let material = Acting::Solid(NonlocalSolid(law));
-            return Ok(Self { body, material, criterion, followed: Vec::new() });
+            return Ok(Self { body, material, criterion, followed: Vec::new(), stiffness: 1.0.into() });
         }
         let law: Arc<dyn BondPotential> = Arc::from(spec.bond_law()?);
         let youngs_modulus = spec.youngs_modulus.map_or(f64::NAN, |modulus| modulus.si());
@@ -150,7 +161,7 @@ impl<const D: usize> Bonded<D> {
             }
             None => Acting::Bonds(bonded),
         };
-        Ok(Self { body, material, criterion, followed })
+        Ok(Self { body, material, criterion, followed, stiffness: inclusions.micromodulus })
     }
 }
 

@@ -26,7 +26,7 @@ use probes::Probes;
 use sections::Sections;
 use variants::UnderWay;
 
-use crate::bonds::{Bonds, covered_stretches, fragments};
+use crate::bonds::{Bonds, Property, covered_stretches, fragments};
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::material::relief;
@@ -153,10 +153,10 @@ fn run_variant<const D: usize>(
     let mut phases = Phases::new();
     phases.start("build");
     let Built { bonded, loads, loaded, probes, sections } = Built::<D>::new(source, scene, variant)?;
-    let Bonded { mut body, material, criterion, followed } = bonded;
+    let Bonded { mut body, material, criterion, followed, stiffness } = bonded;
     let plate = scene::exact_plate(source, scene, &body)?;
     phases.stop();
-    let warnings = scene::warnings(scene, &body);
+    let warnings = scene::warnings(source, scene, &body);
     let sites = body.bonds.sites();
     let fresh = state.is_none();
     let mut state = state.unwrap_or_else(|| State::new(sites));
@@ -188,6 +188,7 @@ fn run_variant<const D: usize>(
         probes: &probes,
         sections: &sections,
         criterion: criterion.as_ref(),
+        stiffness: &stiffness,
     };
     solve((source, scene), &solution, under_way, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
@@ -237,7 +238,7 @@ fn run_variant<const D: usize>(
     phases.time("compare", || {
         outcome.responses(&*body.bonds, &loads, &state);
         outcome.values_of_history(scene);
-        outcome.values_of_contact(scene, &state);
+        outcome.values_of_contact::<D>(scene);
         outcome.values_of_probes(scene);
         if let Some(exact) = &scene.exact {
             compare::hole(&*body.bonds, exact, plate.as_ref(), &stresses.cauchy, &loaded, &mut outcome);
@@ -312,6 +313,7 @@ struct Solution<'a, const D: usize> {
     probes: &'a Probes<D>,
     sections: &'a Sections<D>,
     criterion: Option<&'a Criterion>,
+    stiffness: &'a Property,
 }
 
 fn solve<const D: usize>(
@@ -323,13 +325,15 @@ fn solve<const D: usize>(
     phases: &mut Phases,
     frames: &mut Frames<D>,
 ) -> Result<(), Failure> {
-    let Solution { material, observed, loads, probes, sections, criterion } = *solution;
+    let Solution { material, observed, loads, probes, sections, criterion, stiffness } = *solution;
     let factors = scene.solver.factors();
     let mut watch = |status: &Status, state: &State<D>| under_way.watch(status, state);
-    let modulus = material.micromodulus(&*body.bonds);
     let contact = match &scene.contact {
         Some(contact) => {
-            Some(contact.contact(contact.planes(source).map_err(Failure::from)?, &*body.bonds, modulus)?)
+            let planes = contact.planes(source, scene.dynamics.is_some()).map_err(Failure::from)?;
+            let whole = material.longitudinal_modulus(&*body.bonds);
+            let modulus = Property::new(&*body.bonds, |site, _| whole * stiffness.at(site));
+            Some(contact.contact(planes, body, material.micromodulus(&*body.bonds), &modulus)?)
         }
         None => None,
     };

@@ -53,7 +53,10 @@ impl Fault for Error {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Geometry(_) | Self::Parameter { .. } | Self::TimeStep { .. } => 2,
-            Self::NotFinite { .. } | Self::NotConverged { .. } | Self::Unstable { .. } => 1,
+            Self::NotFinite { .. }
+            | Self::NotConverged { .. }
+            | Self::Unstable { .. }
+            | Self::Penetration { .. } => 1,
             Self::Within { error, .. } => error.exit_code(),
             Self::Shared(error) => error.exit_code(),
         }

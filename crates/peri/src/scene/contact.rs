@@ -1,11 +1,11 @@
 //! What a scene says of contact: between particles, and with rigid planes.
 
 use super::line::plane_of;
-use super::values::{plain, vector};
+use super::values::{Body, plain, vector};
 use super::{Method, Scene};
-use crate::bonds::Bonds;
+use crate::bonds::Property;
 use crate::calibrate::Space;
-use crate::contact::{Contact, Plane, STIFFNESS};
+use crate::contact::{Contact, PAIR_STIFFNESS, PLANE_STIFFNESS, Plane};
 use crate::error::Error;
 use crate::quantities as q;
 use polycore::report::Named;
@@ -13,38 +13,29 @@ use polycore::scene::{SceneError, Source, check_name};
 use polycore::units::{Length, Speed};
 use serde::Deserialize;
 
-/// Stiffest contact, beyond which no method would get anywhere, and stiffest one that L-BFGS can follow.
+/// Stiffest contact, beyond which no method would get anywhere.
 const STIFFEST: f64 = 1e4;
-const STIFFEST_OF_LBFGS: f64 = 100.0;
 /// Largest coefficient of friction.
 const ROUGHEST: f64 = 100.0;
 
 /// Contact between particles that no intact bond joins, and with planes.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ContactSpec {
-    /// κ: stiffness of a contact over that of a bond as long as the horizon; 0 only shows how particles overlap.
-    pub stiffness: f64,
+    /// s: 2/s layers of confined material are as compliant as a contact of two bodies, 1/s layers as that with a plane; 0 only shows how
+    /// particles overlap; default: 2, of planes in equilibria 10.
+    pub stiffness: Option<f64>,
+    /// κ: stiffness of a contact of particles over that of a bond as long as the horizon, instead of `stiffness`; 15 in the literature.
+    pub short_range: Option<f64>,
     /// Coefficient of Coulomb friction μ between particles, and of planes that have none of their own.
     pub friction: f64,
-    /// v_ε: slip velocity from which on friction resists in full.
+    /// γ: elastic slip of two sides that stick at the force at which they slide; default: that of equal tangential and normal stiffness.
+    #[serde(alias = "slip_length")]
+    pub elastic_slip: Option<Length>,
+    /// Not used any more: friction holds what sticks.
     pub slip_velocity: Option<Speed>,
-    /// ε: slip in a load step from which on friction resists in full, of quasi-static methods.
-    pub slip_length: Option<Length>,
     /// Rigid planes.
     pub plane: Vec<PlaneSpec>,
-}
-
-impl Default for ContactSpec {
-    fn default() -> Self {
-        Self {
-            stiffness: STIFFNESS,
-            friction: 0.0,
-            slip_velocity: None,
-            slip_length: None,
-            plane: Vec::new(),
-        }
-    }
 }
 
 /// A rigid plane (a line in a plane body) that the body cannot pass.
@@ -57,10 +48,13 @@ pub struct PlaneSpec {
     pub point: Vec<Length>,
     /// Its normal, of any length, towards the body.
     pub normal: Vec<f64>,
-    /// κ of the plane; default: that of `contact`, or 15 where that is 0.
+    /// s of the plane; default: that of `contact` where that is above 0, or 10, in explicit dynamics 2.
     pub stiffness: Option<f64>,
     /// Its coefficient of friction; default: that of `contact`.
     pub friction: Option<f64>,
+    /// Ties the faces of the body that lie on it at the start: it holds and pulls them in all directions; default false.
+    #[serde(default)]
+    pub bonded: bool,
     /// Displacement at the end of the last step; the plane follows the load factor.
     pub displacement: Option<Vec<Length>>,
     /// Velocity, in explicit dynamics; added to the displacement.
@@ -75,9 +69,20 @@ impl PlaneSpec {
 }
 
 impl ContactSpec {
-    /// κ of a plane.
-    fn stiffness_of(&self, plane: &PlaneSpec) -> f64 {
-        plane.stiffness.unwrap_or(if self.stiffness > 0.0 { self.stiffness } else { STIFFNESS })
+    /// s of pairs of particles.
+    pub fn pair_stiffness(&self) -> f64 {
+        self.stiffness.unwrap_or(PAIR_STIFFNESS)
+    }
+
+    /// Whether particles repel each other.
+    pub fn has_pairs(&self) -> bool {
+        self.short_range.unwrap_or(self.pair_stiffness()) > 0.0
+    }
+
+    /// s of a plane.
+    pub fn stiffness_of(&self, plane: &PlaneSpec, explicit: bool) -> f64 {
+        let own = if explicit { PAIR_STIFFNESS } else { PLANE_STIFFNESS };
+        plane.stiffness.or(self.stiffness.filter(|&s| s > 0.0)).unwrap_or(own)
     }
 
     /// μ of a plane.
@@ -87,7 +92,8 @@ impl ContactSpec {
 
     /// Whether any coefficient of friction is above 0.
     pub fn rubs(&self) -> bool {
-        self.friction > 0.0 || self.plane.iter().any(|plane| self.friction_of(plane) > 0.0)
+        (self.friction > 0.0 && self.has_pairs())
+            || self.plane.iter().any(|plane| self.friction_of(plane) > 0.0 && !plane.bonded)
     }
 
     /// The plane in its dimension.
@@ -99,6 +105,7 @@ impl ContactSpec {
         source: &Source,
         key: &str,
         spec: &PlaneSpec,
+        explicit: bool,
     ) -> Result<Plane<D>, SceneError> {
         let (point, normal) = plane_of(source, key, &spec.point, &spec.normal)?;
         let none = [0.0; D];
@@ -115,33 +122,48 @@ impl ContactSpec {
                 })?
             }
         };
-        let (stiffness, friction) = (self.stiffness_of(spec), self.friction_of(spec));
-        Ok(Plane { point, normal, stiffness, friction, displacement, velocity })
+        Ok(Plane {
+            point,
+            normal,
+            stiffness: self.stiffness_of(spec, explicit),
+            friction: self.friction_of(spec),
+            elastic_slip: self.elastic_slip.map(|slip| slip.si()),
+            bonded: spec.bonded,
+            displacement,
+            velocity,
+        })
     }
 
-    /// All planes.
+    /// All planes; `explicit` where their default stiffness is that of explicit dynamics.
     ///
     /// # Errors
     /// As [`super::check`].
-    pub fn planes<const D: usize>(&self, source: &Source) -> Result<Vec<Plane<D>>, SceneError> {
+    pub fn planes<const D: usize>(&self, source: &Source, explicit: bool) -> Result<Vec<Plane<D>>, SceneError> {
         let each = self.plane.iter().enumerate();
-        each.map(|(index, plane)| self.plane_in(source, &format!("contact.plane[{index}]"), plane)).collect()
+        each.map(|(index, plane)| {
+            self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit)
+        })
+        .collect()
     }
 
-    /// Contact of a body of the bond modulus `modulus`.
+    /// Contact of a body of the bond modulus kθ = `micromodulus` and the longitudinal modulus `modulus`.
     ///
     /// # Errors
-    /// As [`Contact::new`]; none of a scene that is checked.
+    /// As [`Contact::with_planes`]; none of a scene that is checked.
     pub fn contact<const D: usize>(
         &self,
         planes: Vec<Plane<D>>,
-        bonds: &dyn Bonds<D>,
-        modulus: f64,
+        body: &Body<D>,
+        micromodulus: f64,
+        modulus: &Property,
     ) -> Result<Contact<D>, Error> {
-        let contact = Contact::new(bonds, modulus, self.stiffness)?;
-        let slip = self.slip_length.map(|l| l.si()).or(self.slip_velocity.map(|v| v.si()));
-        let contact = contact.with_friction(self.friction, slip.unwrap_or(0.0))?;
-        planes.into_iter().try_fold(contact, |contact, plane| contact.with_plane(bonds, plane))
+        let bonds = &*body.bonds;
+        let contact = match self.short_range {
+            Some(short_range) => Contact::short_range(bonds, micromodulus, short_range)?,
+            None => Contact::new(bonds, modulus.clone(), self.pair_stiffness())?,
+        };
+        let contact = contact.with_friction(self.friction, self.elastic_slip.map(|slip| slip.si()))?;
+        contact.with_planes(bonds, &body.surface(), modulus.clone(), planes)
     }
 }
 
@@ -155,7 +177,7 @@ pub(super) fn values(scene: &Scene) -> impl Iterator<Item = Named> {
 /// Values of a plane: forces along the axes, area, spread.
 pub fn of_plane(name: &str, axes: usize) -> Vec<Named> {
     let forces = ["x", "y", "z"].into_iter().take(axes).map(|axis| q::PLANE_FORCE.of(&[name, axis]));
-    forces.chain([q::PLANE_AREA.of(&[name]), q::PLANE_SPREAD.of(&[name])]).collect()
+    forces.chain([q::PLANE_AREA, q::PLANE_SPREAD, q::PLANE_WIDTH].map(|one| one.of(&[name]))).collect()
 }
 
 /// Checks what can be judged without a body.
@@ -164,59 +186,43 @@ pub fn of_plane(name: &str, axes: usize) -> Vec<Named> {
 /// The key, what was found and what is allowed.
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let Some(contact) = &scene.contact else { return Ok(()) };
+    let explicit = scene.method() == Method::Verlet;
     let stiff = |key: &str, found: f64| {
-        let of_lbfgs = scene.method() == Method::Lbfgs;
-        let (most, why) = match (0.0..=STIFFEST).contains(&found) {
-            true if of_lbfgs => (STIFFEST_OF_LBFGS, " with `lbfgs`, more with `adr`"),
-            _ => (STIFFEST, ""),
-        };
-        let allowed = format!("0 to {}{why}", plain(most));
-        if (0.0..=most).contains(&found) { Ok(()) } else { Err(source.error(key, plain(found), allowed)) }
+        let allowed = format!("0 to {}", plain(STIFFEST));
+        if (0.0..=STIFFEST).contains(&found) { Ok(()) } else { Err(source.error(key, plain(found), allowed)) }
     };
     let rough = |key: &str, found: f64| {
         let allowed = format!("0 to {ROUGHEST}");
         if (0.0..=ROUGHEST).contains(&found) { Ok(()) } else { Err(source.error(key, plain(found), allowed)) }
     };
-    stiff("contact.stiffness", contact.stiffness)?;
+    stiff("contact.stiffness", contact.pair_stiffness())?;
+    stiff("contact.short_range", contact.short_range.unwrap_or(0.0))?;
+    if contact.short_range.is_some() && contact.stiffness.is_some() {
+        let allowed = "one of them: `stiffness` follows the material, `short_range` is the κ of the literature";
+        return Err(source.error("contact.short_range", "`short_range` beside `stiffness`", allowed));
+    }
     rough("contact.friction", contact.friction)?;
     for (index, plane) in contact.plane.iter().enumerate() {
         let key = |name: &str| format!("contact.plane[{index}].{name}");
-        stiff(&key("stiffness"), contact.stiffness_of(plane))?;
+        stiff(&key("stiffness"), contact.stiffness_of(plane, explicit))?;
         rough(&key("friction"), contact.friction_of(plane))?;
         let name = plane.name(index);
         check_name(source, &key("name"), &name)?;
         if contact.plane[..index].iter().enumerate().any(|(other, plane)| plane.name(other) == name) {
             return Err(source.error(&key("name"), format!("`{name}` twice"), "different names"));
         }
-        if plane.velocity.is_some() && scene.method() != Method::Verlet {
+        if plane.velocity.is_some() && !explicit {
             let allowed = "`displacement`, or `solver.method = \"verlet\"`";
             return Err(source.error(&key("velocity"), "`velocity` of a quasi-static method", allowed));
         }
     }
     if scene.body.space == Space::Solid {
-        contact.planes::<3>(source)?;
+        contact.planes::<3>(source, explicit)?;
     } else {
-        contact.planes::<2>(source)?;
+        contact.planes::<2>(source, explicit)?;
     }
-    let explicit = scene.method() == Method::Verlet;
-    let (velocity, length) = (contact.slip_velocity.map(|v| v.si()), contact.slip_length.map(|l| l.si()));
-    let [own, other] = [("slip_velocity", velocity, "m/s"), ("slip_length", length, "m")];
-    let ([key, foreign], slip, unit, wrong) = match explicit {
-        true => ([own.0, other.0], own.1, own.2, other.1),
-        false => ([other.0, own.0], other.1, other.2, own.1),
-    };
-    let kind = if explicit { "explicit dynamics" } else { "a quasi-static method" };
-    if wrong.is_some() {
-        let found = format!("`{foreign}` of {kind}");
-        return Err(source.error(&format!("contact.{foreign}"), found, format!("`{key}`")));
-    }
-    match slip {
-        Some(slip) => super::values::positive(source, &format!("contact.{key}"), slip, unit),
-        None if contact.rubs() => {
-            let allowed =
-                format!("a value: friction in {kind} needs it, as the slip from which on it resists in full");
-            Err(source.error(&format!("contact.{key}"), "nothing", allowed))
-        }
+    match contact.elastic_slip {
+        Some(slip) => super::values::positive(source, "contact.elastic_slip", slip.si(), "m"),
         None => Ok(()),
     }
 }

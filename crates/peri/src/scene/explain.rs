@@ -83,13 +83,17 @@ pub fn explain<const D: usize>(
         builds(format!("explicit dynamics up to {} s, {} rows of history", method.end_time, method.records));
     }
     if let Some(contact) = &scene.contact {
-        builds(if contact.stiffness > 0.0 {
-            format!("contact of stiffness {}, a list of close pairs without a bond", contact.stiffness)
+        builds(if contact.has_pairs() {
+            let stiffness = match contact.short_range {
+                Some(kappa) => format!("κ = {kappa}"),
+                None => format!("s = {}", contact.pair_stiffness()),
+            };
+            format!("contact of stiffness {stiffness}, a list of close pairs without a bond")
         } else {
             "detection of overlaps in each step, no repulsion".to_owned()
         });
         if !contact.plane.is_empty() {
-            builds(format!("{} rigid planes, heights above them", contact.plane.len()));
+            builds(format!("{} rigid planes, faces of the body", contact.plane.len()));
         }
         if contact.rubs() {
             builds("friction: its forces, a pass of its own in each step".to_owned());
@@ -120,7 +124,7 @@ pub fn explain<const D: usize>(
     omits(scene.output.fields, "VTKHDF fields");
     omits(scene.output.pictures, "pictures");
     lines.push(format!("  reports    {}", Named::list(&super::quantities(scene))));
-    lines.extend(super::warnings(scene, body).into_iter().map(|text| format!("  warning    {text}")));
+    lines.extend(super::warnings(source, scene, body).into_iter().map(|text| format!("  warning    {text}")));
     Ok(lines)
 }
 

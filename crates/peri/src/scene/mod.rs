@@ -18,6 +18,7 @@ mod loads;
 mod memory;
 mod method;
 mod placement;
+mod planes;
 mod probe;
 mod solid;
 mod values;

@@ -21,7 +21,8 @@ pub fn check_placement<const D: usize>(
         hole(source, body, exact.hole().0)?;
     }
     plate_frame(source, scene, body)?;
-    let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes(source))?;
+    super::planes::check(source, scene, body)?;
+    let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes(source, false))?;
     let rigid: Vec<[f64; D]> = planes.iter().map(|plane| plane.displacement).collect();
     let reach = loads.reach(&*body.bonds, &rigid);
     // under forces alone nobody knows before the run how far they get

@@ -27,9 +27,8 @@ pub struct SolidLaw {
     /// Links of a chain, of `eight-chain`.
     pub links: Option<f64>,
     /// Whether the volumetric energy depends on J averaged over nearest neighbours, of `eight-chain` on a lattice, solid or plane strain;
-    /// default false.
-    #[serde(default)]
-    pub pressure_filter: bool,
+    /// default: true from a bulk modulus of 50 times the shear modulus on.
+    pub pressure_filter: Option<bool>,
     /// The constitutive law of `correspondence`.
     pub constitutive: Option<ConstitutiveSpec>,
     /// Factor on the stabilisation of `correspondence`; default 1.
@@ -56,6 +55,10 @@ impl SolidKind {
     }
 }
 
+/// Bulk modulus over shear modulus from which on the pressure is filtered: without it coarse lattices are too stiff
+/// (docs/guide/src/how-to/contact.md).
+const FILTERED: f64 = 50.0;
+
 /// Where the block stands.
 const KEY: &str = "material.solid";
 
@@ -65,7 +68,7 @@ impl SolidLaw {
         self.constitutive.as_ref().is_some_and(|spec| spec.learnt.is_some())
     }
 
-    /// The law in a space.
+    /// The law in a space, on a lattice or in a cloud.
     ///
     /// # Errors
     /// A key that the law lacks or does not know, or a value out of its domain.
@@ -73,6 +76,7 @@ impl SolidLaw {
         &self,
         source: &Source,
         space: Space,
+        lattice: bool,
     ) -> Result<Arc<dyn PointLaw<D>>, SceneError> {
         let chains = self.law == SolidKind::EightChain;
         let other = if chains { SolidKind::Correspondence } else { SolidKind::EightChain }.name();
@@ -80,7 +84,7 @@ impl SolidLaw {
             ("shear_modulus", self.shear_modulus.is_some(), true),
             ("bulk_modulus", self.bulk_modulus.is_some(), true),
             ("links", self.links.is_some(), true),
-            ("pressure_filter", self.pressure_filter, true),
+            ("pressure_filter", self.pressure_filter == Some(true), true),
             ("constitutive", self.constitutive.is_some(), false),
             ("stabilisation", self.stabilisation.is_some(), false),
         ] {
@@ -117,7 +121,9 @@ impl SolidLaw {
                 }
             };
             let network = EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?;
-            if !self.pressure_filter {
+            let volumetric = space != Space::PlaneStress && lattice;
+            let stiff = volumetric && bulk >= FILTERED * shear.si();
+            if !self.pressure_filter.unwrap_or(stiff) {
                 return Ok(Arc::new(network));
             }
             if space == Space::PlaneStress {
@@ -189,7 +195,8 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
             return Err(source.error("material.critical", found, allowed));
         }
     }
-    if solid.pressure_filter && scene.body.points.is_some() {
+    let lattice = scene.body.points.is_none();
+    if solid.pressure_filter == Some(true) && scene.body.points.is_some() {
         let allowed = "false: points of a cloud have no nearest neighbours";
         return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
     }
@@ -200,10 +207,10 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         return Err(source.error(&format!("stress.measures[{index}]"), "a measure of bond forces", allowed));
     }
     match scene.body.space {
-        Space::Solid => solid.build::<3>(source, Space::Solid).map(|_| ()),
+        Space::Solid => solid.build::<3>(source, Space::Solid, lattice).map(|_| ()),
         plane => {
             positive(source, "body.thickness", scene.body.thickness.map_or(1.0, |t| t.si()), "m")?;
-            solid.build::<2>(source, plane).map(|_| ())
+            solid.build::<2>(source, plane, lattice).map(|_| ())
         }
     }
 }

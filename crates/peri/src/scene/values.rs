@@ -2,6 +2,7 @@
 
 use crate::bonds::Bonds;
 use crate::geometry::{Cut, Operation};
+use crate::surface::Surface;
 use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
 
@@ -22,6 +23,17 @@ pub struct Body<const D: usize> {
     pub cuts: Vec<Cut<D>>,
     /// The shapes added and cut; empty for points and grids.
     pub operations: Vec<Operation<D>>,
+}
+
+impl<const D: usize> Body<D> {
+    /// Face points of its surface: of its shapes, else of its lattice; none of a cloud.
+    pub fn surface(&self) -> Surface<D> {
+        match self.bonds.as_lattice() {
+            _ if !self.operations.is_empty() => Surface::of_shapes(&self.operations, self.bonds.spacing()),
+            Some(lattice) => Surface::of_lattice(lattice),
+            None => Surface::default(),
+        }
+    }
 }
 
 /// A number as a user would write it.

@@ -3,6 +3,7 @@
 use super::{Body, Scene};
 use crate::bonds::{Bonds, CellGrid, has_whole_family};
 use crate::geometry::{Cut, Operation, inside};
+use polycore::scene::Source;
 
 /// Grips that move so many horizons in one step jump over what breaks on the way.
 const LONGEST_STEP: f64 = 3.0;
@@ -13,14 +14,18 @@ const UNEVEN: f64 = 4.0;
 const ON_CRACK: f64 = 1e-6;
 
 /// One sentence for each.
-pub fn warnings<const D: usize>(scene: &Scene, body: &Body<D>) -> Vec<String> {
+pub fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Vec<String> {
     let bonds = &*body.bonds;
     let cracks = body.cuts.iter().enumerate().filter_map(|(index, cut)| on_crack(bonds, index, cut));
     let voids = (0..body.operations.len()).filter_map(|index| bridged(bonds, &body.operations, index));
     let contact = (scene.contact.is_some() && !scene.output.section.is_empty())
         .then(|| "the forces of `output.section` are those of bonds: contact is no part of them".to_owned());
     let once = [volumes(scene, bonds, body.thickness), thin(bonds), long_steps(scene, bonds), contact];
-    once.into_iter().flatten().chain(cracks).chain(voids).collect()
+    let slip = scene.contact.as_ref().and_then(|contact| contact.slip_velocity).map(|_| {
+        "contact.slip_velocity is not used any more: friction holds what sticks by its elastic slip".to_owned()
+    });
+    let planes = super::planes::warnings(source, scene, body);
+    once.into_iter().chain([slip]).flatten().chain(planes).chain(cracks).chain(voids).collect()
 }
 
 /// Volumes of a plane cloud that lack the thickness.

@@ -185,6 +185,10 @@ impl<const D: usize> Equilibrium<D> for RelaxationSolver {
         Ok(None)
     }
 
+    fn tolerance(&self) -> f64 {
+        self.settings.tolerance
+    }
+
     fn broke(&mut self, system: &System<D>, sites: &[u32]) {
         update_unit_mass(&*system.bonds, sites, &mut self.unit_mass);
     }

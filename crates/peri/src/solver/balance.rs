@@ -101,7 +101,7 @@ impl Balance {
             }
             _ => [0.0; D],
         };
-        let rigid = system.repulsion().and_then(|contact| contact.of_planes(&state.displacement));
+        let rigid = system.repulsion().and_then(|contact| contact.of_planes(state.displacement.sites()));
         // force, external force, moment (yz, zx, xy), size
         let of = |sites: &[u32]| {
             let mut sums = [0.0; 10];

@@ -83,7 +83,7 @@ impl<const D: usize> System<'_, D> {
         // what does not follow bond by bond is what the whole body loses
         let before = released.is_none().then(|| self.stored_energy(state, state.observed));
         let bonds = list.len() as u64 / 2;
-        let touches = self.contact.as_ref().is_some_and(Contact::has_pairs);
+        let touches = self.contact.as_ref().is_some_and(Contact::repels);
         let pair =
             |bond: &Overstretched| [bond.site, self.bonds.bond(bond.site as usize, bond.index).site as u32];
         let parted: Vec<[u32; 2]> = if touches { list.iter().map(pair).collect() } else { Vec::new() };
@@ -104,10 +104,6 @@ impl<const D: usize> System<'_, D> {
         }
         state.released +=
             released.unwrap_or_else(|| before.unwrap_or(0.0) - self.stored_energy(state, state.observed));
-        if state.started.is_some() {
-            // what rubs depends on bonds, too
-            self.lag(state);
-        }
         if let Some(contact) = self.contact.as_mut().filter(|_| touches) {
             contact.part(&*self.bonds, &parted);
         }

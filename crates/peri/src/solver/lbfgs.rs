@@ -20,6 +20,8 @@ use crate::field::Field;
 const SEARCHES: u64 = 25;
 const STEPS: usize = 10;
 const ITERATIONS: u64 = 200;
+/// Iterations between looks at what touches.
+const TOUCHES: u64 = 10;
 /// … and growth of a search over the first one with it, or over so few iterations.
 const WORN: u64 = 2;
 const FEW: u64 = 10;
@@ -116,6 +118,8 @@ pub struct LbfgsSolver<const D: usize> {
     searches: u64,
     first: u64,
     worn: bool,
+    /// Faces in touch with planes when the preconditioner was built.
+    in_touch: Vec<[u32; 2]>,
 }
 
 /// A point along a direction.
@@ -152,6 +156,7 @@ impl<const D: usize> LbfgsSolver<D> {
             searches: 0,
             first: 0,
             worn: false,
+            in_touch: Vec::new(),
         }
     }
 
@@ -180,6 +185,7 @@ impl<const D: usize> LbfgsSolver<D> {
         self.memory.clear(true);
         self.local_only = false;
         (self.searches, self.first, self.worn) = (0, 0, false);
+        self.in_touch = in_touch(system, state);
         self.preconditioner.build(system, state, self.settings.weight, self.settings.coarsening.max(2.0));
         Ok(())
     }
@@ -347,6 +353,16 @@ impl<const D: usize> LbfgsSolver<D> {
         self.memory.clear(true);
     }
 
+    /// Whether a tenth of the faces in touch with planes are others than when the preconditioner was built.
+    fn others_touch(&self, system: &System<D>, state: &State<D>) -> bool {
+        if system.repulsion().is_none_or(|contact| !contact.has_planes()) {
+            return false;
+        }
+        let now = in_touch(system, state);
+        let kept = now.iter().filter(|face| self.in_touch.binary_search(face).is_ok()).count();
+        10 * (now.len() + self.in_touch.len() - 2 * kept) > now.len().max(1)
+    }
+
     /// Forces and gradient of an iterate reached otherwise than by a search.
     fn arrive(&mut self, system: &mut System<D>, state: &mut State<D>) -> Result<Point, Error> {
         let point = self.look(system, state)?;
@@ -371,7 +387,7 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         // a run can be interrupted where it is built
         // small steps between which bonds break leave the body much as it was; contact and large steps do not
         let kept = system.breaking.is_some() && system.repulsion().is_none();
-        let fresh = state.round == 0 && (!kept || state.step.is_multiple_of(STEPS));
+        let fresh = state.round == 0 && state.renewals == 0 && (!kept || state.step.is_multiple_of(STEPS));
         let due = fresh || self.worn || self.searches >= SEARCHES;
         if !self.preconditioner.is_built() || (state.iteration == 0 && due) {
             self.begin(system, state, watch)?;
@@ -408,17 +424,27 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
                 }
             }
             watch(&self.status(system, state, false), state)?;
-            if state.iteration.is_multiple_of(ITERATIONS) {
+            let others_touch = state.iteration.is_multiple_of(TOUCHES) && self.others_touch(system, state);
+            if state.iteration.is_multiple_of(ITERATIONS) || others_touch {
                 self.begin(system, state, watch)?;
                 point = self.arrive(system, state)?;
             }
         }
     }
 
+    fn tolerance(&self) -> f64 {
+        self.settings.tolerance
+    }
+
     fn broke(&mut self, system: &System<D>, sites: &[u32]) {
         self.preconditioner.broke(&*system.bonds, sites);
         self.memory.clear(false);
     }
+}
+
+/// Faces in touch with planes.
+fn in_touch<const D: usize>(system: &System<D>, state: &State<D>) -> Vec<[u32; 2]> {
+    system.repulsion().map_or_else(Vec::new, |contact| contact.in_touch(&state.displacement))
 }
 
 /// How far stretches may go in one step, as e = λ² − 1.

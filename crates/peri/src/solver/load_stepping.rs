@@ -6,7 +6,6 @@ use super::state::{Record, State, Watch};
 use super::system::System;
 
 use crate::bonds::StretchRange;
-use crate::contact::Contact;
 use crate::error::Error;
 
 /// A method that finds the equilibrium of a state at the load factor of its step.
@@ -24,6 +23,9 @@ pub trait Equilibrium<const D: usize> {
         watch: &mut Watch<D>,
     ) -> Result<Option<StretchRange>, Error>;
 
+    /// Out-of-balance force over reference force at which a search ends.
+    fn tolerance(&self) -> f64;
+
     /// Takes notice of the sites whose bonds have broken since the last equilibrium.
     fn broke(&mut self, system: &System<D>, sites: &[u32]);
 }
@@ -32,7 +34,7 @@ pub trait Equilibrium<const D: usize> {
 /// every equilibrium in which bonds have just broken.
 ///
 /// # Errors
-/// As [`Equilibrium::equilibrate`], and whatever `finished` returns; [`Error::Parameter`] for friction without a slip length.
+/// As [`Equilibrium::equilibrate`], and whatever `finished` returns.
 pub fn load_stepping<const D: usize>(
     method: &mut dyn Equilibrium<D>,
     system: &mut System<D>,
@@ -40,10 +42,6 @@ pub fn load_stepping<const D: usize>(
     watch: &mut Watch<D>,
     finished: &mut Finished<D>,
 ) -> Result<(), Error> {
-    if let Some(found) = system.friction().map(Contact::slip).filter(|&slip| slip == 0.0) {
-        let allowed = "above 0 m: the slip in a load step from which on friction resists in full".to_owned();
-        return Err(Error::Parameter { name: "slip of friction", found, allowed });
-    }
     let stiffness = system.stiffness_at_rest();
     // of the body as it was built: an interrupted run must guess as if it had not been
     let predictor = system.loads.affine_predictor(&*system.bonds, stiffness);
@@ -53,8 +51,11 @@ pub fn load_stepping<const D: usize>(
     'steps: while state.step < system.factors.len() {
         if !state.predicted && system.friction().is_some() {
             state.started = Some(state.displacement.clone());
+            state.held.clone_from(&state.grips);
+            state.held.iter_mut().for_each(|grip| grip.share = 1.0);
+            state.renewals = 0;
         }
-        system.lag(state);
+        system.begin_step(state);
         if !state.predicted {
             predict(system, state, &predictor);
             state.predicted = true;
@@ -64,9 +65,13 @@ pub fn load_stepping<const D: usize>(
         loop {
             loop {
                 let observed = method.equilibrate(system, state, watch)?;
-                if system.covers_stretches(state, observed)? {
+                if !system.covers_stretches(state, observed)? {
+                    continue;
+                }
+                if !system.renew_friction(state, method.tolerance()) {
                     break;
                 }
+                state.iteration = 0;
             }
             if system.cut(state, shortest) {
                 continue 'steps;
@@ -91,6 +96,7 @@ pub fn load_stepping<const D: usize>(
             let particles = system.bonds.particles();
             particles.iter().for_each(|&site| state.velocity.set(site as usize, [0.0; D]));
         }
+        system.check_planes(state)?;
         record(system, state);
         state.step += 1;
         state.predicted = false;
@@ -157,7 +163,7 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
 fn work_of_loads<const D: usize>(system: &System<D>, state: &mut State<D>) {
     let factor = system.factors[state.step];
     if let Some(contact) = system.friction() {
-        state.rubbing = contact.taken(&state.displacement).1;
+        state.rubbing = contact.slide(&state.displacement).2;
     }
     let (pull, push) = system.conjugates(state);
     let [old_factor, old_pull, old_push] = state.balanced;
@@ -174,8 +180,14 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
     if state.round > 1 || state.history.last().map_or(0, |r| r.broken) != state.broken {
         state.past.clear();
     }
+    // planes push at the final displacement
+    if let Some(contact) = system.contact.as_mut().filter(|contact| contact.repels()) {
+        contact.update(&*system.bonds, &state.displacement);
+    }
     if let Some(contact) = system.friction() {
-        state.motion.rubbed += contact.taken(&state.displacement).0;
+        let (grips, dissipated, _) = contact.slide(&state.displacement);
+        state.grips = grips;
+        state.motion.rubbed += dissipated;
     }
     let balance = Balance::new(system, state);
     let record = Record {

@@ -22,8 +22,8 @@ pub struct Motion {
     pub damped: f64,
     /// Energy that friction has taken, J.
     pub rubbed: f64,
-    /// Largest v_ε of friction in use so far, m/s.
-    pub slip: f64,
+    /// Energy of elastic slip in friction, J.
+    pub(super) stuck: f64,
     pub(super) begun: bool,
     /// Longest step in use, s.
     pub(super) longest: f64,

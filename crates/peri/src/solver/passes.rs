@@ -99,7 +99,7 @@ pub fn force_pass<const D: usize>(
     });
     let (mut sums, observed) = all;
     // planes hold a body, too
-    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes(displacement));
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes());
     (sums, observed)
 }
 
@@ -152,7 +152,7 @@ pub fn gradient_pass<const D: usize>(
         (sums.add(item.0), observed.join(item.1), slope + item.2)
     });
     // planes hold a body, too
-    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes(displacement));
+    sums.constrained += system.repulsion().map_or(0.0, |contact| contact.square_of_planes());
     (sums, observed, slope)
 }
 

@@ -1,7 +1,7 @@
 //! An approximate inverse of the body's stiffness, for gradients of its energy: B g = ω g/(V M) + P A_c⁻¹ Pᵀ g, with the
 //! Gershgorin mass M of dynamic relaxation and a coarse level.
 
-use super::coarse::{Body, Coarse, Survey};
+use super::coarse::{Anchor, Body, Coarse, Survey};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
 use super::places::{Places, in_order};
 use super::state::State;
@@ -62,9 +62,20 @@ impl<const D: usize> Preconditioner<D> {
         let particles = bonds.particles().iter().map(|&site| site as usize);
         particles.filter(|&site| survey.bonded[site] == 0).for_each(|site| springs[site] = 0.0);
         if let Some(contact) = system.repulsion() {
-            contact.add_stiffness(&*system.bonds, &state.displacement, tangent, &mut springs);
+            contact.add_pairs(&*system.bonds, &state.displacement, tangent, &mut springs);
         }
         springs.iter_mut().for_each(|m| *m *= 0.5 * tangent);
+        let mut anchors = Vec::new();
+        if let Some(contact) = system.repulsion() {
+            contact.springs(&state.displacement, &mut |below, normal, stiffness| {
+                let mut head = (0, 0.0);
+                for &(site, weight) in below {
+                    springs[site] += stiffness * weight * weight / bonds.volume(site);
+                    head = if weight > head.1 { (site, weight) } else { head };
+                }
+                anchors.push(Anchor { site: head.0 as u32, normal, stiffness });
+            });
+        }
         let local = |(&site, volume): (&u32, &f64)| {
             let spring = springs[site as usize];
             if spring > 0.0 { weight / (volume * spring) } else { f64::INFINITY }
@@ -82,6 +93,7 @@ impl<const D: usize> Preconditioner<D> {
             law: (law, [modulus, system.material.volumetric()], state.fitted),
             springs: &springs,
             survey: &survey,
+            anchors: &anchors,
         };
         let old = self.coarse.take();
         let most = (self.volumes.len() / SHARE[D - 2]).clamp(LEAST[D - 2], MOST[D - 2]);

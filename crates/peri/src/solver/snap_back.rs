@@ -33,7 +33,7 @@ impl<const D: usize> System<'_, D> {
             state.displacement.set(site, state.displacement.get(site).map(|u| part * u));
             state.velocity.set(site, [0.0; D]);
         }
-        self.lag(state);
+        self.begin_step(state);
         true
     }
 

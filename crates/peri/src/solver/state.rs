@@ -3,7 +3,7 @@
 use super::motion::Motion;
 use super::scale::Balance;
 use crate::bonds::Softened;
-use crate::contact::{Resting, Touching};
+use crate::contact::{Grip, Resting, Touching};
 use crate::error::Error;
 use crate::field::Field;
 use crate::potential::StretchRange;
@@ -157,6 +157,10 @@ pub struct State<const D: usize> {
     pub(super) rubbing: Vec<[f64; 3]>,
     /// Displacement at the start of the load step, where anything rubs between equilibria.
     pub(super) started: Option<Field<D>>,
+    /// Friction after the last step, friction in force towards the current equilibrium, and how often it has been renewed in this step.
+    pub(super) grips: Vec<Grip>,
+    pub(super) held: Vec<Grip>,
+    pub(super) renewals: u32,
     /// Force of each plane, N, where one moves.
     pub(super) pushing: Vec<[f64; 3]>,
     /// Time and energies of explicit dynamics.
@@ -208,6 +212,9 @@ impl<const D: usize> State<D> {
             friction: None,
             rubbing: Vec::new(),
             started: None,
+            grips: Vec::new(),
+            held: Vec::new(),
+            renewals: 0,
             pushing: Vec::new(),
             motion: Motion::default(),
             factors: Vec::new(),

@@ -5,12 +5,16 @@ use super::load::Loads;
 use super::scale::Scale;
 use super::state::State;
 use crate::bonds::{Bonds, Seen, not_finite};
-use crate::contact::{Contact, Plane, Resting, Touching};
+use crate::contact::{Contact, Grip, Plane, Resting, Touching};
 use crate::error::Error;
 use crate::field::Field;
 use crate::material::{Material, Response};
 use crate::potential::StretchRange;
 use std::borrow::Cow;
+
+/// Renewals of the normal forces of friction in a load step, and those after which they are averaged: large coefficients may alternate.
+const RENEWALS: u32 = 40;
+const ALTERNATING: u32 = 8;
 
 /// The system under solution.
 pub struct System<'a, const D: usize> {
@@ -105,17 +109,41 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// Begins friction of a load step where that did, and places rigid planes at its end.
-    pub(super) fn lag(&mut self, state: &State<D>) {
+    /// Places rigid planes at the end of a load step, and has friction act from its start on.
+    pub(super) fn begin_step(&mut self, state: &State<D>) {
         let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let after = self.factors[state.step];
+        self.place(before, 0.0);
+        self.place(after, 0.0);
         if let Some(start) = &state.started
             && let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs())
         {
-            contact.place(before, 0.0);
-            contact.lag(&*self.bonds, start);
+            contact.hold(start, state.held.clone());
         }
-        self.place(after, 0.0);
+    }
+
+    /// Renews the normal forces of friction in an equilibrium; whether they have changed by more than `tolerance` of their sum, so that
+    /// another equilibrium is to be sought.
+    pub(super) fn renew_friction(&mut self, state: &mut State<D>, tolerance: f64) -> bool {
+        let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs()) else { return false };
+        let Some(start) = &state.started else { return false };
+        let mut new = contact.grips(&*self.bonds, &state.displacement, start, &state.grips);
+        let bound = |grips: &[Grip], pair| {
+            grips.binary_search_by_key(&pair, |grip: &Grip| grip.pair).map_or(0.0, |at| grips[at].bound)
+        };
+        let lost = state.held.iter().filter(|grip| bound(&new, grip.pair) == 0.0).map(|grip| grip.bound);
+        let changed = new.iter().map(|grip| (grip.bound - bound(&state.held, grip.pair)).abs());
+        let change: f64 = lost.chain(changed).sum();
+        let total: f64 = new.iter().map(|grip| grip.bound).sum();
+        if change <= tolerance * total || state.renewals >= RENEWALS {
+            return false;
+        }
+        if state.renewals >= ALTERNATING {
+            new.iter_mut().for_each(|grip| grip.bound = 0.5 * (grip.bound + bound(&state.held, grip.pair)));
+        }
+        contact.hold(start, new.clone());
+        (state.held, state.renewals) = (new, state.renewals + 1);
+        true
     }
 
     /// Contact, where it rubs.
@@ -144,16 +172,35 @@ impl<'a, const D: usize> System<'a, D> {
     /// How the body rests on rigid planes, with friction.
     pub(super) fn resting(&self, state: &State<D>) -> Vec<Resting> {
         let Some(contact) = self.repulsion() else { return Vec::new() };
-        let mut resting = contact.resting(&*self.bonds, &state.displacement);
+        let mut resting = contact.resting(&state.displacement);
         for (resting, rub) in resting.iter_mut().zip(&state.rubbing) {
             (0..3).for_each(|d| resting.force[d] += rub[d]);
         }
         resting
     }
 
+    /// Refuses a state in which particles are behind a plane.
+    ///
+    /// # Errors
+    /// [`Error::Penetration`].
+    pub(super) fn check_planes(&self, state: &State<D>) -> Result<(), Error> {
+        let Some(contact) = self.repulsion() else { return Ok(()) };
+        let allowed = 0.5 * self.bonds.spacing();
+        let resting = contact.resting(&state.displacement);
+        let planes = contact.planes().zip(resting).enumerate();
+        for (number, (plane, resting)) in planes.filter(|(_, (plane, _))| !plane.bonded) {
+            if resting.gap < -allowed && plane.stiffness > 0.0 {
+                let what = format!("the body and plane {}", number + 1);
+                let (step, time, overlap) = (state.step, state.motion.time, -resting.gap);
+                return Err(Error::Penetration { what, step, time, overlap, allowed });
+            }
+        }
+        Ok(())
+    }
+
     /// Has contact look for pairs, as it must where bonds have changed.
     pub(super) fn rebuild_contact(&mut self, displacement: &Field<D>) {
-        if let Some(contact) = self.contact.as_mut().filter(|contact| contact.has_pairs()) {
+        if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
             contact.rebuild(&*self.bonds, displacement);
         }
     }

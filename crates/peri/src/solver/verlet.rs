@@ -67,7 +67,7 @@ impl<const D: usize> Method<D> for VelocityVerlet {
     ///
     /// A state that has not moved yet, or the equilibrium that another method found (its velocities reset), is where
     /// time begins: [`State::work`] is set to the energy that is there, so that kinetic + stored + released + damped + rubbed = work
-    /// in every row but for O(Δt²). With friction, automatic steps are 1/√2 of those without.
+    /// in every row but for O(Δt²).
     ///
     /// # Errors
     /// [`Error::Parameter`] for settings out of their domain; [`Error::TimeStep`] for a time step beyond the critical one;
@@ -82,10 +82,11 @@ impl<const D: usize> Method<D> for VelocityVerlet {
     ) -> Result<(), Error> {
         self.check()?;
         let volumes = volumes(system);
-        system.contact.iter_mut().for_each(Contact::unlag);
+        system.contact.iter_mut().for_each(Contact::release);
         if state.motion.begun {
             system.place(self.factor(system, state.motion.time).0, state.motion.time);
             system.restore(state)?;
+            system.contact.iter_mut().for_each(|contact| contact.resume(&state.grips));
         } else {
             self.begin(system, state, &volumes)?;
         }
@@ -99,6 +100,7 @@ impl<const D: usize> Method<D> for VelocityVerlet {
                 self.advance(system, state, &volumes, end)?;
                 watch(&self.status(state), state)?;
             }
+            system.check_planes(state)?;
             self.record(system, state);
             state.step += 1;
             (state.iteration, state.step_iterations, state.motion.planned) = (0, 0, 0);
@@ -239,9 +241,7 @@ impl VelocityVerlet {
         // nothing free, or a tangent without a positive frequency: the bound alone
         motion.covered_step = critical(if estimate > 0.0 { estimate.min(bound) } else { bound });
         motion.floor = law.least_energy * modulus * motion.extent;
-        // a damper of m/Δt, which friction may be, halves the stable ω²Δt²
-        let part = if system.friction().is_some() { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 };
-        motion.longest = self.time_step.unwrap_or(part * self.safety * motion.covered_step);
+        motion.longest = self.time_step.unwrap_or(self.safety * motion.covered_step);
     }
 
     /// Allows for more contact where more particles touch than so far.

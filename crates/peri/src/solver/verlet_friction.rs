@@ -7,23 +7,24 @@
 use super::state::State;
 use super::system::System;
 use super::verlet_step::{Two, VerletStep};
-use crate::contact::{Rubbed, Rubbing};
 use crate::field::{Field, chunk_range};
 use rayon::prelude::*;
 
-/// New forces of friction for the half-step velocities, added to the force; `old` are those of the step before. Adds to the energy that
-/// friction has taken what it took in this step.
+/// Computes friction for the half-step velocities, and adds it to the force; `old` are the forces of friction of the step before. Adds to
+/// the energy that friction has dissipated what it took in this step and does not store.
 pub fn friction_pass<const D: usize>(
-    system: &System<D>,
+    system: &mut System<D>,
     state: &mut State<D>,
     volumes: &[f64],
     leap: &VerletStep,
     old: Option<Field<D>>,
 ) {
-    let Some(contact) = system.friction() else { return };
+    let Some(contact) = system.contact.as_mut().filter(|contact| contact.rubs()) else { return };
     let sites = volumes.len();
-    let rubbing = Rubbing { density: leap.density, step: leap.step };
-    let (displacement, velocity, loads) = (&state.displacement, &state.velocity, &*system.loads);
+    let sliding =
+        contact.slide_on(&*system.bonds, &state.displacement, &state.velocity, leap.step, &state.grips);
+    state.grips = contact.held().to_vec();
+    let (contact, velocity, loads) = (&*contact, &state.velocity, &*system.loads);
     let moves = leap.factors[1] - leap.factors[0];
     let work = |chunk: usize, force: &[&mut [f64]; D]| {
         let mut sum = 0.0;
@@ -41,22 +42,20 @@ pub fn friction_pass<const D: usize>(
     let of = |(chunk, (mut own, total)): (usize, Two<D>)| {
         let before = work(chunk, &own);
         own.iter_mut().for_each(|part| part.fill(0.0));
-        let rubbed = contact.friction(&*system.bonds, displacement, velocity, &rubbing, chunk, &mut own);
+        contact.add_friction(chunk, &mut own);
         for d in 0..D {
-            total[d].iter_mut().zip(&*own[d]).for_each(|(f, rub)| *f += rub);
+            total[d].iter_mut().zip(&*own[d]).for_each(|(f, drag)| *f += drag);
         }
-        (0.5 * (before + work(chunk, &own)), rubbed)
+        0.5 * (before + work(chunk, &own))
     };
-    let parts: Vec<(f64, Rubbed)> =
+    let parts: Vec<f64> =
         friction.chunks_mut().into_par_iter().zip(state.force.chunks_mut()).enumerate().map(of).collect();
-    let mut taken = -parts.iter().map(|(work, _)| work).sum::<f64>();
-    let none = Rubbed::new(contact.planes().count());
-    let Rubbed { planes, slip } = parts.iter().fold(none, |sum, (_, rubbed)| sum.and(rubbed));
+    let mut taken = -parts.iter().sum::<f64>();
     // what planes drag is work of theirs, not heat
-    taken += work_of_planes(contact.moved(), &state.rubbing, &planes);
-    state.motion.rubbed += taken;
-    state.motion.slip = state.motion.slip.max(slip);
-    (state.friction, state.rubbing) = (Some(friction), planes);
+    taken += work_of_planes(contact.moved(), &state.rubbing, &sliding.planes);
+    state.motion.rubbed += taken - (sliding.stored - state.motion.stuck);
+    state.motion.stuck = sliding.stored;
+    (state.friction, state.rubbing) = (Some(friction), sliding.planes);
 }
 
 /// Adds the work of planes that have moved; `rubbed` is their friction before this step.
@@ -65,7 +64,7 @@ pub fn plane_pass<const D: usize>(system: &System<D>, state: &mut State<D>, rubb
     if contact.planes().all(|plane| plane.displacement == [0.0; D] && plane.velocity == [0.0; D]) {
         return;
     }
-    let resting = contact.resting(&*system.bonds, &state.displacement);
+    let resting = contact.resting(&state.displacement);
     let pushing: Vec<[f64; 3]> = resting.iter().map(|plane| plane.force).collect();
     state.work += work_of_planes(contact.moved(), &state.pushing, &pushing)
         + work_of_planes(contact.moved(), rubbed, &state.rubbing);

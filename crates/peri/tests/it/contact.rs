@@ -3,13 +3,13 @@
 
 use crate::bodies::{Body, Built, MODULUS, Random, distance, norm, rms, scatter};
 use peri::bonds::{Bonds, CloudBonds, Overstretched, VolumeCorrection};
-use peri::contact::{Contact, STIFFNESS};
+use peri::contact::{Contact, SHORT_RANGE};
 use peri::field::{CHUNK, Field};
 
 /// Contact forces on particles in input order, and the energy.
 fn contact<const D: usize>(bonds: &dyn Bonds<D>, sites: &[usize], u: &[[f64; D]]) -> (Vec<[f64; D]>, f64) {
     let field = scatter(bonds.sites(), sites, u);
-    let mut contact = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
+    let mut contact = Contact::short_range(bonds, MODULUS, SHORT_RANGE).unwrap();
     contact.update(bonds, &field);
     let mut force = Field::zeros(bonds.sites());
     for (chunk, mut out) in force.chunks_mut().into_iter().enumerate() {
@@ -99,9 +99,9 @@ fn degenerate_states() {
     let one = CloudBonds::new(&points[..1], &[1.0], 1.0, 1.0, VolumeCorrection::None, &[]).unwrap();
     assert_eq!(contact(&one, &[0], &[[7.0; 3]]), (vec![[0.0; 3]], 0.0));
     for bad in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(Contact::new(&one, 1.0, bad).is_err() && Contact::new(&one, bad, 15.0).is_err());
+        assert!(Contact::short_range(&one, 1.0, bad).is_err() && Contact::short_range(&one, bad, 15.0).is_err());
     }
-    assert!(Contact::new(&one, 0.0, 15.0).is_err());
+    assert!(Contact::short_range(&one, 0.0, 15.0).is_err());
     // a body in a heap, all of it in one place: finite
     let built = Body::<2>::solid([12, 12], 1.0, 1.0).build();
     let heap: Vec<[f64; 2]> = built.points.iter().map(|x| x.map(|x| 3.0 - x)).collect();
@@ -145,7 +145,7 @@ fn check_parted<const D: usize>(cells: [usize; D]) {
     fn parted<const D: usize>(bonds: &mut dyn Bonds<D>, sites: &[usize], count: usize) {
         let mut random = Random(11);
         let (u, step) = (random.vectors::<D>(count, 0.04), random.vectors::<D>(count, 0.002));
-        let mut contact = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
+        let mut contact = Contact::short_range(bonds, MODULUS, SHORT_RANGE).unwrap();
         contact.rebuild(bonds, &scatter(bonds.sites(), sites, &u));
         let rebuilds = contact.rebuilds();
         // every fifth bond in one half of the body, and all in a corner
@@ -172,7 +172,7 @@ fn check_parted<const D: usize>(cells: [usize; D]) {
         let field = scatter(bonds.sites(), sites, &moved);
         contact.update(bonds, &field);
         assert_eq!(contact.rebuilds(), rebuilds, "the list was made again");
-        let mut fresh = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
+        let mut fresh = Contact::short_range(bonds, MODULUS, SHORT_RANGE).unwrap();
         fresh.rebuild(bonds, &field);
         let forces = |contact: &Contact<D>| {
             let mut force = Field::zeros(bonds.sites());
@@ -218,7 +218,7 @@ fn a_list_holds_while_bodies_fly() {
         }
         force
     };
-    let mut contact = Contact::new(&cloud, MODULUS, STIFFNESS).unwrap();
+    let mut contact = Contact::short_range(&cloud, MODULUS, SHORT_RANGE).unwrap();
     let (first, mut far, mut random) = (contact.rebuilds(), 0, Random(5));
     for step in 0..220 {
         let shaken = random.vectors::<2>(72, 0.02);
@@ -230,7 +230,7 @@ fn a_list_holds_while_bodies_fly() {
             u.set(sites[40], [1e300, -1e300]);
         }
         contact.update(&cloud, &u);
-        let mut fresh = Contact::new(&cloud, MODULUS, STIFFNESS).unwrap();
+        let mut fresh = Contact::short_range(&cloud, MODULUS, SHORT_RANGE).unwrap();
         fresh.rebuild(&cloud, &u);
         assert_eq!(forces(&contact, &u), forces(&fresh, &u), "{step}");
         assert_eq!(contact.touching(&cloud, &u), fresh.touching(&cloud, &u), "{step}");

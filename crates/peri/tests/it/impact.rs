@@ -4,7 +4,7 @@ use crate::bodies::{Body, MODULUS, Slit, hold};
 use crate::dynamics::DENSITY;
 use peri::Error;
 use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
-use peri::contact::{Contact, STIFFNESS};
+use peri::contact::{Contact, SHORT_RANGE};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{Loads, Method, State, System, VelocityVerlet};
@@ -19,7 +19,7 @@ fn run(
     state: &mut State<2>,
 ) -> Result<(), Error> {
     let law = Law::Linear.build(1.0, 1.0, false).unwrap();
-    let contact = Contact::new(bonds, MODULUS, kappa)?;
+    let contact = Contact::short_range(bonds, MODULUS, kappa)?;
     let mut system = System::new(bonds, BondMaterial::new(&*law, MODULUS), loads, &[]);
     system.contact = Some(contact);
     solver.solve(&mut system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
@@ -31,7 +31,7 @@ fn run(
 fn two_particles_rebound() {
     let (volumes, horizon) = ([1.0, 0.64], 1.5);
     let points = [[0.0, 0.0], [2.0, 0.0]];
-    let stiffness = STIFFNESS * 6.0 * MODULUS / horizon;
+    let stiffness = SHORT_RANGE * 6.0 * MODULUS / horizon;
     let omega = (stiffness * (volumes[0] + volumes[1]) / DENSITY).sqrt();
     let before = [0.3, -0.9];
     let centre = (before[0] * volumes[0] + before[1] * volumes[1]) / (volumes[0] + volumes[1]);
@@ -56,7 +56,7 @@ fn two_particles_rebound() {
                 records: 1,
                 ..VelocityVerlet::new(DENSITY, 1.0 + 2.0 * PI / omega)
             };
-            run(&solver, &mut cloud, &Loads::default(), STIFFNESS, &mut state).unwrap();
+            run(&solver, &mut cloud, &Loads::default(), SHORT_RANGE, &mut state).unwrap();
             let after = sites.map(|site| state.velocity.get(site)[0]);
             let momentum = |v: [f64; 2]| v[0] * volumes[0] + v[1] * volumes[1];
             // rounding of some thousand steps
@@ -118,7 +118,7 @@ fn energy_error(state: &State<2>) -> f64 {
 fn newtons_cradle() {
     let mut left = Vec::new();
     for particles in [10, 40, 160] {
-        let (velocities, state) = cradle(2, particles, 0.5, STIFFNESS);
+        let (velocities, state) = cradle(2, particles, 0.5, SHORT_RANGE);
         let momentum: f64 = velocities.iter().sum();
         eprintln!(
             "two bars of {particles}: {velocities:.4?}, momentum {:.1e}, energy {:.1e}, {} steps",
@@ -132,7 +132,7 @@ fn newtons_cradle() {
         left.push(velocities[0].abs());
     }
     assert!(left[2] < 0.02 && left[2] < 0.7 * left[1] && left[1] < 0.7 * left[0], "{left:?}");
-    let (velocities, _) = cradle(3, 40, 0.5, STIFFNESS);
+    let (velocities, _) = cradle(3, 40, 0.5, SHORT_RANGE);
     eprintln!("three bars of 40: {velocities:.4?}");
     assert!((velocities.iter().sum::<f64>() - 1.0).abs() < 1e-12);
     assert!(velocities[2] > 0.9 && velocities[..2].iter().all(|v| v.abs() < 0.1), "{velocities:?}");
@@ -149,7 +149,7 @@ fn neither_threads_nor_restarts_change_a_bit() {
             let mut built = body.build();
             let bonds = &mut built.lattice;
             let law = Law::ChainOffset.build(720.0, 1200.0, true).unwrap();
-            let contact = Contact::new(bonds, MODULUS, STIFFNESS).unwrap();
+            let contact = Contact::short_range(bonds, MODULUS, SHORT_RANGE).unwrap();
             let mut state = from.unwrap_or_else(|| {
                 let mut state = State::new(bonds.sites());
                 for &site in bonds.particles() {
@@ -184,7 +184,7 @@ fn neither_threads_nor_restarts_change_a_bit() {
 /// Energy through an impact, over the time step: second order, from steps at the stability limit of the stiffest contact.
 #[test]
 fn energy_through_an_impact() {
-    for kappa in [STIFFNESS, 1e4] {
+    for kappa in [SHORT_RANGE, 1e4] {
         let errors: Vec<f64> = [0.4, 0.2, 0.1]
             .map(|safety| {
                 let (_, state) = cradle(2, 20, safety, kappa);

@@ -2,7 +2,7 @@
 
 use crate::bodies::{Body, Built, MODULUS, Slit, distance, hold, rms};
 use peri::bonds::Bonds;
-use peri::contact::{Contact, STIFFNESS, Touching};
+use peri::contact::{Contact, SHORT_RANGE, Touching};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{
@@ -31,7 +31,7 @@ impl<const D: usize> Run<'_, D> {
         let law = self.law.build(720.0, 1200.0, true).unwrap();
         let spacing = self.bonds.spacing();
         let contact = self.contact.map(|[stiffness, skin]| {
-            Contact::new(self.bonds, MODULUS, stiffness).unwrap().with_skin(skin * spacing)
+            Contact::short_range(self.bonds, MODULUS, stiffness).unwrap().with_skin(skin * spacing)
         });
         let mut system = System::new(self.bonds, BondMaterial::new(&*law, MODULUS), self.loads, self.factors);
         (system.contact, system.breaking) = (contact, self.breaking);
@@ -64,7 +64,7 @@ fn springs_in_series() {
     body.slits = vec![Slit { at: 5.0, from: -1.0, to: 2.0 }];
     let bond = 6.0 * MODULUS;
     let factors: Vec<f64> = (1..=10).map(|k| 0.1 * f64::from(k)).collect();
-    for stiffness in [1e-3, STIFFNESS, 1e3] {
+    for stiffness in [1e-3, SHORT_RANGE, 1e3] {
         let spring = stiffness * 6.0 * MODULUS / 1.015;
         let compliance = 8.0 / bond + 1.0 / spring;
         for (name, mut method) in ["relaxation", "L-BFGS"].into_iter().zip(methods(1e-9)) {
@@ -127,7 +127,7 @@ fn elastic_blocks_press_each_other() {
         };
         loads.held_regions = vec![region(&|y| y < 3.0), region(&|y| y > 17.0)];
         let mut state = State::new(bonds.sites());
-        let contact = Some([STIFFNESS, 0.5]);
+        let contact = Some([SHORT_RANGE, 0.5]);
         let run =
             Run { bonds, loads: &loads, factors: &factors, law: Law::ChainOffset, contact, breaking: None };
         let lists = run.solve(&mut *methods(1e-6)[which], &mut state, &mut |_, _| ());
@@ -195,7 +195,7 @@ fn flanks_do_not_interpenetrate() {
     let factors: Vec<f64> = (1..=10).map(|k| 0.1 * f64::from(k)).collect();
     for down in [2.0, 4.0] {
         for which in 0..2 {
-            let deepest = [0.0, STIFFNESS].map(|stiffness| {
+            let deepest = [0.0, SHORT_RANGE].map(|stiffness| {
                 let (mut built, loads) = sheet(30, down);
                 let loads = loads(&built.lattice);
                 let mut state = State::new(built.lattice.sites());
@@ -235,7 +235,7 @@ fn neither_threads_nor_lists_nor_restarts_change_a_bit() {
             let mut state = from.unwrap_or_else(|| State::new(bonds.sites()));
             let mut saved = None;
             let breaking = Some(Breaking { criterion: 1.17.into(), policy: Default::default() });
-            let (law, contact) = (Law::ChainOffset, Some([STIFFNESS, skin]));
+            let (law, contact) = (Law::ChainOffset, Some([SHORT_RANGE, skin]));
             let run = Run { bonds, loads: &loads, factors: &[0.4, 0.7, 1.0], law, contact, breaking };
             let lists = run.solve(&mut *methods(1e-2)[which], &mut state, &mut |state, restartable| {
                 if restartable && state.total_iterations >= save && saved.is_none() {
@@ -285,7 +285,7 @@ fn contact_without_touch_changes_no_bit() {
     };
     for which in 0..2 {
         let without = solve(which, None);
-        assert!(without == solve(which, Some([STIFFNESS, 0.5])) && without == solve(which, Some([0.0, 0.5])));
+        assert!(without == solve(which, Some([SHORT_RANGE, 0.5])) && without == solve(which, Some([0.0, 0.5])));
     }
     let pressed = |contact: Option<[f64; 2]>| {
         let (mut built, loads) = sheet(30, 4.0);

@@ -42,6 +42,18 @@ pub struct Body<'a, const D: usize> {
     pub springs: &'a [f64],
     /// The bonds' survey.
     pub survey: &'a Survey,
+    /// Faces held by rigid planes.
+    pub anchors: &'a [Anchor<D>],
+}
+
+/// A face held by a rigid plane.
+pub struct Anchor<const D: usize> {
+    /// The particle at the face: functions hardly change over what is below it.
+    pub site: u32,
+    /// Direction in which it is held; `None`: all.
+    pub normal: Option<[f64; D]>,
+    /// Stiffness, N/m.
+    pub stiffness: f64,
 }
 
 /// A factored coarse level.
@@ -65,10 +77,11 @@ impl<const D: usize> Coarse<D> {
         // a lattice's particle with every bond has neighbours on all sides; a cloud's may still be at a gap
         let whole = if body.bonds.as_lattice().is_some() { body.survey.most } else { u32::MAX };
         let mut space = Space::new(body.bonds, &body.survey.bonded, whole, edge, most / D)?;
-        let Body { bonds, loads, displacement, law, springs, survey } = *body;
+        let Body { bonds, loads, displacement, law, springs, survey, anchors } = *body;
         let assembly = Assembly::new(bonds, loads, displacement, survey, law, springs, space.edge);
-        let matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
+        let mut matrices: Vec<(ElementMatrix, [f64; CORNERS])> =
             space.elements.par_iter().map(|element| assembly.element(&space, element)).collect();
+        hold(&space, anchors, &mut matrices);
         let extent = extent(body.bonds);
         let shift = SHIFT * assembly.stiffness() * (std::f64::consts::PI / extent).powi(2);
         let (pattern, blocks) = pattern::<D>(&space);
@@ -144,6 +157,37 @@ impl<const D: usize> Coarse<D> {
     /// Degrees of freedom, and entries of the factors.
     pub fn size(&self) -> [usize; 2] {
         [self.coefficients.len(), self.factor.entries()]
+    }
+}
+
+/// Adds k φ_a φ_b n⊗n of anchors to the matrices of their elements.
+fn hold<const D: usize>(
+    space: &Space<D>,
+    anchors: &[Anchor<D>],
+    matrices: &mut [(ElementMatrix, [f64; CORNERS])],
+) {
+    for anchor in anchors {
+        let element = space.element_of[anchor.site as usize];
+        if element == NONE {
+            continue;
+        }
+        let local = space.local.get(anchor.site as usize);
+        let hat = |corner: usize| {
+            (0..D).map(|d| if corner >> d & 1 == 1 { local[d] } else { 1.0 - local[d] }).product::<f64>()
+        };
+        let mut pair = 0;
+        for a in 0..1 << D {
+            for b in a..1 << D {
+                let value = anchor.stiffness * hat(a) * hat(b);
+                for i in 0..D {
+                    for j in 0..D {
+                        let part = anchor.normal.map_or(f64::from(u8::from(i == j)), |n| n[i] * n[j]);
+                        matrices[element as usize].0[pair][i * D + j] += value * part;
+                    }
+                }
+                pair += 1;
+            }
+        }
     }
 }
 
