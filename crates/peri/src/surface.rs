@@ -49,7 +49,10 @@ impl<const D: usize> Patch<D> {
                     let along = if Some(d) == axis { point[d] } else { centre[d] };
                     along + if size > 0.0 { from[d] * radius / size } else { 0.0 }
                 });
-                (length(std::array::from_fn::<f64, D, _>(|d| above[d] - face.place[d])), outward * (radius - size))
+                (
+                    length(std::array::from_fn::<f64, D, _>(|d| above[d] - face.place[d])),
+                    outward * (radius - size),
+                )
             }
         }
     }
@@ -90,8 +93,7 @@ impl<const D: usize> Surface<D> {
 
     /// Takes the free sides of the cells of a lattice.
     pub fn of_lattice(lattice: &LatticeBonds<D>) -> Self {
-        let patches: Vec<Patch<D>> =
-            (0..2 * D).map(|k| Patch::Flat { axis: k / 2, outward: if k % 2 == 0 { -1.0 } else { 1.0 } }).collect();
+        let patches = Self::axes();
         let mut occupied = vec![false; lattice.sites()];
         lattice.particles().iter().for_each(|&site| occupied[site as usize] = true);
         let mut faces = Vec::new();
@@ -110,6 +112,15 @@ impl<const D: usize> Surface<D> {
             }
         }
         Self { faces, patches }
+    }
+
+    /// Takes flat sides whose patches are those of [`Self::of_lattice`]: 2d and 2d + 1 for the normals along −d and d.
+    pub(crate) fn of_sides(faces: Vec<Face<D>>) -> Self {
+        Self { faces, patches: Self::axes() }
+    }
+
+    fn axes() -> Vec<Patch<D>> {
+        (0..2 * D).map(|k| Patch::Flat { axis: k / 2, outward: [-1.0, 1.0][k % 2] }).collect()
     }
 
     /// The face points.
@@ -189,14 +200,7 @@ impl<const D: usize> Surface<D> {
     }
 
     /// Adds the points of both sides of a shape that are flat across an axis, above the columns of the lattice.
-    fn flat(
-        &mut self,
-        shape: &Shape<D>,
-        axis: usize,
-        ends: (f64, f64),
-        outward: f64,
-        columns: &Columns<D>,
-    ) {
+    fn flat(&mut self, shape: &Shape<D>, axis: usize, ends: (f64, f64), outward: f64, columns: &Columns<D>) {
         let middle = 0.5 * (ends.0 + ends.1);
         for (end, sign) in [(ends.0, -outward), (ends.1, outward)] {
             let patch = self.patch(Patch::Flat { axis, outward: sign });

@@ -99,6 +99,7 @@ shapes = [
 {shape('cut', 20).replace('100 mm', '200 mm')},
 ]
 {'[contact]' if self.contact else ''}
+{'short_range = 15' if self.contact else ''}
 [[boundary]]
 name = "all"
 min = ["-1 m", "-1 m", "-1 m"]

@@ -218,7 +218,7 @@ class Model:
         return self
 
     def contact(self, stiffness: float) -> Model:
-        """Particles without a bond repel each other, with a stiffness relative to that of bonds."""
+        """Particles without a bond repel each other: 2/`stiffness` layers of confined material are as compliant as a contact; 2 suits."""
         self._spec["contact"] = float(stiffness)
         return self
 

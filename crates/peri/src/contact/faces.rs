@@ -30,6 +30,8 @@ const BATCH: usize = 1024;
 pub struct Faces<const D: usize> {
     /// X_f, m.
     pub places: Vec<[f64; D]>,
+    /// Numbers of the faces among those of the surface.
+    pub sources: Vec<u32>,
     /// N_f.
     pub normals: Vec<[f64; D]>,
     /// r_f, m.
@@ -59,7 +61,9 @@ struct Below {
 impl<const D: usize> Faces<D> {
     /// Faces of a body; none where the surface has none. Faces whose area bonds of a crack or of
     /// another side take away are left out.
-    pub fn new(bonds: &dyn Bonds<D>, surface: &Surface<D>) -> Self {
+    ///
+    /// `tied` faces have r_f = 0: the weights gain a term along the normal as well, so that faces turn with the body.
+    pub fn new(bonds: &dyn Bonds<D>, surface: &Surface<D>, tied: bool) -> Self {
         let area = typical_area(bonds);
         let load = surface_load(bonds, Tensor::<D>::identity());
         let mut below = below(bonds, surface);
@@ -79,6 +83,7 @@ impl<const D: usize> Faces<D> {
         let areas = sum(&below);
         let mut faces = Self {
             places: Vec::new(),
+            sources: Vec::new(),
             normals: Vec::new(),
             radii: Vec::new(),
             areas: Vec::new(),
@@ -97,7 +102,8 @@ impl<const D: usize> Faces<D> {
             }
             let place = surface.faces()[face].place;
             let mut weights: Vec<f64> = group.iter().map(|below| share(below) / areas[face]).collect();
-            faces.radii.push(centre(bonds, &surface.faces()[face], group, &mut weights));
+            faces.radii.push(centre(bonds, &surface.faces()[face], group, &mut weights, tied));
+            faces.sources.push(face as u32);
             faces.places.push(place);
             faces.normals.push(surface.faces()[face].normal);
             faces.areas.push(areas[face]);
@@ -120,6 +126,42 @@ impl<const D: usize> Faces<D> {
     pub fn below(&self, face: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let range = self.starts[face] as usize..self.starts[face + 1] as usize;
         self.sites[range.clone()].iter().map(|&site| site as usize).zip(self.weights[range].iter().copied())
+    }
+
+    /// Adds entries to every face: what it is tied to.
+    pub fn tie(&mut self, others: impl Fn(usize) -> Vec<(u32, f64)>) {
+        let (mut starts, mut sites, mut weights) = (vec![0], Vec::new(), Vec::new());
+        for face in 0..self.len() {
+            let own = self.below(face).map(|(site, weight)| (site as u32, weight));
+            let all: Vec<(u32, f64)> = own.chain(others(face)).collect();
+            sites.extend(all.iter().map(|entry| entry.0));
+            weights.extend(all.iter().map(|entry| entry.1));
+            starts.push(sites.len() as u32);
+        }
+        (self.starts, self.sites, self.weights) = (starts, sites, weights);
+        (self.particles, self.ends, self.shares) = (Vec::new(), Vec::new(), Vec::new());
+        self.transpose();
+    }
+
+    /// Adds to force densities, N/m³, on the sites from `start` on, forces on faces, N.
+    pub fn spread(&self, pushes: &[[f64; D]], volumes: &[f64], start: usize, force: &mut [&mut [f64]; D]) {
+        let at = |end: usize| self.particles.partition_point(|&site| (site as usize) < end);
+        for particle in at(start)..at(start + force[0].len()) {
+            let site = self.particles[particle] as usize;
+            let sum = self.sum(particle, pushes);
+            if sum != [0.0; D] {
+                (0..D).for_each(|d| force[d][site - start] += sum[d] / volumes[site]);
+            }
+        }
+    }
+
+    /// Force on a particle, by its number in [`Self::particles`], of forces on faces, N.
+    pub fn sum(&self, particle: usize, pushes: &[[f64; D]]) -> [f64; D] {
+        let mut sum = [0.0; D];
+        for &(face, weight) in self.above(particle) {
+            (0..D).for_each(|d| sum[d] += weight * pushes[face as usize][d]);
+        }
+        sum
     }
 
     /// Faces above a particle with their weights, by its number in [`Self::particles`].
@@ -275,6 +317,7 @@ fn centre<const D: usize>(
     face: &Face<D>,
     group: &[Below],
     weights: &mut [f64],
+    tied: bool,
 ) -> f64 {
     let (spacing, normal) = (bonds.spacing(), SVector::<f64, D>::from(face.normal));
     // near the surface most
@@ -286,7 +329,7 @@ fn centre<const D: usize>(
     };
     let aside = |below: &Below| {
         let from = from(below);
-        from - normal * normal.dot(&from)
+        if tied { from } else { from - normal * normal.dot(&from) }
     };
     let (mut off, mut middle) = (SVector::<f64, D>::zeros(), SVector::<f64, D>::zeros());
     for ((below, weight), measure) in group.iter().zip(&*weights).zip(&measure) {
@@ -305,6 +348,7 @@ fn centre<const D: usize>(
             *weight += measure / total * slope.dot(&(aside(below) - middle));
         }
     }
-    let below: f64 = group.iter().zip(&*weights).map(|(below, weight)| weight * normal.dot(&from(below))).sum();
+    let below: f64 =
+        group.iter().zip(&*weights).map(|(below, weight)| weight * normal.dot(&from(below))).sum();
     -spacing * below
 }

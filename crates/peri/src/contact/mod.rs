@@ -29,9 +29,10 @@ mod grip;
 mod list;
 mod plane;
 mod planes;
+mod ties;
 mod vicinity;
 
-use crate::bonds::{Bonds, Property};
+use crate::bonds::{Bonds, LatticeBonds, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::surface::Surface;
@@ -42,6 +43,8 @@ use planes::Planes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
+use ties::Ties;
+pub use ties::{across, grips};
 
 /// κ of Macek & Silling (2007).
 pub const SHORT_RANGE: f64 = 15.0;
@@ -56,6 +59,8 @@ const NEAR: f64 = 0.25;
 pub struct Contact<const D: usize> {
     /// Force density on a particle per volume of the other and per overlap, N/m⁷, where M is the greatest.
     stiffness: f64,
+    /// Whether the stiffness is that of layers of the material.
+    layered: bool,
     /// M of each particle over the greatest, where they differ.
     moduli: Option<Property>,
     /// Volume of the largest particle, m³.
@@ -64,6 +69,7 @@ pub struct Contact<const D: usize> {
     near: f64,
     list: List<D>,
     planes: Option<Planes<D>>,
+    ties: Option<Ties<D>>,
     /// μ of pairs of particles, and γ, m.
     friction: f64,
     elastic_slip: Option<f64>,
@@ -108,7 +114,7 @@ impl<const D: usize> Contact<D> {
             .uniform()
             .is_none()
             .then(|| Property::new(bonds, |site, _| modulus.at(site) / modulus.greatest()));
-        Ok(Self { moduli, ..Self::of_pairs(bonds, unit, stiffness)? })
+        Ok(Self { moduli, layered: true, ..Self::of_pairs(bonds, unit, stiffness)? })
     }
 
     /// Contact of a body with the bond modulus `modulus` = kθ, N/m⁶, and κ = `stiffness`, see [`SHORT_RANGE`].
@@ -130,11 +136,13 @@ impl<const D: usize> Contact<D> {
         let near = NEAR * bonds.spacing();
         Ok(Self {
             stiffness: stiffness * unit,
+            layered: false,
             moduli: None,
             largest_volume: volumes.fold(0.0, f64::max),
             near,
             list: List::new(bonds, near),
             planes: None,
+            ties: None,
             friction: 0.0,
             elastic_slip: None,
             held: Vec::new(),
@@ -163,6 +171,25 @@ impl<const D: usize> Contact<D> {
         Ok(self)
     }
 
+    /// With the particles of `held` tied to the others at their surface with the stiffness s = `stiffness`, of a body of the longitudinal
+    /// modulus M = `modulus`, Pa, without bonds [`across`] it.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] where s is negative, M is not positive, or either is not finite.
+    pub fn with_tied(
+        mut self,
+        bonds: &LatticeBonds<D>,
+        held: &[bool],
+        modulus: f64,
+        stiffness: f64,
+    ) -> Result<Self, Error> {
+        positive("modulus of contact", modulus)?;
+        non_negative("stiffness of ties", stiffness)?;
+        let ties = Ties::new(bonds, held, stiffness * modulus / bonds.spacing());
+        self.ties = (ties.len() > 0).then_some(ties);
+        Ok(self)
+    }
+
     /// With friction of the coefficient `friction` between particles; `elastic_slip` is the slip γ, m, at which it is Coulomb's,
     /// `None` that at which tangential and normal stiffness are equal.
     ///
@@ -186,7 +213,7 @@ impl<const D: usize> Contact<D> {
 
     /// Whether it repels: stiff pairs, or planes.
     pub fn repels(&self) -> bool {
-        self.has_pairs() || self.has_planes()
+        self.has_pairs() || self.has_planes() || self.ties.is_some()
     }
 
     /// Whether particles repel each other.
@@ -220,6 +247,11 @@ impl<const D: usize> Contact<D> {
     /// The last move of every plane, m.
     pub fn moved(&self) -> impl Iterator<Item = [f64; D]> {
         self.planes.iter().flat_map(Planes::moved)
+    }
+
+    /// Deepest overlap of a plane that has moved, m, before its last move and after it; −∞ where none touches.
+    pub fn approach(&self, displacement: &Field<D>) -> [f64; 2] {
+        self.planes.as_ref().map_or([f64::NEG_INFINITY; 2], |planes| planes.approach(displacement))
     }
 
     /// How the body rests on each plane, without friction.
@@ -265,7 +297,8 @@ impl<const D: usize> Contact<D> {
         let of = |chunk: usize| {
             let mut grips = Vec::new();
             let sites = chunk_range(chunk, displacement.sites());
-            for (own, touching) in self.pairs(bonds, displacement, sites, 0.0).filter(|_| self.friction > 0.0) {
+            for (own, touching) in self.pairs(bonds, displacement, sites, 0.0).filter(|_| self.friction > 0.0)
+            {
                 for touch in touching {
                     let pair = Pair::Particles(own.site, touch.site);
                     let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
@@ -288,7 +321,8 @@ impl<const D: usize> Contact<D> {
             grips.sort_unstable_by_key(|grip| grip.pair);
             grips
         };
-        let parts: Vec<Vec<Grip>> = (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        let parts: Vec<Vec<Grip>> =
+            (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
         let mut grips = parts.concat();
         grips.extend(self.planes.iter().flat_map(|planes| planes.grips(displacement, start, old)));
         grips
@@ -350,6 +384,9 @@ impl<const D: usize> Contact<D> {
         if let Some(planes) = &mut self.planes {
             planes.update(displacement, &self.held, self.start.as_ref());
         }
+        if let Some(ties) = &mut self.ties {
+            ties.update(displacement);
+        }
     }
 
     /// Takes in the pairs of sites whose bonds have just broken, each from both of its ends.
@@ -399,11 +436,15 @@ impl<const D: usize> Contact<D> {
         if let Some(planes) = &self.planes {
             planes.force(start, force);
         }
+        if let Some(ties) = &self.ties {
+            ties.force(start, force);
+        }
         self.hold_pairs(displacement, start, force);
         for (own, touching) in self.pairs(bonds, displacement, start..start + force[0].len(), 0.0) {
             let mut sum = None;
             for touch in touching {
-                let push = self.pair(own.site, touch.site) * touch.overlap() * bonds.volume(touch.site as usize);
+                let push =
+                    self.pair(own.site, touch.site) * touch.overlap() * bonds.volume(touch.site as usize);
                 let (sum, direction) = (sum.get_or_insert([0.0; D]), touch.direction());
                 for d in 0..D {
                     sum[d] -= push * direction[d];
@@ -415,6 +456,22 @@ impl<const D: usize> Contact<D> {
                 force[d][own.site as usize - start] += sum[d];
             }
         }
+    }
+
+    /// Greatest overlap 1 − r/d of pairs whose stiffness is that of the material, with their distance d, m.
+    pub fn deepest_pair(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> Option<[f64; 2]> {
+        if !self.layered {
+            return None;
+        }
+        let of = |chunk: usize| {
+            let pairs = self.pairs(bonds, displacement, chunk_range(chunk, displacement.sites()), 0.0);
+            let each = pairs
+                .flat_map(|(_, near)| near.map(|touch| [touch.overlap() / touch.distance, touch.distance]));
+            each.max_by(|a, b| a[0].total_cmp(&b[0]))
+        };
+        let parts: Vec<Option<[f64; 2]>> =
+            (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        parts.into_iter().flatten().max_by(|a, b| a[0].total_cmp(&b[0]))
     }
 
     /// What touches.
@@ -449,6 +506,7 @@ impl<const D: usize> Contact<D> {
             all.overlap = all.overlap.max(overlap);
         }
         all.energy += self.slip_energy(displacement);
+        all.energy += self.ties.as_ref().map_or(0.0, |ties| ties.energy(displacement));
         all
     }
 
@@ -469,9 +527,8 @@ impl<const D: usize> Contact<D> {
     /// Friction in force between particles, of those of some sites.
     fn held_by(&self, sites: Range<usize>) -> &[Grip] {
         let before = |end: usize| {
-            self.held.partition_point(
-                |grip| matches!(grip.pair, Pair::Particles(own, _) if (own as usize) < end),
-            )
+            self.held
+                .partition_point(|grip| matches!(grip.pair, Pair::Particles(own, _) if (own as usize) < end))
         };
         &self.held[before(sites.start)..before(sites.end)]
     }
@@ -544,9 +601,8 @@ impl<const D: usize> Contact<D> {
         let sites = displacement.sites();
         let of = |chunk: usize| {
             let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), 0.0);
-            let stiffness = |own: u32, touch: Near<D>| {
-                self.pair(own, touch.site) * bonds.volume(touch.site as usize)
-            };
+            let stiffness =
+                |own: u32, touch: Near<D>| self.pair(own, touch.site) * bonds.volume(touch.site as usize);
             let sums = pairs.map(|(own, touching)| touching.map(|t| stiffness(own.site, t)).sum::<f64>());
             sums.fold(0.0, f64::max)
         };
@@ -555,7 +611,8 @@ impl<const D: usize> Contact<D> {
     }
 
     fn half_of_planes(&self) -> f64 {
-        self.planes.as_ref().map_or(0.0, |planes| 0.5 * planes.stiffness())
+        let planes = self.planes.as_ref().map_or(0.0, Planes::stiffness);
+        0.5 * (planes + self.ties.as_ref().map_or(0.0, Ties::greatest))
     }
 
     /// k V of the largest particle, and half of what planes add: the least that [`Contact::greatest_stiffness`] is where anything
@@ -576,8 +633,7 @@ impl<const D: usize> Contact<D> {
         masses: &mut [f64],
     ) {
         self.add_pairs(bonds, displacement, tangent, masses);
-        let Some(planes) = &self.planes else { return };
-        planes.springs(displacement, self.near, &mut |below, normal, stiffness| {
+        self.near_springs(displacement, self.near, &mut |below, normal, stiffness| {
             let sum: f64 = below.iter().map(|(_, weight)| weight.abs()).sum();
             let mixed = 1.0 + normal.map_or(0.0, mixed);
             for &(site, weight) in below {
@@ -588,13 +644,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// As [`Self::add_stiffness`], of pairs alone.
-    pub fn add_pairs(
-        &self,
-        bonds: &dyn Bonds<D>,
-        displacement: &Field<D>,
-        tangent: f64,
-        masses: &mut [f64],
-    ) {
+    pub fn add_pairs(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, tangent: f64, masses: &mut [f64]) {
         let of = |own: u32, Near { site, zeta, r, .. }: Near<D>| {
             let unit = zeta.map(|x| x / r.max(f64::MIN_POSITIVE));
             // friction holds in all directions
@@ -604,7 +654,8 @@ impl<const D: usize> Contact<D> {
         let sites = masses.len();
         let sums = (0..sites.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
             let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), self.near);
-            let all = pairs.map(|(own, near)| (own, near.map(|near| of(own.site, near)).sum::<f64>() / tangent));
+            let all =
+                pairs.map(|(own, near)| (own, near.map(|near| of(own.site, near)).sum::<f64>() / tangent));
             all.filter(|(_, sum)| *sum > 0.0).collect()
         });
         let sums: Vec<Vec<(Listed, f64)>> = sums.collect();
@@ -614,15 +665,17 @@ impl<const D: usize> Contact<D> {
         }
     }
 
-    /// Visits faces that touch planes or are about to: particles below with weights, the normal of a plane without friction, the
-    /// stiffness, N/m.
-    pub fn springs(
-        &self,
-        displacement: &Field<D>,
-        visit: &mut dyn FnMut(&[(usize, f64)], Option<[f64; D]>, f64),
-    ) {
+    /// Visits faces that touch planes or are tied: particles below with weights, the normal of a plane without friction, the stiffness, N/m.
+    pub fn springs(&self, displacement: &Field<D>, visit: &mut Spring<D>) {
+        self.near_springs(displacement, 0.0, visit);
+    }
+
+    fn near_springs(&self, displacement: &Field<D>, gap: f64, visit: &mut Spring<D>) {
         if let Some(planes) = &self.planes {
-            planes.springs(displacement, 0.0, visit);
+            planes.springs(displacement, gap, visit);
+        }
+        if let Some(ties) = &self.ties {
+            ties.springs(visit);
         }
     }
 
@@ -665,6 +718,9 @@ impl<const D: usize> Contact<D> {
         self.list.alone.iter().for_each(|&site| velocity.set(site as usize, [0.0; D]));
     }
 }
+
+/// Sees a face: particles below it with weights, the direction in which it is held (`None`: all), the stiffness, N/m.
+pub type Spring<'a, const D: usize> = dyn FnMut(&[(usize, f64)], Option<[f64; D]>, f64) + 'a;
 
 /// Friction after a step of explicit dynamics.
 #[derive(Clone, Debug, Default)]

@@ -93,14 +93,16 @@ impl<const D: usize> Planes<D> {
         planes: Vec<Plane<D>>,
         radius: impl Fn(usize) -> f64,
     ) -> Result<Self, Error> {
-        let faces = Faces::new(bonds, surface);
+        let faces = Faces::new(bonds, surface, false);
         let (mut radii, mut volumes) = (vec![0.0; bonds.sites()], vec![0.0; bonds.sites()]);
         let mut bonded = vec![0; bonds.sites()];
         for site in bonds.particles().iter().map(|&site| site as usize) {
-            (radii[site], volumes[site], bonded[site]) = (radius(site), bonds.volume(site), bonds.bonded(site));
+            (radii[site], volumes[site], bonded[site]) =
+                (radius(site), bonds.volume(site), bonds.bonded(site));
         }
         let spacing = bonds.spacing();
-        let of_particle = bonds.particles().iter().map(|&site| 0.5 / radii[site as usize]).fold(0.0, f64::max);
+        let of_particle =
+            bonds.particles().iter().map(|&site| 0.5 / radii[site as usize]).fold(0.0, f64::max);
         let mut each = Vec::new();
         for (number, plane) in planes.into_iter().enumerate() {
             let plane = plane.checked()?;
@@ -331,23 +333,10 @@ impl<const D: usize> Planes<D> {
 
     /// Adds to force densities, N/m³, on the sites from `start` on, forces on elements, N.
     fn spread(&self, pushes: &[[f64; D]], start: usize, force: &mut [&mut [f64]; D]) {
-        let end = start + force[0].len();
         let (faces, bare) = pushes.split_at(self.faces.len());
-        let range = |sites: &[u32]| {
-            let at = |end: usize| sites.partition_point(|&site| (site as usize) < end);
-            at(start)..at(end)
-        };
-        for particle in range(&self.faces.particles) {
-            let site = self.faces.particles[particle] as usize;
-            let mut sum = [0.0; D];
-            for &(face, weight) in self.faces.above(particle) {
-                (0..D).for_each(|d| sum[d] += weight * faces[face as usize][d]);
-            }
-            if sum != [0.0; D] {
-                (0..D).for_each(|d| force[d][site - start] += sum[d] / self.volumes[site]);
-            }
-        }
-        for particle in range(&self.bare) {
+        self.faces.spread(faces, &self.volumes, start, force);
+        let at = |end: usize| self.bare.partition_point(|&site| (site as usize) < end);
+        for particle in at(start)..at(start + force[0].len()) {
             let site = self.bare[particle] as usize;
             if bare[particle] != [0.0; D] {
                 (0..D).for_each(|d| force[d][site - start] += bare[particle][d] / self.volumes[site]);
@@ -362,11 +351,10 @@ impl<const D: usize> Planes<D> {
         }
         let (faces, bare) = self.pushes.split_at(self.faces.len());
         let of_particle = |particle: usize| {
-            let mut sum = [0.0; D];
-            for &(face, weight) in self.faces.above(particle) {
-                (0..D).for_each(|d| sum[d] += weight * faces[face as usize][d]);
-            }
-            sum.map(|f| (f / self.volumes[self.faces.particles[particle] as usize]).powi(2)).iter().sum::<f64>()
+            let sum = self.faces.sum(particle, faces);
+            sum.map(|f| (f / self.volumes[self.faces.particles[particle] as usize]).powi(2))
+                .iter()
+                .sum::<f64>()
         };
         let of_bare = |(push, &site): (&[f64; D], &u32)| {
             push.iter().map(|f| (f / self.volumes[site as usize]).powi(2)).sum::<f64>()
@@ -411,7 +399,8 @@ impl<const D: usize> Planes<D> {
             }
             // a face stands for half of what lies between two, on either side; in space there are as many in each row
             let rows: f64 = if D == 2 { count } else { count.sqrt() };
-            let extent = crate::geometry::length(std::array::from_fn::<f64, D, _>(|d| (high[d] - low[d]).max(0.0)));
+            let extent =
+                crate::geometry::length(std::array::from_fn::<f64, D, _>(|d| (high[d] - low[d]).max(0.0)));
             resting.width = if rows > 1.0 { extent * rows / (rows - 1.0) } else { 0.0 };
             if push > 0.0 {
                 let square: f64 = (0..D).map(|d| second[d] / push - (first[d] / push).powi(2)).sum();
@@ -424,6 +413,21 @@ impl<const D: usize> Planes<D> {
             resting
         };
         self.each.iter().map(of).collect()
+    }
+
+    /// Deepest overlap of a plane that has moved, m, before its last move and after it.
+    pub fn approach(&self, field: &Field<D>) -> [f64; 2] {
+        let mut most = [f64::NEG_INFINITY; 2];
+        for placed in self.each.iter().filter(|placed| !placed.plane.bonded && placed.now != placed.before) {
+            let normal = placed.plane.normal;
+            let moved: f64 = (0..D).map(|d| normal[d] * (placed.now[d] - placed.before[d])).sum();
+            let overlaps = self.near(placed, field, 0.0).into_iter().map(|touch| touch.overlap);
+            let after = overlaps.fold(f64::NEG_INFINITY, f64::max);
+            if after > most[1] {
+                most = [after - moved, after];
+            }
+        }
+        most
     }
 
     /// Bound of what planes add to the stiffness over volumes, N/m⁴, however many faces touch.
@@ -442,11 +446,12 @@ impl<const D: usize> Planes<D> {
 
     /// Visits what touches or is nearer than `gap`, m: the particles below it with their weights, the directions in which the plane
     /// holds it, and the stiffness, N/m.
-    pub fn springs(&self, field: &Field<D>, gap: f64, visit: &mut dyn FnMut(&[(usize, f64)], Option<[f64; D]>, f64)) {
+    pub fn springs(&self, field: &Field<D>, gap: f64, visit: &mut super::Spring<D>) {
         let mut below = Vec::new();
         for placed in &self.each {
             let plane = &placed.plane;
-            let touches = if plane.bonded { self.touches(placed, field) } else { self.near(placed, field, gap) };
+            let touches =
+                if plane.bonded { self.touches(placed, field) } else { self.near(placed, field, gap) };
             for touch in touches {
                 below.clear();
                 match touch.element.checked_sub(self.faces.len()) {

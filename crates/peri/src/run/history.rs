@@ -188,20 +188,24 @@ impl Outcome {
                 ));
             }
         }
-        for (plane, name) in contact.plane.iter().zip(self.planes.clone()).filter(|(plane, _)| !plane.bonded) {
+        for (plane, name) in contact.plane.iter().zip(self.planes.clone()).filter(|(plane, _)| !plane.bonded)
+        {
             let index = self.planes.iter().position(|other| *other == name).unwrap_or(0);
-            let gaps = self.history.iter().filter_map(|row| row.resting.get(index)).map(|resting| resting.gap);
+            let gaps =
+                self.history.iter().filter_map(|row| row.resting.get(index)).map(|resting| resting.gap);
             let least = gaps.fold(f64::INFINITY, f64::min);
             let wanted = plane.displacement.is_some() || plane.friction.is_some_and(|mu| mu > 0.0);
             if least > 0.0 && wanted {
-                self.warnings.push(format!("nothing has touched plane `{name}`: the least gap was {least:.3e} m"));
+                self.warnings
+                    .push(format!("nothing has touched plane `{name}`: the least gap was {least:.3e} m"));
             }
         }
         if scene.contact.as_ref().is_some_and(ContactSpec::rubs) {
             self.value(q::FRICTION_WORK, last.rubbed);
         }
         for (name, resting) in self.planes.clone().iter().zip(&last.resting) {
-            let values = resting.force[..D].iter().copied().chain([resting.area, resting.spread, resting.width]);
+            let values =
+                resting.force[..D].iter().copied().chain([resting.area, resting.spread, resting.width]);
             of_plane(name, D).into_iter().zip(values).for_each(|(named, value)| self.value(named, value));
         }
     }

@@ -152,7 +152,7 @@ fn run_variant<const D: usize>(
 ) -> Result<Outcome, Failure> {
     let mut phases = Phases::new();
     phases.start("build");
-    let Built { bonded, loads, loaded, probes, sections } = Built::<D>::new(source, scene, variant)?;
+    let Built { bonded, loads, loaded, held, probes, sections } = Built::<D>::new(source, scene, variant)?;
     let Bonded { mut body, material, criterion, followed, stiffness } = bonded;
     let plate = scene::exact_plate(source, scene, &body)?;
     phases.stop();
@@ -189,6 +189,7 @@ fn run_variant<const D: usize>(
         sections: &sections,
         criterion: criterion.as_ref(),
         stiffness: &stiffness,
+        held: held.as_deref(),
     };
     solve((source, scene), &solution, under_way, &mut body, &mut state, &mut phases, &mut frames)?;
     outcome.work_of(&*body.bonds, &state);
@@ -282,6 +283,8 @@ struct Built<const D: usize> {
     loads: Loads<D>,
     /// Sites in any loading layer.
     loaded: Vec<bool>,
+    /// Particles of grips that are tied at their surface, by site.
+    held: Option<Vec<bool>>,
     probes: Probes<D>,
     sections: Sections<D>,
 }
@@ -297,11 +300,16 @@ impl<const D: usize> Built<D> {
         }
         let (loads, loaded) = loads_of(source, scene, &body)?;
         scene::check_placement(source, scene, &body, &loads)?;
+        let held = scene::tied_grips(source, scene, &*body.bonds, &loads)?;
+        if let Some(held) = &held {
+            let list = crate::contact::across(&*body.bonds, held);
+            body.bonds.sever(&list);
+        }
         let probes = Probes::new(source, scene, &body)?;
         let sections = Sections::new(source, &scene.output.section, &body)?;
         lines::check(source, &scene.output.line, &*body.bonds)?;
         let bonded = Bonded::new(source, scene, variant, body)?;
-        Ok(Self { bonded, loads, loaded, probes, sections })
+        Ok(Self { bonded, loads, loaded, held, probes, sections })
     }
 }
 
@@ -314,6 +322,7 @@ struct Solution<'a, const D: usize> {
     sections: &'a Sections<D>,
     criterion: Option<&'a Criterion>,
     stiffness: &'a Property,
+    held: Option<&'a [bool]>,
 }
 
 fn solve<const D: usize>(
@@ -325,7 +334,7 @@ fn solve<const D: usize>(
     phases: &mut Phases,
     frames: &mut Frames<D>,
 ) -> Result<(), Failure> {
-    let Solution { material, observed, loads, probes, sections, criterion, stiffness } = *solution;
+    let Solution { material, observed, loads, probes, sections, criterion, stiffness, held } = *solution;
     let factors = scene.solver.factors();
     let mut watch = |status: &Status, state: &State<D>| under_way.watch(status, state);
     let contact = match &scene.contact {
@@ -333,7 +342,8 @@ fn solve<const D: usize>(
             let planes = contact.planes(source, scene.dynamics.is_some()).map_err(Failure::from)?;
             let whole = material.longitudinal_modulus(&*body.bonds);
             let modulus = Property::new(&*body.bonds, |site, _| whole * stiffness.at(site));
-            Some(contact.contact(planes, body, material.micromodulus(&*body.bonds), &modulus)?)
+            let tied = held.map(|held| (held, contact.tie_stiffness(scene.dynamics.is_some())));
+            Some(contact.contact(planes, body, material.micromodulus(&*body.bonds), &modulus, tied)?)
         }
         None => None,
     };

@@ -3,11 +3,12 @@
 use super::line::plane_of;
 use super::values::{Body, plain, vector};
 use super::{Method, Scene};
-use crate::bonds::Property;
+use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
-use crate::contact::{Contact, PAIR_STIFFNESS, PLANE_STIFFNESS, Plane};
+use crate::contact::{Contact, PAIR_STIFFNESS, PLANE_STIFFNESS, Plane, grips};
 use crate::error::Error;
 use crate::quantities as q;
+use crate::solver::Loads;
 use polycore::report::Named;
 use polycore::scene::{SceneError, Source, check_name};
 use polycore::units::{Length, Speed};
@@ -34,6 +35,9 @@ pub struct ContactSpec {
     pub elastic_slip: Option<Length>,
     /// Not used any more: friction holds what sticks.
     pub slip_velocity: Option<Speed>,
+    /// Whether a region of prescribed displacement holds a solid at its surface, instead of by bonds across it, which give way as a layer
+    /// of the body would; default: true beside planes, unless bonds break.
+    pub tied_grips: Option<bool>,
     /// Rigid planes.
     pub plane: Vec<PlaneSpec>,
 }
@@ -69,6 +73,12 @@ impl PlaneSpec {
 }
 
 impl ContactSpec {
+    /// s of ties: that of the stiffest plane.
+    pub fn tie_stiffness(&self, explicit: bool) -> f64 {
+        let planes = self.plane.iter().map(|plane| self.stiffness_of(plane, explicit));
+        planes.fold(if explicit { PAIR_STIFFNESS } else { PLANE_STIFFNESS }, f64::max)
+    }
+
     /// s of pairs of particles.
     pub fn pair_stiffness(&self) -> f64 {
         self.stiffness.unwrap_or(PAIR_STIFFNESS)
@@ -138,12 +148,14 @@ impl ContactSpec {
     ///
     /// # Errors
     /// As [`super::check`].
-    pub fn planes<const D: usize>(&self, source: &Source, explicit: bool) -> Result<Vec<Plane<D>>, SceneError> {
+    pub fn planes<const D: usize>(
+        &self,
+        source: &Source,
+        explicit: bool,
+    ) -> Result<Vec<Plane<D>>, SceneError> {
         let each = self.plane.iter().enumerate();
-        each.map(|(index, plane)| {
-            self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit)
-        })
-        .collect()
+        each.map(|(index, plane)| self.plane_in(source, &format!("contact.plane[{index}]"), plane, explicit))
+            .collect()
     }
 
     /// Contact of a body of the bond modulus kθ = `micromodulus` and the longitudinal modulus `modulus`.
@@ -156,6 +168,7 @@ impl ContactSpec {
         body: &Body<D>,
         micromodulus: f64,
         modulus: &Property,
+        tied: Option<(&[bool], f64)>,
     ) -> Result<Contact<D>, Error> {
         let bonds = &*body.bonds;
         let contact = match self.short_range {
@@ -163,8 +176,39 @@ impl ContactSpec {
             None => Contact::new(bonds, modulus.clone(), self.pair_stiffness())?,
         };
         let contact = contact.with_friction(self.friction, self.elastic_slip.map(|slip| slip.si()))?;
-        contact.with_planes(bonds, &body.surface(), modulus.clone(), planes)
+        let contact = contact.with_planes(bonds, &body.surface(), modulus.clone(), planes)?;
+        match (tied, bonds.as_lattice()) {
+            (Some((held, stiffness)), Some(lattice)) => {
+                contact.with_tied(lattice, held, modulus.greatest(), stiffness)
+            }
+            _ => Ok(contact),
+        }
     }
+}
+
+/// Particles of the regions of prescribed displacement that are tied at their surface, by site; `None` where none is.
+///
+/// # Errors
+/// Ties of a body that cannot have any.
+pub fn tied_grips<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    bonds: &dyn Bonds<D>,
+    loads: &Loads<D>,
+) -> Result<Option<Vec<bool>>, SceneError> {
+    let Some(contact) = &scene.contact else { return Ok(None) };
+    let can = scene.material.solid.is_some() && bonds.as_lattice().is_some();
+    if contact.tied_grips == Some(true) && !can {
+        let allowed = "false: only solids (`[material.solid]`) on a lattice have faces to tie";
+        return Err(source.error("contact.tied_grips", "true", allowed));
+    }
+    let default = can && !contact.plane.is_empty() && scene.material.critical.is_none();
+    let Some(lattice) = bonds.as_lattice().filter(|_| contact.tied_grips.unwrap_or(default)) else {
+        return Ok(None);
+    };
+    let held = grips(lattice, &loads.constrained);
+    let free = bonds.particles().iter().any(|&site| !held[site as usize]);
+    Ok((free && held.contains(&true)).then_some(held))
 }
 
 /// Values of all planes of a scene: forces along the axes, area, spread.
@@ -198,7 +242,8 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     stiff("contact.stiffness", contact.pair_stiffness())?;
     stiff("contact.short_range", contact.short_range.unwrap_or(0.0))?;
     if contact.short_range.is_some() && contact.stiffness.is_some() {
-        let allowed = "one of them: `stiffness` follows the material, `short_range` is the κ of the literature";
+        let allowed =
+            "one of them: `stiffness` follows the material, `short_range` is the κ of the literature";
         return Err(source.error("contact.short_range", "`short_range` beside `stiffness`", allowed));
     }
     rough("contact.friction", contact.friction)?;

@@ -29,7 +29,10 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     add(critical, &[if energy { q::CRITICAL_ENERGY } else { q::CRITICAL_STRETCH }]);
     add(critical && scene.dynamics.is_none(), &[q::BREAKING_EVENTS]);
     add(critical, &[q::DETACHED_PARTICLES, q::LAST_LOAD, q::LAST_DISPLACEMENT, q::RELEASED_ENERGY]);
-    add(scene.contact.is_some(), &[q::CONTACT_ENERGY, q::CONTACTS, q::DEEPEST_OVERLAP, q::CONTACT_SHARE, q::CONTACT_STIFFNESS]);
+    add(
+        scene.contact.is_some(),
+        &[q::CONTACT_ENERGY, q::CONTACTS, q::DEEPEST_OVERLAP, q::CONTACT_SHARE, q::CONTACT_STIFFNESS],
+    );
     let rubs = scene.contact.as_ref().is_some_and(super::ContactSpec::rubs);
     add(rubs, &[q::FRICTION_WORK]);
     let motion = [q::CRITICAL_TIME_STEP, q::TIME_STEP, q::KINETIC_ENERGY, q::ENERGY_ERROR];

@@ -171,7 +171,8 @@ fn balanced<const D: usize>(
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
     let Some(field) = &loads.body_force else { return Ok(()) };
-    let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
+    let planes =
+        scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
     for d in 0..D {
         let (mut sum, mut size) = (0.0, 0.0);
         // what a plane may hold

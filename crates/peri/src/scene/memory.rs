@@ -21,6 +21,8 @@ const PAST: f64 = 6.0;
 /// Fields of L-BFGS beside its pairs, and bytes of its coarse level a particle: factors in both precisions while they are made.
 const FIELDS_OF_LBFGS: f64 = 8.0;
 const COARSE: f64 = 300.0;
+/// A face of a plane body with its entries, there and back; there are about four times as many in space.
+const FACE: f64 = 700.0;
 /// Sites and particles of contact: cells, their order, the list of near pairs.
 const CONTACT: f64 = 190.0;
 /// Damage: bonds at the start, what breaks.
@@ -51,7 +53,12 @@ fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
         each += (FIELDS_OF_LBFGS + Lbfgs::default().memory as f64) * vector + COARSE;
     }
     if let Some(contact) = &scene.contact {
-        each += CONTACT + 8.0 * (2 * contact.plane.len()) as f64;
+        each += CONTACT;
+        if !contact.plane.is_empty() {
+            // radii, volumes, bonds; faces of the sides of a cube, each over a column of two horizons
+            let side = 2.0 * D as f64 * sites.powf(-1.0 / D as f64);
+            each += 20.0 + side.min(1.0) * FACE * if D == 2 { 1.0 } else { 4.0 };
+        }
         each += if contact.rubs() { 3.0 * vector } else { 0.0 };
     }
     if scene.material.solid.is_some() {

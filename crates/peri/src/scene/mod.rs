@@ -28,7 +28,7 @@ mod warn;
 pub use boundary::{Boundary, Prescribed, PrescribedField, Side};
 pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
-pub use contact::{ContactSpec, PlaneSpec, of_plane};
+pub use contact::{ContactSpec, PlaneSpec, of_plane, tied_grips};
 pub use crack::cuts_of;
 pub use expect::{quantities, quantities_of};
 pub use explain::explain;

@@ -9,17 +9,21 @@ use polycore::scene::{SceneError, Source};
 const FACING: f64 = -0.99;
 /// Part of the body between two planes that must be left.
 const LEFT: f64 = 0.2;
+/// Distance of the surface from a bonded plane, in spacings.
+const TIED: f64 = 0.5;
 /// Overlap of faces, in spacings, up to which particles are still in front of a plane.
 const PRESTRESSED: f64 = 0.01;
 /// Load factors at which planes are looked at.
 const LOOKS: u32 = 100;
 
-/// A plane of a scene with a unit normal, and the range of the body along it, m.
+/// A plane of a scene with a unit normal, and the range of the body's particles along it, m.
 struct Seen<const D: usize> {
     name: String,
     plane: Plane<D>,
     low: f64,
     high: f64,
+    /// Height of the lowest point of the surface, m.
+    surface: f64,
 }
 
 impl<const D: usize> Seen<D> {
@@ -33,15 +37,19 @@ impl<const D: usize> Seen<D> {
 fn seen<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Result<Vec<Seen<D>>, SceneError> {
     let Some(contact) = &scene.contact else { return Ok(Vec::new()) };
     let planes = contact.planes::<D>(source, scene.method() == Method::Verlet)?;
+    let surface = body.surface();
     let each = planes.into_iter().enumerate().map(|(index, mut plane)| {
         let size = crate::geometry::length(plane.normal);
         plane.normal = plane.normal.map(|n| n / size);
-        let heights = body.bonds.particles().iter().map(|&site| {
-            plane.height(body.bonds.position(site as usize))
-        });
+        let heights =
+            body.bonds.particles().iter().map(|&site| plane.height(body.bonds.position(site as usize)));
         let (low, high) =
             heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
-        Seen { name: contact.plane[index].name(index), plane, low, high }
+        let faces = surface.faces().iter().map(|face| plane.height(face.place));
+        let lowest = faces.fold(f64::INFINITY, f64::min);
+        let of_particles = low - 0.5 * body.bonds.spacing();
+        let lowest = if lowest.is_finite() { lowest } else { of_particles };
+        Seen { name: contact.plane[index].name(index), plane, low, high, surface: lowest }
     });
     Ok(each.collect())
 }
@@ -81,12 +89,23 @@ pub(super) fn check<const D: usize>(
                 .count();
             let found = format!("{behind} of {} particles behind plane `{}`", particles.len(), own.name);
             let advice = if own.high < allowed {
-                let opposite = own.plane.normal.map(|n| super::plain(if n == 0.0 { 0.0 } else { -n })).join(", ");
+                let opposite =
+                    own.plane.normal.map(|n| super::plain(if n == 0.0 { 0.0 } else { -n })).join(", ");
                 format!("a normal towards the body: [{opposite}]")
             } else {
                 "a plane with the whole body in front of it; `normal` points towards the body".to_owned()
             };
             return Err(source.error(&format!("{key}.normal"), found, advice));
+        }
+        if own.plane.bonded && !(own.surface.abs() < TIED * spacing) {
+            let found = format!("plane `{}` {:.3e} m from the surface of the body", own.name, own.surface);
+            let allowed =
+                format!("up to half a spacing, {:.3e} m: a bonded plane touches the body", TIED * spacing);
+            return Err(source.error(&format!("{key}.point"), found, allowed));
+        }
+        if own.plane.bonded && body.surface().faces().is_empty() {
+            let allowed = "false: a cloud of points has no faces to tie";
+            return Err(source.error(&format!("{key}.bonded"), "true", allowed));
         }
         for (other_index, other) in planes.iter().enumerate().skip(index + 1) {
             let turn: f64 = (0..D).map(|d| own.plane.normal[d] * other.plane.normal[d]).sum();
@@ -98,7 +117,11 @@ pub(super) fn check<const D: usize>(
             for (factor, time) in moments(scene) {
                 let gap = apart - own.raised(factor, time) - other.raised(factor, time);
                 if gap < LEFT * body_between {
-                    let when = if time > 0.0 { format!("time {time:.3e} s") } else { format!("load factor {factor:.3}") };
+                    let when = if time > 0.0 {
+                        format!("time {time:.3e} s")
+                    } else {
+                        format!("load factor {factor:.3}")
+                    };
                     let found = format!(
                         "planes `{}` and `{}` {:.3e} m apart at {when}, with {body_between:.3e} m of the body between them",
                         own.name, other.name, gap
@@ -114,7 +137,11 @@ pub(super) fn check<const D: usize>(
         let when = if time > 0.0 { format!("time {time:.3e} s") } else { format!("load factor {factor:.3}") };
         let names: Vec<String> = planes.iter().map(|seen| format!("`{}`", seen.name)).collect();
         let found = format!("planes {} that leave no room between them at {when}", names.join(", "));
-        return Err(source.error("contact.plane", found, "planes with room for the body in front of all of them"));
+        return Err(source.error(
+            "contact.plane",
+            found,
+            "planes with room for the body in front of all of them",
+        ));
     }
     Ok(())
 }
@@ -147,9 +174,8 @@ fn has_room<const D: usize>(planes: &[Seen<D>], body: &Body<D>, factor: f64, tim
     let count = rows.len();
     let mut chosen: Vec<usize> = (0..=D).collect();
     loop {
-        let matrix = nalgebra::DMatrix::from_fn(D + 1, D + 1, |i, j| {
-            if j < D { rows[chosen[i]].0[j] } else { -1.0 }
-        });
+        let matrix =
+            nalgebra::DMatrix::from_fn(D + 1, D + 1, |i, j| if j < D { rows[chosen[i]].0[j] } else { -1.0 });
         let right = nalgebra::DVector::from_fn(D + 1, |i, _| rows[chosen[i]].1);
         if let Some(corner) = matrix.lu().solve(&right)
             && corner.iter().all(|x| x.is_finite())
@@ -170,7 +196,7 @@ fn has_room<const D: usize>(planes: &[Seen<D>], body: &Body<D>, factor: f64, tim
 pub(super) fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Vec<String> {
     let (planes, spacing) = (seen(source, scene, body).unwrap_or_default(), body.bonds.spacing());
     let of = |seen: &Seen<D>| {
-        let gap = seen.low - 0.5 * spacing;
+        let gap = seen.surface;
         if gap < -PRESTRESSED * spacing {
             return Some(format!(
                 "plane `{}` stands {:.3e} m inside the surface of the body at the start: it presses before it moves",
@@ -179,7 +205,8 @@ pub(super) fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Bo
         }
         let moves = seen.plane.displacement != [0.0; D] || seen.plane.velocity != [0.0; D];
         let reach = moments(scene).into_iter().map(|(f, t)| seen.raised(f, t)).fold(0.0, f64::max);
-        (moves && reach < gap && scene.dynamics.is_none()).then(|| {
+        let far = reach < gap - PRESTRESSED * spacing && !seen.plane.bonded;
+        (moves && far && scene.dynamics.is_none()).then(|| {
             format!("plane `{}` comes {reach:.3e} m nearer to the body, whose gap is {gap:.3e} m: it does not reach it", seen.name)
         })
     };

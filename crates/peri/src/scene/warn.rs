@@ -22,7 +22,8 @@ pub fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) 
         .then(|| "the forces of `output.section` are those of bonds: contact is no part of them".to_owned());
     let once = [volumes(scene, bonds, body.thickness), thin(bonds), long_steps(scene, bonds), contact];
     let slip = scene.contact.as_ref().and_then(|contact| contact.slip_velocity).map(|_| {
-        "contact.slip_velocity is not used any more: friction holds what sticks by its elastic slip".to_owned()
+        "contact.slip_velocity is not used any more: friction holds what sticks by its elastic slip"
+            .to_owned()
     });
     let planes = super::planes::warnings(source, scene, body);
     once.into_iter().chain([slip]).flatten().chain(planes).chain(cracks).chain(voids).collect()

@@ -6,6 +6,8 @@ use crate::field::Field;
 
 /// Cuts of one step, or lowerings of its load, by stretches; then it is halved.
 pub(super) const BY_STRETCH: u32 = 3;
+/// Motion of a plane beyond first touch in one step, in spacings.
+const BEYOND: f64 = 0.5;
 /// Part of the shortest step that is not worth one of its own.
 const CRUMB: f64 = 0.25;
 
@@ -40,6 +42,21 @@ impl<const D: usize> System<'_, D> {
         let rest = || Field::zeros(state.displacement.sites());
         state.displacement = if at == 0 { rest() } else { state.past.pop().unwrap_or_else(rest) };
         (state.predicted, state.iteration) = (false, 0);
+        true
+    }
+
+    /// Whether a plane would move by more than half a spacing beyond first touch in this step, which then is cut there.
+    pub(super) fn cut_at_touch(&mut self, state: &mut State<D>) -> bool {
+        let Some(contact) = self.repulsion().filter(|_| !self.snap_back) else { return false };
+        let [before, after] = contact.approach(&state.displacement);
+        let most = before.max(0.0) + BEYOND * self.bonds.spacing();
+        if after.is_nan() || after <= most * (1.0 + 1e-6) {
+            return false;
+        }
+        let start = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
+        let part = (most - before) / (after - before);
+        let factor = start + part * (self.factors[state.step] - start);
+        self.insert(state, &[factor]);
         true
     }
 

@@ -56,6 +56,9 @@ pub fn load_stepping<const D: usize>(
             state.renewals = 0;
         }
         system.begin_step(state);
+        if !state.predicted && system.cut_at_touch(state) {
+            continue;
+        }
         if !state.predicted {
             predict(system, state, &predictor);
             state.predicted = true;
@@ -96,7 +99,7 @@ pub fn load_stepping<const D: usize>(
             let particles = system.bonds.particles();
             particles.iter().for_each(|&site| state.velocity.set(site as usize, [0.0; D]));
         }
-        system.check_planes(state)?;
+        system.check_overlaps(state)?;
         record(system, state);
         state.step += 1;
         state.predicted = false;

@@ -135,7 +135,11 @@ impl<'a, const D: usize> System<'a, D> {
         let changed = new.iter().map(|grip| (grip.bound - bound(&state.held, grip.pair)).abs());
         let change: f64 = lost.chain(changed).sum();
         let total: f64 = new.iter().map(|grip| grip.bound).sum();
-        if change <= tolerance * total || state.renewals >= RENEWALS {
+        if change <= tolerance * total {
+            return false;
+        }
+        if state.renewals >= RENEWALS {
+            state.unconverged += 1;
             return false;
         }
         if state.renewals >= ALTERNATING {
@@ -179,11 +183,11 @@ impl<'a, const D: usize> System<'a, D> {
         resting
     }
 
-    /// Refuses a state in which particles are behind a plane.
+    /// Refuses a state in which particles are behind a plane, or half through each other.
     ///
     /// # Errors
     /// [`Error::Penetration`].
-    pub(super) fn check_planes(&self, state: &State<D>) -> Result<(), Error> {
+    pub(super) fn check_overlaps(&self, state: &State<D>) -> Result<(), Error> {
         let Some(contact) = self.repulsion() else { return Ok(()) };
         let allowed = 0.5 * self.bonds.spacing();
         let resting = contact.resting(&state.displacement);
@@ -195,7 +199,16 @@ impl<'a, const D: usize> System<'a, D> {
                 return Err(Error::Penetration { what, step, time, overlap, allowed });
             }
         }
-        Ok(())
+        match contact.deepest_pair(&*self.bonds, &state.displacement) {
+            Some([overlap, distance]) if overlap > 0.5 => Err(Error::Penetration {
+                what: "particles without a bond".to_owned(),
+                step: state.step,
+                time: state.motion.time,
+                overlap: overlap * distance,
+                allowed: 0.5 * distance,
+            }),
+            _ => Ok(()),
+        }
     }
 
     /// Has contact look for pairs, as it must where bonds have changed.

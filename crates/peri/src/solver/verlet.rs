@@ -100,7 +100,7 @@ impl<const D: usize> Method<D> for VelocityVerlet {
                 self.advance(system, state, &volumes, end)?;
                 watch(&self.status(state), state)?;
             }
-            system.check_planes(state)?;
+            system.check_overlaps(state)?;
             self.record(system, state);
             state.step += 1;
             (state.iteration, state.step_iterations, state.motion.planned) = (0, 0, 0);
@@ -241,7 +241,9 @@ impl VelocityVerlet {
         // nothing free, or a tangent without a positive frequency: the bound alone
         motion.covered_step = critical(if estimate > 0.0 { estimate.min(bound) } else { bound });
         motion.floor = law.least_energy * modulus * motion.extent;
-        motion.longest = self.time_step.unwrap_or(self.safety * motion.covered_step);
+        // friction follows the normal force, which the tangent of neither has: half of ω²Δt² is left to it
+        let part = if system.friction().is_some() { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 };
+        motion.longest = self.time_step.unwrap_or(part * self.safety * motion.covered_step);
     }
 
     /// Allows for more contact where more particles touch than so far.

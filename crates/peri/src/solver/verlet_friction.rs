@@ -21,8 +21,9 @@ pub fn friction_pass<const D: usize>(
 ) {
     let Some(contact) = system.contact.as_mut().filter(|contact| contact.rubs()) else { return };
     let sites = volumes.len();
-    let sliding =
-        contact.slide_on(&*system.bonds, &state.displacement, &state.velocity, leap.step, &state.grips);
+    // what moves at the start has slid as far as it will in the first step
+    let span = if leap.step > 0.0 { leap.step } else { state.motion.longest };
+    let sliding = contact.slide_on(&*system.bonds, &state.displacement, &state.velocity, span, &state.grips);
     state.grips = contact.held().to_vec();
     let (contact, velocity, loads) = (&*contact, &state.velocity, &*system.loads);
     let moves = leap.factors[1] - leap.factors[0];
@@ -53,7 +54,11 @@ pub fn friction_pass<const D: usize>(
     let mut taken = -parts.iter().sum::<f64>();
     // what planes drag is work of theirs, not heat
     taken += work_of_planes(contact.moved(), &state.rubbing, &sliding.planes);
-    state.motion.rubbed += taken - (sliding.stored - state.motion.stuck);
+    if leap.step > 0.0 {
+        state.motion.rubbed += taken - (sliding.stored - state.motion.stuck);
+    } else {
+        state.work += sliding.stored;
+    }
     state.motion.stuck = sliding.stored;
     (state.friction, state.rubbing) = (Some(friction), sliding.planes);
 }

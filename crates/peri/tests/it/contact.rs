@@ -99,7 +99,9 @@ fn degenerate_states() {
     let one = CloudBonds::new(&points[..1], &[1.0], 1.0, 1.0, VolumeCorrection::None, &[]).unwrap();
     assert_eq!(contact(&one, &[0], &[[7.0; 3]]), (vec![[0.0; 3]], 0.0));
     for bad in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(Contact::short_range(&one, 1.0, bad).is_err() && Contact::short_range(&one, bad, 15.0).is_err());
+        assert!(
+            Contact::short_range(&one, 1.0, bad).is_err() && Contact::short_range(&one, bad, 15.0).is_err()
+        );
     }
     assert!(Contact::short_range(&one, 0.0, 15.0).is_err());
     // a body in a heap, all of it in one place: finite

@@ -3,7 +3,7 @@
 use crate::bodies::{Body, MODULUS, Random, Slit, hold, norm};
 use crate::dynamics::DENSITY;
 use peri::Error;
-use peri::bonds::Bonds;
+use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
 use peri::contact::{Contact, Plane, SHORT_RANGE};
 use peri::field::{CHUNK, Field};
 use peri::material::BondMaterial;
@@ -123,8 +123,10 @@ fn slides_down() {
         let ([x, v], error, row) = incline.run();
         let exact = G * (theta.sin() - mu * theta.cos());
         eprintln!("slides at {degrees}°, μ = {mu}: {v:.6} m/s, exactly {exact:.6}, off by {error:.1e} J");
-        // the elastic slip of 1e-5 m at the start
-        assert!((v / exact - 1.0).abs() < 1e-4 && error.abs() < 1e-6);
+        // until the elastic slip is μN/k_t friction is weaker, by a half in the mean
+        let (bound, pull) = (mu * G * theta.cos(), G * theta.sin());
+        let weaker = 0.5 * bound * (2.0 * bound / PENALTY / pull).sqrt();
+        assert!(v - exact > -1e-6 && v - exact < 2.0 * weaker + 1e-6 && error.abs() < 1e-6);
         assert!((row.rubbed - mu * G * theta.cos() * x).abs() < 1e-4, "{row:?}");
     }
 }
@@ -154,7 +156,7 @@ fn stops_after() {
         let ([x, _], error, row) = incline.run();
         let exact = 0.5 * v0 * v0 / (mu * G);
         eprintln!("stops from {v0} m/s: {x:.8} m, exactly {exact:.8}, off by {error:.1e} J");
-        // an elastic slip of μN/k = 5e-6 m
+        // it holds from an elastic slip of μN/k = 5e-6 m on
         assert!((x - exact).abs() < 2e-5 && error.abs() < 1e-5);
         assert!((row.rubbed / (0.5 * v0 * v0) - 1.0).abs() < 1e-4);
     }
@@ -169,7 +171,7 @@ fn belt_drags() {
     let exact = 1.5 * (1.0 - reached) + 0.5 * 1.5 * reached;
     eprintln!("belt: {v:.6} m/s, {x:.6} m of {exact:.6}, heat {:.6} of 1.125 J, off {error:.1e}", row.rubbed);
     // what sticks swings by its elastic slip at the frequency √(k/m) = 1e3/s
-    assert!((v - 1.5).abs() < 4e-3 && (x - exact).abs() < 2e-5 && error.abs() < 5e-6);
+    assert!((v - 1.5).abs() < 4e-3 && (x - exact).abs() < 1e-4 && error.abs() < 5e-6);
     assert!((row.rubbed - 1.125).abs() < 1e-4);
     let push = [-0.3_f64.sin(), 0.3_f64.cos()].map(|n| n * G);
     let force = row.resting[0].force;
@@ -186,7 +188,12 @@ fn belt_in_equilibrium() {
         let bonds = &mut built.lattice;
         let loads = hold(bonds, |_| Some((3, [0.0; 2])));
         let (mu, stiffness, deep) = (0.5, 40.0, 0.1);
-        let belt = Plane { friction: mu, stiffness, displacement: [0.2, 0.0], ..Plane::new([0.0, deep], [0.0, 1.0]) };
+        let belt = Plane {
+            friction: mu,
+            stiffness,
+            displacement: [0.2, 0.0],
+            ..Plane::new([0.0, deep], [0.0, 1.0])
+        };
         let contact = beside(bonds, 0.0, vec![belt]);
         let factors: Vec<f64> = (1..=steps).map(|step| f64::from(step) / f64::from(steps)).collect();
         let (state, _) = equilibria(method, bonds, &loads, contact, &factors, None).unwrap();
@@ -210,9 +217,9 @@ fn leg(from: f64, to: f64, steps: usize) -> impl Iterator<Item = f64> {
 /// again to U: F(U) = √(2EAτU), F at 0 on the way back F_U − 2√(EAτU), a cycle takes 4F_U U/3, at any number of steps.
 #[test]
 fn strip_pulled_forth_and_back() {
-    // lengths in cells, forces in units of the bonds' k = 6kθ over their number
+    // lengths in cells, forces in units of the bonds' k = 6kθ, which is EA
     let (count, pull) = (100, 0.18);
-    let unit = 6.0 * MODULUS / count as f64;
+    let unit = 6.0 * MODULUS;
     for steps in [4, 16, 64] {
         let mut built = Body::<2>::solid([count, 1], 1.0, 1.015).build();
         let bonds = &mut built.lattice;
@@ -281,7 +288,7 @@ fn plane_hits_a_particle() {
         // by its own velocity, or with the load factor, over 1 s
         let (velocity, displacement) = if moves { ([0.5, 0.0], [0.0; 2]) } else { ([0.0; 2], [0.5, 0.0]) };
         let plane = Plane { velocity, displacement, ..Plane::new([-0.1, 0.0], [1.0, 0.0]) };
-        let contact = beside(&one, 0.0, vec![Plane { stiffness: 1e5, ..plane }]);
+        let contact = beside(&one, 0.0, vec![Plane { stiffness: 2e3, ..plane }]);
         let mut state = State::new(one.sites());
         let solver = VelocityVerlet {
             time_step: Some(1e-4),
@@ -295,6 +302,34 @@ fn plane_hits_a_particle() {
         assert!((v[0] - 1.0).abs() < 1e-6 && (row.work / (0.5 * DENSITY) - 1.0).abs() < 2e-6);
         assert!(off(row).abs() < 1e-6 && v[1] == 0.0);
     }
+}
+
+/// Peridigm's verification test Contact_Friction, Coulomb's law itself: two particles that repel each other and rub.
+#[test]
+fn two_particles_of_peridigm() {
+    let (side, modulus, reach, horizon) = (0.1612_f64, 1e12, 0.2, 0.6_f64);
+    let volume = side.powi(3);
+    // our contact distance is 0.9 of the distance at rest
+    let rest = reach / 0.9;
+    let own_horizon = 0.2;
+    let points = [[0.0, 0.0], [0.0, rest]];
+    let mut cloud =
+        CloudBonds::new(&points, &[volume; 2], side, own_horizon, VolumeCorrection::None, &[]).unwrap();
+    let wanted = 18.0 * modulus / (std::f64::consts::PI * horizon.powi(5));
+    let contact = Contact::short_range(&cloud, MODULUS, wanted * own_horizon / (6.0 * MODULUS)).unwrap();
+    let contact = contact.with_friction(0.3, Some(1e-15)).unwrap();
+    let sites = [0, 1].map(|p| cloud.input_order().iter().position(|&i| i == p).unwrap());
+    let mut state = State::new(cloud.sites());
+    state.displacement.set(sites[1], [0.0, 0.19 - rest]);
+    state.velocity.set(sites[0], [10.0, 0.0]);
+    state.velocity.set(sites[1], [-10.0, 0.0]);
+    let solver = VelocityVerlet { time_step: Some(1e-5), records: 1, ..VelocityVerlet::new(8960.0, 1e-3) };
+    run(&solver, &mut cloud, &Loads::default(), contact, &mut state).unwrap();
+    let v = state.velocity.get(sites[0]);
+    eprintln!("Peridigm: {v:?}");
+    // an elastic slip of 1e-15 m turns by as much as the pair does
+    assert!((v[0] / 0.161378373734 - 1.0).abs() < 1e-8, "{v:?}");
+    assert!((v[1] / -41.4843659641 - 1.0).abs() < 1e-8, "{v:?}");
 }
 
 /// Friction between particles against a plain sum over all pairs, of velocities, slips and bounds at random; Σ V f = 0.
@@ -334,7 +369,11 @@ fn friction_of_a_heap<const D: usize>(cells: [usize; D]) {
             let slip: [f64; D] = std::array::from_fn(|k| step * (relative[k] - along * zeta[k] / r));
             let most = mu * (d - r);
             let part = (most / norm(slip)).min(1.0);
-            if part < 1.0 { slides += 1 } else { sticks += 1 }
+            if part < 1.0 {
+                slides += 1
+            } else {
+                sticks += 1
+            }
             for k in 0..D {
                 plain[k] -= stiffness * bonds.volume(j) * part * slip[k];
             }
@@ -418,7 +457,6 @@ fn neither_threads_nor_restarts_change_a_bit() {
     assert!(off(row).abs() < 1e-2 * row.work && row.rubbed > 0.0);
 }
 
-
 /// A row of five particles against a plane, F = u/(4/k + 1/s) with the bonds' k = 6kθV²/Δ and a plane of s and unit modulus: both
 /// quasi-static methods, planes that move and supports that move.
 #[test]
@@ -470,7 +508,6 @@ fn row_on_a_plane() {
     }
 }
 
-
 /// Two blocks, one on the other and both on a rough plane, pressed and dragged: all that slides bears μN of the step itself; no force is
 /// lost, and a run goes on from a state in the middle of a step with the same bits, on any number of threads.
 #[test]
@@ -506,7 +543,6 @@ fn dragged_over_a_plane() {
     }
 }
 
-
 /// What planes and friction are not.
 #[test]
 fn refuses() {
@@ -540,7 +576,7 @@ fn refuses() {
 fn plane_through_a_body() {
     let mut built = Body::<2>::solid([12, 12], 1.0, 3.015).build();
     let bonds = &mut built.lattice;
-    let plane = Plane { friction: 0.5, stiffness: 30.0, ..Plane::new([0.0, 6.0], [0.0, 1.0]) };
+    let plane = Plane { friction: 0.5, stiffness: 5.0, ..Plane::new([0.0, 6.0], [0.0, 1.0]) };
     let contact = beside(bonds, SHORT_RANGE, vec![plane]).with_friction(0.5, None).unwrap();
     let mut state = State::new(bonds.sites());
     let solver = VelocityVerlet { records: 5, ..VelocityVerlet::new(DENSITY, 20.0) };

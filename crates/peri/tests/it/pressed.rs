@@ -285,7 +285,9 @@ fn contact_without_touch_changes_no_bit() {
     };
     for which in 0..2 {
         let without = solve(which, None);
-        assert!(without == solve(which, Some([SHORT_RANGE, 0.5])) && without == solve(which, Some([0.0, 0.5])));
+        assert!(
+            without == solve(which, Some([SHORT_RANGE, 0.5])) && without == solve(which, Some([0.0, 0.5]))
+        );
     }
     let pressed = |contact: Option<[f64; 2]>| {
         let (mut built, loads) = sheet(30, 4.0);
