@@ -318,6 +318,16 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error("material.critical", found, crate::critical::ONE_OF));
         }
     }
+    let inclusions = material.inclusions.iter().enumerate();
+    let criticals = inclusions
+        .filter_map(|(index, one)| Some((format!("material.inclusions[{index}].critical"), one.critical?)))
+        .chain(material.critical.map(|own| ("material.critical".to_owned(), own)));
+    for (key, critical) in criticals {
+        if let Some(convention) = critical.convention.filter(|_| critical.fracture_energy.is_none()) {
+            let found = format!("`{}` without `fracture_energy`", convention.name());
+            return Err(source.error(&format!("{key}.convention"), found, "a `fracture_energy` beside it"));
+        }
+    }
     for (index, field) in material.fields.iter().enumerate() {
         let key = format!("material.fields[{index}].of");
         if material.fields[..index].iter().any(|other| other.of == field.of) {
