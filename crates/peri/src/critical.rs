@@ -1,8 +1,10 @@
 //! Critical bond stretch: interpretations of "1.2 √n̄", a number, or a fracture energy.
 
+mod area;
 mod crossing;
 
-pub use crossing::{Convention, Crossing, short_bonds};
+pub use area::CrackArea;
+pub use crossing::{Convention, Crossing};
 
 use crate::bonds::Bonds;
 use crate::calibrate::Space;

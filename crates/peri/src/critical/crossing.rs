@@ -1,7 +1,7 @@
 //! Bonds across a cut through a body, and the energy that a crack takes where it breaks them.
 
 use crate::bonds::{Bonds, surface_weight};
-use crate::field::{CHUNK, Field};
+use crate::field::Field;
 use rayon::prelude::*;
 use serde::Deserialize;
 
@@ -40,7 +40,7 @@ impl Convention {
 /// s of κ = 1 + sD/N in the plane and in space, from strips of pure shear at N = 12 to 196 and 32 to 256 (formulation-tearing.md, 1, 2).
 const SNAP: [f64; 2] = [6.2, 8.0];
 /// Length up to which bonds are short, in spacings: along edges and diagonals of a lattice's cells.
-const SHORT: f64 = 1.8;
+pub(super) const SHORT: f64 = 1.8;
 /// Part of the horizon by which the centroid of the bonds of a particle at a surface lies off it: 0.33 in the outermost layer of a plane
 /// body, 0.24 to 0.28 in space, 0 inside; jitter of 0.3 spacings moves it by 0.07.
 const OFF: f64 = 0.2;
@@ -50,7 +50,7 @@ const OFF: f64 = 0.2;
 pub struct Crossing {
     /// Σ_J w V_J |ξ_e||ξ|, m⁵, with the axis e of the largest sum: kθΦ times it is the energy of the bonds across a unit area.
     pub reach: f64,
-    /// Σ_J w V_J |ξ_e|/|ξ| over bonds up to [`SHORT`] spacings, m³, along the same axis: what [`short_bonds`] loses by a unit of crack.
+    /// Σ_J w V_J |ξ_e|/|ξ| over bonds up to [`SHORT`] spacings, m³, along the same axis: short bonds across a unit area, see [`super::CrackArea`].
     pub short: f64,
     /// Bonds N of the particle.
     pub bonds: f64,
@@ -154,25 +154,4 @@ fn inside<const D: usize>(bonds: &dyn Bonds<D>) -> Vec<u32> {
         clear
     };
     bonds.particles().iter().filter(whole).copied().collect()
-}
-
-/// Σ V_I w V_J/|ξ| over the intact bonds of a body up to [`SHORT`] spacings, each from both ends, m^(2D−1). What it has lost, over
-/// [`Crossing::short`], is the area of new cracks, by the formula of Cauchy and Crofton: lines of all directions meet a surface in
-/// proportion to its area. Short bonds break where a crack passes, longer ones beside it, too. With 1/|ξ| planes along the axes, at 45°
-/// and along (111) lose the same to 2 % (cf. Boykov & Kolmogorov, ICCV 2003, doi:10.1109/ICCV.2003.1238310).
-pub fn short_bonds<const D: usize>(bonds: &dyn Bonds<D>) -> f64 {
-    let short = SHORT * bonds.spacing();
-    let of = |sites: &[u32]| {
-        let mut sum = 0.0;
-        for site in sites.iter().map(|&site| site as usize) {
-            let mut own = 0.0;
-            bonds.neighbours(site, &mut |bond| {
-                own += if bond.length <= short { bond.volume / bond.length } else { 0.0 };
-            });
-            sum += bonds.volume(site) * own;
-        }
-        sum
-    };
-    let parts: Vec<f64> = bonds.particles().par_chunks(CHUNK).map(of).collect();
-    parts.iter().sum()
 }

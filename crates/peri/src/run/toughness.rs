@@ -2,16 +2,13 @@
 
 use super::outcome::Outcome;
 use crate::bonds::Bonds;
-use crate::critical::{Crossing, Toughness, short_bonds};
+use crate::critical::{CrackArea, Crossing, Toughness};
 use crate::quantities as q;
 use crate::scene::Scene;
 
-/// The body before it is loaded, to find the area of new cracks.
+/// The body before it is loaded, and what its cracks should take.
 pub struct NewCrack {
-    /// [`Crossing::short`], m³.
-    short: f64,
-    /// [`short_bonds`] before.
-    before: f64,
+    area: CrackArea,
     /// Energy at which a crack runs, J/m²; none of a solid with a critical stretch.
     tearing: Option<f64>,
 }
@@ -21,16 +18,16 @@ impl NewCrack {
         let given = scene.material.critical.and_then(|critical| critical.fracture_energy);
         let tearing = toughness.map(|own| own.tearing).or(given.map(|energy| energy.si()));
         let crossing = toughness.map_or_else(|| Crossing::new(bonds, None), |own| own.crossing);
-        Self { short: crossing.short, before: short_bonds(bonds), tearing }
+        Self { area: CrackArea::new(bonds, &crossing), tearing }
     }
 
-    /// Area, dissipated energy over it, and that over the tearing energy; the latter only where one is that of the whole body.
+    /// Area, dissipated energy over it, and that over the tearing energy of the body without its inclusions.
     pub fn values<const D: usize>(&self, bonds: &dyn Bonds<D>, outcome: &mut Outcome) {
         if let Some(tearing) = self.tearing {
             outcome.value(q::TEARING_ENERGY, tearing);
         }
         let Some(last) = outcome.history.last().filter(|last| last.broken > 0).cloned() else { return };
-        let area = (self.before - short_bonds(bonds)) / self.short;
+        let area = self.area.of(bonds);
         if !(area > 0.0 && area.is_finite()) {
             return;
         }
