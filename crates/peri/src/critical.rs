@@ -9,7 +9,7 @@ pub use crossing::{Convention, Crossing};
 use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::error::Error;
-use crate::potential::{BondPotential, NetworkStretch};
+use crate::potential::{BondPotential, NetworkStretch, softened_energy};
 use crate::solver::Bilinear;
 use polycore::units::{EnergyPerArea, Stress};
 use serde::Deserialize;
@@ -217,10 +217,15 @@ impl Critical {
 }
 
 /// Fracture energy G, J/m², of a critical stretch, with Φ = ∫₁^{λc} t dλ/kθ. [`Convention::Tearing`]: κkθΦ Σ_J w V_J |ξ_e||ξ| of a
-/// [`Crossing`]; [`Convention::Bonds`]: tδ⁴kθΦ in a sheet, (2π/5)δ⁵kθΦ in a solid.
+/// [`Crossing`]; [`Convention::Bonds`]: tδ⁴kθΦ in a sheet, (2π/5)δ⁵kθΦ in a solid; [`Convention::Softening`]: kθΦ Σ_J w V_J |ξ_e||ξ| of bonds
+/// that soften and bear nothing at this stretch.
 pub fn fracture_energy(context: &Context, convention: Convention, stretch: f64) -> f64 {
-    let energy = context.law.energy(stretch) * context.modulus;
+    let energy = match convention {
+        Convention::Softening => softened_energy(context.law, stretch, stretch),
+        _ => context.law.energy(stretch),
+    } * context.modulus;
     match (convention, context.space) {
+        (Convention::Softening, _) => context.crossing.reach * energy,
         (Convention::Tearing, _) => context.crossing.loss * context.crossing.reach * energy,
         (Convention::Bonds, Space::Solid) => 2.0 * PI / 5.0 * context.horizon.powi(5) * energy,
         (Convention::Bonds, _) => context.thickness * context.horizon.powi(4) * energy,
@@ -246,17 +251,14 @@ impl Toughness {
     /// Of a critical stretch that follows from `critical`.
     pub fn new(critical: &Critical, context: &Context, stretch: f64) -> Self {
         let given = critical.fracture_energy.map(|_| critical.convention.unwrap_or(context.convention));
-        let of = |convention| fracture_energy(context, convention, stretch);
-        let (tearing, bonds) = (of(Convention::Tearing), of(Convention::Bonds));
-        Self { convention: given, stretch, tearing, bonds, crossing: context.crossing }
-    }
-
-    /// The energy of a convention, J/m².
-    pub fn energy(&self, convention: Convention) -> f64 {
-        match convention {
-            Convention::Tearing => self.tearing,
-            Convention::Bonds => self.bonds,
+        let soft = given == Some(Convention::Softening);
+        let tearing = if soft { Convention::Softening } else { Convention::Tearing };
+        let tearing = fracture_energy(context, tearing, stretch);
+        let mut bonds = fracture_energy(context, Convention::Bonds, stretch);
+        if soft {
+            bonds *= softened_energy(context.law, stretch, stretch) / context.law.energy(stretch);
         }
+        Self { convention: given, stretch, tearing, bonds, crossing: context.crossing }
     }
 }
 

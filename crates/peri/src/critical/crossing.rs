@@ -17,6 +17,9 @@ pub enum Convention {
     /// The continuum's energy of the bonds across a unit of crack at λ_c, G₀ of Silling & Askari, Comput. Struct. 83 (2005) 1526: for
     /// comparison with published values of G₀ and s₀ and with other programs.
     Bonds,
+    /// The tearing energy of bonds that soften and break at no load: nothing is lost but what is in them, and a crack runs at the energy of the
+    /// lattice's bonds across it at every horizon ratio.
+    Softening,
 }
 
 impl Convention {
@@ -25,14 +28,7 @@ impl Convention {
         match self {
             Self::Tearing => "tearing",
             Self::Bonds => "bonds",
-        }
-    }
-
-    /// The other one.
-    pub fn other(self) -> Self {
-        match self {
-            Self::Tearing => Self::Bonds,
-            Self::Bonds => Self::Tearing,
+            Self::Softening => "softening",
         }
     }
 }

@@ -107,6 +107,11 @@ impl<const D: usize> IntoMaterial<D> for Rubber {
         let (crossing, convention) = (Crossing::new(bonds, None), Convention::default());
         let context = Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention };
         let critical = self.critical.map(|critical| critical.resolve(&context)).transpose()?;
-        Ok((BondMaterial::new(law, modulus), critical))
+        let material = BondMaterial::new(law, modulus);
+        let soft = self.critical.and_then(|own| own.convention) == Some(Convention::Softening);
+        match critical.filter(|_| soft) {
+            Some(end) => Ok((material.softening(end.into()), critical)),
+            None => Ok((material, critical)),
+        }
     }
 }

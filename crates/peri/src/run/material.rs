@@ -142,7 +142,12 @@ impl<const D: usize> Bonded<D> {
             let own = |critical: Critical, stiffness| critical.resolve(&context(stiffness, crossing));
             criterion = Some(inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?.into());
         }
-        let bonded = BondMaterial::new(law, modulus);
+        let mut bonded = BondMaterial::new(law, modulus);
+        if scene.softens()
+            && let Some(Criterion::Stretch(end)) = &criterion
+        {
+            bonded = bonded.softening(end.clone());
+        }
         let material = match inclusions.prestrain {
             Some(strain) => {
                 let prestrained = Prestrained::new(bonded, strain);

@@ -50,7 +50,7 @@ pub use warn::warnings;
 
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
-use crate::critical::Critical;
+use crate::critical::{Convention, Critical};
 use crate::potential::Law;
 use crate::stress::{BallVolume, Measure};
 use polycore::report::Expect;
@@ -458,6 +458,11 @@ impl Scene {
     /// Whether its law is learnt from data.
     pub fn is_learnt(&self) -> bool {
         self.material.solid.as_ref().is_some_and(SolidLaw::is_learnt)
+    }
+
+    /// Whether the bonds of its law soften before they break.
+    pub fn softens(&self) -> bool {
+        self.material.critical.and_then(|own| own.convention) == Some(Convention::Softening)
     }
 
     /// Largest relative error of the fitted bond law.

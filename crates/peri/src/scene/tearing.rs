@@ -5,6 +5,8 @@ use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::critical::{Convention, Toughness};
 use crate::geometry::Cut;
+use crate::potential::onset;
+use polycore::scene::{SceneError, Source};
 
 /// Horizon ratio below which a crack keeps to the lattice's axes.
 const LEAST_RATIO: f64 = 2.5;
@@ -19,6 +21,32 @@ const LARGE: f64 = 1.5;
 /// Layers from which on a solid has all of its bonds across a cut but a tenth.
 const LAYERS: f64 = 10.5;
 
+/// Checks the conventions of a bond law's fracture energies.
+///
+/// # Errors
+/// A convention without a fracture energy, or other ones beside bonds that soften.
+pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let material = &scene.material;
+    let inclusions = material.inclusions.iter().enumerate();
+    let criticals = inclusions
+        .filter_map(|(index, one)| Some((format!("material.inclusions[{index}].critical"), one.critical?)))
+        .chain(material.critical.map(|own| ("material.critical".to_owned(), own)));
+    for (key, critical) in criticals {
+        let Some(convention) = critical.convention else { continue };
+        let key = format!("{key}.convention");
+        if critical.fracture_energy.is_none() {
+            let found = format!("`{}` without `fracture_energy`", convention.name());
+            return Err(source.error(&key, found, "a `fracture_energy` beside it"));
+        }
+        let soft = convention == Convention::Softening;
+        if soft != scene.softens() {
+            let found = format!("`{}` beside the `convention` of `material.critical`", convention.name());
+            return Err(source.error(&key, found, "`softening` of all bonds, or of none"));
+        }
+    }
+    Ok(())
+}
+
 /// Lines for `peri check`: the fracture energy by both conventions, and warnings.
 pub fn explain_tearing<const D: usize>(
     scene: &Scene,
@@ -27,22 +55,27 @@ pub fn explain_tearing<const D: usize>(
 ) -> Vec<String> {
     let Some(own) = toughness else { return Vec::new() };
     let (convention, crossing) = (own.convention.unwrap_or_default(), own.crossing);
-    let other = convention.other();
-    let mut lines = vec![format!(
-        "  fracture   λc = {:.6}: {} J/m² by `{}`, {} J/m² by `{}`; c = {:.4} (κ = {:.4} of {:.1} bonds, S = {:.4})",
-        own.stretch,
-        digits(own.energy(convention)),
-        convention.name(),
-        digits(own.energy(other)),
-        other.name(),
-        own.tearing / own.bonds,
-        crossing.loss,
-        crossing.bonds,
-        own.tearing / own.bonds / crossing.loss
-    )];
+    let (tearing, bonds) = (digits(own.tearing), digits(own.bonds));
+    let (c, loss, count) = (own.tearing / own.bonds, crossing.loss, crossing.bonds);
+    let text = match convention {
+        Convention::Softening => format!(
+            "λf = {:.6}, soft from λ0 = {:.6} on: {tearing} J/m² by `softening`; c = S = {c:.4}",
+            own.stretch,
+            onset(own.stretch)
+        ),
+        Convention::Tearing => format!(
+            "λc = {:.6}: {tearing} J/m² by `tearing`, {bonds} J/m² by `bonds`; c = {c:.4} (κ = {loss:.4} of {count:.1} bonds)",
+            own.stretch
+        ),
+        Convention::Bonds => format!(
+            "λc = {:.6}: {bonds} J/m² by `bonds`, {tearing} J/m² by `tearing`; c = {c:.4} (κ = {loss:.4} of {count:.1} bonds)",
+            own.stretch
+        ),
+    };
     let warnings = tearing_warnings(scene, body, toughness).into_iter();
-    lines.extend(warnings.map(|text| format!("  warning    {text}")));
-    lines
+    std::iter::once(format!("  fracture   {text}"))
+        .chain(warnings.map(|text| format!("  warning    {text}")))
+        .collect()
 }
 
 fn digits(value: f64) -> String {
@@ -64,9 +97,9 @@ pub fn tearing_warnings<const D: usize>(
     body: &Body<D>,
     toughness: Option<&Toughness>,
 ) -> Vec<String> {
-    let Some(own) = toughness.filter(|own| own.convention == Some(Convention::Tearing)) else {
-        return Vec::new();
-    };
+    let meant = |own: &&Toughness| own.convention.is_some_and(|one| one != Convention::Bonds);
+    let Some(own) = toughness.filter(meant) else { return Vec::new() };
+    let soft = own.convention == Some(Convention::Softening);
     let bonds = &*body.bonds;
     let ratio = bonds.horizon() / bonds.spacing();
     let whole = (!own.crossing.whole).then(|| {
@@ -82,14 +115,14 @@ pub fn tearing_warnings<const D: usize>(
         )
     });
     let scatter = if scene.body.has_points() { scatter(bonds) } else { 0.0 };
-    let uneven = (scatter > UNEVEN).then(|| {
+    let uneven = (scatter > UNEVEN && !soft).then(|| {
         format!(
             "points lie unevenly (nearest distances scatter by {:.0} %): cracks run at the fracture energy to 15 %, on a regular \
              lattice to 5 %",
             100.0 * scatter
         )
     });
-    let large = (own.stretch > LARGE).then(|| {
+    let large = (own.stretch > LARGE && !soft).then(|| {
         format!(
             "a critical stretch of {:.3}: from 1.5 on cracks run at up to 10 % less than the fracture energy",
             own.stretch
