@@ -10,8 +10,12 @@ use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{BondMaterial, Material};
 use peri::potential::{BondPotential, DUCTILITY, Law, StretchRange, integrity, onset, softened_energy};
+use peri::run::explanation;
+use peri::scene::Scene;
+use polycore::scene::Source;
 use polycore::units::EnergyPerArea;
 use std::f64::consts::PI;
+use std::path::Path;
 
 fn sheet(ratio: f64, correction: VolumeCorrection) -> LatticeBonds<2> {
     let side = 4.0 * ratio.ceil();
@@ -47,8 +51,7 @@ fn bonds_across_a_cut() {
     for (ratio, correction, surface, count, loss, share) in plane {
         let bonds = sheet(ratio, correction);
         let kt = modulus(Space::PlaneStress, 1.0, ratio, 0.5);
-        let factors =
-            surface.then(|| surface_factors(&bonds, kt, stiffness_1111(Space::PlaneStress, 1.0)));
+        let factors = surface.then(|| surface_factors(&bonds, kt, stiffness_1111(Space::PlaneStress, 1.0)));
         let found = Crossing::new::<2>(&bonds, factors.as_ref());
         assert!(found.whole && found.bonds == count, "{found:?}");
         near("tearing_loss", found.loss, loss, 1e-4);
@@ -123,7 +126,9 @@ fn softened_bonds() {
     let law = Law::ChainOffset.build(50.0, 1200.0, false).unwrap();
     let end = 1.8;
     for stretch in [0.9, 1.1, onset(end) - 1e-3, 1.3, 1.5, 1.79, 1.9] {
-        let slope = (softened_energy(&*law, stretch + 1e-5, end) - softened_energy(&*law, stretch - 1e-5, end)) / 2e-5;
+        let slope = (softened_energy(&*law, stretch + 1e-5, end)
+            - softened_energy(&*law, stretch - 1e-5, end))
+            / 2e-5;
         near("softened_tension", slope, integrity(stretch, end) * law.tension(stretch), 1e-6);
     }
     assert_eq!([integrity(onset(end) - 1e-12, end), integrity(end, end)], [1.0, 0.0]);
@@ -147,8 +152,7 @@ fn forces_of_soft_bonds_are_slopes() {
             let [x, y] = bonds.position(site);
             displacement.set(site, [0.01 * (0.7 * x).sin(), 0.03 * y + 0.02 * (0.5 * x + y).cos()]);
         }
-        let cover =
-            peri::material::Cover { stretches: [0.9, 1.2], bound: 1e-9, clamped: true, known: None };
+        let cover = peri::material::Cover { stretches: [0.9, 1.2], bound: 1e-9, clamped: true, known: None };
         response.cover(&mut *bonds, &displacement, &cover).unwrap();
         bonds.round(&displacement);
         response.prepare(&*bonds, &displacement);
@@ -250,4 +254,90 @@ fn areas_of_cracks() {
     let (d, e) = (4.0 / 2f64.sqrt(), 4.0 / 3f64.sqrt());
     let exact = (49.0 + d * 42.0 + e * 36.0) / (1.0 + d + e);
     near("crack_area_solid", area.of::<3>(&solid), exact, 1e-12);
+}
+
+/// What `peri check` says of a scene.
+fn told(text: &str, folder: &Path) -> String {
+    let source = Source::new(folder.join("scene.toml"), text);
+    let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
+    explanation(&source, &scene, false).unwrap_or_else(|error| panic!("{error}")).join("\n")
+}
+
+const STRIP: &str = r#"version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["0 mm", "-12 mm"], max = ["80 mm", "12 mm"] }]
+cracks = [{ from = ["-1 mm", "0 mm"], to = ["40 mm", "0 mm"] }]
+[material]
+youngs_modulus = "2 MPa"
+law = "linear"
+critical = { fracture_energy = "2 J/m^2" }
+[[boundary]]
+side = "y-"
+displacement = ["0 mm", "0 mm"]
+[[boundary]]
+side = "y+"
+displacement = ["0 mm", "0.4 mm"]
+"#;
+
+/// Each warning where its cause is, none in a scene that has no cause, and none by `bonds`.
+#[test]
+fn causes_of_other_energies_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let told = |text: &str| told(text, directory.path());
+    let fine = told(STRIP);
+    assert!(!fine.contains("warning"), "{fine}");
+    assert!(fine.contains("2 J/m² by `tearing`, 1.37805 J/m² by `bonds`; c = 1.4513"), "{fine}");
+    let short = STRIP.replace("\"40 mm\", \"0 mm\"", "\"19 mm\", \"0 mm\"");
+    let narrow = STRIP.replace("[material]", "horizon_ratio = 2.015\n[material]");
+    let wide = STRIP.replace("[material]", "horizon_ratio = 4.015\n[material]");
+    let soft = STRIP.replace("2 J/m^2", "2000 J/m^2");
+    let thin = STRIP.replace(
+        "min = [\"0 mm\", \"-12 mm\"], max = [\"80 mm\", \"12 mm\"]",
+        "min = [\"0 mm\", \"-2 mm\"], max = [\"80 mm\", \"2 mm\"]",
+    );
+    let slab = STRIP
+        .replace("plane-stress", "solid")
+        .replace("thickness = \"1 mm\"\n", "")
+        .replace("\"-12 mm\"], max = [\"80 mm\", \"12 mm\"]", "\"-12 mm\", \"0 mm\"], max = [\"80 mm\", \"12 mm\", \"6 mm\"]")
+        .replace("from = [\"-1 mm\", \"0 mm\"], to = [\"40 mm\", \"0 mm\"]", "from = [\"-1 mm\", \"0 mm\", \"-1 mm\"], to = [\"40 mm\", \"0 mm\", \"-1 mm\"], and = [\"-1 mm\", \"0 mm\", \"7 mm\"]")
+        .replace("[\"0 mm\", \"0 mm\"]", "[\"0 mm\", \"0 mm\", \"free\"]")
+        .replace("[\"0 mm\", \"0.4 mm\"]", "[\"0 mm\", \"0.4 mm\", \"free\"]");
+    for (scene, cause) in [
+        (&short, "body.cracks[0] is 19.0 spacings long"),
+        (&narrow, "a horizon of 2.015 spacings"),
+        (&wide, "body.cracks[0] is 40.0 spacings long"),
+        (&soft, "a critical stretch of 1.56"),
+        (&thin, "no particle has a whole family"),
+        (&slab, "the body is 6.0 layers thick along z"),
+    ] {
+        let text = told(scene);
+        assert!(text.contains(cause), "{cause}: {text}");
+        let text = told(&scene.replace("J/m^2\"", "J/m^2\", convention = \"bonds\""));
+        assert!(!text.contains(cause), "{cause}: {text}");
+    }
+    // a cloud with a jitter of 0.05 and 0.2 spacings (splitmix64)
+    for (jitter, uneven) in [(0.05, false), (0.2, true)] {
+        let mut seed = 5_u64;
+        let mut random = || {
+            seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = seed;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            2.0 * ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 - 1.0
+        };
+        let mut points = "x,y,volume\n".to_owned();
+        for k in 0..80 * 24 {
+            let [x, y] = [k % 80, k / 80].map(|k| (f64::from(k) + 0.5 + jitter * random()) * 1e-3);
+            points += &format!("{x},{},1e-9\n", y - 12e-3);
+        }
+        std::fs::write(directory.path().join("points.csv"), points).unwrap();
+        let from = STRIP.find("spacing").unwrap();
+        let to = STRIP.find("cracks").unwrap();
+        let cloud = STRIP.replace(&STRIP[from..to], "points = \"points.csv\"\nhorizon = \"3.015 mm\"\n");
+        assert_eq!(told(&cloud).contains("points lie unevenly"), uneven, "{}", told(&cloud));
+    }
 }
