@@ -310,10 +310,12 @@ fn causes_of_other_energies_are_named() {
     let narrow = STRIP.replace("[material]", "horizon_ratio = 2.015\n[material]");
     let wide = STRIP.replace("[material]", "horizon_ratio = 4.015\n[material]");
     let soft = STRIP.replace("2 J/m^2", "2000 J/m^2");
-    let thin = STRIP.replace(
-        "min = [\"0 mm\", \"-12 mm\"], max = [\"80 mm\", \"12 mm\"]",
-        "min = [\"0 mm\", \"-2 mm\"], max = [\"80 mm\", \"2 mm\"]",
-    );
+    let thin = STRIP
+        .replace(
+            "min = [\"0 mm\", \"-12 mm\"], max = [\"80 mm\", \"12 mm\"]",
+            "min = [\"0 mm\", \"-2 mm\"], max = [\"80 mm\", \"2 mm\"]",
+        )
+        .replace("[[boundary]]\n", "[[boundary]]\nlayers = 1\n");
     let slab = STRIP
         .replace("plane-stress", "solid")
         .replace("thickness = \"1 mm\"\n", "")
