@@ -7,6 +7,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReado
 use peri::Error;
 use peri::bonds::{Bonds, VolumeCorrection};
 use peri::calibrate::Calibration;
+use peri::critical::Convention;
 use peri::geometry::{Cut, Shape};
 use peri::material::BondMaterial;
 use peri::model::{self, Body, Model, Rubber};
@@ -43,6 +44,7 @@ pub struct Spec {
     lattice_calibration: bool,
     critical_stretch: Option<f64>,
     fracture_energy: Option<f64>,
+    convention: String,
     regions: Vec<Load>,
     steps: usize,
     contact: Option<f64>,
@@ -327,7 +329,14 @@ where
     let rubber = rubber.calibration(calibration);
     let rubber = match (spec.critical_stretch, spec.fracture_energy) {
         (Some(stretch), _) => rubber.critical_stretch(stretch),
-        (None, Some(energy)) => rubber.fracture_energy(energy),
+        (None, Some(energy)) => {
+            let all = [Convention::Tearing, Convention::Bonds, Convention::Softening];
+            let named = all.into_iter().find(|one| one.name() == spec.convention).ok_or_else(|| {
+                let found = &spec.convention;
+                value(format!("convention: found {found:?}; allowed: tearing, bonds, softening"))
+            })?;
+            rubber.fracture_energy_by(named, energy)
+        }
         (None, None) => rubber,
     };
     let mut model = Model::new(body, rubber).steps(spec.steps);

@@ -65,6 +65,9 @@ def test_a_law_of_python_breaks_by_its_energy():
     ours = pulled(sheet(), lambda l: 3 * (l - 1), fracture_energy=500.0).steps(7).solve()
     theirs = pulled(sheet(), "linear", fracture_energy=500.0).steps(7).solve()
     assert theirs.damage.max() > 0.3 and (ours.damage == theirs.damage).all()
+    # the bonds' energy is 1.4513 times smaller than that of tearing at the default horizon
+    bonds = pulled(sheet(), "linear", fracture_energy=500.0 / 1.451324016, convention="bonds").steps(7).solve()
+    assert (bonds.damage == theirs.damage).all()
 
 
 def test_samples_of_a_law():
@@ -145,6 +148,8 @@ def test_refusals():
         pulled(body).solve(tolerance=1e-12, max_iterations=3)
     with pytest.raises(ValueError, match="one of them"):
         peri.Model(body, youngs_modulus=1e6, critical_stretch=2, fracture_energy=100)
+    with pytest.raises(ValueError, match="convention: found .griffith.; allowed: tearing, bonds, softening"):
+        peri.Model(body, youngs_modulus=1e6, fracture_energy=100, convention="griffith")
 
 
 def test_pictures():

@@ -1,9 +1,15 @@
 //! Critical bond stretch: interpretations of "1.2 √n̄", a number, or a fracture energy.
 
+mod area;
+mod crossing;
+
+pub use area::CrackArea;
+pub use crossing::{Convention, Crossing};
+
 use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::error::Error;
-use crate::potential::{BondPotential, NetworkStretch};
+use crate::potential::{BondPotential, NetworkStretch, softened_energy};
 use crate::solver::Bilinear;
 use polycore::units::{EnergyPerArea, Stress};
 use serde::Deserialize;
@@ -22,6 +28,8 @@ pub struct Critical {
     pub stretch: Option<f64>,
     /// Fracture energy G, from which the stretch follows: the mesh-objective choice.
     pub fracture_energy: Option<EnergyPerArea>,
+    /// What the fracture energy of a bond law is the energy of; default: `tearing`, of an inclusion that of the rest.
+    pub convention: Option<Convention>,
     /// Uniaxial tensile strength of a solid, force over the undeformed section, beside its fracture energy: bonds soften.
     pub strength: Option<Stress>,
 }
@@ -83,6 +91,10 @@ pub struct Context<'a> {
     pub horizon: f64,
     /// Thickness, m.
     pub thickness: f64,
+    /// Bonds across a cut through the body.
+    pub crossing: Crossing,
+    /// What a fracture energy is the energy of, where nothing else is said.
+    pub convention: Convention,
 }
 
 /// Energy density Y_c, J/m³, beyond which bonds of a solid break that has the fracture energy G, J/m²: G/(c Σ ŵ|ξ₁|), with the sum over
@@ -196,31 +208,71 @@ impl Critical {
             },
             (None, Some(stretch), None) if stretch > 1.0 => Ok(stretch),
             (None, Some(stretch), None) => fault("critical.stretch", stretch, "above 1"),
-            (None, None, Some(energy)) => stretch_of_energy(context, energy.si()),
+            (None, None, Some(energy)) => {
+                stretch_of_energy(context, self.convention.unwrap_or(context.convention), energy.si())
+            }
             _ => fault("critical (number of alternatives)", self.given().len() as f64, ONE_OF),
         }
     }
 }
 
-/// Fracture energy G of a critical stretch: Φ = ∫₁^{λc} t dλ/kθ, G = tδ⁴kθΦ in a sheet, (2π/5)δ⁵kθΦ in a solid.
-pub fn fracture_energy(context: &Context, stretch: f64) -> f64 {
-    let energy = context.law.energy(stretch) * context.modulus;
-    match context.space {
-        Space::Solid => 2.0 * PI / 5.0 * context.horizon.powi(5) * energy,
-        _ => context.thickness * context.horizon.powi(4) * energy,
+/// Fracture energy G, J/m², of a critical stretch, with Φ = ∫₁^{λc} t dλ/kθ. [`Convention::Tearing`]: κkθΦ Σ_J w V_J |ξ_e||ξ| of a
+/// [`Crossing`]; [`Convention::Bonds`]: tδ⁴kθΦ in a sheet, (2π/5)δ⁵kθΦ in a solid; [`Convention::Softening`]: kθΦ Σ_J w V_J |ξ_e||ξ| of bonds
+/// that soften and bear nothing at this stretch.
+pub fn fracture_energy(context: &Context, convention: Convention, stretch: f64) -> f64 {
+    let energy = match convention {
+        Convention::Softening => softened_energy(context.law, stretch, stretch),
+        _ => context.law.energy(stretch),
+    } * context.modulus;
+    match (convention, context.space) {
+        (Convention::Softening, _) => context.crossing.reach * energy,
+        (Convention::Tearing, _) => context.crossing.loss * context.crossing.reach * energy,
+        (Convention::Bonds, Space::Solid) => 2.0 * PI / 5.0 * context.horizon.powi(5) * energy,
+        (Convention::Bonds, _) => context.thickness * context.horizon.powi(4) * energy,
     }
 }
 
-/// The stretch at which a bond has stored its share of G, by bisection: energy grows with stretch in tension.
-fn stretch_of_energy(context: &Context, energy: f64) -> Result<f64, Error> {
+/// Fracture energies of a bond law in a body.
+#[derive(Clone, Copy, Debug)]
+pub struct Toughness {
+    /// What the scene's fracture energy is the energy of; `None` where it gives a stretch.
+    pub convention: Option<Convention>,
+    /// Critical stretch λ_c.
+    pub stretch: f64,
+    /// Energy at which a crack runs, J/m².
+    pub tearing: f64,
+    /// Energy of the bonds across a unit of crack by the continuum's integral, J/m².
+    pub bonds: f64,
+    /// Bonds across a cut through the body.
+    pub crossing: Crossing,
+}
+
+impl Toughness {
+    /// Of a critical stretch that follows from `critical`.
+    pub fn new(critical: &Critical, context: &Context, stretch: f64) -> Self {
+        let given = critical.fracture_energy.map(|_| critical.convention.unwrap_or(context.convention));
+        let soft = given == Some(Convention::Softening);
+        let tearing = if soft { Convention::Softening } else { Convention::Tearing };
+        let tearing = fracture_energy(context, tearing, stretch);
+        let mut bonds = fracture_energy(context, Convention::Bonds, stretch);
+        if soft {
+            bonds *= softened_energy(context.law, stretch, stretch) / context.law.energy(stretch);
+        }
+        Self { convention: given, stretch, tearing, bonds, crossing: context.crossing }
+    }
+}
+
+/// The stretch at which bonds have stored their shares of G, by bisection: energy grows with stretch in tension.
+fn stretch_of_energy(context: &Context, convention: Convention, energy: f64) -> Result<f64, Error> {
     let fault = |allowed: &str| {
         Err(Error::Parameter { name: "critical.fracture_energy", found: energy, allowed: allowed.to_owned() })
     };
     if !(energy > 0.0 && energy.is_finite()) {
         return fault("above 0");
     }
+    let of = |stretch: f64| fracture_energy(context, convention, stretch);
     let (mut low, mut high) = (1.0, 2.0);
-    while fracture_energy(context, high) < energy {
+    while of(high) < energy {
         low = high;
         high *= 2.0;
         if high > 1e9 {
@@ -229,7 +281,7 @@ fn stretch_of_energy(context: &Context, energy: f64) -> Result<f64, Error> {
     }
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
-        if fracture_energy(context, middle) < energy { low = middle } else { high = middle }
+        if of(middle) < energy { low = middle } else { high = middle }
     }
     Ok(0.5 * (low + high))
 }
@@ -239,6 +291,18 @@ mod tests {
     use super::*;
     use crate::calibrate::modulus;
     use crate::potential::Law;
+
+    fn context<'a>(
+        law: &'a dyn BondPotential,
+        space: Space,
+        modulus: f64,
+        horizon: f64,
+        thickness: f64,
+    ) -> Context<'a> {
+        let crossing = Crossing { reach: 2.0, short: 1.0, bonds: 28.0, loss: 1.4, whole: true };
+        let convention = Convention::default();
+        Context { law, links: None, space, modulus, horizon, thickness, crossing, convention }
+    }
 
     /// formulation.md, table of the four examples, to its printed digits.
     #[test]
@@ -274,17 +338,12 @@ mod tests {
             for (space, horizon) in [(Space::PlaneStress, 6e-3), (Space::Solid, 6e-3)] {
                 let built = law.build(720.0, 1200.0, false).unwrap();
                 let kt = modulus(space, 0.6e6, horizon, 3e-3);
-                let context = Context {
-                    law: &*built,
-                    links: Some(720.0),
-                    space,
-                    modulus: kt,
-                    horizon,
-                    thickness: 3e-3,
-                };
-                let energy = fracture_energy(&context, 1.7);
-                let found = stretch_of_energy(&context, energy).unwrap();
-                assert!((found - 1.7).abs() < 1e-12, "{law:?}: {found}");
+                let context = Context { links: Some(720.0), ..context(&*built, space, kt, horizon, 3e-3) };
+                for convention in [Convention::Tearing, Convention::Bonds] {
+                    let energy = fracture_energy(&context, convention, 1.7);
+                    let found = stretch_of_energy(&context, convention, energy).unwrap();
+                    assert!((found - 1.7).abs() < 1e-12, "{law:?} {convention:?}: {found}");
+                }
             }
         }
     }
@@ -295,33 +354,11 @@ mod tests {
         let (e, horizon, s) = (1e7, 0.03, 0.02);
         let law = Law::Linear.build(0.0, 0.0, false).unwrap();
         let kt = modulus(Space::Solid, e, horizon, 1.0);
-        let context =
-            Context { law: &*law, links: None, space: Space::Solid, modulus: kt, horizon, thickness: 1.0 };
+        let context = context(&*law, Space::Solid, kt, horizon, 1.0);
         // G₀ = (π/10) c s₀² δ⁵ with c = 6kθ (Silling & Askari 2005, Eq. (24): πcs₀²δ⁵/10)
         let exact = PI / 10.0 * 6.0 * kt * s * s * horizon.powi(5);
-        assert!((fracture_energy(&context, 1.0 + s) / exact - 1.0).abs() < 1e-12);
-    }
-
-    /// formulation.md: lattice over continuum G is 1.006 (2D) and 1.12 (3D) at m = 3.015: the energy of the bonds that cross
-    /// a plane, 2kθΦ|ξ| each pair, summed over the rows |ξ_y| from which they start.
-    #[test]
-    fn fracture_energy_of_a_lattice() {
-        let ratio: f64 = 3.015;
-        let (mut sheet, mut solid) = (0.0, 0.0);
-        for x in -3..=3 {
-            for y in 1..=3 {
-                for z in -3..=3 {
-                    let [x, y, z] = [x, y, z].map(f64::from);
-                    let length = (x * x + y * y + z * z).sqrt();
-                    if length <= ratio {
-                        solid += 2.0 * length * y;
-                        sheet += if z == 0.0 { 2.0 * length * y } else { 0.0 };
-                    }
-                }
-            }
-        }
-        assert!((sheet / ratio.powi(4) - 1.006).abs() < 5e-4);
-        assert!((solid / (2.0 * PI / 5.0 * ratio.powi(5)) - 1.12).abs() < 5e-3);
+        let found = fracture_energy(&context, Convention::Bonds, 1.0 + s);
+        assert!((found / exact - 1.0).abs() < 1e-12);
     }
 
     /// `reference/ch2/s8_G.py`: G = 2.67 N/mm, E = 0.6 N/mm², δ = 6.03 mm give Φ = 2πG/(3Eδ), and a linear bond breaks at
@@ -333,9 +370,12 @@ mod tests {
         let phi = 2.0 * PI * energy / (3.0 * e * horizon);
         let law = Law::Linear.build(0.0, 0.0, false).unwrap();
         let (space, modulus) = (Space::PlaneStress, modulus(Space::PlaneStress, e, horizon, thickness));
-        let context = Context { law: &*law, links: None, space, modulus, horizon, thickness };
-        let critical =
-            Critical { fracture_energy: Some(EnergyPerArea::from_si(energy)), ..Critical::default() };
+        let context = context(&*law, space, modulus, horizon, thickness);
+        let critical = Critical {
+            fracture_energy: Some(EnergyPerArea::from_si(energy)),
+            convention: Some(Convention::Bonds),
+            ..Critical::default()
+        };
         let found = critical.resolve(&context).unwrap();
         assert!((found - (1.0 + (2.0 * phi / 3.0).sqrt())).abs() < 1e-12, "{found}");
     }
@@ -343,14 +383,7 @@ mod tests {
     #[test]
     fn interpretations_that_break_at_rest_are_refused() {
         let law = Law::ChainOffset.build(720.0, 1200.0, false).unwrap();
-        let context = Context {
-            law: &*law,
-            links: Some(720.0),
-            space: Space::PlaneStress,
-            modulus: 1.0,
-            horizon: 1.0,
-            thickness: 1.0,
-        };
+        let context = Context { links: Some(720.0), ..context(&*law, Space::PlaneStress, 1.0, 1.0, 1.0) };
         for (factor, interpretation) in [
             (0.03, Interpretation::BondFull),
             (0.1, Interpretation::BondEighth),

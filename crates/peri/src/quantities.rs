@@ -18,6 +18,10 @@ polycore::quantities! {
     RELEASED_ENERGY = "released_energy", "J", "with `material.critical`: energy that broken bonds held when they broke";
     CRITICAL_STRETCH = "critical_stretch", "", "with `material.critical`: least stretch at which a bond of the body breaks";
     CRITICAL_ENERGY = "critical_energy", "J/m³", "with `fracture_energy` of a `solid`: energy, over a bond's share of a family, beyond which it breaks";
+    TEARING_ENERGY = "tearing_energy", "J/m²", "with `material.critical`: energy per area at which a crack in equilibrium runs; of a bond law κB of the critical stretch, of a `solid` its `fracture_energy`";
+    NEW_CRACK_AREA = "new_crack_area", "m²", "with `material.critical`: area of new cracks, from pairs of neighbours whose bond broke and that have no neighbour in common any more, where there are any";
+    DISSIPATED_PER_AREA = "dissipated_per_area", "J/m²", "work less stored, kinetic and friction's energy, over `new_crack_area`: what new cracks took, with the energy lost when bonds snap and at barriers of the lattice, and in bonds that broke elsewhere";
+    DISSIPATION_BIAS = "dissipation_bias", "", "this over `tearing_energy`, less 1: 0 where the crack ran at G; above it where the load supplied more";
     FRAGMENTS = "fragments", "", "with `material.critical`: pieces of two particles or more that intact bonds hold together";
     LARGEST_FRAGMENT = "largest_fragment", "", "with `material.critical`: volume of the largest of these over that of the body";
     FIRST_BREAK = "first_break", "m", "displacement of the step in which the first bond breaks";

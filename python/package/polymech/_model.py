@@ -145,7 +145,8 @@ class Model:
 
     `law` is the name of a bond law (``chain-offset``, ``chain-shifted``, ``chain-affine``, ``linear``, ``as-published``), a
     `BondLaw`, or a function of stretches. `youngs_modulus` in Pa. Chains have `links` of a `dissociation` energy, in kθ. Bonds break at
-    a `critical_stretch`, or at that which follows from a `fracture_energy` in J/m².
+    a `critical_stretch`, or at that which follows from a `fracture_energy` in J/m²: by the `convention` ``tearing`` the energy at which a
+    crack runs, by ``bonds`` that of the bonds across it, by ``softening`` that of tearing of bonds that soften before they break.
 
     A region is a function of the coordinates, arrays in m, such as ``lambda x, y: y < 6e-3``, or a box: two corners.
     """
@@ -160,12 +161,15 @@ class Model:
         dissociation: float = 1200.0,
         critical_stretch: float | None = None,
         fracture_energy: float | None = None,
+        convention: str = "tearing",
         calibration: str = "continuum",
     ) -> None:
         if calibration not in ("continuum", "lattice"):
             raise ValueError(f"calibration: found {calibration!r}; allowed: continuum, lattice")
         if critical_stretch is not None and fracture_energy is not None:
             raise ValueError("found critical_stretch and fracture_energy; allowed: one of them")
+        if convention not in ("tearing", "bonds", "softening"):
+            raise ValueError(f"convention: found {convention!r}; allowed: tearing, bonds, softening")
         if not isinstance(law, (str, BondLaw)):
             law = BondLaw(law)
         self.body = body
@@ -177,6 +181,7 @@ class Model:
             "dissociation": float(dissociation),
             "critical_stretch": critical_stretch,
             "fracture_energy": fracture_energy,
+            "convention": convention,
             "lattice_calibration": calibration == "lattice",
             "regions": [],
             "steps": 1,

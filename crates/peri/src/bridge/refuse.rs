@@ -31,6 +31,12 @@ pub(super) fn refuse(source: &Source, scene: &Scene, variant: &Variant) -> Resul
             "`none`: LAMMPS has a table for each bond length",
         ),
         (
+            scene.softens(),
+            "material.critical.convention",
+            "`softening`, bonds that soften before they break",
+            "`tearing` or `bonds`: the tables end where bonds break at once",
+        ),
+        (
             !material.inclusions.is_empty(),
             "material.inclusions",
             "inclusions, which give pairs weights of their own",

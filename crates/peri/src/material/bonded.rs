@@ -1,10 +1,13 @@
 //! Bond laws as materials: no state of a particle, forces by the kernels of [`crate::bonds`].
 
+use super::softened::{Lacking, lacking_energy};
 use super::{Bond, Cover, Family, LawRange, Material, Response};
-use crate::bonds::{Bonds, LatticeBonds, Overstretched};
+use crate::bonds::{Bonds, LatticeBonds, Overstretched, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
-use crate::potential::{BondPotential, EnergyTable, KernelFit, StretchRange, TangentTable};
+use crate::potential::{
+    BondPotential, EnergyTable, KernelFit, StretchRange, TangentTable, integrity, softened_energy,
+};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -20,12 +23,19 @@ const SAMPLES: u32 = 200;
 pub struct BondMaterial<'a> {
     law: Arc<dyn BondPotential + 'a>,
     modulus: f64,
+    /// λ_f of bonds that soften before they break.
+    end: Option<Property>,
 }
 
 impl<'a> BondMaterial<'a> {
     /// Of a law, or a reference to one, in units of kθ = `modulus`, N/m⁶.
     pub fn new(law: impl BondPotential + 'a, modulus: f64) -> Self {
-        Self { law: Arc::new(law), modulus }
+        Self { law: Arc::new(law), modulus, end: None }
+    }
+
+    /// With bonds that soften and bear nothing at a stretch λ_f, that of the weaker of their ends, see [`integrity`].
+    pub fn softening(self, end: Property) -> Self {
+        Self { end: Some(end), ..self }
     }
 
     /// The law.
@@ -49,13 +59,20 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
 
     /// 2kθ t(λ) ζ/|ζ|, Eqs (2.6), (2.47).
     fn force(&self, bond: &Bond<D>, (): &(), (): &()) -> [f64; D] {
-        let size = self.scale(bond) * self.law.tension_at_strain(bond.strain());
+        let mut size = self.scale(bond) * self.law.tension_at_strain(bond.strain());
+        if let Some(end) = &self.end {
+            size *= integrity(bond.stretch(), end.weaker(bond.from, bond.to));
+        }
         bond.direction().map(|x| size * x)
     }
 
     /// Σ_J kθ |ξ| φ w V_J, Eq. (2.39).
     fn energy(&self, family: &Family<D>, (): &()) -> f64 {
-        self.modulus * family.sum(|bond| bond.weight * bond.length * self.law.energy(bond.stretch()))
+        let energy = |bond: &Bond<D>| match &self.end {
+            None => self.law.energy(bond.stretch()),
+            Some(end) => softened_energy(&*self.law, bond.stretch(), end.weaker(bond.from, bond.to)),
+        };
+        self.modulus * family.sum(|bond| bond.weight * bond.length * energy(&bond))
     }
 
     /// Σ_J (2kθ w V_J/|ξ|)·max(|t′|, |t|/λ)(1 + max_{d≠e} |n_d n_e|).
@@ -77,7 +94,8 @@ impl<const D: usize> Material<D> for BondMaterial<'_> {
     where
         Self: 'a,
     {
-        Box::new(Kernels { material: self, fitted: None, table: None, tangents: None })
+        let lacking = Lacking::default();
+        Box::new(Kernels { material: self, fitted: None, table: None, tangents: None, fit: None, lacking })
     }
 }
 
@@ -96,6 +114,10 @@ struct Kernels<'a> {
     table: Option<(StretchRange, EnergyTable)>,
     /// Tangents likewise.
     tangents: Option<(StretchRange, TangentTable)>,
+    /// The fit, where bonds soften.
+    fit: Option<KernelFit>,
+    /// What soft bonds of the present displacement lack.
+    lacking: Lacking,
 }
 
 impl<const D: usize> Response<D> for Kernels<'_> {
@@ -116,12 +138,17 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         }
         bonds.set_law(&fit, modulus);
         self.fitted = EnergyTable::of_fit(&fit, law.energy(1.0));
+        self.fit = self.material.end.is_some().then_some(fit);
         let tangent =
             |stretch: f64| law.tension_derivative(stretch).abs().max(law.tension(stretch).abs() / stretch);
         Ok(samples(cover.stretches).map(tangent).fold(0.0, f64::max) * modulus)
     }
 
-    fn prepare(&mut self, _bonds: &dyn Bonds<D>, _displacement: &Field<D>) {}
+    fn prepare(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>) {
+        if let Some((end, fit)) = self.material.end.as_ref().zip(self.fit.as_ref()) {
+            self.lacking = Lacking::new(&self.material, end, fit, bonds, displacement);
+        }
+    }
 
     fn has_points(&self) -> bool {
         false
@@ -136,6 +163,9 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         track: Option<&mut StretchRange>,
     ) {
         bonds.force(displacement, start, force, track);
+        if self.material.end.is_some() {
+            self.lacking.add(start, force);
+        }
     }
 
     fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
@@ -151,10 +181,15 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         let Some(table) = self.fitted.as_ref().or(self.table.as_ref().map(|(_, table)| table)) else {
             return 0.0;
         };
+        let lacking = self
+            .material
+            .end
+            .as_ref()
+            .map(|end| modulus * lacking_energy(&self.material, end, table, bonds, displacement));
         if let Some(sum) =
             bonds.as_lattice().and_then(|lattice| lattice.energy(displacement, |e| table.value(e)))
         {
-            return modulus * sum;
+            return modulus * sum + lacking.unwrap_or(0.0);
         }
         let of = |sites: &[u32]| {
             let mut sum = 0.0;
@@ -175,7 +210,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
             sum
         };
         let parts: Vec<f64> = bonds.particles().par_chunks(CHUNK).map(of).collect();
-        modulus * parts.iter().sum::<f64>()
+        modulus * parts.iter().sum::<f64>() + lacking.unwrap_or(0.0)
     }
 
     /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. Beyond what is fitted q is constant: the energy grows with half
@@ -184,6 +219,11 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         let law = &*self.material.law;
         let energy = |bond: &Overstretched| {
             let stretch = (1.0 + bond.elongation).sqrt();
+            if let Some(end) = &self.material.end {
+                let other = bonds.bond(bond.site as usize, bond.index).site;
+                let energy = softened_energy(law, stretch, end.weaker(bond.site as usize, other));
+                return bonds.volume(bond.site as usize) * bond.weight * bond.length * energy;
+            }
             let mut energy = law.energy(stretch.min(most));
             if stretch > most {
                 let beyond = bond.elongation - (most * most - 1.0);

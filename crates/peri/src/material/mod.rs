@@ -22,6 +22,7 @@ mod pointwise;
 mod prestrained;
 mod relief;
 mod response;
+mod softened;
 mod solid_passes;
 mod strength;
 mod traction;

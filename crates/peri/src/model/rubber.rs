@@ -3,7 +3,7 @@
 use super::{Body, IntoMaterial};
 use crate::bonds::{Bonds, LatticeBonds};
 use crate::calibrate::{Calibration, lattice_factor, modulus};
-use crate::critical::{Context, Critical};
+use crate::critical::{Context, Convention, Critical, Crossing};
 use crate::error::Error;
 use crate::material::BondMaterial;
 use crate::potential::{BondPotential, Law, Scaled};
@@ -62,10 +62,15 @@ impl Rubber {
         self
     }
 
-    /// Bonds break at the stretch that follows from a fracture energy G, J/m².
-    pub fn fracture_energy(mut self, energy: f64) -> Self {
-        self.critical =
-            Some(Critical { fracture_energy: Some(EnergyPerArea::from_si(energy)), ..Critical::default() });
+    /// Bonds break at the stretch that follows from a tearing energy G, J/m², see [`Convention::Tearing`].
+    pub fn fracture_energy(self, energy: f64) -> Self {
+        self.fracture_energy_by(Convention::Tearing, energy)
+    }
+
+    /// Bonds break at the stretch that follows from a fracture energy G, J/m², by a convention.
+    pub fn fracture_energy_by(mut self, convention: Convention, energy: f64) -> Self {
+        let (energy, convention) = (Some(EnergyPerArea::from_si(energy)), Some(convention));
+        self.critical = Some(Critical { fracture_energy: energy, convention, ..Critical::default() });
         self
     }
 }
@@ -99,8 +104,14 @@ impl<const D: usize> IntoMaterial<D> for Rubber {
         };
         let (space, horizon, thickness) = (body.space, bonds.horizon(), body.thickness);
         let modulus = modulus(space, found, horizon, thickness) * lattice_factor(self.calibration, bonds);
-        let context = Context { law: &*law, links, space, modulus, horizon, thickness };
+        let (crossing, convention) = (Crossing::new(bonds, None), Convention::default());
+        let context = Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention };
         let critical = self.critical.map(|critical| critical.resolve(&context)).transpose()?;
-        Ok((BondMaterial::new(law, modulus), critical))
+        let material = BondMaterial::new(law, modulus);
+        let soft = self.critical.and_then(|own| own.convention) == Some(Convention::Softening);
+        match critical.filter(|_| soft) {
+            Some(end) => Ok((material.softening(end.into()), critical)),
+            None => Ok((material, critical)),
+        }
     }
 }

@@ -6,6 +6,7 @@ mod fit;
 mod laws;
 mod range;
 mod ratio;
+mod softened;
 #[cfg(test)]
 mod tests;
 
@@ -14,6 +15,7 @@ pub use energy::{EnergyTable, TangentTable};
 pub use fit::KernelFit;
 pub use laws::{AsPublished, BondStretch, LinearBond, NetworkStretch, Scaled, Shifted};
 pub use range::StretchRange;
+pub use softened::{DUCTILITY, integrity, onset, softened_energy};
 
 use crate::error::Error;
 use serde::Deserialize;

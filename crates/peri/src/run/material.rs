@@ -3,7 +3,7 @@
 use crate::bonds::{Bonds, Property};
 use crate::calibrate;
 use crate::correction::{bond_factors, surface_factors};
-use crate::critical::{Context, Critical, bilinear, energy_limit};
+use crate::critical::{Context, Critical, Crossing, Toughness, bilinear, energy_limit};
 use crate::error::Error;
 use crate::material::{
     BondMaterial, Material, NonlocalSolid, PointLaw, Pointwise, Prestrained, Response, energy_at_strength,
@@ -68,6 +68,8 @@ pub struct Bonded<const D: usize> {
     pub material: Acting<D>,
     /// When bonds break, where the scene says so.
     pub criterion: Option<Criterion>,
+    /// Fracture energies of the critical stretch of a bond law.
+    pub toughness: Option<Toughness>,
     /// The parameters that follow fields.
     pub followed: Vec<Followed>,
     /// Stiffness of the material over what it is without inclusions.
@@ -114,7 +116,14 @@ impl<const D: usize> Bonded<D> {
                 _ => None,
             };
             let material = Acting::Solid(NonlocalSolid(law));
-            return Ok(Self { body, material, criterion, followed: Vec::new(), stiffness: 1.0.into() });
+            return Ok(Self {
+                body,
+                material,
+                criterion,
+                toughness: None,
+                followed: Vec::new(),
+                stiffness: 1.0.into(),
+            });
         }
         let law: Arc<dyn BondPotential> = Arc::from(spec.bond_law()?);
         let youngs_modulus = spec.youngs_modulus.map_or(f64::NAN, |modulus| modulus.si());
@@ -125,15 +134,16 @@ impl<const D: usize> Bonded<D> {
         let surface = (variant.surface == SurfaceCorrection::Energy).then(|| {
             surface_factors(&*body.bonds, modulus, calibrate::stiffness_1111(space, youngs_modulus))
         });
+        let crossing = spec.critical.map(|_| Crossing::new(&*body.bonds, surface.as_ref()));
         let followed = scene::followed(source, scene, &body)?;
         let inclusions = Inclusions::new(source, scene, &body, &followed)?;
         if let Some(factors) = bond_factors(&*body.bonds, surface, &inclusions.micromodulus) {
             body.bonds.set_factors(factors);
         }
-        let resolve = |critical: Critical, stiffness: f64| {
-            let modulus = stiffness * modulus;
-            let context = Context { law: &*law, links: spec.links, space, modulus, horizon, thickness };
-            critical.resolve(&context)
+        let context = |stiffness: f64, crossing: Crossing| {
+            let (links, modulus) = (spec.links, stiffness * modulus);
+            let convention = spec.critical.and_then(|critical| critical.convention).unwrap_or_default();
+            Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention }
         };
         let fault = |error| match error {
             Error::Parameter { name, found, allowed } => {
@@ -142,15 +152,20 @@ impl<const D: usize> Bonded<D> {
             }
             other => source.error("material.critical", other, "a critical stretch"),
         };
-        let criterion: Option<Criterion> = match spec.critical {
-            Some(critical) => {
-                let stretch = resolve(critical, 1.0).map_err(fault)?;
-                let own = |critical, stiffness| resolve(critical, stiffness);
-                Some(inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?.into())
-            }
-            None => None,
-        };
-        let bonded = BondMaterial::new(law, modulus);
+        let (mut criterion, mut toughness): (Option<Criterion>, _) = (None, None);
+        if let Some((critical, crossing)) = spec.critical.zip(crossing) {
+            let rest = context(1.0, crossing);
+            let stretch = critical.resolve(&rest).map_err(fault)?;
+            toughness = Some(Toughness::new(&critical, &rest, stretch));
+            let own = |critical: Critical, stiffness| critical.resolve(&context(stiffness, crossing));
+            criterion = Some(inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?.into());
+        }
+        let mut bonded = BondMaterial::new(law, modulus);
+        if scene.softens()
+            && let Some(Criterion::Stretch(end)) = &criterion
+        {
+            bonded = bonded.softening(end.clone());
+        }
         let material = match inclusions.prestrain {
             Some(strain) => {
                 let prestrained = Prestrained::new(bonded, strain);
@@ -161,7 +176,7 @@ impl<const D: usize> Bonded<D> {
             }
             None => Acting::Bonds(bonded),
         };
-        Ok(Self { body, material, criterion, followed, stiffness: inclusions.micromodulus })
+        Ok(Self { body, material, criterion, toughness, followed, stiffness: inclusions.micromodulus })
     }
 }
 

@@ -14,6 +14,7 @@ mod scale;
 mod sections;
 mod solid;
 mod stages;
+mod toughness;
 mod variants;
 
 pub use outcome::{Outcome, Profile};
@@ -24,6 +25,7 @@ use material::Observed;
 pub(crate) use material::{Acting, Bonded};
 use probes::Probes;
 use sections::Sections;
+use toughness::NewCrack;
 use variants::UnderWay;
 
 use crate::bonds::{Bonds, Property, covered_stretches, fragments};
@@ -153,10 +155,12 @@ fn run_variant<const D: usize>(
     let mut phases = Phases::new();
     phases.start("build");
     let Built { bonded, loads, loaded, held, probes, sections } = Built::<D>::new(source, scene, variant)?;
-    let Bonded { mut body, material, criterion, followed, stiffness } = bonded;
+    let Bonded { mut body, material, criterion, toughness, followed, stiffness } = bonded;
     let plate = scene::exact_plate(source, scene, &body)?;
     phases.stop();
-    let warnings = scene::warnings(source, scene, &body);
+    let mut warnings = scene::warnings(source, scene, &body);
+    warnings.extend(scene::tearing_warnings(scene, &body, toughness.as_ref()));
+    let crack = criterion.as_ref().map(|_| NewCrack::new(scene, &*body.bonds, toughness.as_ref()));
     let sites = body.bonds.sites();
     let fresh = state.is_none();
     let mut state = state.unwrap_or_else(|| State::new(sites));
@@ -239,6 +243,9 @@ fn run_variant<const D: usize>(
     phases.time("compare", || {
         outcome.responses(&*body.bonds, &loads, &state);
         outcome.values_of_history(scene);
+        if let Some(crack) = &crack {
+            crack.values(&*body.bonds, &mut outcome);
+        }
         outcome.values_of_contact::<D>(scene);
         outcome.values_of_probes(scene);
         if let Some(exact) = &scene.exact {
@@ -439,8 +446,9 @@ fn explanation_in<const D: usize>(
         }
         let (source, scene) = variant.resolve(source, scene)?;
         let built = Built::<D>::new(&source, &scene, &variant)?;
-        let Bonded { body, criterion, followed, .. } = &built.bonded;
+        let Bonded { body, criterion, toughness, followed, .. } = &built.bonded;
         lines.extend(scene::explain(&source, &scene, &variant, body, criterion.as_ref())?);
+        lines.extend(scene::explain_tearing(&scene, body, toughness.as_ref()));
         lines.extend(followed.iter().map(|one| format!("  follows    {one}")));
     }
     Ok(lines)

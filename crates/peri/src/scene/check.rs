@@ -318,6 +318,7 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error("material.critical", found, crate::critical::ONE_OF));
         }
     }
+    super::tearing::check(source, scene)?;
     for (index, field) in material.fields.iter().enumerate() {
         let key = format!("material.fields[{index}].of");
         if material.fields[..index].iter().any(|other| other.of == field.of) {
@@ -329,8 +330,13 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             return Err(source.error(&key, "a fracture energy of a material without one", allowed));
         }
     }
-    if material.is_prestrained() {
-        // forces of prestrained bonds are not those of the fitted law, from which stresses are taken
+    if material.is_prestrained() || scene.softens() {
+        // forces of these bonds are not those of the fitted law, from which stresses are taken
+        let what = if scene.softens() { "bonds that soften" } else { "a prestrain in `material`" };
+        if material.is_prestrained() && scene.softens() {
+            let found = "`softening` of prestrained bonds";
+            return Err(source.error("material.critical.convention", found, "`tearing` or `bonds`"));
+        }
         let j_integral = |probe: &Probe| probe.track == Track::JIntegral;
         for (key, given) in [
             ("stress", scene.stress.is_some()),
@@ -338,8 +344,8 @@ fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             ("probe", scene.probe.iter().any(j_integral)),
         ] {
             if given {
-                let found = "together with a prestrain in `material`";
-                return Err(source.error(key, found, "displacements of prestrained bodies only, so far"));
+                let found = format!("together with {what}");
+                return Err(source.error(key, found, "displacements of such bodies only, so far"));
             }
         }
     }

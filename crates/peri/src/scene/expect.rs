@@ -27,6 +27,9 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     let energy = scene.material.solid.is_some()
         && scene.material.critical.is_some_and(|critical| critical.fracture_energy.is_some());
     add(critical, &[if energy { q::CRITICAL_ENERGY } else { q::CRITICAL_STRETCH }]);
+    let tearing = scene.material.solid.is_none() || energy;
+    add(critical && tearing, &[q::TEARING_ENERGY, q::DISSIPATION_BIAS]);
+    add(critical, &[q::NEW_CRACK_AREA, q::DISSIPATED_PER_AREA]);
     add(critical && scene.dynamics.is_none(), &[q::BREAKING_EVENTS]);
     add(critical, &[q::DETACHED_PARTICLES, q::LAST_LOAD, q::LAST_DISPLACEMENT, q::RELEASED_ENERGY]);
     add(

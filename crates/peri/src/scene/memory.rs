@@ -67,7 +67,8 @@ fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
         each += if scene.observes_forces() { 3.0 * state + 2.0 * passes } else { 2.0 * state + passes };
     }
     if scene.material.critical.is_some() {
-        each += BREAKING;
+        // the bonds at the start and at the end, a sum of each particle, for the area of cracks
+        each += BREAKING + 2.0 * masks + 8.0;
     }
     if scene.is_mixed() {
         // displacement and surface factors in single precision
@@ -120,6 +121,7 @@ pub fn needed<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> f64 {
             of_sites::<D>(scene, sites, 0)
                 + of_cloud::<D>(particles, directed)
                 + of_relief::<D>(scene, particles)
+                + of_pairs::<D>(scene, particles)
                 + shared
         }
     };
@@ -132,6 +134,12 @@ pub(super) fn of_cloud<const D: usize>(particles: f64, bonds: f64) -> f64 {
     // and the rows that the kernel reads
     particles * (6.0 * 8.0 * D as f64 + 96.0 + 32.0 * (D as f64 - 1.0))
         + padded * (4.0 + 8.0 + 8.0 + BOND_LISTS)
+}
+
+/// Bytes of the short bonds of a cloud whose cracks have an area, in a list that grows, and of their sums.
+fn of_pairs<const D: usize>(scene: &Scene, particles: f64) -> f64 {
+    let pairs = if D == 2 { 4.0 } else { 13.0 };
+    if scene.material.critical.is_some() { particles * pairs * (16.0 + 8.0) } else { 0.0 }
 }
 
 /// Bytes of a solid in a cloud beside those of one on a lattice: θ, what it adds to states, and what the kernels read of a particle.

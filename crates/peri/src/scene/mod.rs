@@ -21,6 +21,7 @@ mod placement;
 mod planes;
 mod probe;
 mod solid;
+mod tearing;
 mod values;
 mod variant;
 mod warn;
@@ -43,13 +44,14 @@ pub use method::{Dynamics, Method, Precision, Solver};
 pub use placement::{check_placement, exact_plate};
 pub use probe::{Probe, Track};
 pub use solid::{SolidKind, SolidLaw};
+pub use tearing::{explain_tearing, tearing_warnings};
 pub use values::{Body, plain};
 pub use variant::Variant;
 pub use warn::warnings;
 
 use crate::bonds::VolumeCorrection;
 use crate::calibrate::{Calibration, Space};
-use crate::critical::Critical;
+use crate::critical::{Convention, Critical};
 use crate::potential::Law;
 use crate::stress::{BallVolume, Measure};
 use polycore::report::Expect;
@@ -457,6 +459,11 @@ impl Scene {
     /// Whether its law is learnt from data.
     pub fn is_learnt(&self) -> bool {
         self.material.solid.as_ref().is_some_and(SolidLaw::is_learnt)
+    }
+
+    /// Whether the bonds of its law soften before they break.
+    pub fn softens(&self) -> bool {
+        self.material.critical.and_then(|own| own.convention) == Some(Convention::Softening)
     }
 
     /// Largest relative error of the fitted bond law.

@@ -176,6 +176,10 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         }
     }
     if let Some(critical) = &material.critical {
+        if critical.convention.is_some() {
+            let allowed = "nothing: the fracture energy of a `solid` is always that of tearing";
+            return Err(source.error("material.critical.convention", "a convention of bond laws", allowed));
+        }
         if let Some(strength) = critical.strength {
             let key = "material.critical.strength";
             positive(source, key, strength.si(), "Pa")?;

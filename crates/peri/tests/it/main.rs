@@ -38,6 +38,7 @@ mod solids;
 mod spectra;
 mod stress;
 mod surface;
+mod tearing;
 mod time_step;
 mod tractions;
 mod waves;

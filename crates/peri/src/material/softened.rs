@@ -1,0 +1,89 @@
+//! Bond laws whose bonds soften before they break: what the few soft bonds of a body lack against the law of the kernels.
+
+use super::{Bond, BondMaterial};
+use crate::bonds::{Bonds, Property};
+use crate::field::{CHUNK, Field, chunk_range};
+use crate::potential::{EnergyTable, KernelFit, integrity, onset, softened_energy};
+use rayon::prelude::*;
+
+/// The soft bonds of a displacement, by work items: site, and force density that its bonds lack, N/m³ (to be added).
+#[derive(Default)]
+pub(super) struct Lacking(Vec<Vec<(u32, [f64; 3])>>);
+
+/// Visits the bonds of a work item beyond the onset, with their stretch and λ_f, each from every end in the item.
+fn each<const D: usize>(
+    end: &Property,
+    bonds: &dyn Bonds<D>,
+    displacement: &Field<D>,
+    chunk: usize,
+    visit: &mut dyn FnMut(&Bond<D>, f64),
+) {
+    let least = onset(end.least()).powi(2) - 1.0;
+    let sites = chunk_range(chunk, bonds.sites());
+    for [site, index] in bonds.suspects(displacement, sites, least * (1.0 - 1e-9) - 1e-12) {
+        let bond = Bond::new(site as usize, &bonds.bond(site as usize, index), displacement);
+        visit(&bond, end.weaker(bond.from, bond.to));
+    }
+}
+
+impl Lacking {
+    /// Of a displacement, with the fit that the kernels have.
+    pub fn new<const D: usize>(
+        material: &BondMaterial,
+        end: &Property,
+        fit: &KernelFit,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+    ) -> Self {
+        let (law, modulus) = (material.law(), material.modulus());
+        let of = |chunk: usize| {
+            let mut found: Vec<(u32, [f64; 3])> = Vec::new();
+            each(end, bonds, displacement, chunk, &mut |bond, end| {
+                let stretch = bond.stretch();
+                let borne = integrity(stretch, end);
+                if borne < 1.0 {
+                    let pull = borne * law.tension(stretch) / stretch - fit.value(bond.elongation());
+                    let size = 2.0 * modulus * bond.weight / bond.length * pull;
+                    let current = bond.current();
+                    let force = std::array::from_fn(|d| if d < D { size * current[d] } else { 0.0 });
+                    found.push((bond.from as u32, force));
+                }
+            });
+            found
+        };
+        Self((0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect())
+    }
+
+    /// Adds what the sites of `force`, from `start` on in one work item, lack.
+    pub fn add<const D: usize>(&self, start: usize, force: &mut [&mut [f64]; D]) {
+        let Some(lacking) = self.0.get(start / CHUNK) else { return };
+        let sites = start..start + force[0].len();
+        for (site, more) in lacking.iter().filter(|(site, _)| sites.contains(&(*site as usize))) {
+            (0..D).for_each(|d| force[d][*site as usize - start] += more[d]);
+        }
+    }
+}
+
+/// Energy that soft bonds lack against `table`, over kθ.
+pub(super) fn lacking_energy<const D: usize>(
+    material: &BondMaterial,
+    end: &Property,
+    table: &EnergyTable,
+    bonds: &dyn Bonds<D>,
+    displacement: &Field<D>,
+) -> f64 {
+    let law = material.law();
+    let of = |chunk: usize| {
+        let mut sum = 0.0;
+        each(end, bonds, displacement, chunk, &mut |bond, end| {
+            let stretch = bond.stretch();
+            if integrity(stretch, end) < 1.0 {
+                let more = softened_energy(law, stretch, end) - table.value(bond.elongation());
+                sum += bonds.volume(bond.from) * bond.weight * bond.length * more;
+            }
+        });
+        sum
+    };
+    let parts: Vec<f64> = (0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+    parts.iter().sum()
+}
