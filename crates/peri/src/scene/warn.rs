@@ -3,6 +3,7 @@
 use super::{Body, Scene};
 use crate::bonds::{Bonds, CellGrid, has_whole_family};
 use crate::geometry::{Cut, Operation, inside};
+use polycore::scene::Source;
 
 /// Grips that move so many horizons in one step jump over what breaks on the way.
 const LONGEST_STEP: f64 = 3.0;
@@ -13,14 +14,21 @@ const UNEVEN: f64 = 4.0;
 const ON_CRACK: f64 = 1e-6;
 
 /// One sentence for each.
-pub fn warnings<const D: usize>(scene: &Scene, body: &Body<D>) -> Vec<String> {
+pub fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Vec<String> {
     let bonds = &*body.bonds;
     let cracks = body.cuts.iter().enumerate().filter_map(|(index, cut)| on_crack(bonds, index, cut));
     let voids = (0..body.operations.len()).filter_map(|index| bridged(bonds, &body.operations, index));
     let contact = (scene.contact.is_some() && !scene.output.section.is_empty())
         .then(|| "the forces of `output.section` are those of bonds: contact is no part of them".to_owned());
+    let turns = super::rotation::chords(source, scene, body);
     let once = [volumes(scene, bonds, body.thickness), thin(bonds), long_steps(scene, bonds), contact];
-    once.into_iter().flatten().chain(cracks).chain(voids).collect()
+    once.into_iter()
+        .flatten()
+        .chain(cracks)
+        .chain(super::bridges::bridges(body))
+        .chain(turns)
+        .chain(voids)
+        .collect()
 }
 
 /// Volumes of a plane cloud that lack the thickness.
@@ -139,8 +147,8 @@ fn bridged<const D: usize>(
     }
     (across > 0).then(|| {
         format!(
-            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} bonds cross it; a \
-             crack through it breaks them",
+            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} bonds cross it, \
+             as `bond_gaps` asks",
             width * 1e3,
             ["x", "y", "z"][axis],
             horizon * 1e3

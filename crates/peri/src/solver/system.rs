@@ -105,10 +105,11 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// Begins friction of a load step where that did, and places rigid planes at its end.
+    /// Begins friction of a load step where that did, and places rigid planes and turned regions' rates at its end.
     pub(super) fn lag(&mut self, state: &State<D>) {
         let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let after = self.factors[state.step];
+        self.set_rates(after, after);
         if let Some(start) = &state.started
             && let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs())
         {
