@@ -71,7 +71,7 @@ impl<const D: usize> Gaps<D> {
     }
 
     /// Those between the parts of a cloud: points belong together that are nearer than 1.5 edges of the larger of their cubes. `None`
-    /// where there is one part.
+    /// where there is one part, or the parts have less than ten points in the mean: points then are far from cubes.
     pub fn of_points(points: &[[f64; D]], volumes: &[f64], thickness: f64) -> Option<Self> {
         let edges: Vec<f64> = volumes.iter().map(|v| JOINED * (v / thickness).powf(1.0 / D as f64)).collect();
         let largest = edges.iter().copied().fold(0.0, f64::max);
@@ -97,7 +97,8 @@ impl<const D: usize> Gaps<D> {
             }
         }
         let parts = points.iter().zip(parts).map(|(point, part)| (point.map(f64::to_bits), part)).collect();
-        (count > 1).then_some(Self { horizon: f64::INFINITY, closed: 0.0, kind: Kind::Points { parts } })
+        let parted = count > 1 && 10 * count as usize <= points.len();
+        parted.then_some(Self { horizon: f64::INFINITY, closed: 0.0, kind: Kind::Points { parts } })
     }
 
     /// What bonds of length `reach` from a point may meet; `None`: no gap.

@@ -1,6 +1,6 @@
 //! The parts of a body that do not touch, and which of them are bonded.
 
-use super::Body;
+use super::{Body, Scene};
 use crate::bonds::components;
 use crate::geometry::Operation;
 use std::collections::BTreeMap;
@@ -14,6 +14,26 @@ fn crosses<const D: usize>(body: &Body<D>, site: usize, other: usize) -> bool {
     let (here, there) = (bonds.position(site), bonds.position(other));
     let near = body.gaps.as_ref().and_then(|gaps| gaps.within(here, bonds.horizon() * (1.0 + 1e-9)));
     near.is_some_and(|near| near.severs(here, there))
+}
+
+/// A warning of points that fall into parts which are bonded, where nobody has asked for that.
+pub(super) fn bonded_parts<const D: usize>(scene: &Scene, body: &Body<D>) -> Option<String> {
+    if body.gaps.is_none() || scene.body.bond_gaps.is_some() {
+        return None;
+    }
+    let bonds = &*body.bonds;
+    let mut across = 0_u64;
+    for &site in bonds.particles() {
+        bonds.neighbours(site as usize, &mut |bond| {
+            across += u64::from((site as usize) < bond.site && crosses(body, site as usize, bond.site));
+        });
+    }
+    (across > 0).then(|| {
+        format!(
+            "the points fall into parts more than 1.5 edges of their cubes apart, which {across} bonds join: `body.bond_gaps = false` \
+             parts them, `true` says that this is meant"
+        )
+    })
 }
 
 /// Lines for `peri check`; none of a body without gaps.

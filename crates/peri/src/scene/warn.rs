@@ -21,7 +21,13 @@ pub fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) 
     let contact = (scene.contact.is_some() && !scene.output.section.is_empty())
         .then(|| "the forces of `output.section` are those of bonds: contact is no part of them".to_owned());
     let turns = super::rotation::chords(source, scene, body);
-    let once = [volumes(scene, bonds, body.thickness), thin(bonds), long_steps(scene, bonds), contact];
+    let once = [
+        volumes(scene, bonds, body.thickness),
+        thin(bonds),
+        long_steps(scene, bonds),
+        contact,
+        super::parts::bonded_parts(scene, body),
+    ];
     once.into_iter()
         .flatten()
         .chain(cracks)

@@ -6,6 +6,7 @@ use peri::model::Body;
 use peri::run::{Finished, Peri, run};
 use peri::scene::Scene;
 use polycore::case::{Case, Options, Run};
+use polycore::output::vtkhdf;
 use polycore::scene::Source;
 
 fn solve(text: &str) -> Finished {
@@ -344,4 +345,112 @@ displacement = ["0 mm", "1 mm"]
     assert!(check(&short).contains("body.cracks[0] ends less than a spacing"), "{}", check(&short));
     let long = strip("{ from = [\"-1 mm\", \"10 mm\"], to = [\"6 mm\", \"10 mm\"] }");
     assert!(!check(&long).contains("warning"), "{}", check(&long));
+}
+
+/// Damage counts what cracks of the scene break: of each particle the part of its bonds that a body without the crack has more, with and
+/// without bonds that may break.
+#[test]
+fn cracks_are_damage() {
+    let body = [boxed([0.0; 2], [10e-3, 20e-3])];
+    let bonds = |cuts: &[Cut<2>]| {
+        LatticeBonds::new(lattice(&body, 1e-3, 1e-3).unwrap(), 3.015, VolumeCorrection::None, cuts).unwrap()
+    };
+    let [whole, cracked] = [bonds(&[]), bonds(&[Cut::segment([-1e-3, 10e-3], [5e-3, 10e-3])])];
+    let lost = whole
+        .particles()
+        .iter()
+        .map(|&site| 1.0 - f64::from(cracked.bonded(site as usize)) / f64::from(whole.bonded(site as usize)));
+    let expected: Vec<f64> = lost.collect();
+    assert!(expected.iter().any(|&damage| damage > 0.3) && expected.iter().any(|&damage| damage == 0.0));
+    for critical in ["", "critical = { stretch = 5 }"] {
+        let text = format!(
+            r#"version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+spacing = "1 mm"
+shapes = [{{ add = "box", min = ["0 mm", "0 mm"], max = ["10 mm", "20 mm"] }}]
+cracks = [{{ from = ["-1 mm", "10 mm"], to = ["5 mm", "10 mm"] }}]
+[material]
+youngs_modulus = "2 MPa"
+law = "linear"
+{critical}
+[[boundary]]
+side = "y-"
+displacement = ["0 mm", "0 mm"]
+[[boundary]]
+side = "y+"
+displacement = ["0 mm", "0.1 mm"]
+[output]
+pictures = false
+"#
+        );
+        let directory = tempfile::tempdir().unwrap();
+        let source = Source::new("scene.toml", text);
+        let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
+        let mut own = Run::new(const { &Peri::PROGRAM }, &source, None, Options::new(directory.path()));
+        run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"));
+        let frames = vtkhdf::read(directory.path().join("dx-1mm_m-3.015.vtkhdf")).unwrap();
+        let damage = frames.data(frames.len() - 1, "damage").unwrap();
+        // fields are written in single precision
+        assert!(damage.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-6) && damage.len() == 200);
+    }
+}
+
+/// Grips of whole layers change the free length with the spacing; grips of a length that all spacings divide do not.
+#[test]
+fn free_lengths_of_a_study() {
+    let told = |depth: &str| {
+        check(&format!(
+            r#"version = 1
+program = "peri"
+[body]
+space = "plane-stress"
+thickness = "1 mm"
+shapes = [{{ add = "box", min = ["0 mm", "0 mm"], max = ["10 mm", "48 mm"] }}]
+[material]
+youngs_modulus = "2 MPa"
+law = "linear"
+[[boundary]]
+side = "y-"
+{depth}
+displacement = ["0 mm", "0 mm"]
+[[boundary]]
+side = "y+"
+{depth}
+displacement = ["0 mm", "1 mm"]
+[[study]]
+spacing = ["1 mm", "2 mm"]
+"#
+        ))
+    };
+    let layers = told("");
+    assert!(
+        layers.contains(
+            "between y- and y+ is 36.0000 mm at a spacing of 2.0000 mm and 42.0000 mm at 1.0000 mm"
+        ),
+        "{layers}"
+    );
+    let depth = told("depth = \"6 mm\"");
+    assert!(!depth.contains("warning") && depth.contains("6 layers, 6.0000 mm deep"), "{depth}");
+    assert!(told("depth = \"5 mm\"").contains("38.0000 mm at 1.0000 mm"), "{}", told("depth = \"5 mm\""));
+}
+
+/// A spacing of a nanometre, or a horizon of millions of spacings: errors that name cells and bytes, before memory is asked for.
+#[test]
+fn bodies_larger_than_memory_are_refused() {
+    let build = |spacing: f64, ratio: f64| {
+        let body = Body::lattice(Shape::cuboid([0.0; 3], [0.1, 0.05, 0.05]), spacing).horizon(ratio);
+        body.build().map(|_| ()).unwrap_err().to_string()
+    };
+    let error = build(1e-9, 3.015);
+    assert!(
+        error.contains("found 0.000000001 m") && error.contains("2.500e23 cells") && error.contains("GiB"),
+        "{error}"
+    );
+    assert!(build(1e-300, 3.015).contains("cells"), "{}", build(1e-300, 3.015));
+    assert!(build(0.01, 1e7).contains("cells"), "{}", build(0.01, 1e7));
+    let plane = Body::lattice(Shape::rectangle([0.0; 2], [1.0, 1.0]), 1e-9).build();
+    assert!(plane.map(|_| ()).unwrap_err().to_string().contains("1.000e18 cells"));
 }
