@@ -11,7 +11,9 @@ use crate::contact::{Contact, Plane};
 use crate::error::Error;
 use crate::material::{BondMaterial, Material};
 use crate::potential::KernelFit;
-use crate::solver::{Breaking, Loads, Method, Policy, Record, State, Status, Support, System};
+use crate::solver::{
+    Breaking, Loads, Method, Policy, Record, Rotation, State, Status, Support, System, Turned,
+};
 use crate::stress::{self, BallVolume, Loaded, Measure, Missing, Tensor};
 
 /// What a body can be made of: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
@@ -48,6 +50,8 @@ pub struct Model<const D: usize, M> {
     body: Body<D>,
     material: M,
     regions: Vec<(Region<D>, Support<D>)>,
+    /// Regions that turn, by their numbers.
+    rotations: Vec<(usize, Rotation<D>)>,
     factors: Vec<f64>,
     critical_stretch: Option<Property>,
     contact: Option<f64>,
@@ -57,8 +61,9 @@ pub struct Model<const D: usize, M> {
 impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
     /// A body without loads: one load step, bonds that break only where the material says so, no contact.
     pub fn new(body: Body<D>, material: M) -> Self {
-        let (regions, factors) = (Vec::new(), vec![1.0]);
-        Self { body, material, regions, factors, critical_stretch: None, contact: None, planes: Vec::new() }
+        let (regions, rotations, factors) = (Vec::new(), Vec::new(), vec![1.0]);
+        let planes = Vec::new();
+        Self { body, material, regions, rotations, factors, critical_stretch: None, contact: None, planes }
     }
 
     /// Fixes all components of a region.
@@ -69,6 +74,13 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
     /// Moves a region by a displacement, m, at load factor 1. Where regions overlap the last one counts.
     pub fn displace(self, region: impl Fn([f64; D]) -> bool + 'static, displacement: [f64; D]) -> Self {
         self.support(region, Support { displacement: displacement.map(Some), body_force: [0.0; D] })
+    }
+
+    /// Turns a region about an axis, along the arc: by the whole angle at load factor 1. Of turned regions that others overlap,
+    /// nothing else may be prescribed.
+    pub fn rotate(mut self, region: impl Fn([f64; D]) -> bool + 'static, rotation: Rotation<D>) -> Self {
+        self.rotations.push((self.regions.len(), rotation));
+        self.displace(region, [0.0; D])
     }
 
     /// Loads a region by a body force, N/m³, at load factor 1. Forces add up.
@@ -147,7 +159,13 @@ impl<const D: usize, M: IntoMaterial<D>> Model<D, M> {
             members.iter().for_each(|&site| loaded[site as usize] = true);
             regions.push((members, support));
         }
-        let loads = Loads::new(bonds.sites(), &regions);
+        let mut loads = Loads::new(bonds.sites(), &regions);
+        let holds = |support: &Support<D>| support.displacement.iter().any(Option::is_some);
+        for (number, rotation) in self.rotations {
+            let region = regions[..number].iter().filter(|(_, support)| holds(support)).count();
+            let (shift, components, sites) = ([0.0; D], (1 << D) - 1, regions[number].0.clone());
+            loads.turn(&bonds, Turned { rotation, shift, components, region, sites });
+        }
         let modulus = material.longitudinal_modulus(&bonds);
         let contact = match (self.contact, self.planes.is_empty()) {
             (None, true) => None,

@@ -112,6 +112,24 @@ pub struct Fragment {
 
 /// Parts of the body that hang together by intact bonds, single particles left out; the largest first.
 pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> Vec<Fragment> {
+    let roots = components(bonds, |_, _| true);
+    // by its first site, which is its root
+    let mut found: BTreeMap<u32, Fragment> = BTreeMap::new();
+    for &site in bonds.particles() {
+        let own = found.entry(roots[site as usize]).or_insert(Fragment { particles: 0, volume: 0.0 });
+        own.particles += 1;
+        own.volume += bonds.volume(site as usize);
+    }
+    let mut fragments: Vec<Fragment> = found.into_values().filter(|own| own.particles > 1).collect();
+    fragments.sort_by(|a, b| b.volume.total_cmp(&a.volume));
+    fragments
+}
+
+/// The first site of the part that each site hangs together with by intact bonds that `holds` accepts, by their sites.
+pub fn components<const D: usize, B: Bonds<D> + ?Sized>(
+    bonds: &B,
+    holds: impl Fn(usize, usize) -> bool,
+) -> Vec<u32> {
     let mut root: Vec<u32> = (0..bonds.sites() as u32).collect();
     let find = |root: &mut Vec<u32>, mut site: u32| {
         while root[site as usize] != site {
@@ -122,18 +140,11 @@ pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> Vec<Fragmen
     };
     for &site in bonds.particles() {
         bonds.neighbours(site as usize, &mut |bond| {
-            let (a, b) = (find(&mut root, site), find(&mut root, bond.site as u32));
-            root[a.max(b) as usize] = a.min(b);
+            if holds(site as usize, bond.site) {
+                let (a, b) = (find(&mut root, site), find(&mut root, bond.site as u32));
+                root[a.max(b) as usize] = a.min(b);
+            }
         });
     }
-    // by its first site, which is its root
-    let mut found: BTreeMap<u32, Fragment> = BTreeMap::new();
-    for &site in bonds.particles() {
-        let own = found.entry(find(&mut root, site)).or_insert(Fragment { particles: 0, volume: 0.0 });
-        own.particles += 1;
-        own.volume += bonds.volume(site as usize);
-    }
-    let mut fragments: Vec<Fragment> = found.into_values().filter(|own| own.particles > 1).collect();
-    fragments.sort_by(|a, b| b.volume.total_cmp(&a.volume));
-    fragments
+    (0..bonds.sites() as u32).map(|site| find(&mut root, site)).collect()
 }

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
-use crate::geometry::{Cut, cuts_within, severed};
+use crate::geometry::{Cut, Gaps, cuts_within, severed};
 use crate::potential::{KernelFit, StretchRange};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -88,6 +88,22 @@ impl<const D: usize> CloudBonds<D> {
         volume_correction: VolumeCorrection,
         cuts: &[Cut<D>],
     ) -> Result<Self, Error> {
+        Self::with_gaps(points, volumes, thickness, horizon, volume_correction, cuts, None)
+    }
+
+    /// As [`Self::new`], without the bonds that cross a gap.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_gaps(
+        points: &[[f64; D]],
+        volumes: &[f64],
+        thickness: f64,
+        horizon: f64,
+        volume_correction: VolumeCorrection,
+        cuts: &[Cut<D>],
+        gaps: Option<&Gaps<D>>,
+    ) -> Result<Self, Error> {
         if points.is_empty() {
             return Err(Error::geometry("the body contains no particle".to_owned()));
         }
@@ -117,6 +133,7 @@ impl<const D: usize> CloudBonds<D> {
             .map(|(own, &here)| {
                 let mut list = Vec::new();
                 let cuts = cuts_within(cuts, here, reach);
+                let gaps = gaps.and_then(|gaps| gaps.within(here, reach));
                 let (mut twin, mut parted) = (None, false);
                 grid.near(here, reach, |other| {
                     let square: f64 = (0..D).map(|d| (sorted[other][d] - here[d]).powi(2)).sum();
@@ -126,7 +143,7 @@ impl<const D: usize> CloudBonds<D> {
                     if other != own && square <= reach * reach {
                         if severed(&cuts, here, sorted[other]) {
                             parted = true;
-                        } else {
+                        } else if !gaps.as_ref().is_some_and(|gaps| gaps.severs(here, sorted[other])) {
                             list.push(other as u32);
                         }
                     }

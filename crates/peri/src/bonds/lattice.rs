@@ -7,13 +7,13 @@ use super::lattice_kernel::{Class, Factors, TILE, Tiles};
 use super::lattice_sums::{GradientSums, Span, Spans, Weights};
 use super::rows::{LatticeKernel, StencilBond, lattice_kernel};
 use super::softening::{Softened, Softening, integrity};
-use super::stencil::{Stencil, fullest, layout};
+use super::stencil::{Stencil, fullest, layout, storage};
 use super::{
     Bonds, Kind, Neighbour, Overstretched, VolumeCorrection, plain_force, refuse_one_sided, surface_weight,
 };
 use crate::error::Error;
 use crate::field::{Field, chunk_range};
-use crate::geometry::{Cut, Lattice};
+use crate::geometry::{Cut, Gaps, Lattice, refuse_too_large};
 use crate::potential::{KernelFit, StretchRange, TangentTable};
 use mixed::Mixed;
 use rayon::prelude::*;
@@ -53,15 +53,31 @@ impl<const D: usize> LatticeBonds<D> {
     ///
     /// # Errors
     /// [`Error::Geometry`] where no cell is occupied, the list of occupied cells does not fit the box, the spacing is not
-    /// positive, or the horizon is not finite or reaches no neighbour.
+    /// positive, the horizon is not finite or reaches no neighbour, or bonds need more memory than is left.
     pub fn new(
         lattice: Lattice<D>,
         ratio: f64,
         volume_correction: VolumeCorrection,
         cuts: &[Cut<D>],
     ) -> Result<Self, Error> {
+        Self::with_gaps(lattice, ratio, volume_correction, cuts, None)
+    }
+
+    /// As [`Self::new`], without the bonds that cross a gap.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_gaps(
+        lattice: Lattice<D>,
+        ratio: f64,
+        volume_correction: VolumeCorrection,
+        cuts: &[Cut<D>],
+        gaps: Option<&Gaps<D>>,
+    ) -> Result<Self, Error> {
         let (listed, cells) = (lattice.occupied.len(), lattice.cells);
-        if listed == 0 || listed != cells.iter().product::<usize>() {
+        if listed == 0
+            || cells.iter().try_fold(1, |product: usize, &n| product.checked_mul(n)) != Some(listed)
+        {
             return Err(Error::geometry(format!("a box of {cells:?} cells with {listed} listed")));
         }
         for (name, value) in
@@ -71,6 +87,10 @@ impl<const D: usize> LatticeBonds<D> {
                 return Err(Error::geometry(format!("{name}: found {value}; allowed: above 0, finite")));
             }
         }
+        let (sites, offsets) =
+            (storage(cells.map(|n| n as f64), ratio), (2.0 * ratio.floor() + 1.0).powi(D as i32));
+        let bytes = 8.0 * (offsets / 64.0).ceil() * sites + (4 * D) as f64 * offsets;
+        refuse_too_large(lattice.spacing, [sites, f64::from(u32::MAX)], bytes)?;
         let mut stencil = Stencil::<D>::new(ratio);
         if stencil.offsets.is_empty() {
             return Err(Error::geometry(format!("a horizon of {ratio} spacings reaches no neighbour")));
@@ -106,7 +126,7 @@ impl<const D: usize> LatticeBonds<D> {
         if bonds.particles.is_empty() {
             return Err(Error::geometry("the body contains no particle".to_owned()));
         }
-        bonds.connect(cuts);
+        bonds.connect(cuts, gaps);
         bonds.classify();
         refuse_one_sided(&bonds)?;
         Ok(bonds)
@@ -252,40 +272,6 @@ impl<const D: usize> LatticeBonds<D> {
         } else if let Some((fit, modulus)) = &self.table {
             plain_force(self, fit, *modulus, displacement, start, force, track);
         }
-    }
-
-    /// Which sites hold a particle.
-    pub fn occupancy(&self) -> Vec<bool> {
-        let mut occupied = vec![false; self.sites];
-        for &site in &self.particles {
-            occupied[site as usize] = true;
-        }
-        occupied
-    }
-
-    /// The site of the cell at `offset` from `cell`, if it lies in the box.
-    pub fn cell_at(&self, cell: [usize; D], offset: [i32; D]) -> Option<usize> {
-        let mut there = [0; D];
-        for d in 0..D {
-            there[d] =
-                cell[d].checked_add_signed(offset[d] as isize).filter(|&c| c < self.lattice.cells[d])?;
-        }
-        Some(self.site(there))
-    }
-
-    /// The cell of a site, if the site is one of the box's.
-    pub fn cell_of(&self, site: usize) -> Option<[usize; D]> {
-        let mut rest = site.checked_sub(self.guard)?;
-        let mut cell = [0; D];
-        for &d in self.order.iter().rev() {
-            cell[d] = rest / self.strides[d];
-            rest %= self.strides[d];
-        }
-        (0..D).all(|d| cell[d] < self.lattice.cells[d]).then_some(cell)
-    }
-
-    fn site(&self, cell: [usize; D]) -> usize {
-        self.guard + (0..D).map(|d| self.strides[d] * cell[d]).sum::<usize>()
     }
 
     fn occupied_sites(&self) -> Vec<u32> {

@@ -3,25 +3,32 @@
 use super::Bonds;
 
 /// A property of the particles: one value for all, which costs nothing, or a value for each site. A number is one: `3.0.into()`.
+/// Bonds may be weaker than both of their ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Property {
     /// Site by site; empty where all particles have `least`.
     values: Vec<f64>,
     least: f64,
     greatest: f64,
+    /// Bonds weaker than both ends, by their sites, ascending, each from both ends.
+    bonds: Vec<([u32; 2], f64)>,
 }
 
 impl From<f64> for Property {
     fn from(value: f64) -> Self {
-        Self { values: Vec::new(), least: value, greatest: value }
+        Self { values: Vec::new(), least: value, greatest: value, bonds: Vec::new() }
     }
 }
 
 impl Property {
     /// A field: `value` of the site and the position, m, of each particle.
     pub fn new<const D: usize>(bonds: &dyn Bonds<D>, value: impl Fn(usize, [f64; D]) -> f64) -> Self {
-        let mut field =
-            Self { values: vec![0.0; bonds.sites()], least: f64::INFINITY, greatest: f64::NEG_INFINITY };
+        let mut field = Self {
+            values: vec![0.0; bonds.sites()],
+            least: f64::INFINITY,
+            greatest: f64::NEG_INFINITY,
+            bonds: Vec::new(),
+        };
         for site in bonds.particles().iter().map(|&site| site as usize) {
             let value = value(site, bonds.position(site));
             field.values[site] = value;
@@ -35,21 +42,38 @@ impl Property {
     /// The value of the particle in a site.
     #[inline]
     pub fn at(&self, site: usize) -> f64 {
-        self.values.get(site).copied().unwrap_or(self.least)
+        self.values.get(site).copied().unwrap_or(self.greatest)
     }
 
-    /// The value of a bond that is as strong as the weaker of its ends.
+    /// Weakens single bonds, named by their sites from one end each, below the values of their ends.
+    #[must_use]
+    pub fn weakened(mut self, bonds: Vec<([u32; 2], f64)>) -> Self {
+        let below =
+            |&([site, other], value): &([u32; 2], f64)| value < self.weaker(site as usize, other as usize);
+        let weak: Vec<([u32; 2], f64)> = bonds.into_iter().filter(below).collect();
+        self.least = weak.iter().map(|bond| bond.1).fold(self.least, f64::min);
+        self.bonds = weak.iter().flat_map(|&([a, b], value)| [([a, b], value), ([b, a], value)]).collect();
+        self.bonds.sort_unstable_by_key(|bond| bond.0);
+        self
+    }
+
+    /// The value of a bond: that of the weaker of its ends, unless the bond is weaker than both.
     #[inline]
     pub fn weaker(&self, site: usize, other: usize) -> f64 {
-        if self.values.is_empty() { self.least } else { self.at(site).min(self.at(other)) }
+        let ends = if self.values.is_empty() { self.greatest } else { self.at(site).min(self.at(other)) };
+        if self.bonds.is_empty() {
+            return ends;
+        }
+        let found = self.bonds.binary_search_by_key(&[site as u32, other as u32], |bond| bond.0);
+        found.map_or(ends, |at| self.bonds[at].1)
     }
 
-    /// The one value of all particles; `None` of a field.
+    /// The one value of all particles and bonds; `None` of a field.
     pub fn uniform(&self) -> Option<f64> {
-        self.values.is_empty().then_some(self.least)
+        (self.values.is_empty() && self.bonds.is_empty()).then_some(self.least)
     }
 
-    /// The smallest value of any particle.
+    /// The smallest value of any particle or bond.
     pub fn least(&self) -> f64 {
         self.least
     }

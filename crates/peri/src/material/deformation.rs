@@ -266,6 +266,16 @@ impl<const D: usize> Point<D> {
         bond.direction().map(|x| size * x)
     }
 
+    /// The part of a bond's force density that is its own, T_IJ/V_J.
+    pub fn own_force(&self, bond: &Bond<D>) -> [f64; D] {
+        let nothing = Self::default();
+        let (linear, pull) = (self.linear(&nothing, bond), self.pull(&nothing, bond));
+        let relief =
+            self.relief.as_ref().map_or(SVector::zeros(), |own| own.piola * SVector::from(bond.relief));
+        let unit = 1.0 / (bond.length * bond.length);
+        std::array::from_fn(|a| unit * (linear[a] + relief[a]) + pull[a])
+    }
+
     /// The mean deformation; `None` where too few bonds are left.
     pub fn deformation(&self) -> Option<&Deformation<D>> {
         self.has_gradient().then_some(&self.deformation)

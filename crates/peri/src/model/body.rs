@@ -3,7 +3,7 @@
 use crate::bonds::{LatticeBonds, VolumeCorrection};
 use crate::calibrate::Space;
 use crate::error::Error;
-use crate::geometry::{Cut, Operation, Shape, lattice};
+use crate::geometry::{Cut, Gaps, Operation, Shape, lattice};
 use crate::surface::Surface;
 
 /// Shapes filled with particles on a regular lattice; lengths in m.
@@ -14,6 +14,7 @@ pub struct Body<const D: usize> {
     spacing: f64,
     ratio: f64,
     correction: VolumeCorrection,
+    bond_gaps: bool,
     pub(super) space: Space,
     pub(super) thickness: f64,
 }
@@ -28,6 +29,7 @@ impl<const D: usize> Body<D> {
             spacing,
             ratio: 3.015,
             correction: VolumeCorrection::None,
+            bond_gaps: false,
             space: if D == 2 { Space::PlaneStress } else { Space::Solid },
             thickness: 1.0,
         }
@@ -48,6 +50,12 @@ impl<const D: usize> Body<D> {
     /// A crack of zero width: no bond crosses it.
     pub fn crack(mut self, crack: Cut<D>) -> Self {
         self.cracks.push(crack);
+        self
+    }
+
+    /// Keeps the bonds across [`Gaps`]: between shapes that do not touch, and across cuts narrower than the horizon.
+    pub fn bond_gaps(mut self) -> Self {
+        self.bond_gaps = true;
         self
     }
 
@@ -78,7 +86,10 @@ impl<const D: usize> Body<D> {
             return Err(Error::geometry(format!("thickness: found {found} m; allowed: above 0, finite")));
         }
         let lattice = lattice(&self.operations, self.spacing, self.thickness)?;
-        LatticeBonds::new(lattice, self.ratio, self.correction, &self.cracks)
+        let gaps = (!self.bond_gaps)
+            .then(|| Gaps::of_shapes(&self.operations, &lattice, self.ratio * self.spacing))
+            .flatten();
+        LatticeBonds::with_gaps(lattice, self.ratio, self.correction, &self.cracks, gaps.as_ref())
     }
 }
 

@@ -3,8 +3,9 @@
 use super::material::Observed;
 use crate::bonds::{Bonds, Kind, covered_stretches};
 use crate::error::Error;
+use crate::geometry::Cut;
 use crate::potential::KernelFit;
-use crate::scene::Scene;
+use crate::scene::{Scene, severed_of_each};
 use crate::solver::{Record, State};
 use crate::stress::{self, Loaded, Measure, Measured, Missing, Tensor, cauchy, deformation_gradients};
 use polycore::constitutive::Flags;
@@ -20,8 +21,8 @@ pub type Fields<const D: usize> = Vec<(Measure, Vec<Tensor<D>>)>;
 pub struct Frames<'a, const D: usize> {
     scene: &'a Scene,
     observed: &'a Observed<'a, D>,
-    /// Intact bonds of each particle as the body was built, cracks taken off; only where bonds break.
-    whole: Option<Vec<u32>>,
+    /// Bonds of each particle without cracks, and how many these have broken; only where there are cracks, or bonds break.
+    whole: Option<[Vec<u32>; 2]>,
     series: Option<ParticleSeries>,
     path: PathBuf,
     /// The last step written.
@@ -88,19 +89,22 @@ pub(super) fn tensor_in_space<const D: usize>(t: &Tensor<D>) -> [f64; 9] {
 }
 
 impl<'a, const D: usize> Frames<'a, D> {
-    /// Begins, or continues after the steps in `state`. `bonds` are those of the body as it was built.
+    /// Begins, or continues after the steps in `state`. `bonds` are those of the body as it was built, with its cracks.
     ///
     /// # Errors
     /// Files that cannot be written or read.
     pub fn new(
         scene: &'a Scene,
         observed: &'a Observed<'a, D>,
-        bonds: &dyn Bonds<D>,
+        (bonds, cuts): (&dyn Bonds<D>, &[Cut<D>]),
         state: &State<D>,
         path: PathBuf,
         by_window: Vec<bool>,
     ) -> Result<Self, Error> {
-        let whole = scene.material.critical.is_some().then(|| all_intact(bonds));
+        let whole = (scene.material.critical.is_some() || !cuts.is_empty()).then(|| {
+            let cracked = severed_of_each(bonds, cuts);
+            [all_intact(bonds).iter().zip(&cracked).map(|(left, cracked)| left + cracked).collect(), cracked]
+        });
         let every = scene.output.every;
         let done = every.map_or(0, |every| frames_of(every, state));
         let series = match (scene.output.fields, done) {
@@ -150,14 +154,22 @@ impl<'a, const D: usize> Frames<'a, D> {
         Ok(())
     }
 
-    /// Broken bonds over those that the body was built with, particle by particle; cracks are no damage.
+    /// Broken bonds over those of the body without cracks, particle by particle: bonds that cracks of the scene break are damage.
     pub fn damage(&self, bonds: &dyn Bonds<D>) -> Option<Vec<f64>> {
-        let whole = self.whole.as_ref()?;
+        let [whole, _] = self.whole.as_ref()?;
         let now = all_intact(bonds);
         let part = |(&whole, &now): (&u32, &u32)| {
             if whole == 0 { 0.0 } else { 1.0 - f64::from(now) / f64::from(whole) }
         };
         Some(whole.iter().zip(&now).map(part).collect())
+    }
+
+    /// The sum of the damage that cracks of the scene are.
+    pub fn damage_of_cracks(&self) -> f64 {
+        let part = |(&whole, &cracked): (&u32, &u32)| {
+            if whole == 0 { 0.0 } else { 1.0 - f64::from(whole - cracked) / f64::from(whole) }
+        };
+        self.whole.as_ref().map_or(0.0, |[whole, cracked]| whole.iter().zip(cracked).map(part).sum())
     }
 
     /// Stresses of a state. The phase of a measure is what it would take alone ([`Measured::seconds`]).

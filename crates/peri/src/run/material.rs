@@ -6,7 +6,8 @@ use crate::correction::{bond_factors, surface_factors};
 use crate::critical::{Context, Critical, Crossing, Toughness, bilinear, energy_limit};
 use crate::error::Error;
 use crate::material::{
-    BondMaterial, Material, NonlocalSolid, PointLaw, Pointwise, Prestrained, Response, energy_at_strength,
+    BondMaterial, Family, Material, NonlocalSolid, PointLaw, Pointwise, Prestrained, Response,
+    energy_at_strength,
 };
 use crate::potential::{BondPotential, KernelFit};
 use crate::run::Failure;
@@ -284,6 +285,38 @@ impl<'a, const D: usize> Observed<'a, D> {
                 }
             }
         }
+    }
+
+    /// Σ V_I V_J (x_J − x_I) × T_IJ over the bonds of `sites` to the sites that `wanted` names, N m: bonds of solids are not parallel to their
+    /// forces, T_IJ − T_JI, and Σ_J V_J (x_J − x_I) × T_IJ = 0 in a whole family alone. With it, the moment of the forces of `sites` is what the
+    /// body transmits.
+    pub fn couple(
+        &self,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        sites: &[u32],
+        wanted: &dyn Fn(usize) -> bool,
+    ) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        let Self::Solid { states, .. } = self else { return sum };
+        let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
+        states.prepare(bonds, &state.displacement);
+        for site in sites.iter().map(|&site| site as usize) {
+            let (volume, points) = (bonds.volume(site), states.points());
+            Family::new(bonds, &state.displacement, site).each(|bond| {
+                if wanted(bond.to) {
+                    let part = points[site].own_force(&bond);
+                    let at = |of: &dyn Fn(usize) -> f64, d: usize| if d < D { of(d) } else { 0.0 };
+                    let (arm, pull) = (|d: usize| bond.reference[d] + bond.change[d], |d: usize| part[d]);
+                    for d in 0..3 {
+                        let (a, b) = ((d + 1) % 3, (d + 2) % 3);
+                        let cross = at(&arm, a) * at(&pull, b) - at(&arm, b) * at(&pull, a);
+                        sum[d] += volume * bond.volume * cross;
+                    }
+                }
+            });
+        }
+        sum
     }
 
     /// First Piola–Kirchhoff and Cauchy stress of a solid's law in every particle, Pa; `None` for bond laws.

@@ -104,7 +104,8 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     let fitting = (available() / memory) as usize;
     let at_once = if alone { 1 } else { rayon::current_num_threads().min(fitting).max(1) };
     let names: Vec<String> = variants.iter().map(Variant::name).collect();
-    let finished = variants::all::<D>(run, &names, at_once, |index, under_way, state| {
+    let lengths = scene::free_lengths::<D>(source, scene, &variants)?;
+    let mut finished = variants::all::<D>(run, &names, at_once, |index, under_way, state| {
         let variant = &variants[index];
         let (own_source, own_scene) = variant.resolve(source, scene)?;
         let study = variant.study.and_then(|index| scene.study.get(index));
@@ -129,6 +130,7 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
         outcome.description = study.and_then(|study| study.description.clone());
         Ok(outcome)
     })?;
+    finished.iter_mut().take(1).for_each(|outcome| outcome.warnings.extend(lengths.clone()));
     let mut report = compare::report(source, scene, &finished, quick);
     history::write(scene, &finished, output)?;
     compare::study(&finished, output)?;
@@ -184,7 +186,7 @@ fn run_variant<const D: usize>(
     let corrected = variant.surface == scene::SurfaceCorrection::Energy;
     let by_window = loaded.iter().map(|&loaded| loaded || corrected).collect();
     let observed = Observed::new(scene, &material, &*body.bonds);
-    let mut frames = Frames::new(scene, &observed, &*body.bonds, &state, path, by_window)?;
+    let mut frames = Frames::new(scene, &observed, (&*body.bonds, &body.cuts), &state, path, by_window)?;
     let solution = Solution {
         material: &material,
         observed: &observed,
@@ -267,6 +269,7 @@ fn run_variant<const D: usize>(
     let flagged: Option<Vec<f64>> =
         flagged.map(|flags| flags.iter().map(|flags| f64::from(u8::from(flags.any()))).collect());
     let damage = if seen_at_end && flagged.is_none() { frames.damage(&*body.bonds) } else { None };
+    let cracks = frames.damage_of_cracks();
     frames.finish(&*body.bonds, &state, &stresses)?;
     if scene.output.pictures {
         draw::maps(scene, &*body.bonds, &state, &stresses.cauchy, &outcome, output)?;
@@ -274,7 +277,7 @@ fn run_variant<const D: usize>(
             draw::flagged(&*body.bonds, &state, values, &outcome, output)?;
         }
         if staged {
-            stages::stages(scene, &outcome, body.bonds.spacing(), &path, output)?;
+            stages::stages(scene, &outcome, (body.bonds.spacing(), cracks), &path, output)?;
         } else if seen_at_end {
             let damage = damage.map(|damage| (solid::damage_field(), damage));
             let second = flagged.map(|flagged| (solid::flagged_field(), flagged)).or(damage);
@@ -439,7 +442,9 @@ fn explanation_in<const D: usize>(
     quick: bool,
 ) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
-    for variant in scene::check(source, scene, quick)? {
+    let variants = scene::check(source, scene, quick)?;
+    let lengths = scene::free_lengths::<D>(source, scene, &variants)?;
+    for variant in variants {
         if let Some(error) = expected_error(scene, &variant) {
             lines.push(format!("variant {}\n  expects    an error that contains `{error}`", variant.name()));
             continue;
@@ -451,5 +456,6 @@ fn explanation_in<const D: usize>(
         lines.extend(scene::explain_tearing(&scene, body, toughness.as_ref()));
         lines.extend(followed.iter().map(|one| format!("  follows    {one}")));
     }
+    lines.extend(lengths.into_iter().map(|text| format!("  warning    {text}")));
     Ok(lines)
 }

@@ -71,7 +71,8 @@ impl<const D: usize> Sections<D> {
     }
 
     /// Forces and moments of every section, as [`SectionSpec::values`] names them: F = Σ f_IJ V_I V_J over the intact bonds
-    /// from behind a plane to its front, and the moments of these forces, in deformed positions, about its point.
+    /// from behind a plane to its front, and the moments of these forces, in deformed positions, about its point; of solids with the
+    /// couples of their bonds ([`Observed::couple`]).
     pub fn see(&self, bonds: &dyn Bonds<D>, state: &State<D>, observed: &Observed<D>) -> Vec<f64> {
         let mut seen = Vec::new();
         for section in &self.each {
@@ -89,6 +90,8 @@ impl<const D: usize> Sections<D> {
                     force[d] += sum[d];
                 }
             });
+            let couple = observed.couple(bonds, state, &section.behind, &in_front);
+            (0..3).for_each(|d| moment[d] += couple[d]);
             seen.extend(force);
             seen.extend(&moment[if D == 3 { 0 } else { 2 }..]);
         }

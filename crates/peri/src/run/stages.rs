@@ -18,13 +18,13 @@ use std::path::Path;
 pub fn stages(
     scene: &Scene,
     outcome: &Outcome,
-    spacing: f64,
+    (spacing, cracks): (f64, f64),
     series: &Path,
     output: &Path,
 ) -> Result<(), Error> {
     let frames = vtkhdf::read(series)?;
     let damages: Vec<f64> = (0..frames.len())
-        .map(|k| Ok(frames.data(k, "damage")?.iter().sum()))
+        .map(|k| Ok(since(frames.data(k, "damage")?.iter().sum(), cracks)))
         .collect::<Result<_, Error>>()?;
     // the step of the peak load, which the damage does not determine
     let peak = outcome.history.iter().enumerate().max_by(|a, b| a.1.load.total_cmp(&b.1.load));
@@ -109,6 +109,12 @@ pub fn stages(
     }
     map.write(output.join(format!("stages_{}.png", outcome.file_name())))?;
     Ok(())
+}
+
+/// Damage beside that of the scene's cracks; a sum of both has rounding.
+fn since(damage: f64, cracks: f64) -> f64 {
+    let since = damage - cracks;
+    if since > 3e-7 * cracks { since } else { 0.0 }
 }
 
 /// How stages are laid out: side by side, damage under stress; wide bodies one under another, damage beside stress.

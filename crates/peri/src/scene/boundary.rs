@@ -2,7 +2,7 @@
 
 use super::ShapeSpec;
 use super::formula::Formula;
-use polycore::units::{Force, Length, Speed, Stress};
+use polycore::units::{Angle, Force, Length, Speed, Stress};
 use serde::Deserialize;
 
 /// A region and its conditions.
@@ -13,8 +13,10 @@ pub struct Boundary {
     pub name: Option<String>,
     /// A side of the body's bounding box …
     pub side: Option<Side>,
-    /// … to this depth in particles; default: the horizon, rounded down.
+    /// … to this depth in particles; default: the horizon, rounded down …
     pub layers: Option<usize>,
+    /// … or to this depth as a length: particles whose centres lie in it.
+    pub depth: Option<Length>,
     /// Or a box: lower corner …
     pub min: Option<Vec<Length>>,
     /// … and upper corner.
@@ -30,6 +32,8 @@ pub struct Boundary {
     pub velocity: Option<Vec<Speed>>,
     /// Displacement at the end of the last step, component by component: a length or `"free"`.
     pub displacement: Option<Vec<Prescribed>>,
+    /// A turn about an axis, along the arc; `displacement` adds to it.
+    pub rotation: Option<RotationSpec>,
     /// The same as formulas of the place, m.
     pub displacement_field: Option<Vec<PrescribedField>>,
     /// Velocity at the start as formulas of the place, m/s.
@@ -39,13 +43,40 @@ pub struct Boundary {
 impl Boundary {
     /// Whether displacements are prescribed here.
     pub fn holds(&self) -> bool {
-        self.displacement.is_some() || self.displacement_field.is_some()
+        self.displacement.is_some() || self.displacement_field.is_some() || self.rotation.is_some()
+    }
+
+    /// Layers of particles at a side that it acts on.
+    pub fn layers_of(&self, spacing: f64, horizon_ratio: f64) -> usize {
+        match (self.depth, self.layers) {
+            // centres lie half a spacing inside
+            (Some(depth), _) => (depth.si() / spacing + 0.5 + 1e-9).floor() as usize,
+            (None, layers) => layers.unwrap_or(horizon_ratio.floor() as usize).max(1),
+        }
+    }
+
+    /// The key of its depth from a side, where one is given.
+    pub fn depth_key(&self) -> Option<&'static str> {
+        let keys = [("layers", self.layers.is_some()), ("depth", self.depth.is_some())];
+        keys.into_iter().find_map(|(name, given)| given.then_some(name))
     }
 
     /// Whether it gives a velocity at the start.
     pub fn moves(&self) -> bool {
         self.velocity.is_some() || self.velocity_field.is_some()
     }
+}
+
+/// A turn of a region about an axis, of a plane body about a point.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RotationSpec {
+    /// A point of the axis.
+    pub point: Vec<Length>,
+    /// Direction of the axis, of any length, in a solid.
+    pub axis: Option<Vec<f64>>,
+    /// Angle at the end of the last step, of the right hand about the axis; in the plane from x to y.
+    pub angle: Angle,
 }
 
 /// Sides of the bounding box.

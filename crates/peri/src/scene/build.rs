@@ -8,13 +8,12 @@ use super::variant::Variant;
 use super::{Axis, Scene, ShapeKind, ShapeSpec};
 use crate::bonds::{Bonds, LatticeBonds};
 use crate::calibrate::Space;
-use crate::geometry::{Cut, Operation, Shape, bounds, cell_counts, lattice};
+use crate::geometry::{Cut, Gaps, MOST_CELLS, Operation, Shape, bounds, cell_counts, lattice};
 use polycore::memory::{available, gib};
 use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
 
-/// Cells and sites a body may have at most, whatever memory there is: sites are counted in 32 bits.
-const MOST_CELLS: f64 = 2e9;
+/// Sites a body may have at most, whatever memory there is: they are counted in 32 bits.
 const MOST_SITES: f64 = u32::MAX as f64;
 
 /// Builds the body of a variant.
@@ -57,8 +56,12 @@ fn filled<const D: usize>(
         let found = format!("{} m, with which the volume of a particle is {volume} m³", variant.spacing);
         return Err(source.error(spacing_key(scene), found, "a spacing whose cells have a volume"));
     }
-    let mut bonds = LatticeBonds::new(lattice, variant.horizon_ratio, variant.volume, cuts)
-        .map_err(|error| source.error("body.horizon_ratio", error, "a horizon that reaches a neighbour"))?;
+    let gaps = Gaps::of_shapes(&operations, &lattice, variant.horizon_ratio * variant.spacing);
+    let severing = gaps.as_ref().filter(|_| scene.body.bond_gaps != Some(true));
+    let mut bonds = LatticeBonds::with_gaps(lattice, variant.horizon_ratio, variant.volume, cuts, severing)
+        .map_err(|error| {
+        source.error("body.horizon_ratio", error, "a horizon that reaches a neighbour")
+    })?;
     if bonds.directed_bonds() == 0 {
         let found = format!(
             "{} m, which leaves {} particles without any bond",
@@ -76,7 +79,8 @@ fn filled<const D: usize>(
     }
     memory::refuse_too_large(source, scene, spacing_key(scene), &bonds)?;
     let (severed, cuts) = (Vec::new(), Vec::new());
-    Ok(Body { bonds: Box::new(bonds), bounds: (low, high), thickness, severed, cuts, operations })
+    let bonds = Box::new(bonds);
+    Ok(Body { bonds, bounds: (low, high), thickness, severed, cuts, gaps, operations })
 }
 
 /// Bytes that a variant needs at least, as far as its lattice determines it, before anything of it is built; 0 for a cloud.
@@ -98,7 +102,7 @@ pub fn least_memory<const D: usize>(
 /// Operations on shapes, and the box around what they add.
 type Outline<const D: usize> = (Vec<Operation<D>>, [f64; D], [f64; D]);
 
-fn outline<const D: usize>(source: &Source, scene: &Scene) -> Result<Outline<D>, SceneError> {
+pub(super) fn outline<const D: usize>(source: &Source, scene: &Scene) -> Result<Outline<D>, SceneError> {
     let operations = operations(source, "body.shapes", scene.body.shapes())?;
     let (low, high) = bounds(&operations)
         .ok_or_else(|| source.error("body.shapes", "no shape is added", "at least one shape with `add`"))?;

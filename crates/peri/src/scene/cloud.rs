@@ -6,7 +6,7 @@ use super::memory;
 use super::values::{Body, LARGEST_RATIO, needed, ordered, positive, vector};
 use super::variant::Variant;
 use crate::bonds::{Bonds, CloudBonds, LatticeBonds};
-use crate::geometry::{Cut, recognise};
+use crate::geometry::{Cut, Gaps, recognise};
 use polycore::memory::{available, gib};
 use polycore::scene::{SceneError, Source};
 use std::collections::HashMap;
@@ -41,17 +41,21 @@ pub fn cloud<const D: usize>(
         }
         (None, None) => return Err(source.error("body.points", "nothing", "`points` or a `grid`")),
     };
-    if let Some(body) = regular(&positions, &volumes, thickness, horizon, variant, cuts) {
+    if let Some(body) = regular(&positions, &volumes, thickness, horizon, (scene, variant), cuts) {
         memory::refuse_too_large(source, scene, key, &*body.bonds)?;
         return Ok(body);
     }
     refuse_too_many_bonds(source, &positions, horizon)?;
+    // cells of a grid may be far from cubes
+    let gaps = scene.body.points.as_ref().and_then(|_| Gaps::of_points(&positions, &volumes, thickness));
+    let severing = gaps.as_ref().filter(|_| scene.body.bond_gaps == Some(false));
     let bonds =
-        CloudBonds::new(&positions, &volumes, thickness, horizon, variant.volume, cuts).map_err(|error| {
-            let file =
-                scene.body.points.as_ref().map_or(String::new(), |path| format!("{}: ", path.display()));
-            source.error(key, format!("{file}{error}"), "distinct points with volumes above 0")
-        })?;
+        CloudBonds::with_gaps(&positions, &volumes, thickness, horizon, variant.volume, cuts, severing)
+            .map_err(|error| {
+                let file =
+                    scene.body.points.as_ref().map_or(String::new(), |path| format!("{}: ", path.display()));
+                source.error(key, format!("{file}{error}"), "distinct points with volumes above 0")
+            })?;
     if bonds.directed_bonds() == 0 {
         let found = format!("{horizon} m, which reaches no neighbour");
         return Err(source.error("body.horizon", found, "larger"));
@@ -69,6 +73,7 @@ pub fn cloud<const D: usize>(
         thickness,
         severed: Vec::new(),
         cuts: Vec::new(),
+        gaps,
         operations: Vec::new(),
     })
 }
@@ -79,7 +84,7 @@ fn regular<const D: usize>(
     volumes: &[f64],
     thickness: f64,
     horizon: f64,
-    variant: &Variant,
+    (scene, variant): (&Scene, &Variant),
     cuts: &[Cut<D>],
 ) -> Option<Body<D>> {
     let lattice = recognise(positions, volumes, thickness)?;
@@ -91,13 +96,16 @@ fn regular<const D: usize>(
     }
     let low = lattice.origin.map(|x| x - 0.5 * lattice.spacing);
     let high: [f64; D] = std::array::from_fn(|d| low[d] + lattice.cells[d] as f64 * lattice.spacing);
-    let bonds = LatticeBonds::new(lattice, ratio, variant.volume, cuts).ok()?;
+    let gaps = Gaps::of_cells(&lattice);
+    let severing = gaps.as_ref().filter(|_| scene.body.bond_gaps != Some(true));
+    let bonds = LatticeBonds::with_gaps(lattice, ratio, variant.volume, cuts, severing).ok()?;
     (bonds.directed_bonds() > 0).then(|| Body {
         bonds: Box::new(bonds),
         bounds: (low, high),
         thickness,
         severed: Vec::new(),
         cuts: Vec::new(),
+        gaps,
         operations: Vec::new(),
     })
 }

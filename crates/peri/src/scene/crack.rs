@@ -3,7 +3,7 @@
 use super::Scene;
 use super::values::vector;
 use crate::bonds::{Bonds, CellGrid};
-use crate::geometry::Cut;
+use crate::geometry::{Cut, cuts_within, severed as severs};
 use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
 
@@ -86,6 +86,28 @@ pub(super) fn severed<const D: usize>(
         Ok(severed)
     };
     cuts.iter().enumerate().map(count).collect()
+}
+
+/// Bonds of each particle that the cracks of a body break together.
+pub fn severed_of_each<const D: usize>(bonds: &dyn Bonds<D>, cuts: &[Cut<D>]) -> Vec<u32> {
+    let reach = bonds.horizon() * (1.0 + 1e-9);
+    let mut counts = vec![0; bonds.particles().len()];
+    let places = bonds.particles().iter().map(|&site| bonds.position(site as usize)).enumerate();
+    let near = |place: &[f64; D]| cuts.iter().any(|cut| cut.is_within(*place, reach));
+    let (own, places): (Vec<usize>, Vec<[f64; D]>) = places.filter(|(_, place)| near(place)).unzip();
+    if own.is_empty() {
+        return counts;
+    }
+    let grid = CellGrid::new(&places, reach);
+    for (k, &here) in places.iter().enumerate() {
+        let cuts = cuts_within(cuts, here, reach);
+        grid.near(here, reach, |other| {
+            let square: f64 = (0..D).map(|d| (places[other][d] - here[d]).powi(2)).sum();
+            counts[own[k]] +=
+                u32::from(other != k && square <= reach * reach && severs(&cuts, here, places[other]));
+        });
+    }
+    counts
 }
 
 /// Whether |a × b| vanishes to rounding.

@@ -50,6 +50,7 @@ pub fn explain<const D: usize>(
             .collect();
         builds(format!("a crack, ({}) mm: {severed} bonds broken", corners.join(") – (")));
     }
+    lines.extend(super::parts::explain(body));
     lines.extend(super::loads::explain(source, scene, body)?);
     lines.push(format!("  needs      {}", polycore::memory::needs(super::memory_needed(scene, bonds))));
     let mut builds = |text: String| lines.push(format!("  builds     {text}"));

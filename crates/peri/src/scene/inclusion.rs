@@ -7,10 +7,12 @@ use crate::bonds::{Bonds, Property};
 use crate::calibrate::{Space, poisson_ratio};
 use crate::critical::Critical;
 use crate::error::Error;
+use crate::geometry::Shape;
 use polycore::scene::{SceneError, Source};
 use polycore::units::{EnergyPerArea, Ratio};
 use serde::Deserialize;
 use std::array;
+use std::collections::HashMap;
 
 /// A part of the body whose bonds are stiffer or softer; a bond across its border has the mean of both.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -21,7 +23,8 @@ pub struct Inclusion {
     /// Its stiffness over that of the rest; default: 1.
     #[serde(default = "whole")]
     pub stiffness: f64,
-    /// When its bonds break, instead of `material.critical`; a bond across its border breaks as the weaker side does.
+    /// When its bonds break, instead of `material.critical`; a bond that ends in it or passes through it breaks as the weakest
+    /// part on its way does, so that a layer may be thinner than the spacing.
     pub critical: Option<Critical>,
     /// ε*: the strain that it would have if it were free, the same in all directions; those of several parts add up.
     pub prestrain: Option<Ratio>,
@@ -50,7 +53,7 @@ pub struct Inclusions<'a, const D: usize> {
     /// ε* site by site, where there is any.
     pub prestrain: Option<Vec<[[f64; D]; D]>>,
     /// The inclusions, and their particles' sites.
-    each: Vec<(&'a Inclusion, Vec<u32>)>,
+    each: Vec<(&'a Inclusion, Shape<D>, Vec<u32>)>,
 }
 
 impl<'a, const D: usize> Inclusions<'a, D> {
@@ -90,14 +93,17 @@ impl<'a, const D: usize> Inclusions<'a, D> {
             let shape = shape::<D>(source, &key, kind, &inclusion.shape)?;
             let inside = |&site: &u32| shape.contains(bonds.position(site as usize));
             let members: Vec<u32> = bonds.particles().iter().copied().filter(inside).collect();
-            if members.is_empty() {
+            // a layer between particles may still be a weak one
+            let acts =
+                inclusion.stiffness != 1.0 || inclusion.prestrain.is_some() || inclusion.critical.is_none();
+            if members.is_empty() && acts {
                 return Err(source.error(&key, "a shape without particles", "a shape with at least one"));
             }
             members.iter().for_each(|&site| stiffness[site as usize] *= inclusion.stiffness);
             if let Some(strain) = inclusion.prestrain {
                 members.iter().for_each(|&site| prestrain[site as usize] += strain.si());
             }
-            each.push((inclusion, members));
+            each.push((inclusion, shape, members));
         }
         let at = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
         let fracture_energy = following(Parameter::FractureEnergy).cloned();
@@ -140,7 +146,7 @@ impl<'a, const D: usize> Inclusions<'a, D> {
                 })?;
             }
         }
-        for (index, (inclusion, members)) in self.each.iter().enumerate() {
+        for (index, (inclusion, _, members)) in self.each.iter().enumerate() {
             let Some(critical) = inclusion.critical else { continue };
             let key = format!("material.inclusions[{index}].critical");
             let fault = |error| match error {
@@ -159,9 +165,93 @@ impl<'a, const D: usize> Inclusions<'a, D> {
                 last = Some((stiffness, own));
             }
         }
-        Ok(Property::new(bonds, |site, _| stretch.get(site).copied().unwrap_or(rest)))
+        let property = Property::new(bonds, |site, _| stretch.get(site).copied().unwrap_or(rest));
+        if self.each.iter().all(|(inclusion, ..)| inclusion.critical.is_none()) {
+            return Ok(property);
+        }
+        let weak = self.passing(source, bonds, resolve)?;
+        for (index, (_, _, members)) in self.each.iter().enumerate() {
+            if members.is_empty() && !weak.iter().any(|one| one.0.contains(&index)) {
+                let key = format!("material.inclusions[{index}].shape");
+                let found = "a shape without particles, and without bonds that pass through it";
+                return Err(source.error(&key, found, "a shape with at least one"));
+            }
+        }
+        Ok(property.weakened(weak.into_iter().map(|(_, bond, value)| (bond, value)).collect()))
+    }
+
+    /// Bonds that pass through inclusions with a critical stretch: these, the bond's sites and the least critical stretch on its way between
+    /// the ends.
+    fn passing(
+        &self,
+        source: &Source,
+        bonds: &dyn Bonds<D>,
+        resolve: &dyn Fn(Critical, f64) -> Result<f64, Error>,
+    ) -> Result<Vec<Passing>, SceneError> {
+        let reach = bonds.horizon() * (1.0 + 1e-9);
+        let mut known: HashMap<(usize, u64), f64> = HashMap::new();
+        let mut found = Vec::new();
+        for &site in bonds.particles() {
+            let here = bonds.position(site as usize);
+            let near = |shape: &Shape<D>| {
+                let (low, high) = shape.bounds();
+                (0..D).all(|d| low[d] - reach <= here[d] && here[d] <= high[d] + reach)
+            };
+            let near: Vec<usize> = (0..self.each.len()).filter(|&index| near(&self.each[index].1)).collect();
+            if near.iter().all(|&index| self.each[index].0.critical.is_none()) {
+                continue;
+            }
+            // of the rest of the body at this end
+            let inside = |place| near.iter().filter(move |&&index| self.each[index].1.contains(place));
+            let stiffness = |place| inside(place).map(|&index| self.each[index].0.stiffness).product::<f64>();
+            let rest = self.micromodulus.at(site as usize) / stiffness(here);
+            let mut others = Vec::new();
+            bonds.neighbours(site as usize, &mut |bond| {
+                if site < bond.site as u32 {
+                    others.push(bond.site as u32);
+                }
+            });
+            for other in others {
+                let there = bonds.position(other as usize);
+                let mut ends: Vec<f64> =
+                    near.iter().filter_map(|&index| self.each[index].1.span(here, there)).flatten().collect();
+                ends.sort_by(f64::total_cmp);
+                let mut passing = (Vec::new(), [site, other], f64::INFINITY);
+                for pair in ends.windows(2).filter(|pair| pair[1] - pair[0] > THIN) {
+                    let part = 0.5 * (pair[0] + pair[1]);
+                    let place: [f64; D] = array::from_fn(|d| here[d] + part * (there[d] - here[d]));
+                    let last =
+                        inside(place).rev().find_map(|&index| Some((index, self.each[index].0.critical?)));
+                    let Some((index, critical)) = last else { continue };
+                    let stiffness = rest * stiffness(place);
+                    let value = match known.get(&(index, stiffness.to_bits())) {
+                        Some(&value) => value,
+                        None => resolve(critical, stiffness).map_err(|error| {
+                            source.error(
+                                &format!("material.inclusions[{index}].critical"),
+                                error,
+                                "a critical stretch",
+                            )
+                        })?,
+                    };
+                    known.insert((index, stiffness.to_bits()), value);
+                    passing.0.push(index);
+                    passing.2 = passing.2.min(value);
+                }
+                if !passing.0.is_empty() {
+                    found.push(passing);
+                }
+            }
+        }
+        Ok(found)
     }
 }
+
+/// Part of a bond's length that is none: where faces meet.
+const THIN: f64 = 1e-6;
+
+/// Inclusions that a bond passes through, its sites, and the least critical stretch in them.
+type Passing = (Vec<usize>, [u32; 2], f64);
 
 #[cfg(test)]
 mod tests {

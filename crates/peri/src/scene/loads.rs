@@ -29,10 +29,11 @@ pub fn loads_of<const D: usize>(
         }
         let forced =
             boundary.traction.is_some() || boundary.force.is_some() || boundary.displacement.is_some();
+        let forced = forced || boundary.rotation.is_some();
         for &site in members.iter().filter(|_| forced) {
             loaded[site as usize] = true;
         }
-        let by_area = scene.material.solid.is_some() && boundary.layers.is_none();
+        let by_area = scene.material.solid.is_some() && boundary.layers.is_none() && boundary.depth.is_none();
         let support = support(source, &key, boundary, body, &members, depth.filter(|_| !by_area))?;
         if let (Some(side), Some(traction), true) = (boundary.side, &boundary.traction, by_area) {
             tractions.push((side, std::array::from_fn(|d| traction[d].si())));
@@ -44,6 +45,7 @@ pub fn loads_of<const D: usize>(
         add_traction(body, side, traction, &mut loads, &mut loaded);
     }
     follow_formulas(source, scene, body, &regions, &mut loads)?;
+    super::rotation::turn(source, scene, body, &regions, &mut loads)?;
     if scene.method() == Method::Verlet {
         // a body in motion needs neither balance nor hold
         return Ok((loads, loaded));
@@ -270,7 +272,7 @@ fn name_of(index: usize, boundary: &Boundary) -> String {
 
 /// Layers of particles at a side that a boundary acts on.
 pub(super) fn layers<const D: usize>(boundary: &Boundary, bonds: &dyn crate::bonds::Bonds<D>) -> usize {
-    boundary.layers.unwrap_or((bonds.horizon() / bonds.spacing()).floor() as usize).max(1)
+    boundary.layers_of(bonds.spacing(), bonds.horizon() / bonds.spacing())
 }
 
 pub(super) fn region<const D: usize>(
@@ -290,16 +292,33 @@ pub(super) fn region<const D: usize>(
                     "a side along x or y of a plane body",
                 ));
             }
+            let name = boundary.depth_key().unwrap_or("layers");
+            if boundary.depth.is_some() && boundary.layers.is_some() {
+                return Err(source.error(
+                    &format!("{key}.depth"),
+                    "`depth` together with `layers`",
+                    "one of them",
+                ));
+            }
             if boundary.layers == Some(0) {
                 return Err(source.error(&format!("{key}.layers"), 0, "at least 1"));
             }
             let layers = layers(boundary, &*body.bonds);
-            let depth = layers as f64 * spacing;
+            // particles of a lattice fill whole layers
+            let depth = match boundary.depth {
+                Some(depth) if body.bonds.as_lattice().is_none() => depth.si(),
+                _ => layers as f64 * spacing,
+            };
+            if depth <= 0.0 || boundary.depth.is_some_and(|depth| depth.si() <= 0.0) {
+                let found = format!("{} m", boundary.depth.map_or(0.0, |depth| depth.si()));
+                let allowed = format!("at least half a spacing, {} m: it holds no particle", 0.5 * spacing);
+                return Err(source.error(&format!("{key}.depth"), found, allowed));
+            }
             let extent = body.bounds.1[axis] - body.bounds.0[axis];
             if depth > extent * (1.0 + 1e-9) {
                 let found = format!("{layers} layers, {depth} m deep");
                 return Err(source.error(
-                    &format!("{key}.layers"),
+                    &format!("{key}.{name}"),
                     found,
                     format!("at most the body, {extent} m"),
                 ));
@@ -313,10 +332,10 @@ pub(super) fn region<const D: usize>(
             (low, high, Some(depth))
         }
         (None, Some(min), Some(max)) if boundary.shapes.is_empty() => {
-            if boundary.layers.is_some() {
+            if let Some(name) = boundary.depth_key() {
                 return Err(source.error(
-                    &format!("{key}.layers"),
-                    "`layers`",
+                    &format!("{key}.{name}"),
+                    format!("`{name}`"),
                     "nothing: the box has its own depth",
                 ));
             }
@@ -325,7 +344,7 @@ pub(super) fn region<const D: usize>(
             ordered(source, key, min, max)?;
             (min, max, None)
         }
-        (None, None, None) if !boundary.shapes.is_empty() && boundary.layers.is_none() => {
+        (None, None, None) if !boundary.shapes.is_empty() && boundary.depth_key().is_none() => {
             ([f64::NEG_INFINITY; D], [f64::INFINITY; D], None)
         }
         (side, min, max) => {
@@ -403,6 +422,12 @@ fn support<const D: usize>(
             Prescribed::At(value) => Some(value),
         });
     }
+    if super::rotation::rotation_of::<D>(source, key, boundary)?.is_some() {
+        for (d, component) in support.displacement.iter_mut().enumerate() {
+            let free = boundary.displacement.as_ref().is_some_and(|given| given[d] == Prescribed::Free);
+            *component = if free { None } else { Some(component.unwrap_or(0.0)) };
+        }
+    }
     if let Some(field) = &boundary.displacement_field {
         count("displacement_field", field.len())?;
         either("displacement_field", boundary.displacement.is_some(), "displacement")?;
@@ -427,7 +452,7 @@ fn support<const D: usize>(
         return Err(source.error(
             key,
             "a region without a condition",
-            "`traction`, `force`, `displacement` or, in explicit dynamics, `velocity`",
+            "`traction`, `force`, `displacement`, `rotation` or, in explicit dynamics, `velocity`",
         ));
     }
     Ok(support)

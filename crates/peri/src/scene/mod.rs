@@ -1,6 +1,7 @@
 //! The scene of a peridynamic problem, as written in TOML. Only what a scene names is built.
 
 mod boundary;
+mod bridges;
 mod build;
 mod cells;
 mod check;
@@ -12,30 +13,34 @@ mod explain;
 mod field;
 mod followed;
 mod formula;
+mod grips;
 mod inclusion;
 mod line;
 mod loads;
 mod memory;
 mod method;
+mod parts;
 mod placement;
 mod planes;
 mod probe;
+mod rotation;
 mod solid;
 mod tearing;
 mod values;
 mod variant;
 mod warn;
 
-pub use boundary::{Boundary, Prescribed, PrescribedField, Side};
+pub use boundary::{Boundary, Prescribed, PrescribedField, RotationSpec, Side};
 pub use build::{body_of, least_memory};
 pub use check::{check, check_variant};
 pub use contact::{ContactSpec, PlaneSpec, of_plane, tied_grips};
-pub use crack::cuts_of;
+pub use crack::{cuts_of, severed_of_each};
 pub use expect::{quantities, quantities_of};
 pub use explain::explain;
 pub use field::{FieldSpec, Parameter};
 pub use followed::{Followed, followed};
 pub use formula::Formula;
+pub use grips::free_lengths;
 pub use inclusion::{Inclusion, Inclusions};
 pub use line::{LineField, SectionSpec, line_fields};
 pub use loads::{loads_of, region_names, velocities_of};
@@ -131,6 +136,9 @@ pub struct BodySpec {
     pub points: Option<PathBuf>,
     /// A box of cells that may have unequal sides, with `horizon`.
     pub grid: Option<GridSpec>,
+    /// Bonds across gaps: between parts that do not touch and across cuts narrower than the horizon. Default: false; of points
+    /// that form no lattice: true.
+    pub bond_gaps: Option<bool>,
     /// Cracks of zero width.
     #[serde(default)]
     pub cracks: Vec<CrackSpec>,

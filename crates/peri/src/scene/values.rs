@@ -1,7 +1,7 @@
 //! What readers of several blocks share: checks of single values, and the body that they refer to.
 
 use crate::bonds::Bonds;
-use crate::geometry::{Cut, Operation};
+use crate::geometry::{Cut, Gaps, Operation};
 use crate::surface::Surface;
 use polycore::scene::{SceneError, Source};
 use polycore::units::Length;
@@ -21,6 +21,8 @@ pub struct Body<const D: usize> {
     pub severed: Vec<u64>,
     /// Its cracks.
     pub cuts: Vec<Cut<D>>,
+    /// Its gaps, whether bonds cross them or not.
+    pub gaps: Option<Gaps<D>>,
     /// The shapes added and cut; empty for points and grids.
     pub operations: Vec<Operation<D>>,
 }

@@ -20,13 +20,27 @@ pub fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) 
     let voids = (0..body.operations.len()).filter_map(|index| bridged(bonds, &body.operations, index));
     let contact = (scene.contact.is_some() && !scene.output.section.is_empty())
         .then(|| "the forces of `output.section` are those of bonds: contact is no part of them".to_owned());
-    let once = [volumes(scene, bonds, body.thickness), thin(bonds), long_steps(scene, bonds), contact];
     let slip = scene.contact.as_ref().and_then(|contact| contact.slip_velocity).map(|_| {
         "contact.slip_velocity is not used any more: friction holds what sticks by its elastic slip"
             .to_owned()
     });
-    let planes = super::planes::warnings(source, scene, body);
-    once.into_iter().chain([slip]).flatten().chain(planes).chain(cracks).chain(voids).collect()
+    let turns = super::rotation::chords(source, scene, body);
+    let once = [
+        volumes(scene, bonds, body.thickness),
+        thin(bonds),
+        long_steps(scene, bonds),
+        contact,
+        slip,
+        super::parts::bonded_parts(scene, body),
+    ];
+    once.into_iter()
+        .flatten()
+        .chain(cracks)
+        .chain(super::bridges::bridges(body))
+        .chain(turns)
+        .chain(super::planes::warnings(source, scene, body))
+        .chain(voids)
+        .collect()
 }
 
 /// Volumes of a plane cloud that lack the thickness.
@@ -145,8 +159,8 @@ fn bridged<const D: usize>(
     }
     (across > 0).then(|| {
         format!(
-            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} bonds cross it; a \
-             crack through it breaks them",
+            "body.shapes[{index}] cuts out {:.3} mm along {}, less than the horizon of {:.3} mm: {across} bonds cross it, \
+             as `bond_gaps` asks",
             width * 1e3,
             ["x", "y", "z"][axis],
             horizon * 1e3

@@ -1,5 +1,6 @@
-//! Loads and supports: body forces and prescribed displacement components, proportional to one load factor.
+//! Loads and supports: body forces and prescribed displacement components, proportional to one load factor but for regions that turn.
 
+use super::rotation::Turned;
 use crate::bonds::{Bonds, has_whole_family};
 use crate::field::{CHUNK, Field};
 use rayon::prelude::*;
@@ -18,12 +19,14 @@ pub struct Support<const D: usize> {
 pub struct Loads<const D: usize> {
     /// Body force density at load factor 1, N/m³.
     pub body_force: Option<Field<D>>,
-    /// Prescribed displacement at load factor 1, m, where constrained.
+    /// Prescribed displacement at load factor 1, m, where constrained; of turned regions its rate over the load factor.
     pub displacement: Option<Field<D>>,
     /// Bit d of a site: component d is constrained. Empty where nothing is.
     pub constrained: Vec<u8>,
     /// Sites of each region of prescribed displacement, in the order given.
     pub held_regions: Vec<Vec<u32>>,
+    /// Regions that turn about an axis.
+    pub turned: Vec<Turned<D>>,
 }
 
 impl<const D: usize> Loads<D> {
@@ -69,7 +72,7 @@ impl<const D: usize> Loads<D> {
         }
     }
 
-    /// What the loads pull, N·m: Σ −F V·d over constrained components with d their displacement at factor 1, and
+    /// What the loads pull, N·m: Σ −F V·d over constrained components with d the rate of their displacement over the factor, and
     /// Σ b V·u with b the body force at factor 1. `force` holds out-of-balance force densities.
     pub fn conjugates(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, force: &Field<D>) -> (f64, f64) {
         let (mut pull, mut push) = (0.0, 0.0);
@@ -89,19 +92,28 @@ impl<const D: usize> Loads<D> {
         (pull, push)
     }
 
-    /// How far apart the prescribed displacements are at factor 1, m: √Σ_d (max − min)²; `rigid` are those of rigid planes.
+    /// How far apart the prescribed displacements are at factor 1, m: √Σ_d (max − min)²; of turned regions the longest arc; `rigid` are
+    /// those of rigid planes.
     pub fn reach(&self, bonds: &dyn Bonds<D>, rigid: &[[f64; D]]) -> f64 {
+        let mut turned = vec![false; if self.turned.is_empty() { 0 } else { bonds.sites() }];
+        self.turned.iter().flat_map(|region| &region.sites).for_each(|&site| turned[site as usize] = true);
+        let still = |site: usize| !turned.get(site).copied().unwrap_or(false);
         let span = |d: usize| {
-            let constrained =
-                bonds.particles().iter().map(|&s| s as usize).filter(|&s| self.constrained(s) >> d & 1 == 1);
+            let constrained = bonds
+                .particles()
+                .iter()
+                .map(|&s| s as usize)
+                .filter(|&s| self.constrained(s) >> d & 1 == 1 && still(s));
             let prescribed = self.displacement.as_ref();
             let (low, high) = constrained
                 .filter_map(|s| Some(prescribed?.get(s)[d]))
                 .chain(rigid.iter().map(|plane| plane[d]))
+                .chain(self.turned.iter().map(|region| region.shift[d]))
                 .fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
             high - low
         };
-        (0..D).map(|d| span(d).powi(2)).sum::<f64>().sqrt()
+        let straight = (0..D).map(|d| span(d).powi(2)).sum::<f64>().sqrt();
+        if self.turned.is_empty() { straight } else { straight.hypot(self.arc(bonds)) }
     }
 
     /// Total body force at factor 1 along each axis, N: of both directions the larger.

@@ -116,7 +116,7 @@ pub fn load_stepping<const D: usize>(
 
 /// Moves the body with its grips and lets it start from rest. Where bonds may break, which takes many small steps, along
 /// the last equilibria u, u′, u″ by 3u − 3u′ + u″ where they are equally far apart and no bond broke since, by 2u − u′
-/// where there are two; affinely otherwise.
+/// where there are two; affinely otherwise. Where grips turn, with the nearest of them.
 fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: &[[f64; 4]; D]) {
     let factor = system.factors[state.step];
     let at = |back: usize| {
@@ -141,6 +141,10 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
         _ => &[],
     };
     let past = &state.past[state.past.len() - weights.len()..];
+    if !system.loads.turned.is_empty() {
+        system.loads.carry(&*system.bonds, [at(1), factor], &mut state.displacement);
+    }
+    let carried = !system.loads.turned.is_empty();
     for &site in system.bonds.particles() {
         let site = site as usize;
         let position = system.bonds.position(site);
@@ -150,6 +154,8 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
             if constrained >> d & 1 == 1 {
                 value[d] =
                     factor * system.loads.displacement.as_ref().map_or(0.0, |field| field.get(site)[d]);
+            } else if carried {
+                continue;
             } else if weights.is_empty() {
                 let affine: f64 = (0..D).map(|e| predictor[d][e + 1] * position[e]).sum();
                 value[d] += increment * (predictor[d][0] + affine);
@@ -160,6 +166,7 @@ fn predict<const D: usize>(system: &System<D>, state: &mut State<D>, predictor: 
         state.displacement.set(site, value);
         state.velocity.set(site, [0.0; D]);
     }
+    system.loads.place_turned(&*system.bonds, factor, &mut state.displacement);
 }
 
 /// Adds the work of the loads since the last equilibrium, by the trapezoidal rule.

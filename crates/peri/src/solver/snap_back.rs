@@ -34,6 +34,7 @@ impl<const D: usize> System<'_, D> {
             state.velocity.set(site, [0.0; D]);
         }
         self.begin_step(state);
+        self.loads.place_turned(&*self.bonds, self.factors[at], &mut state.displacement);
         true
     }
 

@@ -109,10 +109,11 @@ impl<'a, const D: usize> System<'a, D> {
         }
     }
 
-    /// Places rigid planes at the end of a load step, and has friction act from its start on.
+    /// Places rigid planes at the end of a load step, sets the rates of turned regions there, and has friction act from its start on.
     pub(super) fn begin_step(&mut self, state: &State<D>) {
         let before = state.step.checked_sub(1).map_or(0.0, |before| self.factors[before]);
         let after = self.factors[state.step];
+        self.set_rates(after, after);
         self.place(before, 0.0);
         self.place(after, 0.0);
         if let Some(start) = &state.started

@@ -151,6 +151,7 @@ impl VelocityVerlet {
     ) -> Result<(), Error> {
         let (factor, rate) = self.factor(system, 0.0);
         system.place(factor, 0.0);
+        system.set_rates(factor, factor);
         (state.friction, state.started) = (None, None);
         (state.rubbing, state.pushing) = (Vec::new(), Vec::new());
         for &site in system.bonds.particles() {
@@ -164,6 +165,7 @@ impl VelocityVerlet {
             state.displacement.set(site, u);
             state.velocity.set(site, v);
         }
+        system.loads.place_turned(&*system.bonds, factor, &mut state.displacement);
         if state.displacement.non_finite().is_some() || state.velocity.non_finite().is_some() {
             return Err(system.not_finite(state));
         }
@@ -268,7 +270,10 @@ impl VelocityVerlet {
         let (before, (factor, rate)) = (self.factor(system, state.motion.time).0, self.factor(system, after));
         let (density, damping, step) = (self.density, self.damping, state.motion.time_step);
         let leap = VerletStep { step, density, damping, factors: [before, factor], rate };
+        // the leap goes to the factor times this, the kick takes its increment
+        system.set_rates(0.0, factor);
         let first = leap_pass(&system.loads, state, volumes, &leap);
+        system.set_rates(before, factor);
         // two ends, √D components
         state.motion.slack += 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
         system.place(factor, after);

@@ -27,10 +27,12 @@ mod load_steps;
 mod looks;
 mod materials;
 mod model;
+mod parts;
 mod pressed;
 mod prestrain;
 mod relaxation;
 mod rigid;
+mod rotations;
 #[path = "../../examples/rubber_bearing.rs"]
 mod rubber_bearing;
 mod softening;

@@ -4,12 +4,12 @@ use super::LatticeBonds;
 use crate::bonds::Bonds;
 use crate::bonds::lattice_kernel::{Class, TILE};
 use crate::field::{CHUNK, chunk_range};
-use crate::geometry::{Cut, cuts_within, severed};
+use crate::geometry::{Cut, Gaps, cuts_within, severed};
 use rayon::prelude::*;
 
 impl<const D: usize> LatticeBonds<D> {
-    /// Bonds of all pairs of occupied sites within the stencil, less those that cross a cut.
-    pub(super) fn connect(&mut self, cuts: &[Cut<D>]) {
+    /// Bonds of all pairs of occupied sites within the stencil, less those that cross a cut or a gap.
+    pub(super) fn connect(&mut self, cuts: &[Cut<D>], gaps: Option<&Gaps<D>>) {
         let words = self.stencil.offsets.len().div_ceil(64);
         let occupied = self.occupancy();
         let bits = |site: usize| -> Vec<u64> {
@@ -17,9 +17,14 @@ impl<const D: usize> LatticeBonds<D> {
             let Some(cell) = self.cell_of(site).filter(|_| occupied[site]) else { return bits };
             let here = self.position(site);
             let cuts = cuts_within(cuts, here, self.horizon());
+            let gaps = gaps.and_then(|gaps| gaps.within(here, self.horizon()));
+            let parted = |there: [f64; D]| {
+                !cuts.is_empty() && severed(&cuts, here, there)
+                    || gaps.as_ref().is_some_and(|gaps| gaps.severs(here, there))
+            };
             for (k, offset) in self.stencil.offsets.iter().enumerate() {
                 let there = self.cell_at(cell, *offset).filter(|&there| occupied[there]);
-                if there.is_some_and(|there| cuts.is_empty() || !severed(&cuts, here, self.position(there))) {
+                if there.is_some_and(|there| !parted(self.position(there))) {
                     bits[k / 64] |= 1 << (k % 64);
                 }
             }
@@ -72,5 +77,39 @@ impl<const D: usize> LatticeBonds<D> {
         };
         let classes = (0..sites / TILE).into_par_iter().map(class).collect();
         self.classes = classes;
+    }
+
+    /// Which sites hold a particle.
+    pub fn occupancy(&self) -> Vec<bool> {
+        let mut occupied = vec![false; self.sites];
+        for &site in &self.particles {
+            occupied[site as usize] = true;
+        }
+        occupied
+    }
+
+    /// The site of the cell at `offset` from `cell`, if it lies in the box.
+    pub fn cell_at(&self, cell: [usize; D], offset: [i32; D]) -> Option<usize> {
+        let mut there = [0; D];
+        for d in 0..D {
+            there[d] =
+                cell[d].checked_add_signed(offset[d] as isize).filter(|&c| c < self.lattice.cells[d])?;
+        }
+        Some(self.site(there))
+    }
+
+    /// The cell of a site, if the site is one of the box's.
+    pub fn cell_of(&self, site: usize) -> Option<[usize; D]> {
+        let mut rest = site.checked_sub(self.guard)?;
+        let mut cell = [0; D];
+        for &d in self.order.iter().rev() {
+            cell[d] = rest / self.strides[d];
+            rest %= self.strides[d];
+        }
+        (0..D).all(|d| cell[d] < self.lattice.cells[d]).then_some(cell)
+    }
+
+    pub(super) fn site(&self, cell: [usize; D]) -> usize {
+        self.guard + (0..D).map(|d| self.strides[d] * cell[d]).sum::<usize>()
     }
 }
