@@ -110,8 +110,8 @@ pub struct Fragment {
     pub volume: f64,
 }
 
-/// Parts of the body that hang together by intact bonds, single particles left out; the largest first.
-pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> Vec<Fragment> {
+/// The first site of the part of the body that each site belongs to: what intact bonds hold together (union–find).
+pub fn roots<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> Vec<u32> {
     let mut root: Vec<u32> = (0..bonds.sites() as u32).collect();
     let find = |root: &mut Vec<u32>, mut site: u32| {
         while root[site as usize] != site {
@@ -126,10 +126,15 @@ pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> Vec<Fragmen
             root[a.max(b) as usize] = a.min(b);
         });
     }
-    // by its first site, which is its root
+    (0..bonds.sites() as u32).map(|site| find(&mut root, site)).collect()
+}
+
+/// Parts of the body that hang together by intact bonds, single particles left out; the largest first.
+pub fn fragments<const D: usize, B: Bonds<D> + ?Sized>(bonds: &B) -> Vec<Fragment> {
+    let root = roots(bonds);
     let mut found: BTreeMap<u32, Fragment> = BTreeMap::new();
     for &site in bonds.particles() {
-        let own = found.entry(find(&mut root, site)).or_insert(Fragment { particles: 0, volume: 0.0 });
+        let own = found.entry(root[site as usize]).or_insert(Fragment { particles: 0, volume: 0.0 });
         own.particles += 1;
         own.volume += bonds.volume(site as usize);
     }

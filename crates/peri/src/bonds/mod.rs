@@ -19,7 +19,7 @@ mod stencil;
 
 pub use crate::geometry::Lattice;
 pub use crate::potential::StretchRange;
-pub use breaking::{Fragment, Overstretched, Seen, fingerprint, fragments, overstretched};
+pub use breaking::{Fragment, Overstretched, Seen, fingerprint, fragments, overstretched, roots};
 pub use cells::CellGrid;
 pub use cloud::CloudBonds;
 pub use cloud_kernel::GROUP;

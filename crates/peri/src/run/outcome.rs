@@ -112,6 +112,10 @@ impl Outcome {
         ] {
             self.work.push((name.to_owned(), count));
         }
+        if state.motion.bounds > 0 {
+            self.work.push(("frequency_bounds".to_owned(), state.motion.bounds));
+            self.work.push(("frequency_searches".to_owned(), state.motion.searches));
+        }
         self.value(q::SMALLEST_STRETCH, (1.0 + state.observed.low).max(0.0).sqrt());
         self.value(q::LARGEST_STRETCH, (1.0 + state.observed.high).sqrt());
     }

@@ -53,6 +53,7 @@ impl Fault for Error {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Geometry(_) | Self::Parameter { .. } | Self::TimeStep { .. } => 2,
+            Self::NoEquilibrium { torn, .. } => 2 - u8::from(*torn),
             Self::NotFinite { .. } | Self::NotConverged { .. } | Self::Unstable { .. } => 1,
             Self::Within { error, .. } => error.exit_code(),
             Self::Shared(error) => error.exit_code(),
