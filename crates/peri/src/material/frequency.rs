@@ -93,8 +93,7 @@ impl<const D: usize> Point<D> {
         let (norm, root) = (self.deformation.gradient().norm(), self.deformation.residual.sqrt());
         let mixed = law.residual_stiffness(&self.deformation) * root;
         let shear = self.slope * self.whole / dimension;
-        let gradient = law.stiffness(&self.deformation) + mixed * norm
-            - shear * self.shape.min(1.0);
+        let gradient = law.stiffness(&self.deformation) + mixed * norm - shear * self.shape.min(1.0);
         self.reach.slope = self.slope + dimension * mixed * (norm + root) / self.whole;
         self.reach.front = WAVES * self.integrity() * gradient.max(0.0) * size;
         self.reach.front * among + greatest_wave::<D>() * self.reach.slope * squares
@@ -128,7 +127,8 @@ pub fn bound<const D: usize>(
     let particles = bonds.particles();
     let of_chunk = |(chunk, points): (usize, &mut [Point<D>])| {
         let range = chunk_range(chunk, bonds.sites());
-        let [from, to] = [range.start, range.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
+        let [from, to] =
+            [range.start, range.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
         let mut beyond = Vec::new();
         for &site in &particles[from..to] {
             let family = Family::new(bonds, displacement, site as usize);

@@ -3,6 +3,7 @@
 mod against;
 mod compare;
 mod draw;
+mod envelope;
 mod frames;
 mod history;
 mod lines;
@@ -116,8 +117,7 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
                     Err(Failure::Run(error))
                 }
                 _ => Ok(outcome),
-            })
-        {
+            }) {
             Err(failure) if expected.is_some_and(|text| failure.to_string().contains(text)) => {
                 let mut outcome = Outcome::new(variant.name(), variant);
                 outcome.error = Some(failure.to_string());
@@ -192,6 +192,7 @@ fn run_variant<const D: usize>(
     }
     let mut outcome = Outcome::new(variant.name(), variant);
     outcome.warnings = warnings;
+    outcome.snaps_back = scene.solver.snap_back;
     for scene::Followed { parameter, field: [mean, least, largest], mesh_mean, unit, .. } in &followed {
         for (quantity, value) in q::OF_A_FIELD.iter().zip([mean, mesh_mean, least, largest]) {
             outcome.value(quantity.of(&[parameter.value_name()]).in_unit(unit), *value);
@@ -211,7 +212,8 @@ fn run_variant<const D: usize>(
         sections: &sections,
         criterion: criterion.as_ref(),
     };
-    let solved = solve((source, scene), &solution, under_way, &mut body, &mut state, &mut phases, &mut frames);
+    let solved =
+        solve((source, scene), &solution, under_way, &mut body, &mut state, &mut phases, &mut frames);
     let ended = match solved {
         Err(Failure::Run(error @ Error::NoEquilibrium { .. })) if !state.history.is_empty() => Some(error),
         other => other.map(|()| None)?,

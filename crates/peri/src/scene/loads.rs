@@ -173,7 +173,11 @@ fn balanced<const D: usize>(
 ) -> Result<(), SceneError> {
     let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source))?;
     let normals = planes.iter().map(|plane| plane.normal).collect();
-    let stops = Stops { normals, pairs: scene.contact.is_some(), rubs: scene.contact.as_ref().is_some_and(ContactSpec::rubs) };
+    let stops = Stops {
+        normals,
+        pairs: scene.contact.is_some(),
+        rubs: scene.contact.as_ref().is_some_and(ContactSpec::rubs),
+    };
     let Some(part) = adrift(&*body.bonds, loads, None, &stops, scene.tolerance()) else { return Ok(()) };
     let Adrift { particles, of, force, axis, .. } = &part;
     let found = if particles == of {

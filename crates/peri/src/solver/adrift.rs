@@ -153,6 +153,15 @@ impl<const D: usize> System<'_, D> {
         if self.loads.body_force.is_none() || self.factors.is_empty() {
             return Ok(());
         }
+        let sites = || self.bonds.particles().iter().map(|&site| site as usize);
+        let loaded =
+            |site: usize| self.loads.body_force.as_ref().is_some_and(|body| body.get(site) != [0.0; D]);
+        if state.broken > 0 && !sites().any(loaded) {
+            return Err(self.no_equilibrium(
+                state,
+                "every particle that bore a force has lost all its bonds".to_owned(),
+            ));
+        }
         match adrift(&*self.bonds, &self.loads, Some(&state.displacement), &self.stops(), tolerance) {
             Some(part) => Err(self.no_equilibrium(state, part.to_string())),
             None => Ok(()),

@@ -11,16 +11,13 @@ const MEETS: f64 = 0.75;
 /// Grips that move as a whole: of more than these, displacements follow a field.
 const MOST_GRIPS: usize = 16;
 /// What is allowed instead.
-pub const INVERTS: &str = "displacements that leave the body right side out; reduce them, or hold the regions farther apart";
+pub const INVERTS: &str =
+    "displacements that leave the body right side out; reduce them, or hold the regions farther apart";
 /// D λ_min of the shape tensor below which neighbours do not span space.
 const SPANS: f64 = 0.1;
 
 /// What is found, or nothing, where prescribed displacements at any of the load factors `factors`, or between them, press a body through itself.
-pub fn inverted<const D: usize>(
-    bonds: &dyn Bonds<D>,
-    loads: &Loads<D>,
-    factors: &[f64],
-) -> Option<String> {
+pub fn inverted<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, factors: &[f64]) -> Option<String> {
     loads.displacement.as_ref()?;
     passing(bonds, loads, factors).or_else(|| turned(bonds, loads, factors))
 }
@@ -133,7 +130,15 @@ fn turned<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, factors: &[f64
             }
         });
         let tensor = |rows: &[[f64; 3]; 3], third: f64| {
-            nalgebra::Matrix3::from_fn(|a, b| if a < D && b < D { rows[a][b] } else if a == b { third } else { 0.0 })
+            nalgebra::Matrix3::from_fn(|a, b| {
+                if a < D && b < D {
+                    rows[a][b]
+                } else if a == b {
+                    third
+                } else {
+                    0.0
+                }
+            })
         };
         let shape = tensor(&shape, 1.0) / weight;
         let shape = nalgebra::Matrix3::from_fn(|a, b| if a == b && a >= D { 1.0 } else { shape[(a, b)] });

@@ -225,6 +225,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
         contact: system.touching(state),
         work: state.work,
         released: state.released,
+        smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
         largest_stretch: (1.0 + observed.high).sqrt(),
         time: 0.0,
         kinetic: 0.0,

@@ -29,8 +29,8 @@ mod verlet;
 mod verlet_friction;
 mod verlet_step;
 
-pub use adrift::{Adrift, Stops, adrift};
 pub use adr::{DynamicRelaxation, RelaxationSolver};
+pub use adrift::{Adrift, Stops, adrift};
 pub use criterion::{Bilinear, Breaking, Criterion, Policy};
 pub use inverted::{INVERTS, inverted};
 pub use lbfgs::{Lbfgs, LbfgsSolver};

@@ -40,7 +40,9 @@ pub struct Record {
     pub work: f64,
     /// Energy of broken bonds when they broke, J.
     pub released: f64,
-    /// Largest intact stretch.
+    /// Smallest and largest stretch of intact bonds.
+    pub smallest_stretch: f64,
+    /// See `smallest_stretch`.
     pub largest_stretch: f64,
     /// Time, s; 0 without dynamics.
     pub time: f64,

@@ -29,6 +29,8 @@ const GROWTH: f64 = 1.25;
 
 /// Steps are planned anew where they may become longer by this.
 const LONGER: f64 = 1.25;
+/// Cuts of one step, after which it is taken as it is.
+const MOST_CUTS: u32 = 12;
 
 /// Settings of explicit dynamics. [`State::velocity`] is the velocity at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -262,18 +264,35 @@ impl VelocityVerlet {
         volumes: &[f64],
         end: f64,
     ) -> Result<(), Error> {
-        let after = state.motion.time_after(end);
-        let (before, (factor, rate)) = (self.factor(system, state.motion.time).0, self.factor(system, after));
-        let (density, damping, step) = (self.density, self.damping, state.motion.time_step);
-        let leap = VerletStep { step, density, damping, factors: [before, factor], rate };
-        let first = leap_pass(&system.loads, state, volumes, &leap);
-        // two ends, √D components
-        let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
-        state.motion.slack += strain;
-        system.place(factor, after);
+        let before = self.factor(system, state.motion.time).0;
+        let (density, damping) = (self.density, self.damping);
+        let start = self.follows(system).then(|| (state.displacement.clone(), state.velocity.clone()));
+        let (mut cuts, slack) = (0, state.motion.slack);
+        let (after, leap, first) = loop {
+            let after = state.motion.time_after(end);
+            let (factor, rate) = self.factor(system, after);
+            let step = state.motion.time_step;
+            let leap = VerletStep { step, density, damping, factors: [before, factor], rate };
+            let first = leap_pass(&system.loads, state, volumes, &leap);
+            // two ends, √D components
+            let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
+            state.motion.slack = slack + strain;
+            system.place(factor, after);
+            system.prepare(&state.displacement);
+            let Some((displacement, velocity)) = &start else { break (after, leap, first) };
+            cuts += 1;
+            if cuts > MOST_CUTS || !self.is_too_long(system, state, strain) {
+                break (after, leap, first);
+            }
+            // a step that ends where it would have been too long is taken back
+            state.displacement.clone_from(displacement);
+            state.velocity.clone_from(velocity);
+            system.place(before, state.motion.time);
+            state.motion.plan(end);
+        };
+        let factor = leap.factors[1];
         let (friction, rubbing, rubs) =
             (state.friction.take(), state.rubbing.clone(), system.friction().is_some());
-        system.prepare(&state.displacement);
         let look = state.motion.must_look(state.fitted, system.breaking_stretch());
         let (mut second, observed) = force_pass(system, state, volumes, &leap, look, !look && !rubs);
         system.count_evaluation(state);
@@ -300,9 +319,12 @@ impl VelocityVerlet {
         self.account(state, first, second)?;
         let broken = look && self.sever(system, state, observed, factor);
         self.cover_contact(system, state);
-        self.follow(system, state, volumes, broken, strain);
+        let follows = self.follows(system);
+        if follows {
+            self.follow(system, state, volumes, broken);
+        }
         let motion = &mut state.motion;
-        let longer = system.material.has_points() && motion.longest > LONGER * motion.time_step;
+        let longer = follows && motion.longest > LONGER * motion.time_step;
         if (longer || motion.longest < (1.0 - 1e-9) * motion.time_step) && motion.taken < motion.planned {
             motion.plan(end);
         }
@@ -386,6 +408,7 @@ impl VelocityVerlet {
             contact: system.touching(state),
             work: state.work,
             released: state.released,
+            smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
             largest_stretch: (1.0 + observed.high).sqrt(),
             time: state.motion.time,
             kinetic: state.motion.kinetic,
