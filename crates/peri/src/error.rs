@@ -46,6 +46,26 @@ pub enum Error {
         /// Relative residual requested.
         needed: f64,
     },
+    /// Loads that nothing can balance: a part of the body bears a force and hangs on nothing, from the start or once the body is torn.
+    #[error(
+        "no equilibrium {}: {why}; {}",
+        if *torn { format!("after {step} steps, torn at load factor {factor:.4}") } else { format!("at load factor {factor:.4}") },
+        if *torn {
+            "the last equilibrium is kept; prescribe a displacement instead of the force to follow the body beyond its peak load"
+        } else {
+            "hold it by a `displacement` along that axis, balance the forces, or use explicit dynamics"
+        }
+    )]
+    NoEquilibrium {
+        /// Load steps finished.
+        step: usize,
+        /// Load factor of the next.
+        factor: f64,
+        /// Whether bonds have broken.
+        torn: bool,
+        /// What bears which force, or how far it has moved.
+        why: String,
+    },
     /// The time step of explicit dynamics is beyond the critical one.
     #[error("time step: found {found:.4e} s; allowed: up to the critical {critical:.4e} s")]
     TimeStep {

@@ -3,8 +3,10 @@
 polycore::quantities! {
     /// Scalars of every variant; with several variants each has its variant's name behind it in square brackets.
     pub OF_A_VARIANT:
-    SMALLEST_STRETCH = "smallest_stretch", "", "smallest stretch of any bond in any iteration";
-    LARGEST_STRETCH = "largest_stretch", "", "largest stretch of any bond in any iteration";
+    SMALLEST_STRETCH = "smallest_stretch", "", "smallest stretch of an intact bond at the end of any step (with `[dynamics]` in any row of the history)";
+    LARGEST_STRETCH = "largest_stretch", "", "largest stretch of an intact bond at the end of any step (with `[dynamics]` in any row of the history)";
+    SMALLEST_STRETCH_MET = "smallest_stretch_met", "", "smallest stretch that the law was evaluated at on the way, in any iteration";
+    LARGEST_STRETCH_MET = "largest_stretch_met", "", "largest stretch that the law was evaluated at on the way, in any iteration and in bonds that then broke";
     FIT_ERROR = "fit_error", "", "measured relative error of the fitted law at the final stretches";
     LARGEST_DISPLACEMENT = "largest_displacement", "m", "length of the longest displacement vector";
     REACTION = "reaction_{axis}", "N", "with a prescribed displacement: net reactions of these regions along an axis, the larger of the summed positive and negative ones; the history has each region's with its sign";
@@ -25,7 +27,8 @@ polycore::quantities! {
     FRAGMENTS = "fragments", "", "with `material.critical`: pieces of two particles or more that intact bonds hold together";
     LARGEST_FRAGMENT = "largest_fragment", "", "with `material.critical`: volume of the largest of these over that of the body";
     FIRST_BREAK = "first_break", "m", "displacement of the step in which the first bond breaks";
-    LOAD_AT_FIRST_BREAK = "load_at_first_break", "N", "load of the equilibrium before the first bond breaks";
+    LOAD_AT_FIRST_BREAK = "load_at_first_break", "N", "load at the end of the last step before the one in which the first bond breaks";
+    LOAD_OF_FIRST_EVENT = "load_of_first_event", "N", "without `[dynamics]`: load of the equilibrium, within its step, in which the first bonds break";
     BROKEN_BONDS = "broken_bonds", "", "broken bonds at the end";
     BREAKING_EVENTS = "breaking_events", "", "with `material.critical`, without `[dynamics]`: equilibria in which bonds broke together";
     DETACHED_PARTICLES = "detached_particles", "", "particles that have lost all their bonds";

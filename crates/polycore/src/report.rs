@@ -167,6 +167,19 @@ impl Report {
         self.refresh()
     }
 
+    /// Takes note that a run ended in an error before its end: it has not passed.
+    pub fn ended(&mut self, what: &str, error: &str) -> &mut Self {
+        self.trials.push(Trial {
+            what: what.to_owned(),
+            description: "runs to its end".to_owned(),
+            observed: error.to_owned(),
+            iterations: None,
+            passed: false,
+        });
+        self.passed = false;
+        self
+    }
+
     /// Everything expected is satisfied, every trial passed, and every number is finite.
     pub fn passed(&self) -> bool {
         self.passed

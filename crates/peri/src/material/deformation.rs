@@ -2,10 +2,12 @@
 
 use super::cloud_passes::CloudPasses;
 use super::eight_chain::cofactor;
+use super::frequency::Reach;
 use super::solid_passes::SolidPasses;
 use super::{Bond, Family, Material, Passes};
 use crate::bonds::{Bonds, Columns, Kind};
 use crate::calibrate::modulus_in;
+use crate::field::Field;
 use nalgebra::{Matrix3, SMatrix, SVector};
 use polycore::constitutive::Flags;
 use std::sync::Arc;
@@ -74,6 +76,13 @@ pub trait PointLaw<const D: usize>: Send + Sync {
     /// A bound of ‖∂P/∂F‖₂, Pa.
     fn stiffness(&self, deformation: &Deformation<D>) -> f64;
 
+    /// κ = 4 W_SS ≥ 0, Pa, of a law whose W depends on tr FᵀF + residual alone: `stiffness` holds the residual constant, and a
+    /// change of both takes κ(F:δF + ½δ residual)² in all. 0 where W is linear in the residual.
+    fn residual_stiffness(&self, deformation: &Deformation<D>) -> f64 {
+        let _ = deformation;
+        0.0
+    }
+
     /// Shear modulus at rest, Pa.
     fn shear_modulus(&self) -> f64;
 
@@ -109,6 +118,9 @@ impl<L: PointLaw<D> + ?Sized, const D: usize> PointLaw<D> for Arc<L> {
     }
     fn stiffness(&self, deformation: &Deformation<D>) -> f64 {
         (**self).stiffness(deformation)
+    }
+    fn residual_stiffness(&self, deformation: &Deformation<D>) -> f64 {
+        (**self).residual_stiffness(deformation)
     }
     fn shear_modulus(&self) -> f64 {
         (**self).shear_modulus()
@@ -153,21 +165,23 @@ const PROBE: f64 = 1e-5;
 #[derive(Clone, Debug)]
 pub struct Point<const D: usize> {
     /// Σ_J V_J of the whole family, m³, and of the intact bonds that `inverse` and `shape` belong to.
-    whole: f64,
-    intact: f64,
+    pub(super) whole: f64,
+    pub(super) intact: f64,
     /// M⁻¹.
-    inverse: Tensor<D>,
+    pub(super) inverse: Tensor<D>,
     /// D λ_min(M).
-    shape: f64,
-    deformation: Deformation<D>,
+    pub(super) shape: f64,
+    pub(super) deformation: Deformation<D>,
     /// What [`super::filter`] adds to W and ∂W/∂J; 0 without.
     pub(super) filtered: [f64; 2],
     /// A, Q + A 1, both over Σ_J V_J, and the stiffness of the springs over it, Pa/m³.
-    slope: f64,
+    pub(super) slope: f64,
     stress: Tensor<D>,
-    spring: f64,
+    pub(super) spring: f64,
     /// The particle's own part in the bound of the stiffness, N/m⁴.
     own: f64,
+    /// What the bound of the frequency needs, see [`super::frequency`].
+    pub(super) reach: Reach,
     /// Where bonds have θ.
     relief: Option<Box<Relieved<D>>>,
 }
@@ -197,6 +211,7 @@ impl<const D: usize> Default for Point<D> {
             stress: zero,
             spring: 0.0,
             own: 0.0,
+            reach: Reach::default(),
             relief: None,
         }
     }
@@ -216,6 +231,7 @@ impl<const D: usize> Point<D> {
             }
         });
         self.intact = intact;
+        self.reach.forget();
         let (inverse, least) = if intact > 0.0 { invert(&(shape / intact)) } else { (shape, 0.0) };
         (self.inverse, self.shape) = (inverse, D as f64 * least);
         if let Some(relief) = &mut self.relief {
@@ -418,6 +434,16 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         let mut most = points[family.site()].own;
         family.each(|bond| most = most.max(points[bond.to].own));
         0.5 * if D == 2 { 1.75 } else { 1.0 } * most
+    }
+
+    fn frequency_bound(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        points: &mut [Point<D>],
+        enough: f64,
+    ) -> Option<f64> {
+        Some(super::frequency::bound(&self.0, (bonds, displacement), points, enough))
     }
 
     /// Of Young's modulus E ≈ 3μ.

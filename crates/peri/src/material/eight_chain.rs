@@ -292,6 +292,11 @@ impl<const D: usize> PointLaw<D> for EightChain<D> {
             + by_volume.abs() * if D == 2 { 1.0 } else { size }
     }
 
+    fn residual_stiffness(&self, deformation: &Deformation<D>) -> f64 {
+        let [second, _] = self.curvatures(deformation.excess_trace(), deformation.volume_change());
+        4.0 * second.max(0.0)
+    }
+
     fn shear_modulus(&self) -> f64 {
         self.modulus
     }

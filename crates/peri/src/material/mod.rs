@@ -17,6 +17,7 @@ mod deformation;
 mod eight_chain;
 mod family;
 mod filter;
+mod frequency;
 mod levels;
 mod pointwise;
 mod prestrained;
@@ -44,6 +45,7 @@ pub use crate::bonds::Property;
 
 use crate::bonds::Bonds;
 use crate::calibrate::{Space, modulus_in, stiffness_1111};
+use crate::field::Field;
 
 /// A material: the forces between particles follow from an energy E = Σ_I V_I W_I.
 ///
@@ -96,6 +98,20 @@ pub trait Material<const D: usize>: Send + Sync {
     /// From it follow the fictitious mass of dynamic relaxation, the local part of the preconditioner and the bound ω² ≤ 2s/ρ of
     /// the time step. `points` are the states of all sites: of the particle, `points[family.site()]`, and of its neighbours.
     fn stiffness(&self, family: &Family<D>, points: &[Self::Point]) -> f64;
+
+    /// A bound of ρω², N/m⁴, of all oscillations about the present displacement, for explicit dynamics, which asks for it every few
+    /// steps: cheaper and sharper than twice the greatest [`Self::stiffness`], which is taken where there is none. Where it is below
+    /// `enough`, `enough` will do. `points` are the states of all sites.
+    fn frequency_bound(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        points: &mut [Self::Point],
+        enough: f64,
+    ) -> Option<f64> {
+        let _ = (bonds, displacement, points, enough);
+        None
+    }
 
     /// kθ, N/m⁶, of linear bonds t = 3kθ(λ − 1) that are about as stiff, see [`crate::calibrate::modulus_in`]: the scale of
     /// forces, of first guesses and of the preconditioner's coarse level. Equilibria do not depend on it.

@@ -287,6 +287,18 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         bonds.particles().par_iter().map(of).collect()
     }
 
+    fn frequency_bound(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, enough: f64) -> f64 {
+        let own = self.material.frequency_bound(bonds, displacement, &mut self.points, enough);
+        if let Some(own) = own {
+            return own;
+        }
+        self.visit(bonds, displacement, M::stiffen);
+        let of = |&site: &u32| {
+            self.material.stiffness(&Family::new(bonds, displacement, site as usize), &self.points)
+        };
+        2.0 * bonds.particles().par_iter().map(of).reduce(|| 0.0, f64::max)
+    }
+
     /// Frequencies grow as the bound of the stiffness does.
     fn range(&self, _stretches: [f64; 2]) -> LawRange {
         LawRange { mean_tangent: self.tangent, least_tangent: self.tangent, least_energy: 0.0 }

@@ -121,6 +121,13 @@ pub trait Response<const D: usize>: Send + Sync {
         stretches: [f64; 2],
     ) -> Vec<f64>;
 
+    /// A bound of ρω², N/m⁴, of oscillations about the displacement last prepared, of materials with states of particles; where it is
+    /// below `enough`, `enough` will do. See [`super::Material::frequency_bound`].
+    fn frequency_bound(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, enough: f64) -> f64 {
+        let _ = (bonds, displacement, enough);
+        f64::INFINITY
+    }
+
     /// Tangents and energies over a range of stretches.
     fn range(&self, stretches: [f64; 2]) -> LawRange;
 }

@@ -1,5 +1,6 @@
 //! The history of loading: values, tables and curves of load against displacement and of energies.
 
+use super::envelope::envelope;
 use super::outcome::Outcome;
 use crate::quantities as q;
 use crate::scene::{ContactSpec, Scene, of_plane};
@@ -118,10 +119,12 @@ impl Outcome {
         if scene.material.critical.is_some() {
             if let Some(first) = self.history.iter().position(|r| r.broken > 0) {
                 self.value(q::FIRST_BREAK, self.history[first].displacement);
-                // of the equilibrium before: that at the end of the step may be past the collapse
+                // that at the end of the step may be past the collapse
                 let before = first.checked_sub(1).map_or(0.0, |s| self.history[s].load);
-                let load = self.events.first().filter(|_| !self.is_dynamic()).map_or(before, |e| e.load);
-                self.value(q::LOAD_AT_FIRST_BREAK, load);
+                self.value(q::LOAD_AT_FIRST_BREAK, before);
+                if let Some(event) = self.events.first().filter(|_| !self.is_dynamic()) {
+                    self.value(q::LOAD_OF_FIRST_EVENT, event.load);
+                }
             }
             self.value(q::BROKEN_BONDS, last.broken as f64);
             if !self.is_dynamic() {
@@ -215,6 +218,12 @@ impl Outcome {
         let loads: Vec<f64> = std::iter::once(0.0).chain(self.history.iter().map(|r| r.load)).collect();
         let (at, &peak) = loads.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
         (at > 0 && peak > 0.0).then(|| (peak - loads[at - 1]).abs() / peak)
+    }
+
+    /// See [`envelope`], from the undeformed body on.
+    fn envelope(&self) -> [Vec<f64>; 2] {
+        let rows = self.history.iter().map(|r| [r.displacement, r.load]);
+        envelope(&std::iter::once([0.0; 2]).chain(rows).collect::<Vec<_>>())
     }
 
     /// Load at a displacement between two steps, linearly; from the undeformed body on.
@@ -344,6 +353,11 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
         let views: Vec<_> = columns.iter().map(|(n, u, v)| (n.as_str(), u.as_str(), v.as_slice())).collect();
         csv::write(output.join(format!("history_{}.csv", outcome.file_name())), &views)?;
     }
+    for outcome in several.iter().filter(|outcome| outcome.snaps_back) {
+        let [at, load] = outcome.envelope();
+        let columns = [("displacement", "m", &at[..]), ("load", "N", &load)];
+        csv::write(output.join(format!("envelope_{}.csv", outcome.file_name())), &columns)?;
+    }
     for outcome in outcomes.iter().filter(|outcome| !outcome.events.is_empty()) {
         let each = |get: &dyn Fn(&Event) -> f64| outcome.events.iter().map(get).collect::<Vec<f64>>();
         let (step, load) = (each(&|e| e.step as f64 + 1.0), each(&|e| e.load));
@@ -377,6 +391,11 @@ pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), E
         let columns = outcome.columns();
         let (x, y) = (from_rest(&columns[0].2, 1e3), from_rest(&columns[1].2, 1.0));
         plot = plot.series(Series::line(&outcome.name, &x, &y));
+        if outcome.snaps_back {
+            let [at, load] = outcome.envelope();
+            let at: Vec<f64> = at.iter().map(|u| u * 1e3).collect();
+            plot = plot.series(Series::reference(&format!("{}, envelope", outcome.name), &at, &load));
+        }
     }
     if !loaded.is_empty() {
         plot.write(output.join("load_displacement.png"))?;

@@ -3,6 +3,7 @@
 mod against;
 mod compare;
 mod draw;
+mod envelope;
 mod frames;
 mod history;
 mod lines;
@@ -113,7 +114,13 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
         let mut outcome = match scene::check_variant(&own_source, &own_scene)
             .map_err(Failure::from)
             .and_then(|()| run_variant::<D>(&own_source, &own_scene, variant, output, under_way, state))
-        {
+            .and_then(|(outcome, ended)| match ended {
+                Some(error) if expected.is_none_or(|text| !error.to_string().contains(text)) => {
+                    kept((source, scene, quick), outcome, &error, output)?;
+                    Err(Failure::Run(error))
+                }
+                _ => Ok(outcome),
+            }) {
             Err(failure) if expected.is_some_and(|text| failure.to_string().contains(text)) => {
                 let mut outcome = Outcome::new(variant.name(), variant);
                 outcome.error = Some(failure.to_string());
@@ -141,6 +148,21 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     Ok(Finished { report, outcomes: finished })
 }
 
+/// Writes what there is of a variant that ended in an error: its history, its values, and a report that has not passed.
+fn kept(
+    (source, scene, quick): (&Source, &Scene, bool),
+    outcome: Outcome,
+    error: &Error,
+    output: &Path,
+) -> Result<(), Failure> {
+    let outcomes = [outcome];
+    history::write(scene, &outcomes, output)?;
+    let mut report = compare::report(source, scene, &outcomes, quick);
+    report.ended(&outcomes[0].name, &error.to_string());
+    report.write(output)?;
+    Ok(())
+}
+
 /// What the error of a variant must contain, where one is expected.
 fn expected_error<'a>(scene: &'a Scene, variant: &Variant) -> Option<&'a str> {
     variant.study.and_then(|index| scene.study.get(index)?.expect_error.as_deref())
@@ -153,7 +175,7 @@ fn run_variant<const D: usize>(
     output: &Path,
     under_way: &UnderWay<D>,
     state: Option<State<D>>,
-) -> Result<Outcome, Failure> {
+) -> Result<(Outcome, Option<Error>), Failure> {
     let mut phases = Phases::new();
     phases.start("build");
     let Built { bonded, loads, loaded, held, probes, sections } = Built::<D>::new(source, scene, variant)?;
@@ -176,6 +198,7 @@ fn run_variant<const D: usize>(
     }
     let mut outcome = Outcome::new(variant.name(), variant);
     outcome.warnings = warnings;
+    outcome.snaps_back = scene.solver.snap_back;
     for scene::Followed { parameter, field: [mean, least, largest], mesh_mean, unit, .. } in &followed {
         for (quantity, value) in q::OF_A_FIELD.iter().zip([mean, mesh_mean, least, largest]) {
             outcome.value(quantity.of(&[parameter.value_name()]).in_unit(unit), *value);
@@ -197,7 +220,18 @@ fn run_variant<const D: usize>(
         stiffness: &stiffness,
         held: held.as_deref(),
     };
-    solve((source, scene), &solution, under_way, &mut body, &mut state, &mut phases, &mut frames)?;
+    let solved =
+        solve((source, scene), &solution, under_way, &mut body, &mut state, &mut phases, &mut frames);
+    let ended = match solved {
+        Err(Failure::Run(error @ Error::NoEquilibrium { .. })) if !state.history.is_empty() => Some(error),
+        other => other.map(|()| None)?,
+    };
+    if let Some(error) = &ended {
+        // the last equilibrium has bonds that are broken by now
+        body = Built::<D>::new(source, scene, variant)?.bonded.body;
+        state.sever(&mut *body.bonds)?;
+        outcome.error = Some(error.to_string());
+    }
     outcome.work_of(&*body.bonds, &state);
     if let Acting::Bonds(bonded) = &material {
         let stretches = covered_stretches(&*body.bonds, &state.displacement);
@@ -284,7 +318,7 @@ fn run_variant<const D: usize>(
             solid::end(scene, &*body.bonds, &state, &stresses, second, &outcome, output)?;
         }
     }
-    Ok(outcome)
+    Ok((outcome, ended))
 }
 
 /// All that a variant is before it is solved.

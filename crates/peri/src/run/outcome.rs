@@ -28,6 +28,8 @@ pub struct Outcome {
     pub events: Vec<Event>,
     /// The fragments, the largest first.
     pub fragments: Vec<Fragment>,
+    /// Whether the load was lowered where bonds broke, see `solver.snap_back`.
+    pub snaps_back: bool,
     /// Names of the regions of prescribed displacement.
     pub regions: Vec<String>,
     /// Names of rigid planes.
@@ -70,6 +72,7 @@ impl Outcome {
             history: Vec::new(),
             events: Vec::new(),
             fragments: Vec::new(),
+            snaps_back: false,
             regions: Vec::new(),
             planes: Vec::new(),
             probes: Vec::new(),
@@ -112,8 +115,15 @@ impl Outcome {
         ] {
             self.work.push((name.to_owned(), count));
         }
-        self.value(q::SMALLEST_STRETCH, (1.0 + state.observed.low).max(0.0).sqrt());
-        self.value(q::LARGEST_STRETCH, (1.0 + state.observed.high).sqrt());
+        if state.motion.bounds > 0 {
+            self.work.push(("frequency_bounds".to_owned(), state.motion.bounds));
+            self.work.push(("frequency_searches".to_owned(), state.motion.searches));
+        }
+        let rows = || state.history.iter();
+        self.value(q::SMALLEST_STRETCH, rows().map(|row| row.smallest_stretch).fold(1.0, f64::min));
+        self.value(q::LARGEST_STRETCH, rows().map(|row| row.largest_stretch).fold(1.0, f64::max));
+        self.value(q::SMALLEST_STRETCH_MET, (1.0 + state.observed.low).max(0.0).sqrt());
+        self.value(q::LARGEST_STRETCH_MET, (1.0 + state.observed.high).sqrt());
     }
 
     /// Largest displacement, force of the held regions, applied force.

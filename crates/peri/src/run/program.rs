@@ -20,7 +20,7 @@ impl Case for Peri {
   peri sweep SCENE --vary material.fracture_energy=50J/m^2,100J/m^2
   peri exact law --law chain-affine --links 720 --dissociation 1200
   peri schema > peri.schema.json                    for editors",
-        magic: b"peri-c10",
+        magic: b"peri-c11",
         columns: &[
             "peak_load*",
             "displacement_at_peak*",
@@ -53,6 +53,7 @@ impl Fault for Error {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Geometry(_) | Self::Parameter { .. } | Self::TimeStep { .. } => 2,
+            Self::NoEquilibrium { torn, .. } => 2 - u8::from(*torn),
             Self::NotFinite { .. }
             | Self::NotConverged { .. }
             | Self::Unstable { .. }

@@ -3,11 +3,11 @@
 use super::build::operations;
 use super::formula::Formula;
 use super::values::{Body, ordered, vector};
-use super::{Boundary, Method, Prescribed, PrescribedField, Scene, Side};
+use super::{Boundary, ContactSpec, Method, Prescribed, PrescribedField, Scene, Side};
 use crate::field::Field;
 use crate::geometry::inside;
 use crate::material::{Tensor, surface_load};
-use crate::solver::{Loads, Support};
+use crate::solver::{Adrift, INVERTS, Loads, Stops, Support, adrift, inverted};
 use polycore::scene::{SceneError, Source};
 
 /// Loads and supports of a body, and the sites where forces act on it, of loads or of holding.
@@ -46,6 +46,7 @@ pub fn loads_of<const D: usize>(
     }
     follow_formulas(source, scene, body, &regions, &mut loads)?;
     super::rotation::turn(source, scene, body, &regions, &mut loads)?;
+    upright(source, scene, body, &loads)?;
     if scene.method() == Method::Verlet {
         // a body in motion needs neither balance nor hold
         return Ok((loads, loaded));
@@ -165,36 +166,48 @@ fn follow_formulas<const D: usize>(
     Ok(())
 }
 
-/// A body that nothing holds is never at rest under forces that do not balance.
+/// A part of a body that nothing holds is never at rest under forces that do not balance.
 fn balanced<const D: usize>(
     source: &Source,
     scene: &Scene,
     body: &Body<D>,
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
-    let Some(field) = &loads.body_force else { return Ok(()) };
-    let planes =
-        scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
-    for d in 0..D {
-        let (mut sum, mut size) = (0.0, 0.0);
-        // what a plane may hold
-        let mut constrained = planes.iter().any(|plane| plane.normal[d] != 0.0);
-        for &site in body.bonds.particles() {
-            let force = field.get(site as usize)[d] * body.bonds.volume(site as usize);
-            sum += force;
-            size += force.abs();
-            constrained |= loads.constrained(site as usize) >> d & 1 == 1;
-        }
-        if !constrained && sum.abs() > scene.tolerance() * size {
-            let axis = ["x", "y", "z"][d];
-            let found = format!(
-                "a total force of {sum:.3e} N along {axis}, along which no displacement is prescribed"
-            );
-            let allowed = "balanced forces, or a `displacement` of some region";
-            return Err(source.error("boundary", found, allowed));
-        }
+    let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
+    let normals = planes.iter().map(|plane| plane.normal).collect();
+    let stops = Stops {
+        normals,
+        pairs: scene.contact.is_some(),
+        rubs: scene.contact.as_ref().is_some_and(ContactSpec::rubs),
+    };
+    let Some(part) = adrift(&*body.bonds, loads, None, &stops, scene.tolerance()) else { return Ok(()) };
+    let Adrift { particles, of, force, axis, .. } = &part;
+    let found = if particles == of {
+        format!("a total force of {force:.3e} N along {axis}, along which no displacement is prescribed")
+    } else {
+        part.to_string()
+    };
+    let allowed = format!("balanced forces, or a `displacement` along {axis} of some region of it");
+    Err(source.error("boundary", found, allowed))
+}
+
+/// Displacements that a body can follow.
+fn upright<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+    loads: &Loads<D>,
+) -> Result<(), SceneError> {
+    let factors = match &scene.dynamics {
+        // a course of its own may stay far below 1
+        Some(dynamics) if dynamics.factor.is_some() => return Ok(()),
+        Some(_) => vec![1.0],
+        None => scene.solver.factors(),
+    };
+    match inverted(&*body.bonds, loads, &factors) {
+        Some(found) => Err(source.error("boundary", found, INVERTS)),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// What the regions of prescribed displacement are called, in their order.

@@ -129,6 +129,7 @@ impl RelaxationSolver {
                 let sites = system.break_bonds(state);
                 broken = !sites.is_empty();
                 Equilibrium::broke(self, system, &sites);
+                system.refuse_adrift(state, settings.tolerance)?;
             }
         }
         let quotient = if state.iteration > 0 && sums.quotient_bottom > 0.0 {
@@ -185,11 +186,11 @@ impl<const D: usize> Equilibrium<D> for RelaxationSolver {
         Ok(None)
     }
 
-    fn tolerance(&self) -> f64 {
-        self.settings.tolerance
-    }
-
     fn broke(&mut self, system: &System<D>, sites: &[u32]) {
         update_unit_mass(&*system.bonds, sites, &mut self.unit_mass);
+    }
+
+    fn tolerance(&self) -> f64 {
+        self.settings.tolerance
     }
 }

@@ -420,6 +420,7 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
                 broken = !sites.is_empty();
                 if broken {
                     self.broke(system, &sites);
+                    system.refuse_adrift(state, self.settings.tolerance)?;
                     point = self.arrive(system, state)?;
                 }
             }
@@ -432,13 +433,13 @@ impl<const D: usize> Equilibrium<D> for LbfgsSolver<D> {
         }
     }
 
-    fn tolerance(&self) -> f64 {
-        self.settings.tolerance
-    }
-
     fn broke(&mut self, system: &System<D>, sites: &[u32]) {
         self.preconditioner.broke(&*system.bonds, sites);
         self.memory.clear(false);
+    }
+
+    fn tolerance(&self) -> f64 {
+        self.settings.tolerance
     }
 }
 

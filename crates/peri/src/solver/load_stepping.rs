@@ -23,19 +23,38 @@ pub trait Equilibrium<const D: usize> {
         watch: &mut Watch<D>,
     ) -> Result<Option<StretchRange>, Error>;
 
-    /// Out-of-balance force over reference force at which a search ends.
-    fn tolerance(&self) -> f64;
-
     /// Takes notice of the sites whose bonds have broken since the last equilibrium.
     fn broke(&mut self, system: &System<D>, sites: &[u32]);
+
+    /// Out-of-balance force over its reference that will do.
+    fn tolerance(&self) -> f64;
 }
 
 /// Solves the remaining load steps of `state`; `finished` sees every finished step and, with [`State::round`] above 0,
 /// every equilibrium in which bonds have just broken.
 ///
 /// # Errors
-/// As [`Equilibrium::equilibrate`], and whatever `finished` returns.
+/// As [`Equilibrium::equilibrate`], and whatever `finished` returns;
+/// [`Error::NoEquilibrium`] where nothing holds a part that bears a force, at the start or once it is torn off: `state` is then at the last
+/// finished step; [`Error::Geometry`] for prescribed displacements that press the body through itself.
 pub fn load_stepping<const D: usize>(
+    method: &mut dyn Equilibrium<D>,
+    system: &mut System<D>,
+    state: &mut State<D>,
+    watch: &mut Watch<D>,
+    finished: &mut Finished<D>,
+) -> Result<(), Error> {
+    if state.step == 0 && !state.predicted {
+        system.refuse_inverted(&system.factors)?;
+    }
+    let stepped = step_by_step(method, system, state, watch, finished);
+    if matches!(stepped, Err(Error::NoEquilibrium { .. })) {
+        state.retreat();
+    }
+    stepped
+}
+
+fn step_by_step<const D: usize>(
     method: &mut dyn Equilibrium<D>,
     system: &mut System<D>,
     state: &mut State<D>,
@@ -48,6 +67,8 @@ pub fn load_stepping<const D: usize>(
     system.scale = Scale::new(&*system.bonds, &system.loads, stiffness);
     let shortest = system.shortest();
     system.restore(state)?;
+    let (tolerance, forced) = (method.tolerance(), system.loads.body_force.is_some());
+    system.refuse_adrift(state, tolerance)?;
     'steps: while state.step < system.factors.len() {
         if !state.predicted && system.friction().is_some() {
             state.started = Some(state.displacement.clone());
@@ -67,7 +88,11 @@ pub fn load_stepping<const D: usize>(
         }
         loop {
             loop {
-                let observed = method.equilibrate(system, state, watch)?;
+                let observed = method.equilibrate(system, state, watch);
+                if matches!(observed, Ok(_) | Err(Error::NotConverged { .. })) {
+                    system.refuse_far(state)?;
+                }
+                let observed = observed?;
                 if !system.covers_stretches(state, observed)? {
                     continue;
                 }
@@ -95,6 +120,7 @@ pub fn load_stepping<const D: usize>(
             }
             state.cuts = 0;
             method.broke(system, &sites);
+            system.refuse_adrift(state, tolerance)?;
             finished(&*system.bonds, state)?;
             let particles = system.bonds.particles();
             particles.iter().for_each(|&site| state.velocity.set(site as usize, [0.0; D]));
@@ -106,6 +132,9 @@ pub fn load_stepping<const D: usize>(
         state.round = 0;
         (state.step_iterations, state.cuts) = (0, 0);
         system.raise(state, shortest);
+        if forced {
+            state.accept();
+        }
         finished(&*system.bonds, state)?;
         if severed(system, state) {
             break;
@@ -215,6 +244,7 @@ fn record<const D: usize>(system: &mut System<D>, state: &mut State<D>) {
         contact: system.touching(state),
         work: state.work,
         released: state.released,
+        smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
         largest_stretch: (1.0 + observed.high).sqrt(),
         time: 0.0,
         kinetic: 0.0,

@@ -1,12 +1,14 @@
 //! What is to be solved, and how: quasi-static equilibria or explicit dynamics.
 
 mod adr;
+mod adrift;
 mod balance;
 mod breaking;
 mod coarse;
 mod covering;
 mod criterion;
 mod cut;
+mod inverted;
 mod lbfgs;
 mod load;
 mod load_stepping;
@@ -14,6 +16,7 @@ mod mass;
 mod memory;
 mod method;
 mod motion;
+mod pace;
 mod passes;
 mod places;
 mod preconditioner;
@@ -28,7 +31,9 @@ mod verlet_friction;
 mod verlet_step;
 
 pub use adr::{DynamicRelaxation, RelaxationSolver};
+pub use adrift::{Adrift, Stops, adrift};
 pub use criterion::{Bilinear, Breaking, Criterion, Policy};
+pub use inverted::{INVERTS, inverted};
 pub use lbfgs::{Lbfgs, LbfgsSolver};
 pub use load::{Loads, Support};
 pub use load_stepping::{Equilibrium, load_stepping};

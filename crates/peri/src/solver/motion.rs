@@ -1,5 +1,6 @@
 //! Where explicit dynamics are: time, steps, and when stretches must be looked at again.
 
+use super::pace::Pace;
 use crate::potential::StretchRange;
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +25,10 @@ pub struct Motion {
     pub rubbed: f64,
     /// Energy of elastic slip in friction, J.
     pub(super) stuck: f64,
+    /// How often the greatest frequency was bounded, and how often searched for, since the start; of solids.
+    pub bounds: u64,
+    /// See `bounds`.
+    pub searches: u64,
     pub(super) begun: bool,
     /// Longest step in use, s.
     pub(super) longest: f64,
@@ -43,8 +48,8 @@ pub struct Motion {
     pub(super) floor: f64,
     /// Largest of what was available and what has gone.
     pub(super) turnover: f64,
-    /// Stretches up to which `frequency` is good for a material whose stiffness is known at one displacement only.
-    pub(super) known: Option<[f64; 2]>,
+    /// Of a material whose stiffness is that of a displacement, see [`super::pace`].
+    pub(super) pace: Pace,
     /// Stretches at the last look, and how much they may have changed since.
     pub(super) looked: [f64; 2],
     pub(super) slack: f64,
@@ -72,17 +77,9 @@ impl Motion {
         self.slack = 0.0;
     }
 
-    /// Whether stretches have left what `frequency` is good for.
-    pub(super) fn is_outgrown(&self) -> bool {
-        self.known.is_some_and(|[low, high]| self.looked[0] < low || self.looked[1] > high)
-    }
-
     /// Whether stretches may have left what is fitted, or reached the critical one. A bond's stretch changes by no more
     /// than its ends' increments over its length.
-    pub(super) fn must_look(&self, mut fitted: [f64; 2], critical: Option<f64>) -> bool {
-        if let Some([low, high]) = self.known {
-            fitted = [fitted[0].max(low), fitted[1].min(high)];
-        }
+    pub(super) fn must_look(&self, fitted: [f64; 2], critical: Option<f64>) -> bool {
         let [low, high] = [self.looked[0] - self.slack, self.looked[1] + self.slack];
         // NaN looks, too
         let inside = low >= fitted[0] && high <= fitted[1] && critical.is_none_or(|c| high <= c);

@@ -15,7 +15,7 @@ pub struct Scale {
     /// s of each site, N/m⁴.
     springs: Vec<f64>,
     /// U at load factor 1, m, and L, m.
-    largest: f64,
+    pub(super) largest: f64,
     pub(super) diagonal: f64,
     /// δ‖s‖₂ over constrained particles, N/m³, and δ Σ V s over them, N.
     pub(super) constrained: f64,

@@ -2,7 +2,7 @@
 
 use super::motion::Motion;
 use super::scale::Balance;
-use crate::bonds::Softened;
+use crate::bonds::{Bonds, Softened};
 use crate::contact::{Grip, Resting, Touching};
 use crate::error::Error;
 use crate::field::Field;
@@ -40,7 +40,9 @@ pub struct Record {
     pub work: f64,
     /// Energy of broken bonds when they broke, J.
     pub released: f64,
-    /// Largest intact stretch.
+    /// Smallest and largest stretch of intact bonds.
+    pub smallest_stretch: f64,
+    /// See `smallest_stretch`.
     pub largest_stretch: f64,
     /// Time, s; 0 without dynamics.
     pub time: f64,
@@ -172,8 +174,22 @@ pub struct State<const D: usize> {
     pub(super) cuts: u32,
     /// Factor and largest stretch of the equilibrium from which the load was lowered, see [`System::snap_back`](super::System::snap_back).
     pub(super) lowered: Option<[f64; 2]>,
+    /// The last finished step under given forces, which may tear the body apart.
+    pub(super) accepted: Option<Box<Accepted<D>>>,
     /// The finished steps.
     pub history: Vec<Record>,
+}
+
+/// A finished step, as far as the history does not have it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub(super) struct Accepted<const D: usize> {
+    displacement: Field<D>,
+    force: Field<D>,
+    intact: Option<Vec<u64>>,
+    softened: Vec<Softened>,
+    events: usize,
+    stretches: StretchRange,
 }
 
 impl<const D: usize> State<D> {
@@ -221,8 +237,67 @@ impl<const D: usize> State<D> {
             inserted: Vec::new(),
             cuts: 0,
             lowered: None,
+            accepted: None,
             history: Vec::new(),
         }
+    }
+}
+
+impl<const D: usize> State<D> {
+    /// Keeps a finished step, see [`Self::retreat`].
+    pub(super) fn accept(&mut self) {
+        self.accepted = Some(Box::new(Accepted {
+            displacement: self.displacement.clone(),
+            force: self.force.clone(),
+            intact: self.intact.clone(),
+            softened: self.softened.clone(),
+            events: self.events.len(),
+            stretches: self.balanced_stretches,
+        }));
+    }
+
+    /// Goes back to the last finished step, or to the undeformed body; counts of work stay. Bonds are another's: see [`Self::sever`].
+    pub(super) fn retreat(&mut self) {
+        let sites = self.displacement.sites();
+        let accepted = self.accepted.take().map_or_else(
+            || Accepted {
+                displacement: Field::zeros(sites),
+                force: Field::zeros(sites),
+                intact: None,
+                softened: Vec::new(),
+                events: 0,
+                stretches: StretchRange::REST,
+            },
+            |accepted| *accepted,
+        );
+        (self.displacement, self.force) = (accepted.displacement, accepted.force);
+        (self.intact, self.softened) = (accepted.intact, accepted.softened);
+        self.balanced_stretches = accepted.stretches;
+        self.velocity = Field::zeros(sites);
+        self.events.truncate(accepted.events);
+        let last = self.history.last();
+        self.broken = last.map_or(0, |row| row.broken);
+        self.detached = last.map_or(0, |row| row.detached);
+        self.released = last.map_or(0.0, |row| row.released);
+        self.work = last.map_or(0.0, |row| row.work);
+        (self.predicted, self.round, self.iteration, self.step_iterations) = (false, 0, 0, 0);
+    }
+
+    /// Severs and softens the bonds of a body as it was built as they are in this state.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`] for another body.
+    pub fn sever(&self, bonds: &mut dyn Bonds<D>) -> Result<(), Error> {
+        if let Some(words) = &self.intact
+            && !bonds.restore(words)
+        {
+            let found = format!("a state of {} words of bonds, which is another body's", words.len());
+            return Err(Error::geometry(found));
+        }
+        if !self.softened.is_empty() {
+            bonds.soften(self.softened.clone());
+        }
+        Ok(())
     }
 }
 

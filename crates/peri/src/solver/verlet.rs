@@ -27,6 +27,11 @@ const LENIENT: u64 = 8;
 /// Contact that is allowed for, over what was observed: the time step is not shortened for each particle that joins.
 const GROWTH: f64 = 1.25;
 
+/// Steps are planned anew where they may become longer by this.
+const LONGER: f64 = 1.25;
+/// Cuts of one step, after which it is taken as it is.
+const MOST_CUTS: u32 = 12;
+
 /// Settings of explicit dynamics. [`State::velocity`] is the velocity at the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityVerlet {
@@ -45,13 +50,6 @@ pub struct VelocityVerlet {
     /// Rows of history, equally far apart; steps are shortened evenly to fall on them.
     pub records: usize,
 }
-
-/// Factor on ω² of materials whose stiffness is known at one displacement only …
-const MARGIN: f64 = 1.3;
-/// … which is looked for again where strains have grown by this part of themselves, or of …
-const GROWS: f64 = 0.25;
-/// … this strain.
-const LEAST: f64 = 0.1;
 
 impl VelocityVerlet {
     /// Steps of 0.9 of the critical one up to `end_time`, no damping, loads at once, 100 rows of history.
@@ -81,6 +79,9 @@ impl<const D: usize> Method<D> for VelocityVerlet {
         finished: &mut Finished<D>,
     ) -> Result<(), Error> {
         self.check()?;
+        if !state.motion.begun && system.course.is_none() {
+            system.refuse_inverted(&[1.0])?;
+        }
         let volumes = volumes(system);
         system.contact.iter_mut().for_each(Contact::release);
         if state.motion.begun {
@@ -216,29 +217,30 @@ impl VelocityVerlet {
     }
 
     /// Notes the sharp frequency of the present stretches in units of the law's tangent there.
-    fn know<const D: usize>(&self, system: &System<D>, state: &mut State<D>, frequency: f64) {
-        let motion = &mut state.motion;
-        let tangent = system.material.range(motion.looked).least_tangent;
-        motion.frequency = if frequency > 0.0 { frequency / tangent } else { 0.0 };
-        // a given time step does not follow it
-        if system.material.has_points() && self.time_step.is_none() {
-            let [low, high] = motion.looked;
-            motion.known =
-                Some([low - GROWS * (1.0 - low).max(LEAST), high + GROWS * (high - 1.0).max(LEAST)]);
+    fn know<const D: usize>(&self, system: &mut System<D>, state: &mut State<D>, frequency: f64) {
+        let tangent = system.material.range(state.motion.looked).least_tangent;
+        state.motion.frequency = if frequency > 0.0 { frequency / tangent } else { 0.0 };
+        if system.material.has_points() {
+            self.measure(system, state, frequency);
         }
     }
 
     /// What follows from the stretches that the fitted law covers: bounds of the critical time step and of the energy.
-    fn cover<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
+    pub(super) fn cover<const D: usize>(&self, system: &System<D>, state: &mut State<D>) {
         let (law, modulus) = (system.material.range(state.fitted), system.material.bond_law().1);
         let motion = &mut state.motion;
         // blocks of the tangent's rows: ω² ≤ ‖A_II‖ + Σ‖A_IJ‖ with ‖t′nn + t/λ(1 − nn)‖ ≤ max(|t′|, |t|/λ);
         // Feingold & Varga (1962), doi:10.2140/pjm.1962.12.1241
-        let bound = 2.0 * (motion.stiffness * state.tangent + motion.contact) / self.density;
-        // the stiffness of particles with states is that of a displacement, not of a range: it may grow until the next look
-        let margin = if system.material.has_points() { MARGIN } else { 1.0 };
+        let contact = 2.0 * motion.contact / self.density;
         // the greatest frequency of a sum is no greater than the sum of both (Weyl)
-        let estimate = margin * motion.frequency * law.mean_tangent + 2.0 * motion.contact / self.density;
+        let [bound, estimate] = if system.material.has_points() {
+            motion.pace.squares(self.density).map(|square| square + contact)
+        } else {
+            [
+                2.0 * (motion.stiffness * state.tangent + motion.contact) / self.density,
+                motion.frequency * law.mean_tangent + contact,
+            ]
+        };
         motion.gershgorin_step = critical(bound);
         // nothing free, or a tangent without a positive frequency: the bound alone
         motion.covered_step = critical(if estimate > 0.0 { estimate.min(bound) } else { bound });
@@ -266,35 +268,45 @@ impl VelocityVerlet {
         volumes: &[f64],
         end: f64,
     ) -> Result<(), Error> {
-        let after = state.motion.time_after(end);
-        let (before, (factor, rate)) = (self.factor(system, state.motion.time).0, self.factor(system, after));
-        let (density, damping, step) = (self.density, self.damping, state.motion.time_step);
-        let leap = VerletStep { step, density, damping, factors: [before, factor], rate };
-        // the leap goes to the factor times this, the kick takes its increment
-        system.set_rates(0.0, factor);
-        let first = leap_pass(&system.loads, state, volumes, &leap);
-        system.set_rates(before, factor);
-        // two ends, √D components
-        state.motion.slack += 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
-        system.place(factor, after);
+        let before = self.factor(system, state.motion.time).0;
+        let (density, damping) = (self.density, self.damping);
+        let start = self.follows(system).then(|| (state.displacement.clone(), state.velocity.clone()));
+        let (mut cuts, slack) = (0, state.motion.slack);
+        let (after, leap, first) = loop {
+            let after = state.motion.time_after(end);
+            let (factor, rate) = self.factor(system, after);
+            let step = state.motion.time_step;
+            let leap = VerletStep { step, density, damping, factors: [before, factor], rate };
+            // the leap goes to the factor times this, the kick takes its increment
+            system.set_rates(0.0, factor);
+            let first = leap_pass(&system.loads, state, volumes, &leap);
+            system.set_rates(before, factor);
+            // two ends, √D components
+            let strain = 2.0 * (D as f64).sqrt() * first.increment / state.motion.shortest;
+            state.motion.slack = slack + strain;
+            system.place(factor, after);
+            system.prepare(&state.displacement);
+            let Some((displacement, velocity)) = &start else { break (after, leap, first) };
+            cuts += 1;
+            if cuts > MOST_CUTS || !self.is_too_long(system, state, strain) {
+                break (after, leap, first);
+            }
+            // a step that ends where it would have been too long is taken back
+            state.displacement.clone_from(displacement);
+            state.velocity.clone_from(velocity);
+            system.place(before, state.motion.time);
+            state.motion.plan(end);
+        };
+        let factor = leap.factors[1];
         let (friction, rubbing, rubs) =
             (state.friction.take(), state.rubbing.clone(), system.friction().is_some());
-        system.prepare(&state.displacement);
         let look = state.motion.must_look(state.fitted, system.breaking_stretch());
         let (mut second, observed) = force_pass(system, state, volumes, &leap, look, !look && !rubs);
         system.count_evaluation(state);
         if look {
             state.observed = state.observed.join(observed);
             state.motion.see(observed);
-            let wider = state.observed.high.is_finite() && system.widen(state)?;
-            let outgrown = state.motion.is_outgrown() && observed.high.is_finite();
-            if outgrown {
-                system.fit(state, None)?;
-                let shortest = state.motion.shortest;
-                let frequency = largest_frequency_squared(system, state, volumes, density, shortest);
-                self.know(system, state, frequency);
-            }
-            if wider || outgrown {
+            if state.observed.high.is_finite() && system.widen(state)? {
                 refresh(system, state, factor, None);
                 system.count_evaluation(state);
                 self.cover(system, state);
@@ -312,12 +324,15 @@ impl VelocityVerlet {
         state.step_iterations += 1;
         state.total_iterations += 1;
         self.account(state, first, second)?;
-        if look {
-            self.sever(system, state, observed, factor);
-        }
+        let broken = look && self.sever(system, state, observed, factor);
         self.cover_contact(system, state);
+        let follows = self.follows(system);
+        if follows {
+            self.follow(system, state, volumes, broken);
+        }
         let motion = &mut state.motion;
-        if motion.longest < (1.0 - 1e-9) * motion.time_step && motion.taken < motion.planned {
+        let longer = follows && motion.longest > LONGER * motion.time_step;
+        if (longer || motion.longest < (1.0 - 1e-9) * motion.time_step) && motion.taken < motion.planned {
             motion.plan(end);
         }
         Ok(())
@@ -347,18 +362,20 @@ impl VelocityVerlet {
         Ok(())
     }
 
-    /// Breaks what is overstretched; the forces are then those of what is left.
+    /// Breaks what is overstretched; the forces are then those of what is left. Whether anything did.
     fn sever<const D: usize>(
         &self,
         system: &mut System<D>,
         state: &mut State<D>,
         observed: StretchRange,
         factor: f64,
-    ) {
-        if system.is_overstretched(observed) {
-            let sites = system.break_bonds(state);
-            refresh(system, state, factor, Some(&sites));
+    ) -> bool {
+        if !system.is_overstretched(observed) {
+            return false;
         }
+        let sites = system.break_bonds(state);
+        refresh(system, state, factor, Some(&sites));
+        !sites.is_empty()
     }
 
     fn status<const D: usize>(&self, state: &State<D>) -> Status {
@@ -398,6 +415,7 @@ impl VelocityVerlet {
             contact: system.touching(state),
             work: state.work,
             released: state.released,
+            smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
             largest_stretch: (1.0 + observed.high).sqrt(),
             time: state.motion.time,
             kinetic: state.motion.kinetic,

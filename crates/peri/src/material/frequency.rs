@@ -1,0 +1,152 @@
+//! A bound of the greatest frequency of a [`super::NonlocalSolid`] at any deformation and with any bonds broken, by Schur's test.
+//!
+//! F of a particle i depends on u_j by B_ij = V_j M⁻¹ξ/(|ξ|² Σ_J V_J), on its own by b_i = |Σ_j B_ij|. With k_i = ‖∂P/∂F‖ less what the
+//! springs of the stabilisation have, R_i = Σ_j |B_ij| + b_i and a_i = I_i k_i R_i the Hessian K of the energy has
+//!
+//! K ≤ diag(V_j m_j), m_j = Σ_i (V_i/V_j) a_i |B_ij| + a_j b_j + springs, ρω² ≤ max m_j.
+//!
+//! That is proven and two to three times too much: waves on a lattice do not reach all signs that Schur's test allows. So the first two terms
+//! are taken by [`WAVES`] and the springs by the greatest of Σ_j ω(1 − cos k·ξ) over Σ_j ω, both measured. Shape tensors come in by R_i: few
+//! bonds are stiff, and it is their neighbours among whom that is shared.
+
+use super::Family;
+use super::deformation::{Point, PointLaw};
+use crate::bonds::Bonds;
+use crate::field::{CHUNK, Field, chunk_range};
+use nalgebra::SVector;
+use rayon::prelude::*;
+
+/// Part of the bound by Schur's test that frequencies reach: at stretches of 1 to 3 and with up to half of the bonds broken.
+const WAVES: f64 = 0.4;
+
+/// Part of a family below which its bonds are few.
+const FEW: f64 = 0.7;
+
+/// What a particle adds to the bound.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach {
+    /// R and b, 1/m, and Σ_J V_J/|ξ|² of the intact bonds, m; not numbers until they are asked for.
+    size: f64,
+    own: f64,
+    squares: f64,
+    /// What R is where all neighbours are such particles: more than R where few bonds are left.
+    among: f64,
+    /// WAVES·a, Pa/m, and A of the springs with what the residual adds, over Σ_K V_K.
+    front: f64,
+    slope: f64,
+}
+
+impl Default for Reach {
+    fn default() -> Self {
+        Self { size: f64::NAN, own: f64::NAN, squares: f64::NAN, among: f64::NAN, front: 0.0, slope: 0.0 }
+    }
+}
+
+impl Reach {
+    /// Its bonds have changed.
+    pub fn forget(&mut self) {
+        self.size = f64::NAN;
+    }
+}
+
+/// Greatest Σ_j ω 2(1 − cos k·ξ) over Σ_j ω in lattices.
+fn greatest_wave<const D: usize>() -> f64 {
+    if D == 2 { 2.6 } else { 2.4 }
+}
+
+impl<const D: usize> Point<D> {
+    /// R, b and Σ V/|ξ|² of the intact bonds.
+    fn measure(&mut self, family: &Family<D>) {
+        let (mut size, mut sum, mut squares) = (0.0, SVector::<f64, D>::zeros(), 0.0);
+        let mut greatest = 0.0_f64;
+        family.each(|bond| {
+            let share = bond.volume / (bond.length * bond.length);
+            let part = self.inverse * SVector::from(bond.reference) * (share / self.intact);
+            size += part.norm();
+            greatest = greatest.max(part.norm());
+            sum += part;
+            squares += share;
+        });
+        (self.reach.own, self.reach.squares) = (sum.norm(), squares);
+        self.reach.size = size + self.reach.own;
+        let bonds = self.whole / family.volume();
+        let all = if self.integrity() > FEW { size } else { size.max(bonds * greatest) };
+        self.reach.among = all + self.reach.own;
+    }
+
+    /// The law's part; gives what bounds ρω² where all neighbours are alike.
+    fn stiffen_waves(&mut self, law: &(impl PointLaw<D> + ?Sized), family: &Family<D>) -> f64 {
+        if self.intact <= 0.0 {
+            (self.reach.front, self.reach.slope) = (0.0, 0.0);
+            return 0.0;
+        }
+        if self.reach.size.is_nan() {
+            self.measure(family);
+        }
+        let Reach { size, among, squares, .. } = self.reach;
+        if !self.has_gradient() {
+            (self.reach.front, self.reach.slope) = (0.0, 0.0);
+            return 4.0 * self.spring * squares;
+        }
+        let dimension = D as f64;
+        // κ(F:δF + ½δr)² ≤ κ(|F| + √r)(|F||δF|² + √r D Σ ω|δz|²/I)
+        let (norm, root) = (self.deformation.gradient().norm(), self.deformation.residual.sqrt());
+        let mixed = law.residual_stiffness(&self.deformation) * root;
+        let shear = self.slope * self.whole / dimension;
+        let gradient = law.stiffness(&self.deformation) + mixed * norm - shear * self.shape.min(1.0);
+        self.reach.slope = self.slope + dimension * mixed * (norm + root) / self.whole;
+        self.reach.front = WAVES * self.integrity() * gradient.max(0.0) * size;
+        self.reach.front * among + greatest_wave::<D>() * self.reach.slope * squares
+    }
+}
+
+/// m_j of a particle.
+fn of_particle<const D: usize>(family: &Family<D>, points: &[Point<D>]) -> f64 {
+    let own = &points[family.site()];
+    let mut sum = own.reach.front * own.reach.own;
+    family.each(|bond| {
+        let other = &points[bond.to];
+        let share = bond.volume / (bond.length * bond.length);
+        if other.reach.front > 0.0 {
+            let part = (other.inverse * SVector::<f64, D>::from(bond.reference)).norm();
+            sum += other.reach.front * part * share / other.intact;
+        }
+        let waves = 0.5 * greatest_wave::<D>() * (own.reach.slope + other.reach.slope);
+        sum += share * (waves + 2.0 * (own.spring + other.spring));
+    });
+    sum
+}
+
+/// max m_j, or `enough` where that is more.
+pub fn bound<const D: usize>(
+    law: &(impl PointLaw<D> + ?Sized),
+    (bonds, displacement): (&dyn Bonds<D>, &Field<D>),
+    points: &mut [Point<D>],
+    enough: f64,
+) -> f64 {
+    let particles = bonds.particles();
+    let of_chunk = |(chunk, points): (usize, &mut [Point<D>])| {
+        let range = chunk_range(chunk, bonds.sites());
+        let [from, to] =
+            [range.start, range.end].map(|end| particles.partition_point(|&s| (s as usize) < end));
+        let mut beyond = Vec::new();
+        for &site in &particles[from..to] {
+            let family = Family::new(bonds, displacement, site as usize);
+            if points[site as usize - range.start].stiffen_waves(law, &family) > enough {
+                beyond.push(site);
+            }
+        }
+        beyond
+    };
+    let beyond: Vec<Vec<u32>> = points.par_chunks_mut(CHUNK).enumerate().map(of_chunk).collect();
+    // who has one of these in its family, or is one
+    let mut near = beyond.concat();
+    for site in beyond.concat() {
+        bonds.neighbours(site as usize, &mut |bond| near.push(bond.site as u32));
+    }
+    near.sort_unstable();
+    near.dedup();
+    let points = &*points;
+    let of = |&site: &u32| of_particle(&Family::new(bonds, displacement, site as usize), points);
+    near.par_iter().map(of).reduce(|| enough, f64::max)
+}

@@ -1,0 +1,198 @@
+//! Loads without an equilibrium: parts of a body that bear a force and that nothing holds, and displacements far beyond the body.
+//!
+//! Intact bonds divide a body into parts. Supports prescribe single components, so that a part of which component d is nowhere prescribed
+//! bears no reaction along d: where its forces along d do not vanish it has no equilibrium at any displacement. Where every such sum
+//! vanishes, forces that do not follow the body leave its rotation a potential that is bounded, so that no other mechanism lacks an
+//! equilibrium: only translations are looked at. Contact pushes: a plane may hold what presses on it, a part held along d what lies behind it.
+
+use super::load::Loads;
+use super::scale::Scale;
+use super::state::State;
+use super::system::System;
+use crate::bonds::{Bonds, components};
+use crate::error::Error;
+use crate::field::Field;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Displacement over the size of the body, or over the largest prescribed one, beyond which it is no equilibrium's.
+const FAR: f64 = 1e3;
+
+/// A part of a body, held together by intact bonds, whose forces along an axis nothing balances.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Adrift {
+    /// Its particles.
+    pub particles: usize,
+    /// Particles of the body.
+    pub of: usize,
+    /// Its middle in the reference configuration, m.
+    pub middle: Vec<f64>,
+    /// The axis.
+    pub axis: &'static str,
+    /// Sum of its forces along the axis at load factor 1, N.
+    pub force: f64,
+}
+
+impl fmt::Display for Adrift {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let middle: Vec<String> = self.middle.iter().map(|x| format!("{:.4}", x * 1e3)).collect();
+        write!(
+            f,
+            "a part of {} of {} particles around X = ({}) mm bears {:.3e} N along {} at load factor 1, and nothing holds it along {}",
+            self.particles,
+            self.of,
+            middle.join(", "),
+            self.force,
+            self.axis,
+            self.axis
+        )
+    }
+}
+
+/// What may hold a part beside supports: it pushes.
+#[derive(Clone, Debug, Default)]
+pub struct Stops<const D: usize> {
+    /// Normals of rigid planes, towards the body.
+    pub normals: Vec<[f64; D]>,
+    /// Whether particles repel each other.
+    pub pairs: bool,
+    /// Whether anything rubs: it may then hold along every axis.
+    pub rubs: bool,
+}
+
+/// What is known of a part.
+#[derive(Clone, Copy)]
+struct Piece<const D: usize> {
+    particles: usize,
+    /// Components prescribed in any particle.
+    held: u8,
+    /// Σ V b and Σ V |b| along each axis, N.
+    force: [f64; D],
+    size: [f64; D],
+    /// Σ X, Σ x and the extent of x, m.
+    reference: [f64; D],
+    middle: [f64; D],
+    extent: [[f64; 2]; D],
+}
+
+/// The first part of a body with forces along an axis that add up to more than `tolerance` of their sizes, and that nothing can hold.
+pub fn adrift<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    loads: &Loads<D>,
+    displacement: Option<&Field<D>>,
+    stops: &Stops<D>,
+    tolerance: f64,
+) -> Option<Adrift> {
+    let body = loads.body_force.as_ref()?;
+    let roots = components(bonds, |_, _| true);
+    let mut pieces: BTreeMap<u32, Piece<D>> = BTreeMap::new();
+    for &site in bonds.particles() {
+        let (site, root) = (site as usize, roots[site as usize]);
+        let (volume, force, rest) = (bonds.volume(site), body.get(site), bonds.position(site));
+        let moved = displacement.map_or([0.0; D], |field| field.get(site));
+        let piece = pieces.entry(root).or_insert(Piece {
+            particles: 0,
+            held: 0,
+            force: [0.0; D],
+            size: [0.0; D],
+            reference: [0.0; D],
+            middle: [0.0; D],
+            extent: [[f64::INFINITY, f64::NEG_INFINITY]; D],
+        });
+        piece.particles += 1;
+        piece.held |= loads.constrained(site);
+        for d in 0..D {
+            let place = rest[d] + moved[d];
+            piece.force[d] += volume * force[d];
+            piece.size[d] += volume * force[d].abs();
+            piece.reference[d] += rest[d];
+            piece.middle[d] += place;
+            piece.extent[d] = [piece.extent[d][0].min(place), piece.extent[d][1].max(place)];
+        }
+    }
+    let holds = |piece: &Piece<D>, d: usize| {
+        let sign = piece.force[d].signum();
+        let middle = piece.middle[d] / piece.particles as f64;
+        let ahead = |other: &Piece<D>| {
+            let end = if sign > 0.0 { other.extent[d][1] } else { -other.extent[d][0] };
+            other.held >> d & 1 == 1 && end > sign * middle
+        };
+        piece.held >> d & 1 == 1
+            || stops.rubs
+            || stops.normals.iter().any(|normal| normal[d] * sign < 0.0)
+            || stops.pairs && pieces.values().any(ahead)
+    };
+    for piece in pieces.values() {
+        for d in 0..D {
+            if piece.force[d].abs() > tolerance * piece.size[d] && !holds(piece, d) {
+                return Some(Adrift {
+                    particles: piece.particles,
+                    of: bonds.particles().len(),
+                    middle: piece.reference.map(|x| x / piece.particles as f64).to_vec(),
+                    axis: ["x", "y", "z"][d],
+                    force: piece.force[d],
+                });
+            }
+        }
+    }
+    None
+}
+
+impl<const D: usize> System<'_, D> {
+    fn stops(&self) -> Stops<D> {
+        let Some(contact) = self.repulsion() else { return Stops::default() };
+        let normals = contact.planes().map(|plane| plane.normal).collect();
+        Stops { normals, pairs: contact.has_pairs(), rubs: contact.rubs() }
+    }
+
+    /// Refuses parts that bear a force and that nothing holds; of a body with given forces only.
+    ///
+    /// # Errors
+    /// [`Error::NoEquilibrium`].
+    pub(super) fn refuse_adrift(&self, state: &State<D>, tolerance: f64) -> Result<(), Error> {
+        if self.loads.body_force.is_none() || self.factors.is_empty() {
+            return Ok(());
+        }
+        let sites = || self.bonds.particles().iter().map(|&site| site as usize);
+        let loaded =
+            |site: usize| self.loads.body_force.as_ref().is_some_and(|body| body.get(site) != [0.0; D]);
+        if state.broken > 0 && !sites().any(loaded) {
+            return Err(self.no_equilibrium(
+                state,
+                "every particle that bore a force has lost all its bonds".to_owned(),
+            ));
+        }
+        match adrift(&*self.bonds, &self.loads, Some(&state.displacement), &self.stops(), tolerance) {
+            Some(part) => Err(self.no_equilibrium(state, part.to_string())),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses a balance of forces at a displacement that only rounding can balance.
+    ///
+    /// # Errors
+    /// [`Error::NoEquilibrium`].
+    pub(super) fn refuse_far(&self, state: &State<D>) -> Result<(), Error> {
+        if self.loads.body_force.is_none() {
+            return Ok(());
+        }
+        let factor = self.factors.get(state.step).copied().unwrap_or(1.0);
+        let Scale { largest, diagonal, .. } = self.scale;
+        let limit = FAR * diagonal.max(largest * factor.abs());
+        let sites = self.bonds.particles().iter().map(|&site| state.displacement.get(site as usize));
+        let square = sites.map(|u| u.iter().map(|x| x * x).sum::<f64>()).fold(0.0, f64::max);
+        let far = square.sqrt();
+        if far <= limit || limit == 0.0 {
+            return Ok(());
+        }
+        Err(self.no_equilibrium(
+            state,
+            format!("a displacement of {far:.3e} m is reached, of a body {diagonal:.3e} m in size"),
+        ))
+    }
+
+    fn no_equilibrium(&self, state: &State<D>, why: String) -> Error {
+        let factor = self.factors.get(state.step).copied().unwrap_or(1.0);
+        Error::NoEquilibrium { step: state.step, factor, torn: state.broken > 0, why }
+    }
+}

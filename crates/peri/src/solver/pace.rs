@@ -1,0 +1,164 @@
+//! How long explicit steps may be where the stiffness is that of a displacement, of solids: it grows with every stretch, where a body is
+//! crushed, and where bonds break.
+//!
+//! m, [`crate::material::Response::frequency_bound`], bounds ρω² of a state at the cost of a force or less. The Lanczos iteration gives ω²
+//! itself and with it the part r = ρω²/m that frequencies reach; between two of them ω² is taken as r m/ρ. Steps are those of [`MARGIN`]
+//! times that. m is looked at where a step ends, before its forces act: a step that ends where it would have been too long, as one that
+//! crushes a particle does, is taken back and cut, so that no kick follows from it. Looks follow every step in which bonds broke or strains
+//! may have changed by [`STRAIN`], and otherwise are the more seldom the slower m grows; ω² is measured again where m has come far from
+//! where it was. All that follows from the state alone.
+
+use super::state::State;
+use super::system::System;
+use super::time_step::largest_frequency_squared;
+use super::verlet::VelocityVerlet;
+use serde::{Deserialize, Serialize};
+
+/// Factor on ω² by which it may grow until steps are shortened.
+const MARGIN: f64 = 1.3;
+/// Factor by which ω² that steps are made for grows at most where one is taken back: where it ends tells little of where half of it would.
+const CUT: f64 = 4.0;
+/// Factors on m, up and down, beyond which ω² is measured again.
+const ABOVE: f64 = 4.0;
+const BELOW: f64 = 1.6;
+/// Least part of the bound that frequencies are taken to reach.
+const LEAST_PART: f64 = 0.05;
+/// Strain that steps may add at most, by the increments of displacements, between two looks.
+const STRAIN: f64 = 0.2;
+/// Most steps between two looks, and looks between two at whether steps may be longer.
+const SELDOM: u32 = 8;
+const WAITS: u32 = 32;
+
+/// What is known of the greatest frequency.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Pace {
+    /// m when ω² was last measured, N/m⁴, and r.
+    bound: f64,
+    part: f64,
+    /// ρω² that steps are made for, without the margin.
+    covered: f64,
+    /// m at the last look, steps between it and the next, and steps until then; looks since steps were changed.
+    last: f64,
+    every: u32,
+    due: u32,
+    looks: u32,
+    /// Strain since the last look, at most.
+    strain: f64,
+}
+
+impl Pace {
+    /// ω² by the bound and as it is allowed for, 1/s².
+    pub(super) fn squares(&self, density: f64) -> [f64; 2] {
+        let covered = MARGIN * self.covered;
+        [self.bound.max(self.last).max(covered) / density, covered / density]
+    }
+
+    /// Whether a step that has changed strains by `strain` at most is looked at.
+    fn is_due(&mut self, strain: f64) -> bool {
+        self.due = self.due.saturating_sub(1);
+        self.strain += strain;
+        self.due == 0 || self.strain > STRAIN
+    }
+
+    /// Takes note of m: how soon the next look is due, half of what is left of the margin at the pace of before.
+    fn see(&mut self, bound: f64) {
+        let (grown, steps) = (bound / self.last, f64::from(self.every));
+        let left = (MARGIN * self.covered / (self.part * bound)).max(1.0).ln();
+        let slow = if grown > 1.0 { 0.5 * left * steps / grown.ln() } else { f64::from(SELDOM) };
+        self.every = (slow.min(2.0 * steps) as u32).clamp(1, SELDOM);
+        (self.last, self.due, self.strain) = (bound, self.every, 0.0);
+        self.looks += 1;
+    }
+}
+
+impl VelocityVerlet {
+    /// Whether steps follow the stiffness of a displacement.
+    pub(super) fn follows<const D: usize>(&self, system: &System<D>) -> bool {
+        system.material.has_points() && self.time_step.is_none()
+    }
+
+    /// Takes note of ω² of the present state.
+    pub(super) fn measure<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        frequency: f64,
+    ) {
+        system.prepare(&state.displacement);
+        let bound = system.material.frequency_bound(&*system.bonds, &state.displacement, 0.0);
+        let measured = self.density * frequency;
+        // nothing oscillates, or the Lanczos iteration has failed: the bound alone
+        let good = measured > 0.0 && measured.is_finite() && bound > 0.0;
+        let part = if good { (measured / bound).max(LEAST_PART) } else { 1.0 };
+        state.motion.pace =
+            Pace { bound, part, covered: part * bound, last: bound, every: 1, due: 1, looks: 0, strain: 0.0 };
+    }
+
+    /// Looks at the state where a step ends, prepared, if that is due. True where the step was too long for it: steps are then shorter.
+    pub(super) fn is_too_long<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        strain: f64,
+    ) -> bool {
+        let pace = &mut state.motion.pace;
+        if !pace.is_due(strain) {
+            return false;
+        }
+        state.motion.bounds += 1;
+        let enough = pace.covered / pace.part;
+        let bound = system.material.frequency_bound(&*system.bonds, &state.displacement, enough);
+        let pace = &mut state.motion.pace;
+        pace.see(bound);
+        let needed = pace.part * bound;
+        if needed <= MARGIN * pace.covered {
+            return false;
+        }
+        pace.covered = if pace.covered > 0.0 { needed.min(CUT * pace.covered) } else { needed };
+        (pace.looks, pace.due) = (0, 1);
+        self.cover(system, state);
+        true
+    }
+
+    /// Follows the stiffness after a step, in which bonds have `broken` or not: shorter steps where the margin is used up, longer ones where
+    /// there is far more.
+    pub(super) fn follow<const D: usize>(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        volumes: &[f64],
+        broken: bool,
+    ) {
+        let pace = &mut state.motion.pace;
+        let waited = pace.looks >= WAITS;
+        let known = pace.last;
+        let grown = pace.part * known > pace.covered;
+        if !broken && !waited && !grown {
+            return;
+        }
+        let enough = pace.covered / pace.part / if waited { BELOW } else { 1.0 };
+        let mut bound = known;
+        if broken || waited {
+            state.motion.bounds += 1;
+            system.prepare(&state.displacement);
+            bound = system.material.frequency_bound(&*system.bonds, &state.displacement, enough);
+            state.motion.pace.see(bound);
+        }
+        let pace = &mut state.motion.pace;
+        pace.due = if broken { 1 } else { pace.due };
+        let falls = waited && bound <= enough;
+        pace.looks = if waited { 0 } else { pace.looks };
+        if bound * pace.part <= pace.covered && !falls {
+            return;
+        }
+        if bound > ABOVE * pace.bound || falls && BELOW * bound <= pace.bound {
+            let shortest = state.motion.shortest;
+            let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
+            state.motion.searches += 1;
+            self.measure(system, state, frequency);
+        } else {
+            pace.covered = pace.part * bound;
+        }
+        self.cover(system, state);
+    }
+}
