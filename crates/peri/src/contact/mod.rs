@@ -232,6 +232,11 @@ impl<const D: usize> Contact<D> {
             || self.planes().any(|plane| plane.friction > 0.0 && !plane.bonded)
     }
 
+    /// Whether planes or grips hold faces in all directions.
+    pub fn is_tied(&self) -> bool {
+        self.ties.is_some() || self.planes().any(|plane| plane.bonded)
+    }
+
     /// Moves planes to where they are at a load factor and a time, s.
     pub fn place(&mut self, factor: f64, time: f64) {
         if let Some(planes) = &mut self.planes {

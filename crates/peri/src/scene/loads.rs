@@ -178,7 +178,7 @@ fn balanced<const D: usize>(
     let stops = Stops {
         normals,
         pairs: scene.contact.is_some(),
-        rubs: scene.contact.as_ref().is_some_and(ContactSpec::rubs),
+        rubs: scene.contact.as_ref().is_some_and(ContactSpec::rubs) || planes.iter().any(|plane| plane.bonded),
     };
     let Some(part) = adrift(&*body.bonds, loads, None, &stops, scene.tolerance()) else { return Ok(()) };
     let Adrift { particles, of, force, axis, .. } = &part;

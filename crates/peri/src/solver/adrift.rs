@@ -142,7 +142,7 @@ impl<const D: usize> System<'_, D> {
     fn stops(&self) -> Stops<D> {
         let Some(contact) = self.repulsion() else { return Stops::default() };
         let normals = contact.planes().map(|plane| plane.normal).collect();
-        Stops { normals, pairs: contact.has_pairs(), rubs: contact.rubs() }
+        Stops { normals, pairs: contact.has_pairs(), rubs: contact.rubs() || contact.is_tied() }
     }
 
     /// Refuses parts that bear a force and that nothing holds; of a body with given forces only.
