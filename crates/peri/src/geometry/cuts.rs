@@ -30,7 +30,7 @@ impl<const D: usize> Cut<D> {
     fn meets(&self, a: [f64; D], b: [f64; D], slack: f64) -> Option<Meeting<D>> {
         let solution = self.passage(a, b)?;
         let size = length(std::array::from_fn::<f64, D, _>(|d| b[d] - a[d]));
-        let sizes = self.edges.map(|edge| length(edge));
+        let sizes = self.edges.map(length);
         if !(NEAR..=1.0 - NEAR).contains(&solution[0]) {
             return None;
         }

@@ -67,7 +67,7 @@ impl<const D: usize> Gaps<D> {
         let several = parts.iter().any(|&part| part > 1);
         let Lattice { spacing, origin, cells, .. } = *lattice;
         let kind = Kind::Cells { spacing, origin, cells, parts };
-        several.then(|| Self { horizon: f64::INFINITY, closed: CLOSED * spacing, kind })
+        several.then_some(Self { horizon: f64::INFINITY, closed: CLOSED * spacing, kind })
     }
 
     /// Those between the parts of a cloud: points belong together that are nearer than 1.5 edges of the larger of their cubes. `None`

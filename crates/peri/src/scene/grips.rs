@@ -7,6 +7,9 @@ use polycore::scene::{SceneError, Source};
 /// Relative change of a free length that is told.
 const TOLD: f64 = 1e-3;
 
+/// A spacing, and the free length along each axis that has grips at both sides, m.
+type Lengths<const D: usize> = (f64, [Option<f64>; D]);
+
 /// A sentence for each axis along which the free length between two grips differs between variants that differ in nothing but their
 /// spacing.
 ///
@@ -18,7 +21,7 @@ pub fn free_lengths<const D: usize>(
     variants: &[Variant],
 ) -> Result<Vec<String>, SceneError> {
     let mut told = Vec::new();
-    let mut seen: Vec<(String, Vec<(f64, [Option<f64>; D])>)> = Vec::new();
+    let mut seen: Vec<(String, Vec<Lengths<D>>)> = Vec::new();
     for variant in variants.iter().filter(|variant| variant.spacing > 0.0) {
         if variant.study.is_some_and(|index| scene.study[index].expect_error.is_some()) {
             continue;

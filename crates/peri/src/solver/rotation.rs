@@ -88,6 +88,9 @@ impl<const D: usize> Turned<D> {
     }
 }
 
+/// A region that carries free particles: its turn, its displacement at load factor 1, m, and places of some of its particles.
+type Carrier<'a, const D: usize> = (Option<&'a Turned<D>>, [f64; D], Vec<[f64; D]>);
+
 impl<const D: usize> Loads<D> {
     /// Turns a region whose components are constrained already.
     pub fn turn(&mut self, bonds: &dyn Bonds<D>, turned: Turned<D>) {
@@ -154,7 +157,7 @@ impl<const D: usize> Loads<D> {
             }
             sum.map(|x| x / sites.len().max(1) as f64)
         };
-        let regions: Vec<(Option<&Turned<D>>, [f64; D], Vec<[f64; D]>)> = self
+        let regions: Vec<Carrier<D>> = self
             .held_regions
             .iter()
             .enumerate()

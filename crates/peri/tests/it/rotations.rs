@@ -110,7 +110,7 @@ fn a_bar_twisted_along_the_arc() {
 fn a_bar_free_along_its_axis() {
     let turn = "rotation = { point = [\"0 mm\", \"0 mm\", \"0 mm\"], axis = [0, 0, 1], angle = \"90 deg\" }
 displacement = [\"0 mm\", \"0 mm\", \"free\"]";
-    let held = solve(&bar(&turn.lines().next().unwrap(), 3));
+    let held = solve(&bar(turn.lines().next().unwrap(), 3));
     let text = bar(turn, 3)
         + "[[probe]]\nname = \"end\"\ntrack = \"displacement\"\naxis = \"z\"\nside = \"z+\"\nlayers = 1\n";
     let free = solve(&text);
