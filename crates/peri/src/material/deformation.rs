@@ -1,7 +1,7 @@
 //! Solids of the mean deformation of a family, with any Poisson ratio: correspondence and its stabilisation as one energy.
 
 use super::cloud_passes::CloudPasses;
-use super::eight_chain::cofactor;
+use super::eight_chain::{CRUSHED, cofactor};
 use super::frequency::Reach;
 use super::solid_passes::SolidPasses;
 use super::{Bond, Family, Material, Passes};
@@ -431,6 +431,11 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         enough: f64,
     ) -> Option<f64> {
         Some(super::frequency::bound(&self.0, (bonds, displacement), points, enough))
+    }
+
+    fn is_crushed(&self, point: &Point<D>) -> bool {
+        // NaN is
+        point.deformation().is_some_and(|deformation| !(deformation.volume_change() >= CRUSHED - 1.0))
     }
 
     /// Of Young's modulus E ≈ 3μ.

@@ -111,6 +111,13 @@ pub trait Material<const D: usize>: Send + Sync {
         None
     }
 
+    /// Whether the intact bonds of a particle describe a deformation that crushes it to nothing or turns it inside out: few bonds that are
+    /// left by a break may. Explicit dynamics then break these, too.
+    fn is_crushed(&self, point: &Self::Point) -> bool {
+        let _ = point;
+        false
+    }
+
     /// kθ, N/m⁶, of linear bonds t = 3kθ(λ − 1) that are about as stiff, see [`crate::calibrate::modulus_in`]: the scale of
     /// forces, of first guesses and of the preconditioner's coarse level. Equilibria do not depend on it.
     fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64;

@@ -299,6 +299,14 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
         2.0 * bonds.particles().par_iter().map(of).reduce(|| 0.0, f64::max)
     }
 
+    fn crushed(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, sites: &[u32]) -> Vec<u32> {
+        if !self.has_points() {
+            return Vec::new();
+        }
+        self.prepare(bonds, displacement);
+        sites.iter().copied().filter(|&site| self.material.is_crushed(&self.points[site as usize])).collect()
+    }
+
     /// Frequencies grow as the bound of the stiffness does.
     fn range(&self, _stretches: [f64; 2]) -> LawRange {
         LawRange { mean_tangent: self.tangent, least_tangent: self.tangent, least_energy: 0.0 }
