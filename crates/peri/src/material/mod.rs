@@ -45,6 +45,9 @@ pub use crate::bonds::Property;
 use crate::bonds::Bonds;
 use crate::field::Field;
 
+/// A body in a state: its bonds and displacement.
+pub type Body<'a, const D: usize> = (&'a dyn Bonds<D>, &'a Field<D>);
+
 /// A material: the forces between particles follow from an energy E = Σ_I V_I W_I.
 ///
 /// With the force state τ_IJ = ∂W_I/∂ζ_IJ/V_J of particle I, N/m⁶, the force density on it is
@@ -100,14 +103,8 @@ pub trait Material<const D: usize>: Send + Sync {
     /// A bound of ρω², N/m⁴, of all oscillations about the present displacement, for explicit dynamics, which asks for it every few
     /// steps: cheaper and sharper than twice the greatest [`Self::stiffness`], which is taken where there is none. Where it is below
     /// `enough`, `enough` will do. `points` are the states of all sites.
-    fn frequency_bound(
-        &self,
-        bonds: &dyn Bonds<D>,
-        displacement: &Field<D>,
-        points: &mut [Self::Point],
-        enough: f64,
-    ) -> Option<f64> {
-        let _ = (bonds, displacement, points, enough);
+    fn frequency_bound(&self, body: Body<D>, points: &mut [Self::Point], enough: f64) -> Option<f64> {
+        let _ = (body, points, enough);
         None
     }
 

@@ -288,7 +288,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
     }
 
     fn frequency_bound(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, enough: f64) -> f64 {
-        let own = self.material.frequency_bound(bonds, displacement, &mut self.points, enough);
+        let own = self.material.frequency_bound((bonds, displacement), &mut self.points, enough);
         if let Some(own) = own {
             return own;
         }
