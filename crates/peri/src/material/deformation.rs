@@ -427,8 +427,8 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     }
 
     fn is_crushed(&self, point: &Point<D>) -> bool {
-        // NaN is
-        point.deformation().is_some_and(|deformation| !(deformation.volume_change() >= CRUSHED - 1.0))
+        let change = point.deformation().map_or(0.0, Deformation::volume_change);
+        change.is_nan() || change < CRUSHED - 1.0
     }
 
     /// Of Young's modulus E ≈ 3μ.
