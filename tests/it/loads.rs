@@ -131,3 +131,61 @@ fn every_value_may_be_expected() {
         assert!(values.contains_key(asked), "{asked}: {:?}", values.keys());
     }
 }
+
+/// A notched strip under a growing force: the run ends with the error once it is torn, and keeps the last step in equilibrium, in
+/// its own run and as a variant that expects the error; a study of one tells both.
+#[test]
+fn torn_by_a_force_a_run_keeps_its_last_equilibrium() {
+    let scene = r#"version = 1
+program = "peri"
+
+[body]
+space = "plane-stress"
+thickness = "2 mm"
+spacing = "1 mm"
+shapes = [{ add = "box", min = ["-10 mm", "-20 mm"], max = ["10 mm", "20 mm"] }]
+cracks = [{ from = ["-10 mm", "0 mm"], to = ["-4 mm", "0 mm"] }]
+
+[material]
+youngs_modulus = "2 MPa"
+law = "linear"
+critical = { stretch = 1.3 }
+
+[[boundary]]
+side = "y-"
+displacement = ["0 mm", "0 mm"]
+
+[[boundary]]
+side = "y+"
+force = ["0 N", "20 N"]
+
+[solver]
+steps = 20
+stop_below = 0.05
+"#;
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    let expecting = "\n[[study]]\nname = \"torn\"\nspacing = [\"1 mm\"]\nexpect_error = \"no equilibrium\"\n";
+    fs::write(here.join("one.toml"), scene).unwrap();
+    fs::write(here.join("study.toml"), scene.to_owned() + expecting).unwrap();
+    peri("run one.toml --output one", here).with_code(1).tells("no equilibrium after 7 steps");
+    peri("run study.toml --output study", here).with_code(0);
+    let (one, study) = (report(&here.join("one")), report(&here.join("study")));
+    assert_eq!(one["passed"], false);
+    let name = "dx=1mm m=3.015 torn";
+    assert_eq!(scalar(&study, &format!("failed_as_expected[{name}]")), 1.0);
+    for (report, of) in [(&one, String::new()), (&study, format!("[{name}]"))] {
+        let value = |quantity: &str| scalar(report, &format!("{quantity}{of}"));
+        // 7 N is the last row: 8 N tears it
+        assert!((value("peak_load") - 7.0).abs() < 1e-9 && value("last_load") == value("peak_load"));
+        // of ends of steps, not of what was tried
+        assert!(value("largest_stretch") < 1.3 && value("largest_stretch_met") > 1.3);
+        assert!((value("load_at_first_break") - 6.0).abs() < 1e-9);
+        assert!(value("largest_displacement") < 5e-3);
+    }
+    // the field is that of the last row
+    let series = vtkhdf::read(here.join("one/dx-1mm_m-3.015.vtkhdf")).unwrap();
+    let moved = series.data(0, "displacement").unwrap();
+    let largest = moved.chunks(3).map(|u| u.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max);
+    assert!((largest / scalar(&one, "largest_displacement") - 1.0).abs() < 1e-6, "{largest}");
+}

@@ -1,13 +1,12 @@
 //! Solids of the mean deformation of a family, with any Poisson ratio: correspondence and its stabilisation as one energy.
 
 use super::cloud_passes::CloudPasses;
-use super::eight_chain::cofactor;
+use super::eight_chain::{CRUSHED, cofactor};
 use super::frequency::Reach;
 use super::solid_passes::SolidPasses;
-use super::{Bond, Family, Material, Passes};
+use super::{Body, Bond, Family, Material, Passes};
 use crate::bonds::{Bonds, Columns, Kind};
 use crate::calibrate::modulus_in;
-use crate::field::Field;
 use nalgebra::{Matrix3, SMatrix, SVector};
 use polycore::constitutive::Flags;
 use std::sync::Arc;
@@ -436,14 +435,13 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         0.5 * if D == 2 { 1.75 } else { 1.0 } * most
     }
 
-    fn frequency_bound(
-        &self,
-        bonds: &dyn Bonds<D>,
-        displacement: &Field<D>,
-        points: &mut [Point<D>],
-        enough: f64,
-    ) -> Option<f64> {
-        Some(super::frequency::bound(&self.0, (bonds, displacement), points, enough))
+    fn frequency_bound(&self, body: Body<D>, points: &mut [Point<D>], enough: f64) -> Option<f64> {
+        Some(super::frequency::bound(&self.0, body, points, enough))
+    }
+
+    fn is_crushed(&self, point: &Point<D>) -> bool {
+        let change = point.deformation().map_or(0.0, Deformation::volume_change);
+        change.is_nan() || change < CRUSHED - 1.0
     }
 
     /// Of Young's modulus E ≈ 3μ.

@@ -28,7 +28,7 @@ pub struct EightChain<const D: usize> {
 /// Relative extension beyond which β grows linearly: a chain that a load step stretches too far has a force nevertheless.
 pub(super) const LINEAR: f64 = 0.995;
 /// J below which ln J and J⁻² go on as parabolas.
-const CRUSHED: f64 = 0.2;
+pub(super) const CRUSHED: f64 = 0.2;
 
 /// Excess of I₁ below which the energy is an integral of μ, which does not cancel.
 const SMALL: f64 = 0.05;

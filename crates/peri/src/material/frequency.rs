@@ -9,10 +9,9 @@
 //! are taken by [`WAVES`] and the springs by the greatest of Σ_j ω(1 − cos k·ξ) over Σ_j ω, both measured. Shape tensors come in by R_i: few
 //! bonds are stiff, and it is their neighbours among whom that is shared.
 
-use super::Family;
 use super::deformation::{Point, PointLaw};
-use crate::bonds::Bonds;
-use crate::field::{CHUNK, Field, chunk_range};
+use super::{Body, Family};
+use crate::field::{CHUNK, chunk_range};
 use nalgebra::SVector;
 use rayon::prelude::*;
 
@@ -120,7 +119,7 @@ fn of_particle<const D: usize>(family: &Family<D>, points: &[Point<D>]) -> f64 {
 /// max m_j, or `enough` where that is more.
 pub fn bound<const D: usize>(
     law: &(impl PointLaw<D> + ?Sized),
-    (bonds, displacement): (&dyn Bonds<D>, &Field<D>),
+    (bonds, displacement): Body<D>,
     points: &mut [Point<D>],
     enough: f64,
 ) -> f64 {

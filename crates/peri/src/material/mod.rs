@@ -47,6 +47,9 @@ use crate::bonds::Bonds;
 use crate::calibrate::{Space, modulus_in, stiffness_1111};
 use crate::field::Field;
 
+/// A body in a state: its bonds and displacement.
+pub type Body<'a, const D: usize> = (&'a dyn Bonds<D>, &'a Field<D>);
+
 /// A material: the forces between particles follow from an energy E = Σ_I V_I W_I.
 ///
 /// With the force state τ_IJ = ∂W_I/∂ζ_IJ/V_J of particle I, N/m⁶, the force density on it is
@@ -102,15 +105,16 @@ pub trait Material<const D: usize>: Send + Sync {
     /// A bound of ρω², N/m⁴, of all oscillations about the present displacement, for explicit dynamics, which asks for it every few
     /// steps: cheaper and sharper than twice the greatest [`Self::stiffness`], which is taken where there is none. Where it is below
     /// `enough`, `enough` will do. `points` are the states of all sites.
-    fn frequency_bound(
-        &self,
-        bonds: &dyn Bonds<D>,
-        displacement: &Field<D>,
-        points: &mut [Self::Point],
-        enough: f64,
-    ) -> Option<f64> {
-        let _ = (bonds, displacement, points, enough);
+    fn frequency_bound(&self, body: Body<D>, points: &mut [Self::Point], enough: f64) -> Option<f64> {
+        let _ = (body, points, enough);
         None
+    }
+
+    /// Whether the intact bonds of a particle describe a deformation that crushes it to nothing or turns it inside out: few bonds that are
+    /// left by a break may. Explicit dynamics then break these, too.
+    fn is_crushed(&self, point: &Self::Point) -> bool {
+        let _ = point;
+        false
     }
 
     /// kθ, N/m⁶, of linear bonds t = 3kθ(λ − 1) that are about as stiff, see [`crate::calibrate::modulus_in`]: the scale of

@@ -288,7 +288,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
     }
 
     fn frequency_bound(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, enough: f64) -> f64 {
-        let own = self.material.frequency_bound(bonds, displacement, &mut self.points, enough);
+        let own = self.material.frequency_bound((bonds, displacement), &mut self.points, enough);
         if let Some(own) = own {
             return own;
         }
@@ -297,6 +297,14 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
             self.material.stiffness(&Family::new(bonds, displacement, site as usize), &self.points)
         };
         2.0 * bonds.particles().par_iter().map(of).reduce(|| 0.0, f64::max)
+    }
+
+    fn crushed(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, sites: &[u32]) -> Vec<u32> {
+        if !self.has_points() {
+            return Vec::new();
+        }
+        self.prepare(bonds, displacement);
+        sites.iter().copied().filter(|&site| self.material.is_crushed(&self.points[site as usize])).collect()
     }
 
     /// Frequencies grow as the bound of the stiffness does.

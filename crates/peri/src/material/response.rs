@@ -128,6 +128,12 @@ pub trait Response<const D: usize>: Send + Sync {
         f64::INFINITY
     }
 
+    /// Of some sites those that their bonds crush, see [`super::Material::is_crushed`].
+    fn crushed(&mut self, bonds: &dyn Bonds<D>, displacement: &Field<D>, sites: &[u32]) -> Vec<u32> {
+        let _ = (bonds, displacement, sites);
+        Vec::new()
+    }
+
     /// Tangents and energies over a range of stretches.
     fn range(&self, stretches: [f64; 2]) -> LawRange;
 }

@@ -3,7 +3,7 @@
 use super::criterion::{Bilinear, Criterion, Policy, most};
 use super::state::{Event, State};
 use super::system::System;
-use crate::bonds::{Overstretched, Softened, fingerprint};
+use crate::bonds::{Neighbour, Overstretched, Softened, fingerprint};
 use crate::contact::Contact;
 use crate::potential::StretchRange;
 
@@ -63,7 +63,7 @@ impl<const D: usize> System<'_, D> {
     /// Severs all bonds beyond what they bear, and softens those on the way there; the sites of their ends.
     pub fn break_bonds(&mut self, state: &mut State<D>) -> Vec<u32> {
         let mut softened = None;
-        let list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
+        let mut list = match self.breaking.as_ref().map(|breaking| &breaking.criterion) {
             Some(&Criterion::Softening(law)) => {
                 let found = self.overloaded(state, law.onset);
                 // in dynamics forces follow at once
@@ -82,17 +82,23 @@ impl<const D: usize> System<'_, D> {
         let released = self.material.released(&*self.bonds, &list, most(self.breaking.as_ref()));
         // what does not follow bond by bond is what the whole body loses
         let before = released.is_none().then(|| self.stored_energy(state, state.observed));
-        let bonds = list.len() as u64 / 2;
         let touches = self.contact.as_ref().is_some_and(Contact::repels);
         let pair =
             |bond: &Overstretched| [bond.site, self.bonds.bond(bond.site as usize, bond.index).site as u32];
-        let parted: Vec<[u32; 2]> = if touches { list.iter().map(pair).collect() } else { Vec::new() };
+        let mut parted: Vec<[u32; 2]> = if touches { list.iter().map(pair).collect() } else { Vec::new() };
+        if !list.is_empty() {
+            self.bonds.sever(&list);
+        }
+        if state.motion.begun && released.is_none() && !list.is_empty() {
+            let more = self.crumble(state, &mut list);
+            parted.extend(more.into_iter().filter(|_| touches));
+        }
+        let bonds = list.len() as u64 / 2;
         state.broken += bonds;
         let [factor, pull, push] = state.balanced;
         let load = self.response(factor, (pull, push)).0;
         if bonds > 0 {
             state.events.push(Event { step: state.step, bonds, fingerprint: fingerprint(&list), load });
-            self.bonds.sever(&list);
         }
         let mut sites: Vec<u32> = list.iter().map(|bond| bond.site).collect();
         if let Some(mut softened) = softened {
@@ -117,6 +123,47 @@ impl<const D: usize> System<'_, D> {
         sites.dedup();
         state.detached += self.release(sites.iter().copied());
         sites
+    }
+
+    /// Severs the bonds of particles that those left after `list` crush to nothing, and adds them to it: energies that no step could follow
+    /// would come from nothing. Both ends of each.
+    fn crumble(&mut self, state: &State<D>, list: &mut Vec<Overstretched>) -> Vec<[u32; 2]> {
+        let mut pairs = Vec::new();
+        let mut ends: Vec<u32> = list.iter().map(|bond| bond.site).collect();
+        while !ends.is_empty() {
+            ends.sort_unstable();
+            ends.dedup();
+            let crushed = self.material.crushed(&*self.bonds, &state.displacement, &ends);
+            let mut more = Vec::new();
+            for &site in &crushed {
+                self.bonds.neighbours(site as usize, &mut |bond| more.push((site, bond)));
+            }
+            let of = |site: u32, bond: &Neighbour<D>| Overstretched {
+                site,
+                index: bond.index,
+                elongation: 0.0,
+                length: bond.length,
+                weight: bond.weight,
+            };
+            let mut found: Vec<Overstretched> = more.iter().map(|(site, bond)| of(*site, bond)).collect();
+            for (site, there) in &more {
+                self.bonds.neighbours(there.site, &mut |bond| {
+                    if bond.site == *site as usize {
+                        found.push(of(there.site as u32, &bond));
+                    }
+                });
+            }
+            found.sort_unstable_by_key(|bond| (bond.site, bond.index));
+            found.dedup_by_key(|bond| (bond.site, bond.index));
+            for bond in &found {
+                pairs.push([bond.site, self.bonds.bond(bond.site as usize, bond.index).site as u32]);
+            }
+            self.bonds.sever(&found);
+            ends = found.iter().map(|bond| bond.site).collect();
+            list.append(&mut found);
+        }
+        list.sort_unstable_by_key(|bond| (bond.site, bond.index));
+        pairs
     }
 
     /// Takes the body forces off particles without bonds, which nothing could balance; their number.

@@ -61,6 +61,9 @@ fn passing<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, factors: &[f6
     None
 }
 
+/// A particle of the first grip: its place along the relative motion and across it, m, and its site.
+type Passed<const D: usize> = (f64, [f64; D], usize);
+
 /// Where and from which load factor on particles of the second grip, which moves by `apart` against the first, pass through it.
 fn passes<const D: usize>(
     bonds: &dyn Bonds<D>,
@@ -82,7 +85,7 @@ fn passes<const D: usize>(
         (s, across)
     };
     let cell = |across: &[f64; D]| across.map(|x| (x / spacing).floor() as i64);
-    let mut cells: HashMap<[i64; D], Vec<(f64, [f64; D], usize)>> = HashMap::new();
+    let mut cells: HashMap<[i64; D], Vec<Passed<D>>> = HashMap::new();
     for &site in here {
         let (s, across) = place(site);
         cells.entry(cell(&across)).or_default().push((s, across, site));

@@ -101,9 +101,9 @@ fn torn_by_a_force() {
     };
     let full = 1.7 * peak;
     let methods: [(&dyn Method<2>, Policy); 3] = [
-        (&Lbfgs::default(), Policy::AtEquilibrium),
-        (&DynamicRelaxation::default(), Policy::AtEquilibrium),
-        (&DynamicRelaxation::default(), Policy::EachIteration),
+        (&Lbfgs { tolerance: 1e-5, ..Lbfgs::default() }, Policy::AtEquilibrium),
+        (&DynamicRelaxation { tolerance: 1e-5, ..DynamicRelaxation::default() }, Policy::AtEquilibrium),
+        (&DynamicRelaxation { tolerance: 1e-5, ..DynamicRelaxation::default() }, Policy::EachIteration),
     ];
     for (method, policy) in methods {
         let (mut bonds, mut loads) = strip();
