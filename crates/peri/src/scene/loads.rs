@@ -173,12 +173,14 @@ fn balanced<const D: usize>(
     body: &Body<D>,
     loads: &Loads<D>,
 ) -> Result<(), SceneError> {
-    let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
+    let planes =
+        scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
     let normals = planes.iter().map(|plane| plane.normal).collect();
     let stops = Stops {
         normals,
         pairs: scene.contact.is_some(),
-        rubs: scene.contact.as_ref().is_some_and(ContactSpec::rubs) || planes.iter().any(|plane| plane.bonded),
+        rubs: scene.contact.as_ref().is_some_and(ContactSpec::rubs)
+            || planes.iter().any(|plane| plane.bonded),
     };
     let Some(part) = adrift(&*body.bonds, loads, None, &stops, scene.tolerance()) else { return Ok(()) };
     let Adrift { particles, of, force, axis, .. } = &part;
