@@ -63,12 +63,14 @@ impl<const D: usize> Patch<D> {
 pub struct Surface<const D: usize> {
     faces: Vec<Face<D>>,
     patches: Vec<Patch<D>>,
+    /// Faces that only bound what lies below the others: the last ones.
+    bounds: usize,
 }
 
 impl<const D: usize> Surface<D> {
     /// Samples the boundary of shapes: flat sides above the columns of the lattice, round ones at equal arcs of about `spacing`, m.
     pub fn of_shapes(operations: &[Operation<D>], spacing: f64) -> Self {
-        let mut surface = Self { faces: Vec::new(), patches: Vec::new() };
+        let mut surface = Self { faces: Vec::new(), patches: Vec::new(), bounds: 0 };
         let Some((low, high)) = bounds(operations) else { return surface };
         let counts = cell_counts(low, high, spacing);
         let origin = std::array::from_fn(|d| 0.5 * (low[d] + high[d]) - 0.5 * spacing * (counts[d] - 1.0));
@@ -111,12 +113,27 @@ impl<const D: usize> Surface<D> {
                 faces.push(Face { place, normal, patch: patch as u32 });
             }
         }
-        Self { faces, patches }
+        Self { faces, patches, bounds: 0 }
     }
 
     /// Takes flat sides whose patches are those of [`Self::of_lattice`]: 2d and 2d + 1 for the normals along −d and d.
     pub(crate) fn of_sides(faces: Vec<Face<D>>) -> Self {
-        Self { faces, patches: Self::axes() }
+        Self { faces, patches: Self::axes(), bounds: 0 }
+    }
+
+    /// With the faces of another surface of the same body on the other side of what lies below these.
+    pub fn bounded_by(mut self, other: &Self) -> Self {
+        let shift = self.patches.len() as u32;
+        self.patches.extend(&other.patches);
+        let own = other.faces.len() - other.bounds;
+        self.faces.extend(other.faces[..own].iter().map(|face| Face { patch: face.patch + shift, ..*face }));
+        self.bounds += own;
+        self
+    }
+
+    /// Whether a face, by its number, only bounds what lies below the others.
+    pub fn is_bound(&self, face: usize) -> bool {
+        face + self.bounds >= self.faces.len()
     }
 
     fn axes() -> Vec<Patch<D>> {

@@ -264,7 +264,8 @@ fn below<const D: usize>(bonds: &dyn Bonds<D>, surface: &Surface<D>) -> Vec<Belo
             let nearest = patch.iter().map(|below| below.depth).fold(f64::INFINITY, f64::min);
             let kept = |below: &&Below| below.depth < nearest + 0.75 * spacing;
             let sum: f64 = patch.iter().filter(kept).map(|below| below.hat).sum();
-            for below in patch.iter().filter(kept).filter(|below| !opposed(below)) {
+            let own = |below: &&Below| !surface.is_bound(below.face as usize) && !opposed(below);
+            for below in patch.iter().filter(kept).filter(own) {
                 all.push(Below { hat: below.hat / sum, ..*below });
             }
         }
@@ -287,7 +288,8 @@ fn join_small<const D: usize>(
     spacing: f64,
 ) {
     let faces = surface.faces();
-    let small: Vec<usize> = (0..faces.len()).filter(|&face| areas[face] < SMALL * area).collect();
+    let is_small = |&face: &usize| !surface.is_bound(face) && areas[face] < SMALL * area;
+    let small: Vec<usize> = (0..faces.len()).filter(is_small).collect();
     if small.is_empty() {
         return;
     }

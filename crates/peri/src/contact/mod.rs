@@ -44,7 +44,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use ties::Ties;
-pub use ties::{across, grips};
+pub use ties::{Interface, across, grips};
 
 /// κ of Macek & Silling (2007).
 pub const SHORT_RANGE: f64 = 15.0;
@@ -171,21 +171,22 @@ impl<const D: usize> Contact<D> {
         Ok(self)
     }
 
-    /// With the particles of `held` tied to the others at their surface with the stiffness s = `stiffness`, of a body of the longitudinal
-    /// modulus M = `modulus`, Pa, without bonds [`across`] it.
+    /// With held particles tied to the others at their interface with the stiffness s = `stiffness`, of a body of the outer surface `outside`
+    /// and the longitudinal modulus M = `modulus`, Pa, without bonds [`across`] the interface.
     ///
     /// # Errors
     /// [`Error::Parameter`] where s is negative, M is not positive, or either is not finite.
     pub fn with_tied(
         mut self,
         bonds: &LatticeBonds<D>,
-        held: &[bool],
+        interface: Interface<D>,
+        outside: &Surface<D>,
         modulus: f64,
         stiffness: f64,
     ) -> Result<Self, Error> {
         positive("modulus of contact", modulus)?;
         non_negative("stiffness of ties", stiffness)?;
-        let ties = Ties::new(bonds, held, stiffness * modulus / bonds.spacing());
+        let ties = Ties::new(bonds, interface, outside, stiffness * modulus / bonds.spacing());
         self.ties = (ties.len() > 0).then_some(ties);
         Ok(self)
     }

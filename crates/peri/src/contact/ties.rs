@@ -65,9 +65,16 @@ pub struct Ties<const D: usize> {
     greatest: f64,
 }
 
-impl<const D: usize> Ties<D> {
-    /// Ties held particles, with no bond to others, to the others beside them; the penalty is sM/Δx, Pa/m.
-    pub fn new(bonds: &LatticeBonds<D>, held: &[bool], penalty: f64) -> Self {
+/// Sides of free particles beside held ones, with the held particles that extrapolate to them, each with its factor.
+pub struct Interface<const D: usize> {
+    /// The sides, with normals towards the held particles.
+    pub surface: Surface<D>,
+    behind: Vec<Vec<(u32, f64)>>,
+}
+
+impl<const D: usize> Interface<D> {
+    /// The surface between held particles and others.
+    pub fn new(bonds: &LatticeBonds<D>, held: &[bool]) -> Self {
         let (mut sides, mut behind) = (Vec::new(), Vec::new());
         let mut occupied = vec![false; bonds.sites()];
         bonds.particles().iter().for_each(|&site| occupied[site as usize] = true);
@@ -90,7 +97,16 @@ impl<const D: usize> Ties<D> {
                 });
             }
         }
-        let mut faces = Faces::new(bonds, &Surface::of_sides(sides), true);
+        Self { surface: Surface::of_sides(sides), behind }
+    }
+}
+
+impl<const D: usize> Ties<D> {
+    /// Ties the sides of an interface to what is behind it, in a body with the outer surface `outside` and no bonds across the interface; the
+    /// penalty is sM/Δx, Pa/m.
+    pub fn new(bonds: &LatticeBonds<D>, interface: Interface<D>, outside: &Surface<D>, penalty: f64) -> Self {
+        let Interface { surface, behind } = interface;
+        let mut faces = Faces::new(bonds, &surface.bounded_by(outside), true);
         let greatest = faces.greatest(bonds);
         let free: Vec<usize> = (0..faces.len()).map(|face| faces.below(face).count()).collect();
         let sources = faces.sources.clone();

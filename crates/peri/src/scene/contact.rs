@@ -5,7 +5,7 @@ use super::values::{Body, plain, vector};
 use super::{Method, Scene};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
-use crate::contact::{Contact, PAIR_STIFFNESS, PLANE_STIFFNESS, Plane, grips};
+use crate::contact::{Contact, Interface, PAIR_STIFFNESS, PLANE_STIFFNESS, Plane, grips};
 use crate::error::Error;
 use crate::quantities as q;
 use crate::solver::Loads;
@@ -176,13 +176,19 @@ impl ContactSpec {
             None => Contact::new(bonds, modulus.clone(), self.pair_stiffness())?,
         };
         let contact = contact.with_friction(self.friction, self.elastic_slip.map(|slip| slip.si()))?;
-        let contact = contact.with_planes(bonds, &body.surface(), modulus.clone(), planes)?;
-        match (tied, bonds.as_lattice()) {
-            (Some((held, stiffness)), Some(lattice)) => {
-                contact.with_tied(lattice, held, modulus.greatest(), stiffness)
-            }
-            _ => Ok(contact),
-        }
+        let outside = body.surface();
+        let (Some((held, stiffness)), Some(lattice)) = (tied, bonds.as_lattice()) else {
+            return contact.with_planes(bonds, &outside, modulus.clone(), planes);
+        };
+        let interface = Interface::new(lattice, held);
+        let surface = outside.clone().bounded_by(&interface.surface);
+        contact.with_planes(bonds, &surface, modulus.clone(), planes)?.with_tied(
+            lattice,
+            interface,
+            &outside,
+            modulus.greatest(),
+            stiffness,
+        )
     }
 }
 

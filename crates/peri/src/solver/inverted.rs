@@ -41,12 +41,15 @@ fn passing<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, factors: &[f6
             }
         }
     }
-    let grips: Vec<([f64; D], Vec<usize>)> =
-        grips.into_iter().map(|((_, bits), sites)| (bits.map(f64::from_bits), sites)).collect();
+    let grips: Vec<(u8, [f64; D], Vec<usize>)> =
+        grips.into_iter().map(|((held, bits), sites)| (held, bits.map(f64::from_bits), sites)).collect();
     let [low, high] = factors.iter().fold([0.0_f64, 0.0_f64], |[low, high], &f| [low.min(f), high.max(f)]);
-    for (first, (own, here)) in grips.iter().enumerate() {
-        for (other, there) in &grips[first + 1..] {
-            let apart: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
+    for (first, (own_held, own, here)) in grips.iter().enumerate() {
+        for (held, other, there) in &grips[first + 1..] {
+            // where one of them is free it gives way
+            let both = own_held & held;
+            let apart: [f64; D] =
+                std::array::from_fn(|d| if both >> d & 1 == 1 { other[d] - own[d] } else { 0.0 });
             if let Some((at, factor)) = passes(bonds, [here, there], apart, [low, high]) {
                 let at: Vec<String> = at.iter().map(|x| format!("{:.4}", x * 1e3)).collect();
                 let [own, other] = [own, other].map(|u| u.map(|x| format!("{:.4}", x * 1e3)).join(", "));
