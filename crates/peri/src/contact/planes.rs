@@ -6,6 +6,7 @@ use super::plane::{Plane, Resting};
 use crate::bonds::{Bonds, Property};
 use crate::error::Error;
 use crate::field::Field;
+use crate::geometry::length;
 use crate::surface::Surface;
 use rayon::prelude::*;
 
@@ -399,8 +400,8 @@ impl<const D: usize> Planes<D> {
             }
             // a face stands for half of what lies between two, on either side; in space there are as many in each row
             let rows: f64 = if D == 2 { count } else { count.sqrt() };
-            let extent =
-                crate::geometry::length(std::array::from_fn::<f64, D, _>(|d| (high[d] - low[d]).max(0.0)));
+            let spans: [f64; D] = std::array::from_fn(|d| (high[d] - low[d]).max(0.0));
+            let extent = if D == 2 { length(spans) } else { spans.into_iter().fold(0.0, f64::max) };
             resting.width = if rows > 1.0 { extent * rows / (rows - 1.0) } else { 0.0 };
             if push > 0.0 {
                 let square: f64 = (0..D).map(|d| second[d] / push - (first[d] / push).powi(2)).sum();

@@ -13,6 +13,7 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     let mut add =
         |given: bool, more: &[Quantity]| all.extend(more.iter().filter(|_| given).map(|&q| Named::from(q)));
     add(true, &[q::SMALLEST_STRETCH, q::LARGEST_STRETCH, q::LARGEST_DISPLACEMENT]);
+    add(true, &[q::SMALLEST_STRETCH_MET, q::LARGEST_STRETCH_MET]);
     add(scene.material.solid.is_none() && !scene.material.is_prestrained(), &[q::FIT_ERROR]);
     add(true, &[q::WORK_OF_LOADS, q::STORED_ENERGY, q::DAMPED_ENERGY, q::LARGEST_RESIDUAL]);
     let records = scene.dynamics.as_ref().map_or(scene.solver.steps, |dynamics| dynamics.method().records);
@@ -30,7 +31,7 @@ pub fn quantities(scene: &Scene) -> Vec<Named> {
     let tearing = scene.material.solid.is_none() || energy;
     add(critical && tearing, &[q::TEARING_ENERGY, q::DISSIPATION_BIAS]);
     add(critical, &[q::NEW_CRACK_AREA, q::DISSIPATED_PER_AREA]);
-    add(critical && scene.dynamics.is_none(), &[q::BREAKING_EVENTS]);
+    add(critical && scene.dynamics.is_none(), &[q::BREAKING_EVENTS, q::LOAD_OF_FIRST_EVENT]);
     add(critical, &[q::DETACHED_PARTICLES, q::LAST_LOAD, q::LAST_DISPLACEMENT, q::RELEASED_ENERGY]);
     add(
         scene.contact.is_some(),
