@@ -25,10 +25,13 @@
 //! the pair: particles have no spin, so that it does not conserve angular momentum.
 
 mod faces;
+mod friction;
 mod grip;
 mod list;
 mod plane;
+mod plane_friction;
 mod planes;
+mod stiffness;
 mod ties;
 mod vicinity;
 
@@ -36,6 +39,7 @@ use crate::bonds::{Bonds, LatticeBonds, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::surface::Surface;
+pub use friction::Sliding;
 pub use grip::{Drag, Grip, Pair};
 use list::{List, Listed, Near};
 pub use plane::{Plane, Resting};
@@ -43,6 +47,7 @@ use planes::Planes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
+pub use stiffness::Spring;
 use ties::Ties;
 pub use ties::{Interface, across, grips};
 
@@ -279,103 +284,6 @@ impl<const D: usize> Contact<D> {
         Some(field)
     }
 
-    /// Has friction act as `grips` say, from the displacement `start` on.
-    pub fn hold(&mut self, start: &Field<D>, grips: Vec<Grip>) {
-        self.held = grips;
-        self.start = Some(start.clone());
-    }
-
-    /// Ends friction between equilibria.
-    pub fn release(&mut self) {
-        self.held.clear();
-        self.start = None;
-    }
-
-    /// Friction of all that touches at a displacement, sorted by pair: the slips of `old` go on with the normal forces there. What has
-    /// begun to touch since `start` slips for the rest of its way only.
-    pub fn grips(
-        &self,
-        bonds: &dyn Bonds<D>,
-        displacement: &Field<D>,
-        start: &Field<D>,
-        old: &[Grip],
-    ) -> Vec<Grip> {
-        let of = |chunk: usize| {
-            let mut grips = Vec::new();
-            let sites = chunk_range(chunk, displacement.sites());
-            for (own, touching) in self.pairs(bonds, displacement, sites, 0.0).filter(|_| self.friction > 0.0)
-            {
-                for touch in touching {
-                    let pair = Pair::Particles(own.site, touch.site);
-                    let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
-                    let volumes = [own.site, touch.site].map(|site| bonds.volume(site as usize));
-                    let push = self.pair(own.site, touch.site) * volumes[0] * volumes[1];
-                    let bound = self.friction * push * touch.overlap();
-                    let direction = touch.direction();
-                    let normal = std::array::from_fn(|d| direction.get(d).map_or(0.0, |n| -n));
-                    let stiffness = self.elastic_slip.map_or(push, |slip| bound / slip);
-                    let then = touch.overlap_at(start, own.site as usize);
-                    let share = if then >= 0.0 { 1.0 } else { touch.overlap() / (touch.overlap() - then) };
-                    let slip = known.map_or([0.0; 3], |grip| grip.slip);
-                    let mut grip = Grip { pair, slip, bound, stiffness, normal, share };
-                    grip.fit();
-                    if bound > 0.0 {
-                        grips.push(grip);
-                    }
-                }
-            }
-            grips.sort_unstable_by_key(|grip| grip.pair);
-            grips
-        };
-        let parts: Vec<Vec<Grip>> =
-            (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
-        let mut grips = parts.concat();
-        grips.extend(self.planes.iter().flat_map(|planes| planes.grips(displacement, start, old)));
-        grips
-    }
-
-    /// Friction after a load step, sorted by pair, for the next one; energy dissipated in the step, J, and force of friction of each
-    /// plane, N.
-    pub fn slide(&self, displacement: &Field<D>) -> (Vec<Grip>, f64, Vec<[f64; 3]>) {
-        let mut forces = vec![[0.0; 3]; self.planes().count()];
-        let (mut dissipated, mut grips) = (0.0, self.held.clone());
-        for grip in &mut grips {
-            let drag = grip.drag(self.slipped(grip.pair, displacement));
-            grip.slip = drag.slip;
-            match grip.pair {
-                // the other half is seen from the other side
-                Pair::Particles(..) => dissipated += 0.5 * drag.dissipated,
-                Pair::Face(plane, _) | Pair::Particle(plane, _) => {
-                    dissipated += drag.dissipated;
-                    (0..3).for_each(|d| forces[plane as usize][d] += drag.force[d]);
-                }
-            }
-        }
-        (grips, dissipated, forces)
-    }
-
-    /// Motion of the first side of a pair against the second since friction began to act, m.
-    fn slipped(&self, pair: Pair, displacement: &Field<D>) -> [f64; 3] {
-        let Some(start) = &self.start else { return [0.0; 3] };
-        let Pair::Particles(own, other) = pair else {
-            return self.planes.as_ref().map_or([0.0; 3], |planes| planes.slipped(pair, displacement, start));
-        };
-        let since = |site: u32, d: usize| {
-            displacement.components()[d][site as usize] - start.components()[d][site as usize]
-        };
-        std::array::from_fn(|d| if d < D { since(own, d) - since(other, d) } else { 0.0 })
-    }
-
-    /// Energy of elastic slip, J.
-    fn slip_energy(&self, displacement: &Field<D>) -> f64 {
-        let of = |grip: &Grip| {
-            let slip = grip.drag(self.slipped(grip.pair, displacement)).slip;
-            let part = if matches!(grip.pair, Pair::Particles(..)) { 0.5 } else { 1.0 };
-            part * Grip { slip, ..*grip }.energy()
-        };
-        self.held.iter().map(of).sum()
-    }
-
     /// How often the list was made.
     pub fn rebuilds(&self) -> u64 {
         self.list.rebuilds
@@ -515,226 +423,6 @@ impl<const D: usize> Contact<D> {
         all.energy += self.ties.as_ref().map_or(0.0, |ties| ties.energy(displacement));
         all
     }
-
-    /// Adds the force densities of friction between particles, N/m³, on the sites from `start` on, of one work item.
-    fn hold_pairs(&self, displacement: &Field<D>, start: usize, force: &mut [&mut [f64]; D]) {
-        if self.start.is_none() {
-            return;
-        }
-        let end = start + force[0].len();
-        for grip in self.held_by(start..end) {
-            let Pair::Particles(own, _) = grip.pair else { continue };
-            let drag = grip.drag(self.slipped(grip.pair, displacement)).force;
-            let volume = self.list.volume(own as usize);
-            (0..D).for_each(|d| force[d][own as usize - start] += drag[d] / volume);
-        }
-    }
-
-    /// Friction in force between particles, of those of some sites.
-    fn held_by(&self, sites: Range<usize>) -> &[Grip] {
-        let before = |end: usize| {
-            self.held
-                .partition_point(|grip| matches!(grip.pair, Pair::Particles(own, _) if (own as usize) < end))
-        };
-        &self.held[before(sites.start)..before(sites.end)]
-    }
-
-    /// Friction after a step of explicit dynamics, s, with the velocity at the half step, m/s: the slips of `old` go on with the
-    /// present normal forces. Takes effect in [`Self::add_friction`].
-    pub fn slide_on(
-        &mut self,
-        bonds: &dyn Bonds<D>,
-        displacement: &Field<D>,
-        velocity: &Field<D>,
-        step: f64,
-        old: &[Grip],
-    ) -> Sliding {
-        let mut grips = self.grips(bonds, displacement, displacement, old);
-        let mut sliding = Sliding { planes: vec![[0.0; 3]; self.planes().count()], ..Sliding::default() };
-        let at = |site: u32| velocity.get(site as usize);
-        for grip in &mut grips {
-            grip.share = 1.0;
-            let moved = match (grip.pair, &self.planes) {
-                (Pair::Particles(own, other), _) => {
-                    let (own, other) = (at(own), at(other));
-                    std::array::from_fn(|d| if d < D { step * (own[d] - other[d]) } else { 0.0 })
-                }
-                (pair, Some(planes)) => planes.carried(pair, velocity, step),
-                (_, None) => [0.0; 3],
-            };
-            let drag = grip.drag(moved);
-            grip.slip = drag.slip;
-            let part = if matches!(grip.pair, Pair::Particles(..)) { 0.5 } else { 1.0 };
-            sliding.stored += part * grip.energy();
-            if let Pair::Face(plane, _) | Pair::Particle(plane, _) = grip.pair {
-                (0..3).for_each(|d| sliding.planes[plane as usize][d] += drag.force[d]);
-            }
-        }
-        self.held = grips;
-        if let Some(planes) = &mut self.planes {
-            planes.drag(&self.held);
-        }
-        sliding
-    }
-
-    /// Friction in force, sorted by pair.
-    pub fn held(&self) -> &[Grip] {
-        &self.held
-    }
-
-    /// Has friction of explicit dynamics act as `grips` say.
-    pub fn resume(&mut self, grips: &[Grip]) {
-        self.held = grips.to_vec();
-        self.start = None;
-    }
-
-    /// Adds the force densities of friction after [`Self::slide_on`], N/m³, on the particles of work item `chunk`.
-    pub fn add_friction(&self, chunk: usize, force: &mut [&mut [f64]; D]) {
-        let start = chunk * CHUNK;
-        for grip in self.held_by(start..start + force[0].len()) {
-            let Pair::Particles(own, _) = grip.pair else { continue };
-            let volume = self.list.volume(own as usize);
-            (0..D).for_each(|d| force[d][own as usize - start] -= grip.stiffness * grip.slip[d] / volume);
-        }
-        if let Some(planes) = &self.planes {
-            planes.friction(start, force);
-        }
-    }
-
-    /// max_I Σ_J k V_J over what touches, with half of what planes add, N/m⁴: twice that over the density bounds what contact adds to
-    /// the squared greatest frequency.
-    pub fn greatest_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> f64 {
-        let sites = displacement.sites();
-        let of = |chunk: usize| {
-            let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), 0.0);
-            let stiffness =
-                |own: u32, touch: Near<D>| self.pair(own, touch.site) * bonds.volume(touch.site as usize);
-            let sums = pairs.map(|(own, touching)| touching.map(|t| stiffness(own.site, t)).sum::<f64>());
-            sums.fold(0.0, f64::max)
-        };
-        let pairs = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max);
-        pairs + self.half_of_planes()
-    }
-
-    fn half_of_planes(&self) -> f64 {
-        let planes = self.planes.as_ref().map_or(0.0, Planes::stiffness);
-        0.5 * (planes + self.ties.as_ref().map_or(0.0, Ties::greatest))
-    }
-
-    /// k V of the largest particle, and half of what planes add: the least that [`Contact::greatest_stiffness`] is where anything
-    /// touches, if all are alike.
-    pub fn pair_stiffness(&self) -> f64 {
-        self.stiffness * self.largest_volume + self.half_of_planes()
-    }
-
-    /// Adds to the Gershgorin sums of dynamic relaxation, in units of `tangent`, those of what touches or is about to:
-    /// Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and of planes. A particle that became heavy only in touch would be driven far into
-    /// another as a light one, out again as a heavy one, and so on indefinitely. A particle without bonds has twice that alone:
-    /// it starts each step from rest, see [`Contact::still`], and so must not go farther than a gradient step may.
-    pub fn add_stiffness(
-        &self,
-        bonds: &dyn Bonds<D>,
-        displacement: &Field<D>,
-        tangent: f64,
-        masses: &mut [f64],
-    ) {
-        self.add_pairs(bonds, displacement, tangent, masses);
-        self.near_springs(displacement, self.near, &mut |below, normal, stiffness| {
-            let sum: f64 = below.iter().map(|(_, weight)| weight.abs()).sum();
-            let mixed = 1.0 + normal.map_or(0.0, mixed);
-            for &(site, weight) in below {
-                let row = stiffness * weight.abs() * sum / bonds.volume(site);
-                masses[site] += 0.5 * row * mixed / tangent;
-            }
-        });
-    }
-
-    /// As [`Self::add_stiffness`], of pairs alone.
-    pub fn add_pairs(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, tangent: f64, masses: &mut [f64]) {
-        let of = |own: u32, Near { site, zeta, r, .. }: Near<D>| {
-            let unit = zeta.map(|x| x / r.max(f64::MIN_POSITIVE));
-            // friction holds in all directions
-            let mixed = if self.friction > 0.0 { 1.0 } else { mixed(unit) };
-            self.pair(own, site) * bonds.volume(site as usize) * (1.0 + mixed)
-        };
-        let sites = masses.len();
-        let sums = (0..sites.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
-            let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), self.near);
-            let all =
-                pairs.map(|(own, near)| (own, near.map(|near| of(own.site, near)).sum::<f64>() / tangent));
-            all.filter(|(_, sum)| *sum > 0.0).collect()
-        });
-        let sums: Vec<Vec<(Listed, f64)>> = sums.collect();
-        for (own, sum) in sums.into_iter().flatten() {
-            let mass = &mut masses[own.site as usize];
-            *mass = if own.alone { 2.0 * sum } else { *mass + sum };
-        }
-    }
-
-    /// Visits faces that touch planes or are tied: particles below with weights, the normal of a plane without friction, the stiffness, N/m.
-    pub fn springs(&self, displacement: &Field<D>, visit: &mut Spring<D>) {
-        self.near_springs(displacement, 0.0, visit);
-    }
-
-    fn near_springs(&self, displacement: &Field<D>, gap: f64, visit: &mut Spring<D>) {
-        if let Some(planes) = &self.planes {
-            planes.springs(displacement, gap, visit);
-        }
-        if let Some(ties) = &self.ties {
-            ties.springs(visit);
-        }
-    }
-
-    /// Numbers of the faces in touch with planes, plane by plane.
-    pub fn in_touch(&self, displacement: &Field<D>) -> Vec<[u32; 2]> {
-        self.planes.as_ref().map_or_else(Vec::new, |planes| planes.in_touch(displacement))
-    }
-
-    /// How far a step along a direction may go so that none leaps past another: by a quarter of a spacing against each
-    /// other where they touch or are about to, by half of one at all. ∞ along a direction of zeros.
-    pub fn longest_step(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, direction: &Field<D>) -> f64 {
-        if !self.has_pairs() {
-            // nothing leaps past a plane
-            return f64::INFINITY;
-        }
-        let sites = displacement.sites();
-        let of = |chunk: usize| {
-            let (mut farthest, mut closing) = (0.0_f64, 0.0_f64);
-            let range = chunk_range(chunk, sites);
-            let parts = direction.components().map(|d| &d[range.clone()]);
-            for k in 0..parts[0].len() {
-                farthest = farthest.max((0..D).map(|d| parts[d][k] * parts[d][k]).sum());
-            }
-            for (own, near) in self.pairs(bonds, displacement, range, self.near) {
-                let here = direction.get(own.site as usize);
-                for other in near {
-                    let there = direction.get(other.site as usize);
-                    closing = closing.max((0..D).map(|d| (there[d] - here[d]).powi(2)).sum());
-                }
-            }
-            [farthest, closing]
-        };
-        let parts = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of);
-        let [farthest, closing] = parts.reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
-        self.near / (0.5 * farthest.sqrt()).max(closing.sqrt())
-    }
-
-    /// Brings particles without bonds to rest: what is pushed aside does not fly on in a search for equilibrium.
-    pub fn still(&self, velocity: &mut Field<D>) {
-        self.list.alone.iter().for_each(|&site| velocity.set(site as usize, [0.0; D]));
-    }
-}
-
-/// Sees a face: particles below it with weights, the direction in which it is held (`None`: all), the stiffness, N/m.
-pub type Spring<'a, const D: usize> = dyn FnMut(&[(usize, f64)], Option<[f64; D]>, f64) + 'a;
-
-/// Friction after a step of explicit dynamics.
-#[derive(Clone, Debug, Default)]
-pub struct Sliding {
-    /// Force on the body by each plane, N.
-    pub planes: Vec<[f64; 3]>,
-    /// Energy of elastic slip, J.
-    pub stored: f64,
 }
 
 /// Checks that a quantity is positive and finite.
@@ -743,10 +431,4 @@ fn positive(name: &'static str, found: f64) -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::Parameter { name, found, allowed: "above 0, finite".into() })
-}
-
-/// max_{d≠e} |n_d n_e|.
-fn mixed<const D: usize>(n: [f64; D]) -> f64 {
-    let pairs = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
-    pairs.map(|(d, e)| (n[d] * n[e]).abs()).fold(0.0, f64::max)
 }

@@ -16,29 +16,29 @@ const TIED: f64 = 0.5;
 const BATCH: usize = 1024;
 
 /// A plane in motion.
-struct Placed<const D: usize> {
-    plane: Plane<D>,
+pub(super) struct Placed<const D: usize> {
+    pub(super) plane: Plane<D>,
     /// Displacement of the plane now and at the last placement, m.
-    now: [f64; D],
-    before: [f64; D],
+    pub(super) now: [f64; D],
+    pub(super) before: [f64; D],
     /// Faces tied to it.
     tied: Vec<u32>,
 }
 
 /// A face, or a particle that touches planes itself, beside a plane.
 #[derive(Clone, Copy)]
-struct Touch<const D: usize> {
+pub(super) struct Touch<const D: usize> {
     /// Number of a face; from the number of faces on, of a bare particle.
-    element: usize,
+    pub(super) element: usize,
     /// Its place, m, on the surface of a particle.
     place: [f64; D],
     /// Depth behind the plane, m.
-    overlap: f64,
+    pub(super) overlap: f64,
     /// Displacement against the plane, m, where it is tied.
     offset: Option<[f64; D]>,
     /// Area, m², and normal stiffness, N/m.
     area: f64,
-    stiffness: f64,
+    pub(super) stiffness: f64,
 }
 
 impl<const D: usize> Touch<D> {
@@ -59,12 +59,12 @@ impl<const D: usize> Touch<D> {
 
 /// All planes of a scene, and what touches them: the faces of the body, and particles that have lost bonds.
 pub struct Planes<const D: usize> {
-    each: Vec<Placed<D>>,
-    faces: Faces<D>,
+    pub(super) each: Vec<Placed<D>>,
+    pub(super) faces: Faces<D>,
     /// Whether no particle of a face has lost a bond.
     sound: Vec<bool>,
     /// Sites of particles that touch planes themselves, ascending, and where they were at rest, m.
-    bare: Vec<u32>,
+    pub(super) bare: Vec<u32>,
     homes: Vec<[f64; D]>,
     /// Bonds of each site as the body was built.
     bonded: Vec<u32>,
@@ -77,7 +77,7 @@ pub struct Planes<const D: usize> {
     /// Forces of all planes on faces and on bare particles, N, at the displacement of the last update; empty where nothing touches.
     pushes: Vec<[f64; D]>,
     /// Forces of friction in explicit dynamics likewise.
-    drags: Vec<[f64; D]>,
+    pub(super) drags: Vec<[f64; D]>,
     /// Bound of the eigenvalues that touching faces add to the stiffness over volumes for a penalty of 1 Pa/m.
     greatest: f64,
 }
@@ -178,7 +178,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Faces and bare particles.
-    fn elements(&self) -> usize {
+    pub(super) fn elements(&self) -> usize {
         self.faces.len() + self.bare.len()
     }
 
@@ -191,7 +191,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Displacement of an element, m.
-    fn displacement(&self, field: &Field<D>, element: usize) -> [f64; D] {
+    pub(super) fn displacement(&self, field: &Field<D>, element: usize) -> [f64; D] {
         match element.checked_sub(self.faces.len()) {
             None => self.faces.mean(element, field),
             Some(bare) => field.get(self.bare[bare] as usize),
@@ -199,7 +199,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// An element beside a plane, whatever its overlap.
-    fn beside(&self, placed: &Placed<D>, field: &Field<D>, element: usize) -> Touch<D> {
+    pub(super) fn beside(&self, placed: &Placed<D>, field: &Field<D>, element: usize) -> Touch<D> {
         let Plane { normal, stiffness, .. } = placed.plane;
         let moved = self.displacement(field, element);
         let (home, radius, area) = match element.checked_sub(self.faces.len()) {
@@ -239,7 +239,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// What is nearer to a plane than `gap`, m, in order.
-    fn near(&self, placed: &Placed<D>, field: &Field<D>, gap: f64) -> Vec<Touch<D>> {
+    pub(super) fn near(&self, placed: &Placed<D>, field: &Field<D>, gap: f64) -> Vec<Touch<D>> {
         let count = self.elements();
         let batch = |start: usize| {
             let range = start * BATCH..((start + 1) * BATCH).min(count);
@@ -277,50 +277,13 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Plane and element of a pair; `None` of two particles.
-    fn element(&self, pair: Pair) -> Option<(usize, usize)> {
+    pub(super) fn element(&self, pair: Pair) -> Option<(usize, usize)> {
         match pair {
             Pair::Particles(..) => None,
             Pair::Face(plane, face) => Some((plane as usize, face as usize)),
             Pair::Particle(plane, site) => {
                 Some((plane as usize, self.faces.len() + self.bare.binary_search(&site).ok()?))
             }
-        }
-    }
-
-    /// Motion of a face or particle against a plane since `start`, m.
-    pub fn slipped(&self, pair: Pair, field: &Field<D>, start: &Field<D>) -> [f64; 3] {
-        let Some((number, element)) = self.element(pair) else { return [0.0; 3] };
-        let (now, then) = (self.displacement(field, element), self.displacement(start, element));
-        let placed = &self.each[number];
-        let moved = |d: usize| now[d] - then[d] - (placed.now[d] - placed.before[d]);
-        std::array::from_fn(|d| if d < D { moved(d) } else { 0.0 })
-    }
-
-    /// Motion of a face or particle against a plane in a step, s, with a velocity, m/s, m.
-    pub fn carried(&self, pair: Pair, velocity: &Field<D>, step: f64) -> [f64; 3] {
-        let Some((number, element)) = self.element(pair) else { return [0.0; 3] };
-        let (placed, v) = (&self.each[number], self.displacement(velocity, element));
-        std::array::from_fn(|d| if d < D { step * v[d] - (placed.now[d] - placed.before[d]) } else { 0.0 })
-    }
-
-    /// Takes the forces of friction in explicit dynamics from elastic slips.
-    pub fn drag(&mut self, held: &[Grip]) {
-        let mut drags = std::mem::take(&mut self.drags);
-        drags.clear();
-        for grip in held {
-            let Some((_, element)) = self.element(grip.pair) else { continue };
-            if drags.is_empty() {
-                drags.resize(self.elements(), [0.0; D]);
-            }
-            (0..D).for_each(|d| drags[element][d] -= grip.stiffness * grip.slip[d]);
-        }
-        self.drags = drags;
-    }
-
-    /// Adds the force densities of friction in explicit dynamics on the sites from `start` on.
-    pub fn friction(&self, start: usize, force: &mut [&mut [f64]; D]) {
-        if !self.drags.is_empty() {
-            self.spread(&self.drags, start, force);
         }
     }
 
@@ -333,7 +296,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Adds to force densities, N/m³, on the sites from `start` on, forces on elements, N.
-    fn spread(&self, pushes: &[[f64; D]], start: usize, force: &mut [&mut [f64]; D]) {
+    pub(super) fn spread(&self, pushes: &[[f64; D]], start: usize, force: &mut [&mut [f64]; D]) {
         let (faces, bare) = pushes.split_at(self.faces.len());
         self.faces.spread(faces, &self.volumes, start, force);
         let at = |end: usize| self.bare.partition_point(|&site| (site as usize) < end);
@@ -472,42 +435,5 @@ impl<const D: usize> Planes<D> {
             self.touches(placed, field).into_iter().map(move |touch| [number as u32, touch.element as u32])
         })
         .collect()
-    }
-
-    /// Friction of all that touches at a displacement, with the normal forces there; the slips of `old`, sorted by pair, go on. What has begun to touch
-    /// since `start` has slipped for its part of the way alone.
-    pub fn grips(&self, field: &Field<D>, start: &Field<D>, old: &[Grip]) -> Vec<Grip> {
-        let mut grips = Vec::new();
-        for (number, placed) in self.each.iter().enumerate() {
-            let plane = &placed.plane;
-            if plane.friction == 0.0 || plane.bonded {
-                continue;
-            }
-            let shift: f64 = (0..D).map(|d| placed.before[d] * plane.normal[d]).sum();
-            for touch in self.near(placed, field, 0.0) {
-                let bound = plane.friction * touch.stiffness * touch.overlap;
-                let pair = match touch.element.checked_sub(self.faces.len()) {
-                    None => Pair::Face(number as u32, touch.element as u32),
-                    Some(bare) => Pair::Particle(number as u32, self.bare[bare]),
-                };
-                let stiffness = plane.elastic_slip.map_or(touch.stiffness, |slip| bound / slip);
-                let normal = std::array::from_fn(|d| plane.normal.get(d).copied().unwrap_or(0.0));
-                let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
-                let then = self.beside(placed, start, touch.element).overlap - {
-                    // `beside` has the plane where it is now
-                    let now: f64 = (0..D).map(|d| placed.now[d] * plane.normal[d]).sum();
-                    now - shift
-                };
-                let share = if then >= 0.0 { 1.0 } else { touch.overlap / (touch.overlap - then) };
-                let slip = known.map_or([0.0; 3], |grip| grip.slip);
-                let mut grip = Grip { pair, slip, bound, stiffness, normal, share };
-                grip.fit();
-                if bound > 0.0 {
-                    grips.push(grip);
-                }
-            }
-        }
-        grips.sort_unstable_by_key(|grip| grip.pair);
-        grips
     }
 }

@@ -1,9 +1,10 @@
 //! Both passes of a solid on a cloud, by the kernels of [`crate::bonds`].
 
-use super::deformation::{NonlocalSolid, Point, PointLaw, Tensor};
+use super::deformation::{NonlocalSolid, Point, PointLaw};
 use super::family::{Bond, Family};
 use super::pointwise::Passes;
 use super::solid_passes::Families;
+use super::tensor::Tensor;
 use crate::bonds::{Bonds, CloudBonds, CloudPlaces, Columns, Kind, Softened, StretchRange, among};
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;

@@ -1,6 +1,7 @@
 //! Any constitutive law C → (W, S, ℂ) as the law of a family's mean deformation.
 
-use super::deformation::{Deformation, PointLaw, PointStress, Tensor, embed};
+use super::deformation::{Deformation, PointLaw, PointStress};
+use super::tensor::{Tensor, embed};
 use crate::calibrate::Space;
 use crate::error::Error;
 use nalgebra::Matrix3;

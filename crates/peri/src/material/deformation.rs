@@ -4,24 +4,13 @@ use super::cloud_passes::CloudPasses;
 use super::eight_chain::{CRUSHED, cofactor};
 use super::frequency::Reach;
 use super::solid_passes::SolidPasses;
+use super::tensor::{Tensor, embed, invert};
 use super::{Body, Bond, Family, Material, Passes};
 use crate::bonds::{Bonds, Columns, Kind};
 use crate::calibrate::modulus_in;
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::SVector;
 use polycore::constitutive::Flags;
 use std::sync::Arc;
-
-/// A tensor in the space of a body.
-pub type Tensor<const D: usize> = SMatrix<f64, D, D>;
-
-/// A tensor embedded in three dimensions.
-pub(super) fn embed<const D: usize>(tensor: &Tensor<D>, third: f64) -> Matrix3<f64> {
-    Matrix3::from_fn(|a, b| match (a < D && b < D, a == b) {
-        (true, _) => tensor[(a, b)],
-        (false, true) => third,
-        (false, false) => 0.0,
-    })
-}
 
 /// The mean deformation of a family: with ω_IJ = V_J/(|ξ|² Σ_K V_K) over the whole family, I = Σ_J V_J/Σ_K V_K over the intact
 /// bonds, M = Σ_J ω ξ⊗ξ/I and η = u_J − u_I.
@@ -314,13 +303,6 @@ impl<const D: usize> Point<D> {
     pub fn integrity(&self) -> f64 {
         if self.whole > 0.0 { self.intact / self.whole } else { 0.0 }
     }
-}
-
-/// M⁻¹ and the least eigenvalue of M = `shape`, a tensor of trace 1.
-pub(super) fn invert<const D: usize>(shape: &Tensor<D>) -> (Tensor<D>, f64) {
-    let values = embed(shape, 1.0).symmetric_eigenvalues();
-    // the third of two dimensions is 1, and none of the others is larger
-    (shape.try_inverse().unwrap_or_else(Tensor::zeros), values.min())
 }
 
 impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {

@@ -1,6 +1,7 @@
 //! Rubber as a network of Langevin chains whose volume is kept by a pressure.
 
-use super::deformation::{Deformation, PointLaw, PointStress, Tensor, embed};
+use super::deformation::{Deformation, PointLaw, PointStress};
+use super::tensor::{Tensor, embed};
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::quadrature::mean;

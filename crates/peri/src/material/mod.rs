@@ -26,12 +26,13 @@ mod response;
 mod softened;
 mod solid_passes;
 mod strength;
+mod tensor;
 mod traction;
 
 pub use affine::{Affine, AffinePoint};
 pub use bonded::BondMaterial;
 pub use constitutive::Correspondence;
-pub use deformation::{Deformation, NonlocalSolid, Point, PointLaw, PointStress, Tensor};
+pub use deformation::{Deformation, NonlocalSolid, Point, PointLaw, PointStress};
 pub use eight_chain::EightChain;
 pub use family::{Bond, Family};
 pub use pointwise::{Passes, Pointwise};
@@ -39,6 +40,7 @@ pub use prestrained::Prestrained;
 pub use relief::relief;
 pub use response::{Cover, LawRange, Response};
 pub use strength::energy_at_strength;
+pub use tensor::Tensor;
 pub use traction::surface_load;
 
 pub use crate::bonds::Property;

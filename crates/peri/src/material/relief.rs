@@ -6,8 +6,9 @@
 //! h + Lθ takes the place of h, with L of the stabilisation, f = −Lu where A = 1 and P = 0: symmetric and positive definite as soon as some
 //! particles have θ = 0. Cf. Chen, Hillman & Rüter 2013, doi:10.1002/nme.4512.
 
-use super::deformation::{LEAST_SHAPE, invert};
+use super::deformation::LEAST_SHAPE;
 use super::levels::Levels;
+use super::tensor::invert;
 use crate::bonds::{Bonds, CloudBonds, CloudPlaces, Columns, Kind};
 use crate::field::{CHUNK, Field};
 use nalgebra::{SMatrix, SVector};

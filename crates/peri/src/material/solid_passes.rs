@@ -1,9 +1,10 @@
 //! Both passes of a solid on a lattice, by the kernels of [`crate::bonds`], and what they share with clouds.
 
-use super::deformation::{NonlocalSolid, Point, PointLaw, Tensor};
+use super::deformation::{NonlocalSolid, Point, PointLaw};
 use super::family::Family;
 use super::filter::Filter;
 use super::pointwise::Passes;
+use super::tensor::Tensor;
 use crate::bonds::{Bonds, LinearRow, Softened, StretchRange, among};
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;

@@ -1,6 +1,7 @@
 //! Uniform states at which a solid has its strength.
 
-use super::deformation::{Deformation, PointLaw, Tensor};
+use super::deformation::{Deformation, PointLaw};
+use super::tensor::Tensor;
 
 /// No solid is strained farther.
 const GREATEST: f64 = 1e3;

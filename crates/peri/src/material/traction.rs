@@ -1,6 +1,7 @@
 //! Tractions on the surfaces that the families of a solid see.
 
-use super::deformation::{Deformation, NonlocalSolid, PointLaw, PointStress, Tensor};
+use super::deformation::{Deformation, NonlocalSolid, PointLaw, PointStress};
+use super::tensor::Tensor;
 use super::{Pointwise, Response};
 use crate::bonds::Bonds;
 use crate::field::{CHUNK, Field};

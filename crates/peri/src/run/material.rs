@@ -91,7 +91,7 @@ impl<const D: usize> Bonded<D> {
         let (space, spec) = (scene.body.space, &scene.material);
         let (horizon, thickness) = (body.bonds.horizon(), body.thickness);
         if let Some(solid) = &spec.solid {
-            let law = solid.build::<D>(source, space, scene.body.points.is_none())?;
+            let law = solid.build::<D>(source, space, scene.is_beside_planes())?;
             let criterion = match spec.critical {
                 Some(Critical { stretch: Some(stretch), .. }) => Some(stretch.into()),
                 Some(Critical { fracture_energy: Some(energy), strength: Some(strength), .. }) => {

@@ -72,6 +72,13 @@ impl PlaneSpec {
     }
 }
 
+impl Scene {
+    /// Whether the body is a lattice beside rigid planes.
+    pub fn is_beside_planes(&self) -> bool {
+        self.body.points.is_none() && self.contact.as_ref().is_some_and(|contact| !contact.plane.is_empty())
+    }
+}
+
 impl ContactSpec {
     /// s of ties: that of the stiffest plane.
     pub fn tie_stiffness(&self, explicit: bool) -> f64 {

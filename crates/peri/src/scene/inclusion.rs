@@ -2,7 +2,7 @@
 
 use super::build::shape;
 use super::values::Body;
-use super::{Followed, Parameter, Scene, ShapeSpec, plain};
+use super::{Followed, Material, Parameter, Scene, ShapeSpec, plain};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate::{Space, poisson_ratio};
 use crate::critical::Critical;
@@ -274,5 +274,23 @@ mod tests {
         let shear: [[f64; 3]; 3] = relaxed(Space::Solid, 4.0, &[[0.0, 2.0, 0.0], [2.0, 0.0, 0.0], [0.0; 3]]);
         close(shear[1][0], -0.625);
         close(shear[0][0] + shear[2][2], 0.0);
+    }
+}
+
+impl Material {
+    /// Whether some bonds are at rest at another stretch than 1.
+    pub fn is_prestrained(&self) -> bool {
+        let follows = self.fields.iter().any(|field| field.of == Parameter::Prestrain);
+        follows || self.inclusions.iter().any(|inclusion| inclusion.prestrain.is_some())
+    }
+
+    /// The bond law of this material.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] where a chain parameter is out of its domain.
+    pub fn bond_law(&self) -> Result<Box<dyn crate::potential::BondPotential>, crate::Error> {
+        let law = self.law.unwrap_or_default();
+        let rescale = self.rescale.unwrap_or(law.rescales());
+        law.build(self.links.unwrap_or(1.0), self.dissociation.unwrap_or(1.0), rescale)
     }
 }

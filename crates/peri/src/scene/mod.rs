@@ -485,21 +485,3 @@ impl Scene {
         self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == Precision::Mixed)
     }
 }
-
-impl Material {
-    /// Whether some bonds are at rest at another stretch than 1.
-    pub fn is_prestrained(&self) -> bool {
-        let follows = self.fields.iter().any(|field| field.of == Parameter::Prestrain);
-        follows || self.inclusions.iter().any(|inclusion| inclusion.prestrain.is_some())
-    }
-
-    /// The bond law of this material.
-    ///
-    /// # Errors
-    /// [`crate::Error::Parameter`] where a chain parameter is out of its domain.
-    pub fn bond_law(&self) -> Result<Box<dyn crate::potential::BondPotential>, crate::Error> {
-        let law = self.law.unwrap_or_default();
-        let rescale = self.rescale.unwrap_or(law.rescales());
-        law.build(self.links.unwrap_or(1.0), self.dissociation.unwrap_or(1.0), rescale)
-    }
-}

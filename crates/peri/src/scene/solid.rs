@@ -27,7 +27,7 @@ pub struct SolidLaw {
     /// Links of a chain, of `eight-chain`.
     pub links: Option<f64>,
     /// Whether the volumetric energy depends on J averaged over nearest neighbours, of `eight-chain` on a lattice, solid or plane strain;
-    /// default: true from a bulk modulus of 50 times the shear modulus on.
+    /// default: beside rigid planes true from a bulk modulus of 50 times the shear modulus on.
     pub pressure_filter: Option<bool>,
     /// The constitutive law of `correspondence`.
     pub constitutive: Option<ConstitutiveSpec>,
@@ -55,8 +55,8 @@ impl SolidKind {
     }
 }
 
-/// Bulk modulus over shear modulus from which on the pressure is filtered: without it coarse lattices are too stiff
-/// (docs/guide/src/how-to/contact.md).
+/// Bulk modulus over shear modulus from which on the pressure is filtered beside planes: without it coarse lattices are too stiff there
+/// (docs/guide/src/how-to/contact.md). Grips that hold by bonds give way, which makes up for that.
 const FILTERED: f64 = 50.0;
 
 /// Where the block stands.
@@ -68,7 +68,7 @@ impl SolidLaw {
         self.constitutive.as_ref().is_some_and(|spec| spec.learnt.is_some())
     }
 
-    /// The law in a space, on a lattice or in a cloud.
+    /// The law in a space; `planes`: on a lattice beside rigid planes.
     ///
     /// # Errors
     /// A key that the law lacks or does not know, or a value out of its domain.
@@ -76,7 +76,7 @@ impl SolidLaw {
         &self,
         source: &Source,
         space: Space,
-        lattice: bool,
+        planes: bool,
     ) -> Result<Arc<dyn PointLaw<D>>, SceneError> {
         let chains = self.law == SolidKind::EightChain;
         let other = if chains { SolidKind::Correspondence } else { SolidKind::EightChain }.name();
@@ -121,7 +121,7 @@ impl SolidLaw {
                 }
             };
             let network = EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?;
-            let volumetric = space != Space::PlaneStress && lattice;
+            let volumetric = space != Space::PlaneStress && planes;
             let stiff = volumetric && bulk >= FILTERED * shear.si();
             if !self.pressure_filter.unwrap_or(stiff) {
                 return Ok(Arc::new(network));
@@ -199,7 +199,7 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
             return Err(source.error("material.critical", found, allowed));
         }
     }
-    let lattice = scene.body.points.is_none();
+    let planes = scene.is_beside_planes();
     if solid.pressure_filter == Some(true) && scene.body.points.is_some() {
         let allowed = "false: points of a cloud have no nearest neighbours";
         return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
@@ -211,10 +211,10 @@ pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<
         return Err(source.error(&format!("stress.measures[{index}]"), "a measure of bond forces", allowed));
     }
     match scene.body.space {
-        Space::Solid => solid.build::<3>(source, Space::Solid, lattice).map(|_| ()),
+        Space::Solid => solid.build::<3>(source, Space::Solid, planes).map(|_| ()),
         plane => {
             positive(source, "body.thickness", scene.body.thickness.map_or(1.0, |t| t.si()), "m")?;
-            solid.build::<2>(source, plane, lattice).map(|_| ())
+            solid.build::<2>(source, plane, planes).map(|_| ())
         }
     }
 }

@@ -1,0 +1,201 @@
+//! Friction of all that touches: between equilibria and in explicit dynamics.
+
+use super::Contact;
+use super::grip::{Grip, Pair};
+use crate::bonds::Bonds;
+use crate::field::{CHUNK, Field, chunk_range};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Friction after a step of explicit dynamics.
+#[derive(Clone, Debug, Default)]
+pub struct Sliding {
+    /// Force on the body by each plane, N.
+    pub planes: Vec<[f64; 3]>,
+    /// Energy of elastic slip, J.
+    pub stored: f64,
+}
+
+impl<const D: usize> Contact<D> {
+    /// Has friction act as `grips` say, from the displacement `start` on.
+    pub fn hold(&mut self, start: &Field<D>, grips: Vec<Grip>) {
+        self.held = grips;
+        self.start = Some(start.clone());
+    }
+
+    /// Ends friction between equilibria.
+    pub fn release(&mut self) {
+        self.held.clear();
+        self.start = None;
+    }
+
+    /// Friction of all that touches at a displacement, sorted by pair: the slips of `old` go on with the normal forces there. What has
+    /// begun to touch since `start` slips for the rest of its way only.
+    pub fn grips(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        start: &Field<D>,
+        old: &[Grip],
+    ) -> Vec<Grip> {
+        let of = |chunk: usize| {
+            let mut grips = Vec::new();
+            let sites = chunk_range(chunk, displacement.sites());
+            for (own, touching) in self.pairs(bonds, displacement, sites, 0.0).filter(|_| self.friction > 0.0)
+            {
+                for touch in touching {
+                    let pair = Pair::Particles(own.site, touch.site);
+                    let known = old.binary_search_by_key(&pair, |grip| grip.pair).ok().map(|at| &old[at]);
+                    let volumes = [own.site, touch.site].map(|site| bonds.volume(site as usize));
+                    let push = self.pair(own.site, touch.site) * volumes[0] * volumes[1];
+                    let bound = self.friction * push * touch.overlap();
+                    let direction = touch.direction();
+                    let normal = std::array::from_fn(|d| direction.get(d).map_or(0.0, |n| -n));
+                    let stiffness = self.elastic_slip.map_or(push, |slip| bound / slip);
+                    let then = touch.overlap_at(start, own.site as usize);
+                    let share = if then >= 0.0 { 1.0 } else { touch.overlap() / (touch.overlap() - then) };
+                    let slip = known.map_or([0.0; 3], |grip| grip.slip);
+                    let mut grip = Grip { pair, slip, bound, stiffness, normal, share };
+                    grip.fit();
+                    if bound > 0.0 {
+                        grips.push(grip);
+                    }
+                }
+            }
+            grips.sort_unstable_by_key(|grip| grip.pair);
+            grips
+        };
+        let parts: Vec<Vec<Grip>> =
+            (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
+        let mut grips = parts.concat();
+        grips.extend(self.planes.iter().flat_map(|planes| planes.grips(displacement, start, old)));
+        grips
+    }
+
+    /// Friction after a load step, sorted by pair, for the next one; energy dissipated in the step, J, and force of friction of each
+    /// plane, N.
+    pub fn slide(&self, displacement: &Field<D>) -> (Vec<Grip>, f64, Vec<[f64; 3]>) {
+        let mut forces = vec![[0.0; 3]; self.planes().count()];
+        let (mut dissipated, mut grips) = (0.0, self.held.clone());
+        for grip in &mut grips {
+            let drag = grip.drag(self.slipped(grip.pair, displacement));
+            grip.slip = drag.slip;
+            match grip.pair {
+                // the other half is seen from the other side
+                Pair::Particles(..) => dissipated += 0.5 * drag.dissipated,
+                Pair::Face(plane, _) | Pair::Particle(plane, _) => {
+                    dissipated += drag.dissipated;
+                    (0..3).for_each(|d| forces[plane as usize][d] += drag.force[d]);
+                }
+            }
+        }
+        (grips, dissipated, forces)
+    }
+
+    /// Motion of the first side of a pair against the second since friction began to act, m.
+    fn slipped(&self, pair: Pair, displacement: &Field<D>) -> [f64; 3] {
+        let Some(start) = &self.start else { return [0.0; 3] };
+        let Pair::Particles(own, other) = pair else {
+            return self.planes.as_ref().map_or([0.0; 3], |planes| planes.slipped(pair, displacement, start));
+        };
+        let since = |site: u32, d: usize| {
+            displacement.components()[d][site as usize] - start.components()[d][site as usize]
+        };
+        std::array::from_fn(|d| if d < D { since(own, d) - since(other, d) } else { 0.0 })
+    }
+
+    /// Energy of elastic slip, J.
+    pub(super) fn slip_energy(&self, displacement: &Field<D>) -> f64 {
+        let of = |grip: &Grip| {
+            let slip = grip.drag(self.slipped(grip.pair, displacement)).slip;
+            let part = if matches!(grip.pair, Pair::Particles(..)) { 0.5 } else { 1.0 };
+            part * Grip { slip, ..*grip }.energy()
+        };
+        self.held.iter().map(of).sum()
+    }
+
+    /// Adds the force densities of friction between particles, N/m³, on the sites from `start` on, of one work item.
+    pub(super) fn hold_pairs(&self, displacement: &Field<D>, start: usize, force: &mut [&mut [f64]; D]) {
+        if self.start.is_none() {
+            return;
+        }
+        let end = start + force[0].len();
+        for grip in self.held_by(start..end) {
+            let Pair::Particles(own, _) = grip.pair else { continue };
+            let drag = grip.drag(self.slipped(grip.pair, displacement)).force;
+            let volume = self.list.volume(own as usize);
+            (0..D).for_each(|d| force[d][own as usize - start] += drag[d] / volume);
+        }
+    }
+
+    /// Friction in force between particles, of those of some sites.
+    fn held_by(&self, sites: Range<usize>) -> &[Grip] {
+        let before = |end: usize| {
+            self.held
+                .partition_point(|grip| matches!(grip.pair, Pair::Particles(own, _) if (own as usize) < end))
+        };
+        &self.held[before(sites.start)..before(sites.end)]
+    }
+
+    /// Friction after a step of explicit dynamics, s, with the velocity at the half step, m/s: the slips of `old` go on with the
+    /// present normal forces. Takes effect in [`Self::add_friction`].
+    pub fn slide_on(
+        &mut self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        velocity: &Field<D>,
+        step: f64,
+        old: &[Grip],
+    ) -> Sliding {
+        let mut grips = self.grips(bonds, displacement, displacement, old);
+        let mut sliding = Sliding { planes: vec![[0.0; 3]; self.planes().count()], ..Sliding::default() };
+        let at = |site: u32| velocity.get(site as usize);
+        for grip in &mut grips {
+            grip.share = 1.0;
+            let moved = match (grip.pair, &self.planes) {
+                (Pair::Particles(own, other), _) => {
+                    let (own, other) = (at(own), at(other));
+                    std::array::from_fn(|d| if d < D { step * (own[d] - other[d]) } else { 0.0 })
+                }
+                (pair, Some(planes)) => planes.carried(pair, velocity, step),
+                (_, None) => [0.0; 3],
+            };
+            let drag = grip.drag(moved);
+            grip.slip = drag.slip;
+            let part = if matches!(grip.pair, Pair::Particles(..)) { 0.5 } else { 1.0 };
+            sliding.stored += part * grip.energy();
+            if let Pair::Face(plane, _) | Pair::Particle(plane, _) = grip.pair {
+                (0..3).for_each(|d| sliding.planes[plane as usize][d] += drag.force[d]);
+            }
+        }
+        self.held = grips;
+        if let Some(planes) = &mut self.planes {
+            planes.drag(&self.held);
+        }
+        sliding
+    }
+
+    /// Friction in force, sorted by pair.
+    pub fn held(&self) -> &[Grip] {
+        &self.held
+    }
+
+    /// Has friction of explicit dynamics act as `grips` say.
+    pub fn resume(&mut self, grips: &[Grip]) {
+        self.held = grips.to_vec();
+        self.start = None;
+    }
+
+    /// Adds the force densities of friction after [`Self::slide_on`], N/m³, on the particles of work item `chunk`.
+    pub fn add_friction(&self, chunk: usize, force: &mut [&mut [f64]; D]) {
+        let start = chunk * CHUNK;
+        for grip in self.held_by(start..start + force[0].len()) {
+            let Pair::Particles(own, _) = grip.pair else { continue };
+            let volume = self.list.volume(own as usize);
+            (0..D).for_each(|d| force[d][own as usize - start] -= grip.stiffness * grip.slip[d] / volume);
+        }
+        if let Some(planes) = &self.planes {
+            planes.friction(start, force);
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Stiffness of contact: for time steps, masses of relaxation, preconditioners and the lengths of their steps.
+
+use super::Contact;
+use super::list::{Listed, Near};
+use super::planes::Planes;
+use super::ties::Ties;
+use crate::bonds::Bonds;
+use crate::field::{CHUNK, Field, chunk_range};
+use rayon::prelude::*;
+
+/// Sees a face: particles below it with weights, the direction in which it is held (`None`: all), the stiffness, N/m.
+pub type Spring<'a, const D: usize> = dyn FnMut(&[(usize, f64)], Option<[f64; D]>, f64) + 'a;
+
+impl<const D: usize> Contact<D> {
+    /// max_I Σ_J k V_J over what touches, with half of what planes add, N/m⁴: twice that over the density bounds what contact adds to
+    /// the squared greatest frequency.
+    pub fn greatest_stiffness(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>) -> f64 {
+        let sites = displacement.sites();
+        let of = |chunk: usize| {
+            let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), 0.0);
+            let stiffness =
+                |own: u32, touch: Near<D>| self.pair(own, touch.site) * bonds.volume(touch.site as usize);
+            let sums = pairs.map(|(own, touching)| touching.map(|t| stiffness(own.site, t)).sum::<f64>());
+            sums.fold(0.0, f64::max)
+        };
+        let pairs = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).reduce(|| 0.0, f64::max);
+        pairs + self.half_of_planes()
+    }
+
+    fn half_of_planes(&self) -> f64 {
+        let planes = self.planes.as_ref().map_or(0.0, Planes::stiffness);
+        0.5 * (planes + self.ties.as_ref().map_or(0.0, Ties::greatest))
+    }
+
+    /// k V of the largest particle, and half of what planes add: the least that [`Contact::greatest_stiffness`] is where anything
+    /// touches, if all are alike.
+    pub fn pair_stiffness(&self) -> f64 {
+        self.stiffness * self.largest_volume + self.half_of_planes()
+    }
+
+    /// Adds to the Gershgorin sums of dynamic relaxation, in units of `tangent`, those of what touches or is about to:
+    /// Σ_J k V_J (1 + max_{d≠e} |n_d n_e|), and of planes. A particle that became heavy only in touch would be driven far into
+    /// another as a light one, out again as a heavy one, and so on indefinitely. A particle without bonds has twice that alone:
+    /// it starts each step from rest, see [`Contact::still`], and so must not go farther than a gradient step may.
+    pub fn add_stiffness(
+        &self,
+        bonds: &dyn Bonds<D>,
+        displacement: &Field<D>,
+        tangent: f64,
+        masses: &mut [f64],
+    ) {
+        self.add_pairs(bonds, displacement, tangent, masses);
+        self.near_springs(displacement, self.near, &mut |below, normal, stiffness| {
+            let sum: f64 = below.iter().map(|(_, weight)| weight.abs()).sum();
+            let mixed = 1.0 + normal.map_or(0.0, mixed);
+            for &(site, weight) in below {
+                let row = stiffness * weight.abs() * sum / bonds.volume(site);
+                masses[site] += 0.5 * row * mixed / tangent;
+            }
+        });
+    }
+
+    /// As [`Self::add_stiffness`], of pairs alone.
+    pub fn add_pairs(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, tangent: f64, masses: &mut [f64]) {
+        let of = |own: u32, Near { site, zeta, r, .. }: Near<D>| {
+            let unit = zeta.map(|x| x / r.max(f64::MIN_POSITIVE));
+            // friction holds in all directions
+            let mixed = if self.friction > 0.0 { 1.0 } else { mixed(unit) };
+            self.pair(own, site) * bonds.volume(site as usize) * (1.0 + mixed)
+        };
+        let sites = masses.len();
+        let sums = (0..sites.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
+            let pairs = self.pairs(bonds, displacement, chunk_range(chunk, sites), self.near);
+            let all =
+                pairs.map(|(own, near)| (own, near.map(|near| of(own.site, near)).sum::<f64>() / tangent));
+            all.filter(|(_, sum)| *sum > 0.0).collect()
+        });
+        let sums: Vec<Vec<(Listed, f64)>> = sums.collect();
+        for (own, sum) in sums.into_iter().flatten() {
+            let mass = &mut masses[own.site as usize];
+            *mass = if own.alone { 2.0 * sum } else { *mass + sum };
+        }
+    }
+
+    /// Visits faces that touch planes or are tied: particles below with weights, the normal of a plane without friction, the stiffness, N/m.
+    pub fn springs(&self, displacement: &Field<D>, visit: &mut Spring<D>) {
+        self.near_springs(displacement, 0.0, visit);
+    }
+
+    fn near_springs(&self, displacement: &Field<D>, gap: f64, visit: &mut Spring<D>) {
+        if let Some(planes) = &self.planes {
+            planes.springs(displacement, gap, visit);
+        }
+        if let Some(ties) = &self.ties {
+            ties.springs(visit);
+        }
+    }
+
+    /// Numbers of the faces in touch with planes, plane by plane.
+    pub fn in_touch(&self, displacement: &Field<D>) -> Vec<[u32; 2]> {
+        self.planes.as_ref().map_or_else(Vec::new, |planes| planes.in_touch(displacement))
+    }
+
+    /// How far a step along a direction may go so that none leaps past another: by a quarter of a spacing against each
+    /// other where they touch or are about to, by half of one at all. ∞ along a direction of zeros.
+    pub fn longest_step(&self, bonds: &dyn Bonds<D>, displacement: &Field<D>, direction: &Field<D>) -> f64 {
+        if !self.has_pairs() {
+            // nothing leaps past a plane
+            return f64::INFINITY;
+        }
+        let sites = displacement.sites();
+        let of = |chunk: usize| {
+            let (mut farthest, mut closing) = (0.0_f64, 0.0_f64);
+            let range = chunk_range(chunk, sites);
+            let parts = direction.components().map(|d| &d[range.clone()]);
+            for k in 0..parts[0].len() {
+                farthest = farthest.max((0..D).map(|d| parts[d][k] * parts[d][k]).sum());
+            }
+            for (own, near) in self.pairs(bonds, displacement, range, self.near) {
+                let here = direction.get(own.site as usize);
+                for other in near {
+                    let there = direction.get(other.site as usize);
+                    closing = closing.max((0..D).map(|d| (there[d] - here[d]).powi(2)).sum());
+                }
+            }
+            [farthest, closing]
+        };
+        let parts = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of);
+        let [farthest, closing] = parts.reduce(|| [0.0; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+        self.near / (0.5 * farthest.sqrt()).max(closing.sqrt())
+    }
+
+    /// Brings particles without bonds to rest: what is pushed aside does not fly on in a search for equilibrium.
+    pub fn still(&self, velocity: &mut Field<D>) {
+        self.list.alone.iter().for_each(|&site| velocity.set(site as usize, [0.0; D]));
+    }
+}
+
+/// max_{d≠e} |n_d n_e|.
+fn mixed<const D: usize>(n: [f64; D]) -> f64 {
+    let pairs = (0..D).flat_map(|d| (0..d).map(move |e| (d, e)));
+    pairs.map(|(d, e)| (n[d] * n[e]).abs()).fold(0.0, f64::max)
+}
