@@ -46,7 +46,7 @@ const OFF: f64 = 0.2;
 pub struct Crossing {
     /// Σ_J w V_J |ξ_e||ξ|, m⁵, with the axis e of the largest sum: kθΦ times it is the energy of the bonds across a unit area.
     pub reach: f64,
-    /// Σ_J w V_J |ξ_e|/|ξ| over bonds up to [`SHORT`] spacings, m³, along the same axis: short bonds across a unit area, see [`super::CrackArea`].
+    /// Σ_J w V_J |ξ_e|/|ξ| over bonds up to `SHORT` spacings, m³, along the same axis: short bonds across a unit area, see [`super::CrackArea`].
     pub short: f64,
     /// Bonds N of the particle.
     pub bonds: f64,

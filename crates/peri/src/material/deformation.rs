@@ -146,9 +146,6 @@ pub(super) const LEAST_SHAPE: f64 = 0.1;
 /// (|q̂|δ)² of the largest gradient that particles one spacing apart feel: 2.69 to 3.09 for δ of 2 to 6 spacings.
 pub(super) const GRADIENT: f64 = 3.1;
 
-/// Strain of differences of stress: truncation and rounding are about 1e-10 of a modulus.
-const PROBE: f64 = 1e-5;
-
 /// What a particle knows of its family.
 #[derive(Clone, Debug)]
 pub struct Point<const D: usize> {
@@ -431,14 +428,14 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
         modulus_in(bonds, 3.0 * self.0.shear_modulus())
     }
 
-    /// ∂P₁₁/∂F₁₁ at rest, by a central difference.
+    /// ∂P₁₁/∂F₁₁ at rest, by a central difference: truncation and rounding are about 1e-10 of it.
     fn longitudinal_modulus(&self, _bonds: &dyn Bonds<D>) -> f64 {
         let at = |strain: f64| {
             let mut gradient = Tensor::<D>::zeros();
             gradient[(0, 0)] = strain;
             self.0.respond(&Deformation { displacement_gradient: gradient, residual: 0.0 }).piola[(0, 0)]
         };
-        (at(PROBE) - at(-PROBE)) / (2.0 * PROBE)
+        (at(1e-5) - at(-1e-5)) / 2e-5
     }
 
     /// Bonds of E = 3μ have λ = 1.2μ and K = 2μ in space and in plane strain.

@@ -253,6 +253,24 @@ const THIN: f64 = 1e-6;
 /// Inclusions that a bond passes through, its sites, and the least critical stretch in them.
 type Passing = (Vec<usize>, [u32; 2], f64);
 
+impl Material {
+    /// Whether some bonds are at rest at another stretch than 1.
+    pub fn is_prestrained(&self) -> bool {
+        let follows = self.fields.iter().any(|field| field.of == Parameter::Prestrain);
+        follows || self.inclusions.iter().any(|inclusion| inclusion.prestrain.is_some())
+    }
+
+    /// The bond law of this material.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] where a chain parameter is out of its domain.
+    pub fn bond_law(&self) -> Result<Box<dyn crate::potential::BondPotential>, crate::Error> {
+        let law = self.law.unwrap_or_default();
+        let rescale = self.rescale.unwrap_or(law.rescales());
+        law.build(self.links.unwrap_or(1.0), self.dissociation.unwrap_or(1.0), rescale)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -274,23 +292,5 @@ mod tests {
         let shear: [[f64; 3]; 3] = relaxed(Space::Solid, 4.0, &[[0.0, 2.0, 0.0], [2.0, 0.0, 0.0], [0.0; 3]]);
         close(shear[1][0], -0.625);
         close(shear[0][0] + shear[2][2], 0.0);
-    }
-}
-
-impl Material {
-    /// Whether some bonds are at rest at another stretch than 1.
-    pub fn is_prestrained(&self) -> bool {
-        let follows = self.fields.iter().any(|field| field.of == Parameter::Prestrain);
-        follows || self.inclusions.iter().any(|inclusion| inclusion.prestrain.is_some())
-    }
-
-    /// The bond law of this material.
-    ///
-    /// # Errors
-    /// [`crate::Error::Parameter`] where a chain parameter is out of its domain.
-    pub fn bond_law(&self) -> Result<Box<dyn crate::potential::BondPotential>, crate::Error> {
-        let law = self.law.unwrap_or_default();
-        let rescale = self.rescale.unwrap_or(law.rescales());
-        law.build(self.links.unwrap_or(1.0), self.dissociation.unwrap_or(1.0), rescale)
     }
 }

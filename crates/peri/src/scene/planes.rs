@@ -97,7 +97,7 @@ pub(super) fn check<const D: usize>(
             };
             return Err(source.error(&format!("{key}.normal"), found, advice));
         }
-        if own.plane.bonded && !(own.surface.abs() < TIED * spacing) {
+        if own.plane.bonded && own.surface.abs() >= TIED * spacing {
             let found = format!("plane `{}` {:.3e} m from the surface of the body", own.name, own.surface);
             let allowed =
                 format!("up to half a spacing, {:.3e} m: a bonded plane touches the body", TIED * spacing);

@@ -221,8 +221,13 @@ fn areas_of_cracks() {
     let columns = 40.0;
     let shape = Operation::Add(Shape::rectangle([0.0; 2], [columns, 16.0]));
     let built = || {
-        LatticeBonds::new(lattice(&[shape.clone()], 1.0, 0.5).unwrap(), 3.015, VolumeCorrection::None, &[])
-            .unwrap()
+        LatticeBonds::new(
+            lattice(std::slice::from_ref(&shape), 1.0, 0.5).unwrap(),
+            3.015,
+            VolumeCorrection::None,
+            &[],
+        )
+        .unwrap()
     };
     let mut bonds = built();
     let crossing = Crossing::new::<2>(&bonds, None);
