@@ -10,7 +10,7 @@ use rayon::prelude::*;
 #[derive(Default)]
 pub(super) struct Lacking(Vec<Vec<(u32, [f64; 3])>>);
 
-/// Visits the bonds of a work item beyond the onset, with their stretch and λ_f, each from every end in the item.
+/// Visits the bonds beyond the onset that a work item finds, with their stretch and λ_f; all items find each once from both of its ends.
 fn each<const D: usize>(
     end: &Property,
     bonds: &dyn Bonds<D>,
@@ -51,7 +51,14 @@ impl Lacking {
             });
             found
         };
-        Self((0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect())
+        let count = bonds.sites().div_ceil(CHUNK);
+        let parts: Vec<Vec<(u32, [f64; 3])>> = (0..count).into_par_iter().map(of).collect();
+        // an item may have found the other end of its bonds in another one
+        let mut items = vec![Vec::new(); count];
+        for found in parts.into_iter().flatten() {
+            items[found.0 as usize / CHUNK].push(found);
+        }
+        Self(items)
     }
 
     /// Adds what the sites of `force`, from `start` on in one work item, lack.

@@ -19,7 +19,7 @@ const MARGIN: f64 = 1.3;
 /// Factor by which ω² that steps are made for grows at most where one is taken back: where it ends tells little of where half of it would.
 const CUT: f64 = 4.0;
 /// Factors on m, up and down, beyond which ω² is measured again.
-const ABOVE: f64 = 4.0;
+const ABOVE: f64 = 1.5;
 const BELOW: f64 = 1.6;
 /// Least part of the bound that frequencies are taken to reach.
 const LEAST_PART: f64 = 0.05;
