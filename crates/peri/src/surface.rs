@@ -131,7 +131,7 @@ impl<const D: usize> Surface<D> {
         self
     }
 
-    /// Whether a face, by its number, only bounds what lies below the others.
+    /// Returns true for a face, by its number, that only bounds what lies below the others.
     pub fn is_bound(&self, face: usize) -> bool {
         face + self.bounds >= self.faces.len()
     }

@@ -176,7 +176,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Friction in force, sorted by pair.
-    pub fn held(&self) -> &[Grip] {
+    pub fn active_grips(&self) -> &[Grip] {
         &self.held
     }
 

@@ -64,7 +64,7 @@ const NEAR: f64 = 0.25;
 pub struct Contact<const D: usize> {
     /// Force density on a particle per volume of the other and per overlap, N/m⁷, where M is the greatest.
     stiffness: f64,
-    /// Whether the stiffness is that of layers of the material.
+    /// Stiffness given in layers of the material, not as κ.
     layered: bool,
     /// M of each particle over the greatest, where they differ.
     moduli: Option<Property>,
@@ -217,28 +217,28 @@ impl<const D: usize> Contact<D> {
         self
     }
 
-    /// Whether it repels: stiff pairs, or planes.
+    /// Returns true where pairs, planes or ties exert forces.
     pub fn repels(&self) -> bool {
         self.has_pairs() || self.has_planes() || self.ties.is_some()
     }
 
-    /// Whether particles repel each other.
+    /// Returns true where particles repel each other.
     pub fn has_pairs(&self) -> bool {
         self.stiffness > 0.0
     }
 
-    /// Whether there are planes.
+    /// Returns true where there are planes.
     pub fn has_planes(&self) -> bool {
         self.planes.is_some()
     }
 
-    /// Whether anything rubs: a coefficient of friction above 0.
+    /// Returns true where a coefficient of friction is above 0.
     pub fn rubs(&self) -> bool {
         (self.has_pairs() && self.friction > 0.0)
             || self.planes().any(|plane| plane.friction > 0.0 && !plane.bonded)
     }
 
-    /// Whether planes or grips hold faces in all directions.
+    /// Returns true where planes or grips hold faces in all directions.
     pub fn is_tied(&self) -> bool {
         self.ties.is_some() || self.planes().any(|plane| plane.bonded)
     }
@@ -265,7 +265,7 @@ impl<const D: usize> Contact<D> {
         self.planes.as_ref().map_or([f64::NEG_INFINITY; 2], |planes| planes.approach(displacement))
     }
 
-    /// How the body rests on each plane, without friction.
+    /// Force, area and width of the contact with each plane, without friction.
     pub fn resting(&self, displacement: &Field<D>) -> Vec<Resting> {
         self.planes.as_ref().map_or_else(Vec::new, |planes| planes.resting(displacement))
     }

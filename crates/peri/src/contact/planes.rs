@@ -30,7 +30,7 @@ pub(super) struct Placed<const D: usize> {
 pub(super) struct Touch<const D: usize> {
     /// Number of a face; from the number of faces on, of a bare particle.
     pub(super) element: usize,
-    /// Its place, m, on the surface of a particle.
+    /// Place, m; of a particle on its surface.
     place: [f64; D],
     /// Depth behind the plane, m.
     pub(super) overlap: f64,
@@ -61,7 +61,7 @@ impl<const D: usize> Touch<D> {
 pub struct Planes<const D: usize> {
     pub(super) each: Vec<Placed<D>>,
     pub(super) faces: Faces<D>,
-    /// Whether no particle of a face has lost a bond.
+    /// Faces whose particles have all their bonds.
     sound: Vec<bool>,
     /// Sites of particles that touch planes themselves, ascending, and where they were at rest, m.
     pub(super) bare: Vec<u32>,
@@ -219,7 +219,7 @@ impl<const D: usize> Planes<D> {
         Touch { element, place, overlap: shift - placed.plane.height(place), offset: None, area, stiffness }
     }
 
-    /// What a plane holds, in order: its tied faces, or what is behind it.
+    /// Elements that a plane holds, in order: its tied faces, or those behind it.
     fn touches(&self, placed: &Placed<D>, field: &Field<D>) -> Vec<Touch<D>> {
         if placed.plane.bonded {
             let tied = |&face: &u32| {
@@ -238,7 +238,7 @@ impl<const D: usize> Planes<D> {
         self.near(placed, field, 0.0)
     }
 
-    /// What is nearer to a plane than `gap`, m, in order.
+    /// Elements nearer to a plane than `gap`, m, in order.
     pub(super) fn near(&self, placed: &Placed<D>, field: &Field<D>, gap: f64) -> Vec<Touch<D>> {
         let count = self.elements();
         let batch = |start: usize| {
@@ -338,7 +338,7 @@ impl<const D: usize> Planes<D> {
         all
     }
 
-    /// How the body rests on each plane, without friction.
+    /// Force, area and width of the contact with each plane, without friction.
     pub fn resting(&self, field: &Field<D>) -> Vec<Resting> {
         let of = |placed: &Placed<D>| {
             let normal = placed.plane.normal;

@@ -73,7 +73,7 @@ impl PlaneSpec {
 }
 
 impl Scene {
-    /// Whether the body is a lattice beside rigid planes.
+    /// Returns true for a lattice beside rigid planes.
     pub fn is_beside_planes(&self) -> bool {
         self.body.points.is_none() && self.contact.as_ref().is_some_and(|contact| !contact.plane.is_empty())
     }
@@ -91,7 +91,7 @@ impl ContactSpec {
         self.stiffness.unwrap_or(PAIR_STIFFNESS)
     }
 
-    /// Whether particles repel each other.
+    /// Returns true where particles repel each other.
     pub fn has_pairs(&self) -> bool {
         self.short_range.unwrap_or(self.pair_stiffness()) > 0.0
     }

@@ -4,7 +4,7 @@ use super::build::outline;
 use super::{Boundary, Scene, Variant};
 use polycore::scene::{SceneError, Source};
 
-/// Relative change of a free length that is told.
+/// Relative change of a free length above which a study warns.
 const TOLD: f64 = 1e-3;
 
 /// A spacing, and the free length along each axis that has grips at both sides, m.

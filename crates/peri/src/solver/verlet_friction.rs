@@ -24,7 +24,7 @@ pub fn friction_pass<const D: usize>(
     // what moves at the start has slid as far as it will in the first step
     let span = if leap.step > 0.0 { leap.step } else { state.motion.longest };
     let sliding = contact.slide_on(&*system.bonds, &state.displacement, &state.velocity, span, &state.grips);
-    state.grips = contact.held().to_vec();
+    state.grips = contact.active_grips().to_vec();
     let (contact, velocity, loads) = (&*contact, &state.velocity, &*system.loads);
     let moves = leap.factors[1] - leap.factors[0];
     let work = |chunk: usize, force: &[&mut [f64]; D]| {

@@ -509,8 +509,8 @@ fn row_on_a_plane() {
     }
 }
 
-/// Two blocks, one on the other and both on a rough plane, pressed and dragged: all that slides bears μN of the step itself; no force is
-/// lost, and a run goes on from a state in the middle of a step with the same bits, on any number of threads.
+/// Two blocks, one on the other and both on a rough plane, pressed and dragged: all that slides bears μN of the step itself; forces
+/// balance, and a run resumed within a step gives the same bits, on any number of threads.
 #[test]
 fn dragged_over_a_plane() {
     let mut body = Body::<2>::solid([8, 8], 1.0, 3.015);

@@ -288,7 +288,7 @@ side = "z+"
 displacement = ["0 mm", "0 mm", "1 mm"]
 "#;
 
-/// Facets whose corners are rounded meet; facets that miss each other by more are told. The whole block bears more than 3 N.
+/// Facets whose corners are rounded meet; facets that miss each other by more give a warning. The whole block bears more than 3 N.
 #[test]
 fn facets_meet() {
     for corner in ["0.71", "0.710001", "0.7099", "0.7105"] {

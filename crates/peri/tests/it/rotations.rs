@@ -200,7 +200,7 @@ fn a_strip_swung_by_its_grip() {
     assert!(coarse < 0.01 && (3.0..5.0).contains(&(coarse / fine)), "{coarse} {fine}");
 }
 
-/// The field of the same turn along the chord is told.
+/// A field of the same turn along the chord gives a warning.
 #[test]
 fn chords_are_told() {
     let chord = "displacement_field = [\"-0.5*x - 0.866025404*y\", \"0.866025404*x - 0.5*y\", \"0\"]";
