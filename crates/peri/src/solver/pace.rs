@@ -5,13 +5,14 @@
 //! itself and with it the part r = ρω²/m that frequencies reach; between two of them ω² is taken as r m/ρ. Steps are those of [`MARGIN`]
 //! times that. m is looked at where a step ends, before its forces act: a step that ends where it would have been too long, as one that
 //! crushes a particle does, is taken back and cut, so that no kick follows from it. Looks follow every step in which bonds broke or strains
-//! may have changed by [`STRAIN`], and otherwise are the more seldom the slower m grows; ω² is measured again where m has come far from
-//! where it was. All that follows from the state alone.
+//! may have changed by [`STRAIN`], and otherwise are the more seldom the slower m grows; ω² is measured again where m or the stretches have
+//! come far from where they were: r changes with the stretches. All that follows from the state alone.
 
 use super::state::State;
 use super::system::System;
 use super::time_step::largest_frequency_squared;
 use super::verlet::VelocityVerlet;
+use crate::bonds::stretch_range;
 use serde::{Deserialize, Serialize};
 
 /// Factor on ω² by which it may grow until steps are shortened.
@@ -23,6 +24,9 @@ const ABOVE: f64 = 1.5;
 const BELOW: f64 = 1.6;
 /// Least part of the bound that frequencies are taken to reach.
 const LEAST_PART: f64 = 0.05;
+/// Growth of strains, as a part of themselves or of [`LEAST`], beyond which ω² is measured again.
+const GROWS: f64 = 0.25;
+const LEAST: f64 = 0.1;
 /// Strain that steps may add at most, by the increments of displacements, between two looks.
 const STRAIN: f64 = 0.2;
 /// Most steps between two looks, and looks between two at whether steps may be longer.
@@ -44,6 +48,9 @@ pub struct Pace {
     looks: u32,
     /// Strain since the last look, at most.
     strain: f64,
+    /// Least and greatest stretch for which r holds, and whether a look has met others.
+    known: [f64; 2],
+    outgrown: bool,
 }
 
 impl Pace {
@@ -90,8 +97,11 @@ impl VelocityVerlet {
         // nothing oscillates, or the Lanczos iteration has failed: the bound alone
         let good = measured > 0.0 && measured.is_finite() && bound > 0.0;
         let part = if good { (measured / bound).max(LEAST_PART) } else { 1.0 };
+        let [low, high] = stretches(system, state);
+        let known = [low - GROWS * (1.0 - low).max(LEAST), high + GROWS * (high - 1.0).max(LEAST)];
+        let covered = part * bound;
         state.motion.pace =
-            Pace { bound, part, covered: part * bound, last: bound, every: 1, due: 1, looks: 0, strain: 0.0 };
+            Pace { bound, part, covered, last: bound, every: 1, due: 1, known, ..Pace::default() };
     }
 
     /// Looks at the state where a step ends, prepared, if that is due. True where the step was too long for it: steps are then shorter.
@@ -108,8 +118,10 @@ impl VelocityVerlet {
         state.motion.bounds += 1;
         let enough = pace.covered / pace.part;
         let bound = system.material.frequency_bound(&*system.bonds, &state.displacement, enough);
+        let [low, high] = stretches(system, state);
         let pace = &mut state.motion.pace;
         pace.see(bound);
+        pace.outgrown |= low < pace.known[0] || high > pace.known[1];
         let needed = pace.part * bound;
         if needed <= MARGIN * pace.covered {
             return false;
@@ -133,7 +145,7 @@ impl VelocityVerlet {
         let waited = pace.looks >= WAITS;
         let known = pace.last;
         let grown = pace.part * known > pace.covered;
-        if !broken && !waited && !grown {
+        if !broken && !waited && !grown && !pace.outgrown {
             return;
         }
         let enough = pace.covered / pace.part / if waited { BELOW } else { 1.0 };
@@ -148,10 +160,10 @@ impl VelocityVerlet {
         pace.due = if broken { 1 } else { pace.due };
         let falls = waited && bound <= enough;
         pace.looks = if waited { 0 } else { pace.looks };
-        if bound * pace.part <= pace.covered && !falls {
+        if bound * pace.part <= pace.covered && !falls && !pace.outgrown {
             return;
         }
-        if bound > ABOVE * pace.bound || falls && BELOW * bound <= pace.bound {
+        if pace.outgrown || bound > ABOVE * pace.bound || falls && BELOW * bound <= pace.bound {
             let shortest = state.motion.shortest;
             let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
             state.motion.searches += 1;
@@ -161,4 +173,10 @@ impl VelocityVerlet {
         }
         self.cover(system, state);
     }
+}
+
+/// Least and greatest stretch of the intact bonds.
+fn stretches<const D: usize>(system: &System<D>, state: &State<D>) -> [f64; 2] {
+    let range = stretch_range(&*system.bonds, &state.displacement);
+    [range.low, range.high].map(|square| (1.0 + square).max(0.0).sqrt())
 }
