@@ -21,7 +21,8 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     ];
     lines.extend(built.notes.iter().map(|note| format!("note       {note}")));
     let task = scene.task(source, built)?;
-    lines.extend(task.notes.iter().map(|note| format!("note       {note}")));
+    let cut = scene.cut_steps();
+    lines.extend(task.notes.iter().chain(&cut).map(|note| format!("note       {note}")));
     let quantities = scene.quantities(&task);
     let mut problem = std::sync::Arc::unwrap_or_clone(task.problem);
     let births = problem.births.len();
@@ -54,7 +55,11 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
         ));
     }
     if let Some(interfaces) = &task.interfaces {
-        lines.push(format!("builds     healing of {} interfaces", interfaces.list.len()));
+        lines.push(format!(
+            "builds     healing of {} interfaces, {}",
+            interfaces.list.len(),
+            interfaces.law.explain()
+        ));
     }
     let radiates = problem.conditions.iter().any(|c| matches!(c, Condition::Radiation { .. }));
     let changes = problem.conditions.iter().any(|c| !c.breaks().is_empty())

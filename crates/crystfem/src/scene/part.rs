@@ -217,7 +217,30 @@ impl Default for PartOutput {
     }
 }
 
+/// Fields written unless the scene says how often.
+const FRAMES: f64 = 50.0;
+
 impl PartScene {
+    /// Time between fields of a run to `end`, s; fixed steps are not cut unless the scene says so.
+    pub fn every(&self, end: f64) -> f64 {
+        let frame = end / FRAMES;
+        match (self.output.every, self.time.step.map(|step| step.si())) {
+            (Some(every), _) => every.si(),
+            (None, Some(step)) => step * (frame / step).ceil().max(1.0),
+            (None, None) => frame,
+        }
+    }
+
+    /// What is to be said where the times of fields cut fixed steps.
+    pub fn cut_steps(&self) -> Option<String> {
+        let [step, every] = [self.time.step?.si(), self.output.every?.si()];
+        let count = every / step;
+        let cuts = (count - count.round()).abs() > 1e-9 * count || count < 0.5;
+        cuts.then(|| {
+            format!("steps of {step} s end at the times of fields, too: `output.every` of {every} s is no multiple of `time.step`")
+        })
+    }
+
     /// Checks what can be judged without a mesh.
     ///
     /// # Errors
