@@ -125,7 +125,7 @@ fn card(
         options.units.name(),
         host_name(name)
     );
-    let density = format!("*DENSITY\n{:?}\n", density * spec.density.si());
+    let density = format!("*DENSITY\n{}\n", digits(density * spec.density.si()));
     if spec.conductivity_factors.is_some() || spec.powder.is_some() || spec.law == Law::AsPublished {
         let found = "a material with directions, of powder, or `as-published`";
         return Err(source.error(key, found, "an isotropic conductor or polymer: others have no card"));
@@ -146,20 +146,21 @@ fn card(
     let (listed, rest) = match options.host {
         Host::Abaqus => (constants, None),
         Host::Calculix => {
-            let rest =
-                umatht_names().zip(&constants[6..]).map(|(name, value)| format!("{name} = {value:?}\n"));
+            let rest = umatht_names()
+                .zip(&constants[6..])
+                .map(|(name, value)| format!("{name} = {}\n", digits(*value)));
             let head = [&constants[..3], &[3.0], &constants[4..6]].concat();
             (head, Some(format!("# constants 7 to 15 of {name}, SI\n{}", rest.collect::<String>())))
         }
     };
     let _ = writeln!(text, "*USER MATERIAL, TYPE=THERMAL, CONSTANTS={}", listed.len());
     for row in listed.chunks(8) {
-        let row: Vec<String> = row.iter().map(|number| format!("{number:?}")).collect();
+        let row: Vec<String> = row.iter().map(|number| digits(*number)).collect();
         let _ = writeln!(text, "{}", row.join(", "));
     }
     text += &density;
     if options.host == Host::Calculix {
-        let _ = writeln!(text, "*SPECIFIC HEAT\n{capacity:?}");
+        let _ = writeln!(text, "*SPECIFIC HEAT\n{}", digits(capacity));
     }
     // CalculiX takes latent heat as a load, from a fourth state variable
     let states = if options.host == Host::Calculix && polymer.latent_heat.is_some() { 4 } else { 3 };
@@ -202,13 +203,21 @@ fn constants(polymer: &Polymer, options: &Options) -> Option<Vec<f64>> {
     Some(all)
 }
 
+/// A number without the noise of its last digits.
+fn digits(number: f64) -> String {
+    let short: f64 = format!("{number:.11e}").parse().unwrap_or(number);
+    format!("{short:?}")
+}
+
 /// A value, or rows of a value and its temperature.
 fn lines(property: &Property, factor: f64, zero: f64) -> String {
     match property {
-        Property::Constant(value) => format!("{:?}\n", factor * value),
+        Property::Constant(value) => digits(factor * value) + "\n",
         Property::Table(table) => table
             .rows()
-            .map(|[temperature, value]| format!("{:?}, {:?}\n", factor * value, temperature - zero))
+            .map(|[temperature, value]| {
+                format!("{}, {}\n", digits(factor * value), digits(temperature - zero))
+            })
             .collect(),
     }
 }

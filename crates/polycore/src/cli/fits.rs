@@ -15,7 +15,7 @@ use polycore::report::{Phases, Report};
 use super::MPA;
 use super::quantities as q;
 use super::scene::Case;
-use super::{draw, material, trials};
+use super::{card, draw, material, trials};
 
 /// Fits every law to every table, writes tables and pictures.
 pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {
@@ -44,6 +44,7 @@ pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {
     if !all.is_empty() {
         write_fits(directory, &all)?;
         material::write(directory, &all)?;
+        card::write(directory, &all)?;
     }
     phases.start("trials");
     for trial in &case.trials {

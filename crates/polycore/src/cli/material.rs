@@ -15,7 +15,7 @@ use super::MPA;
 const EIGHT_CHAINS: &str = "eight-chain";
 
 /// Bulk over shear modulus: nearly incompressible. Tests at constant volume do not determine it.
-const BULK_RATIO: f64 = 100.0;
+pub const BULK_RATIO: f64 = 100.0;
 
 /// Standard errors to either side of a value that hold 95 % of a normal distribution.
 const HALF_WIDTH: f64 = 1.96;
