@@ -221,3 +221,61 @@ fn lines(property: &Property, factor: f64, zero: f64) -> String {
             .collect(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = r#"
+version = 1
+program = "crystfem"
+[materials.own-pp]
+law = "semicrystalline"
+density = "905 kg/m^3"
+conductivity = "0.2 W/(m K)"
+specific_heat = "1900 J/(kg K)"
+kinetics = { growth_rate = "5.3e6 1/s", nucleation = "3.3e5 K^2", equilibrium_melting = "458.2 K", frozen = "231.2 K", avrami_exponent = 3.0 }
+melting = { sharpness = "0.965 1/K", shape = 8.584, peak = "438 K" }
+crystallinity = 0.5
+latent_heat = "200 J/g"
+[materials.glass]
+law = "conductor"
+density = "2500 kg/m^3"
+conductivity = { temperature = ["0 degC", "100 degC"], value = ["1 W/(m K)", "1.2 W/(m K)"] }
+specific_heat = "800 J/(kg K)"
+[[point]]
+name = "p"
+start = "180 degC"
+legs = [{ hold = "1 s" }]
+"#;
+
+    fn cards(host: Host, units: Units, celsius: bool) -> Vec<(String, Option<String>)> {
+        let options = Options { scene: "s.toml".into(), host, units, celsius, output: "cards".into() };
+        let source = Source::new("s.toml", SCENE);
+        let all = materials(&source).unwrap();
+        all.iter().map(|(name, spec, key)| card(&options, &source, name, spec, key).unwrap()).collect()
+    }
+
+    #[test]
+    fn units_are_those_of_the_host() {
+        let [(glass, none), (pp, nothing)] = &cards(Host::Abaqus, Units::Mm, true)[..] else { panic!("two") };
+        assert!(none.is_none() && nothing.is_none());
+        let expected = "*CONDUCTIVITY\n1.0, 0.0\n1.2, 100.0\n*SPECIFIC HEAT\n800000000.0\n*DENSITY\n2.5e-9\n";
+        assert!(glass.ends_with(expected), "{glass}");
+        let expected = "*MATERIAL, NAME=OWN_PP\n*USER MATERIAL, TYPE=THERMAL, CONSTANTS=15\n\
+                        0.2, 1900000000.0, 100000000000.0, 0.0, 273.15, 0.0, 5300000.0, 330000.0\n\
+                        6270.0, 458.2, 231.2, 3.0, 0.965, 8.584, 438.0\n*DENSITY\n9.05e-10\n*DEPVAR\n3\n";
+        assert!(pp.ends_with(expected), "{pp}");
+    }
+
+    /// Six constants, the other nine in a file, c by its own card, a fourth state for the latent heat.
+    #[test]
+    fn calculix_takes_six_constants() {
+        let all = cards(Host::Calculix, Units::Si, false);
+        let (deck, Some(file)) = &all[1] else { panic!("a file") };
+        let expected = "CONSTANTS=6\n0.2, 1900.0, 100000.0, 3.0, 0.0, 1.0\n*DENSITY\n905.0\n*SPECIFIC HEAT\n1900.0\n*DEPVAR\n4\n";
+        assert!(deck.ends_with(expected), "{deck}");
+        assert_eq!(file.lines().filter(|line| line.contains(" = ")).count(), 9);
+        assert!(file.contains("melting_peak = 438.0\n"), "{file}");
+    }
+}

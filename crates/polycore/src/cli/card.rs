@@ -21,15 +21,24 @@ const FILES: [(&str, &str, f64); 2] =
 pub fn write(directory: &Path, all: &[(&str, &Table, Vec<Fit>)]) -> Result<(), Error> {
     for (name, units, pascals) in FILES {
         atomic_write(directory.join(name), |file| {
-            writeln!(file, "** units {units}; K is {BULK_RATIO} times the shear modulus: tests at constant volume do not determine it")?;
+            writeln!(
+                file,
+                "** units {units}; K is {BULK_RATIO} times the shear modulus: tests at constant volume do not determine it"
+            )?;
             for (data, _, fits) in all {
                 for fit in fits {
                     let values: Vec<f64> = fit.parameters.iter().map(|parameter| parameter.value).collect();
                     let scaled = fit.parameters.iter().zip(&values);
-                    let scaled: Vec<f64> =
-                        scaled.map(|(of, value)| if of.unit == "Pa" { value / pascals } else { *value }).collect();
+                    let scaled: Vec<f64> = scaled
+                        .map(|(of, value)| if of.unit == "Pa" { value / pascals } else { *value })
+                        .collect();
                     let bulk = BULK_RATIO * fit.law.shear_modulus() / pascals;
-                    write!(file, "**\n** {} fitted to {data}\n{}", fit.model.key, card(fit.model.key, &scaled, bulk))?;
+                    write!(
+                        file,
+                        "**\n** {} fitted to {data}\n{}",
+                        fit.model.key,
+                        card(fit.model.key, &scaled, bulk)
+                    )?;
                 }
             }
             Ok(())
@@ -84,8 +93,16 @@ mod tests {
     fn hosts_have_their_own_forms() {
         for (key, parameters, expected) in [
             ("neo-hookean", &[0.4][..], "*HYPERELASTIC, NEO HOOKE\n2.000000e-1, 5.000000e-2\n"),
-            ("mooney-rivlin", &[0.15, 0.02], "*HYPERELASTIC, MOONEY-RIVLIN\n1.500000e-1, 2.000000e-2, 5.000000e-2\n"),
-            ("eight-chain", &[0.27, 25.0], "*HYPERELASTIC, ARRUDA-BOYCE\n2.700000e-1, 5.000000e0, 5.000000e-2\n"),
+            (
+                "mooney-rivlin",
+                &[0.15, 0.02],
+                "*HYPERELASTIC, MOONEY-RIVLIN\n1.500000e-1, 2.000000e-2, 5.000000e-2\n",
+            ),
+            (
+                "eight-chain",
+                &[0.27, 25.0],
+                "*HYPERELASTIC, ARRUDA-BOYCE\n2.700000e-1, 5.000000e0, 5.000000e-2\n",
+            ),
             (
                 "ogden-2",
                 &[0.4, 2.0, 0.1, -1.5],
@@ -97,6 +114,10 @@ mod tests {
             assert!(found.ends_with(expected), "{found}");
         }
         // a name of twelve numbers still has eight a line
-        assert!(MODELS.iter().all(|model| card(model.key, model.example, 1.0).lines().all(|line| line.len() < 256)));
+        assert!(
+            MODELS
+                .iter()
+                .all(|model| card(model.key, model.example, 1.0).lines().all(|line| line.len() < 256))
+        );
     }
 }
