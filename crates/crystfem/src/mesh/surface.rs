@@ -138,7 +138,7 @@ impl Surface {
     }
 
     /// Where a boundary condition acts: `outer` (everywhere), a named surface (from whichever side its faces are
-    /// given), the part of the surface of a named element set, or a side of the box around the mesh
+    /// given), the part of the surface of a named element set, the outer faces whose nodes are in a named node set, or a side of the box around the mesh
     /// ([`BOX_SIDES`]: faces within 1e-9 of its diagonal). A name of the mesh comes before our own.
     ///
     /// # Errors
@@ -159,6 +159,19 @@ impl Surface {
         } else if let Some(set) = mesh.element_sets.get(name) {
             let elements = set.iter().filter(|element| (**element as usize) < self.elements);
             faces.extend(elements.flat_map(|element| self.faces_of(*element)).map(|number| number as u32));
+        } else if let Some(set) = mesh.node_sets.get(name) {
+            let within = |number: &u32| {
+                self.outer.get(*number as usize) == Some(&true)
+                    && mesh.face_nodes(self.face(*number)).iter().all(|node| set.binary_search(node).is_ok())
+            };
+            faces.extend((0..self.outer.len() as u32).filter(within));
+            if faces.is_empty() {
+                let count = set.len();
+                return Err(Error::Mesh(format!(
+                    "node set `{name}` ({count} nodes) has all nodes of no outer face; allowed: one that has, or a temperature, \
+                     which acts on nodes"
+                )));
+            }
         } else if name == "outer" {
             faces.extend(0..self.outer.len() as u32);
         } else if let Some(side) = BOX_SIDES.iter().position(|side| *side == name) {
@@ -173,6 +186,7 @@ impl Surface {
         } else {
             let mut known: Vec<String> =
                 mesh.surfaces.keys().chain(mesh.element_sets.keys()).cloned().collect();
+            known.extend(mesh.node_sets.keys().filter(|name| !mesh.surfaces.contains_key(*name)).cloned());
             for own in ["outer"].into_iter().chain(BOX_SIDES) {
                 if !known.iter().any(|name| name == own) {
                     known.push(own.to_owned());
