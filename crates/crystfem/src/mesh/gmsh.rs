@@ -256,8 +256,11 @@ impl Reader {
 
     /// Dimension and tag of an entity; 4.0 has the tag first.
     fn entity(&self, numbers: &mut Numbers) -> Result<[i64; 2], Error> {
-        let [first, second] = [numbers.int("an entity")?, numbers.int("an entity")?];
-        Ok(if self.version == Version::Four { [second, first] } else { [first, second] })
+        if self.version == Version::Four {
+            let tag = numbers.int("tag of an entity")?;
+            return Ok([numbers.int("dimension of an entity")?, tag]);
+        }
+        Ok([numbers.int("dimension of an entity")?, numbers.int("tag of an entity")?])
     }
 
     /// An element, after its number.

@@ -148,8 +148,8 @@ fn what_is_wrong_is_named_with_its_line() {
     refused("", &["a.msh:1: first line", "$MeshFormat"]);
     refused(&with("4.1 0 8", "3.1 0 8"), &["a.msh:2:", "found \"3.1 0 8\"", "Mesh.MshFileVersion = 4.1"]);
     refused(
-        &with("3 7 4 1\n11", "3 7 12 1\n11"),
-        &["a.msh:27: type of elements: found \"12\"", "4, 11 (tetrahedra)", "SecondOrderIncomplete"],
+        &with("3 7 4 1\n11", "3 7 14 1\n11"),
+        &["a.msh:27: type of elements: found \"14\"", "4, 11 (tetrahedra)", "pyramids are none"],
     );
     refused(&with("11 1 2 3 4", "11 1 2 3 9"), &["a.msh:28: node of element 11: found \"9\""]);
     refused(&with("0 1 0\n0 0", "0 x 0\n0 0"), &["a.msh:21: coordinate: found \"x\"; allowed: a number"]);
