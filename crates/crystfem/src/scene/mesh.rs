@@ -2,7 +2,7 @@
 
 use super::fault::{located, located_in};
 use super::memory;
-use super::voxels::{Filling, PathSpec, StlSpec, box_of};
+use super::voxels::{Filling, PRINTED, PathSpec, StlSpec, box_of};
 use crate::error::Error;
 use crate::mesh::{Bar, Block, Grid, Mesh, Split, Substrate, Tube, quality, read};
 use polycore::scene::{SceneError, Source};
@@ -199,6 +199,10 @@ impl MeshSpec {
             let found = read(&path, unit).map_err(|error| at("mesh.file", error))?;
             notes = found.notes;
             if let Some(suspicion) = self.without_unit(source, &found.mesh) {
+                let [low, high] = found.mesh.bounds().unwrap_or_default();
+                if (0..3).any(|d| high[d] - low[d] > PRINTED[1]) {
+                    return Err(suspicion);
+                }
                 notes.push(suspicion.message().to_owned());
             }
             notes.extend(found.mesh.bounds().map(|bounds| format!("the part is {}", box_of(bounds))));

@@ -17,7 +17,7 @@ pub(super) const FILAMENT: f64 = 1.75e-3;
 const LEAST: [f64; 2] = [0.1, 0.5];
 
 /// Largest sides that printed parts have, m.
-const PRINTED: [f64; 2] = [1e-4, 10.0];
+pub(super) const PRINTED: [f64; 2] = [1e-4, 10.0];
 
 /// Where parameters stand in their block.
 const KEYS: [(&str, &str); 7] = [

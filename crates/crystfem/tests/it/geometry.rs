@@ -131,12 +131,12 @@ fn sizes_that_are_not_plausible_name_the_unit() {
     }
 }
 
-/// A bar of eight bricks along x, 8 mm long, as a deck of Abaqus and CalculiX with sets of nodes at its ends.
-fn deck() -> String {
+/// A bar of eight bricks of `step` units along x, as a deck of Abaqus and CalculiX with sets of nodes at its ends.
+fn deck(step: usize) -> String {
     let mut text = "*HEADING\nbar\n*NODE, NSET=ALL\n".to_owned();
     for i in 0..9 {
         for (k, [y, z]) in [[0, 0], [1, 0], [1, 1], [0, 1]].into_iter().enumerate() {
-            writeln!(text, "{}, {i}., {y}., {z}.", 4 * i + k + 1).unwrap();
+            writeln!(text, "{}, {}., {y}., {z}.", 4 * i + k + 1, step * i).unwrap();
         }
     }
     text += "*ELEMENT, TYPE=DC3D8, ELSET=BAR\n";
@@ -155,7 +155,7 @@ fn deck() -> String {
 fn node_sets_of_a_deck_are_boundaries() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    fs::write(here.join("bar.inp"), deck()).unwrap();
+    fs::write(here.join("bar.inp"), deck(1)).unwrap();
     let mesh = "[mesh]\nfile = \"bar.inp\"\nunit = \"1 mm\"\n";
     let end = "[time]\nend = \"1e5 s\"\n[[probe]]\nname = \"p\"\nat = [\"2 mm\", \"0.5 mm\", \"0.5 mm\"]\n";
     let hold = |name: &str, celsius: f64| {
@@ -194,6 +194,14 @@ fn node_sets_of_a_deck_are_boundaries() {
     );
     let lines = lines.unwrap().join("\n");
     assert!(lines.contains("8 × 1 × 1 m") && lines.contains("unit"), "{lines}");
+    fs::write(here.join("bar.inp"), deck(10)).unwrap();
+    let error =
+        explain(&source(here, "[mesh]\nfile = \"bar.inp\"\n", "[time]\nend = \"1 s\"\n"), false).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("`mesh.unit`: found nothing, and with the file's unit as 1 m the part is 80 × 1 × 1 m")
+    );
 }
 
 /// `check` opens the files of thermal analyses.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::cards::{Card, Cards};
 
 /// What a scene says instead.
-const INSTEAD: [(&str, &[&str]); 15] = [
+const INSTEAD: [(&str, &[&str]); 14] = [
     ("`density` of [materials.NAME]", &["DENSITY"]),
     ("`conductivity` of [materials.NAME]", &["CONDUCTIVITY"]),
     ("`specific_heat` of [materials.NAME]", &["SPECIFIC HEAT"]),
@@ -19,9 +19,12 @@ const INSTEAD: [(&str, &[&str]); 15] = [
     ("`flux` of [[boundary]], or `power` of [[source]]", &["DFLUX", "DSFLUX", "CFLUX"]),
     ("values over time, `{ time = […], value = […] }`", &["AMPLITUDE"]),
     ("[time]", &["HEAT TRANSFER", "COUPLED TEMPERATURE-DISPLACEMENT", "UNCOUPLED TEMPERATURE-DISPLACEMENT"]),
-    ("kelvin everywhere, constants built in", &["PHYSICAL CONSTANTS"]),
     ("[mechanics]", &["ELASTIC", "EXPANSION", "PLASTIC", "VISCOELASTIC"]),
 ];
+
+/// Keywords that join parts which share no nodes.
+const JOINING: [&str; 7] =
+    ["TIE", "CONTACT PAIR", "CONTACT", "EQUATION", "MPC", "GAP CONDUCTANCE", "EMBEDDED ELEMENT"];
 
 /// Keywords with their number, the first line and what it says.
 #[derive(Default)]
@@ -44,15 +47,21 @@ impl Ignored {
     pub fn tell(self, notes: &mut Vec<String>) {
         let mut rest = Vec::new();
         for (keyword, (count, line, said)) in self.0 {
-            let Some((instead, _)) = INSTEAD.iter().find(|(_, all)| all.contains(&keyword.as_str())) else {
-                rest.push(format!("*{keyword} ({count})"));
-                continue;
+            let instead = INSTEAD.iter().find(|(_, all)| all.contains(&keyword.as_str()));
+            let why = match instead {
+                Some((instead, _)) => format!("the deck has no units; give {instead}"),
+                None if JOINING.contains(&keyword.as_str()) => {
+                    "heat passes only between elements that share nodes: merge the nodes of the parts"
+                        .to_owned()
+                }
+                None => {
+                    rest.push(format!("*{keyword} ({count})"));
+                    continue;
+                }
             };
             let said = if said.is_empty() { String::new() } else { format!(", `{said}`") };
             let times = if count > 1 { format!(", {count} times") } else { String::new() };
-            notes.push(format!(
-                "*{keyword} (line {line}{said}{times}) is NOT used: the deck has no units; give {instead}"
-            ));
+            notes.push(format!("*{keyword} (line {line}{said}{times}) is NOT used: {why}"));
         }
         if !rest.is_empty() {
             notes.push(format!("keywords not used: {}", rest.join(", ")));

@@ -256,6 +256,22 @@ fn orders_do_not_mix() {
     assert!(error.contains("elements 0 and 1 have the corners of one face and different nodes"), "{error}");
 }
 
+/// Keywords with a meaning here are told one by one, with how often and what they say first.
+#[test]
+fn what_is_not_used_says_what_to_give_instead() {
+    let more = "*Tie, name=glue\na, b\n*Dflux\nBricks, BF, 1.\n*DFLUX, amplitude=RAMP\nagain, BF, 2.\n*initial conditions, type=temperature\nAll, 20.\n\
+                *Node File\nNT\n*NODE FILE\nNT\n";
+    let notes = parsed(&format!("{BRICK}{more}")).notes;
+    for told in [
+        "*TIE (line 46, `glue`) is NOT used: heat passes only between elements that share nodes",
+        "*DFLUX (line 48, `Bricks, BF, 1.`, 2 times) is NOT used: the deck has no units; give `flux` of [[boundary]], or `power`",
+        "*INITIAL CONDITIONS (line 52, `All, 20.`) is NOT used: the deck has no units; give `temperature` of [[region]]",
+        "keywords not used: *END STEP (1), *NODE FILE (2), *STEP (1)",
+    ] {
+        assert!(notes.iter().any(|note| note.starts_with(told)), "{told}: {notes:#?}");
+    }
+}
+
 /// An instance is moved, then turned about a line.
 #[test]
 fn instances_are_placed() {
