@@ -54,7 +54,8 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
         ));
     }
     if task.mechanics.as_ref().is_some_and(|mechanics| mechanics.stiff) {
-        let advice = "`mesh.order = 2`, or hexahedra";
+        // elements of second order are not printed
+        let advice = if births > 0 { "hexahedra bend right" } else { "`mesh.order = 2`, or hexahedra" };
         lines.push(format!(
             "note       stress of tetrahedra of 4 nodes: they bend far too little, warpage and stress are rough; {advice}"
         ));

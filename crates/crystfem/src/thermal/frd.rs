@@ -257,6 +257,33 @@ mod tests {
         assert_eq!(frames[0].temperature, [472.15, 472.16, 472.17, 472.18, -100.0]);
     }
 
+    /// Without solids shells are the mesh, without those beams.
+    #[test]
+    fn shells_and_beams() {
+        let shells = GOOD.replace(
+            " -1         1    3    0    1\n -2         1         2         3         7",
+            " -1         1    7    0    1\n -2         1         2         3",
+        );
+        let (frd, frames) = read(&shells).unwrap();
+        assert_eq!(
+            (frd.cells.types.as_slice(), frd.cells.connectivity.as_slice()),
+            (&[5][..], &[0, 1, 2][..])
+        );
+        assert_eq!(frames[0].temperature.len(), 5);
+        let beams = shells.replace(
+            "    7    0    1\n -2         1         2         3",
+            "   11    0    1\n -2         1         2",
+        );
+        let (frd, _) = read(&beams).unwrap();
+        assert_eq!(
+            (frd.cells.types.as_slice(), frd.cells.connectivity.as_slice()),
+            (&[3, 3][..], &[0, 1, 0, 4][..])
+        );
+        let none =
+            GOOD.replace("    3    0    1", "   99    0    1").replace("   11    0    1", "   99    0    1");
+        assert!(read(&none).err().unwrap().to_string().contains("solids, shells or beams"));
+    }
+
     /// Cut at any line and changed anywhere: an error with a line, or fewer results; never a panic.
     #[test]
     fn damaged_files() {

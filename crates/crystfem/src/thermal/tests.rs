@@ -33,6 +33,16 @@ fn files_of_others() {
     }
 }
 
+/// A strip in the plane as MOOSE writes it (`make.py`): two axes, QUAD4.
+#[test]
+fn exodus_in_two_dimensions() {
+    let analysis = open(&file("strip.e"), None).unwrap();
+    assert_eq!((analysis.points[5], analysis.cells.types.as_slice()), ([2.0, 1.0, 0.0], &[9, 9][..]));
+    assert_eq!(analysis.cells.connectivity, [0, 1, 4, 3, 1, 2, 5, 4]);
+    let frames: Vec<Frame> = analysis.frames.collect::<Result<_, _>>().unwrap();
+    assert_eq!((frames.len(), frames[2].time, frames[2].temperature[5]), (3, 5.0, 615.0));
+}
+
 #[test]
 fn names_that_there_are_not() {
     for (name, array, says) in [
@@ -200,6 +210,21 @@ fn shapes_of_fewer_dimensions_and_parts() {
     std::fs::write(at("numbers.bin"), [vec![0; 3], bytes].concat()).unwrap();
     let binary = "<Attribute Name=\"T\"><DataItem Dimensions=\"6\" NumberType=\"Float\" Precision=\"8\" Endian=\"Big\" Seek=\"3\" Format=\"Binary\">numbers.bin</DataItem></Attribute>";
     write("binary.xdmf", xdmf(grid(&format!("{mesh}{binary}"))));
+
+    // cut anywhere and with any letter changed: an error or other numbers
+    for name in ["list.xmf", "hdf.xdmf", "binary.xdmf"] {
+        let good = std::fs::read(at(name)).unwrap();
+        let damaged = at("damaged.xdmf");
+        for place in 0..good.len() {
+            let mut changed = good.clone();
+            changed[place] ^= [0x02, 0x10][place % 2];
+            for bytes in [&good[..place], &changed[..]] {
+                std::fs::write(&damaged, bytes).unwrap();
+                let read = open(&damaged, None).map(|analysis| analysis.frames.count());
+                assert!(read.is_err() || bytes.len() == good.len(), "{name}: {place}");
+            }
+        }
+    }
 
     let both = &[0.0, 2.5][..];
     for (name, nodes, types, times) in [

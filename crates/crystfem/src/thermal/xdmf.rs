@@ -205,7 +205,7 @@ impl Xdmf {
                 // vertices and lines tell how many nodes they have
                 let told = usize::from(code <= 2.0);
                 let count = if told == 1 { behind.first().map_or(0, |&n| n as usize) } else { count };
-                let own = behind.get(told..told + count).ok_or_else(cut)?;
+                let own = behind.get(told..).and_then(|rest| rest.get(..count)).ok_or_else(cut)?;
                 push(if told == 1 && code > 1.0 && count > 2 { 4 } else { vtk }, own)?;
                 rest = &behind[told + count..];
             }

@@ -258,6 +258,28 @@ fn files_as_programs_write_them() {
     }
 }
 
+/// Cut anywhere and with any byte changed: an error, or a surface whose cells can be found.
+#[test]
+fn damaged_files_are_errors_or_surfaces() {
+    let shells = [brick([3.0, 2.0, 1.0]), shell([1.0; 3], [2.0, 3.0, 4.0], true)].concat();
+    for good in [ascii(&shells).into_bytes(), binary(&shells)] {
+        for place in (0..good.len()).step_by(3) {
+            for bit in [0x01, 0x40, 0x80] {
+                let mut changed = good.clone();
+                changed[place] ^= bit;
+                for bytes in [&good[..place], &changed[..]] {
+                    let Ok(stl) = parsed(bytes) else { continue };
+                    let [low, high] = stl.bounds();
+                    let size = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+                    assert!(size > 0.0 && stl.volume > 0.0);
+                    // cells that are too many are refused
+                    _ = stl.voxels([size / 4.0; 3], 0.1);
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn what_is_wrong_is_named() {
     let triangles = brick([3.0, 2.0, 1.0]);
