@@ -180,9 +180,9 @@ fn node_sets_of_a_deck_are_boundaries() {
     let lines = explain(&source(here, mesh, &(hold("COLD", 20.0) + end)), false).unwrap().join("\n");
     for told in [
         "the part is 8 × 1 × 1 mm",
-        "*CONDUCTIVITY (line 58, `50.,`) is NOT used: the deck has no units; give `conductivity` of [materials.NAME]",
-        "*AMPLITUDE (line 60, `RAMP`) is NOT used",
-        "*BOUNDARY (line 64, `COLD, 11, 11, 20.`) is NOT used",
+        "*CONDUCTIVITY (line 56, `50.,`) is NOT used: the deck has no units; give `conductivity` of [materials.NAME]",
+        "*AMPLITUDE (line 58, `RAMP`) is NOT used",
+        "*BOUNDARY (line 63, `COLD, 11, 11, 20.`) is NOT used",
         "keywords not used: *END STEP (1), *STEP (1)",
     ] {
         assert!(lines.contains(told), "{told}:\n{lines}");

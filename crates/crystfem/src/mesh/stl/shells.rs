@@ -13,6 +13,10 @@ const INWARDS: f64 = 1.37e-4;
 /// Corners closer than this part of the largest extent are one.
 const WELD: f64 = 1e-6;
 
+/// Times that triangles are split, and open edges times their corners that are looked at.
+const ROUNDS: usize = 30;
+const MOST_PAIRS: usize = 100_000_000;
+
 /// A shell: triangles joined by edges.
 pub(super) struct Shell {
     triangles: Vec<u32>,
@@ -69,7 +73,7 @@ pub(super) fn shells(
     notes: &mut Vec<String>,
 ) -> Result<Vec<Shell>, Error> {
     let mut edges = edges(triangles);
-    if !edges.values().all(|(count, _)| count[0] == count[1]) {
+    if !is_closed(&edges) {
         let mut known = HashSet::new();
         let before = triangles.len();
         triangles.retain(|&[a, b, c]| {
@@ -81,6 +85,12 @@ pub(super) fn shells(
         if doubled > 0 {
             notes.push(format!("{doubled} triangles that are there twice are left out"));
             edges = self::edges(triangles);
+        }
+    }
+    if !is_closed(&edges) {
+        let split = split(points, triangles, &mut edges);
+        if split > 0 {
+            notes.push(format!("{split} triangles are split where corners of others lie on their edges"));
         }
     }
     closed(path, points, &edges)?;
@@ -131,6 +141,55 @@ fn edges(triangles: &[[u32; 3]]) -> Edges {
         }
     }
     edges
+}
+
+fn is_closed(edges: &Edges) -> bool {
+    edges.values().all(|(count, _)| count[0] == count[1])
+}
+
+/// Splits triangles at corners of others that lie on their edges, where the surface is open; how many.
+fn split(points: &[[f64; 3]], triangles: &mut Vec<[u32; 3]>, edges: &mut Edges) -> usize {
+    let [low, high] = bounds(points.iter());
+    let near = WELD * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+    let at = |n: u32| Vector3::from(points[n as usize]);
+    let before = triangles.len();
+    for _ in 0..ROUNDS {
+        let mut open: Vec<[u32; 2]> =
+            edges.iter().filter(|(_, (count, _))| count[0] != count[1]).map(|(ends, _)| *ends).collect();
+        open.sort_unstable();
+        let mut corners = open.as_flattened().to_vec();
+        corners.sort_unstable();
+        corners.dedup();
+        if open.len() * corners.len() > MOST_PAIRS {
+            break;
+        }
+        let on = |&[p, q]: &[u32; 2]| {
+            let along = at(q) - at(p);
+            let inside = |r: &u32| {
+                let arm = at(*r) - at(p);
+                let part = arm.dot(&along) / along.norm_squared();
+                let apart = (arm - along * part).norm();
+                part > 0.0 && part < 1.0 && apart <= near && *r != p && *r != q
+            };
+            corners.iter().copied().find(inside).map(|r| ([p, q], r))
+        };
+        let found: HashMap<[u32; 2], u32> = open.iter().filter_map(on).collect();
+        if found.is_empty() {
+            break;
+        }
+        for k in 0..triangles.len() {
+            let [a, b, c] = triangles[k];
+            for [p, q, third] in [[a, b, c], [b, c, a], [c, a, b]] {
+                if let Some(&r) = found.get(&[p.min(q), p.max(q)]).filter(|r| **r != third) {
+                    triangles[k] = [p, r, third];
+                    triangles.push([r, q, third]);
+                    break;
+                }
+            }
+        }
+        *edges = self::edges(triangles);
+    }
+    triangles.len() - before
 }
 
 /// Every edge is passed as often one way as the other.

@@ -215,6 +215,29 @@ fn corners_are_welded_at_a_tolerance_of_the_size() {
     assert!(stl.notes.iter().any(|note| note.contains("1 of them smaller")), "{:?}", stl.notes);
 }
 
+/// Corners of triangles on edges of others, one and three on an edge: the surface is closed all the same; a hole is not.
+#[test]
+fn corners_on_edges_of_others_close_a_surface() {
+    let [a, c, d] = [[0.0, 0.0, 10.0], [10.0, 10.0, 10.0], [0.0, 10.0, 10.0]];
+    let whole = brick([10.0; 3]);
+    let is_top = |t: &[[f32; 3]; 3]| t.iter().all(|p| p[2] == 10.0);
+    for on in [vec![5.0], vec![2.5, 5.0, 6.25], vec![3.3]] {
+        let mut triangles: Vec<_> = whole.iter().copied().filter(|t| !is_top(t)).collect();
+        let edge: Vec<[f32; 3]> = [0.0].iter().chain(&on).chain(&[10.0]).map(|x| [*x, 0.0, 10.0]).collect();
+        triangles.extend(edge.windows(2).map(|two| [two[0], two[1], c]));
+        triangles.push([a, c, d]);
+        let stl = parsed(&binary(&triangles)).unwrap_or_else(|error| panic!("{on:?}: {error}"));
+        assert!((stl.volume * 1e9 / 1000.0 - 1.0).abs() < 1e-9, "{on:?}: {}", stl.volume);
+        assert!(stl.notes[0].contains(&format!("{} triangles are split", on.len())), "{:?}", stl.notes);
+        let last = triangles.len() - 2;
+        triangles.remove(last);
+        assert!(
+            parsed(&binary(&triangles)).unwrap_err().to_string().contains("not a closed surface"),
+            "{on:?}"
+        );
+    }
+}
+
 /// Forms of text and bytes that programs write.
 #[test]
 fn files_as_programs_write_them() {
