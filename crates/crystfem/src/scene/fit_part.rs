@@ -29,6 +29,15 @@ impl PartFit {
         scene
     }
 
+    /// Builds the part once: opens the files that it reads.
+    ///
+    /// # Errors
+    /// What its mesh and its task refuse.
+    pub fn build(&self) -> Result<(), SceneError> {
+        let built = self.scene.mesh.build(&self.source)?;
+        self.scene.task(&self.source, built).map(|_| ())
+    }
+
     /// α of all files, one after the other.
     pub fn degrees(&self) -> Vec<f64> {
         self.curves.iter().flat_map(|(_, _, degrees)| degrees.iter().copied()).collect()

@@ -124,7 +124,8 @@ pub struct PrintSpec {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundarySpec {
-    /// `outer` (the current outer surface), a surface of the mesh, an element set, or a side of the box around the mesh:
+    /// `outer` (the current outer surface), a surface of the mesh, an element set, a node set (a temperature acts on its nodes, else its
+    /// outer faces count), or a side of the box around the mesh:
     /// `left`, `right`, `front`, `back`, `bottom`, `top`.
     pub surface: String,
     /// Surfaces that are left out of `outer`.

@@ -297,6 +297,14 @@ impl PartScene {
             for name in &spec.except {
                 except.extend(faces(&format!("{key}.except"), name)?);
             }
+            // nodes without faces
+            if let (Some(temperature), Some(nodes)) = (&spec.temperature, spec.node_set(mesh)) {
+                let value = Field::Uniform(temperature.build(source, &format!("{key}.temperature"))?);
+                let condition = Condition::Temperature { nodes, value };
+                condition.check().map_err(|error| located_in(source, &key, &CONDITION_KEYS, &error))?;
+                conditions.push(condition);
+                continue;
+            }
             let place = if let Some([min, max]) = spec.corners() {
                 let mut inside = faces(&format!("{key}.surface"), &spec.surface)?;
                 inside.retain(|face| {
@@ -356,6 +364,17 @@ impl PartScene {
 }
 
 impl BoundarySpec {
+    /// Nodes of a set of the mesh, where no surface has its name; in the box where there is one.
+    fn node_set(&self, mesh: &Mesh) -> Option<Vec<u32>> {
+        let set = mesh.node_sets.get(&self.surface).filter(|_| !mesh.surfaces.contains_key(&self.surface))?;
+        let Some([min, max]) = self.corners() else { return Some(set.clone()) };
+        let inside = |node: &&u32| {
+            let at = mesh.points[**node as usize];
+            (0..3).all(|d| (min[d]..=max[d]).contains(&at[d]))
+        };
+        Some(set.iter().filter(inside).copied().collect()).filter(|nodes: &Vec<u32>| !nodes.is_empty())
+    }
+
     fn conditions(
         &self,
         source: &Source,

@@ -16,6 +16,9 @@ pub(super) const FILAMENT: f64 = 1.75e-3;
 /// Cells are left out that are filled less: with the part that is filled, and where cells are full.
 const LEAST: [f64; 2] = [0.1, 0.5];
 
+/// Largest sides that printed parts have, m.
+pub(super) const PRINTED: [f64; 2] = [1e-4, 10.0];
+
 /// Where parameters stand in their block.
 const KEYS: [(&str, &str); 7] = [
     ("size of a cell", "cell"),
@@ -117,14 +120,53 @@ impl StlSpec {
         let block = "mesh.stl";
         let at = |error: Error| located_in(source, block, &KEYS, &error);
         let file = source.file(&self.file);
-        let surface =
+        let mut surface =
             stl::read(&file, self.unit.si()).map_err(|error| located(source, "mesh.stl.file", &error))?;
         let size = self.cell.map(|x| x.si());
+        self.plausible(source, surface.bounds(), size)?;
         memory::refuse_mesh(source, "mesh.stl.cell", surface.cells(size).map_err(at)?, 1)?;
-        let voxels =
-            surface.voxels(size, self.least.unwrap_or(LEAST[usize::from(!self.fill)])).map_err(at)?;
+        let least = self.least.unwrap_or(LEAST[usize::from(!self.fill)]);
+        let (voxels, overlaps) = surface.voxels(size, least).map_err(at)?;
+        surface.notes.extend(overlaps);
+        surface.notes.push(format!("the part is {}", box_of(surface.bounds())));
         built(source, block, voxels, self.fill, surface.notes, None)
     }
+
+    /// Refuses a part that is too small or too large to be printed, or smaller than a cell: its unit is another.
+    fn plausible(
+        &self,
+        source: &Source,
+        [low, high]: [[f64; 3]; 2],
+        cell: [f64; 3],
+    ) -> Result<(), SceneError> {
+        let size = [0, 1, 2].map(|d| high[d] - low[d]);
+        let largest = size.into_iter().fold(0.0, f64::max);
+        let [least, most] = PRINTED;
+        let fits = (0..3).any(|d| size[d] >= 0.5 * cell[d]);
+        if largest >= least && largest < most && fits {
+            return Ok(());
+        }
+        let unit = self.unit.si();
+        let found = format!("{unit} m per unit of the file, which makes the part {}", box_of([low, high]));
+        let [x, y, z] = size.map(|x| rounded(x / unit));
+        let allowed = format!(
+            "a `unit` with which its largest side is between {} mm and {most} m, and it is no smaller than a cell: \
+             the file's own numbers are {x} × {y} × {z}, e.g. \"1 m\" if these are metres",
+            1e3 * least
+        );
+        Err(source.error("mesh.stl.unit", found, allowed))
+    }
+}
+
+/// The sides of a box, in mm.
+pub(super) fn box_of([low, high]: [[f64; 3]; 2]) -> String {
+    let [x, y, z] = [0, 1, 2].map(|d| rounded(1e3 * (high[d] - low[d])));
+    format!("{x} × {y} × {z} mm")
+}
+
+/// To five digits.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.4e}").parse().unwrap_or(x)
 }
 
 /// A path with limits on its acceleration, where there are some.
