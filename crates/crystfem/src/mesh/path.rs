@@ -128,8 +128,9 @@ pub struct ToolPath {
     pub volumetric: bool,
     /// Layers that the file marks; 0 where it marks none.
     pub layers: usize,
-    /// How long the slicer says that the print takes, s.
+    /// How long the slicer says that the print takes, s, from the move `first` on.
     pub estimate: Option<f64>,
+    first: usize,
     /// All motions, filament alone too.
     motions: Vec<Motion>,
     /// Limits, in the order of the file.
@@ -229,7 +230,8 @@ fn told(counts: &mut BTreeMap<String, usize>) -> String {
     let mut all: Vec<(String, usize)> = std::mem::take(counts).into_iter().collect();
     all.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     let more = all.len().saturating_sub(20);
-    let mut names: Vec<String> = all.iter().take(20).map(|(name, count)| format!("{name} ({count})")).collect();
+    let mut names: Vec<String> =
+        all.iter().take(20).map(|(name, count)| format!("{name} ({count})")).collect();
     if more > 0 {
         names.push(format!("{more} more"));
     }
@@ -240,5 +242,7 @@ fn error(path: &Path, line: usize, what: &str, found: impl ToString, allowed: im
     crate::mesh::labelled::line_error(path, line, what, found, allowed)
 }
 
+#[cfg(test)]
+mod dialects;
 #[cfg(test)]
 mod tests;

@@ -23,13 +23,15 @@ pub(super) fn filament(
     if let (Some(own), Some(stated), true) = (given, path.filament, path.volumetric)
         && (own / stated - 1.0).abs() > SAME
     {
-        let allowed = format!("{} mm or nothing: E of the file is a volume (M200) of this diameter", 1e3 * stated);
+        let allowed =
+            format!("{} mm or nothing: E of the file is a volume (M200) of this diameter", 1e3 * stated);
         return Err(source.error(&format!("{block}.filament"), format!("{} mm", 1e3 * own), allowed));
     }
     Ok(given.or(path.filament).unwrap_or(FILAMENT))
 }
 
-/// The path with its times: by the limits of the scene, or of the file, or at F; and how that compares with the slicer's estimate.
+/// The path with its times: by the limits of the scene, or of the file, or at F; and how that compares with
+/// the slicer's estimate.
 pub(super) fn timed(
     source: &Source,
     block: &str,
@@ -39,16 +41,20 @@ pub(super) fn timed(
     notes: &mut Vec<String>,
 ) -> Result<ToolPath, SceneError> {
     let (path, with) = match (acceleration, jerk) {
-        (None, None) => match path.limits_told() {
-            Some(limits) => {
-                notes.push(format!("times by the limits that the file states: {limits}; waits for temperatures left out"));
-                (path.as_stated(), "with the limits that the file states")
+        (None, None) => {
+            match path.limits_told() {
+                Some(limits) => {
+                    notes.push(format!(
+                        "times by the limits that the file states: {limits}; waits for temperatures left out"
+                    ));
+                    (path.as_stated(), "with the limits that the file states")
+                }
+                None => {
+                    notes.push("times at F: the file states no limits of acceleration; waits for temperatures left out".into());
+                    (path, "at F")
+                }
             }
-            None => {
-                notes.push("times at F: the file states no limits of acceleration; waits for temperatures left out".into());
-                (path, "at F")
-            }
-        },
+        }
         (Some(acceleration), Some(jerk)) => {
             let path = path.accelerated(acceleration.si(), jerk.si());
             (path.map_err(|error| located_in(source, block, &KEYS, &error))?, "with the limits of the scene")
@@ -98,7 +104,8 @@ pub(super) fn leave_out(
         return Ok(());
     }
     let list: Vec<String> = path.shares().iter().map(|(name, _)| (*name).to_owned()).collect();
-    let list: Vec<String> = list.into_iter().filter(|name| !name.is_empty()).map(|name| format!("`{name}`")).collect();
+    let list: Vec<String> =
+        list.into_iter().filter(|name| !name.is_empty()).map(|name| format!("`{name}`")).collect();
     let key = format!("{block}.leave_out");
     if list.is_empty() {
         let found = "features of a file that names none (`;TYPE:`, `; FEATURE:`)";
@@ -108,16 +115,23 @@ pub(super) fn leave_out(
     for (index, name) in names.iter().enumerate() {
         match path.without(name) {
             None => {
-                let allowed = format!("what the file prints ({}), or one of {}", list.join(", "), FAMILIES.join(", "));
+                let allowed =
+                    format!("what the file prints ({}), or one of {}", list.join(", "), FAMILIES.join(", "));
                 return Err(source.error(&format!("{key}[{index}]"), format!("`{name}`"), allowed));
             }
-            Some(0) => notes.push(format!("nothing of `{name}` to leave out; the file prints {}", list.join(", "))),
+            Some(0) => {
+                notes.push(format!("nothing of `{name}` to leave out; the file prints {}", list.join(", ")))
+            }
             Some(_) => {}
         }
     }
     let share = 100.0 * (1.0 - path.fed() / before);
     if !path.is_fed() {
-        return Err(source.error(&key, "all that the file prints", format!("less than all of {}", list.join(", "))));
+        return Err(source.error(
+            &key,
+            "all that the file prints",
+            format!("less than all of {}", list.join(", ")),
+        ));
     }
     notes.push(format!("left out of the part: {share:.1} % of the filament ({})", names.join(", ")));
     Ok(())

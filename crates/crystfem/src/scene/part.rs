@@ -110,7 +110,8 @@ pub struct PrintSpec {
     /// is not printed.
     #[serde(default)]
     pub fill: bool,
-    /// Diameter of the filament, for the volume that G-code extrudes; default: as the file states it, or 1.75 mm.
+    /// Diameter of the filament, for the volume that G-code extrudes; default: as the file states it, or 1.75
+    /// mm.
     pub filament: Option<Length>,
     /// Features of G-code that print nothing of the part, as of `mesh.path`.
     #[serde(default)]

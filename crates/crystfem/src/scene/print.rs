@@ -1,9 +1,9 @@
 //! What is laid down when: in layers, or along a path.
 
 use super::fault::located;
+use super::file;
 use super::part::PrintSpec;
 use super::places::{elements, millimetres};
-use super::file;
 use super::voxels::Filling;
 use crate::element;
 use crate::error::Error;
@@ -96,7 +96,11 @@ impl PrintSpec {
                 by_temperature.entry(set.to_bits()).or_default().push(element);
             }
             let births_of = by_temperature.into_iter();
-            births.extend(births_of.map(|(bits, elements)| Birth { time, elements, temperature: f64::from_bits(bits) }));
+            births.extend(births_of.map(|(bits, elements)| Birth {
+                time,
+                elements,
+                temperature: f64::from_bits(bits),
+            }));
         }
         Ok(births)
     }

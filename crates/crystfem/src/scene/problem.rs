@@ -124,7 +124,10 @@ impl PartScene {
             })?,
             None => Laid::default(),
         };
-        let mechanics = self.mechanics(source, &mesh, &material_of, &absent)?;
+        let mechanics = {
+            let path = filling.as_ref().and_then(|filling| filling.path.as_ref()).map(|(path, _)| path);
+            self.mechanics(source, &mesh, &material_of, &absent, path)?
+        };
         let appearing = births.iter().map(|birth| birth.elements.as_slice());
         let interfaces = self.interfaces(source, &mesh, &material_of, appearing)?;
         let end = self.time.end.map_or(by_itself, |end| end.si());

@@ -77,7 +77,11 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
         }
         if over.cools_to.is_some() || over.cooling_time.is_some() {
             let name = if over.cools_to.is_some() { "cools_to" } else { "cooling_time" };
-            return Err(source.error(&format!("{key}.{name}"), "cooling of no bed", "`of = \"bed\"` of a G-code file"));
+            return Err(source.error(
+                &format!("{key}.{name}"),
+                "cooling of no bed",
+                "`of = \"bed\"` of a G-code file",
+            ));
         }
         if let Some(swing) = over.swing(source, key, table)? {
             return Ok(swing);

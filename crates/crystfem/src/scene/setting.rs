@@ -15,7 +15,8 @@ const CHANGE: f64 = 1.0;
 /// What a bed cools towards, K, and its time constant, s: 3 mm of aluminium (7.3 kJ/(m² K)) lose 12 W/(m² K).
 const ROOM: f64 = 298.15;
 const CONSTANT: f64 = 600.0;
-/// Times of a cooling that are given, over its time constant: between them it is off by 0.2 % of the whole at most.
+/// Times of a cooling that are given, over its time constant: between them it is off by 0.2 % of the whole at
+/// most.
 const TIMES: [f64; 20] =
     [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9, 1.1, 1.3, 1.5, 1.8, 2.1, 2.5, 3.0, 3.6, 4.4, 5.5, 7.0];
 /// A bed is as cold as it gets, K.
@@ -67,8 +68,14 @@ impl<D: Dimension + Copy> TimesSpec<D> {
         Ok(path.as_stated())
     }
 
-    /// A setting of a G-code file over its time; each command changes it within a second, but a bed that is switched off or set lower
-    /// cools exponentially. Before the first one it has that one's value, and the fan is off.
+    /// What a bed cools towards, K, and the time constant, s.
+    fn cooling(&self) -> (f64, f64) {
+        (self.cools_to.map_or(ROOM, |room| room.si()), self.cooling_time.map_or(CONSTANT, |time| time.si()))
+    }
+
+    /// A setting of a G-code file over its time; each command changes it within a second, but a bed that is
+    /// switched off or set lower cools exponentially. Before the first one it has that one's value, and the
+    /// fan is off.
     pub(super) fn of_file(
         &self,
         source: &Source,
@@ -106,8 +113,7 @@ impl<D: Dimension + Copy> TimesSpec<D> {
         if let Some((name, _)) = cooling.iter().find(|(_, given)| *given && setting != Setting::Bed) {
             return Err(fault(name, "cooling of no bed", "`of = \"bed\"`"));
         }
-        let room = self.cools_to.map_or(ROOM, |room| room.si());
-        let constant = self.cooling_time.map_or(CONSTANT, |time| time.si());
+        let (room, constant) = self.cooling();
         if !(constant > 0.0 && constant.is_finite()) {
             return Err(fault("cooling_time", &constant.to_string(), "above 0, finite"));
         }
@@ -132,8 +138,8 @@ fn steps(pairs: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points
 }
 
-/// Temperatures of a bed, K: it is heated within a second, and cools towards a room with a time constant, s, down to what it
-/// is set to; NaN is off. A file that switches it off at first has it on before.
+/// Temperatures of a bed, K: it is heated within a second, and cools towards a room with a time constant, s,
+/// down to what it is set to; NaN is off. A file that switches it off at first has it on before.
 fn bed(pairs: &[(f64, f64)], room: f64, constant: f64) -> Vec<(f64, f64)> {
     let on = pairs.iter().position(|pair| !pair.1.is_nan());
     let Some(on) = on else { return pairs.first().map_or_else(Vec::new, |_| vec![(0.0, room)]) };
@@ -161,16 +167,23 @@ fn bed(pairs: &[(f64, f64)], room: f64, constant: f64) -> Vec<(f64, f64)> {
 }
 
 impl ScheduleSpec<TemperatureDimension> {
-    /// Of a bed that its file switches off at last: when, s, unless it is cold at `end`, s, and how hot it is then, K.
-    pub(super) fn still_hot(&self, source: &Source, key: &str, end: f64) -> Result<Option<(f64, f64)>, SceneError> {
+    /// Of a bed that its file switches off at last: when, s, unless it is cold at `end`, s, and how hot it is
+    /// then, K.
+    pub(super) fn still_hot(
+        &self,
+        source: &Source,
+        key: &str,
+        end: f64,
+    ) -> Result<Option<(f64, f64)>, SceneError> {
         let Self::Over(over) = self else { return Ok(None) };
         if over.of != Some(FileSetting::Bed) {
             return Ok(None);
         }
-        let last = over.path(source, key)?.setting(Setting::Bed).last().copied();
-        let Some((time, _)) = last.filter(|pair| pair.1.is_nan()) else { return Ok(None) };
-        let then = self.build(source, key)?.at(end);
-        let room = over.cools_to.map_or(ROOM, |room| room.si());
+        let pairs = over.path(source, key)?.setting(Setting::Bed);
+        let Some(&(time, _)) = pairs.last().filter(|pair| pair.1.is_nan()) else { return Ok(None) };
+        let (room, constant) = over.cooling();
+        let schedule = Schedule::linear(&bed(&pairs, room, constant));
+        let then = schedule.map_err(|error| located(source, key, &error))?.at(end);
         Ok((then > room + COLD).then_some((time, then)))
     }
 }
@@ -179,12 +192,16 @@ impl ScheduleSpec<TemperatureDimension> {
 mod tests {
     use super::*;
 
-    /// Off at 10 s from 60 °C in a room of 20 °C, time constant 100 s: (60 − 20)/e after 100 s; set lower it stops there.
+    /// Off at 10 s from 60 °C in a room of 20 °C, time constant 100 s: (60 − 20)/e after 100 s; set lower it
+    /// stops there.
     #[test]
     fn beds_cool() {
-        let at = |pairs: &[(f64, f64)], time: f64| Schedule::linear(&bed(pairs, 20.0, 100.0)).unwrap().at(time);
+        let at =
+            |pairs: &[(f64, f64)], time: f64| Schedule::linear(&bed(pairs, 20.0, 100.0)).unwrap().at(time);
         let off = [(0.0, 60.0), (10.0, f64::NAN)];
-        for (time, exact) in [(5.0, 60.0), (110.0, 20.0 + 40.0 / 1f64.exp()), (210.0, 20.0 + 40.0 / 2f64.exp())] {
+        for (time, exact) in
+            [(5.0, 60.0), (110.0, 20.0 + 40.0 / 1f64.exp()), (210.0, 20.0 + 40.0 / 2f64.exp())]
+        {
             let found = at(&off, time);
             assert!((found - exact).abs() < 0.1, "{time}: {found} {exact}");
         }

@@ -1,10 +1,10 @@
 //! Meshes of cells that a G-code file or an STL surface fills.
 
 use super::fault::{located, located_in};
+use super::file;
 use super::memory;
 use super::mesh::Built;
 use crate::error::Error;
-use super::file;
 use crate::mesh::path::{Cells, Deposit, ToolPath, read_gcode};
 use crate::mesh::{RATIOS, Voxels, quality, stl};
 use polycore::scene::{SceneError, Source};
@@ -44,8 +44,8 @@ pub struct PathSpec {
     pub filament: Option<Length>,
     /// Height of all beads; default: as the file tells, or down to what lies below.
     pub bead_height: Option<Length>,
-    /// Features that are printed but left out of the part, as the file names them, or by one name for all slicers: `skirt`,
-    /// `brim`, `raft`, `purge`, `support`, `wipe-tower`, ….
+    /// Features that are printed but left out of the part, as the file names them, or by one name for all
+    /// slicers: `skirt`, `brim`, `raft`, `purge`, `support`, `wipe-tower`, ….
     #[serde(default)]
     pub leave_out: Vec<String>,
     /// Whether ρ and k of an element are scaled by the part of it that is filled, so that the printed mass is that of the file;
@@ -119,7 +119,10 @@ impl PathSpec {
         let Deposit { voxels, times, tools } = path.deposit(&cells).map_err(at)?;
         if !tools.is_empty() {
             let sets: Vec<String> = path.tools().iter().map(|tool| format!("`tool-{tool}`")).collect();
-            notes.push(format!("several tools print: element sets {} for the materials of regions", sets.join(", ")));
+            notes.push(format!(
+                "several tools print: element sets {} for the materials of regions",
+                sets.join(", ")
+            ));
         }
         built(source, block, voxels, self.fill, notes, Some((path, times)))
     }

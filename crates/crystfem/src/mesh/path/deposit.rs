@@ -30,7 +30,8 @@ pub struct Deposit {
     pub voxels: Voxels,
     /// When half of what is in each element is there, s.
     pub times: Vec<f64>,
-    /// The tool that laid most of each element, where several print: then element sets `tool-0` and so on are theirs.
+    /// The tool that laid most of each element, where several print: then element sets `tool-0` and so on are
+    /// theirs.
     pub tools: Vec<u16>,
 }
 
@@ -96,8 +97,11 @@ impl ToolPath {
                 "the path extrudes nothing; allowed: G-code with E in printing moves".into(),
             ));
         }
-        let beads: Vec<(&Move, f64)> =
-            self.printing().zip(self.heights(cells.filament, cells.height)).filter(|(one, _)| one.fed > 0.0).collect();
+        let beads: Vec<(&Move, f64)> = self
+            .printing()
+            .zip(self.heights(cells.filament, cells.height))
+            .filter(|(one, _)| one.fed > 0.0)
+            .collect();
         if let Some((one, height)) = beads.iter().find(|(_, height)| !(*height > 0.0 && height.is_finite())) {
             let ([x, y, z], line) = (one.to.map(|x| 1e3 * x), one.line);
             return Err(Error::Mesh(format!(

@@ -36,7 +36,8 @@ pub(super) fn plain(name: &str) -> String {
     words.collect::<Vec<_>>().join("-")
 }
 
-/// The families of a plain name of PrusaSlicer, SuperSlicer, OrcaSlicer, Bambu Studio, Cura, Simplify3D or ideaMaker.
+/// The families of a plain name of PrusaSlicer, SuperSlicer, OrcaSlicer, Bambu Studio, Cura, Simplify3D or
+/// ideaMaker.
 fn families(plain: &str) -> &'static [&'static str] {
     match plain {
         "skirt" | "ooze-shield" | "draft-shield" => &["skirt", "shield"],
@@ -52,7 +53,9 @@ fn families(plain: &str) -> &'static [&'static str] {
         }
         "wipe-tower" | "prime-tower" | "prime-pillar" => &["wipe-tower"],
         "external-perimeter" | "outer-wall" | "wall-outer" | "outer-perimeter" => &["outer-wall"],
-        "perimeter" | "inner-wall" | "wall-inner" | "inner-perimeter" | "internal-perimeter" => &["inner-wall"],
+        "perimeter" | "inner-wall" | "wall-inner" | "inner-perimeter" | "internal-perimeter" => {
+            &["inner-wall"]
+        }
         "overhang-perimeter" | "overhang-wall" => &["overhang"],
         "thin-wall" | "thin-walls" | "single-extrusion" => &["thin-wall"],
         "gap-fill" | "gap-infill" => &["gap-fill"],
@@ -90,7 +93,8 @@ impl ToolPath {
         self.features.get(usize::from(one.feature)).map_or("", String::as_str)
     }
 
-    /// Features that are laid, with the share of each in the filament fed, largest first; `""` of what has no name.
+    /// Features that are laid, with the share of each in the filament fed, largest first; `""` of what has no
+    /// name.
     pub fn shares(&self) -> Vec<(&str, f64)> {
         let mut fed = vec![0.0; self.features.len().max(1)];
         for one in self.printing() {
@@ -106,8 +110,8 @@ impl ToolPath {
         shares
     }
 
-    /// The same path without beads of a name (one of [`FAMILIES`], or as the file has it): their moves lay nothing down. Also how many
-    /// that are; `None` for a name that is neither.
+    /// The same path without beads of a name (one of [`FAMILIES`], or as the file has it): their moves lay
+    /// nothing down. Also how many that are; `None` for a name that is neither.
     pub fn without(&mut self, name: &str) -> Option<usize> {
         let hit: Vec<bool> = self.features.iter().map(|feature| goes_by(feature, name)).collect();
         let known = hit.contains(&true) || FAMILIES.iter().any(|family| goes_by(family, name));

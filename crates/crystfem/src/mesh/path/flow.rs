@@ -42,8 +42,8 @@ impl ToolPath {
         levels
     }
 
-    /// A setting over time: pairs of time, s, and value, each from its time on. Of commands at one time the last holds. Of the bed NaN
-    /// is off.
+    /// A setting over time: pairs of time, s, and value, each from its time on. Of commands at one time the
+    /// last holds. Of the bed NaN is off.
     pub fn setting(&self, of: Setting) -> Vec<(f64, f64)> {
         let mut pairs: Vec<(f64, f64)> = Vec::new();
         for command in &self.commands {

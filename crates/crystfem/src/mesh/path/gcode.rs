@@ -15,19 +15,22 @@ pub(super) const CELSIUS: f64 = 273.15;
 /// Tools above this are none: firmwares use such numbers for other things.
 const MOST_TOOLS: f64 = 63.0;
 
-/// Reads a G-code file as slicers write it for Marlin, Klipper and RepRapFirmware: G0 and G1 with X, Y, Z, E, F, also without the
-/// command in a line of words alone; arcs G2 and G3 in the XY plane with I and J or R, in chords that are 0.01 mm from the arc at most;
-/// G4 (wait), G20 and G21 (inch, mm), G28 (home), G90 and G91, M82 and M83 (absolute, relative; once M82 or M83 has come, G90 and G91
-/// leave E alone), G92 (here is …), M200 (E is a volume), tools (T), M104 and M109 of the selected tool or that of T, G10 with P and S
-/// likewise, M140 and M190 (temperatures; how long it is waited for them is not known), M106 and M107 of the part's fan; limits of the
-/// machine (M201 to M205, M566, SET_VELOCITY_LIMIT), which [`ToolPath::as_stated`] applies; SAVE_GCODE_STATE and RESTORE_GCODE_STATE; features,
-/// heights and layers in comments. A move lays material down if E grows along it and it goes across. Velocity is F all along a move. Other
-/// commands are passed over and counted in a note.
+/// Reads a G-code file as slicers write it for Marlin, Klipper and RepRapFirmware: G0 and G1 with X, Y, Z, E,
+/// F, also without the command in a line of words alone; arcs G2 and G3 in the XY plane with I and J or R, in
+/// chords that are 0.01 mm from the arc at most; G4 (wait), G20 and G21 (inch, mm), G28 (home), G90 and G91,
+/// M82 and M83 (absolute, relative; once M82 or M83 has come, G90 and G91 leave E alone), G92 (here is …),
+/// M200 (E is a volume), tools (T), M104 and M109 of the selected tool or that of T, G10 with P and S
+/// likewise, M140 and M190 (temperatures; how long it is waited for them is not known), M106 and M107 of the
+/// part's fan; limits of the machine (M201 to M205, M566, SET_VELOCITY_LIMIT), which [`ToolPath::as_stated`]
+/// applies; SAVE_GCODE_STATE and RESTORE_GCODE_STATE; features, heights and layers in comments. A move lays
+/// material down if E grows along it and it goes across. Velocity is F all along a move. Other commands are
+/// passed over and counted in a note.
 ///
 /// # Errors
-/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line for binary files and archives, words of moves that are no
-/// numbers, a move before any F, an F that is not positive, arcs without a centre or radius that fits, other curves (G5), other planes
-/// (G18, G19), and temperatures below absolute zero.
+/// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line for binary files and
+/// archives, words of moves that are no numbers, a move before any F, an F that is not positive, arcs without
+/// a centre or radius that fits, other curves (G5), other planes (G18, G19), and temperatures below absolute
+/// zero.
 pub fn read_gcode(path: &Path) -> Result<ToolPath, Error> {
     parse(path, &crate::mesh::read_bytes(path)?)
 }
@@ -66,7 +69,9 @@ fn text_of<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a [u8], Error> {
         [b'G', b'C', b'D', b'E', ..] => {
             refused("binary G-code", "text: export it from the slicer as text (binary G-code off)")
         }
-        [b'P', b'K', 3, 4, ..] => refused("an archive", "the G-code file in it (Bambu: Metadata/plate_1.gcode)"),
+        [b'P', b'K', 3, 4, ..] => {
+            refused("an archive", "the G-code file in it (Bambu: Metadata/plate_1.gcode)")
+        }
         [0x1f, 0x8b, ..] => refused("a compressed file", "the G-code file in it"),
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => refused("UTF-16", "text in UTF-8 or ASCII"),
         [0xef, 0xbb, 0xbf, ..] => Ok(&bytes[3..]),
@@ -93,18 +98,28 @@ struct Reader<'a> {
     stopped: bool,
     /// A factor of flow or velocity that is not 100 %.
     factors: Vec<String>,
+    /// What a change of filament takes, s.
+    change: f64,
 }
 
 impl<'a> Reader<'a> {
     fn new(path: &'a Path, first: Remarks, limits: Limits) -> Self {
         let mut remarks = Remarks::new(first.layers > 0);
+        let mut first_volume = None;
         (remarks.estimate, remarks.filaments) = (first.estimate, first.filaments);
         (remarks.bambu, remarks.per_minute) = (first.bambu, first.per_minute);
+        remarks.volumetric = first.volumetric;
+        let mut printer = Printer::new();
+        if remarks.volumetric {
+            let diameter = remarks.filaments.first().copied().unwrap_or(super::FILAMENT);
+            printer.volumetric = (0..=MOST_TOOLS as u16).map(|tool| (tool, diameter)).collect();
+            first_volume = Some(diameter);
+        }
         Self {
             path,
-            printer: Printer::new(),
+            printer,
             remarks,
-            tool_path: ToolPath { limits: vec![limits], ..ToolPath::default() },
+            tool_path: ToolPath { limits: vec![limits], filament: first_volume, ..ToolPath::default() },
             limits,
             skipped: BTreeMap::new(),
             hot: BTreeMap::new(),
@@ -112,6 +127,7 @@ impl<'a> Reader<'a> {
             repeated: 0,
             stopped: false,
             factors: Vec::new(),
+            change: first.change,
         }
     }
 
@@ -132,8 +148,12 @@ impl<'a> Reader<'a> {
             }
         }
         if let Some(comment) = comment {
+            let layers = self.remarks.layers;
             // settings have been read
             self.remarks.read(comment, &mut Limits::default());
+            if layers == 0 && self.remarks.layers > 0 {
+                self.tool_path.first = self.tool_path.moves.len();
+            }
         }
         Ok(())
     }
@@ -166,16 +186,25 @@ impl<'a> Reader<'a> {
         gone.map_err(|wrong| error(self.path, line, wrong.what, wrong.found_in(text), wrong.allowed))
     }
 
-    fn code(&mut self, line: usize, text: &str, letter: char, number: f64, words: &Words) -> Result<(), Error> {
+    fn code(
+        &mut self,
+        line: usize,
+        text: &str,
+        letter: char,
+        number: f64,
+        words: &Words,
+    ) -> Result<(), Error> {
         let code = format!("{letter}{number}");
         let value = |letter: char| words.value(letter);
         match code.as_str() {
             "G0" | "G1" | "G2" | "G3" => return self.go(line, text, number, words),
             "G92" if words.wrong.is_some() => return Err(self.wrong(line, words)),
-            "G5" => {
+            "G5" if value('X').is_some() || value('Y').is_some() => {
                 return Err(error(self.path, line, "command", code, "straight moves and arcs, G0 to G3"));
             }
-            "G18" | "G19" => return Err(error(self.path, line, "command", code, "G17, arcs in the XY plane")),
+            "G18" | "G19" => {
+                return Err(error(self.path, line, "command", code, "G17, arcs in the XY plane"));
+            }
             "G17" => {}
             "M104" | "M109" | "M140" | "M190" => {
                 // S, or R that waits for cooling too; a command without either waits
@@ -233,6 +262,9 @@ impl<'a> Reader<'a> {
     }
 
     fn select(&mut self, tool: u16) {
+        if tool != self.printer.tool && !self.tool_path.moves.is_empty() {
+            self.printer.time += self.change;
+        }
         self.printer.tool = tool;
         self.stopped = true;
         // a tool without a temperature of its own shares the nozzle
@@ -307,6 +339,7 @@ impl<'a> Reader<'a> {
             "SET_VELOCITY_LIMIT" => self.limit(|limits| limits.velocity_limit(rest)),
             "SAVE_GCODE_STATE" => self.printer.save(state()),
             "RESTORE_GCODE_STATE" => self.printer.restore(state()),
+            "SET_HEATER_TEMPERATURE" => self.heater(rest),
             "ACTIVATE_EXTRUDER" => {
                 let extruder = line::keys(rest).find(|(key, _)| key == "EXTRUDER").map(|(_, value)| value);
                 let number = extruder.and_then(|name| name.strip_prefix("extruder"));
@@ -324,10 +357,30 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Klipper's heaters by name; 0 is off.
+    fn heater(&mut self, rest: &str) {
+        let of = |name: &str| line::keys(rest).find(|(key, _)| key == name).map(|(_, value)| value);
+        let celsius = of("TARGET").map_or(Some(0.0), |text| text.parse::<f64>().ok());
+        match (of("HEATER"), celsius.filter(|celsius| (0.0..1e4).contains(celsius))) {
+            (Some("heater_bed"), Some(celsius)) => {
+                self.set(if celsius == 0.0 { Setting::BedOff } else { Setting::Bed }, celsius + CELSIUS);
+            }
+            (Some(name), Some(celsius)) if celsius > 0.0 && name.starts_with("extruder") => {
+                let tool = name["extruder".len()..].parse().unwrap_or(0);
+                self.hot.insert(tool, celsius + CELSIUS);
+                if tool == self.printer.tool {
+                    self.set(Setting::Nozzle, celsius + CELSIUS);
+                }
+            }
+            _ => self.skip("SET_HEATER_TEMPERATURE"),
+        }
+    }
+
     /// A macro that starts a print, with the temperatures that it is given.
     fn begin(&mut self, name: &str, rest: &str) {
         for (key, value) in line::keys(rest) {
-            let Some(celsius) = value.parse::<f64>().ok().filter(|found| *found > 20.0 && *found < 600.0) else {
+            let Some(celsius) = value.parse::<f64>().ok().filter(|found| *found > 20.0 && *found < 600.0)
+            else {
                 continue;
             };
             let is = |words: &[&str]| words.iter().any(|word| key.contains(word));
@@ -342,7 +395,9 @@ impl<'a> Reader<'a> {
             if setting == Setting::Nozzle {
                 self.hot.insert(self.printer.tool, celsius + CELSIUS);
             }
-            self.tool_path.notes.push(format!("`{name}` with {key}={value} is taken for {celsius} °C of the {what}"));
+            self.tool_path
+                .notes
+                .push(format!("`{name}` with {key}={value} is taken for {celsius} °C of the {what}"));
         }
     }
 
@@ -355,17 +410,26 @@ impl<'a> Reader<'a> {
         path.rest = printer.time - path.moves.last().map_or(0.0, |last| last.end);
         (path.features, path.layers) = (remarks.features, remarks.layers);
         path.estimate = remarks.estimate.map(|known| known.1);
+        // of all, unless it leaves out what is before the first layer
+        if remarks.estimate.is_none_or(|known| known.0 > 0) {
+            path.first = 0;
+        }
         // lengths of filament of the first diameter
         let diameter = path.filament.or(remarks.filaments.first().copied());
         if let (Some(whole), None) = (diameter, path.filament) {
-            let factor = |tool: u16| remarks.filaments.get(usize::from(tool)).map_or(1.0, |own| (own / whole).powi(2));
+            let factor =
+                |tool: u16| remarks.filaments.get(usize::from(tool)).map_or(1.0, |own| (own / whole).powi(2));
             path.moves.iter_mut().for_each(|one| one.fed *= factor(one.tool));
         }
         path.volumetric = path.filament.is_some();
         path.filament = diameter;
         let (doubtful, line) = printer.doubtful;
         if doubtful > 0 && path.moves.iter().any(|one| one.prints && one.line >= line) {
-            let read = if printer.relative_feed.is_some() { "absolute, as M82 says" } else { "relative, as the axes" };
+            let read = if printer.relative_feed.is_some() {
+                "absolute, as M82 says"
+            } else {
+                "relative, as the axes"
+            };
             path.notes.push(format!(
                 "{doubtful} moves feed between G91 and G90 without M83, the first in line {line}: E is read as {read} (firmwares differ)"
             ));
@@ -374,7 +438,10 @@ impl<'a> Reader<'a> {
             path.notes.push(format!("{} lines without a command repeat the move before them", self.repeated));
         }
         if !self.factors.is_empty() {
-            path.notes.push(format!("factors of flow and velocity left out, as slicers do: {}", self.factors.join(", ")));
+            path.notes.push(format!(
+                "factors of flow and velocity left out, as slicers do: {}",
+                self.factors.join(", ")
+            ));
         }
         if !self.skipped.is_empty() {
             path.notes.push(format!("commands not used: {}", told(&mut self.skipped)));

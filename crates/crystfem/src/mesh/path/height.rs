@@ -17,7 +17,8 @@ const TOPS: usize = 3;
 const CORE: f64 = 0.9;
 /// A bead lies on what is highest under so much of its length.
 const SHARE: f64 = 0.03;
-/// Bead widths over the middle one of their level: a bead higher than its level must not be narrower, one lower than it not wider.
+/// Bead widths over the middle one of their level: a bead higher than its level must not be narrower; where z
+/// rises, none is wider.
 const NARROW: f64 = 0.75;
 const WIDE: f64 = 1.5;
 /// Group of all moves along which z changes.
@@ -138,9 +139,10 @@ impl Found {
 }
 
 impl ToolPath {
-    /// Height of each printing move's bead, m, `height` of all where it is given. Otherwise what the file tells; otherwise down to the
-    /// highest earlier bead below it, or to the bed. A bead over air, which cannot be as high as the gap, has the height of
-    /// others at its level, or down to the next level. `filament`: its diameter, m.
+    /// Height of each printing move's bead, m, `height` of all where it is given. Otherwise what the file
+    /// tells; otherwise down to the highest earlier bead below it, or to the bed. A bead over air, which
+    /// cannot be as high as the gap, has the height of others at its level, or down to the next level.
+    /// `filament`: its diameter, m.
     pub(super) fn heights(&self, filament: f64, height: Option<f64>) -> Vec<f64> {
         if let Some(height) = height {
             return vec![height; self.printing().count()];
@@ -168,7 +170,8 @@ impl ToolPath {
             let own = found.area / found.gap;
             if found.gap <= 0.0 {
                 found.gap
-            } else if found.gap < 0.99 * usual && own > WIDE * width {
+            } else if found.group == RISING && own > WIDE * width {
+                // where a vase begins it narrows to nothing
                 usual.min(found.area / (WIDE * width)).max(found.gap)
             } else if found.gap <= 1.01 * usual || (found.fits() && own >= NARROW * width) {
                 found.gap
@@ -179,7 +182,8 @@ impl ToolPath {
         self.printing().zip(&found).map(height).collect()
     }
 
-    /// The same path with the heights of its beads, as a mesh of it has them: they stay when what is below is left out.
+    /// The same path with the heights of its beads, as a mesh of it has them: they stay when what is below is
+    /// left out.
     pub fn with_heights(mut self, filament: f64, height: Option<f64>) -> Self {
         let heights = self.heights(filament, height);
         for (one, height) in self.moves.iter_mut().filter(|one| one.prints).zip(heights) {

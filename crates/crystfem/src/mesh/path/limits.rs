@@ -1,4 +1,5 @@
-//! Limits of a machine that a file states (M201 to M205, M566, SET_VELOCITY_LIMIT, settings in comments), and what a move takes with them.
+//! Limits of a machine that a file states (M201 to M205, M566, SET_VELOCITY_LIMIT, settings in comments), and
+//! what a move takes with them.
 
 use super::line::{Words, keys};
 use super::plan::Ramp;
@@ -45,7 +46,8 @@ impl Default for Limits {
 impl Limits {
     /// Takes in M201, M203, M204, M205 or M566; `per_minute`: as RepRapFirmware has velocities.
     pub fn command(&mut self, code: &str, words: &Words, per_minute: bool) {
-        let positive = |letter: char| words.value(letter).filter(|found| *found > 0.0).map(|found| 1e-3 * found);
+        let positive =
+            |letter: char| words.value(letter).filter(|found| *found > 0.0).map(|found| 1e-3 * found);
         let minutes = |all: &[f64; 4]| per_minute || all.iter().any(|v| *v > 1e-3 * FAST);
         let mut of_axes = AXES.map(|axis| positive(axis).unwrap_or(0.0));
         self.stated = true;
@@ -88,7 +90,9 @@ impl Limits {
             self.jerk = [SQUARE_CORNER, SQUARE_CORNER, SQUARE_CORNER, 1e-3];
         }
         for (key, value) in keys(rest) {
-            let Some(value) = value.parse::<f64>().ok().filter(|v| *v > 0.0).map(|v| 1e-3 * v) else { continue };
+            let Some(value) = value.parse::<f64>().ok().filter(|v| *v > 0.0).map(|v| 1e-3 * v) else {
+                continue;
+            };
             match key.as_str() {
                 "ACCEL" => self.by_kind = [value; 3],
                 "VELOCITY" => (self.velocity[0], self.velocity[1]) = (value, value),
@@ -129,7 +133,8 @@ impl Limits {
     /// One line of what they are.
     pub fn told(&self) -> String {
         let list = |all: &[f64]| {
-            let values = all.iter().map(|v| if v.is_finite() { format!("{:.6}", 1e3 * v) } else { "–".into() });
+            let values =
+                all.iter().map(|v| if v.is_finite() { format!("{:.6}", 1e3 * v) } else { "–".into() });
             let short = values.map(|v| match v.contains('.') {
                 true => v.trim_end_matches('0').trim_end_matches('.').to_owned(),
                 false => v,
@@ -182,8 +187,8 @@ impl Limits {
         (0..4).map(of).fold(ramp.velocity, f64::min)
     }
 
-    /// Velocity at which one motion may become the next, by the steps of velocity of its axes (a reversal counts once), or by the
-    /// deviation from the corner: v² = a δ sin(θ/2)/(1 − sin(θ/2)).
+    /// Velocity at which one motion may become the next, by the steps of velocity of its axes (a reversal
+    /// counts once), or by the deviation from the corner: v² = a δ sin(θ/2)/(1 − sin(θ/2)).
     pub fn corner(&self, before: Option<(&Ramp, [f64; 4])>, after: (&Ramp, [f64; 4])) -> f64 {
         let (next, to) = after;
         let Some((last, from)) = before else { return self.deviation.map_or(self.safe(next, to), |_| 0.0) };

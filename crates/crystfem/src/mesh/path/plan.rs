@@ -5,7 +5,8 @@ use super::{Motion, ToolPath};
 use crate::error::Error;
 use nalgebra::Vector3;
 
-/// A straight motion: how long it is, m, how fast, m/s, how it gets there, m/s², and with which velocity it may begin.
+/// A straight motion: how long it is, m, how fast, m/s, how it gets there, m/s², and with which velocity it
+/// may begin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ramp {
     pub length: f64,
@@ -14,14 +15,13 @@ pub(super) struct Ramp {
     pub enter: f64,
 }
 
-/// Durations of motions one after another, s, by trapezoids of velocity from rest to rest: passes back and forth give the
-/// velocity at each corner. `exit`: the velocity of the last at its end.
+/// Durations of motions one after another, s, by trapezoids of velocity from rest to rest: passes back and
+/// forth give the velocity at each corner. `exit`: the velocity of the last at its end.
 fn durations(ramps: &[Ramp], exit: f64) -> Vec<f64> {
     let mut corner: Vec<f64> = ramps.iter().map(|ramp| ramp.enter).collect();
     corner.push(exit);
-    let reach = |velocity: f64, ramp: &Ramp| {
-        (velocity * velocity + 2.0 * ramp.acceleration * ramp.length).sqrt()
-    };
+    let reach =
+        |velocity: f64, ramp: &Ramp| (velocity * velocity + 2.0 * ramp.acceleration * ramp.length).sqrt();
     for (k, ramp) in ramps.iter().enumerate().rev() {
         corner[k] = corner[k].min(reach(corner[k + 1], ramp));
     }
@@ -42,8 +42,8 @@ fn durations(ramps: &[Ramp], exit: f64) -> Vec<f64> {
 
 impl ToolPath {
     /// The same path with trapezoidal velocities: along each move the velocity changes by `acceleration` at most, m/s², and
-    /// from move to move by `jerk` along each axis, m/s (as Marlin's classic jerk). Waits, and filament alone, keep their time and
-    /// let velocity pass. Velocity is even along each move of the result.
+    /// from move to move by `jerk` along each axis, m/s (as Marlin's classic jerk). Waits, and filament
+    /// alone, keep their time and let velocity pass. Velocity is even along each move of the result.
     ///
     /// # Errors
     /// An acceleration or a jerk that is not positive.
@@ -74,8 +74,8 @@ impl ToolPath {
         Ok(self)
     }
 
-    /// The same path with the limits that its file states, filament alone too: with each axis' velocity, acceleration and jerk, or the
-    /// deviation at junctions, of their time in the file. Waits are stops.
+    /// The same path with the limits that its file states, filament alone too: with each axis' velocity,
+    /// acceleration and jerk, or the deviation at junctions, of their time in the file. Waits are stops.
     pub fn as_stated(mut self) -> Self {
         let mut last: Option<(Ramp, [f64; 4])> = None;
         let (mut ramps, mut kept): (Vec<Ramp>, Vec<usize>) = Default::default();

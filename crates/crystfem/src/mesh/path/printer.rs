@@ -45,7 +45,8 @@ pub(super) struct Printer {
     pub tool: u16,
     /// Diameters of filament, m, of tools whose E is a volume (M200).
     pub volumetric: BTreeMap<u16, f64>,
-    /// Moves that feed between G91 and G90 without M83, which firmwares read in two ways, and the line of the first.
+    /// Moves that feed between G91 and G90 without M83, which firmwares read in two ways, and the line of the
+    /// first.
     pub doubtful: (usize, u32),
     /// States that SAVE_GCODE_STATE kept, by name.
     saved: BTreeMap<String, (bool, Option<bool>, f64, [f64; 3], f64)>,
@@ -83,9 +84,11 @@ impl Printer {
             allowed: "positive and finite, before or in the first move".into(),
         };
         if let Some(feed) = value('F') {
-            // per minute
-            self.velocity = feed * self.unit / 60.0;
-            if !(self.velocity > 0.0 && self.velocity.is_finite()) {
+            // per minute; of 0 firmwares keep the one before
+            if feed != 0.0 {
+                self.velocity = feed * self.unit / 60.0;
+            }
+            if feed < 0.0 || !self.velocity.is_finite() {
                 return Err(velocity(feed));
             }
         }
@@ -102,8 +105,10 @@ impl Printer {
             Some(number) => number - self.feed,
         };
         self.feed += fed;
-        if self.relative && self.relative_feed != Some(true) && value('E').is_some_and(|number| number > 0.0) {
-            self.doubtful = (self.doubtful.0 + 1, if self.doubtful.0 == 0 { with.line } else { self.doubtful.1 });
+        if self.relative && self.relative_feed != Some(true) && value('E').is_some_and(|number| number > 0.0)
+        {
+            self.doubtful =
+                (self.doubtful.0 + 1, if self.doubtful.0 == 0 { with.line } else { self.doubtful.1 });
         }
         // m of filament
         let fed = match self.volumetric.get(&self.tool) {

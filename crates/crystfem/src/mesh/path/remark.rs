@@ -19,8 +19,12 @@ pub(super) struct Remarks {
     height: f64,
     /// Marks of layers.
     pub layers: usize,
-    /// How long the slicer says that the print takes, s; the closest of its figures.
+    /// How long the slicer says that the print takes, s; rank 0 from the first layer on.
     pub estimate: Option<(u8, f64)>,
+    /// What a change of filament takes, s.
+    pub change: f64,
+    /// Whether E is a volume throughout.
+    pub volumetric: bool,
     /// Diameters of filaments, m, tool by tool.
     pub filaments: Vec<f64>,
     /// Of a printer whose part fan is P1.
@@ -40,6 +44,8 @@ impl Remarks {
             height: 0.0,
             layers: 0,
             estimate: None,
+            change: 0.0,
+            volumetric: false,
             filaments: Vec::new(),
             bambu: false,
             per_minute: false,
@@ -53,7 +59,8 @@ impl Remarks {
 
     /// Height of the beads that follow, m; 0 where no comment tells, as in a printer's own code.
     pub fn height(&self) -> f64 {
-        let own = self.features.get(usize::from(self.feature)).is_some_and(|name| super::feature::is_purge(name));
+        let own =
+            self.features.get(usize::from(self.feature)).is_some_and(|name| super::feature::is_purge(name));
         if own { 0.0 } else { self.height }
     }
 
@@ -72,7 +79,8 @@ impl Remarks {
     fn layer(&mut self) {
         self.layers += 1;
         // what a printer's own code laid ends here; a slicer names what follows
-        let own = self.features.get(usize::from(self.feature)).is_some_and(|name| super::feature::is_purge(name));
+        let own =
+            self.features.get(usize::from(self.feature)).is_some_and(|name| super::feature::is_purge(name));
         if own {
             self.feature = 0;
         }
@@ -82,7 +90,8 @@ impl Remarks {
     pub fn read(&mut self, comment: &str, limits: &mut Limits) {
         let text = comment.trim();
         let after = |names: &[&str]| {
-            let begins = |name: &&&str| text.get(..name.len()).is_some_and(|own| own == **name);
+            let begins =
+                |name: &&&str| text.get(..name.len()).is_some_and(|own| own.eq_ignore_ascii_case(name));
             names.iter().find(begins).map(|name| text[name.len()..].trim())
         };
         if let Some(name) = after(&["TYPE:", "FEATURE:", "feature "]) {
@@ -111,8 +120,16 @@ impl Remarks {
         match key {
             "filament_diameter" | "filamentDiameters" if self.filaments.is_empty() => {
                 let all = value.split([',', '|']).map_while(|word| word.trim().parse::<f64>().ok());
-                self.filaments = all.filter(|found| *found > 0.1 && *found < 20.0).map(|d| 1e-3 * d).collect();
+                self.filaments =
+                    all.filter(|found| *found > 0.1 && *found < 20.0).map(|d| 1e-3 * d).collect();
             }
+            "machine_load_filament_time"
+            | "machine_unload_filament_time"
+            | "filament_load_time"
+            | "filament_unload_time" => {
+                self.change += first().filter(|s| *s > 0.0 && *s < 1e4).unwrap_or(0.0);
+            }
+            "FLAVOR" => self.volumetric = value.contains("Volumetric") || value == "UltiGCode",
             "gcode_flavor" => self.per_minute |= value.eq_ignore_ascii_case("reprapfirmware"),
             "machine_limits_usage" => self.limits_ignored = value == "ignore",
             "printer_model" => self.bambu |= value.starts_with("Bambu Lab"),
@@ -126,19 +143,23 @@ impl Remarks {
     }
 }
 
-/// Whether a comment begins a layer: PrusaSlicer, SuperSlicer, OrcaSlicer; Bambu Studio; Cura, ideaMaker; Simplify3D.
+/// Whether a comment begins a layer: PrusaSlicer, SuperSlicer, OrcaSlicer; Bambu Studio; Cura, ideaMaker;
+/// Simplify3D.
 pub(super) fn is_layer(text: &str) -> bool {
     let numbered = |prefix: &str| {
         let rest = text.strip_prefix(prefix).map(str::trim_start);
         rest.is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
     };
-    text == "LAYER_CHANGE" || text == "CHANGE_LAYER" || numbered("LAYER:") || (numbered("layer ") && text.contains("Z ="))
+    text == "LAYER_CHANGE"
+        || text == "CHANGE_LAYER"
+        || numbered("LAYER:")
+        || (numbered("layer ") && text.contains("Z ="))
 }
 
-/// Seconds of an estimate, and its rank: the print itself before all with its preparation.
+/// Seconds of an estimate, and its rank: 0 from the first layer on, 1 of all.
 fn estimate(text: &str) -> Option<(u8, f64)> {
     if let Some(rest) = text.strip_prefix("TIME:").or_else(|| text.strip_prefix("Print Time:")) {
-        return rest.trim().parse().ok().filter(|s: &f64| *s > 0.0 && *s != PLACEHOLDER).map(|s| (0, s));
+        return rest.trim().parse().ok().filter(|s: &f64| *s > 0.0 && *s != PLACEHOLDER).map(|s| (1, s));
     }
     if let Some(rest) = text.strip_prefix("model printing time:") {
         let own = rest.split(';').next()?;
@@ -186,7 +207,7 @@ mod tests {
             ("estimated printing time (silent mode) = 1h 0m 0s", None),
             ("estimated first layer printing time (normal mode) = 1m", None),
             ("model printing time: 8m 57s; total estimated time: 15m 42s", Some((0, 537.0))),
-            ("TIME:1012", Some((0, 1012.0))),
+            ("TIME:1012", Some((1, 1012.0))),
             ("TIME:6666", None),
             ("TIME_ELAPSED:5.3", None),
             ("Build time: 1 hours 24 minutes", Some((1, 5040.0))),

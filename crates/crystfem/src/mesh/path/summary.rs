@@ -17,8 +17,8 @@ impl ToolPath {
         tools
     }
 
-    /// The same path without what has no room above the bed (z ≤ 0) or falls through the air, as the purges of some printers do: how many
-    /// moves, the line of the first, and the share of the filament.
+    /// The same path without what has no room above the bed (z ≤ 0) or falls through the air, as the purges
+    /// of some printers do: how many moves, the line of the first, and the share of the filament.
     pub fn without_loose(&mut self) -> Option<(usize, u32, f64)> {
         let whole = self.fed();
         let (mut count, mut line, mut fed) = (0, 0, 0.0);
@@ -35,7 +35,8 @@ impl ToolPath {
         (count > 0).then(|| (count, line, fed / whole))
     }
 
-    /// Layers, box, filament, volume and time of what is printed, and the share of each feature in its volume. `filament`: its diameter, m.
+    /// Layers, box, filament, volume and time of what is printed, and the share of each feature in its
+    /// volume. `filament`: its diameter, m.
     pub fn told(&self, filament: f64) -> Vec<String> {
         let ends = || self.printing().flat_map(|one| [one.from, one.to]);
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -52,7 +53,12 @@ impl ToolPath {
         let volume: f64 = self.printing().map(|one| one.volume(filament)).sum();
         let mut lines = vec![format!(
             "the file prints {layers} {}, middle lines from {} to {}, {:.3} mm³ of {:.1} mm of filament, in {}",
-            if self.layers > 0 { "marked layers" } else { "levels" },
+            match (self.layers > 0, layers) {
+                (true, 1) => "marked layer",
+                (true, _) => "marked layers",
+                (false, 1) => "level",
+                (false, _) => "levels",
+            },
             place(low),
             place(high),
             1e9 * volume,
@@ -61,8 +67,10 @@ impl ToolPath {
         )];
         let shares = self.shares();
         if shares.iter().any(|(name, _)| !name.is_empty()) {
-            let name = |name: &str| if name.is_empty() { "without a name".to_owned() } else { format!("`{name}`") };
-            let list = shares.iter().take(LISTED).map(|(of, share)| format!("{} {:.1} %", name(of), 100.0 * share));
+            let name =
+                |name: &str| if name.is_empty() { "without a name".to_owned() } else { format!("`{name}`") };
+            let list =
+                shares.iter().take(LISTED).map(|(of, share)| format!("{} {:.1} %", name(of), 100.0 * share));
             let more = shares.len().saturating_sub(LISTED);
             let more = if more > 0 { format!(", {more} more") } else { String::new() };
             lines.push(format!("by feature: {}{more}", list.collect::<Vec<_>>().join(", ")));
@@ -70,17 +78,18 @@ impl ToolPath {
         lines
     }
 
-    /// How the duration compares with the slicer's estimate, where the file has one; what it was computed with. An estimate
-    /// that differs by more than a twentieth says what to do.
+    /// How the duration compares with the slicer's estimate, where the file has one; what it was computed
+    /// with. An estimate that differs by more than a twentieth says what to do.
     pub fn compared(&self, with: &str) -> Option<String> {
         let estimate = self.estimate?;
-        let off = self.duration() / estimate - 1.0;
-        let told = format!(
-            "the slicer estimates {}, the path takes {:+.1} % of that more or less, {with}",
-            clock(estimate),
-            100.0 * off
-        );
-        Some(match off.abs() > 0.05 {
+        let start = self.moves.get(self.first).map_or(0.0, |one| one.start);
+        let own = self.duration() - start;
+        let off = 100.0 * (own / estimate - 1.0);
+        let (own, said) = (clock(own), clock(estimate));
+        let from = if self.first > 0 { "from the first layer on " } else { "" };
+        let told =
+            format!("{from}the path takes {own} {with}, and {said} as its slicer estimates ({off:+.1} %)");
+        Some(match off.abs() > 5.0 {
             true => format!("{told}: `acceleration` and `jerk` set other limits"),
             false => told,
         })
