@@ -340,6 +340,37 @@ fn ends_at_rest(time: f64, v: f64, a: f64, j: f64) -> f64 {
     time + (v * v - (v - j).powi(2)) / (2.0 * a * v)
 }
 
+/// A square of one wall as PrusaSlicer writes it for a MINI: fifteen layers with retractions, wipes and lifts, which it
+/// estimates at 67 s.
+#[test]
+fn time_of_prusa_slicer() {
+    let mut text = "M201 X1250 Y1250 Z400 E5000\nM203 X180 Y180 Z12 E80\nM204 P1250 R1250 T1250\nM205 X8 Y8 Z2 E10\nM83\n\
+        G1 Y-2 X179 F2400\nG1 Z3 F720\nG1 X170 F1000\nG1 Z0.2 F720\nG1 X110 E8 F900\nG1 X40 E10 F700\nG1 E-3.2 F4200\nG1 Z.4 F10800\n"
+        .to_owned();
+    for layer in 1..=15 {
+        let (z, low, high) = (0.2 * f64::from(layer), 82.725, 97.275);
+        if layer > 1 {
+            text += &format!(
+                "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z{z:.1} F10800\nG1 Z{:.1}\n",
+                z + 0.2
+            );
+        }
+        text += &format!(
+            "G1 X{low} Y{low} F10800\nG1 Z{z:.1}\nG1 E3.2 F2400\nM204 S800\nG1 F{}\n",
+            if layer > 1 { 1293 } else { 1637 }
+        );
+        for [x, y] in [[high, low], [high, high], [low, high], [low, low + 0.06]] {
+            text += &format!("G1 X{x} Y{y} E.4925\n");
+        }
+        text += "M204 S1250\n";
+    }
+    text += "G1 E-2.24 F4200\nG1 F8640 X84.7 Y82.777 E-.912\nG1 E-.048 F4200\nG1 Z3.2 F10800\nG1 E-1 F2100\nG1 Z5 F720\nG1 X178 Y178 F4200\nG1 Z33 F720\n";
+    let path = parsed(&text);
+    let found = path.clone().as_stated().duration();
+    assert!((found / 67.0 - 1.0).abs() < 0.01, "{found}");
+    assert!(path.duration() < 0.94 * 67.0, "{}", path.duration());
+}
+
 #[test]
 fn estimates_are_compared() {
     let told = |text: &str| parsed(text).compared("at F").unwrap();
