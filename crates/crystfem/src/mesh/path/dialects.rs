@@ -100,8 +100,8 @@ fn vases_rise_by_a_turn() {
     }
     let heights = parsed(&text).heights(1.75e-3, None);
     assert!(heights[..4].iter().all(|height| (1e3 * height - 0.2).abs() < 1e-9), "{heights:?}");
-    // the first turn narrows to nothing where it begins; there the bead is wider, but not more than half again
-    assert!(heights[4..8].iter().all(|height| (0.1..0.21).contains(&(1e3 * height))), "{heights:?}");
+    // the first turn begins as a wedge on what is flat
+    assert!(heights[4..8].iter().all(|height| (1e3 * height - 0.2).abs() < 0.02), "{heights:?}");
     assert!(heights[8..].iter().all(|height| (1e3 * height - 0.2).abs() < 2e-3), "{heights:?}");
 }
 

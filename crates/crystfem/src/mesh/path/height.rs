@@ -17,12 +17,12 @@ const TOPS: usize = 3;
 const CORE: f64 = 0.9;
 /// A bead lies on what is highest under so much of its length.
 const SHARE: f64 = 0.03;
-/// Bead widths over the middle one of their level: a bead higher than its level must not be narrower; where z
-/// rises, none is wider.
+/// A bead higher than its level must not be narrower than this over the middle width there.
 const NARROW: f64 = 0.75;
-const WIDE: f64 = 1.5;
-/// Group of all moves along which z changes.
-const RISING: i64 = i64::MIN;
+/// Where z rises, a bead keeps its own height if its width is the middle one to this.
+const EVEN: f64 = 0.1;
+/// Groups below this are runs of moves along which z changes.
+const RISING: i64 = i64::MIN / 2;
 
 /// Highest tops so far over the bed, falling, by cells in x and y.
 struct Map {
@@ -141,7 +141,7 @@ impl Found {
 impl ToolPath {
     /// Height of each printing move's bead, m, `height` of all where it is given. Otherwise what the file
     /// tells; otherwise down to the highest earlier bead below it, or to the bed. A bead over air, which
-    /// cannot be as high as the gap, has the height of others at its level, or down to the next level.
+    /// cannot be as high as the gap, has the height of others at its level, or down to the next level; in a vase the rise of a turn.
     /// `filament`: its diameter, m.
     pub(super) fn heights(&self, filament: f64, height: Option<f64>) -> Vec<f64> {
         if let Some(height) = height {
@@ -164,15 +164,15 @@ impl ToolPath {
             let Some(&(usual, width)) = levels.get(&found.group) else {
                 // none at this level fits
                 let step = one.to[2] - below(one.to[2]);
-                let own = if found.group == RISING { found.strand() } else { step };
+                let own = if found.group < RISING { found.strand() } else { step };
                 return if found.gap > 0.0 { found.gap.min(own) } else { found.gap };
             };
             let own = found.area / found.gap;
             if found.gap <= 0.0 {
                 found.gap
-            } else if found.group == RISING && own > WIDE * width {
-                // where a vase begins it narrows to nothing
-                usual.min(found.area / (WIDE * width)).max(found.gap)
+            } else if found.group < RISING {
+                // the first turn of a vase is a wedge, on what is flat
+                if (own / width - 1.0).abs() <= EVEN { found.gap } else { usual }
             } else if found.gap <= 1.01 * usual || (found.fits() && own >= NARROW * width) {
                 found.gap
             } else {
@@ -204,11 +204,14 @@ impl ToolPath {
         }
         let mut map = Map::new(self, if whole > 0.0 { sum / whole } else { 0.0 });
         let mut found = Vec::new();
+        let (mut run, mut rose) = (i64::MIN, false);
         for one in self.printing() {
             let area = one.area(filament);
             let same = (SAME * area.sqrt()).max(LEAST);
             let rises = (one.to[2] - one.from[2]).abs() > LEAST;
-            let group = if rises { RISING } else { (one.to[2] / LEAST).round() as i64 };
+            run += i64::from(rises && !rose);
+            rose = rises;
+            let group = if rises { run } else { (one.to[2] / LEAST).round() as i64 };
             let stated = one.height > 0.0;
             let mut bead = Found { group, gap: one.height, area, length: one.length(), stated };
             if !stated {
