@@ -4,6 +4,7 @@ use super::PartScene;
 use super::fault::located;
 use crate::mechanics::{SolidifyingMaxwell, is_known, key};
 use crate::mesh::Mesh;
+use crate::mesh::path::ToolPath;
 use crate::mesh::surface::Surface;
 use polycore::scene::{SceneError, Source};
 use polycore::units::{PerTemperature, Ratio, Stress};
@@ -114,7 +115,7 @@ pub struct Mechanics {
 
 impl PartScene {
     /// The mechanics of a scene on a mesh, where it has any; `material_of` are the materials of elements by their place in the scene, and `absent`
-    /// elements are never printed.
+    /// elements are never printed; `path` is that of a mesh of one.
     ///
     /// # Errors
     /// A [`SceneError`] for unknown names, elements that are neither hexahedra of first order nor tetrahedra, and a part that nothing holds.
@@ -124,6 +125,7 @@ impl PartScene {
         mesh: &Mesh,
         material_of: &[u16],
         absent: &[u32],
+        path: Option<&ToolPath>,
     ) -> Result<Option<Mechanics>, SceneError> {
         let Some(spec) = &self.mechanics else { return Ok(None) };
         let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
@@ -179,11 +181,17 @@ impl PartScene {
         let loose = loose(mesh, &bears, &bed);
         if loose > 0 {
             let found = format!("{loose} elements that nothing connects with the bed");
-            return Err(source.error(
-                "mechanics.bed",
-                found,
-                "a part that hangs together and touches the bed",
-            ));
+            let mut allowed = "a part that hangs together and touches the bed".to_owned();
+            if let Some(path) = path {
+                let names: Vec<&str> =
+                    path.shares().iter().map(|share| share.0).filter(|name| !name.is_empty()).collect();
+                allowed += "; `mesh.path.leave_out` takes skirts, brims and purge lines out of it";
+                allowed += &format!(
+                    " (the file names {})",
+                    if names.is_empty() { "none".into() } else { names.join(", ") }
+                );
+            }
+            return Err(source.error("mechanics.bed", found, allowed));
         }
         let places =
             |nodes: &[u32]| -> Vec<_> { nodes.iter().map(|&node| mesh.points[node as usize]).collect() };

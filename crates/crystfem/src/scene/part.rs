@@ -110,9 +110,13 @@ pub struct PrintSpec {
     /// is not printed.
     #[serde(default)]
     pub fill: bool,
-    /// Diameter of the filament, for the volume that G-code extrudes; default 1.75 mm.
+    /// Diameter of the filament, for the volume that G-code extrudes; default: as the file states it, or 1.75
+    /// mm.
     pub filament: Option<Length>,
-    /// Limit of acceleration along G-code, for times; default: none, velocity is F.
+    /// Features of G-code that print nothing of the part, as of `mesh.path`.
+    #[serde(default)]
+    pub leave_out: Vec<String>,
+    /// Limit of acceleration along G-code, for times; default: as the file states, or none: velocity is F.
     pub acceleration: Option<Acceleration>,
     /// Step of velocity at corners, with `acceleration`.
     pub jerk: Option<Speed>,
@@ -364,6 +368,7 @@ impl PrintSpec {
                 ("offset", self.offset.is_some()),
                 ("fill", self.fill),
                 ("filament", self.filament.is_some()),
+                ("leave_out", !self.leave_out.is_empty()),
                 ("acceleration", self.acceleration.is_some()),
                 ("jerk", self.jerk.is_some()),
             ] {
@@ -379,6 +384,7 @@ impl PrintSpec {
             ("temperature", self.temperature.is_some(), !path, true),
             ("layer_time", self.layer_time.is_some(), !path, !path),
             ("filament", self.filament.is_some(), false, path),
+            ("leave_out", !self.leave_out.is_empty(), false, path),
             ("acceleration", self.acceleration.is_some(), false, path),
             ("jerk", self.jerk.is_some(), false, path),
             ("layer_height", self.layer_height.is_some(), false, !path && self.elements.is_some()),
