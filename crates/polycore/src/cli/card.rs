@@ -4,11 +4,10 @@ use std::io::Write as _;
 use std::path::Path;
 
 use polycore::Error;
-use polycore::constitutive::hyperelastic::data::Table;
-use polycore::constitutive::hyperelastic::fit::Fit;
 use polycore::output::atomic_write;
 
-use super::material::BULK_RATIO;
+use super::fits::Set;
+use super::material::{BULK_RATIO, unusable};
 
 /// Files by units: their name, what they say of it, and the host's unit of stress, Pa.
 const FILES: [(&str, &str, f64); 2] =
@@ -18,15 +17,15 @@ const FILES: [(&str, &str, f64); 2] =
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write(directory: &Path, all: &[(&str, &Table, Vec<Fit>)]) -> Result<(), Error> {
+pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
     for (name, units, pascals) in FILES {
         atomic_write(directory.join(name), |file| {
             writeln!(
                 file,
                 "** units {units}; K is {BULK_RATIO} times the shear modulus: tests at constant volume do not determine it"
             )?;
-            for (data, _, fits) in all {
-                for fit in fits {
+            for set in all {
+                for fit in set.fits.iter().filter(|fit| unusable(fit).is_none()) {
                     let values: Vec<f64> = fit.parameters.iter().map(|parameter| parameter.value).collect();
                     let scaled = fit.parameters.iter().zip(&values);
                     let scaled: Vec<f64> = scaled
@@ -35,8 +34,9 @@ pub fn write(directory: &Path, all: &[(&str, &Table, Vec<Fit>)]) -> Result<(), E
                     let bulk = BULK_RATIO * fit.law.shear_modulus() / pascals;
                     write!(
                         file,
-                        "**\n** {} fitted to {data}\n{}",
+                        "**\n** {} fitted to {}\n{}",
                         fit.model.key,
+                        set.name,
                         card(fit.model.key, &scaled, bulk)
                     )?;
                 }
