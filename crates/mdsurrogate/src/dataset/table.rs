@@ -1,5 +1,7 @@
 //! Tables of text, packed (gzip) or not, with the place of each cell.
 
+use super::lammps;
+use super::options::{PROPERTIES, ReadOptions, is_sampled};
 use crate::Error;
 use crate::error::nearest;
 use flate2::Crc;
@@ -20,6 +22,8 @@ pub(super) struct Table {
     /// Name, and unit in square brackets if there is one.
     pub headings: Vec<(String, Option<String>)>,
     records: Vec<csv::StringRecord>,
+    /// How a file of LAMMPS was understood.
+    lammps: Option<lammps::Origin>,
 }
 
 /// A column that was looked up.
@@ -27,33 +31,13 @@ pub(super) struct Table {
 pub(super) struct Column(usize);
 
 impl Table {
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let mut packed = Vec::new();
-        File::open(path)
-            .and_then(|file| file.take(LARGEST + 1).read_to_end(&mut packed))
-            .map_err(Error::io("read", path))?;
-        let mut crc = Crc::new();
-        crc.update(&packed);
-        let fingerprint = format!("{} bytes, CRC-32 {:08x}", packed.len(), crc.sum());
-        let gzip = packed.starts_with(&[0x1f, 0x8b]);
-        let mut text = Vec::new();
-        if gzip {
-            let unpack = MultiGzDecoder::new(&packed[..]).take(LARGEST + 1).read_to_end(&mut text);
-            unpack.map_err(|error| {
-                Error::file(
-                    path,
-                    format!("a gzip file that is truncated or damaged after {} bytes ({error})", text.len()),
-                    "a complete gzip file",
-                )
-            })?;
-        } else {
-            text = packed;
-        }
-        if text.len() as u64 > LARGEST {
-            return Err(Error::file(path, "more than 2 GiB of text", "tables up to 2 GiB"));
-        }
-        if text.iter().all(u8::is_ascii_whitespace) {
-            return Err(Error::file(path, "an empty file", "a CSV table with a line of headings"));
+    /// Reads a table, of LAMMPS' own files too.
+    pub fn read(path: &Path, options: &ReadOptions) -> Result<Self, Error> {
+        let (text, fingerprint) = unpacked(path)?;
+        if let Some(kind) = lammps::kind(&text) {
+            let (headings, records, origin) = lammps::read(path, &text, kind, options)?;
+            let path = path.to_path_buf();
+            return Ok(Self { path, fingerprint, headings, records, lammps: Some(origin) });
         }
         let fail =
             |error: csv::Error| Error::file(path, error, "a CSV table, all rows as long as the headings");
@@ -64,7 +48,56 @@ impl Table {
         if records.is_empty() {
             return Err(Error::file(path, "headings without rows", "at least one row"));
         }
-        Ok(Self { path: path.to_path_buf(), fingerprint, headings, records })
+        let mut table = Self { path: path.to_path_buf(), fingerprint, headings, records, lammps: None };
+        table.rename(options)?;
+        Ok(table)
+    }
+
+    /// Gives columns the names of the properties that they are said to be.
+    fn rename(&mut self, options: &ReadOptions) -> Result<(), Error> {
+        let averaged = options.prefix();
+        let mut named = Vec::new();
+        for (property, name) in &options.names {
+            if !PROPERTIES.contains(&property.as_str()) {
+                let similar = nearest(property, PROPERTIES.into_iter());
+                let allowed = similar.map_or(PROPERTIES.join(", "), |name| format!("`{name}`?"));
+                return Err(Error::parameter("names", format!("`{property}`"), allowed));
+            }
+            let Some(Column(column)) = self.find(name) else {
+                let similar = nearest(name, self.headings.iter().map(|(other, _)| other.as_str()));
+                return Err(Error::MissingColumn { path: self.path.clone(), column: name.clone(), similar });
+            };
+            let prefix = if is_sampled(property) { averaged } else { "" };
+            named.push((column, format!("{prefix}{property}")));
+        }
+        for (column, name) in named {
+            self.headings[column].0 = name;
+        }
+        Ok(())
+    }
+
+    /// Whether LAMMPS wrote the file.
+    pub fn is_lammps(&self) -> bool {
+        self.lammps.is_some()
+    }
+
+    /// How a file of LAMMPS was understood.
+    pub fn lammps(&self) -> Option<&lammps::Origin> {
+        self.lammps.as_ref()
+    }
+
+    /// Pa in LAMMPS' unit of pressure.
+    pub fn pressure_unit(&self) -> Option<f64> {
+        self.lammps.as_ref()?.units.map(|units| units.sizes()[0])
+    }
+
+    /// An error of the numbers of a row, with its line.
+    pub fn at_row(&self, row: usize, error: Error) -> Error {
+        let (found, allowed) = match error {
+            Error::Parameter { name, found, allowed } => (format!("{name}: {found}"), allowed),
+            other => (other.to_string(), "a deformation with positive determinant".into()),
+        };
+        Error::file(&self.path, format!("line {}: {found}", self.line(row)), allowed)
     }
 
     pub fn rows(&self) -> usize {
@@ -129,10 +162,10 @@ impl Table {
         }
     }
 
-    /// Pa in one unit of a column: that of its heading (`S11 [GPa]`), else `default`.
-    pub fn stress_unit(&self, column: Column, default: f64) -> Result<f64, Error> {
+    /// Pa in one unit of a column by its heading (`S11 [GPa]`).
+    pub fn stress_unit(&self, column: Column) -> Result<Option<f64>, Error> {
         let (name, unit) = &self.headings[column.0];
-        let Some(unit) = unit else { return Ok(default) };
+        let Some(unit) = unit else { return Ok(None) };
         let one = format!("1 {unit}").parse::<Stress>().map_err(|error| Error::Cell {
             path: self.path.clone(),
             line: 1,
@@ -140,8 +173,40 @@ impl Table {
             found: format!("the unit `{unit}` ({error})"),
             allowed: "a unit of stress, as in `S11 [MPa]`".into(),
         })?;
-        Ok(one.si())
+        Ok(Some(one.si()))
     }
+}
+
+/// The text of a file, and its bytes and checksum.
+fn unpacked(path: &Path) -> Result<(Vec<u8>, String), Error> {
+    let mut packed = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(LARGEST + 1).read_to_end(&mut packed))
+        .map_err(Error::io("read", path))?;
+    let mut crc = Crc::new();
+    crc.update(&packed);
+    let fingerprint = format!("{} bytes, CRC-32 {:08x}", packed.len(), crc.sum());
+    let gzip = packed.starts_with(&[0x1f, 0x8b]);
+    let mut text = Vec::new();
+    if gzip {
+        let unpack = MultiGzDecoder::new(&packed[..]).take(LARGEST + 1).read_to_end(&mut text);
+        unpack.map_err(|error| {
+            Error::file(
+                path,
+                format!("a gzip file that is truncated or damaged after {} bytes ({error})", text.len()),
+                "a complete gzip file",
+            )
+        })?;
+    } else {
+        text = packed;
+    }
+    if text.len() as u64 > LARGEST {
+        return Err(Error::file(path, "more than 2 GiB of text", "tables up to 2 GiB"));
+    }
+    if text.iter().all(u8::is_ascii_whitespace) {
+        return Err(Error::file(path, "an empty file", "a CSV table with a line of headings"));
+    }
+    Ok((text, fingerprint))
 }
 
 fn heading(text: &str) -> (String, Option<String>) {
