@@ -90,7 +90,9 @@ pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneEr
         let of = if heats.is_empty() { String::new() } else { format!("; peaks of {}", heats.join(", ")) };
         format!("fit {}: {:?}, {what}{of}", spec.name, spec.law)
     };
-    Ok(scene.fit.iter().zip(&jobs).map(line).collect())
+    let tables = scene.fit.iter().flat_map(|spec| &spec.data);
+    let tables = tables.filter_map(|data| crate::table::understood(&source.file(&data.file)));
+    Ok(tables.chain(scene.fit.iter().zip(&jobs).map(line)).collect())
 }
 
 fn solve(spec: &FitSpec, job: Job, run: &mut polycore::case::Run) -> Result<Vec<Done>, Failure> {

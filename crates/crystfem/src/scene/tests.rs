@@ -51,7 +51,12 @@ fn a_good_scene_is_explained() {
     assert!(lines.contains("point a: prescribed temperature, 1 segments, 4800 s; adaptive steps"), "{lines}");
     std::fs::write(folder.path().join("a.csv"), "temperature [degC],alpha\n160,0.1\n150,0.5\n").unwrap();
     let lines = complaint(&head(FIT), folder.path());
-    assert_eq!(lines, "fit a: Nakamura, K0, K_G and n from 2 measurements in 1 runs");
+    let how =
+        "separator `,`, decimal point, UTF-8, headings in line 1, columns `temperature [degC]`, `alpha`";
+    assert_eq!(
+        lines,
+        format!("data a.csv: {how}\nfit a: Nakamura, K0, K_G and n from 2 measurements in 1 runs")
+    );
 }
 
 /// Every fault is named with key, what was found and what is allowed.
@@ -186,7 +191,7 @@ fn bad_fits() {
         ("file = \"a.csv\"", "file = \"rising.csv\"", &["measurement 2", "temperatures that fall"]),
         ("file = \"a.csv\"", "file = \"text.csv\"", &["text.csv:2: column 2, `alpha`: found \"much\""]),
         ("rate = \"1 K/min\"", "rate = \"0 K/min\"", &["`fit[0].data[0].rate`", "above 0"]),
-        (", rate = \"1 K/min\"", "", &["a.csv:1: header", "`time [unit]`"]),
+        (", rate = \"1 K/min\"", "", &["a.csv:1: headings", "`time [unit]`"]),
         ("frozen = \"21 degC\"", "", &["`fit[0].frozen`", "`glass_transition`"]),
         ("frozen = \"21 degC\"", "frozen = \"200 degC\"", &["above the temperature of frozen chains"]),
         ("equilibrium_melting = \"193.2 degC\"", "", &["`fit[0].equilibrium_melting`", "Hoffman–Weeks"]),
@@ -234,7 +239,7 @@ fn bad_fits() {
             flow("back.csv", ", mass = \"2 mg\"", "down"),
             &["back.csv:5: column `time`", "8 s", "9 s or later"],
         ),
-        (flow("a.csv", "", "up"), &["a.csv:1: header", "`time [unit]`"]),
+        (flow("a.csv", "", "up"), &["a.csv:1: headings", "`time [unit]`"]),
         (flow("w.csv", ", from = \"20 s\"", "up"), &["`fit[0].data[0].from`", "20 s", "0 to 18 s"]),
         (
             flow("w.csv", ", to = \"150 degC\"", "up"),
