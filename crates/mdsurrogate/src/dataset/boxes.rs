@@ -36,9 +36,15 @@ impl Boxes {
     }
 
     fn at(&self, table: &Table, row: usize) -> Result<PeriodicBox, Error> {
-        let lengths = table.numbers(row, &self.lengths)?;
-        let tilts = self.tilts.map_or(Ok([0.0; 3]), |tilts| table.numbers(row, &tilts))?;
-        Ok(PeriodicBox { lengths, tilts })
+        let in_angstroms = |columns: &[Column; 3]| -> Result<[f64; 3], Error> {
+            let mut numbers = table.numbers(row, columns)?;
+            for (number, column) in numbers.iter_mut().zip(columns) {
+                *number *= table.length_unit(*column)?;
+            }
+            Ok(numbers)
+        };
+        let tilts = self.tilts.as_ref().map_or(Ok([0.0; 3]), in_angstroms)?;
+        Ok(PeriodicBox { lengths: in_angstroms(&self.lengths)?, tilts })
     }
 
     /// The box at the instant of a row, where the table has it.

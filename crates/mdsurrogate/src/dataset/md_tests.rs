@@ -217,6 +217,23 @@ fn stresses_beside_f() {
     assert!(error.contains("all nine of F11") && error.contains("columns of zeros"), "{error}");
 }
 
+/// Decimal commas, semicolons, units below the headings and lengths in nm.
+#[test]
+fn tables_as_people_write_them() {
+    let text = "Werkstoff;PA12\nrun_id;F11;F22;F33;lx;ly;lz;sxx;syy;szz;sxy;sxz;syz\n;;;;nm;nm;nm;kbar;kbar;kbar;kbar;kbar;kbar\n\
+                a;1,0;1,0;1,0;2,0;2,0;2,0;0;0;0;0;0;0\na;1,1;1,0;1,0;2,2;2,0;2,0;1,5;0;0;0;0;0\n";
+    let options = ReadOptions { columns: Columns::Instantaneous, ..ReadOptions::default() };
+    let set = file("t.csv", text, &options).unwrap();
+    let row = &set.paths[0].rows[1];
+    assert!((row.c[0] - 1.21).abs() < 1e-12 && (row.cauchy[0] / 1.5e8 - 1.0).abs() < 1e-12);
+    assert!(set.provenance[0].contains("separator `;`, decimal comma"), "{:?}", set.provenance);
+    let given =
+        ReadOptions { reference: Some(crate::kinematics::PeriodicBox::orthogonal([20.0; 3])), ..options };
+    assert!((file("t.csv", text, &given).unwrap().paths[0].rows[1].c[0] - 1.21).abs() < 1e-12);
+    let error = refused(file("t.csv", &text.replace("1,5;0", "1.5;0"), &given));
+    assert!(error.contains("column `sxx`: found `1.5`") && error.contains("decimal comma"), "{error}");
+}
+
 /// Columns of one's own names.
 #[test]
 fn named_columns() {

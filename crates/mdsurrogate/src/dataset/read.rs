@@ -294,7 +294,6 @@ fn unknown_form(table: &Table, columns: Columns) -> Error {
         _ if table.has("F11") => {
             "all nine of F11 F12 F13 F21 … F33; where there is no shear, add columns of zeros".into()
         }
-        _ if headings.len() == 1 => format!("{forms}, separated by commas"),
         Columns::Averaged if table.has("lx") => {
             "avg_lx … avg_syz; for lx … syz as they are, `columns = \"instantaneous\"` (`--instantaneous`)"
                 .into()
@@ -356,6 +355,10 @@ fn table(table: &Table, options: &ReadOptions) -> Result<Dataset, Error> {
         set.paths.len(),
         set.skipped
     );
+    if let Some(how) = table.understood() {
+        line += "; ";
+        line += &how;
+    }
     for note in table.lammps().iter().flat_map(|origin| &origin.notes).chain(&notes) {
         line += "; ";
         line += note;
