@@ -76,8 +76,9 @@ impl Surrogate {
         c: PyReadonlyArray2<'py, f64>,
         tangent: bool,
         uncertainty: bool,
+        rounding: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        crate::predict::predict(py, &self.law, &c, tangent, uncertainty)
+        crate::predict::predict(py, &self.law, &c, tangent, uncertainty, rounding)
     }
 }
 
