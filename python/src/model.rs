@@ -247,7 +247,8 @@ impl Simulation {
             let names: Vec<&str> = Measure::ALL.iter().map(|one| one.name()).collect();
             value(format!("measure: found {measure:?}; allowed: {}", names.join(", ")))
         })?;
-        let found = py.detach(|| pool::here(|| self.body.stress(which, known)))?.map_err(|error| fault(&error))?;
+        let found =
+            py.detach(|| pool::here(|| self.body.stress(which, known)))?.map_err(|error| fault(&error))?;
         let d = self.body.dimension();
         let count = found.len() / (d * d);
         found.into_pyarray(py).reshape(vec![count, d, d])

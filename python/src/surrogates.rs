@@ -69,7 +69,7 @@ impl Surrogate {
         self.law.members().iter().map(of_member).collect()
     }
 
-    #[pyo3(signature = (c, tangent, uncertainty))]
+    #[pyo3(signature = (c, tangent, uncertainty, rounding))]
     fn predict<'py>(
         &self,
         py: Python<'py>,

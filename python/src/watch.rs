@@ -5,8 +5,8 @@ use polycore::case::{Step, StepField};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::time::{Duration, Instant};
 
@@ -127,15 +127,17 @@ pub fn left_alone<T: Send + 'static>(
         };
         let _ = sender.send(found);
     });
-    loop {
-        match py.detach(|| receiver.recv_timeout(EVERY)) {
-            Ok(found) => return Ok(found),
-            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(PyRuntimeError::new_err("a thread ended without an answer"));
+    py.detach(move || {
+        loop {
+            match receiver.recv_timeout(EVERY) {
+                Ok(found) => return Ok(found),
+                Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals())?,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(PyRuntimeError::new_err("a thread ended without an answer"));
+                }
             }
         }
-    }
+    })
 }
 
 /// Serves the working thread until it ends; what was raised first.

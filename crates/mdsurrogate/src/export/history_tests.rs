@@ -35,7 +35,8 @@ fn stresses(law: &Surrogate) -> Vec<Voigt> {
 #[test]
 fn routines_follow_the_history() {
     assert!(
-        c_source(&law(), "law").unwrap_err().to_string().contains("--form fortran") && onnx(&law()).is_err()
+        c_source(&law(), "law").unwrap_err().to_string().contains("--form fortran")
+            && onnx(&law(), OnnxOptions::default()).is_err()
     );
     if !there("gfortran") {
         return;

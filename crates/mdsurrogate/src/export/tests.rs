@@ -239,7 +239,7 @@ fn exported_onnx_agrees() {
     let mut memory = Workspace::default();
     for (name, law) in laws() {
         let model = directory.path().join("law.onnx");
-        std::fs::write(&model, onnx(&law).unwrap()).unwrap();
+        std::fs::write(&model, onnx(&law, OnnxOptions::default()).unwrap()).unwrap();
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/onnx.py");
         let mut command = Command::new(&python);
         command.arg(script).arg(&model).args(points.iter().map(|c| numbers(c.as_slice())));
@@ -263,6 +263,50 @@ fn exported_onnx_agrees() {
                 None => assert!(numbers[8].is_nan(), "{name}"),
             }
             assert_eq!(numbers[9..15], prediction.flags.outside.map(f64::from), "{name}");
+        }
+    }
+}
+
+/// Every law with its tangent and in single precision, in onnxruntime.
+#[test]
+fn exported_onnx_has_tangents_and_single_precision() {
+    let python = std::env::var("ONNX_PYTHON").unwrap_or("python3".into());
+    let probe = Command::new(&python).args(["-c", "import onnxruntime"]).output();
+    if !probe.is_ok_and(|output| output.status.success()) {
+        evidence::skipped(&format!("onnxruntime in {python} (ONNX_PYTHON names another)"));
+        return;
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let points: Vec<Voigt> = deformations().iter().map(c_of).collect();
+    let mut memory = Workspace::default();
+    for (name, law) in laws() {
+        // of single precision: some thousand roundings of 6e-8, and differences of large invariants
+        for (options, tolerance) in [
+            (OnnxOptions { single: false, tangent: true }, 1e-11),
+            (OnnxOptions { single: true, tangent: true }, 2e-3),
+            (OnnxOptions { single: true, tangent: false }, 2e-3),
+        ] {
+            let model = directory.path().join("law.onnx");
+            std::fs::write(&model, onnx(&law, options).unwrap()).unwrap();
+            let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/onnx.py");
+            let mut command = Command::new(&python);
+            command.arg(script).arg(&model).args(points.iter().map(|c| numbers(c.as_slice())));
+            let text = run(&mut command);
+            assert_eq!(text.lines().count(), points.len());
+            for (c, numbers) in points.iter().zip(text.lines().map(numbers_of)) {
+                let prediction = law.tangent(c, &mut memory).unwrap();
+                let difference = (Voigt::from_row_slice(&numbers[..6]) - prediction.stress).norm();
+                let size = prediction.stress.norm() + 1e6;
+                assert!(difference < tolerance * size, "{name} {options:?}: {difference:e} of {size:e}");
+                assert_eq!(numbers[9..15], prediction.flags.outside.map(f64::from), "{name}");
+                assert_eq!(numbers.len(), if options.tangent { 51 } else { 15 });
+                if options.tangent {
+                    let expected = prediction.tangent.unwrap();
+                    let difference = (Voigt6x6::from_row_slice(&numbers[15..]) - expected).norm();
+                    let size = expected.norm() + 1e6;
+                    assert!(difference < tolerance * size, "{name} {options:?}: {difference:e} of {size:e}");
+                }
+            }
         }
     }
 }
