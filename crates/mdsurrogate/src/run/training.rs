@@ -15,6 +15,11 @@ use polycore::tensor::Voigt;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
+/// A best epoch within this part of all is among the first …
+const EARLY: f64 = 0.1;
+/// … of a training with at least so many epochs.
+const LONG: usize = 20;
+
 /// Where the trainings of a scene stand: member by member of model by model; the last may be unfinished.
 #[derive(Debug, Default, Serialize, Deserialize)]
 struct Progress {
@@ -223,7 +228,26 @@ pub fn remarks(trained: &[Trained], data: &Prepared) -> Vec<String> {
         );
         (!names.is_empty()).then_some(text)
     };
-    trained.iter().filter_map(remark).collect()
+    trained.iter().filter_map(remark).chain(trained.iter().flat_map(early)).collect()
+}
+
+/// Members whose best epoch is among the first: they have not learnt from the rest of their training.
+fn early(model: &Trained) -> Vec<String> {
+    let members = model.states.len();
+    let line = |(member, state): (usize, &State)| {
+        let (best, epochs) = (state.best_epoch() as usize, state.history().len());
+        let early = epochs >= LONG && (best as f64) <= EARLY * epochs as f64;
+        let of = if members > 1 { format!(" (member {} of {members})", member + 1) } else { String::new() };
+        early.then(|| {
+            format!(
+                "{}{of}: its best epoch is {best} of {epochs}: the loss on the validation rows only grew afterwards, so the law is \
+                 that of the first steps. Look at its learning curve; a smaller learning rate, or validation rows more like the \
+                 training rows, may help",
+                model.name
+            )
+        })
+    };
+    model.states.iter().enumerate().filter_map(line).collect()
 }
 
 /// Numbers of the trainings, and Fig. 3.7.
