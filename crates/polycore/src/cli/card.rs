@@ -26,11 +26,9 @@ pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
             )?;
             for set in all {
                 for fit in set.fits.iter().filter(|fit| unusable(fit).is_none()) {
-                    let values: Vec<f64> = fit.parameters.iter().map(|parameter| parameter.value).collect();
-                    let scaled = fit.parameters.iter().zip(&values);
-                    let scaled: Vec<f64> = scaled
-                        .map(|(of, value)| if of.unit == "Pa" { value / pascals } else { *value })
-                        .collect();
+                    let parameters = fit.parameters.iter();
+                    let scale = |unit: &str| if unit == "Pa" { pascals } else { 1.0 };
+                    let scaled: Vec<f64> = parameters.map(|of| of.value / scale(of.unit)).collect();
                     let bulk = BULK_RATIO * fit.law.shear_modulus() / pascals;
                     write!(
                         file,
