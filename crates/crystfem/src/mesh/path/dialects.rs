@@ -72,12 +72,17 @@ fn beads_lie_on_what_is_below() {
     let sequential = format!(
         "M83\nG1 F600 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\nG0 X0 Y50 Z.3\nG1 X10 E{e}\nG0 X0 Y50 Z.5\nG1 X10 E{e}\n"
     );
+    let thin = format!(
+        "M83\nG1 F600 X0 Y9 Z.3\nG1 X10 E{}\nG0 X0 Y0 Z.2\nG1 X10 E{e}\nG0 X0 Y0 Z.4\nG1 X10 E{e}\n",
+        0.4 * e
+    );
     for (dialect, text, heights) in [
         ("PrusaSlicer", &prusa, vec![0.25, 0.3, 0.2, 0.4, 0.25]),
         ("Cura", &cura, vec![0.3, 0.2, 0.15]),
         ("Bambu Studio", &bambu, vec![0.28, 0.2, 0.16]),
         ("OrcaSlicer for Klipper, without comments", &klipper, vec![0.2, 0.3, 0.15, 0.15, 0.3, 0.2]),
         ("overhang", &over, vec![0.2, 0.2, 0.2, 0.2, 0.2]),
+        ("a thin purge line, alone at its height", &thin, vec![0.3, 0.2, 0.2]),
         ("one by one", &sequential, vec![0.2, 0.2, 0.3, 0.2]),
     ] {
         let found = parsed(text).heights(1.75e-3, None);
@@ -291,7 +296,7 @@ fn limits_of_the_file() {
         ("Marlin, M203", format!("M203 X25 Y25\n{one}"), 4.0),
         (
             "RepRapFirmware, mm/min",
-            format!("M566 X600 Y600\nM201 X500\nM203 X3000\nG1 X100 F6000\n"),
+            "M566 X600 Y600\nM201 X500\nM203 X3000\nG1 X100 F6000\n".to_owned(),
             with_jerk(100.0, 50.0, 500.0, 10.0),
         ),
         (

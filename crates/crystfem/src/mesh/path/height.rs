@@ -21,6 +21,8 @@ const SHARE: f64 = 0.03;
 const NARROW: f64 = 0.75;
 /// Where z rises, a bead keeps its own height if its width is the middle one to this.
 const EVEN: f64 = 0.1;
+/// A gap of so many diameters of a strand is filled where nothing else is known.
+const NEAR: f64 = 2.0;
 /// Groups below this are runs of moves along which z changes.
 const RISING: i64 = i64::MIN / 2;
 
@@ -165,7 +167,8 @@ impl ToolPath {
                 // none at this level fits
                 let step = one.to[2] - below(one.to[2]);
                 let own = if found.group < RISING { found.strand() } else { step };
-                return if found.gap > 0.0 { found.gap.min(own) } else { found.gap };
+                let near = found.gap <= NEAR * found.strand();
+                return if near { found.gap } else { found.gap.min(own) };
             };
             let own = found.area / found.gap;
             if found.gap <= 0.0 {

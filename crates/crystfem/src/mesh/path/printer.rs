@@ -49,7 +49,17 @@ pub(super) struct Printer {
     /// first.
     pub doubtful: (usize, u32),
     /// States that SAVE_GCODE_STATE kept, by name.
-    saved: BTreeMap<String, (bool, Option<bool>, f64, [f64; 3], f64)>,
+    saved: BTreeMap<String, Saved>,
+}
+
+/// Modes, velocity and names of places, as [`Printer`] has them.
+#[derive(Clone, Copy, Debug)]
+struct Saved {
+    relative: bool,
+    relative_feed: Option<bool>,
+    velocity: f64,
+    offset: [f64; 3],
+    feed: f64,
 }
 
 /// What comes with each move.
@@ -265,16 +275,16 @@ impl Printer {
 
     /// Keeps modes, velocity and names of places under a name, as Klipper does.
     pub fn save(&mut self, name: &str) {
-        let state = (self.relative, self.relative_feed, self.velocity, self.offset, self.feed);
+        let Self { relative, relative_feed, velocity, offset, feed, .. } = *self;
+        let state = Saved { relative, relative_feed, velocity, offset, feed };
         self.saved.insert(name.to_owned(), state);
     }
 
     /// Takes them back; places stay where they are.
     pub fn restore(&mut self, name: &str) {
-        if let Some((relative, relative_feed, velocity, offset, feed)) = self.saved.get(name).copied() {
-            (self.relative, self.relative_feed, self.velocity, self.offset) =
-                (relative, relative_feed, velocity, offset);
-            self.feed = feed;
+        if let Some(saved) = self.saved.get(name).copied() {
+            (self.relative, self.relative_feed) = (saved.relative, saved.relative_feed);
+            (self.velocity, self.offset, self.feed) = (saved.velocity, saved.offset, saved.feed);
         }
     }
 }
