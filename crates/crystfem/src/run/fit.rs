@@ -89,14 +89,6 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> 
 /// A fault of the scene or of its data.
 pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneError> {
     let jobs = scene.jobs(source)?;
-    for (index, (job, _)) in jobs.iter().enumerate() {
-        if let Job::Part(part) = job {
-            let fault = |error: SceneError| {
-                source.error(&format!("fit[{index}].part"), error.message(), "a valid part")
-            };
-            part.build().map_err(fault)?;
-        }
-    }
     let line = |(spec, (job, peaks)): (&FitSpec, &(Job, Vec<Measured>))| {
         let what = match job {
             Job::Avrami(times, _) => format!("k and n from {} measurements", times.len()),

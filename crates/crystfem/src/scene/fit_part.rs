@@ -29,15 +29,6 @@ impl PartFit {
         scene
     }
 
-    /// Builds the part once: opens the files that it reads.
-    ///
-    /// # Errors
-    /// What its mesh and its task refuse.
-    pub fn build(&self) -> Result<(), SceneError> {
-        let built = self.scene.mesh.build(&self.source)?;
-        self.scene.task(&self.source, built).map(|_| ())
-    }
-
     /// α of all files, one after the other.
     pub fn degrees(&self) -> Vec<f64> {
         self.curves.iter().flat_map(|(_, _, degrees)| degrees.iter().copied()).collect()
@@ -87,6 +78,9 @@ impl FitSpec {
             let [times, degrees] = table(source, &key(&format!("data[{i}].file")), &data.file, columns)?;
             curves.push((index, times, degrees));
         }
+        // opens the files that the part reads
+        let task = scene.mesh.build(&part).and_then(|built| scene.task(&part, built));
+        task.map_err(|error| source.error(&key("part"), error.message(), "the scene of a valid part"))?;
         let material = name.to_owned();
         Ok(PartFit { source: part, scene, material, constants, curves })
     }

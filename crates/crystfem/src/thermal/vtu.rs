@@ -29,7 +29,7 @@ pub fn open(path: &Path, array: Option<&str>) -> Result<Analysis, Error> {
     let names: Vec<String> = scalars.into_iter().map(|(name, _)| name).collect();
     let name = chosen(first, &names, array)?.to_owned();
     let nodes = points.len();
-    for missing in files.iter().flat_map(|(_, parts)| parts).filter(|file| !file.is_file()) {
+    if let Some(missing) = files.iter().flat_map(|(_, parts)| parts).find(|file| !file.is_file()) {
         return Err(unusable(path, &format!("{}, which is not there", missing.display())));
     }
     let frames = files.into_iter().map(move |(time, parts)| {

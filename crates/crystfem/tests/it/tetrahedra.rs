@@ -89,10 +89,10 @@ fn a_bimetal_bends() {
             step(&mesh, 0.0, |e| if low(e) { 3e9 } else { 1.5e9 }, |e, _| if low(e) { -0.01 } else { -0.02 });
         curvature(&mesh, &body).abs() / 4.864_864_865
     };
-    near("tetrahedra_bimetal_tet10", found([16, 1, 3], true), 1.0, 1e-3);
+    near("tetrahedra_bimetal_tet10", found([16, 1, 3], true), 1.0, 3e-4);
     let first = [[16, 1, 3], [32, 2, 6]].map(|count| found(count, false));
-    within("tetrahedra_bimetal_tet4", first[0], 0.3, 0.9);
-    within("tetrahedra_bimetal_tet4_half", first[1], first[0] + 0.05, 0.98);
+    within("tetrahedra_bimetal_tet4", first[0], 0.45, 0.52);
+    within("tetrahedra_bimetal_tet4_half", first[1], 0.74, 0.82);
 }
 
 /// Four tetrahedra on each side of each hexahedron, around its middle. New nodes and, of second order, those on edges are moved to the
@@ -178,7 +178,7 @@ fn ball_errors(n: usize, second: bool) -> [f64; 2] {
 #[test]
 fn a_ball_cools() {
     for (name, second, orders, most) in
-        [("tet4", false, [1.6, 0.8], [0.05, 0.4]), ("tet10", true, [2.3, 1.7], [2e-3, 0.03])]
+        [("tet4", false, [1.8, 1.0], [0.025, 0.05]), ("tet10", true, [2.3, 2.1], [6e-4, 4e-3])]
     {
         let errors = [2, 4].map(|n| ball_errors(n, second));
         for (k, what) in ["surface", "stress"].into_iter().enumerate() {
@@ -202,8 +202,8 @@ fn a_hot_spot_in_a_plate() {
         (mean + 49.550_398).abs()
     };
     let [coarse, fine] = [2, 4].map(error);
-    at_most("tetrahedra_hot_spot_centre", fine, 0.1);
-    within("tetrahedra_hot_spot_order", (coarse / fine).log2(), 1.5, 6.0);
+    at_most("tetrahedra_hot_spot_centre", fine, 5e-3);
+    within("tetrahedra_hot_spot_order", (coarse / fine).log2(), 2.5, 6.0);
 }
 
 /// Elements of all kinds beside each other, and those that have none.
