@@ -390,13 +390,12 @@ fn choose<M: Copy + PartialEq>(
         .filter_map(|(i, role)| Some((i, (wanted.of)(role.what)?, role)))
         .collect();
     let of = |measure: Option<M>| all.iter().filter(move |one| one.1 == measure).collect::<Vec<_>>();
-    // what the key says, then named measures in their order, then those that name none
-    let asked = wanted.measure.map(|measure| vec![Some(measure), None]);
-    let order = asked.unwrap_or_else(|| {
-        let named = wanted.order.iter().copied().map(Some);
-        let (first, rest): (Vec<_>, Vec<_>) = named.partition(|one| *one != wanted.order.last().copied());
-        first.into_iter().chain([None]).chain(rest).collect()
-    });
+    // named measures in their order, then those that name none, then the last; what the key says before all
+    let mut order: Vec<Option<M>> = wanted.order.iter().copied().map(Some).collect();
+    order.insert(order.len() - 1, None);
+    if let Some(asked) = wanted.measure {
+        order.splice(0..0, [Some(asked), None]);
+    }
     let found = order.into_iter().map(of).find(|found| !found.is_empty()).unwrap_or_default();
     match found[..] {
         [(column, measure, role)] => Ok(chosen(*column, *measure, Some(role))),
