@@ -113,7 +113,10 @@ impl Separator {
                 1
             } else if cell.contains([';', ',', '\t']) && cell.contains(|c: char| c.is_ascii_digit()) {
                 -2
-            } else if cell.split_once(' ').is_some_and(|(one, two)| digit(one, true) && digit(two, false)) {
+            } else if cell
+                .split_once(' ')
+                .is_some_and(|(one, two)| digit(one, true) && digit(two.trim_start(), false))
+            {
                 -1
             } else {
                 0
