@@ -13,7 +13,7 @@ use polycore::output;
 use polycore::report::{Phases, Report};
 
 use super::MPA;
-use super::material::{DIGITS, digits, stress, unit_of};
+use super::material::{DIGITS, digits, unit_of};
 use super::quantities as q;
 use super::scene::{Case, DataSet};
 use super::{card, draw, material, trials};
@@ -29,6 +29,13 @@ pub struct Set<'a> {
     failed: Vec<(&'static str, String)>,
     /// Law, other table, agreement there: none where the law locks.
     crossed: Vec<(&'static str, &'a str, Option<Agreement>)>,
+}
+
+impl Set<'_> {
+    /// The unit of its stresses, and its Pa: by the largest modulus.
+    fn unit(&self) -> (&'static str, f64) {
+        unit_of(self.fits.iter().map(|fit| fit.law.shear_modulus()).fold(0.0, f64::max))
+    }
 }
 
 /// Fits every law to every table, writes tables and pictures. A law that cannot be fitted is named; the others are kept. Where it is
@@ -173,8 +180,7 @@ fn unstable(fit: &Fit, table: &Table) -> Option<(Mode, f64)> {
 fn write_fits(directory: &Path, all: &[Set]) -> Result<(), Error> {
     let mut text = String::from("data,law,quantity,value,standard_error,unit\n");
     for set in all {
-        let stiffest = set.fits.iter().map(|fit| fit.law.shear_modulus()).fold(0.0, f64::max);
-        let (in_unit, pascals) = unit_of(stiffest);
+        let (in_unit, pascals) = set.unit();
         for fit in &set.fits {
             let mut line = |quantity: &str, value: f64, error: Option<f64>, unit: &str| {
                 let (shown, scale) = if unit == "Pa" { (in_unit, pascals) } else { ("", 1.0) };
@@ -254,15 +260,16 @@ fn summary(case: &Case, all: &[Set], report: &Report) -> String {
         text += "rms of the nominal stress, over the measured stresses (their number in brackets); k: parameters\n";
         let _ = write!(text, "{:<22}{:>4}", "law", "k");
         for set in all {
-            let _ = write!(text, "{:>18}", format!("{} ({})", set.name, set.table.measurements()));
+            let head = format!("{} ({}), {}", set.name, set.table.measurements(), set.unit().0);
+            let _ = write!(text, "{head:>24}");
         }
         text.push('\n');
         for model in &case.laws {
             let _ = write!(text, "{:<22}{:>4}", model.key, model.parameters.len());
             for set in all {
                 let fit = set.fits.iter().find(|fit| fit.model.key == model.key);
-                let cell = fit.map_or_else(|| "failed".to_owned(), |fit| stress(fit.rms, 5));
-                let _ = write!(text, "{cell:>18}");
+                let rms = fit.map(|fit| digits(fit.rms / set.unit().1, 5));
+                let _ = write!(text, "{:>24}", rms.unwrap_or_else(|| "failed".to_owned()));
             }
             text.push('\n');
         }

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use polycore::Error;
-use polycore::constitutive::hyperelastic::fit::{Fit, Standing};
+use polycore::constitutive::hyperelastic::fit::{Fit, Fitted, Standing};
 use polycore::output::atomic_write;
 
 use super::fits::Set;
@@ -75,13 +75,22 @@ pub fn unusable(fit: &Fit) -> Option<String> {
     })
 }
 
-/// The block of the eight-chain law with the least rms; without such a one, of the best law.
+/// The block of the eight-chain law with the least rms; without such a one, of the best law. Laws of which every parameter is known to
+/// half of its size come first.
 pub fn best(data: &str, fits: &[Fit]) -> String {
-    let usable = |fit: &&Fit| unusable(fit).is_none();
-    let chains = |fit: &&Fit| fit.model.key.starts_with(EIGHT_CHAINS) && usable(fit);
+    let known = |fit: &Fit| {
+        let sure = |parameter: &Fitted| {
+            parameter.standard_error.is_some_and(|error| HALF_WIDTH * error < parameter.value.abs())
+        };
+        fit.parameters.iter().all(sure)
+    };
+    let usable = || fits.iter().filter(|fit| unusable(fit).is_none());
     let least = |a: &&Fit, b: &&Fit| a.rms.total_cmp(&b.rms);
-    let fit = fits.iter().filter(chains).min_by(least).or(fits.iter().filter(usable).min_by(least));
-    fit.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", block(fit)))
+    let chains = |fit: &&Fit| fit.model.key.starts_with(EIGHT_CHAINS) && known(fit);
+    let best = usable().filter(chains).min_by(least);
+    let best =
+        best.or_else(|| usable().filter(|fit| known(fit)).min_by(least)).or_else(|| usable().min_by(least));
+    best.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", block(fit)))
 }
 
 /// `materials.toml`: the block of every fit, under comments.

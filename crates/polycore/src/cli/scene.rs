@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use polycore::constitutive::hyperelastic::data::{Mode, Table};
+use polycore::constitutive::hyperelastic::fit::neo_hookean_modulus;
 use polycore::constitutive::hyperelastic::{
     self, MODELS, Meaning, ModelDescriptor, StrainMeasure, StressMeasure,
 };
@@ -142,6 +143,7 @@ impl Case {
                     source.error(&key("mode"), error, "a test of which the table has a stress")
                 })?;
             }
+            neo_hookean_modulus(&table).map_err(|error| source.refused(&key("file"), error))?;
             for model in laws.iter().filter(|_| fit.laws.is_some()) {
                 if table.measurements() < model.parameters.len() {
                     let found = format!("{} measured stresses", table.measurements());
@@ -252,9 +254,10 @@ fn advice(name: &str) -> Option<&'static str> {
         "arrudaboyce" | "8chain" => "`eight-chain`: that is Arruda and Boyce's law",
         "ogden" => "`ogden-1`, `ogden-2` or `ogden-3`: by the number of terms",
         "mooney" | "polynomial" | "polynomial1" => "`mooney-rivlin`: the polynomial of first order",
-        "yeoh" | "reducedpolynomial" | "biderman" => {
-            "`gent` or `eight-chain`: of I1 alone and stiffening as `yeoh` is, with two parameters, and stable"
+        "reducedpolynomial" | "reducedpolynomial3" | "polynomial3" | "yeoh3" => {
+            "`yeoh`: the reduced polynomial of third order"
         }
+        "biderman" => "`yeoh`: of I1 alone",
         "neohooke" | "neohookean" | "neo" => "`neo-hookean`",
         "marlow" | "vanderwaals" | "extendedtube" => "`eight-chain-root-i2`, the nearest by its behaviour",
         "prony" | "viscoelastic" | "maxwell" | "creep" => {

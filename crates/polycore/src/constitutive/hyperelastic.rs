@@ -41,6 +41,7 @@ mod plausible;
 pub mod stability;
 #[cfg(feature = "tables")]
 mod table;
+mod yeoh;
 
 pub use chain::{EightChain, EightChainRootI2, ThreeChain};
 #[cfg(feature = "tables")]
@@ -55,6 +56,7 @@ pub use polynomial::{MooneyRivlin, NeoHookean};
 pub use principal::PrincipalResponse;
 #[cfg(feature = "tables")]
 pub use table::{Meaning, Reading};
+pub use yeoh::Yeoh;
 
 /// An isotropic hyperelastic law. Stresses and moduli in Pa, energies in J/m³.
 pub trait Hyperelastic: Send + Sync {

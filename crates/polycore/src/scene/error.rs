@@ -271,9 +271,7 @@ fn advice(name: &str) -> Option<&'static str> {
     let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
     Some(match plain.as_str() {
         "arrudaboyce" => "Arruda and Boyce's law is `eight-chain` here",
-        "yeoh" | "reducedpolynomial" => {
-            "of I1 alone and stiffening, as Yeoh's law, are `gent` and `eight-chain`"
-        }
+        "reducedpolynomial" => "the reduced polynomial of third order is `yeoh` here",
         "prony" | "viscoelastic" => "rates and relaxation are not modelled: laws are elastic",
         "poissonratio" | "poissonsratio" => {
             "Poisson's ratio follows from `bulk_modulus` and the shear modulus, ν = (3K − 2G)/(6K + 2G), or from the law"

@@ -35,6 +35,8 @@ pub(super) struct Role {
     pub what: What,
     /// Of stretch_1, stretch_2 …: 0, 1.
     pub axis: Option<usize>,
+    /// The axis is a number, which may also be that of a specimen.
+    pub numbered: bool,
     /// Counted positive in compression.
     pub compressive: bool,
     /// Unit; nothing where the heading has none.
@@ -134,7 +136,8 @@ impl Role {
         let compressive = words
             .iter()
             .any(|word| ["compress", "stauch", "druck"].iter().any(|start| word.starts_with(start)));
-        Some(Self { what, axis, compressive, unit })
+        let numbered = matches!(words.last(), Some(&("1" | "2")));
+        Some(Self { what, axis, numbered, compressive, unit })
     }
 }
 

@@ -204,8 +204,11 @@ pub fn fit_until(
     Ok(Fit { law, model, parameters, rms, draws: found.draws, measurements, iterations, starts })
 }
 
-/// The modulus of the best neo-Hookean law, in closed form: P is linear in μ. Scale and start of every fit.
-fn neo_hookean_modulus(table: &Table) -> Result<f64, Error> {
+/// The modulus of the best neo-Hookean law, in closed form: P is linear in μ. Scale and start of every fit. Pa.
+///
+/// # Errors
+/// [`Error::Data`] where it is not above zero.
+pub fn neo_hookean_modulus(table: &Table) -> Result<f64, Error> {
     let unit = super::NeoHookean::new(1.0)?;
     let (mut model_data, mut model_model) = (0.0, 0.0);
     for state in &table.states {

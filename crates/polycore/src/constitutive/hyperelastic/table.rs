@@ -121,11 +121,21 @@ impl Columns {
             };
             has(&|what| strain(what).is_some()) && has(&|what| stress(what).is_some())
         };
-        let axes = if meaning.strain_column.is_none() && paired(0) && paired(1) {
-            vec![Some(0), Some(1)]
-        } else {
-            vec![None]
+        let biaxial = meaning.strain_column.is_none() && paired(0) && paired(1);
+        // `strain 1, stress 1, strain 2, stress 2` are specimens side by side
+        let place = |axis, test: &dyn Fn(What) -> bool| {
+            roles.iter().position(|role| {
+                role.as_ref().is_some_and(|role| role.axis == Some(axis) && role.numbered && test(role.what))
+            })
         };
+        let (stress_1, strain_2) =
+            (place(0, &|what| stress(what).is_some()), place(1, &|what| strain(what).is_some()));
+        if biaxial && stress_1.zip(strain_2).is_some_and(|(stress, strain)| stress < strain) {
+            let allowed = "`strain_column` and `stress_column` in the data's entry, if these are specimens side by side (an entry \
+                           each); of a biaxial test both strains before both stresses";
+            return Err(file.refuse_headings(allowed));
+        }
+        let axes = if biaxial { vec![Some(0), Some(1)] } else { vec![None] };
         for &axis in &axes {
             strains.push(choose(
                 file,
@@ -216,10 +226,6 @@ impl Columns {
                 stretches: [0.0; 2],
                 nominal: [0.0; 2],
             };
-            for (axis, (chosen, ratio)) in self.strains.iter().zip(&ratios).enumerate() {
-                let number = file.number(index, chosen.column)?;
-                row.written[axis] = ratio.of(number).map_or(number, |ratio| ratio.si());
-            }
             let mut measured = 0;
             for (axis, (chosen, unit)) in self.stresses.iter().zip(&units).enumerate() {
                 let Some(number) = file.number_or_blank(index, chosen.column)? else { continue };
@@ -228,7 +234,15 @@ impl Columns {
                     si.map_err(|error| file.refuse_cell(index, chosen.column, &error.to_string()))?;
                 measured += 1;
             }
-            if measured == 0 { blank += 1 } else { rows.push(row) }
+            if measured == 0 {
+                blank += 1;
+                continue;
+            }
+            for (axis, (chosen, ratio)) in self.strains.iter().zip(&ratios).enumerate() {
+                let number = file.number(index, chosen.column)?;
+                row.written[axis] = ratio.of(number).map_or(number, |ratio| ratio.si());
+            }
+            rows.push(row);
         }
         let mut notes = Vec::new();
         if blank > 0 {
@@ -333,6 +347,7 @@ impl Columns {
             StressMeasure::Nominal => "nominal stress",
             StressMeasure::True => "true stress",
         };
+        let biaxial = if self.strains.len() == 2 { "biaxial, " } else { "" };
         let assumed = match (self.strains[0].assumed, self.stresses[0].assumed) {
             (true, true) => " (the headings do not say which; keys `strain` and `stress`)",
             (true, false) => " (the heading does not say which strain; key `strain`)",
@@ -343,7 +358,10 @@ impl Columns {
             table.states.iter().flat_map(|state| state.stretches.into_iter().take(self.strains.len()));
         let (low, high) =
             stretches.fold((f64::INFINITY, 0.0_f64), |(low, high), l| (low.min(l), high.max(l)));
-        format!("{}; {strain} and {stress}{assumed}; stretches {low:.4} to {high:.4}", file.understood(&used))
+        format!(
+            "{}; {biaxial}{strain} and {stress}{assumed}; stretches {low:.4} to {high:.4}",
+            file.understood(&used)
+        )
     }
 }
 
@@ -376,7 +394,14 @@ fn choose<M: Copy + PartialEq>(
             let heading = &file.headings[*i];
             heading.text == name || heading.name == name || heading.plain == plainly(name)
         };
-        let Some(column) = (0..roles.len()).find(same) else {
+        let number = name.parse::<usize>().ok().filter(|number| (1..=roles.len()).contains(number));
+        let several = (0..roles.len()).filter(same).count() > 1;
+        if several {
+            let allowed =
+                format!("the number of one of the columns `{name}` as `{key}_column`: \"1\" is the first");
+            return Err(file.refuse_headings(allowed));
+        }
+        let Some(column) = (0..roles.len()).find(same).or(number.map(|number| number - 1)) else {
             return Err(file.refuse_headings(format!("the heading `{name}` of `{key}_column`")));
         };
         let role = roles[column].as_ref();
@@ -390,13 +415,12 @@ fn choose<M: Copy + PartialEq>(
         .filter_map(|(i, role)| Some((i, (wanted.of)(role.what)?, role)))
         .collect();
     let of = |measure: Option<M>| all.iter().filter(move |one| one.1 == measure).collect::<Vec<_>>();
-    // what the key says, then named measures in their order, then those that name none
-    let asked = wanted.measure.map(|measure| vec![Some(measure), None]);
-    let order = asked.unwrap_or_else(|| {
-        let named = wanted.order.iter().copied().map(Some);
-        let (first, rest): (Vec<_>, Vec<_>) = named.partition(|one| *one != wanted.order.last().copied());
-        first.into_iter().chain([None]).chain(rest).collect()
-    });
+    // named measures in their order, then those that name none, then the last; what the key says before all
+    let mut order: Vec<Option<M>> = wanted.order.iter().copied().map(Some).collect();
+    order.insert(order.len() - 1, None);
+    if let Some(asked) = wanted.measure {
+        order.splice(0..0, [Some(asked), None]);
+    }
     let found = order.into_iter().map(of).find(|found| !found.is_empty()).unwrap_or_default();
     match found[..] {
         [(column, measure, role)] => Ok(chosen(*column, *measure, Some(role))),
@@ -406,7 +430,7 @@ fn choose<M: Copy + PartialEq>(
             Err(file.refuse_headings(format!("{LAYOUTS}{}", if raw { advice } else { "" })))
         }
         _ => Err(file.refuse_headings(format!(
-            "one {key}, or `{key}_column = \"…\"` in the data's entry with one of these headings"
+            "one {key}, or `{key}_column = \"…\"` in the data's entry with one of these headings, or its number"
         ))),
     }
 }

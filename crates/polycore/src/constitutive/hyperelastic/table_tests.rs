@@ -98,6 +98,21 @@ fn tests_and_compression() {
     }
     let meaning = Meaning { mode: Some(Mode::Equibiaxial), ..Meaning::default() };
     assert_eq!(read("strain,stress [MPa]\n1,1\n", &meaning).unwrap().table.states[0].stretches, [2.0, 2.0]);
+    // specimens side by side, of different lengths
+    let text = "strain 1,stress 1 [MPa],strain 2,stress 2 [MPa]\n1,1,0.5,0.5\n2,2,,\n";
+    assert!(read(text, &Meaning::default()).unwrap_err().contains("if these are specimens side by side"));
+    let second = Meaning {
+        strain_column: Some("strain 2".into()),
+        stress_column: Some("4".into()),
+        ..Meaning::default()
+    };
+    let reading = read(text, &second).unwrap();
+    assert_eq!((reading.table.states.len(), reading.table.states[0].nominal[0]), (1, 0.5e6));
+    assert_eq!(reading.notes, ["1 rows without a stress are left out"]);
+    let same = "strain,stress [MPa],strain,stress [MPa]\n1,1,0.5,0.5\n2,2,1,n/a\n";
+    let third = |column: &str| Meaning { strain_column: Some(column.into()), ..second.clone() };
+    assert!(read(same, &third("strain")).unwrap_err().contains("the number of one of the columns"));
+    assert_eq!(read(same, &third("3")).unwrap().table.states[0].stretches[0], 1.5);
     // a stress of two that was not measured
     let text = "lambda_1,lambda_2,stress_1 [MPa],stress_2 [MPa]\n2,1,0.5,\n2,2,0.5,0.5\n";
     let states = plain(text).table.states;
