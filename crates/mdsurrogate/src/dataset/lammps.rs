@@ -75,7 +75,7 @@ fn blocks_of_log(text: &str) -> (Vec<Block>, usize, Option<String>) {
     let mut inside = false;
     for (index, line) in text.lines().enumerate() {
         let trimmed = line.trim();
-        let mut words = trimmed.split_whitespace();
+        let mut words = trimmed.split('#').next().unwrap_or_default().split_whitespace();
         if let (Some("units"), Some(name), None) = (words.next(), words.next(), words.next()) {
             units = Some(name.to_owned());
         }
