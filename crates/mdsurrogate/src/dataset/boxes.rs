@@ -76,23 +76,18 @@ impl Boxes {
     ) -> Result<(Vec<Vec<DeformationGradient>>, Vec<String>), Error> {
         let mut flips = Vec::new();
         let mut all = Vec::new();
-        let mut before: Option<PeriodicBox> = None;
         for run in runs {
             let reference = self.reference(table, run, runs, options)?;
-            // runs of a log that continue each other keep their turns
-            let start = before.filter(|_| options.origin == Some(Origin::File) && table.is_lammps());
             let boxes: Vec<PeriodicBox> =
                 run.rows.iter().map(|(_, row)| self.at(table, *row)).collect::<Result<_, _>>()?;
             if self.averaged && self.tilts.is_some() {
                 refuse_mixed(table, run, &boxes)?;
             }
-            let before_run = start.unwrap_or(reference);
-            let (boxes, flipped) = unwrapped(before_run, &boxes);
+            let (boxes, flipped) = unwrapped(reference, &boxes);
             if !flipped.is_empty() {
-                refuse_coarse(table, run, before_run, &boxes)?;
+                refuse_coarse(table, run, reference, &boxes)?;
             }
             flips.extend(flipped.first().map(|&place| (run, run.rows[place].0, flipped.len())));
-            before = boxes.last().copied();
             let of = |(current, (_, row)): (&PeriodicBox, &(u64, usize))| {
                 current.deformation_from(&reference).map_err(|error| table.at_row(*row, error))
             };

@@ -320,8 +320,21 @@ fn logs_of_lammps() {
     assert_eq!(first(file("log", &two, &own).unwrap()), [1.0, 1.0]);
     let of_file = ReadOptions { origin: Some(Origin::File), ..options() };
     let set = file("log", &two, &of_file).unwrap();
-    assert_eq!(set.paths[1].id, "log-3");
-    assert!((first(set)[1] - 1.21).abs() < 1e-12);
+    // one path: the second run goes on where the first ended
+    assert_eq!((set.paths.len(), set.len(), set.paths[0].id.as_str()), (1, 10, "log"));
+    assert!((set.paths[0].rows[5].c[0] - 1.21).abs() < 1e-12);
+    // the row that LAMMPS prints at the end of one run and at the start of the next is one
+    let one = log("units real\n", 1);
+    let rows: Vec<&str> = one.lines().filter(|line| line.split_whitespace().count() == 12).collect();
+    let again = format!("{one}{}\n{}\n{}\nLoop time of 1\n", rows[0], rows[5], rows[1]);
+    assert_eq!(file("log", &again, &of_file).unwrap().len(), 6);
+    let zero = ReadOptions {
+        names: ["pxy", "pxz", "pyz"].map(|name| (name.to_owned(), "0".to_owned())).into(),
+        ..options()
+    };
+    let without = log("units metal\n", 1).replace("Pxy  Pxz  Pyz", "Density Enthalpy PotEng");
+    assert!(refused(file("log", &without, &options())).contains("pxy = \"0\""));
+    assert_eq!(file("log", &without, &zero).unwrap().paths[0].rows[3].cauchy[3], 0.0);
     let chosen = ReadOptions { blocks: vec![3], ..options() };
     let set = file("log", &two, &chosen).unwrap();
     assert_eq!((set.len(), set.paths[0].rows[0].c[0]), (5, 1.0));
