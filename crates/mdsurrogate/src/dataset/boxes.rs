@@ -16,6 +16,9 @@ const FLIPPED_BELOW: f64 = 0.65;
 /// Parts of a length: what lies so far between two sides of a flip is a mean of both.
 const BETWEEN: f64 = 0.02;
 
+/// Steps of a tilt over its length, beyond which either direction may be meant.
+const COARSE: f64 = 0.4;
+
 /// Columns of the box.
 pub(super) struct Boxes {
     lengths: [Column; 3],
@@ -73,19 +76,18 @@ impl Boxes {
     ) -> Result<(Vec<Vec<DeformationGradient>>, Vec<String>), Error> {
         let mut flips = Vec::new();
         let mut all = Vec::new();
-        let mut before: Option<PeriodicBox> = None;
         for run in runs {
             let reference = self.reference(table, run, runs, options)?;
-            // runs of a log that continue each other keep their turns
-            let start = before.filter(|_| options.origin == Some(Origin::File) && table.is_lammps());
             let boxes: Vec<PeriodicBox> =
                 run.rows.iter().map(|(_, row)| self.at(table, *row)).collect::<Result<_, _>>()?;
             if self.averaged && self.tilts.is_some() {
                 refuse_mixed(table, run, &boxes)?;
             }
-            let (boxes, flipped) = unwrapped(start.unwrap_or(reference), &boxes);
+            let (boxes, flipped) = unwrapped(reference, &boxes);
+            if !flipped.is_empty() {
+                refuse_coarse(table, run, reference, &boxes)?;
+            }
             flips.extend(flipped.first().map(|&place| (run, run.rows[place].0, flipped.len())));
-            before = boxes.last().copied();
             let of = |(current, (_, row)): (&PeriodicBox, &(u64, usize))| {
                 current.deformation_from(&reference).map_err(|error| table.at_row(*row, error))
             };
@@ -158,13 +160,43 @@ fn unwrapped(start: PeriodicBox, boxes: &[PeriodicBox]) -> (Vec<PeriodicBox>, Ve
         let xz = xz + k * (xy + n * x);
         let m = ((before.tilts[1] - xz) / x).round();
         before = PeriodicBox { lengths: cell.lengths, tilts: [xy + n * x, xz + m * x, yz + k * y] };
-        if place > 0 && turns != [n, m, k] {
+        if turns != [n, m, k] {
             flips.push(place);
         }
         turns = [n, m, k];
         found.push(before);
     }
     (found, flips)
+}
+
+/// # Errors
+/// Rows between which a tilt changes by so much that the direction cannot be told.
+fn refuse_coarse(
+    table: &Table,
+    run: &Run,
+    mut before: PeriodicBox,
+    boxes: &[PeriodicBox],
+) -> Result<(), Error> {
+    for (cell, (sample, row)) in boxes.iter().zip(&run.rows) {
+        for (tilt, length) in [(0, 0), (1, 0), (2, 1)] {
+            let step = (cell.tilts[tilt] - before.tilts[tilt]).abs() / cell.lengths[length];
+            if step > COARSE {
+                return Err(Error::file(
+                    &table.path,
+                    format!(
+                        "rows too far apart to undo flips of the box: its tilt {} changes by {step:.2} of its length up to line {} \
+                         (run `{}`, sample {sample})",
+                        TILTS[tilt],
+                        table.line(*row),
+                        run.id
+                    ),
+                    "samples between which it changes by less than 0.4, or a run with `flip no`",
+                ));
+            }
+        }
+        before = *cell;
+    }
+    Ok(())
 }
 
 /// # Errors

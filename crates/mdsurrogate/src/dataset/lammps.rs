@@ -75,7 +75,7 @@ fn blocks_of_log(text: &str) -> (Vec<Block>, usize, Option<String>) {
     let mut inside = false;
     for (index, line) in text.lines().enumerate() {
         let trimmed = line.trim();
-        let mut words = trimmed.split_whitespace();
+        let mut words = trimmed.split('#').next().unwrap_or_default().split_whitespace();
         if let (Some("units"), Some(name), None) = (words.next(), words.next(), words.next()) {
             units = Some(name.to_owned());
         }
@@ -151,6 +151,8 @@ enum Place {
     Column(usize),
     /// The distance of two bounds.
     Between(usize, usize),
+    /// 0, as the scene says.
+    Zero,
 }
 
 /// The columns of a block by property.
@@ -159,6 +161,10 @@ fn columns(headings: &[String], options: &ReadOptions) -> Vec<(String, Place)> {
     let capital = |name: &str| name[..1].to_uppercase() + &name[1..];
     let mut found = Vec::new();
     for property in PROPERTIES {
+        if options.names.get(property).is_some_and(|name| name == "0") {
+            found.push((property.to_owned(), Place::Zero));
+            continue;
+        }
         let own = match options.names.get(property) {
             Some(name) => find(name),
             None if LENGTHS.contains(&property) || TILTS.contains(&property) => {
@@ -260,15 +266,23 @@ pub(super) fn read(path: &Path, text: &[u8], kind: Kind, options: &ReadOptions) 
     let file = super::table::name_of(path);
     let time = |block: &Block| block.headings.iter().position(|name| name == "Time").zip(units);
     let timed = usable.iter().all(|(_, block, _)| time(block).is_some());
-    let mut records = Vec::new();
+    let (mut records, mut before) = (Vec::new(), None);
     for (number, block, found) in &usable {
-        let id = if usable.len() > 1 { format!("{file}-{number}") } else { file.clone() };
+        // runs that continue each other are one path
+        let joined = options.origin == Some(super::options::Origin::File) || usable.len() == 1;
+        let id = if joined { file.clone() } else { format!("{file}-{number}") };
         for (line, row) in &block.rows {
+            // LAMMPS prints the last row of a run again at the start of the next
+            if joined && before == Some(row) {
+                continue;
+            }
+            before = Some(row);
             let mut record = csv::StringRecord::from(vec![id.as_str()]);
             for (_, place) in found {
                 record.push_field(&match *place {
                     Place::Column(at) => format!("{:?}", row[at]),
                     Place::Between(low, high) => format!("{:?}", row[high] - row[low]),
+                    Place::Zero => "0".to_owned(),
                 });
             }
             if let Some((at, units)) = time(block).filter(|_| timed) {
@@ -325,7 +339,7 @@ fn none_usable(
     options: &ReadOptions,
 ) -> Error {
     let allowed = "`thermo_style custom step … lx ly lz pxx pyy pzz pxy pxz pyz`, in a tilted box xy xz yz, too; columns of your \
-                   own by `names` in `[data]`, as `names = { lx = \"v_lx\", pxx = \"c_p[1]\" }`";
+                   own by `names` in `[data]`, as `names = { lx = \"v_lx\", pxx = \"c_p[1]\" }` (`pxy = \"0\"` where there is no shear)";
     let best = all.iter().min_by_key(|(.., found)| lacking(found, options).len());
     let found = match best {
         None => format!("{what} without thermo output in columns or yaml"),

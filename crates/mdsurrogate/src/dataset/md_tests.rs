@@ -148,6 +148,8 @@ fn flips_are_undone() {
     }
     let error = refused(of(2.2, true));
     assert!(error.contains("between the two sides of a flip") && error.contains("instantaneous"), "{error}");
+    // a step of more than half a length cannot be told from one the other way
+    assert!(refused(of(9.0, false)).contains("too far apart"));
     // a box that turns back is not flipped
     let mut text = BOX.to_owned();
     for (sample, xy) in [0.0, 3.0, 6.0, 9.0, 6.0, 3.0, 0.0, -3.0, -6.0, -9.0].into_iter().enumerate() {
@@ -204,7 +206,7 @@ fn stresses_beside_f() {
             );
         }
         if heading.starts_with("Pxx") {
-            assert!(refused(file("t.csv", &text, &pressure)).contains("pressures without a unit"));
+            assert!(refused(file("t.csv", &text, &pressure)).contains("pressure (σ = −p) without a unit"));
         }
         if heading.starts_with("P11") {
             let swapped = text.replacen("P12,P13,P21,P22,P23,P31,P32", "P21,P31,P12,P22,P32,P13,P23", 1);
@@ -296,6 +298,8 @@ fn logs_of_lammps() {
     for part in ["1 of 2 blocks", "units metal", "σ = −p", "first row is undeformed", "1 lines"] {
         assert!(line.contains(part), "{line}");
     }
+    let commented = log("units metal # eV, ps, bar\n", 1);
+    assert!(file("log", &commented, &options()).unwrap().provenance[0].contains("units metal"));
     // units must be told, and cannot be told twice differently
     assert!(refused(file("log", &log("", 1), &options())).contains("no word on its units"));
     let of = |units| ReadOptions { units: Some(units), ..options() };
@@ -316,8 +320,21 @@ fn logs_of_lammps() {
     assert_eq!(first(file("log", &two, &own).unwrap()), [1.0, 1.0]);
     let of_file = ReadOptions { origin: Some(Origin::File), ..options() };
     let set = file("log", &two, &of_file).unwrap();
-    assert_eq!(set.paths[1].id, "log-3");
-    assert!((first(set)[1] - 1.21).abs() < 1e-12);
+    // one path: the second run goes on where the first ended
+    assert_eq!((set.paths.len(), set.len(), set.paths[0].id.as_str()), (1, 10, "log"));
+    assert!((set.paths[0].rows[5].c[0] - 1.21).abs() < 1e-12);
+    // the row that LAMMPS prints at the end of one run and at the start of the next is one
+    let one = log("units real\n", 1);
+    let rows: Vec<&str> = one.lines().filter(|line| line.split_whitespace().count() == 12).collect();
+    let again = format!("{one}{}\n{}\n{}\nLoop time of 1\n", rows[0], rows[5], rows[1]);
+    assert_eq!(file("log", &again, &of_file).unwrap().len(), 6);
+    let zero = ReadOptions {
+        names: ["pxy", "pxz", "pyz"].map(|name| (name.to_owned(), "0".to_owned())).into(),
+        ..options()
+    };
+    let without = log("units metal\n", 1).replace("Pxy  Pxz  Pyz", "Density Enthalpy PotEng");
+    assert!(refused(file("log", &without, &options())).contains("pxy = \"0\""));
+    assert_eq!(file("log", &without, &zero).unwrap().paths[0].rows[3].cauchy[3], 0.0);
     let chosen = ReadOptions { blocks: vec![3], ..options() };
     let set = file("log", &two, &chosen).unwrap();
     assert_eq!((set.len(), set.paths[0].rows[0].c[0]), (5, 1.0));
@@ -340,6 +357,16 @@ fn logs_of_lammps() {
         ..options()
     };
     assert_eq!(file("log", &without, &named).unwrap().len(), 5);
+    let own = log("units metal\n", 1).replace("Pxx  Pyy  Pzz  Pxy  Pxz  Pyz", "v_a v_b v_c v_d v_e v_f");
+    let pairs =
+        [("sxx", "v_a"), ("syy", "v_b"), ("szz", "v_c"), ("sxy", "v_d"), ("sxz", "v_e"), ("syz", "v_f")];
+    let stresses = |stress_unit| ReadOptions {
+        names: pairs.map(|(a, b)| (a.to_owned(), b.to_owned())).into(),
+        stress_unit,
+        ..options()
+    };
+    assert!(refused(file("log", &own, &stresses(None))).contains("Cauchy stress without a unit"));
+    assert_eq!(file("log", &own, &stresses(Some(1e6))).unwrap().paths[0].rows[3].cauchy[0], -3e9);
     let tilted = log("units metal\n  triclinic box = (0 0 0) to (20 30 40) with tilt (0 0 0)\n", 1);
     assert!(refused(file("log", &tilted, &options())).contains("whose tilt is not among the columns"));
     let multi = "LAMMPS (1 Jan 2024)\n------------ Step 0 ----- CPU = 0 (sec) -------------\nTotEng = -1 KinEng = 2\n";

@@ -77,14 +77,16 @@ impl Stress {
     pub fn units(&self, table: &Table, options: &ReadOptions) -> Result<Vec<f64>, Error> {
         let default = match self {
             Self::Pressure(_) => options.stress_unit.or(table.pressure_unit()),
+            // a variable of somebody's own may have any unit
+            _ if table.is_lammps() => options.stress_unit,
             _ => Some(options.stress_unit.unwrap_or(1e6)),
         };
         let of = |column: &Column| match table.stress_unit(*column)?.or(default) {
             Some(unit) => Ok(unit),
             None => Err(Error::file(
                 &table.path,
-                "pressures without a unit",
-                "a unit in the headings, as `pxx [atm]`, or `stress_unit` in the scene (LAMMPS: 1 atm with `units real`, 1 bar \
+                format!("{} without a unit", self.name()),
+                "a unit in the headings, as `pxx [atm]`, or `stress_unit` in the scene (pressures of LAMMPS: 1 atm with `units real`, 1 bar \
                  with `units metal`)",
             )),
         };

@@ -100,7 +100,7 @@ mod tests {
     /// μ + (μ + λ − 3λ ln l)/l² along N; below zero beyond a dilation that a bisection finds.
     #[test]
     fn waves_of_a_closed_form() {
-        let (mu, lame) = (1e6, 4e6);
+        let (mu, lame) = (0.2e6, 4e6);
         let law = model("neo-hookean").unwrap().law(&[mu]).unwrap();
         let law = Compressible::new(law, Volumetric::Logarithmic { lame }).unwrap();
         let at = |l: f64| Voigt::new(l * l, l * l, l * l, 0.0, 0.0, 0.0);
@@ -118,12 +118,12 @@ mod tests {
         assert!(Ellipticity::of(&law, &[]).unwrap().is_none());
     }
 
-    /// A band in one direction only: pulled along x until the law softens, the wave that stops runs along x.
+    /// Pulled along x until λ(1 − ln J) < 0: waves across, where the edges are as they were, stop first.
     #[test]
     fn direction_of_a_lost_wave() {
         let law = model("neo-hookean").unwrap().law(&[1e5]).unwrap();
         let law = Compressible::new(law, Volumetric::Logarithmic { lame: 4e6 }).unwrap();
         let found = Ellipticity::of(&law, &[Voigt::new(16.0, 1.0, 1.0, 0.0, 0.0, 0.0)]).unwrap().unwrap();
-        assert!(found.lost == 1 && found.direction[0].abs() > 0.99, "{found:?}");
+        assert!(found.lost == 1 && found.direction[0].abs() < 1e-3, "{found:?}");
     }
 }

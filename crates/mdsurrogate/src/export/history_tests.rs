@@ -108,8 +108,9 @@ contains
         pnewdt = 1
         one = 1d6
         energies = 0
-        call umat(cauchy, statev, ddsdde, energies(1), energies(2), unused, unused, six, six, unused, six, six, two, unused, unused, &
-            unused, two, two, repeat('x', 80), 3, 3, 6, 3, one, 1, two, square, pnewdt, unused, square, f, 1, 1, 1, 1, jstep, 1)
+        call umat(cauchy, statev, ddsdde, energies(1), energies(2), unused, unused, six, six, unused, six, six, two, &
+            unused, unused, unused, two, two, repeat('x', 80), 3, 3, 6, 3, one, 1, two, square, pnewdt, &
+            unused, square, f, 1, 1, 1, 1, jstep, 1)
         e = matmul(transpose(f), f) / 2
         emec = [e(1, 1) - 0.5d0, e(2, 2) - 0.5d0, e(3, 3) - 0.5d0, e(1, 2), e(1, 3), e(2, 3)]
         call material(emec, s, stiff, 0)

@@ -2,8 +2,8 @@
 
 use super::{Failure, uniaxial};
 use crate::dataset::{
-    Dataset, Method, Noise, PROPERTIES, Path as Path_, ReadOptions, Row, Split, Standardisation, hdf5, leak,
-    noise, read, split,
+    Dataset, Method, Noise, Path as Path_, ReadOptions, Row, Split, Standardisation, hdf5, leak, noise, read,
+    split,
 };
 use crate::error::Error;
 use crate::kinematics::{ANGSTROM, NAMES, PeriodicBox};
@@ -31,9 +31,6 @@ pub fn load(source: &Source, data: &Data, files: &[PathBuf], key: &str) -> Resul
         blocks: data.blocks.clone(),
         ..ReadOptions::default()
     };
-    if let Some(wrong) = data.names.keys().find(|name| !PROPERTIES.contains(&name.as_str())) {
-        return Err(source.unknown("data.names", wrong, &PROPERTIES).into());
-    }
     if let Some(lengths) = data.reference_lengths {
         let lengths = lengths.map(|length| length.si() / ANGSTROM);
         if let Some(length) = lengths.iter().find(|length| !(0.1..=1e7).contains(*length)) {
@@ -42,13 +39,6 @@ pub fn load(source: &Source, data: &Data, files: &[PathBuf], key: &str) -> Resul
         }
         let tilts = data.reference_tilts.map_or([0.0; 3], |tilts| tilts.map(|tilt| tilt.si() / ANGSTROM));
         options.reference = Some(PeriodicBox { lengths, tilts });
-    } else if data.reference_tilts.is_some() {
-        let allowed = "`reference_lengths` beside them";
-        return Err(source.error("data.reference_tilts", "tilts alone", allowed).into());
-    }
-    if let (Some(_), Some(_)) = (data.reference, &options.reference) {
-        let allowed = "one of `reference` and `reference_lengths`";
-        return Err(source.error("data.reference", "two references", allowed).into());
     }
     if let Some(unit) = data.stress_unit {
         if unit.si() <= 0.0 {

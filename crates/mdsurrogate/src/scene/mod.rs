@@ -1,6 +1,6 @@
 //! Scenes, as written in TOML: data and what is learnt from them.
 
-use crate::dataset::{Columns, Fractions, LammpsUnits, Measure, Method, Origin};
+use crate::dataset::{Columns, Fractions, LammpsUnits, Measure, Method, Origin, PROPERTIES};
 use crate::quantities;
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
@@ -71,6 +71,9 @@ impl Scene {
                 return Err(source.error(key, "laws without data", "`[data]` with `files`"));
             }
         }
+        if let Some(data) = &self.data {
+            data.check(source)?;
+        }
         if let Some(crystal) = &self.crystal {
             crystal.check(source)?;
         }
@@ -130,6 +133,28 @@ pub struct Data {
     /// Runs of a LAMMPS log that are read, from 1; default all.
     #[serde(default)]
     pub blocks: Vec<usize>,
+}
+
+impl Data {
+    /// # Errors
+    /// What is wrong and where.
+    fn check(&self, source: &Source) -> Result<(), SceneError> {
+        if let Some(wrong) = self.names.keys().find(|name| !PROPERTIES.contains(&name.as_str())) {
+            return Err(source.unknown("data.names", wrong, &PROPERTIES));
+        }
+        if self.reference.is_some() && self.reference_lengths.is_some() {
+            let allowed = "one of `reference` and `reference_lengths`";
+            return Err(source.error("data.reference", "two references", allowed));
+        }
+        if self.reference_tilts.is_some() && self.reference_lengths.is_none() {
+            let allowed = "`reference_lengths` beside them";
+            return Err(source.error("data.reference_tilts", "tilts alone", allowed));
+        }
+        if self.blocks.contains(&0) {
+            return Err(source.error("data.blocks", 0, "numbers of runs, from 1"));
+        }
+        Ok(())
+    }
 }
 
 /// The γ-PA12 crystal of Table 3.1 and the grid of Table 3.2.
