@@ -1,6 +1,8 @@
 //! The Langevin function and its inverses, hyperelastic laws and their fits.
 
 use crate::error::value;
+use crate::pool;
+use crate::watch::{left_alone, stoppable};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use polycore::constitutive::Error;
 use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
@@ -12,6 +14,7 @@ use polycore::tensor::{DeformationGradient, Tensor};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
+use std::sync::atomic::Ordering;
 
 /// From so many numbers on they are shared out to threads.
 const MANY: usize = 1 << 14;
@@ -32,14 +35,15 @@ pub fn langevin<'py>(
         value(format!("method: found {method:?}; allowed: {}", names.join(", ")))
     })?;
     let x = x.as_slice()?;
-    let found = py.detach(|| match function {
+    let work = || match function {
         "langevin" => Some(each(x, chain::langevin)),
         "derivative" => Some(each(x, chain::derivative)),
         "free_energy" => Some(each(x, chain::free_energy)),
         "inverse" => Some(each(x, |x| known.value(x))),
         "inverse_derivative" => Some(each(x, |x| known.derivative(x))),
         _ => None,
-    });
+    };
+    let found = py.detach(|| pool::here(work))?;
     found.map(|found| found.into_pyarray(py)).ok_or_else(|| value(format!("no function {function}")))
 }
 
@@ -140,7 +144,7 @@ impl Law {
         let (first, second) = (first.as_slice()?, second.as_slice()?);
         let law = &*self.law;
         let at = |k: usize| homogeneous::biaxial(law, first[k], second[k]);
-        let found = py.detach(|| points(first.len().min(second.len()), at))?;
+        let found = points(py, first.len().min(second.len()), at)?;
         let count = found.len();
         found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, 2])
     }
@@ -169,7 +173,7 @@ impl Law {
                 _ => flat(law.second_piola_kirchhoff(&f)?),
             })
         };
-        let found = py.detach(|| points(count, at))?;
+        let found = points(py, count, at)?;
         let width = if what == "energy" { 1 } else { 9 };
         found.into_iter().flatten().collect::<Vec<_>>().into_pyarray(py).reshape([count, width])
     }
@@ -179,17 +183,25 @@ impl Law {
         py: Python<'py>,
         c: PyReadonlyArray2<'py, f64>,
         tangent: bool,
+        rounding: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        crate::predict::predict(py, &self.law, &c, tangent, false)
+        crate::predict::predict(py, &self.law, &c, tangent, false, rounding)
     }
 }
 
 /// Evaluates a function at `count` points, on all threads where there are many; returns the first error.
-fn points<T: Send>(count: usize, at: impl Fn(usize) -> Result<T, Error> + Sync) -> PyResult<Vec<T>> {
+fn points<T: Send>(
+    py: Python<'_>,
+    count: usize,
+    at: impl Fn(usize) -> Result<T, Error> + Sync,
+) -> PyResult<Vec<T>> {
     let one = |k: usize| at(k).map_err(|error| format!("point {k}: {error}"));
     let found: Result<Vec<T>, String> = match count < 256 {
-        true => (0..count).map(one).collect(),
-        false => (0..count).into_par_iter().with_min_len(64).map(one).collect(),
+        true => py.detach(|| (0..count).map(one).collect()),
+        false => stoppable(py, |stop| {
+            let stopped = |k| if stop.load(Ordering::Relaxed) { Err(String::new()) } else { one(k) };
+            (0..count).into_par_iter().with_min_len(64).map(stopped).collect()
+        })?,
     };
     found.map_err(value)
 }
@@ -230,7 +242,7 @@ pub fn fit_law<'py>(
     }
     let table = Table { source: String::new(), states };
     let model = hyperelastic::model(key).map_err(value)?;
-    let found = py.detach(|| fit::fit(model, &table)).map_err(value)?;
+    let found = left_alone(py, move || fit::fit(model, &table))?.map_err(value)?;
     let answer = PyDict::new(py);
     let parameters: Vec<_> =
         found.parameters.iter().map(|p| (p.name, p.unit, p.value, p.standard_error)).collect();

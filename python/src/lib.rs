@@ -13,6 +13,7 @@ mod fields;
 mod laws;
 mod model;
 mod point;
+mod pool;
 mod predict;
 mod scenes;
 mod surrogates;
@@ -36,6 +37,7 @@ mod _polymech {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::pool::loaded();
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::bond::BondLaw;
 use crate::error::{fault, value};
+use crate::pool;
 use crate::watch::{Line, Watchers, watched};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
 use peri::Error;
@@ -246,7 +247,8 @@ impl Simulation {
             let names: Vec<&str> = Measure::ALL.iter().map(|one| one.name()).collect();
             value(format!("measure: found {measure:?}; allowed: {}", names.join(", ")))
         })?;
-        let found = py.detach(|| self.body.stress(which, known)).map_err(|error| fault(&error))?;
+        let found =
+            py.detach(|| pool::here(|| self.body.stress(which, known)))?.map_err(|error| fault(&error))?;
         let d = self.body.dimension();
         let count = found.len() / (d * d);
         found.into_pyarray(py).reshape(vec![count, d, d])

@@ -1,6 +1,7 @@
 //! The material of a print at a point, and its kinetics fitted.
 
 use crate::error::fault;
+use crate::watch::left_alone;
 use crystfem::fit::{Fit, Known, Run, nakamura};
 use crystfem::history::History;
 use crystfem::kinetics::{Constants, Kinetics};
@@ -68,13 +69,13 @@ pub fn course<'py>(
     degree: f64,
     kelvin: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let solved = py.detach(|| {
+    let solved = left_alone(py, move || {
         let material = material.polymer()?;
         let drive = Drive::Prescribed(History::new(time, temperature)?);
         let stepping = Stepping::Adaptive { degree, kelvin };
         let curves = Course { material: &material, drive, stepping }.run()?;
         Ok((curves, material.field_names()))
-    });
+    })?;
     let (curves, names) = solved.map_err(|error: crystfem::Error| fault(&error))?;
     let columns = PyDict::new(py);
     for (index, name) in names.iter().enumerate() {
@@ -105,7 +106,7 @@ pub fn fit_kinetics<'py>(
     };
     let runs: Vec<Run> = runs.iter().map(run).collect();
     let Fit { estimates, draws, rms, measurements, evaluations, model } =
-        py.detach(|| nakamura(&runs, &known)).map_err(|error| fault(&error))?;
+        left_alone(py, move || nakamura(&runs, &known))?.map_err(|error| fault(&error))?;
     let answer = PyDict::new(py);
     let rows: Vec<_> =
         estimates.into_iter().map(|e| (e.name, e.unit, e.value, e.standard_error, e.interval)).collect();

@@ -1,5 +1,6 @@
 //! A law at many points: flat arrays in, flat arrays out, on all threads and without the interpreter's lock.
 
+use crate::watch::stoppable;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray2};
 use polycore::constitutive::{Error, Law, Prediction, Workspace};
 use polycore::tensor::Voigt;
@@ -7,12 +8,26 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Points that a thread takes at once.
 const CHUNK: usize = 256;
 
 /// Places of the six components among the nine of a tensor, rows first.
 const UPPER: [usize; 6] = [0, 4, 8, 1, 2, 5];
+
+/// And those of their mirror images.
+const LOWER: [usize; 6] = [0, 4, 8, 3, 6, 7];
+
+/// What is asked of a law at rows of `width` numbers.
+#[derive(Clone, Copy)]
+struct How {
+    width: usize,
+    tangent: bool,
+    uncertainty: bool,
+    /// Two entries of C may differ by this part of its largest.
+    rounding: f64,
+}
 
 /// What a law predicts at N points.
 #[derive(Default)]
@@ -44,13 +59,15 @@ struct Uncertainty<'a> {
 }
 
 /// `stress` (N, 6) in Pa, `tangent` (N, 6, 6) in Pa if asked for, `energy` (N) in J/m³ (NaN of a law without), and of a learnt law
-/// `spread` (N), `deviation` (N, 6), `outside` and `unseen` (N, 6), `far`, `disagree` (N), at the rows of C, (N, 6) or (N, 9).
+/// `spread` (N), `deviation` (N, 6), `outside` and `unseen` (N, 6), `far`, `disagree` (N), at the rows of C, (N, 6) or (N, 9). A C of nine is taken for symmetric where it is within
+/// `rounding` of its largest entry.
 pub fn predict<'py>(
     py: Python<'py>,
     law: &dyn Law,
     c: &PyReadonlyArray2<'py, f64>,
     tangent: bool,
     uncertainty: bool,
+    rounding: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let shape = c.as_array().dim();
     if ![6, 9].contains(&shape.1) {
@@ -59,8 +76,12 @@ pub fn predict<'py>(
     let rows =
         c.as_slice().map_err(|_| PyValueError::new_err("C: found strides; allowed: contiguous rows"))?;
     let (count, width) = shape;
-    let found =
-        py.detach(|| evaluate(law, rows, width, tangent, uncertainty)).map_err(crate::error::value)?;
+    let how = How { width, tangent, uncertainty, rounding };
+    let found = match count <= CHUNK {
+        true => py.detach(|| evaluate(law, rows, how, &AtomicBool::new(false))),
+        false => stoppable(py, |stop| evaluate(law, rows, how, stop))?,
+    };
+    let found = found.map_err(crate::error::value)?;
     let answer = PyDict::new(py);
     answer.set_item("stress", found.stress.into_pyarray(py).reshape([count, 6])?)?;
     answer.set_item("energy", found.energy.into_pyarray(py))?;
@@ -79,9 +100,8 @@ pub fn predict<'py>(
 fn evaluate(
     law: &dyn Law,
     rows: &[f64],
-    width: usize,
-    tangent: bool,
-    uncertainty: bool,
+    How { width, tangent, uncertainty, rounding }: How,
+    stop: &AtomicBool,
 ) -> Result<Found, String> {
     let count = rows.len() / width;
     let mut found = Found { stress: vec![0.0; 6 * count], energy: vec![0.0; count], ..Found::default() };
@@ -112,13 +132,20 @@ fn evaluate(
     }
     let fill = |memory: &mut (Workspace, Vec<Voigt>, Vec<Prediction>),
                 (number, part): (usize, &mut Part<'_>)| {
-        part.fill(law, width, memory).map_err(|(point, told)| (number * CHUNK + point, told))
+        if stop.load(Ordering::Relaxed) {
+            return Err((number * CHUNK, "stopped".to_owned()));
+        }
+        part.fill(law, width, rounding, memory).map_err(|(point, told)| (number * CHUNK + point, told))
     };
-    let filled: Result<(), (usize, String)> = parts
-        .par_iter_mut()
-        .enumerate()
-        .map_init(Default::default, |memory, part| fill(memory, part))
-        .collect();
+    let filled: Result<(), (usize, String)> = match &mut parts[..] {
+        // no threads for few points
+        [one] => fill(&mut Default::default(), (0, one)),
+        parts => parts
+            .par_iter_mut()
+            .enumerate()
+            .map_init(Default::default, |memory, part| fill(memory, part))
+            .collect(),
+    };
     match filled {
         Ok(()) => Ok(found),
         Err((point, told)) => Err(format!("point {point}: {told}")),
@@ -131,21 +158,22 @@ impl Part<'_> {
         &mut self,
         law: &dyn Law,
         width: usize,
+        rounding: f64,
         (memory, points, predictions): &mut (Workspace, Vec<Voigt>, Vec<Prediction>),
     ) -> Result<(), (usize, String)> {
         points.clear();
         for (point, row) in self.c.chunks_exact(width).enumerate() {
             points.push(match width {
                 9 => {
-                    if let Some((i, j)) =
-                        [(1, 3), (2, 6), (5, 7)].into_iter().find(|&(i, j)| row[i] != row[j])
-                    {
+                    let size = row.iter().fold(0.0, |size: f64, entry| size.max(entry.abs()));
+                    let unlike = |&(i, j): &(usize, usize)| (row[i] - row[j]).abs() > rounding * size;
+                    if let Some((i, j)) = [(1, 3), (2, 6), (5, 7)].into_iter().find(unlike) {
                         return Err((
                             point,
                             format!("C: found {} and {}; allowed: a symmetric tensor", row[i], row[j]),
                         ));
                     }
-                    Voigt::from_fn(|a, _| row[UPPER[a]])
+                    Voigt::from_fn(|a, _| 0.5 * (row[UPPER[a]] + row[LOWER[a]]))
                 }
                 _ => Voigt::from_fn(|a, _| row[a]),
             });

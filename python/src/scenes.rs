@@ -1,7 +1,7 @@
 //! Scenes, run as the command lines run them.
 
 use crate::error::failure;
-use crate::watch::{Line, Watchers, watched};
+use crate::watch::{Line, Watchers, left_alone, watched};
 use crystfem::run::Crystfem;
 use peri::run::Peri;
 use polycore::case::{self, Case, Fault, Finished, Options, Part, Step, SweepOptions, Vary};
@@ -140,14 +140,15 @@ pub fn check(
     of_program!(program, check_of(py, Source::new(path, text), how))
 }
 
-fn check_of<C: Case>(py: Python<'_>, source: Source, mut how: Behaviour) -> PyResult<Vec<String>> {
-    let watchers = how.watchers();
-    let Behaviour { output, quick, threads, inputs, .. } = &how;
-    let lines = watched(py, &watchers, *threads, |_| {
-        let source = case::attached::<C::Error>(source, output, *quick, inputs, false)?;
-        C::explain(&source, *quick)
+fn check_of<C: Case>(py: Python<'_>, source: Source, how: Behaviour) -> PyResult<Vec<String>> {
+    let Behaviour { output, quick, inputs, .. } = how;
+    let place = output.clone();
+    // a check writes nothing
+    let lines = left_alone(py, move || {
+        let source = case::attached::<C::Error>(source, &place, quick, &inputs, false)?;
+        C::explain(&source, quick)
     })?;
-    lines.map_err(|error| failure(py, error, output))
+    lines.map_err(|error| failure(py, error, &output))
 }
 
 /// Runs a scene once for every combination of values; arguments and errors are those of [`run`].

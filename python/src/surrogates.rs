@@ -69,15 +69,16 @@ impl Surrogate {
         self.law.members().iter().map(of_member).collect()
     }
 
-    #[pyo3(signature = (c, tangent, uncertainty))]
+    #[pyo3(signature = (c, tangent, uncertainty, rounding))]
     fn predict<'py>(
         &self,
         py: Python<'py>,
         c: PyReadonlyArray2<'py, f64>,
         tangent: bool,
         uncertainty: bool,
+        rounding: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        crate::predict::predict(py, &self.law, &c, tangent, uncertainty)
+        crate::predict::predict(py, &self.law, &c, tangent, uncertainty, rounding)
     }
 }
 

@@ -2,8 +2,10 @@
 
 use numpy::{IntoPyArray, PyArrayMethods};
 use polycore::case::{Step, StepField};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
 use std::time::{Duration, Instant};
@@ -83,9 +85,10 @@ pub fn watched<T: Send>(
     let stop = AtomicBool::new(false);
     let pool = match threads {
         Some(threads) => {
-            Some(rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(crate::error::value)?)
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            Some(Arc::new(pool.map_err(crate::error::value)?))
         }
-        None => None,
+        None => crate::pool::forked()?,
     };
     let (sender, receiver) = channel();
     let (wants_progress, wants_steps) = (watchers.progress.is_some(), watchers.on_step.is_some());
@@ -101,6 +104,39 @@ pub fn watched<T: Send>(
             let found = worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             raised.map_or(Ok(found), Err)
         })
+    })
+}
+
+/// Runs `work` on a thread of its own, with a flag that a signal sets; no function of Python sees it.
+pub fn stoppable<T: Send>(py: Python<'_>, work: impl FnOnce(&AtomicBool) -> T + Send) -> PyResult<T> {
+    watched(py, &Watchers { progress: None, on_step: None }, None, |line| work(line.stop()))
+}
+
+/// Runs `work` that nothing can stop on a thread of its own, which a signal leaves to itself: it ends when it is done, and
+/// what it finds is dropped.
+pub fn left_alone<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let pool = crate::pool::forked()?;
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        let found = match pool {
+            Some(pool) => pool.install(work),
+            None => work(),
+        };
+        let _ = sender.send(found);
+    });
+    py.detach(move || {
+        loop {
+            match receiver.recv_timeout(EVERY) {
+                Ok(found) => return Ok(found),
+                Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals())?,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(PyRuntimeError::new_err("a thread ended without an answer"));
+                }
+            }
+        }
     })
 }
 

@@ -1,6 +1,8 @@
 """Laws as functions of arrays, against formulas in numpy."""
 
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -67,7 +69,7 @@ def test_laws_against_formulas():
 
 def test_names_of_parameters():
     models = Law.models()
-    assert len(models) == 9 and models["gent"]
+    assert len(models) == 10 and models["gent"]
     names = list(models["gent"])
     law = Law("gent", **{name: float(value) for name, value in models["gent"].items()})
     assert list(law.parameters) and names and law.shear_modulus > 0
@@ -148,3 +150,78 @@ def test_laws_are_pickled():
     again = pickle.loads(pickle.dumps(law))
     c = [1.2, 0.9, 1.0, 0.1, 0, 0]
     assert (again.predict(c).stress == law.predict(c).stress).all() and repr(again) == repr(law)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32, np.float16])
+def test_symmetry_to_rounding(kind):
+    """C turned into other axes is symmetric to rounding of its type; the symmetric part is taken."""
+    random = np.random.default_rng(0)
+    law = polymech.Law("gent", 1e5, 50.0, volumetric=("ciarlet", 1e6))
+    for count in (50, 700):
+        f = (np.eye(3) + 0.05 * random.normal(size=(count, 3, 3))).astype(kind)
+        q = np.linalg.qr(random.normal(size=(count, 3, 3)))[0].astype(kind)
+        c = q @ np.swapaxes(f, 1, 2) @ f @ np.swapaxes(q, 1, 2)
+        even = (c.astype(float) + np.swapaxes(c, 1, 2)) / 2
+        assert (c != np.swapaxes(c, 1, 2)).any()
+        assert (law.predict(c).stress == law.predict(even).stress).all()
+    skew = np.array([[1.1, 0.1, 0], [0.11, 1, 0], [0, 0, 1]]).astype(kind)
+    if kind != np.float16:
+        with pytest.raises(ValueError, match="symmetric"):
+            law.predict(skew)
+
+
+FORKED = """
+import concurrent.futures as futures, multiprocessing, sys
+import numpy as np, polymech
+law = polymech.Law("eight-chain", 0.27e6, 25)
+points = np.tile([1.1, 1, 1, 0, 0, 0], (2000, 1))
+x = np.linspace(-0.9, 0.9, 100000)
+def one(k):
+    a = float(law.predict(points).stress[k, 0])
+    b = polymech.Langevin.inverse(x)[k]
+    fit = polymech.fit("neo-hookean", {"uniaxial": ([1.5, 2, 3], [0.3e6, 0.5e6, 0.8e6])})
+    return a, float(b), float(fit.rms), float(law.uniaxial(np.linspace(1, 2, 1000))[k])
+own = one(1)
+pool = futures.ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("fork"))
+done, hung = futures.wait([pool.submit(one, 1) for _ in range(4)], timeout=60)
+for process in pool._processes.values(): process.kill()
+sys.exit(0 if not hung and all(f.result() == own for f in done) else 1)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="fork")
+def test_forked_processes():
+    """A pool forked after a call on all threads computes the same, where it hung."""
+    found = subprocess.run([sys.executable, "-W", "ignore", "-c", FORKED], capture_output=True, text=True, timeout=120)
+    assert found.returncode == 0, found.stderr
+
+
+LONG = """
+import os, signal, threading, time
+import numpy as np, polymech
+from polymech import crystfem
+law = polymech.Law("eight-chain", 0.27e6, 25)
+def fits():
+    stretch = np.linspace(1.01, 4, 20000)
+    for _ in range(1000): polymech.fit("ogden-3", {"uniaxial": (stretch, 1e6 * (stretch - stretch**-2))})
+def points():
+    c = np.tile([1.1, 1, 1, 0, 0, 0], (3_000_000, 1))
+    for _ in range(1000): law.predict(c, tangent=True)
+for call in (fits, points):
+    asked = []
+    def signal_later():
+        time.sleep(1.0)
+        asked.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+    threading.Thread(target=signal_later).start()
+    try: call()
+    except KeyboardInterrupt: assert time.perf_counter() - asked[0] < 5.0, call
+    else: raise SystemExit("no interruption")
+os._exit(0)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="signals")
+def test_long_calls_hear_ctrl_c():
+    found = subprocess.run([sys.executable, "-c", LONG], capture_output=True, text=True, timeout=120)
+    assert found.returncode == 0, found.stderr

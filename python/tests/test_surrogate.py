@@ -176,3 +176,20 @@ def test_speed(capsys):
     theirs = time.perf_counter() - begun
     with capsys.disabled():
         print(f"\nANN-4, 200 000 stresses: {ours:.3f} s; numpy in one batch {theirs:.3f} s")
+
+
+def test_one_hidden_layer():
+    """Ensembles of networks of two layers, in lists and tuples, are no layers themselves."""
+    members = [network(k, [6, 12, 6]) for k in range(3)]
+    c = strains(10)
+    each = np.stack([forward(layers, c, ["softplus", "linear"]) for layers in members])
+    for given in (members, tuple(map(tuple, members)), members[:2]):
+        found = Surrogate.from_weights(given, ["softplus", "linear"], strains=BOX)
+        assert found.header["members"] == len(given)
+        assert np.allclose(found.predict(c).stress, each[: len(given)].mean(axis=0), rtol=1e-12)
+    one = Surrogate.from_weights(members[0], ["softplus", "linear"], strains=BOX)
+    assert one.header["members"] == 1 and np.allclose(one.predict(c).stress, each[0], rtol=1e-12)
+    square = [network(k, [6, 6, 6]) for k in range(2)]
+    assert Surrogate.from_weights(square, ["softplus", "linear"], strains=BOX).header["members"] == 2
+    flat = [network(k, [6, 6]) for k in range(2)]
+    assert Surrogate.from_weights(flat, ["linear"], strains=BOX).header["members"] == 2

@@ -47,5 +47,6 @@ mod results;
 mod rubber;
 mod scenes;
 mod schemas;
+mod slicers;
 mod view;
 mod words;

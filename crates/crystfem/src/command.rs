@@ -10,6 +10,7 @@ use polycore::scene::Source;
 use std::process::ExitCode;
 
 mod bench;
+mod card;
 
 #[derive(clap::Subcommand)]
 enum Command {
@@ -17,6 +18,8 @@ enum Command {
     Point(RunArguments),
     /// Run a scene of fits: constants of the kinetics from measurements, with confidence intervals.
     Fit(RunArguments),
+    /// Write the materials of a scene as cards for Abaqus or CalculiX, in its units.
+    Card(card::Options),
     /// Measure error against run time.
     Bench(bench::Bench),
 }
@@ -26,6 +29,7 @@ pub fn main() -> ExitCode {
     case::main::<Crystfem, _>(|command| match command {
         Command::Point(arguments) => run(&arguments, Kind::Point),
         Command::Fit(arguments) => run(&arguments, Kind::Fit),
+        Command::Card(options) => card::write(&options),
         Command::Bench(bench) => bench.print(),
     })
 }

@@ -3,38 +3,121 @@
 use crate::error::Error;
 use crate::kinetics::GAS_CONSTANT;
 
-/// Degree of healing D_h = min(1, ∫ w dt/τ_r(T))^¼ of chains that cross an interface from contact on (Yang and Pitchumani 2002), with the relaxation time
-/// τ_r = τ₀ exp[(H/R)(1/T − 1/T₀)] and the melt's share w = 1 − α of the colder side: crystals stop it, remelting lets it go on. Strength is
-/// D_h times, fracture energy D_h² times that of the material (de Gennes, Wool).
+/// Degree of healing D_h = min(1, ∫ w dt/τ_r(T))^¼ of chains that cross an interface from contact on (Yang and Pitchumani 2002), with the melt's
+/// share w = 1 − α of the colder side: crystals stop it, remelting lets it go on. Strength is D_h times, fracture energy D_h² times that of
+/// the material (de Gennes, Wool).
+///
+/// The relaxation time is τ₀ at T₀. It follows Arrhenius in the melt, τ_r ∝ exp(H/(RT)), and, with a [`Glass`], the equation of Williams, Landel
+/// and Ferry from there down to the glass transition, at and below which nothing heals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Healing {
     time: f64,
     temperature: f64,
     energy: f64,
+    glass: Option<Glass>,
+}
+
+/// The glass transition: log₁₀ a_T = −C₁(T − T_g)/(C₂ + T − T_g) (Williams, Landel and Ferry 1955).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Glass {
+    /// T_g, K.
+    pub transition: f64,
+    /// C₁.
+    pub steepness: f64,
+    /// C₂, K.
+    pub width: f64,
+}
+
+/// Above T_g + 100 K free volume no longer rules the mobility of chains (Ferry 1980).
+const FREE_VOLUME: f64 = 100.0;
+
+impl Glass {
+    /// C₁ = 17.44 and C₂ = 51.6 K, which fit most polymers; T_g in K.
+    pub fn universal(transition: f64) -> Self {
+        Self { transition, steepness: 17.44, width: 51.6 }
+    }
+
+    /// ln a_T.
+    fn shift(&self, temperature: f64) -> f64 {
+        let above = temperature - self.transition;
+        -std::f64::consts::LN_10 * self.steepness * above / (self.width + above)
+    }
+
+    /// Where the apparent activation energy R T² ln 10 C₁C₂/(C₂ + T − T_g)² falls to `energy`, J/mol, but T_g + 100 K at most.
+    fn border(&self, energy: f64) -> f64 {
+        let Self { transition, steepness, width } = *self;
+        // √H (C₂ + T − T_g) = √(R ln 10 C₁C₂) T
+        let own = (GAS_CONSTANT * std::f64::consts::LN_10 * steepness * width).sqrt();
+        let slope = own - energy.sqrt();
+        let most = transition + FREE_VOLUME;
+        if slope >= 0.0 {
+            most
+        } else {
+            ((width - transition) * energy.sqrt() / slope).clamp(transition, most)
+        }
+    }
 }
 
 impl Healing {
-    /// τ₀, s, at T₀, K, and H, J/mol.
+    /// τ₀, s, at T₀, K, and H, J/mol: Arrhenius at any temperature.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a time or a temperature that is not above 0, an energy below 0, and what is not finite.
     pub fn new(time: f64, temperature: f64, energy: f64) -> Result<Self, Error> {
-        for (name, found, good, allowed) in [
-            ("relaxation time of healing, s", time, time > 0.0, "above 0, finite"),
-            ("temperature of healing, K", temperature, temperature > 0.0, "above 0, finite"),
-            ("activation energy of healing, J/mol", energy, energy >= 0.0, "0 or above, finite"),
-        ] {
-            if !(good && found.is_finite()) {
-                return Err(Error::Parameter { name, found, allowed: allowed.to_owned() });
-            }
+        positive(&[("relaxation time of healing, s", time), ("temperature of healing, K", temperature)])?;
+        if !(energy >= 0.0 && energy.is_finite()) {
+            let (name, allowed) = ("activation energy of healing, J/mol", "0 or above, finite".to_owned());
+            return Err(Error::Parameter { name, found: energy, allowed });
         }
-        Ok(Self { time, temperature, energy })
+        Ok(Self { time, temperature, energy, glass: None })
+    }
+
+    /// The same towards a glass transition.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a T_g that is not above 0 or reaches T₀, and constants that are not above 0.
+    pub fn with_glass(self, glass: Glass) -> Result<Self, Error> {
+        let Glass { transition, steepness, width } = glass;
+        let named = [("glass transition, K", transition), ("C1 of WLF", steepness), ("C2 of WLF, K", width)];
+        positive(&named)?;
+        if transition >= self.temperature {
+            let allowed = format!("below {} K, where the relaxation time is given", self.temperature);
+            return Err(Error::Parameter { name: "glass transition, K", found: transition, allowed });
+        }
+        Ok(Self { glass: Some(glass), ..self })
     }
 
     /// 1/τ_r, 1/s.
     pub fn rate(&self, temperature: f64) -> f64 {
-        let exponent = self.energy / GAS_CONSTANT * (1.0 / temperature - 1.0 / self.temperature);
-        (-exponent).exp() / self.time
+        if self.glass.is_some_and(|glass| temperature <= glass.transition) {
+            return 0.0;
+        }
+        (self.logarithm(self.temperature) - self.logarithm(temperature)).exp() / self.time
+    }
+
+    /// Says which equation holds where.
+    pub fn explain(&self) -> String {
+        match self.glass {
+            Some(glass) => format!(
+                "Arrhenius above {:.1} °C, WLF below, none at and below T_g = {:.1} °C",
+                glass.border(self.energy) - 273.15,
+                glass.transition - 273.15
+            ),
+            None => "Arrhenius at any temperature".to_owned(),
+        }
+    }
+
+    /// ln τ_r but for a constant.
+    fn logarithm(&self, temperature: f64) -> f64 {
+        let arrhenius = |temperature: f64| self.energy / (GAS_CONSTANT * temperature);
+        match self.glass {
+            Some(glass) => {
+                let border = glass.border(self.energy);
+                let below = temperature.min(border);
+                arrhenius(temperature.max(border)) + glass.shift(below) - glass.shift(border)
+            }
+            None => arrhenius(temperature),
+        }
     }
 
     /// ∫ w dt/τ_r over a step of temperatures, K, and melt's shares that are linear in time, by two points of Gauss: fourth order in the step.
@@ -48,6 +131,14 @@ impl Healing {
     /// D_h of an integral.
     pub fn degree(integral: f64) -> f64 {
         integral.clamp(0.0, 1.0).powf(0.25)
+    }
+}
+
+fn positive(named: &[(&'static str, f64)]) -> Result<(), Error> {
+    let allowed = "above 0, finite";
+    match named.iter().find(|(_, found)| !(*found > 0.0 && found.is_finite())) {
+        Some(&(name, found)) => Err(Error::Parameter { name, found, allowed: allowed.to_owned() }),
+        None => Ok(()),
     }
 }
 
@@ -86,6 +177,37 @@ mod tests {
         let sum: f64 = (0..steps).map(|k| healing.progress([438.15; 2], [melt(k), melt(k + 1)], dt)).sum();
         near("healing: ∫(1 − α)dt/τ of a hold", sum, 0.443767419, 1e-6);
         near("healing: its degree, ended by crystals", Healing::degree(sum), 0.816185, 1e-6);
+    }
+
+    /// From T_g + 100 K down to T_g + 20 K the WLF equation slows healing by 10^6.63, Arrhenius at 60 kJ/mol by 10^1.8.
+    #[test]
+    fn the_glass_stops_it() {
+        let arrhenius = Healing::new(2.0, 453.15, 60e3).unwrap();
+        let healing = arrhenius.with_glass(Glass::universal(318.15)).unwrap();
+        let factor = |law: Healing| (law.rate(418.15) / law.rate(338.15)).log10();
+        let wlf = 17.44 * (100.0 / 151.6 - 20.0 / 71.6);
+        near("healing: WLF from T_g + 100 to T_g + 20 K", factor(healing), wlf, 1e-12);
+        near("healing: Arrhenius from T_g + 100 to T_g + 20 K", factor(arrhenius), 1.78, 0.02);
+        // the same in the melt, and at T₀
+        for temperature in [418.15, 440.0, 453.15, 500.0] {
+            assert!((healing.rate(temperature) / arrhenius.rate(temperature) - 1.0).abs() < 1e-12);
+        }
+        assert_eq!([300.0, 318.15].map(|temperature| healing.rate(temperature)), [0.0; 2]);
+        let rates: Vec<f64> = (319..500).map(|t| healing.rate(f64::from(t))).collect();
+        assert!(rates.windows(2).all(|pair| pair[0] < pair[1]));
+        // an energy above that of WLF at T_g + 100 K: both agree in value and slope where they meet
+        let stiff = Healing::new(2.0, 453.15, 200e3).unwrap().with_glass(Glass::universal(318.15)).unwrap();
+        let border = Glass::universal(318.15).border(200e3);
+        assert!(border > 318.15 && border < 418.15, "{border}");
+        let slope = |at: f64| (stiff.logarithm(at + 1e-3) - stiff.logarithm(at - 1e-3)) / 2e-3;
+        near(
+            "healing: slope below over above the border",
+            slope(border - 0.01) / slope(border + 0.01),
+            1.0,
+            1e-3,
+        );
+        assert!(arrhenius.with_glass(Glass::universal(460.0)).is_err());
+        assert!(arrhenius.with_glass(Glass { width: 0.0, ..Glass::universal(318.15) }).is_err());
     }
 
     #[test]

@@ -27,6 +27,8 @@ polycore::quantities! {
     WORST_STRESS_BALANCE = "worst_stress_balance", "", "with `[mechanics]`: largest |work + hardening − stored − lost| of a step over the energies it moved and those stored";
     LEAST_HEALING = "least_healing", "", "with `[healing]`: least degree of healing D_h of an interface between births";
     MEAN_HEALING = "mean_healing", "", "with `[healing]`: its mean by area";
+    LEAST_INTERLAYER_STRENGTH = "least_interlayer_strength", "MPa", "with `healing.strength`: least strength of an interface, D_h times that of the material";
+    MEAN_INTERLAYER_STRENGTH = "mean_interlayer_strength", "MPa", "with `healing.strength`: its mean by area";
     MEAN = "{layer}mean_{field}", "*", "mean by volume at the end, of the part or of a layer";
     LEAST = "{layer}least_{field}", "*", "smallest value at a node";
     LARGEST = "{layer}largest_{field}", "*", "largest value at a node";

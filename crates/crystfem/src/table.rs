@@ -1,16 +1,55 @@
-//! Tables of measured numbers: CSV whose headings are `name [unit]`, as the programs write them too.
+//! Columns of tables of measured numbers, read by [`polycore::table`], and the names under which calorimeters write them.
 
 use crate::error::Error;
-use polycore::units::{Dimension, Quantity};
+use polycore::table::{self, Table};
+use polycore::units::Dimension;
 use std::path::Path;
+
+/// Other names of a column, the likeliest first.
+const NAMES: [(&str, &[&str]); 4] = [
+    ("time", &["time", "t", "elapsed time", "test time", "zeit"]),
+    (
+        "temperature",
+        &[
+            "temperature",
+            "T",
+            "temp",
+            "sample temperature",
+            "sample temp",
+            "ts",
+            "t sample",
+            "temperatur",
+            "program temperature",
+        ],
+    ),
+    (
+        "heat_flow",
+        &[
+            "heat_flow",
+            "heatflow",
+            "dsc",
+            "normalized heat flow",
+            "heat flow normalized",
+            "unsubtracted heat flow",
+            "hf",
+            "wärmestrom",
+            "value",
+        ],
+    ),
+    ("alpha", &["alpha", "α", "relative crystallinity", "conversion"]),
+];
+
+fn names(name: &'static str) -> Vec<&'static str> {
+    NAMES.iter().find(|(first, _)| *first == name).map_or(vec![name], |(_, all)| all.to_vec())
+}
 
 /// A column that is requested.
 #[derive(Clone, Copy)]
 pub struct Column {
     name: &'static str,
-    read: fn(&str) -> Result<f64, String>,
+    read: fn(&Table, usize, Option<&str>) -> Result<Vec<f64>, table::Error>,
     example: &'static str,
-    unit: &'static str,
+    unit: Option<&'static str>,
     least: f64,
     most: f64,
 }
@@ -18,14 +57,13 @@ pub struct Column {
 impl Column {
     /// A column of quantities of dimension `D`.
     pub fn of<D: Dimension>(name: &'static str) -> Self {
-        let read =
-            |text: &str| text.parse::<Quantity<D>>().map(Quantity::si).map_err(|error| error.to_string());
-        Self { name, read, example: D::EXAMPLE, unit: "", least: f64::NEG_INFINITY, most: f64::INFINITY }
+        let (least, most) = (f64::NEG_INFINITY, f64::INFINITY);
+        Self { name, read: Table::column::<D>, example: D::EXAMPLE, unit: None, least, most }
     }
 
     /// Takes a heading without a unit in this one.
     pub fn or_unit(mut self, unit: &'static str) -> Self {
-        self.unit = unit;
+        self.unit = Some(unit);
         self
     }
 
@@ -36,8 +74,7 @@ impl Column {
     }
 }
 
-/// Reads columns, in SI units, whatever their order and units in the file; others are passed over. Lines that begin
-/// with `#` are comments.
+/// Reads columns, in SI units, whatever their order and units in the file; others are passed over.
 ///
 /// # Errors
 /// [`Error::File`] with line and column for a file that cannot be read, a missing or repeated column, a row of another
@@ -54,79 +91,62 @@ pub fn read_with_lines<const N: usize>(
     path: &Path,
     columns: [Column; N],
 ) -> Result<([Vec<f64>; N], Vec<usize>), Error> {
-    let text = std::fs::read_to_string(path).map_err(polycore::Error::io("read", path))?;
-    let fail = |line: u64, what: String, found: &str, allowed: String| Error::File {
-        path: path.to_path_buf(),
-        line: usize::try_from(line).unwrap_or(0),
-        what,
-        found: found.to_owned(),
-        allowed,
-    };
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .flexible(true)
-        .from_reader(text.as_bytes());
-    let header =
-        reader.headers().map_err(|error| fail(1, "header".into(), &error.to_string(), "CSV".into()))?;
-    let header = header.clone();
-    let line = line_of(&text, header.position());
-    let mut places = [(); N].map(|()| (0, String::new()));
+    let table = open(path)?;
+    let mut data = [(); N].map(|()| Vec::new());
+    let mut places = [0; N];
     for (column, place) in columns.iter().zip(&mut places) {
-        let heads: Vec<(usize, String)> = header
-            .iter()
-            .enumerate()
-            .filter_map(|(index, heading)| {
-                let (name, unit) = heading.split_once('[').unwrap_or((heading, ""));
-                let unit = unit.trim_end_matches(']').trim();
-                let unit = if unit.is_empty() { column.unit } else { unit };
-                (name.trim() == column.name).then(|| (index, unit.to_owned()))
-            })
-            .collect();
-        let allowed = format!("one column `{} [unit]`, with numbers like {}", column.name, column.example);
-        let found = header.iter().collect::<Vec<_>>().join(",");
-        let [head] = <[_; 1]>::try_from(heads).map_err(|_| fail(line, "header".into(), &found, allowed))?;
-        *place = head;
+        let found = table.matching(&names(column.name));
+        let [one] = found[..] else {
+            let (name, example) = (column.name, column.example);
+            let allowed = format!("one column `{name} [unit]`, with numbers like {example}");
+            return Err(table.refuse_headings(allowed).into());
+        };
+        *place = one;
     }
-    let (mut data, mut lines) = ([(); N].map(|()| Vec::new()), Vec::new());
-    for record in reader.records() {
-        let record = record.map_err(|error| fail(0, "row".into(), &error.to_string(), "CSV".into()))?;
-        let line = line_of(&text, record.position());
-        if record.len() != header.len() {
-            let found = format!("{} cells", record.len());
-            return Err(fail(line, "row".into(), &found, format!("{}, as the header has", header.len())));
+    if table.rows() == 0 {
+        let line = table.layout().heading_line;
+        return Err(table.refuse(line, "table", "no row".into(), "at least one row of numbers").into());
+    }
+    for ((column, place), data) in columns.iter().zip(places).zip(&mut data) {
+        *data = (column.read)(&table, place, column.unit)?;
+        let range = column.least..=column.most;
+        if let Some(row) = data.iter().position(|value| !range.contains(value)) {
+            let allowed = format!("{} to {} (SI)", column.least, column.most);
+            return Err(table.refuse_cell(row, place, &allowed).into());
         }
-        for ((column, (index, unit)), data) in columns.iter().zip(&places).zip(&mut data) {
-            let cell = &record[*index];
-            let what = format!("column {}, `{}`", index + 1, &header[*index]);
-            let number = (column.read)(format!("{cell} {unit}").trim());
-            let number = number.map_err(|why| fail(line, what.clone(), cell, format!("a number; {why}")))?;
-            if !(column.least..=column.most).contains(&number) {
-                let allowed = format!("{} to {} (SI)", column.least, column.most);
-                return Err(fail(line, what, cell, allowed));
-            }
-            data.push(number);
-        }
-        lines.push(usize::try_from(line).unwrap_or(0));
     }
-    if data.iter().any(Vec::is_empty) {
-        return Err(fail(line, "table".into(), "no row", "at least one row of numbers".into()));
-    }
-    Ok((data, lines))
+    Ok((data, (0..table.rows()).map(|row| table.line(row)).collect()))
 }
 
-/// The line of a record, from 1; the reader counts comments and blank lines before it as its own.
-fn line_of(text: &str, position: Option<&csv::Position>) -> u64 {
-    let Some(position) = position else { return 1 };
-    let rest = usize::try_from(position.byte()).ok().and_then(|byte| text.get(byte..)).unwrap_or("");
-    let skipped = rest.lines().take_while(|line| line.trim().is_empty() || line.starts_with('#')).count();
-    position.line() + skipped as u64
+/// One line: how a table of a calorimeter is understood; nothing of what is none.
+pub fn understood(path: &Path) -> Option<String> {
+    let table = Table::read(path).ok()?;
+    let used: Vec<usize> = NAMES.iter().flat_map(|(_, names)| table.matching(names)).collect();
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    (!used.is_empty()).then(|| format!("data {name}: {}", table.understood(&used)))
+}
+
+impl From<table::Error> for Error {
+    fn from(error: table::Error) -> Self {
+        let table::Error { path, line, what, found, allowed } = error;
+        Self::File { path, line, what, found, allowed }
+    }
+}
+
+/// A table, whose faults are those of a line of a file.
+fn open(path: &Path) -> Result<Table, Error> {
+    Table::read(path).map_err(|error| match error {
+        polycore::Error::Table(error) => error.into(),
+        other => other.into(),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use polycore::units::dimension::{RatioDimension, TemperatureDimension, TimeDimension};
+    use polycore::units::dimension::{
+        RatioDimension, SpecificPowerDimension, TemperatureDimension, TimeDimension,
+    };
 
     fn of(text: &str) -> Result<[Vec<f64>; 3], String> {
         let folder = tempfile::tempdir().unwrap();
@@ -153,17 +173,17 @@ mod tests {
     fn refusals_name_file_line_and_column() {
         let good = "time [s],temperature [degC],alpha\n";
         for (text, parts) in [
-            ("time [s],alpha\n", ["t.csv:1: header", "one column `temperature [unit]`"]),
-            ("time [s],time [s],temperature [K],alpha\n", ["t.csv:1: header", "one column `time"]),
+            ("time [s],alpha\n", ["t.csv:1: headings", "one column `temperature [unit]`"]),
+            ("time [s],time [s],temperature [K],alpha\n", ["t.csv:1: headings", "one column `time"]),
             (good, ["t.csv:1: table", "at least one row"]),
-            ("", ["header", "one column"]),
+            ("", ["headings", "a line of headings"]),
             (&format!("{good}1,2,x\n"), ["t.csv:2: column 3, `alpha`: found \"x\"", "a number"]),
             (&format!("{good}1,20,0.5\n# c\n1,-300,0.5\n"), ["t.csv:4: column 2", "below absolute zero"]),
             (&format!("{good}1,20,1.5\n"), ["found \"1.5\"", "0 to 1"]),
             (&format!("{good}nan,20,0.5\n"), ["t.csv:2: column 1", "not a finite number"]),
-            (&format!("{good}1,20\n"), ["t.csv:2: row", "3, as the header has"]),
-            ("time,temperature [K],alpha\n1,2,0\n", ["t.csv:2: column 1, `time`", "has no unit"]),
-            ("time [m],temperature [K],alpha\n1,2,0\n", ["t.csv:2: column 1", "a time is needed"]),
+            (&format!("{good}1,20\n"), ["t.csv:2: row", "3, as the headings have"]),
+            ("time,temperature [K],alpha\n1,2,0\n", ["t.csv:1: unit of column 1, `time`", "has no unit"]),
+            ("time [m],temperature [K],alpha\n1,2,0\n", ["t.csv:1: unit of column 1", "a time is needed"]),
         ] {
             let error = of(text).unwrap_err();
             assert!(parts.iter().all(|part| error.contains(part)), "{error}");
@@ -175,5 +195,44 @@ mod tests {
                 .to_string()
                 .contains("cannot read /no/such.csv")
         );
+    }
+
+    /// Exports of calorimeters: the same three rows of Netzsch (Latin-1), TA Instruments (UTF-16), Mettler, PerkinElmer
+    /// and of a spreadsheet.
+    #[test]
+    fn exports_of_calorimeters() {
+        let netzsch = "#EXO:1\r\n#DECIMAL:COMMA\r\n##Temp./°C;Time/min;DSC/(mW/mg)\r\n200,5;0,0;0,05\r\n\
+                       199,5;0,1;0,25\r\n";
+        let latin: Vec<u8> = netzsch.chars().map(|c| u8::try_from(c).unwrap()).collect();
+        let ta = "Filename\tPA12.tri\r\nSample\tx\r\nTime (min)\tTemperature (°C)\tHeat Flow (W/g)\r\n\
+                  0.0\t200.5\t0.05\r\n0.1\t199.5\t0.25\r\n";
+        let wide: Vec<u8> =
+            "\u{feff}".chars().chain(ta.chars()).map(|c| c as u16).flat_map(u16::to_le_bytes).collect();
+        let mettler = "Curve Values:\n  Index      t       Ts       Value\n             [s]     [°C]     [W/g]\n\
+                       \x20     0      0    200.5        0.05\n      1      6    199.5        0.25\n";
+        let elmer = "PerkinElmer\nTime\tHeat Flow\tSample Temperature\nminutes\tmW/mg\tºC\n0\t0.05\t200.5\n0.1\t0.25\t199.5\n";
+        let sheet = "\u{feff}\"time [s]\";\"temperature [K]\";\"heat_flow [W/kg]\"\n\"0\";\"473,65\";\"50\"\n6;472,65;250\n";
+        for (name, bytes) in [
+            ("netzsch", latin),
+            ("ta", wide),
+            ("mettler", mettler.as_bytes().to_vec()),
+            ("elmer", elmer.as_bytes().to_vec()),
+            ("sheet", sheet.as_bytes().to_vec()),
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("t.csv");
+            std::fs::write(&path, bytes).unwrap();
+            let columns = [
+                Column::of::<TimeDimension>("time"),
+                Column::of::<TemperatureDimension>("temperature"),
+                Column::of::<SpecificPowerDimension>("heat_flow"),
+            ];
+            let [time, temperature, flow] =
+                read(&path, columns).unwrap_or_else(|error| panic!("{name}: {error}"));
+            assert_eq!(time, [0.0, 6.0], "{name}");
+            assert_eq!(temperature, [473.65, 472.65], "{name}");
+            assert_eq!(flow, [50.0, 250.0], "{name}");
+            assert!(understood(&path).unwrap().starts_with("data t.csv: separat"), "{name}");
+        }
     }
 }

@@ -60,6 +60,9 @@ polycore::quantities! {
     LARGEST_ASYMMETRY = "{model}.largest_tangent_asymmetry", "", "the same, largest of the test rows";
     CYCLE = "{model}.work_of_a_closed_cycle", "", "|∮ S:dC/2| over ∮ |S:dC/2| around a rectangle in C₁₁ and C₃₃, from I to half of the training box";
     OBJECTIVITY = "{model}.lack_of_objectivity", "", "largest ‖σ(RF) − R σ(F) Rᵀ‖/‖σ(F)‖";
+    LEAST_WAVE = "{model}.least_acoustic_eigenvalue", "MPa", "smallest eigenvalue of the acoustic tensor over the directions and up to 500 training strains; below zero the law has lost its ellipticity";
+    LEAST_WAVE_AT = "{model}.least_acoustic_eigenvalue_at_c{component}", "", "component of C there";
+    NOT_ELLIPTIC = "{model}.share_not_elliptic", "", "share of these strains at which the law has lost its ellipticity";
     UNSEEN_SHEAR = "{model}.unseen_shear_stress", "MPa", "shear stress in simple shears of 0.05, where the data have no shear";
     SHEAR_FLAGGED = "{model}.share_of_shear_flagged", "", "share of these shears that are flagged as unseen";
     BINNED = "{model}.heldout.percentage_error_c{component}_{from}_to_{to}", "%", "mean of (3.13) over all held-out runs pulled along an axis, between two values of C";

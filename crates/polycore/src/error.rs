@@ -103,6 +103,10 @@ pub enum Error {
     /// A constitutive law, its fit, table or file.
     #[error(transparent)]
     Constitutive(#[from] constitutive::Error),
+    /// A table of numbers that cannot be read.
+    #[cfg(feature = "tables")]
+    #[error(transparent)]
+    Table(#[from] crate::table::Error),
 }
 
 /// What a user can do something about, before the system's own words.
@@ -136,6 +140,8 @@ impl Error {
             | Self::OutputDirectory { .. }
             | Self::Checkpoint { .. }
             | Self::Format { .. } => EXIT_BAD_INPUT,
+            #[cfg(feature = "tables")]
+            Self::Table(_) => EXIT_BAD_INPUT,
             Self::Constitutive(constitutive::Error::Invalid { .. } | constitutive::Error::File { .. }) => {
                 EXIT_BAD_INPUT
             }

@@ -33,6 +33,8 @@ pub mod random;
 pub mod report;
 #[cfg(feature = "case")]
 pub mod scene;
+#[cfg(feature = "tables")]
+pub mod table;
 pub mod tensor;
 pub mod transfer;
 pub mod units;

@@ -13,6 +13,7 @@ mod cli {
     /// Everything printed and written is in MPa.
     pub const MPA: f64 = 1e6;
 
+    pub mod card;
     pub mod draw;
     pub mod exact;
     pub mod fits;

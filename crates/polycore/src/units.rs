@@ -69,35 +69,81 @@ impl<D: Dimension> FromStr for Quantity<D> {
     /// finite or that over- or underflow in SI units.
     fn from_str(text: &str) -> Result<Self, UnitError> {
         let (number, unit) = grammar::split_number(text)?;
-        let invalid = |problem| UnitError::Range { text: text.trim().into(), problem };
         if !number.is_finite() {
-            return Err(invalid("is not a finite number"));
+            return Err(UnitError::Range { text: text.trim().into(), problem: "is not a finite number" });
         }
-        if unit.is_empty() && D::EXPONENTS != [0; 8] {
-            return Err(UnitError::bare::<D>(text.trim()));
-        }
-        let si = match (table::affine(unit), D::ABSOLUTE_TEMPERATURE) {
-            (Some((factor, zero)), true) => (number + zero) * factor,
-            (Some(_), false) => return Err(UnitError::affine(text.trim(), unit)),
-            (None, _) => {
-                let (numerator, denominator, exponents) = grammar::unit(unit, text)?;
-                if exponents != D::EXPONENTS {
-                    return Err(UnitError::dimension::<D>(text.trim(), exponents));
-                }
-                number * numerator / denominator
-            }
-        };
-        if !si.is_finite() {
-            return Err(invalid("is too large for a 64-bit number in SI units"));
-        }
-        if number != 0.0 && si.abs() < f64::MIN_POSITIVE && !D::ABSOLUTE_TEMPERATURE {
-            return Err(invalid("is too small for a 64-bit number in SI units"));
-        }
-        if D::ABSOLUTE_TEMPERATURE && si < 0.0 {
-            return Err(invalid("lies below absolute zero"));
-        }
-        Ok(Self::from_si(si))
+        Unit::<D>::within(unit, text)?.of(number)
     }
+}
+
+/// A unit of a dimension `D`, read once and then used for many numbers: those of a column of a table.
+#[derive(Clone, Debug)]
+pub struct Unit<D> {
+    text: String,
+    numerator: f64,
+    denominator: f64,
+    zero: f64,
+    dimension: PhantomData<D>,
+}
+
+impl<D: Dimension> Unit<D> {
+    /// Reads a unit; the empty text is that of dimensionless numbers.
+    ///
+    /// # Errors
+    /// An unknown unit, another dimension than `D`, no unit where one is needed.
+    pub fn parse(unit: &str) -> Result<Self, UnitError> {
+        Self::within(unit.trim(), unit)
+    }
+
+    /// The unit at the end of a text, for whose errors the whole of it is given.
+    fn within(unit: &str, whole: &str) -> Result<Self, UnitError> {
+        let new = |numerator, denominator, zero| Self {
+            text: unit.to_owned(),
+            numerator,
+            denominator,
+            zero,
+            dimension: PhantomData,
+        };
+        if unit.is_empty() && D::EXPONENTS != [0; 8] {
+            return Err(UnitError::bare::<D>(whole.trim()));
+        }
+        match (table::affine(unit), D::ABSOLUTE_TEMPERATURE) {
+            (Some((factor, zero)), true) => Ok(new(factor, 1.0, zero)),
+            (Some(_), false) => Err(UnitError::affine(whole.trim(), unit)),
+            (None, _) => {
+                let (numerator, denominator, exponents) = grammar::unit(unit, whole)?;
+                match exponents == D::EXPONENTS {
+                    true => Ok(new(numerator, denominator, 0.0)),
+                    false => Err(UnitError::dimension::<D>(whole.trim(), exponents)),
+                }
+            }
+        }
+    }
+
+    /// The quantity of that many units.
+    ///
+    /// # Errors
+    /// Numbers that over- or underflow in SI units, and temperatures below absolute zero.
+    pub fn of(&self, number: f64) -> Result<Quantity<D>, UnitError> {
+        // −0 stays −0
+        let from_zero = if self.zero == 0.0 { number } else { number + self.zero };
+        let si = from_zero * self.numerator / self.denominator;
+        let problem = if !si.is_finite() {
+            "is too large for a 64-bit number in SI units"
+        } else if number != 0.0 && si.abs() < f64::MIN_POSITIVE && !D::ABSOLUTE_TEMPERATURE {
+            "is too small for a 64-bit number in SI units"
+        } else if D::ABSOLUTE_TEMPERATURE && si < 0.0 {
+            "lies below absolute zero"
+        } else {
+            return Ok(Quantity::from_si(si));
+        };
+        Err(UnitError::Range { text: format!("{number:?} {}", self.text).trim().to_owned(), problem })
+    }
+}
+
+/// Whether a text is a unit of any dimension.
+pub fn is_unit(text: &str) -> bool {
+    !text.is_empty() && (table::affine(text).is_some() || grammar::unit(text, text).is_ok())
 }
 
 impl<D: Dimension> fmt::Display for Quantity<D> {

@@ -47,6 +47,9 @@ fn states(found: usize) {
 /// UMAT as Abaqus declares it (*Abaqus User Subroutines Guide*, 1.1.44): three normal and three shear stresses. Rubbers take F from `DFGRD1`, prints
 /// the strains `STRAN` + `DSTRAN`. Where a law has no stress, `PNEWDT` asks for a quarter of the increment.
 ///
+/// Energies are those of a unit of the deformed volume, in the host's unit of stress: `SSE` is W/J of a rubber; of a print the elastic energy,
+/// beside what crystals took as they grew and melted (`SPD`) and what relaxed (`SCD`).
+///
 /// # Safety
 /// As in Fortran: every pointer is valid for the length that `NTENS`, `NSTATV` and `NPROPS` tell, and nothing else refers to what is written.
 #[unsafe(no_mangle)]
@@ -54,9 +57,9 @@ pub unsafe extern "C" fn umat_(
     stress: *mut f64,
     statev: *mut f64,
     ddsdde: *mut f64,
-    _sse: *mut f64,
-    _spd: *mut f64,
-    _scd: *mut f64,
+    sse: *mut f64,
+    spd: *mut f64,
+    scd: *mut f64,
     _rpl: *mut f64,
     _ddsddt: *mut f64,
     _drplde: *mut f64,
@@ -99,9 +102,14 @@ pub unsafe extern "C" fn umat_(
             [stran, dstran].map(|six| Voigt::from_column_slice(std::slice::from_raw_parts(six, 6))),
         )
     };
-    let answer = with(name, constants, |material| match material {
+    let answer: Result<_, Error> = with(name, constants, |material| match material {
         // SAFETY: the caller's promise
-        Material::Rubber(rubber) => rubber.cauchy(unsafe { &*dfgrd1 }),
+        Material::Rubber(rubber) => {
+            let (stress, tangent, energy) = rubber.stored(unsafe { &*dfgrd1 })?;
+            // SAFETY: the caller's promise
+            unsafe { *sse = energy };
+            Ok((stress, tangent))
+        }
         Material::Print(print) => {
             states(state.len());
             // SAFETY: the caller's promise
@@ -110,7 +118,15 @@ pub unsafe extern "C" fn umat_(
             turned(&mut old, turn);
             // the host has turned its own strain
             old[3..9].copy_from_slice(change[0].as_slice());
-            print.advance(&old, state, temperature, time, |before| before + change[1])
+            let (stress, tangent, energies) =
+                print.advance(&old, state, temperature, time, |before| before + change[1])?;
+            // SAFETY: the caller's promise; they hold the energies at the start
+            unsafe {
+                *sse += energies.stored;
+                *spd += energies.crystals;
+                *scd += energies.viscous;
+            }
+            Ok((stress, tangent))
         }
     });
     // SAFETY: the caller's promise
@@ -207,7 +223,9 @@ pub unsafe extern "C" fn umat_user_(
             states(old.len());
             // SAFETY: the caller's promise
             let (temperature, time) = unsafe { (*t1l, *dtime) };
-            print.advance(old, new, temperature, time, |_| doubled)
+            print
+                .advance(old, new, temperature, time, |_| doubled)
+                .map(|(stress, tangent, _)| (stress, tangent))
         }
     });
     match answer {

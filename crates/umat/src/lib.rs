@@ -19,7 +19,7 @@ mod rubber;
 #[cfg(test)]
 mod tests;
 
-pub use print::Print;
+pub use print::{Dissipation, Print};
 pub use rubber::Rubber;
 
 /// Why a material cannot be made, or has no stress.

@@ -17,6 +17,18 @@ pub struct Print {
     unit: f64,
 }
 
+/// What an increment did with its work, in the host's unit of stress; the three together are the work of the stress on the
+/// strain without the free strain.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Dissipation {
+    /// Increase of the elastic energy.
+    pub stored: f64,
+    /// Taken by growing and melting crystals, and by softening.
+    pub crystals: f64,
+    /// Dissipated by relaxation, that of the melt included.
+    pub viscous: f64,
+}
+
 /// The strains of a branch.
 const SIX: usize = 6;
 
@@ -55,7 +67,7 @@ impl Print {
         Ok(answer.map_err(|error| Error::new(error.name, error.found, error.allowed))?.state)
     }
 
-    /// Stress and the tangent after an increment to a temperature, in a time, s; `strain` gives the total strain at the end from that at the
+    /// Stress, the tangent and energies after an increment to a temperature, in a time, s; `strain` gives the total strain at the end from that at the
     /// start, shears doubled. Reads `state`, writes `new`, both of [`Self::STATES`] numbers.
     ///
     /// # Errors
@@ -67,7 +79,7 @@ impl Print {
         temperature: f64,
         time: f64,
         strain: impl FnOnce(&Voigt) -> Voigt,
-    ) -> Result<(Voigt, Voigt6x6), Error> {
+    ) -> Result<(Voigt, Voigt6x6, Dissipation), Error> {
         let zero = self.thermal[4];
         let old = State { z: state[0], degree: state[1], temperature: state[2] };
         // 0 in fresh material
@@ -86,6 +98,21 @@ impl Print {
         for (branch, kept) in branches.iter_mut().zip(state[9..].chunks_exact(SIX)) {
             branch.copy_from_slice(kept);
         }
+        let nu = self.body.poisson;
+        // Ĉ of modulus 1
+        let (lame, shear) = (nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), 0.5 / (1.0 + nu));
+        let product = |a: &[f64; SIX], b: &[f64; SIX]| {
+            let sum = |range: std::ops::Range<usize>| range.map(|k| a[k] * b[k]).sum::<f64>();
+            let traces = (a[0] + a[1] + a[2]) * (b[0] + b[1] + b[2]);
+            lame * traces + 2.0 * shear * (sum(0..3) + 2.0 * sum(3..6))
+        };
+        let energies = step.energies(&branches[..count], &mechanical, product);
+        let floor = 0.5 * step.floor * product(&mechanical, &mechanical);
+        let dissipation = Dissipation {
+            stored: energies.stored / self.unit,
+            crystals: (energies.growth + energies.melting - energies.softening) / self.unit,
+            viscous: (energies.viscous + floor) / self.unit,
+        };
         step.advance(&mut branches[..count], &mechanical);
         let elastic = step.stress(&branches[..count]);
         let sum: [f64; SIX] = std::array::from_fn(|k| elastic[k] + step.floor * mechanical[k]);
@@ -94,9 +121,6 @@ impl Print {
         for (branch, kept) in branches.iter().zip(new[9..].chunks_exact_mut(SIX)) {
             kept.copy_from_slice(branch);
         }
-        // Ĉ of modulus 1
-        let nu = self.body.poisson;
-        let (lame, shear) = (nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), 0.5 / (1.0 + nu));
         let volume = lame * (sum[0] + sum[1] + sum[2]);
         let stress = Voigt::from_fn(|k, _| 2.0 * shear * sum[k] + if k < 3 { volume } else { 0.0 });
         let tangent = Voigt6x6::from_fn(|a, b| {
@@ -104,7 +128,7 @@ impl Print {
             let own = if a == b { shear * if a < 3 { 2.0 } else { 1.0 } } else { 0.0 };
             common + own
         });
-        Ok((stress / self.unit, tangent * (step.stiffness / self.unit)))
+        Ok((stress / self.unit, tangent * (step.stiffness / self.unit), dissipation))
     }
 }
 
@@ -119,8 +143,8 @@ mod tests {
             print.advance(state, new, t, dt, |_| Voigt::new(plane, plane, third, 0.0, 0.0, 0.0)).unwrap()
         };
         // linear in the strain
-        let (stress, tangent) = advance(state[5]);
-        let (stress, tangent) = (advance(state[5] - stress[2] / tangent[(2, 2)]).0, tangent);
+        let (stress, tangent, _) = advance(state[5]);
+        let stress = advance(state[5] - stress[2] / tangent[(2, 2)]).0;
         let coupled = tangent[(0, 2)] * (tangent[(2, 0)] + tangent[(2, 1)]) / tangent[(2, 2)];
         (stress[0], tangent[(0, 0)] + tangent[(0, 1)] - coupled)
     }

@@ -55,9 +55,20 @@ impl Rubber {
     /// # Errors
     /// As [`Self::material`]; det F ≤ 0.
     pub fn cauchy(&self, f: &[f64; 9]) -> Result<(Voigt, Voigt6x6), Error> {
+        self.stored(f).map(|(stress, tangent, _)| (stress, tangent))
+    }
+
+    /// As [`Self::cauchy`], with the stored energy W/J of a unit of the deformed volume, in the host's unit of stress.
+    ///
+    /// # Errors
+    /// As [`Self::cauchy`].
+    pub fn stored(&self, f: &[f64; 9]) -> Result<(Voigt, Voigt6x6, f64), Error> {
         let f = DeformationGradient::new(Tensor::from_column_slice(f)).map_err(stretched)?;
-        let (s, tangent) = self.material(&voigt::from_stress(&f.right_cauchy_green()))?;
-        Ok((voigt::cauchy_of_material(&f, &s), voigt::jaumann_tangent(&f, &s, &tangent)))
+        let c = voigt::from_stress(&f.right_cauchy_green());
+        let found = self.law.tangent(&c, &mut Workspace::default()).map_err(stretched)?;
+        let (s, tangent) = (found.stress, found.tangent.unwrap_or_default());
+        let energy = found.energy.unwrap_or_default() / f.jacobian();
+        Ok((voigt::cauchy_of_material(&f, &s), voigt::jaumann_tangent(&f, &s, &tangent), energy))
     }
 }
 

@@ -21,6 +21,12 @@ struct Call<'a> {
 impl Call<'_> {
     /// σ, DDSDDE and PNEWDT.
     fn umat(&self, state: &mut [f64]) -> (Voigt, Voigt6x6, f64) {
+        self.with_energies(state, &mut [0.0; 3])
+    }
+
+    /// The same, with SSE, SPD and SCD brought up to date.
+    fn with_energies(&self, state: &mut [f64], energies: &mut [f64; 3]) -> (Voigt, Voigt6x6, f64) {
+        let [sse, spd, scd] = energies;
         let (mut stress, mut tangent, mut cut) = ([0.0; 6], [0.0; 36], 1.0);
         let mut one = [0.0; 9];
         let none = one.as_mut_ptr();
@@ -35,9 +41,9 @@ impl Call<'_> {
                 stress.as_mut_ptr(),
                 state.as_mut_ptr(),
                 tangent.as_mut_ptr(),
-                none,
-                none,
-                none,
+                sse,
+                spd,
+                scd,
                 none,
                 none,
                 none,
@@ -116,6 +122,58 @@ fn tangent_by_differences() {
             assert!(off < 1e-8, "{name} {b}: {off}");
         }
     }
+}
+
+/// SSE is the stored energy of the deformed volume: J SSE grows by the work J σ:d of a slow path from rest.
+#[test]
+fn stored_energy_is_work() {
+    let end = Tensor::new(0.3, 0.2, -0.1, 0.0, -0.1, 0.15, 0.1, 0.0, -0.05);
+    for (name, constants) in [("NEO_HOOKEAN", &[20.0, 1.0][..]), ("EIGHT_CHAIN", &[30.0, 0.5, 12.0][..])] {
+        let at = |part: f64| Tensor::identity() + part * end;
+        let (mut work, steps) = (0.0, 200);
+        let mut sse = [0.0; 3];
+        for step in 0..steps {
+            let [from, to] = [step, step + 1].map(|k| f64::from(k) / f64::from(steps));
+            // midpoint rule: P : dF = J σ F⁻ᵀ : dF
+            let f = at(0.5 * (from + to));
+            let (stress, ..) = call(name, constants, f).umat(&mut []);
+            let piola = voigt::to_stress(&stress) * f.try_inverse().unwrap().transpose() * f.determinant();
+            work += piola.dot(&((to - from) * end));
+            call(name, constants, at(to)).with_energies(&mut [], &mut sse);
+        }
+        let stored = sse[0] * at(1.0).determinant();
+        assert!((stored / work - 1.0).abs() < 1e-4 && work > 0.01, "{name}: {stored} {work}");
+        assert_eq!(sse[1..], [0.0; 2]);
+    }
+}
+
+/// Once its crystals are grown, the work on a print at one temperature is stored or relaxed: no strain is free, and none is lost.
+#[test]
+fn energies_of_a_print_close() {
+    let constants = [1.0, 273.15, 180.0, 0.25, 1e6];
+    let mut state = vec![0.0; Print::STATES];
+    let mut energies = [0.0; 3];
+    let mut one = call("PRINTED_PA12", &constants, Tensor::identity());
+    (one.time, one.temperature) = (10.0, [150.0; 2]);
+    let mut before = Voigt::zeros();
+    for _ in 0..300 {
+        before = one.with_energies(&mut state, &mut energies).0;
+    }
+    // held while it shrinks: crystals take what they are born without
+    assert!(state[1] > 0.999 && energies[0] > 0.0 && energies[1] > 0.0, "{energies:?} {}", state[1]);
+    let (grown, mut work, steps) = (energies, 0.0, 2000);
+    for step in 0..steps {
+        one.time = 0.05;
+        let sign = if step < steps / 2 { 1.0 } else { -0.7 };
+        one.strain[1] = Voigt::new(1.0, -0.3, 0.0, 0.4, 0.0, 0.2) * (sign * 2e-5);
+        let stress = one.with_energies(&mut state, &mut energies).0;
+        work += 0.5 * (before + stress).dot(&one.strain[1]);
+        before = stress;
+        one.strain[0] += one.strain[1];
+    }
+    let [stored, crystals, viscous] = std::array::from_fn(|k| energies[k] - grown[k]);
+    assert!(viscous > 0.1 * work && crystals.abs() < 1e-3 * work, "{stored} {crystals} {viscous} {work}");
+    assert!(((stored + crystals + viscous) / work - 1.0).abs() < 2e-3, "{stored} {viscous} {work}");
 }
 
 /// A held print cools; turned by 90° with its strains, its stresses turn.

@@ -6,7 +6,7 @@ use crystfem::melting::Melting;
 use std::cell::RefCell;
 
 /// Names of the constants, in their order.
-pub const NAMES: [&str; 12] = [
+pub const NAMES: [&str; 15] = [
     "conductivity",
     "specific_heat",
     "latent_heat",
@@ -19,7 +19,12 @@ pub const NAMES: [&str; 12] = [
     "equilibrium_melting",
     "frozen",
     "avrami_exponent",
+    "melting_sharpness",
+    "melting_shape",
+    "melting_peak",
 ];
+/// How many a host lists before those of its own kinetics.
+pub const HEAD: usize = 6;
 
 /// A number that the material cannot have.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -59,7 +64,7 @@ impl Constants {
             allowed: allowed.to_owned(),
         };
         let &[conductivity, specific_heat, latent, column, ref rest @ ..] = list else {
-            let allowed = "4 to 6 constants, 12 with `kinetics` 0";
+            let allowed = "4 to 6 constants, 15 with `kinetics` 0";
             return Err(Error { name: "constants", found: list.len() as f64, allowed: allowed.into() });
         };
         for (place, number) in [(0, conductivity), (1, specific_heat)] {
@@ -77,9 +82,10 @@ impl Constants {
             1.0 => true,
             other => return Err(wrong(5, other, "0 (Abaqus) or 1 (CalculiX)")),
         };
-        let kinetics = match (column, rest) {
-            (1.0, _) => kinetics::Constants::TABLE_4_1_COLUMN_1,
-            (2.0, _) => kinetics::Constants::TABLE_4_1_COLUMN_2,
+        let pa12 = Some(Melting::PA12);
+        let (kinetics, melting) = match (column, rest) {
+            (1.0, _) => (kinetics::Constants::TABLE_4_1_COLUMN_1, pa12),
+            (2.0, _) => (kinetics::Constants::TABLE_4_1_COLUMN_2, pa12),
             (
                 0.0,
                 &[
@@ -91,16 +97,30 @@ impl Constants {
                     equilibrium_melting,
                     frozen,
                     avrami_exponent,
+                    sharpness,
+                    shape,
+                    peak,
                 ],
-            ) => kinetics::Constants {
-                growth_rate,
-                nucleation,
-                activation_energy,
-                equilibrium_melting,
-                frozen,
-                avrami_exponent,
-            },
-            _ => return Err(wrong(3, column, "1 or 2, a column of Table 4.1, or 0 with constants 7 to 12")),
+            ) => {
+                let own = kinetics::Constants {
+                    growth_rate,
+                    nucleation,
+                    activation_energy,
+                    equilibrium_melting,
+                    frozen,
+                    avrami_exponent,
+                };
+                let melts = [sharpness, shape, peak] != [0.0; 3];
+                (own, melts.then(|| Melting::new(sharpness, shape, peak)).transpose()?)
+            }
+            (0.0, &[_, _, _, _, _, _, _, _]) => {
+                let allowed = "15 with `kinetics` 0: k_m in 1/K, d and T_p in K of melting are constants 13 to 15, or 0, 0, 0 for crystals that never melt";
+                return Err(Error { name: "constants", found: 12.0, allowed: allowed.into() });
+            }
+            _ => {
+                let allowed = "1 or 2, a column of Table 4.1 (PA12); 0 with constants 7 to 15; 3 with these in a file (from a host only)";
+                return Err(wrong(3, column, allowed));
+            }
         };
         if latent.is_nan() || latent < 0.0 {
             return Err(wrong(2, latent, "0 or above"));
@@ -111,7 +131,7 @@ impl Constants {
             conductivity: Property::Constant(conductivity),
             specific_heat: Property::Constant(specific_heat),
             kinetics: Kinetics::new(kinetics)?,
-            melting: Some(Melting::PA12),
+            melting,
             // of α alone: the host gives ΔH·X∞
             ultimate_crystallinity: 1.0,
             latent_heat: (latent > 0.0).then_some(latent),

@@ -1,7 +1,10 @@
 //! The symbols that hosts call.
 
-use crate::{Answer, Increment, NAMES, State, respond};
+use crate::{Answer, Increment, NAMES, State, file, respond};
 use std::ffi::{CStr, c_char, c_int};
+
+/// Length of a name in Fortran.
+const NAME: usize = 80;
 
 /// UMATHT as Abaqus declares it; CalculiX appends arguments, which are left alone. `STATEV` are the first three of
 /// [`State`], and, where there is a fourth, the latent heat that crystals release per mass and time; `PROPS` are the constants of
@@ -26,7 +29,7 @@ pub unsafe extern "C" fn umatht_(
     dtime: *const f64,
     _predef: *const f64,
     _dpred: *const f64,
-    _cmname: *const c_char,
+    cmname: *const c_char,
     ntgrd: *const c_int,
     nstatv: *const c_int,
     props: *const f64,
@@ -60,6 +63,9 @@ pub unsafe extern "C" fn umatht_(
     let mut at = Increment { temperature, change, time, gradient: [0.0; 3] };
     at.gradient[..directions].copy_from_slice(gradient);
     let state = State { z: states[0], degree: states[1], temperature: states[2] };
+    // SAFETY: the caller's promise: 80 characters
+    let name = String::from_utf8_lossy(unsafe { std::slice::from_raw_parts(cmname.cast::<u8>(), NAME) });
+    let constants = &*file::complete(&name, constants).unwrap_or_else(|error| end(&error));
     let answer = respond(constants, &at, &state).unwrap_or_else(|error| end(&error.to_string()));
     states[..3].copy_from_slice(&[answer.state.z, answer.state.degree, answer.state.temperature]);
     if let Some(heat) = states.get_mut(3) {

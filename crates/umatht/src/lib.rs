@@ -17,6 +17,7 @@
 //! ```
 
 mod constants;
+mod file;
 mod host;
 
 pub use constants::{Error, NAMES};
@@ -117,6 +118,42 @@ mod tests {
         Increment { temperature, change, time: 1.0, gradient: [1.0, 2.0, 3.0] }
     }
 
+    /// Own kinetics, those of column 1, with a melting point of 500 K.
+    const OWN: [f64; 15] = [
+        0.25,
+        2200.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        37_869.0,
+        136_235.0,
+        6270.0,
+        193.2 + 273.15,
+        21.0 + 273.15,
+        2.678,
+        0.965,
+        8.584,
+        500.0,
+    ];
+
+    /// Crystals melt where their own constants say: at 460 K those of PA12 are gone, others are there, or never melt.
+    #[test]
+    fn melting_belongs_to_the_constants() {
+        let hot = Increment { gradient: [0.0; 3], ..at(440.0, 20.0) };
+        let state = State { z: 2.0, ..State::default() };
+        let degree = |constants: &[f64]| respond(constants, &hot, &state).unwrap().state.degree;
+        let pa12 = degree(&[0.25, 2200.0, 0.0, 1.0]);
+        assert!(pa12 < 1e-3, "{pa12}");
+        assert!(degree(&OWN) > 0.99, "{}", degree(&OWN));
+        let mut never = OWN;
+        never[12..].fill(0.0);
+        assert!(degree(&never) > 0.99);
+        let mut as_pa12 = OWN;
+        as_pa12[14] = 450.0;
+        assert_eq!(degree(&as_pa12), pa12);
+    }
+
     /// The start is that of CalculiX's state, the sign of k that of its conductivity, the zero that of the host.
     #[test]
     fn hosts_differ() {
@@ -156,6 +193,8 @@ mod tests {
             assert!(text.contains("allowed"), "{text}");
         }
         assert!(respond(&good[..3], &at(400.0, 0.0), &State::default()).is_err());
+        let text = respond(&OWN[..12], &at(400.0, 0.0), &State::default()).unwrap_err().to_string();
+        assert!(text.contains("melting"), "{text}");
         assert!(respond(&good, &at(f64::NAN, 0.0), &State::default()).is_err());
         assert!(respond(&good, &at(-1.0, 0.0), &State::default()).is_err());
     }

@@ -95,14 +95,17 @@ class Prediction:
 _PAIRS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 
 
-def predicted(evaluate: Callable[[Array], dict[str, Any]], c: ArrayLike) -> Prediction:
-    """Calls a law of the module at C of any shape."""
-    array = np.asarray(c, dtype=np.float64)
+def predicted(evaluate: Callable[[Array, float], dict[str, Any]], c: ArrayLike) -> Prediction:
+    """Calls a law of the module at C of any shape; tensors may be symmetric to rounding of their type."""
+    given = np.asarray(c)
+    # a product of three matrices of a type is right to some tens of its roundings
+    rounding = 64 * float(np.finfo(given.dtype if given.dtype.kind == "f" else np.float64).eps)
+    array = np.asarray(given, dtype=np.float64)
     tensors = array.ndim >= 2 and array.shape[-2:] == (3, 3)
     if not tensors and (array.ndim == 0 or array.shape[-1] != 6):
         raise ValueError(f"C: found the shape {array.shape}; allowed: (…, 6) or (…, 3, 3)")
     points = array.shape[:-2] if tensors else array.shape[:-1]
-    found = evaluate(np.ascontiguousarray(array).reshape(-1, 9 if tensors else 6))
+    found = evaluate(np.ascontiguousarray(array).reshape(-1, 9 if tensors else 6), min(rounding, 0.01))
     stress = found["stress"]
     if tensors:
         whole = np.empty((len(stress), 3, 3))
@@ -208,7 +211,7 @@ class Law:
 
     def predict(self, c: ArrayLike, tangent: bool = False) -> Prediction:
         """S, W and, if asked for, ℂ at C = FᵀF of shape (…, 6) or (…, 3, 3)."""
-        return predicted(lambda rows: self._law.predict(rows, tangent), c)
+        return predicted(lambda rows, rounding: self._law.predict(rows, tangent, rounding), c)
 
 
 @dataclass(frozen=True)

@@ -114,7 +114,7 @@ class Surrogate:
         Contiguous arrays of float64 are read where they are. `uncertainty=False` leaves spread, deviation and flags out.
         Raises `ValueError` for a C that is not positive definite, and tells which.
         """
-        return predicted(lambda rows: self._law.predict(rows, tangent, uncertainty), c)
+        return predicted(lambda rows, rounding: self._law.predict(rows, tangent, uncertainty, rounding), c)
 
     def __repr__(self) -> str:
         header = self.header
@@ -124,4 +124,14 @@ class Surrogate:
 
 def _is_layer(item: Any) -> bool:
     """Whether this is (W, b), not a list of layers."""
-    return len(item) == 2 and np.ndim(item[0]) == 2 and np.ndim(item[1]) == 1
+    return len(item) == 2 and _rank(item[0]) == 2 and _rank(item[1]) == 1
+
+
+def _rank(item: Any) -> int | None:
+    """Dimensions of an array; none of what is no array, such as a layer (W, b)."""
+    if isinstance(item, (list, tuple)) and len({np.shape(part) if isinstance(part, np.ndarray) else None for part in item}) > 1:
+        return None
+    try:
+        return np.ndim(item)
+    except ValueError:
+        return None

@@ -115,6 +115,11 @@ impl Property {
 }
 
 impl Table {
+    /// Temperatures, K, and values.
+    pub fn rows(&self) -> impl Iterator<Item = [f64; 2]> {
+        self.temperatures.iter().zip(&self.values).map(|(&temperature, &value)| [temperature, value])
+    }
+
     /// The row at or before a temperature within the table.
     fn row(&self, temperature: f64) -> usize {
         self.temperatures.partition_point(|&t| t <= temperature) - 1

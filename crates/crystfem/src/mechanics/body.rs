@@ -1,7 +1,8 @@
-//! A body of solidifying Maxwell elements on a mesh of hexahedra: births, steps, supports.
+//! A body of solidifying Maxwell elements on a mesh of hexahedra and tetrahedra: births, steps, supports.
 
 use super::branch::Energies;
-use super::element::{Hexahedron, POINTS, Six};
+use super::element::{POINTS, Six};
+use super::kind::{self, Element};
 use super::maxwell::Increment;
 use super::solve::{Load, gather};
 use crate::error::Error;
@@ -18,7 +19,7 @@ const TOLERANCE: f64 = 1e-12;
 pub struct Body<'a> {
     pub(super) mesh: &'a Mesh,
     /// Elements of one shape share their matrices.
-    shapes: Vec<Hexahedron>,
+    shapes: Vec<Element>,
     shape: Vec<u32>,
     /// Residual over the load at which a solution ends.
     pub tolerance: f64,
@@ -29,7 +30,7 @@ pub struct Body<'a> {
 /// What a body needs to continue, bit by bit.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BodyState {
-    /// Elastic strains of the branches at each Gauss point, element by element; empty before birth.
+    /// Elastic strains of the branches at each Gauss point (0 beyond those of the element), element by element; empty before birth.
     strains: Vec<Vec<[[f64; 6]; POINTS]>>,
     /// Σ E b s e at the Gauss points of each element at the end of the last step, Pa: the stress over Ĉ.
     stresses: Vec<[[f64; 6]; POINTS]>,
@@ -61,35 +62,34 @@ impl<'a> Body<'a> {
     /// A body without any element born.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for other elements than hexahedra of first order, for elements that are turned inside out, and for a Poisson's ratio outside −1 … 0.5.
+    /// [`Error::Parameter`] for other elements than hexahedra of first order and tetrahedra, for elements that are turned inside out, and for a
+    /// Poisson's ratio outside −1 … 0.5.
     pub fn new(mesh: &'a Mesh, poisson: f64) -> Result<Self, Error> {
         let fault =
             |name, found: f64, allowed: &str| Error::Parameter { name, found, allowed: allowed.to_owned() };
         if !(poisson > -1.0 && poisson < 0.5) {
             return Err(fault("poisson", poisson, "above -1 and below 0.5"));
         }
-        let others = mesh.element_count() - mesh.hexahedra.len();
+        let count = mesh.element_count();
+        let others = (0..count as u32).filter(|&element| !kind::is_known(mesh.nodes(element).len())).count();
         if others > 0 {
-            return Err(fault("elements other than hexahedra", others as f64, "none"));
+            return Err(fault("elements other than 8-node hexahedra and tetrahedra", others as f64, "none"));
         }
         let (mut shapes, mut shape, mut known) = (Vec::new(), Vec::new(), std::collections::HashMap::new());
-        for nodes in &mesh.hexahedra {
-            let corners = nodes.map(|node| mesh.points[node as usize]);
-            let key = Hexahedron::key(&corners);
+        for element in 0..count as u32 {
+            let places = places(mesh, element);
+            let key = kind::key(&places);
             let index = match known.get(&key) {
                 Some(&index) => index,
                 None => {
-                    let element = Hexahedron::new(&corners, poisson);
-                    let element =
-                        element.ok_or_else(|| fault("volume of a hexahedron", f64::NAN, "above 0"))?;
-                    shapes.push(element);
+                    let own = Element::new(&places, poisson);
+                    shapes.push(own.ok_or_else(|| fault("volume of an element", f64::NAN, "above 0"))?);
                     known.insert(key, shapes.len() as u32 - 1);
                     shapes.len() as u32 - 1
                 }
             };
             shape.push(index);
         }
-        let count = mesh.hexahedra.len();
         Ok(Self {
             mesh,
             shapes,
@@ -115,7 +115,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    pub(super) fn shape_of(&self, element: usize) -> &Hexahedron {
+    pub(super) fn shape_of(&self, element: usize) -> &Element {
         &self.shapes[self.shape[element] as usize]
     }
 
@@ -126,22 +126,25 @@ impl<'a> Body<'a> {
 
     /// Cauchy stress at a Gauss point, Pa: xx, yy, zz, xy, yz, zx.
     pub fn stress(&self, element: usize, point: usize) -> [f64; 6] {
-        self.shapes[self.shape[element] as usize]
-            .stress(&Six::from(self.state.stresses[element][point]))
-            .into()
+        self.shape_of(element).stress(&Six::from(self.state.stresses[element][point])).into()
+    }
+
+    /// Number of Gauss points of an element.
+    pub fn points(&self, element: usize) -> usize {
+        self.shape_of(element).weights().len()
     }
 
     /// Mean of an element's stress by volume, Pa: of its Gauss points.
     pub fn mean_stress(&self, element: usize) -> [f64; 6] {
-        let weights = &self.shapes[self.shape[element] as usize].weights;
+        let weights = self.shape_of(element).weights();
         let volume: f64 = weights.iter().sum();
-        let points = (0..POINTS).map(|point| (self.stress(element, point), weights[point] / volume));
+        let points = (0..weights.len()).map(|point| (self.stress(element, point), weights[point] / volume));
         points.fold([0.0; 6], |sum, (stress, share)| std::array::from_fn(|k| sum[k] + share * stress[k]))
     }
 
-    /// The corners of an element at rest.
-    fn corners(&self, element: usize) -> [[f64; 3]; 8] {
-        self.mesh.hexahedra[element].map(|node| self.mesh.points[node as usize])
+    /// Nodes of an element.
+    pub(super) fn nodes(&self, element: usize) -> &'a [u32] {
+        self.mesh.nodes(element as u32)
     }
 
     /// One step of all elements that are born: `increment` of an element, and its linear free strain at a Gauss point and its place (at the Gauss points: taken at the
@@ -160,16 +163,18 @@ impl<'a> Body<'a> {
             .collect();
         let mut free = vec![[false; 3]; self.state.displacement.len()];
         for &element in &alive {
-            self.mesh.hexahedra[element].iter().for_each(|&node| free[node as usize] = [true; 3]);
+            self.nodes(element).iter().for_each(|&node| free[node as usize] = [true; 3]);
         }
         supports.iter().for_each(|&(node, component)| free[node as usize][component] = false);
         let mut load = Load { sum: vec![Vector3::zeros(); self.state.displacement.len()], parts: 0.0 };
         let mut steps = Vec::with_capacity(alive.len());
         for &element in &alive {
             let (shape, increment) = (&self.shapes[self.shape[element] as usize], increment(element));
-            let corners = self.corners(element);
-            let free: [f64; POINTS] =
-                std::array::from_fn(|point| free_strain(element, point, Hexahedron::place(&corners, point)));
+            let (places, count) = (places(self.mesh, element as u32), shape.weights().len());
+            let mut free = [0.0; POINTS];
+            for (point, free) in free.iter_mut().enumerate().take(count) {
+                *free = free_strain(element, point, place(&places, point));
+            }
             // the stress of a step without displacement
             let predicted: [Six; POINTS] = std::array::from_fn(|point| {
                 let mut strains: Vec<[f64; 6]> =
@@ -180,7 +185,7 @@ impl<'a> Body<'a> {
                 shape.stress(&(Six::from(increment.stress(&strains)) + floor))
             });
             let (forces, modal) = shape.forces(&predicted);
-            for (k, &node) in self.mesh.hexahedra[element].iter().enumerate() {
+            for (k, &node) in self.nodes(element).iter().enumerate() {
                 load.sum[node as usize] -= Vector3::from(forces.fixed_rows::<3>(3 * k));
             }
             load.parts += forces.norm_squared();
@@ -192,14 +197,13 @@ impl<'a> Body<'a> {
         let (mut energies, mut floor) = (Energies::default(), 0.0);
         for (element, increment, free, modal) in steps {
             let shape = &self.shapes[self.shape[element] as usize];
-            let local = gather(&self.mesh.hexahedra[element], &moved);
+            let local = gather(self.nodes(element), &moved);
             let strains = shape.strains(&local, &modal, increment.stiffness);
-            for point in 0..POINTS {
+            for (point, &volume) in shape.weights().iter().enumerate() {
                 let mechanical = mechanical(&strains[point], free[point]);
                 let mut branches: Vec<[f64; 6]> =
                     self.state.strains[element].iter().map(|branch| branch[point]).collect();
                 let product = |a: &[f64; 6], b: &[f64; 6]| Six::from(*a).dot(&shape.stress(&Six::from(*b)));
-                let volume = shape.weights[point];
                 energies.add(&increment.energies(&branches, &mechanical, product), volume);
                 floor += 0.5 * volume * increment.floor * product(&mechanical, &mechanical);
                 increment.advance(&mut branches, &mechanical);
@@ -228,6 +232,20 @@ impl<'a> Body<'a> {
         }
         Ok(())
     }
+}
+
+/// The nodes of an element at rest.
+fn places(mesh: &Mesh, element: u32) -> Vec<[f64; 3]> {
+    mesh.nodes(element).iter().map(|&node| mesh.points[node as usize]).collect()
+}
+
+/// Position of a Gauss point.
+fn place(places: &[[f64; 3]], point: usize) -> [f64; 3] {
+    let mut place = [0.0; 3];
+    for (node, share) in places.iter().zip(kind::shares(places.len(), point)) {
+        (0..3).for_each(|d| place[d] += share * node[d]);
+    }
+    place
 }
 
 /// Δε − Δε* 1.

@@ -3,8 +3,8 @@
 //! Conjugate gradients with 3 × 3 blocks alone need as many iterations as a part is slender; blocks plus P (Pᵀ K P)⁻¹ Pᵀ need about
 //! 45 whatever its shape (`docs/guide/src/theory/print-stress.md`).
 
-use super::product::Stiff;
-use nalgebra::{Matrix3, Matrix3x6, SMatrix, Vector3, Vector6};
+use super::product::{Elements, block};
+use nalgebra::{Matrix3x6, SMatrix, Vector3, Vector6};
 use std::collections::BTreeMap;
 
 /// Nodes of a group along each axis.
@@ -23,15 +23,22 @@ pub struct Coarse {
 }
 
 impl Coarse {
-    /// Of elements on nodes at `points`, of which `free` components move.
-    pub fn new(elements: &[Stiff], points: &[[f64; 3]], free: &[[bool; 3]]) -> Self {
+    /// Of elements on nodes at `points`.
+    pub fn new(elements: &Elements, points: &[[f64; 3]]) -> Self {
+        let free = elements.free();
         let mut exists = vec![false; points.len()];
         let (mut edges, mut count) = (Vector3::zeros(), 0.0);
-        for (nodes, ..) in elements {
+        for (nodes, ..) in elements.each() {
             nodes.iter().for_each(|&node| exists[node as usize] = true);
             let at = |k: usize| Vector3::from(points[nodes[k] as usize]);
-            // of an upright brick: its edges
-            edges += (at(6) - at(0)).abs();
+            // of an upright brick: its edges; of a tetrahedron the box around its corners, half of it with nodes on edges
+            edges += if nodes.len() == 8 {
+                (at(6) - at(0)).abs()
+            } else {
+                let [low, high] =
+                    [Vector3::inf, Vector3::sup].map(|of| (1..4).fold(at(0), |all, k| of(&all, &at(k))));
+                (high - low) * if nodes.len() == 4 { 1.0 } else { 0.5 }
+            };
             count += 1.0;
         }
         let side = edges * (SIDE / count);
@@ -64,7 +71,7 @@ impl Coarse {
             }
         }
         let mut first: Vec<u32> = (0..numbers.len() as u32).collect();
-        for (nodes, ..) in elements {
+        for (nodes, ..) in elements.each() {
             let least = nodes.iter().map(|&node| group[node as usize]).min().unwrap_or(0);
             nodes.iter().for_each(|&node| {
                 let first = &mut first[group[node as usize] as usize];
@@ -72,8 +79,8 @@ impl Coarse {
             });
         }
         let mut matrix = Skyline::new(&first);
-        for &(nodes, stiffness, modulus) in elements {
-            let groups = nodes.map(|node| group[node as usize]);
+        for (nodes, stiffness, modulus) in elements.each() {
+            let groups: Vec<u32> = nodes.iter().map(|&node| group[node as usize]).collect();
             let held = nodes.iter().any(|&node| free[node as usize] != [true; 3]);
             // rigid motions of one group do not strain an element inside of it
             if !held && groups.iter().all(|other| *other == groups[0]) {
@@ -82,7 +89,7 @@ impl Coarse {
             for (column, &other) in nodes.iter().enumerate() {
                 for (row, &node) in nodes.iter().enumerate().filter(|(row, _)| groups[*row] >= groups[column])
                 {
-                    let block: Matrix3<f64> = stiffness.fixed_view::<3, 3>(3 * row, 3 * column) * modulus;
+                    let block = block(stiffness, nodes.len(), row, column) * modulus;
                     let own = motions[node as usize].transpose() * (block * motions[other as usize]);
                     matrix.add(groups[row], groups[column], &own);
                 }

@@ -39,7 +39,7 @@ pub fn stiffness(poisson: f64) -> SMatrix<f64, 6, 6> {
 }
 
 /// The strain of one function of gradient g times unit displacements along x, y, z.
-fn strain_of(gradient: [f64; 3]) -> SMatrix<f64, 6, 3> {
+pub fn strain_of(gradient: [f64; 3]) -> SMatrix<f64, 6, 3> {
     let [x, y, z] = gradient;
     SMatrix::from_row_slice(&[x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z, y, x, 0.0, 0.0, z, y, z, 0.0, x])
 }
@@ -154,15 +154,6 @@ impl Hexahedron {
     pub fn shapes(point: usize) -> [f64; 8] {
         let at = gauss(point);
         SIGNS.map(|sign| (0..3).map(|d| 0.5 * (1.0 + sign[d] * at[d])).product())
-    }
-
-    /// Position of a Gauss point.
-    pub fn place(corners: &[[f64; 3]; 8], point: usize) -> [f64; 3] {
-        let mut place = [0.0; 3];
-        for (corner, share) in corners.iter().zip(Self::shapes(point)) {
-            (0..3).for_each(|d| place[d] += share * corner[d]);
-        }
-        place
     }
 }
 

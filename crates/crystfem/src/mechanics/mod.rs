@@ -6,12 +6,15 @@ mod branch;
 mod coarse;
 mod eigenstrain;
 mod element;
+mod kind;
 mod maxwell;
 mod product;
 mod solve;
+mod tetrahedron;
 
 pub use body::{Audit, Body, BodyState, Support};
 pub use branch::{Change, Energies, Step};
 pub use eigenstrain::SpecificVolume;
 pub use element::{Hexahedron, POINTS, stiffness};
+pub use kind::{Element, MOST, is_known, key, points, shares};
 pub use maxwell::{Branch, Shift, SolidifyingMaxwell};

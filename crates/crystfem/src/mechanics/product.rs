@@ -2,7 +2,7 @@
 //! elements, so that its bits do not depend on threads.
 
 use crate::system::vector::sum;
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -11,40 +11,63 @@ const ITEM: usize = 512;
 /// Components of an element.
 const COMPONENTS: usize = 24;
 
-/// An element: its nodes, K̂ and its modulus.
-pub type Stiff<'a> = ([u32; 8], &'a SMatrix<f64, 24, 24>, f64);
+/// Elements of so many nodes: those, K̂ column by column, and its modulus.
+type Stiff<'a, const N: usize> = ([u32; N], &'a [f64], f64);
 
-/// Elements with what each node has of them.
+/// Elements with what each node has of them: hexahedra, then tetrahedra of 4 and of 10 nodes.
 pub struct Elements<'a> {
-    list: Vec<Stiff<'a>>,
-    /// Where the corners of each node begin, as 8 × element + corner.
+    hexahedra: Vec<Stiff<'a, 8>>,
+    first: Vec<Stiff<'a, 4>>,
+    second: Vec<Stiff<'a, 10>>,
+    /// Where the places in `forces` of each node begin.
     starts: Vec<u32>,
     corners: Vec<u32>,
     free: Vec<[bool; 3]>,
-    forces: Vec<[f64; COMPONENTS]>,
+    /// Of all nodes of all elements.
+    forces: Vec<f64>,
 }
 
 impl<'a> Elements<'a> {
-    /// On nodes of which `free` components move.
-    pub fn new(list: Vec<Stiff<'a>>, free: Vec<[bool; 3]>) -> Self {
-        let mut starts = vec![0_u32; free.len() + 1];
-        let nodes = || list.iter().flat_map(|element| element.0);
-        nodes().for_each(|node| starts[node as usize + 1] += 1);
-        (0..free.len()).for_each(|k| starts[k + 1] += starts[k]);
-        let mut next = starts.clone();
-        let mut corners = vec![0; 8 * list.len()];
-        for (corner, node) in (0..).zip(nodes()) {
-            let next = &mut next[node as usize];
-            corners[*next as usize] = corner;
+    /// On nodes of which `free` components move; `number` is that of each node of the mesh among them.
+    pub fn new(
+        list: impl Iterator<Item = (&'a [u32], &'a [f64], f64)>,
+        number: &[u32],
+        free: Vec<[bool; 3]>,
+    ) -> Self {
+        let (mut hexahedra, mut first, mut second) = (Vec::new(), Vec::new(), Vec::new());
+        for (nodes, stiffness, modulus) in list {
+            if let Some(nodes) = nodes.first_chunk::<10>() {
+                second.push((nodes.map(|node| number[node as usize]), stiffness, modulus));
+            } else if let Some(nodes) = nodes.first_chunk::<8>() {
+                hexahedra.push((nodes.map(|node| number[node as usize]), stiffness, modulus));
+            } else if let Some(nodes) = nodes.first_chunk::<4>() {
+                first.push((nodes.map(|node| number[node as usize]), stiffness, modulus));
+            }
+        }
+        let starts = vec![0_u32; free.len() + 1];
+        let mut own =
+            Self { hexahedra, first, second, starts, corners: Vec::new(), free, forces: Vec::new() };
+        let nodes: Vec<u32> = own.each().flat_map(|element| element.0).copied().collect();
+        nodes.iter().for_each(|&node| own.starts[node as usize + 1] += 1);
+        (0..own.free.len()).for_each(|k| own.starts[k + 1] += own.starts[k]);
+        let mut next = own.starts.clone();
+        own.corners = vec![0; nodes.len()];
+        for (corner, node) in (0..).zip(&nodes) {
+            let next = &mut next[*node as usize];
+            own.corners[*next as usize] = corner;
             *next += 1;
         }
-        let forces = vec![[0.0; COMPONENTS]; list.len()];
-        Self { list, starts, corners, free, forces }
+        own.forces = vec![0.0; 3 * nodes.len()];
+        own
     }
 
-    /// Each element.
-    pub fn list(&self) -> &[Stiff<'a>] {
-        &self.list
+    /// Each element: its nodes, K̂ and its modulus.
+    pub fn each(&self) -> impl Iterator<Item = (&[u32], &'a [f64], f64)> {
+        fn plain<'b, 'a, const N: usize>(stiff: &'b Stiff<'a, N>) -> (&'b [u32], &'a [f64], f64) {
+            (&stiff.0, stiff.1, stiff.2)
+        }
+        let tetrahedra = self.first.iter().map(plain).chain(self.second.iter().map(plain));
+        self.hexahedra.iter().map(plain).chain(tetrahedra)
     }
 
     /// Components that move.
@@ -54,16 +77,22 @@ impl<'a> Elements<'a> {
 
     /// image = Σ E K̂ u on free components.
     pub fn product(&mut self, u: &[Vector3<f64>], image: &mut [Vector3<f64>]) {
-        let Self { list, starts, corners, free, forces } = self;
+        let Self { hexahedra, first, second, starts, corners, free, forces } = self;
         let arch = Arch::new();
-        forces.par_chunks_mut(ITEM).zip(list.par_chunks(ITEM)).for_each(|(forces, list)| {
+        let (of_hexahedra, rest) = forces.split_at_mut(COMPONENTS * hexahedra.len());
+        let (of_first, of_second) = rest.split_at_mut(12 * first.len());
+        let parts = of_hexahedra.par_chunks_mut(COMPONENTS * ITEM);
+        parts.zip(hexahedra.par_chunks(ITEM)).for_each(|(forces, list)| {
+            let (forces, _) = forces.as_chunks_mut();
             arch.dispatch(Product { list, u, forces });
         });
+        plain_product(first, u, of_first);
+        plain_product(second, u, of_second);
         image.par_chunks_mut(ITEM).enumerate().for_each(|(item, image)| {
             for (k, image) in (item * ITEM..).zip(image) {
                 let mut sum = [0.0; 3];
                 for &corner in &corners[starts[k] as usize..starts[k + 1] as usize] {
-                    let force = &forces[corner as usize / 8][3 * (corner as usize % 8)..][..3];
+                    let force = &forces[3 * corner as usize..][..3];
                     (0..3).for_each(|d| sum[d] += force[d]);
                 }
                 *image = Vector3::from_fn(|d, _| if free[k][d] { sum[d] } else { 0.0 });
@@ -72,8 +101,29 @@ impl<'a> Elements<'a> {
     }
 }
 
+/// The 3 × 3 block of two nodes of K̂.
+pub fn block(stiffness: &[f64], nodes: usize, row: usize, column: usize) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| stiffness[(3 * column + j) * 3 * nodes + 3 * row + i])
+}
+
+/// E K̂ u of tetrahedra, column by column.
+fn plain_product<const N: usize>(list: &[Stiff<N>], u: &[Vector3<f64>], forces: &mut [f64]) {
+    forces.par_chunks_mut(3 * N * ITEM).zip(list.par_chunks(ITEM)).for_each(|(forces, list)| {
+        for ((nodes, stiffness, modulus), forces) in list.iter().zip(forces.chunks_exact_mut(3 * N)) {
+            forces.fill(0.0);
+            for (k, &node) in nodes.iter().enumerate() {
+                for d in 0..3 {
+                    let x = u[node as usize][d] * modulus;
+                    let column = &stiffness[(3 * k + d) * 3 * N..][..3 * N];
+                    forces.iter_mut().zip(column).for_each(|(force, entry)| *force += entry * x);
+                }
+            }
+        }
+    });
+}
+
 struct Product<'a, 'b> {
-    list: &'a [Stiff<'b>],
+    list: &'a [Stiff<'b, 8>],
     u: &'a [Vector3<f64>],
     forces: &'a mut [[f64; COMPONENTS]],
 }
@@ -95,8 +145,7 @@ impl WithSimd for Product<'_, '_> {
             }
             // even and odd columns apart: their sums do not wait for each other
             let mut sums = [[simd.splat_f64s(0.0); COMPONENTS]; 2];
-            for (pair, local) in condensed.as_slice().chunks_exact(2 * COMPONENTS).zip(local.chunks_exact(2))
-            {
+            for (pair, local) in condensed.chunks_exact(2 * COMPONENTS).zip(local.chunks_exact(2)) {
                 for half in 0..2 {
                     let (column, _) = S::as_simd_f64s(&pair[half * COMPONENTS..(half + 1) * COMPONENTS]);
                     let x = simd.splat_f64s(local[half]);
@@ -122,26 +171,41 @@ pub fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::SVector;
+    use nalgebra::{DMatrix, DVector};
 
-    /// Two elements that share four nodes, one component held, against plain matrices.
+    /// Two hexahedra that share four nodes and tetrahedra on them, one component held, against plain matrices.
     #[test]
     fn a_product_is_that_of_the_matrices() {
-        let matrix = SMatrix::<f64, 24, 24>::from_fn(|i, j| ((i * j + 3 * (i + j)) as f64).sin());
-        let list = vec![([0, 1, 2, 3, 4, 5, 6, 7], &matrix, 2.0), ([4, 5, 6, 7, 8, 9, 10, 11], &matrix, 0.5)];
+        let matrix =
+            |n: usize| DMatrix::<f64>::from_fn(3 * n, 3 * n, |i, j| ((i * j + 3 * (i + j)) as f64).sin());
+        let matrices = [8, 4, 10].map(matrix);
+        let nodes: [&[u32]; 4] = [
+            &[0, 1, 2, 3, 4, 5, 6, 7],
+            &[4, 5, 6, 7, 8, 9, 10, 11],
+            &[3, 1, 9, 5],
+            &[0, 2, 4, 6, 8, 10, 1, 3, 5, 7],
+        ];
+        let list: Vec<(&[u32], &DMatrix<f64>, f64)> = vec![
+            (nodes[3], &matrices[2], 0.3),
+            (nodes[0], &matrices[0], 2.0),
+            (nodes[2], &matrices[1], 1.5),
+            (nodes[1], &matrices[0], 0.5),
+        ];
         let mut free = vec![[true; 3]; 12];
         free[5][1] = false;
         let u: Vec<Vector3<f64>> = (0..12).map(|k| Vector3::new(1.0, f64::from(k), -0.3)).collect();
         let mut expected = vec![Vector3::zeros(); 12];
         for (nodes, matrix, modulus) in &list {
-            let local = SVector::<f64, 24>::from_fn(|k, _| u[nodes[k / 3] as usize][k % 3]);
+            let local = DVector::<f64>::from_fn(3 * nodes.len(), |k, _| u[nodes[k / 3] as usize][k % 3]);
             let forces = *matrix * local * *modulus;
-            (0..24).for_each(|k| expected[nodes[k / 3] as usize][k % 3] += forces[k]);
+            (0..forces.len()).for_each(|k| expected[nodes[k / 3] as usize][k % 3] += forces[k]);
         }
         expected[5][1] = 0.0;
         let mut image = vec![Vector3::zeros(); 12];
-        Elements::new(list, free).product(&u, &mut image);
-        // 24 products of order 10
+        let number: Vec<u32> = (0..12).collect();
+        let plain = list.iter().map(|(nodes, matrix, modulus)| (*nodes, matrix.as_slice(), *modulus));
+        Elements::new(plain, &number, free).product(&u, &mut image);
+        // 30 products of order 10
         assert!(image.iter().zip(&expected).all(|(a, b)| (a - b).norm() < 1e-12), "{image:?}");
         assert_eq!(dot(&image, &u), image.iter().zip(&u).map(|(a, b)| a.dot(b)).sum::<f64>());
     }

@@ -2,10 +2,11 @@
 
 use super::body::Body;
 use super::coarse::Coarse;
-use super::product::{Elements, dot};
+use super::kind::Wide;
+use super::product::{Elements, block, dot};
 use crate::error::Error;
 use crate::system::vector::combine;
-use nalgebra::{Matrix3, SVector, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 const NONE: u32 = u32::MAX;
 
@@ -36,7 +37,7 @@ impl Body<'_> {
     ) -> Result<Vec<Vector3<f64>>, Error> {
         // number of each node among those that exist
         let mut number = vec![NONE; free.len()];
-        for &node in moduli.iter().flat_map(|&(element, _)| &self.mesh.hexahedra[element]) {
+        for &node in moduli.iter().flat_map(|&(element, _)| self.nodes(element)) {
             number[node as usize] = 0;
         }
         let mut nodes = Vec::new();
@@ -45,17 +46,16 @@ impl Body<'_> {
             nodes.push(node);
         }
         let points: Vec<[f64; 3]> = nodes.iter().map(|&node| self.mesh.points[node]).collect();
-        let stiff = moduli.iter().map(|&(element, modulus)| {
-            let own = self.mesh.hexahedra[element].map(|node| number[node as usize]);
-            (own, &self.shape_of(element).condensed, modulus)
-        });
-        let mut elements = Elements::new(stiff.collect(), nodes.iter().map(|&node| free[node]).collect());
+        let stiff = moduli
+            .iter()
+            .map(|&(element, modulus)| (self.nodes(element), self.shape_of(element).condensed(), modulus));
+        let mut elements = Elements::new(stiff, &number, nodes.iter().map(|&node| free[node]).collect());
         let free = elements.free();
         let mut residual: Vec<Vector3<f64>> = nodes.iter().map(|&node| load.sum[node]).collect();
         let mut blocks = vec![Matrix3::zeros(); residual.len()];
-        for (nodes, condensed, modulus) in elements.list() {
+        for (nodes, condensed, modulus) in elements.each() {
             for (k, &node) in nodes.iter().enumerate() {
-                blocks[node as usize] += condensed.fixed_view::<3, 3>(3 * k, 3 * k) * *modulus;
+                blocks[node as usize] += block(condensed, nodes.len(), k, k) * modulus;
             }
         }
         for (block, free) in blocks.iter_mut().zip(free) {
@@ -79,7 +79,7 @@ impl Body<'_> {
         if dot(&residual, &residual).sqrt() <= goal {
             return Ok(spread(&moved));
         }
-        let coarse = Coarse::new(elements.list(), &points, free);
+        let coarse = Coarse::new(&elements, &points);
         let precondition = |residual: &[Vector3<f64>], result: &mut [Vector3<f64>]| {
             combine(result, |k, _| blocks[k] * residual[k]);
             coarse.add(residual, result);
@@ -119,6 +119,10 @@ impl Body<'_> {
     }
 }
 
-pub(super) fn gather(nodes: &[u32; 8], u: &[Vector3<f64>]) -> SVector<f64, 24> {
-    SVector::from_fn(|k, _| u[nodes[k / 3] as usize][k % 3])
+pub(super) fn gather(nodes: &[u32], u: &[Vector3<f64>]) -> Wide {
+    let mut local = Wide::zeros();
+    for (k, &node) in nodes.iter().enumerate() {
+        local.fixed_rows_mut::<3>(3 * k).copy_from(&u[node as usize]);
+    }
+    local
 }

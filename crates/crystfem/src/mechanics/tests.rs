@@ -1,5 +1,5 @@
 use super::*;
-use crate::mechanics::SolidifyingMaxwell;
+use crate::mechanics::{Hexahedron, SolidifyingMaxwell};
 use evidence::{at_most, near};
 use nalgebra::SVector;
 
@@ -253,6 +253,6 @@ fn what_has_no_stress_is_refused() {
     let mut twisted = mesh.clone();
     twisted.points.swap(0, 6);
     assert!(Body::new(&twisted, 0.3).is_err());
-    let pyramids = Mesh { tetrahedra: vec![[0, 1, 3, 4]], ..mesh };
-    assert!(Body::new(&pyramids, 0.3).is_err());
+    let wedge = crate::mesh::Cell::new(&[0, 1, 3, 4, 5, 7]).unwrap();
+    assert!(Body::new(&Mesh { others: vec![wedge], ..mesh }, 0.3).is_err());
 }

@@ -8,10 +8,14 @@ use crate::mesh::Shape;
 use crate::mesh::labelled::{Content, Element, Kind, Node, ReadMesh, line_error};
 
 mod cards;
+mod ignored;
+mod place;
 mod sets;
 mod write;
 
 use cards::{Card, Cards};
+use ignored::Ignored;
+use place::Place;
 use sets::{Entry, Of, Resolver, Set};
 pub use write::write;
 
@@ -19,13 +23,14 @@ pub use write::write;
 ///
 /// Understood, in any case of letters: `*NODE` (`NSET`), `*ELEMENT` (`TYPE`, `ELSET`), `*NSET` and `*ELSET`
 /// (`GENERATE`, names of other sets, `*NSET, ELSET=`), `*SURFACE` (of elements, with or without `Sn`, or of nodes), one
-/// `*PART` with one `*INSTANCE` in place, continuation lines, comments. Triangles and quadrangles of shells and membranes
-/// name surfaces, lines nothing. Other keywords are passed over, in the notes by name. A name keeps the letters of its
+/// `*PART` with one `*INSTANCE` (moved and turned), `*INCLUDE`, continuation lines, comments. Triangles and quadrangles of shells and membranes
+/// name surfaces, lines nothing. Other keywords are passed over: the notes name them, with
+/// the key of a scene that means the same. A name keeps the letters of its
 /// first use.
 ///
 /// # Errors
 /// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line: other elements, numbers that do not
-/// fit, sets and nodes that do not exist, and what would change the mesh unseen (`*INCLUDE`, `*NGEN`, `*SYSTEM`, …);
+/// fit, sets and nodes that do not exist, and what would change the mesh unseen (`*NGEN`, `*SYSTEM`, …);
 /// [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory follows the size of the file.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
     let bytes = super::read_bytes(path)?;
@@ -37,39 +42,51 @@ pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
 /// # Errors
 /// See [`read`].
 pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
-    let mut reader = Reader { path, content: Content::default(), sets: Vec::new(), single: BTreeMap::new() };
-    let mut skipped: BTreeMap<String, usize> = BTreeMap::new();
     let mut cards = Cards::new(path, bytes);
+    mesh(path, &mut cards, scale).map_err(|error| cards.placed(error))
+}
+
+fn mesh(path: &Path, cards: &mut Cards, scale: f64) -> Result<ReadMesh, Error> {
+    let mut reader =
+        Reader { path, content: Content::default(), sets: Vec::new(), single: BTreeMap::new(), place: None };
+    let mut ignored = Ignored::default();
     while let Some(card) = cards.next()? {
         match card.keyword.as_str() {
-            "NODE" => reader.nodes(&card, &mut cards)?,
-            "ELEMENT" => reader.elements(&card, &mut cards)?,
-            "NSET" => reader.set(card, Of::Nodes, "NSET", &mut cards)?,
-            "ELSET" => reader.set(card, Of::Elements, "ELSET", &mut cards)?,
-            "SURFACE" => reader.surface(card, &mut cards)?,
-            "PART" | "INSTANCE" => reader.once(&card, &mut cards)?,
+            "NODE" => reader.nodes(&card, cards)?,
+            "ELEMENT" => reader.elements(&card, cards)?,
+            "NSET" => reader.set(card, Of::Nodes, "NSET", cards)?,
+            "ELSET" => reader.set(card, Of::Elements, "ELSET", cards)?,
+            "SURFACE" => reader.surface(card, cards)?,
+            "PART" => reader.once(&card)?,
+            "INSTANCE" => {
+                reader.once(&card)?;
+                reader.place = Place::read(cards)?.or(reader.place);
+            }
             "END PART" | "ASSEMBLY" | "END ASSEMBLY" | "END INSTANCE" | "HEADING" => {}
             keyword if CHANGING.contains(&keyword) => {
                 let allowed = "a file that contains all its nodes and elements itself";
                 return Err(line_error(path, card.line, "keyword", format!("*{keyword}"), allowed));
             }
-            keyword => *skipped.entry(keyword.to_owned()).or_default() += 1,
+            _ => ignored.add(&card, cards),
         }
     }
-    if !skipped.is_empty() {
-        let names: Vec<String> = skipped.iter().map(|(name, count)| format!("*{name} ({count})")).collect();
-        reader.content.notes.push(format!("keywords not used: {}", names.join(", ")));
+    if cards.included() > 0 {
+        reader.content.notes.push(format!("{} files are included", cards.included()));
+    }
+    ignored.tell(&mut reader.content.notes);
+    if let Some(place) = &reader.place {
+        reader.content.nodes.iter_mut().for_each(|node| node.point = place.of(node.point));
+        reader.content.notes.push("the part is moved to the place of its instance".to_owned());
     }
     let [nodes, elements] = reader.content.labels(path)?;
-    let budget = bytes.len().saturating_mul(16).saturating_add(1 << 16);
+    let budget = cards.bytes.saturating_mul(16).saturating_add(1 << 16);
     let sets = std::mem::take(&mut reader.sets);
     Resolver { path, nodes: &nodes, elements: &elements, budget }.resolve(sets, &mut reader.content)?;
     reader.content.into_mesh(path, &nodes, scale)
 }
 
 /// Keywords that make or move nodes and elements: passing them over would leave another mesh.
-const CHANGING: [&str; 11] = [
-    "INCLUDE",
+const CHANGING: [&str; 10] = [
     "NGEN",
     "NFILL",
     "NCOPY",
@@ -114,6 +131,8 @@ struct Reader<'a> {
     sets: Vec<Set>,
     /// First lines of keywords that may come once.
     single: BTreeMap<String, usize>,
+    /// Where the instance is.
+    place: Option<Place>,
 }
 
 impl Reader<'_> {
@@ -261,16 +280,12 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// One part and one instance of it, where it was drawn: numbers are then unique.
-    fn once(&mut self, card: &Card, cards: &mut Cards) -> Result<(), Error> {
-        if let Some(line) = self.single.insert(card.keyword.clone(), card.line) {
-            let allowed = format!("one; also on line {line}");
-            return Err(line_error(self.path, card.line, "keyword", format!("*{}", card.keyword), allowed));
-        }
-        match cards.row() {
-            Some(row) => Err(row.error("place of an instance", row.text(), "the place of its part")),
-            None => Ok(()),
-        }
+    /// One part and one instance of it: numbers are then unique.
+    fn once(&mut self, card: &Card) -> Result<(), Error> {
+        let Some(line) = self.single.insert(card.keyword.clone(), card.line) else { return Ok(()) };
+        let allowed = "one: write the deck without parts and assemblies (Abaqus/CAE: Model, Edit Attributes)";
+        let found = format!("*{}, after that of line {line}", card.keyword);
+        Err(line_error(self.path, card.line, "keyword", found, allowed))
     }
 }
 

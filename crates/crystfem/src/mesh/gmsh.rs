@@ -1,4 +1,4 @@
-//! Reads Gmsh's MSH 4.1, ASCII and binary of either byte order
+//! Reads Gmsh's MSH 2 and 4, ASCII and binary of either byte order
 //! (<https://gmsh.info/doc/texinfo/gmsh.html#MSH-file-format>).
 //!
 //! A reader of our own: `mshio` 0.4 does not read physical names and panics (`unimplemented!`, `expect`) on sizes and
@@ -12,16 +12,18 @@ use crate::mesh::Shape;
 use crate::mesh::labelled::{Content, Element, Kind, Labels, Node, ReadMesh};
 
 mod numbers;
+mod two;
 
-use numbers::Numbers;
+use numbers::{Numbers, Version};
 
 /// Reads a mesh, coordinates multiplied by `scale` (1e-3 for a file in mm). Physical groups of volumes become element
 /// sets, those of surfaces become surfaces and node sets, those of curves and points node sets; a group without a name
-/// is called `physical-TAG`. Hexahedra (8 or 20 nodes), tetrahedra (4 or 10) and prisms (6 or 15) are computed on.
+/// is called `physical-TAG`. Hexahedra (8 or 20 nodes), tetrahedra (4 or 10) and prisms (6 or 15) are computed on; of 27 and 18
+/// nodes those in the middles of sides and of the element are left out.
 ///
 /// # Errors
 /// [`Error::Shared`] where the file cannot be read; [`Error::File`] with the line (in binary files the section's line
-/// and the byte) for what is not MSH 4.1, other elements, and numbers that do not fit; [`Error::Mesh`] from
+/// and the byte) for what is not MSH 2 or 4, other elements, and numbers that do not fit; [`Error::Mesh`] from
 /// [`crate::mesh::quality::check`]. Memory follows the size of the file, not the counts that it announces.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
     let bytes = super::read_bytes(path)?;
@@ -38,13 +40,17 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
         names: BTreeMap::new(),
         groups: BTreeMap::new(),
         members: bytes.len().saturating_mul(16),
+        version: Version::FourOne,
+        reduced: 0,
     };
     let mut numbers = Numbers::new(path, bytes);
-    numbers.header()?;
+    reader.version = numbers.header()?;
     let mut skipped: BTreeMap<String, usize> = BTreeMap::new();
     while let Some(section) = numbers.section()? {
         match section.as_str() {
             "PhysicalNames" => reader.physical_names(&mut numbers)?,
+            "Nodes" if reader.version == Version::Two => reader.nodes_of_two(&mut numbers)?,
+            "Elements" if reader.version == Version::Two => reader.elements_of_two(&mut numbers)?,
             "Entities" => reader.entities(&mut numbers)?,
             "Nodes" => reader.nodes(&mut numbers)?,
             "Elements" => reader.elements(&mut numbers)?,
@@ -62,6 +68,13 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<ReadMesh, Error> {
     for (section, count) in skipped {
         reader.content.notes.push(format!("{count} × section ${section}: not used"));
     }
+    if reader.reduced > 0 {
+        let count = reader.reduced;
+        let note = format!(
+            "{count} elements of complete second order: nodes in the middles of sides and elements are left out"
+        );
+        reader.content.notes.push(note);
+    }
     let [nodes, _] = reader.content.labels(path)?;
     reader.name_nodes(&nodes);
     reader.content.into_mesh(path, &nodes, scale)
@@ -75,10 +88,13 @@ struct Reader {
     groups: BTreeMap<(i64, i64), Vec<i64>>,
     /// Members that groups may still have: sixteen a byte, so that memory follows the size of the file.
     members: usize,
+    version: Version,
+    /// Elements of complete second order.
+    reduced: usize,
 }
 
 /// Elements by their number in the format.
-const KINDS: [(i64, Kind); 13] = [
+const KINDS: [(i64, Kind); 16] = [
     (1, Kind::Line),
     (2, Kind::Triangle),
     (3, Kind::Quadrangle),
@@ -92,7 +108,14 @@ const KINDS: [(i64, Kind); 13] = [
     (16, Kind::Quadrangle8),
     (17, Kind::Solid(Shape::Hexahedron20)),
     (18, Kind::Solid(Shape::Wedge15)),
+    // of complete second order
+    (10, Kind::Quadrangle8),
+    (12, Kind::Solid(Shape::Hexahedron20)),
+    (13, Kind::Solid(Shape::Wedge15)),
 ];
+
+/// Nodes that elements of complete second order have more: quadrangles, hexahedra, prisms.
+const MORE: [(i64, usize); 3] = [(10, 1), (12, 7), (13, 3)];
 
 impl Reader {
     /// `count`, then lines of dimension, tag and "name"; text in binary files too.
@@ -126,8 +149,8 @@ impl Reader {
         for (dimension, count) in (0..).zip(counts) {
             for _ in 0..count {
                 let tag = numbers.int("tag of an entity")?;
-                // a point has a place, all else a box
-                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                // a point has a place, all else a box; in 4.0 each has one
+                for _ in 0..if dimension == 0 && self.version == Version::FourOne { 3 } else { 6 } {
                     numbers.double("place of an entity")?;
                 }
                 let mut groups = Vec::new();
@@ -147,11 +170,10 @@ impl Reader {
     }
 
     fn nodes(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
-        let [blocks, count, _, _] = numbers.four_sizes()?;
+        let [blocks, count] = self.counts(numbers)?;
         let before = self.content.nodes.len();
         for _ in 0..blocks {
-            let dimension = numbers.int("dimension of an entity")?;
-            numbers.int("tag of an entity")?;
+            let [dimension, _] = self.entity(numbers)?;
             let parametric = numbers.int("parametric (0 or 1)")?;
             let parameters = match (parametric, dimension) {
                 (0, _) => 0,
@@ -165,22 +187,26 @@ impl Reader {
                 }
             };
             let first = self.content.nodes.len();
-            for _ in 0..numbers.size("number of nodes")? {
+            let own = numbers.size("number of nodes")?;
+            if self.version == Version::Four {
+                for _ in 0..own {
+                    let (label, point) = (whole(numbers, "number of a node")?, place(numbers)?);
+                    for _ in 0..parameters {
+                        numbers.double("parametric coordinate")?;
+                    }
+                    self.content.nodes.push(Node { label, line: numbers.line(), point });
+                }
+                continue;
+            }
+            for _ in 0..own {
                 let label = numbers.size("number of a node")?;
                 self.content.nodes.push(Node { label, line: numbers.line(), point: [0.0; 3] });
             }
             for node in first..self.content.nodes.len() {
-                let mut point = [0.0; 3];
-                for x in &mut point {
-                    *x = numbers.double("coordinate")?;
-                    if !x.is_finite() {
-                        return Err(numbers.error("coordinate", *x, "a finite number"));
-                    }
-                }
+                self.content.nodes[node].point = place(numbers)?;
                 for _ in 0..parameters {
                     numbers.double("parametric coordinate")?;
                 }
-                self.content.nodes[node].point = point;
             }
         }
         let found = self.content.nodes.len() - before;
@@ -191,54 +217,99 @@ impl Reader {
     }
 
     fn elements(&mut self, numbers: &mut Numbers) -> Result<(), Error> {
-        let [blocks, count, _, _] = numbers.four_sizes()?;
+        let [blocks, count] = self.counts(numbers)?;
         let before = self.content.elements.len();
         for _ in 0..blocks {
-            let dimension = numbers.int("dimension of an entity")?;
-            let tag = numbers.int("tag of an entity")?;
+            let [dimension, tag] = self.entity(numbers)?;
             let code = numbers.int("type of elements")?;
-            let Some((_, kind)) = KINDS.into_iter().find(|kind| kind.0 == code) else {
-                let allowed = "1, 8 (lines), 2, 9 (triangles), 3, 16 (quadrangles), 4, 11 (tetrahedra), 5, 17 (hexahedra), \
-                               6, 18 (prisms), 15 (point); in Gmsh: Mesh.ElementOrder = 1, or 2 with \
-                               Mesh.SecondOrderIncomplete = 1";
-                return Err(numbers.error("type of elements", code, allowed));
-            };
+            let kind = kind_of(numbers, code)?;
             let first = self.content.elements.len();
             for _ in 0..numbers.size("number of elements")? {
-                let label = numbers.size("number of an element")?;
-                let mut nodes = [0; 20];
-                for node in &mut nodes[..kind.node_count()] {
-                    *node = numbers.size("node of an element")?;
+                if self.version == Version::Four {
+                    let label = whole(numbers, "number of an element")?;
+                    self.element(numbers, label, code, kind, |numbers| whole(numbers, "node of an element"))?;
+                } else {
+                    let label = numbers.size("number of an element")?;
+                    self.element(numbers, label, code, kind, |numbers| numbers.size("node of an element"))?;
                 }
-                let first = self.content.element_nodes.len();
-                let all = &mut self.content.element_nodes;
-                match kind.solid() {
-                    Some(shape) => all.extend(shape.gmsh().iter().map(|&place| nodes[place])),
-                    None => all.extend(&nodes[..kind.node_count()]),
-                }
-                self.content.elements.push(Element { label, line: numbers.line(), kind, first });
             }
             let places = first as u32..self.content.elements.len() as u32;
-            let groups = self.groups.get(&(dimension, tag)).map_or(&[][..], Vec::as_slice);
-            let members = groups.len().saturating_mul(places.len().max(1));
-            let Some(left) = self.members.checked_sub(members) else {
-                return Err(numbers.error(
-                    "members of physical groups",
-                    members,
-                    "16 a byte of the file in all",
-                ));
-            };
-            self.members = left;
+            let groups = self.groups.get(&(dimension, tag)).cloned().unwrap_or_default();
             for group in groups {
-                let name = self.names.get(&(dimension, *group)).cloned();
-                let name = name.unwrap_or_else(|| format!("physical-{group}"));
-                self.content.element_sets.entry(name).or_default().extend(places.clone());
+                self.add_to(numbers, dimension, group, places.clone())?;
             }
         }
         let found = self.content.elements.len() - before;
         if found as u64 != count {
             return Err(numbers.error("number of elements", found, format!("{count}, as announced")));
         }
+        Ok(())
+    }
+
+    /// Blocks and members of a section; 4.1 has the least and greatest tags, too.
+    fn counts(&self, numbers: &mut Numbers) -> Result<[u64; 2], Error> {
+        if self.version == Version::FourOne {
+            return numbers.four_sizes().map(|[blocks, count, _, _]| [blocks, count]);
+        }
+        Ok([numbers.size("number of blocks")?, numbers.size("number of all")?])
+    }
+
+    /// Dimension and tag of an entity; 4.0 has the tag first.
+    fn entity(&self, numbers: &mut Numbers) -> Result<[i64; 2], Error> {
+        if self.version == Version::Four {
+            let tag = numbers.int("tag of an entity")?;
+            return Ok([numbers.int("dimension of an entity")?, tag]);
+        }
+        Ok([numbers.int("dimension of an entity")?, numbers.int("tag of an entity")?])
+    }
+
+    /// An element, after its number.
+    fn element(
+        &mut self,
+        numbers: &mut Numbers,
+        label: u64,
+        code: i64,
+        kind: Kind,
+        node: impl Fn(&mut Numbers) -> Result<u64, Error>,
+    ) -> Result<(), Error> {
+        let mut nodes = [0; 20];
+        for own in &mut nodes[..kind.node_count()] {
+            *own = node(numbers)?;
+        }
+        let more = MORE.iter().find(|more| more.0 == code).map_or(0, |more| more.1);
+        for _ in 0..more {
+            node(numbers)?;
+        }
+        self.reduced += usize::from(more > 0 && kind.solid().is_some());
+        let first = self.content.element_nodes.len();
+        let all = &mut self.content.element_nodes;
+        match kind.solid() {
+            Some(shape) => all.extend(shape.gmsh().iter().map(|&place| nodes[place])),
+            None => all.extend(&nodes[..kind.node_count()]),
+        }
+        self.content.elements.push(Element { label, line: numbers.line(), kind, first });
+        Ok(())
+    }
+
+    /// Elements of a physical group.
+    fn add_to(
+        &mut self,
+        numbers: &Numbers,
+        dimension: i64,
+        group: i64,
+        places: std::ops::Range<u32>,
+    ) -> Result<(), Error> {
+        let Some(left) = self.members.checked_sub(places.len().max(1)) else {
+            return Err(numbers.error(
+                "members of physical groups",
+                places.len(),
+                "16 a byte of the file in all",
+            ));
+        };
+        self.members = left;
+        let name = self.names.get(&(dimension, group)).cloned();
+        let name = name.unwrap_or_else(|| format!("physical-{group}"));
+        self.content.element_sets.entry(name).or_default().extend(places);
         Ok(())
     }
 
@@ -261,6 +332,36 @@ impl Reader {
             members.into_iter().any(|element| !matches!(element.kind, Kind::Line | Kind::Line3 | Kind::Point))
         });
     }
+}
+
+/// The kind of a type of elements.
+fn kind_of(numbers: &Numbers, code: i64) -> Result<Kind, Error> {
+    KINDS.iter().find(|kind| kind.0 == code).map(|kind| kind.1).ok_or_else(|| {
+        let pyramids = if matches!(code, 7 | 14 | 19) { " (pyramids are none)" } else { "" };
+        let allowed = format!(
+            "1, 8 (lines), 2, 9 (triangles), 3, 16, 10 (quadrangles), 4, 11 (tetrahedra), 5, 17, 12 (hexahedra), \
+             6, 18, 13 (prisms), 15 (point){pyramids}; in Gmsh: Mesh.ElementOrder = 1 or 2"
+        );
+        numbers.error("type of elements", code, allowed)
+    })
+}
+
+/// A place, after the number of a node.
+fn place(numbers: &mut Numbers) -> Result<[f64; 3], Error> {
+    let mut point = [0.0; 3];
+    for x in &mut point {
+        *x = numbers.double("coordinate")?;
+        if !x.is_finite() {
+            return Err(numbers.error("coordinate", *x, "a finite number"));
+        }
+    }
+    Ok(point)
+}
+
+/// A number of a node or an element where it has four bytes.
+fn whole(numbers: &mut Numbers, what: &str) -> Result<u64, Error> {
+    let number = numbers.int(what)?;
+    u64::try_from(number).map_err(|_| numbers.error(what, number, "0 or more"))
 }
 
 #[cfg(test)]

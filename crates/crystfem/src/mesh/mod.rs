@@ -323,9 +323,10 @@ pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
     match ending.as_str() {
         "msh" => gmsh::read(path, scale),
         "inp" => abaqus::read(path, scale),
-        _ => {
-            Err(Error::Mesh(format!("{}: allowed: .msh (Gmsh 4.1), .inp (Abaqus, CalculiX)", path.display())))
-        }
+        _ => Err(Error::Mesh(format!(
+            "{}: allowed: .msh (Gmsh 2 and 4), .inp (Abaqus, CalculiX)",
+            path.display()
+        ))),
     }
 }
 

@@ -2,23 +2,35 @@
 
 use std::path::Path;
 
+use std::collections::BTreeMap;
+
 use crate::error::Error;
 use crate::mesh::Mesh;
+
+/// Diameter of a filament unless a scene or a file says otherwise, m.
+pub const FILAMENT: f64 = 1.75e-3;
 
 mod cover;
 #[cfg(feature = "case")]
 mod csv;
 mod deposit;
+mod feature;
 mod flow;
 mod gcode;
+mod height;
+mod limits;
+mod line;
 mod place;
 mod plan;
 mod printer;
+mod remark;
+mod summary;
 
 pub use cover::{Activation, Bead};
 #[cfg(feature = "case")]
 pub use csv::read_csv;
 pub use deposit::{Cells, Deposit};
+pub use feature::FAMILIES;
 pub use flow::stadium_width;
 pub use gcode::{parse, read_gcode};
 
@@ -37,6 +49,33 @@ pub struct Move {
     pub prints: bool,
     /// Length of filament that is fed along it, m; 0 where that is not known.
     pub fed: f64,
+    /// Height of its bead, m; 0 where the file does not tell.
+    pub height: f64,
+    /// What it is part of: an index into [`ToolPath::features`].
+    pub feature: u16,
+    /// Which tool moves.
+    pub tool: u16,
+    /// Line of the file.
+    pub line: u32,
+}
+
+/// A straight motion of X, Y, Z and filament, m, at F.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Motion {
+    delta: [f64; 4],
+    start: f64,
+    end: f64,
+    /// An index into the limits of the file.
+    limits: u32,
+    /// Whether the machine stood before it.
+    stop: bool,
+}
+
+impl Motion {
+    fn length(&self) -> f64 {
+        let across = self.delta[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
+        if across > 0.0 { across } else { self.delta[3].abs() }
+    }
 }
 
 impl Move {
@@ -49,10 +88,12 @@ impl Move {
 /// What a file sets besides places.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
-    /// Temperature of the nozzle, K.
+    /// Temperature of the nozzle of the selected tool, K.
     Nozzle,
     /// Temperature of the bed, K.
     Bed,
+    /// The bed is switched off.
+    BedOff,
     /// Speed of the fan, 0 to 1.
     Fan,
 }
@@ -79,6 +120,21 @@ pub struct ToolPath {
     pub rest: f64,
     /// What was passed over.
     pub notes: Vec<String>,
+    /// Names of features; that of what has no name is empty.
+    pub features: Vec<String>,
+    /// Diameter of the filament that the file states, m.
+    pub filament: Option<f64>,
+    /// Whether E is a volume (M200), which this diameter makes a length.
+    pub volumetric: bool,
+    /// Layers that the file marks; 0 where it marks none.
+    pub layers: usize,
+    /// How long the slicer says that the print takes, s, from the move `first` on.
+    pub estimate: Option<f64>,
+    first: usize,
+    /// All motions, filament alone too.
+    motions: Vec<Motion>,
+    /// Limits, in the order of the file.
+    limits: Vec<limits::Limits>,
 }
 
 impl ToolPath {
@@ -148,7 +204,7 @@ impl ToolPath {
                 }
                 time = start.max(time) + line;
                 place = to;
-                moves.push(Move { from, to, start: time - line, end: time, prints: true, fed: 0.0 });
+                moves.push(Move { from, to, start: time - line, end: time, prints: true, ..Move::default() });
             }
         }
         Ok(Self { moves, ..Self::default() })
@@ -169,9 +225,24 @@ impl ToolPath {
     }
 }
 
+/// Names and how often they came, most often first, twenty at most.
+fn told(counts: &mut BTreeMap<String, usize>) -> String {
+    let mut all: Vec<(String, usize)> = std::mem::take(counts).into_iter().collect();
+    all.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    let more = all.len().saturating_sub(20);
+    let mut names: Vec<String> =
+        all.iter().take(20).map(|(name, count)| format!("{name} ({count})")).collect();
+    if more > 0 {
+        names.push(format!("{more} more"));
+    }
+    names.join(", ")
+}
+
 fn error(path: &Path, line: usize, what: &str, found: impl ToString, allowed: impl Into<String>) -> Error {
     crate::mesh::labelled::line_error(path, line, what, found, allowed)
 }
 
+#[cfg(test)]
+mod dialects;
 #[cfg(test)]
 mod tests;

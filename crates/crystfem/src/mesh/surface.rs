@@ -138,7 +138,7 @@ impl Surface {
     }
 
     /// Where a boundary condition acts: `outer` (everywhere), a named surface (from whichever side its faces are
-    /// given), the part of the surface of a named element set, or a side of the box around the mesh
+    /// given), the part of the surface of a named element set, the faces whose nodes are all in a named node set, or a side of the box around the mesh
     /// ([`BOX_SIDES`]: faces within 1e-9 of its diagonal). A name of the mesh comes before our own.
     ///
     /// # Errors
@@ -159,6 +159,18 @@ impl Surface {
         } else if let Some(set) = mesh.element_sets.get(name) {
             let elements = set.iter().filter(|element| (**element as usize) < self.elements);
             faces.extend(elements.flat_map(|element| self.faces_of(*element)).map(|number| number as u32));
+        } else if let Some(set) = mesh.node_sets.get(name) {
+            let within = |number: &u32| {
+                mesh.face_nodes(self.face(*number)).iter().all(|node| set.binary_search(node).is_ok())
+            };
+            faces.extend((0..self.outer.len() as u32).filter(within));
+            if faces.is_empty() {
+                let count = set.len();
+                return Err(Error::Mesh(format!(
+                    "node set `{name}` ({count} nodes) has all nodes of no face; allowed: one that has, or a temperature, \
+                     which acts on nodes"
+                )));
+            }
         } else if name == "outer" {
             faces.extend(0..self.outer.len() as u32);
         } else if let Some(side) = BOX_SIDES.iter().position(|side| *side == name) {
@@ -178,6 +190,8 @@ impl Surface {
                     known.push(own.to_owned());
                 }
             }
+            let sets = mesh.node_sets.keys().filter(|name| !known.contains(name)).cloned();
+            let known = [&known[..], &sets.collect::<Vec<_>>()].concat();
             return Err(Error::Unknown { what: "surface", name: name.to_owned(), known });
         }
         faces.sort_unstable();
@@ -404,6 +418,12 @@ mod tests {
         assert_eq!(surface.faces_in(&surface.region(&bare, "left").unwrap()), named);
         let error = surface.region(&bare, "lid").unwrap_err().to_string();
         assert!(error.contains("no surface `lid`; allowed: lower, upper, outer, left"), "{error}");
+        // a node set with all nodes of faces, and one with none
+        bare.node_sets.insert("rim".into(), bare.node_sets["left"].clone());
+        assert_eq!(surface.faces_in(&surface.region(&bare, "rim").unwrap()), named);
+        bare.node_sets.insert("dots".into(), vec![0, 5]);
+        let error = surface.region(&bare, "dots").unwrap_err().to_string();
+        assert!(error.contains("node set `dots` (2 nodes) has all nodes of no face"), "{error}");
         bare.surfaces.insert("odd".into(), vec![Face { element: 99, side: 0 }]);
         assert!(surface.region(&bare, "odd").unwrap_err().to_string().contains("element 99 has no side 0"));
     }

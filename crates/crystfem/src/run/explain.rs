@@ -21,7 +21,8 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     ];
     lines.extend(built.notes.iter().map(|note| format!("note       {note}")));
     let task = scene.task(source, built)?;
-    lines.extend(task.notes.iter().map(|note| format!("note       {note}")));
+    let cut = scene.cut_steps();
+    lines.extend(task.notes.iter().chain(&cut).map(|note| format!("note       {note}")));
     let quantities = scene.quantities(&task);
     let mut problem = std::sync::Arc::unwrap_or_clone(task.problem);
     let births = problem.births.len();
@@ -46,15 +47,26 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     if let Some(mechanics) = &task.mechanics {
         let [bearing, shapes] = mechanics.counts;
         lines.push(format!(
-            "builds     stress of {bearing} elements of {shapes} shapes, {} nodes on the bed{}; about 45 products of 24 × 24 numbers for each element whenever the free strain \
+            "builds     stress of {bearing} elements of {shapes} shapes, {} nodes on the bed{}; about 45 products of its matrix for each element whenever the free strain \
              changes by {:e}",
             mechanics.bed.len(),
             if mechanics.release { ", released at the end" } else { "" },
             mechanics.strain_step
         ));
     }
+    if task.mechanics.as_ref().is_some_and(|mechanics| mechanics.stiff) {
+        // elements of second order are not printed
+        let advice = if births > 0 { "hexahedra bend right" } else { "`mesh.order = 2`, or hexahedra" };
+        lines.push(format!(
+            "note       stress of tetrahedra of 4 nodes: they bend far too little, warpage and stress are rough; {advice}"
+        ));
+    }
     if let Some(interfaces) = &task.interfaces {
-        lines.push(format!("builds     healing of {} interfaces", interfaces.list.len()));
+        lines.push(format!(
+            "builds     healing of {} interfaces, {}",
+            interfaces.list.len(),
+            interfaces.law.explain()
+        ));
     }
     let radiates = problem.conditions.iter().any(|c| matches!(c, Condition::Radiation { .. }));
     let changes = problem.conditions.iter().any(|c| !c.breaks().is_empty())

@@ -4,9 +4,10 @@ use super::Failure;
 use super::celsius::{CELSIUS, of_kelvin};
 use super::{fit_part, heat_flow};
 use crate::error::Error;
-use crate::fit::{Fit, avrami, nakamura, ozawa};
+use crate::fit::{Fit, Known, avrami, nakamura, ozawa};
 use crate::quantities as q;
 use crate::scene::{FitScene, FitSpec, Job, Measured};
+use polycore::case::Finished;
 use polycore::output::picture::{LinePlot, Series};
 use polycore::output::{atomic_write, csv};
 use polycore::report::{Phases, Quantity, Report};
@@ -21,10 +22,26 @@ struct Done {
     fit: Fit,
     abscissa: (&'static str, &'static str),
     series: Vec<(String, Vec<f64>, Vec<f64>)>,
+    /// What was known of the kinetics, of `nakamura`.
+    known: Option<Known>,
+}
+
+impl Done {
+    /// The fitted kinetics as a key of a material of a scene.
+    fn block(&self) -> Option<String> {
+        let Known { equilibrium_melting, frozen, activation_energy } = self.known?;
+        let of = |name: &str| self.fit.estimates.iter().find(|one| one.name == name).map(|one| one.value);
+        let [rate, nucleation, n] = ["growth_rate", "nucleation", "avrami_exponent"].map(of);
+        Some(format!(
+            "kinetics = {{ growth_rate = \"{:.6e} 1/s\", nucleation = \"{:.6e} K^2\", activation_energy = \"{activation_energy} J/mol\", \
+             equilibrium_melting = \"{equilibrium_melting} K\", frozen = \"{frozen} K\", avrami_exponent = {:.5} }}\n",
+            rate?, nucleation?, n?
+        ))
+    }
 }
 
 /// Runs every fit.
-pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> Result<Report, Failure> {
+pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> Result<Finished, Failure> {
     let (output, quick) = (run.options.output, run.options.quick);
     let jobs = scene.jobs(source)?;
     run.begin()?;
@@ -57,7 +74,13 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> 
     write_estimates(output, &done)?;
     phases.stop();
     report.phases(&phases).threads(1).judge(&scene.expect, quick);
-    Ok(report)
+    let mut text = report.table();
+    for (one, block) in done.iter().filter_map(|one| Some((one, one.block()?))) {
+        let path = output.join(format!("{}_kinetics.toml", one.name));
+        atomic_write(&path, |file| file.write_all(block.as_bytes()))?;
+        text += &format!("for a material of a scene, {}:\n  {block}", path.display());
+    }
+    Ok(Finished { report, text })
 }
 
 /// What a scene will fit.
@@ -90,7 +113,13 @@ pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneEr
         let of = if heats.is_empty() { String::new() } else { format!("; peaks of {}", heats.join(", ")) };
         format!("fit {}: {:?}, {what}{of}", spec.name, spec.law)
     };
-    Ok(scene.fit.iter().zip(&jobs).map(line).collect())
+    Ok(read(source, scene).chain(scene.fit.iter().zip(&jobs).map(line)).collect())
+}
+
+/// How the tables of a scene are understood, a line each.
+pub fn read<'a>(source: &'a Source, scene: &'a FitScene) -> impl Iterator<Item = String> + 'a {
+    let tables = scene.fit.iter().flat_map(|spec| &spec.data);
+    tables.filter_map(|data| crate::table::understood(&source.file(&data.file)))
 }
 
 fn solve(spec: &FitSpec, job: Job, run: &mut polycore::case::Run) -> Result<Vec<Done>, Failure> {
@@ -99,7 +128,7 @@ fn solve(spec: &FitSpec, job: Job, run: &mut polycore::case::Run) -> Result<Vec<
         Job::Avrami(times, degrees) => {
             let fit = avrami(&times, &degrees)?;
             let series = vec![("measured".to_owned(), times, degrees)];
-            Ok(vec![Done { name: name.clone(), fit, abscissa: ("time", "s"), series }])
+            Ok(vec![Done { name: name.clone(), fit, abscissa: ("time", "s"), series, known: None }])
         }
         Job::Nakamura(runs, known) => {
             let fit = nakamura(&runs, &known)?;
@@ -108,7 +137,13 @@ fn solve(spec: &FitSpec, job: Job, run: &mut polycore::case::Run) -> Result<Vec<
                 .zip(&spec.data)
                 .map(|(run, data)| (stem(&data.file), of_kelvin(&run.temperatures), run.degrees))
                 .collect();
-            Ok(vec![Done { name: name.clone(), fit, abscissa: ("temperature", "degC"), series }])
+            Ok(vec![Done {
+                name: name.clone(),
+                fit,
+                abscissa: ("temperature", "degC"),
+                series,
+                known: Some(known),
+            }])
         }
         Job::Part(part) => {
             let mut show = |trial: usize| {
@@ -119,7 +154,7 @@ fn solve(spec: &FitSpec, job: Job, run: &mut polycore::case::Run) -> Result<Vec<
             let curves = part.curves.into_iter().zip(&spec.data);
             let series =
                 curves.map(|((_, times, degrees), data)| (stem(&data.file), times, degrees)).collect();
-            Ok(vec![Done { name: name.clone(), fit, abscissa: ("time", "s"), series }])
+            Ok(vec![Done { name: name.clone(), fit, abscissa: ("time", "s"), series, known: None }])
         }
         Job::Ozawa(coolings, temperatures) => {
             let mut all = Vec::new();
@@ -129,7 +164,7 @@ fn solve(spec: &FitSpec, job: Job, run: &mut polycore::case::Run) -> Result<Vec<
                 let rates: Vec<f64> = rates.iter().map(|q| q * 60.0).collect();
                 let name = format!("{name}.{}_degC", ((temperature - CELSIUS) * 100.0).round() / 100.0);
                 let series = vec![("measured".to_owned(), rates, degrees)];
-                all.push(Done { name, fit, abscissa: ("cooling_rate", "K/min"), series });
+                all.push(Done { name, fit, abscissa: ("cooling_rate", "K/min"), series, known: None });
             }
             Ok(all)
         }

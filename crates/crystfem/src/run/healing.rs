@@ -1,10 +1,14 @@
 //! Healing of interfaces on their way through the temperatures of a simulation.
 
+use super::outside::{Frame, Outside};
+use crate::error::Error;
 use crate::healing::Healing;
 use crate::quantities as q;
-use crate::scene::Interfaces;
+use crate::scene::{Interfaces, PartScene};
 use crate::simulation::Simulation;
+use polycore::output::picture::{ColorMap, Solids, Strip};
 use polycore::report::Report;
+use std::path::Path;
 
 /// What a resumed run needs: of each interface its integral and, once both sides are there, time, s, temperature, K, and the melt's share.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -72,6 +76,42 @@ impl<'a> Healer<'a> {
         least
     }
 
+    /// healing.png: D_h of the part at the end, at each node the least of the elements around it, and the strength where the scene gives it.
+    ///
+    /// # Errors
+    /// A picture that cannot be written.
+    pub fn draw(&self, scene: &PartScene, simulation: &Simulation, output: &Path) -> Result<(), Error> {
+        let mesh = &simulation.problem().mesh;
+        let degrees = self.field(simulation);
+        let own: Vec<u32> = (0..).zip(&degrees).filter(|(_, x)| x.is_finite()).map(|(e, _)| e).collect();
+        let Some(bounds) = mesh.bounds_of(&own) else { return Ok(()) };
+        let mut least = vec![f64::NAN; mesh.points.len()];
+        for &element in &own {
+            for &node in mesh.nodes(element) {
+                // the least of a number and NaN is the number
+                least[node as usize] = least[node as usize].min(degrees[element as usize]);
+            }
+        }
+        let strip = |label: &str, most: f64| Strip {
+            label: label.into(),
+            range: (0.0, most),
+            colors: ColorMap::Viridis,
+        };
+        let (mut fields, mut values) = (vec![strip("degree of healing", 1.0)], vec![least.clone()]);
+        if let Some(strength) = self.spec.strength.map(|strength| 1e-6 * strength) {
+            fields.push(strip("interlayer strength [MPa]", strength));
+            values.push(least.iter().map(|degree| strength * degree).collect());
+        }
+        let view = scene.output.solid.view();
+        let solids = Solids { title: scene.title.clone(), bounds, unit: ("mm".into(), 1e-3), view, fields };
+        let outside = Outside::new(mesh, &own, scene.output.solid.plane(bounds))?;
+        let title = format!("t = {} s", (simulation.time() * 100.0).round() / 100.0);
+        let exists = degrees.iter().map(|degree| degree.is_finite()).collect();
+        let (title, skin) = outside.skin(Frame { title, values, exists });
+        solids.write(output.join("healing.png"), 1, |_| Ok((title.clone(), skin.clone())))?;
+        Ok(())
+    }
+
     /// Least and mean by area.
     pub fn record(&self, report: &mut Report) {
         let (mut least, mut sum, mut area) = (f64::INFINITY, 0.0, 0.0);
@@ -84,6 +124,10 @@ impl<'a> Healer<'a> {
         if area > 0.0 {
             report.value(q::LEAST_HEALING, least);
             report.value(q::MEAN_HEALING, sum / area);
+            if let Some(strength) = self.spec.strength {
+                report.value(q::LEAST_INTERLAYER_STRENGTH, 1e-6 * strength * least);
+                report.value(q::MEAN_INTERLAYER_STRENGTH, 1e-6 * strength * sum / area);
+            }
         }
         report.work("interfaces", self.spec.list.len() as u64);
     }

@@ -2,7 +2,7 @@
 
 use super::probe::Probe;
 use crate::error::Error;
-use crate::mechanics::{Body, BodyState, Hexahedron, POINTS, Support};
+use crate::mechanics::{Body, BodyState, MOST, Support, points, shares};
 use crate::mesh::Mesh;
 use crate::quantities as q;
 use crate::scene::Mechanics;
@@ -17,8 +17,9 @@ const TOLERANCE: f64 = 1e-8;
 /// The state of an element at the last solution.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Last {
-    /// Temperatures of the nodes, K.
-    nodes: [f64; 8],
+    /// Temperatures of the nodes, K, and their number.
+    nodes: [f64; MOST],
+    count: usize,
     /// α.
     degree: f64,
     /// s.
@@ -75,11 +76,11 @@ impl<'a> Follower<'a> {
         let degrees = simulation.element_means("alpha");
         let births = &simulation.problem().births;
         let now = |element: usize| -> Option<Last> {
-            let mut nodes = [0.0; 8];
-            for (value, &node) in nodes.iter_mut().zip(&self.mesh.hexahedra[element]) {
+            let (mut nodes, own) = ([0.0; MOST], self.mesh.nodes(element as u32));
+            for (value, &node) in nodes.iter_mut().zip(own) {
                 *value = simulation.temperature(node)?;
             }
-            Some(Last { nodes, degree: degrees[element].unwrap_or(0.0), time })
+            Some(Last { nodes, count: own.len(), degree: degrees[element].unwrap_or(0.0), time })
         };
         let mut present = vec![None; self.spec.bears.len()];
         let (mut born, mut change) = (Vec::new(), 0.0_f64);
@@ -93,7 +94,8 @@ impl<'a> Follower<'a> {
                 let birth = (simulation.state().born[element] as usize).checked_sub(1);
                 self.reached.last[element] = match birth.and_then(|birth| births.get(birth)) {
                     Some(birth) => Some(Last {
-                        nodes: [birth.temperature; 8],
+                        nodes: [birth.temperature; MOST],
+                        count: self.mesh.nodes(element as u32).len(),
                         degree: self.spec.fresh,
                         time: birth.time,
                     }),
@@ -105,7 +107,7 @@ impl<'a> Follower<'a> {
                 let strain = |[from, to]: [f64; 2]| {
                     self.spec.law.volume.strain([from, before.degree], [to, after.degree])
                 };
-                let pairs = before.nodes.into_iter().zip(after.nodes);
+                let pairs = before.nodes.into_iter().zip(after.nodes).take(after.count);
                 change = pairs.map(|(from, to)| strain([from, to]).abs()).fold(change, f64::max);
             }
         }
@@ -190,7 +192,7 @@ impl<'a> Follower<'a> {
         let place = |node: u32| Vector3::from(self.mesh.points[node as usize]);
         let alive: std::collections::HashSet<u32> = (0..self.reached.last.len())
             .filter(|&element| self.reached.last[element].is_some())
-            .flat_map(|element| self.mesh.hexahedra[element])
+            .flat_map(|element| self.mesh.nodes(element as u32).iter().copied())
             .collect();
         let bed: Vec<u32> = self.spec.bed.iter().copied().filter(|node| alive.contains(node)).collect();
         let farthest = |of: &dyn Fn(u32) -> f64| {
@@ -212,7 +214,7 @@ impl<'a> Follower<'a> {
     pub fn displacement(&self) -> Vec<f64> {
         let mut all = vec![f64::NAN; 3 * self.mesh.points.len()];
         for element in (0..self.reached.last.len()).filter(|&element| self.reached.last[element].is_some()) {
-            for &node in &self.mesh.hexahedra[element] {
+            for &node in self.mesh.nodes(element as u32) {
                 let node = node as usize;
                 all[3 * node..3 * node + 3].copy_from_slice(&self.body.state.displacement[node]);
             }
@@ -224,7 +226,8 @@ impl<'a> Follower<'a> {
     pub fn mises(&self) -> Vec<f64> {
         let of = |element: usize| {
             let alive = self.reached.last.get(element).is_some_and(Option::is_some);
-            let points = (0..POINTS).map(|point| von_mises(self.body.stress(element, point)));
+            let points =
+                (0..self.body.points(element)).map(|point| von_mises(self.body.stress(element, point)));
             if alive { points.fold(0.0, f64::max) } else { f64::NAN }
         };
         (0..self.mesh.element_count()).map(of).collect()
@@ -297,13 +300,19 @@ impl<'a> Follower<'a> {
 }
 
 impl Last {
-    /// T of the middle, K, and α.
+    /// Mean T, K, and α.
     fn state(&self) -> [f64; 2] {
-        [self.nodes.iter().sum::<f64>() / 8.0, self.degree]
+        // corners of first order have equal shares
+        if self.count <= 8 {
+            return [self.nodes[..self.count].iter().sum::<f64>() / self.count as f64, self.degree];
+        }
+        let points = points(self.count);
+        [(0..points).map(|point| self.at(point)).sum::<f64>() / points as f64, self.degree]
     }
 
     /// T at a Gauss point, K.
     fn at(&self, point: usize) -> f64 {
-        Hexahedron::shapes(point).iter().zip(self.nodes).map(|(share, t)| share * t).sum()
+        let shares = shares(self.count, point);
+        shares[..self.count].iter().zip(self.nodes).map(|(share, t)| share * t).sum()
     }
 }

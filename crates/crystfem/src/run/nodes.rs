@@ -58,6 +58,41 @@ fn part(before: f64, after: f64, degree: f64) -> f64 {
     if part.is_finite() { part } else { (degree - before) / (after - before) }
 }
 
+/// What a file holds: its mesh, and its temperatures at the first time. Files of later times are there, but not read.
+///
+/// # Errors
+/// As [`run`], as far as the first time goes.
+pub fn explain(spec: &NodesSpec, path: &Path) -> Result<String, Error> {
+    let mut analysis = thermal::open(path, spec.array.as_deref())?;
+    let Some(first) = analysis.frames.next().transpose()? else {
+        return Err(none(path));
+    };
+    kelvin(spec, path, &first)?;
+    let span = |pick: fn(f64, f64) -> f64, start| first.temperature.iter().copied().fold(start, pick);
+    let [low, high] = [span(f64::min, f64::INFINITY), span(f64::max, f64::NEG_INFINITY)];
+    let unit = if spec.zero() == 0.0 { "K" } else { "°C" };
+    let (nodes, cells, time) = (analysis.points.len(), analysis.cells.len(), first.time);
+    let file = spec.file.display();
+    Ok(format!("at {nodes} nodes of {cells} elements of {file}, from {low} to {high} {unit} at t = {time} s"))
+}
+
+fn none(path: &Path) -> Error {
+    let reason = "no temperatures; allowed: those of one time at least (CalculiX: *NODE FILE, NT)".into();
+    Error::Data { what: path.display().to_string(), reason }
+}
+
+/// Temperatures of a time, K.
+fn kelvin(spec: &NodesSpec, path: &Path, frame: &thermal::Frame) -> Result<Vec<f64>, Error> {
+    let kelvin: Vec<f64> = frame.temperature.iter().map(|value| value + spec.zero()).collect();
+    let Some(wrong) = kelvin.iter().find(|kelvin| !(kelvin.is_finite() && **kelvin > 0.0)) else {
+        return Ok(kelvin);
+    };
+    let time = frame.time;
+    let reason =
+        format!("{wrong} K at t = {time} s; allowed: above 0 K (`unit` is that of the file's temperatures)");
+    Err(Error::Data { what: path.display().to_string(), reason })
+}
+
 /// Integrates at every node, writes `NAME.vtkhdf` and the values of the end.
 ///
 /// # Errors
@@ -71,7 +106,6 @@ pub fn run(
     report: &mut Report,
 ) -> Result<(), Error> {
     let analysis = thermal::open(path, spec.array.as_deref())?;
-    let zero = spec.zero();
     let mut series =
         MeshSeries::create(output.join(format!("{name}.vtkhdf")), analysis.points, analysis.cells)?;
     let (mut nodes, mut time) = (Vec::<Node>::new(), 0.0);
@@ -79,26 +113,17 @@ pub fn run(
     let data = |reason: String| Error::Data { what: path.display().to_string(), reason };
     for frame in analysis.frames {
         let frame = frame?;
-        let kelvin = |value: &f64| value + zero;
-        if let Some(wrong) =
-            frame.temperature.iter().map(kelvin).find(|kelvin| !(kelvin.is_finite() && *kelvin > 0.0))
-        {
-            let reason = format!(
-                "{wrong} K at t = {} s; allowed: above 0 K (`temperature` is the unit of the file)",
-                frame.time
-            );
-            return Err(data(reason));
-        }
+        let values = kelvin(spec, path, &frame)?;
         if nodes.is_empty() {
             let fresh = |value: &f64| {
-                let start = spec.start.map_or(kelvin(value), |start| start.si());
+                let start = spec.start.map_or(*value, |start| start.si());
                 let mut state = vec![0.0; material.state_names().len()];
                 material.initial_state(start, &mut state);
                 let mut fields = vec![0.0; material.field_names().len()];
                 material.fields(&state, &mut fields);
                 Node { temperature: start, state, fields, reached: [f64::NAN; 3] }
             };
-            nodes = frame.temperature.iter().map(fresh).collect();
+            nodes = values.iter().map(fresh).collect();
             time = if spec.start.is_some() { 0.0 } else { frame.time };
         }
         let duration = frame.time - time;
@@ -107,8 +132,8 @@ pub fn run(
         }
         nodes
             .par_iter_mut()
-            .zip(&frame.temperature)
-            .try_for_each(|(node, value)| node.advance(material, kelvin(value), duration))?;
+            .zip(&values)
+            .try_for_each(|(node, value)| node.advance(material, *value, duration))?;
         time = frame.time;
         frames += 1;
         let temperatures: Vec<f64> = nodes.iter().map(|node| node.temperature - CELSIUS).collect();
@@ -122,9 +147,7 @@ pub fn run(
         series.step(time, &arrays, &[])?;
     }
     if frames == 0 {
-        return Err(data(
-            "no temperatures; allowed: those of one time at least (CalculiX: *NODE FILE, NT)".into(),
-        ));
+        return Err(none(path));
     }
     series.finish()?;
     report.work(&format!("{name}.frames"), frames).work(&format!("{name}.nodes"), nodes.len() as u64);

@@ -13,13 +13,10 @@ use crate::scene::{PartScene, Task};
 use crate::simulation::{Simulation, State};
 use polycore::case::{Finished, Run, STATISTICS, Step, StepField};
 use polycore::output::vtkhdf::{Cells, Data, MeshSeries};
-use polycore::report::{Phases, Quantity, Report};
+use polycore::report::{Phases, Quantity, Report, Value};
 use polycore::scene::Source;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-
-/// Fields written unless the scene says how often.
-const FRAMES: f64 = 50.0;
 
 /// Runs the scene of a body, or resumes it.
 pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished, Failure> {
@@ -30,7 +27,9 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
         let rest = name.strip_prefix("layer-").and_then(|rest| rest.split_once('.'));
         rest.is_some_and(|(_, quantity)| STATISTICS.iter().any(|statistic| quantity.starts_with(statistic)))
     };
-    let text = report.table_of(|name| !of_layer(name) && !name.contains("at_birth_"));
+    let mut text = report.table_of(|name| !of_layer(name) && !name.contains("at_birth_"));
+    text += &warnings(&report);
+    text += &scene.cut_steps().map_or(String::new(), |cut| format!("warning: {cut}\n"));
     Ok(Finished { text, report })
 }
 
@@ -91,11 +90,28 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
         if let Some(follower) = &recorder.follower {
             warped::draw(scene, &task, follower, output)?;
         }
+        if let Some(healer) = &recorder.healer {
+            healer.draw(scene, &simulation, output)?;
+        }
     }
     phases.stop();
     let expect = if is_study { &[] } else { &scene.expect[..] };
     report.phases(&phases).threads(rayon::current_num_threads()).judge(expect, quick);
     Ok(report)
+}
+
+/// What the values of a report warn of, a line each: stress that would flow.
+pub fn warnings(report: &Report) -> String {
+    let mut lines = String::new();
+    for (name, value) in &report.values {
+        let Value::Scalar { value, .. } = value else { continue };
+        if *value > 1.0 && name.rsplit('.').next() == Some(q::MISES_OVER_STRENGTH.name) {
+            lines += &format!(
+                "warning: {name} = {value:.3}: the largest Mises stress is above the strength; the material would yield or break there, which is not computed\n"
+            );
+        }
+    }
+    lines
 }
 
 /// What a scene builds and leaves out.
@@ -151,7 +167,7 @@ impl Recorder<'_> {
         run: &mut Run,
     ) -> Result<Option<MeshSeries>, Failure> {
         let (end, mesh) = (self.task.end, &self.task.problem.mesh);
-        let every = self.scene.output.every.map_or(end / FRAMES, |every| every.si());
+        let every = self.scene.every(end);
         let last = (end / every - 1e-9).ceil().max(1.0) as usize;
         let path = run.options.output.join("fields.vtkhdf");
         let mut series = match (self.scene.output.fields, self.frames) {
@@ -241,6 +257,11 @@ impl Recorder<'_> {
         }
         let healing = self.healer.as_ref().map(|healer| healer.field(simulation));
         of_cells.extend(healing.iter().map(|field| ("healing", 1, field.as_slice())));
+        let strength = self.task.interfaces.as_ref().and_then(|interfaces| interfaces.strength);
+        let strength = strength.zip(healing.as_ref());
+        let strength: Option<Vec<f64>> =
+            strength.map(|(strength, degrees)| degrees.iter().map(|degree| strength * degree).collect());
+        of_cells.extend(strength.iter().map(|field| ("interlayer_strength_Pa", 1, field.as_slice())));
         Ok(series.step(simulation.time(), &arrays, &of_cells)?)
     }
 

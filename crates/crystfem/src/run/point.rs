@@ -6,7 +6,7 @@ use super::draw::{self, Run};
 use crate::error::Error;
 use crate::point::{Course, Curves, Drive, Event, Stepping};
 use crate::quantities as q;
-use crate::scene::PointScene;
+use crate::scene::{NodesSpec, PointScene};
 use polycore::output::csv;
 use polycore::report::{Phases, Quantity, Report};
 use polycore::scene::{SceneError, Source};
@@ -24,6 +24,8 @@ pub fn run(source: &Source, scene: &PointScene, run: &mut polycore::case::Run) -
         built.push((name.as_str(), *spec, spec.build(source, key)?));
     }
     let courses = scene.courses(source)?;
+    let thermal = scene.nodes.iter().enumerate().filter(|(_, nodes)| !quick || nodes.quick);
+    thermal.map(|(index, nodes)| opened(source, index, nodes)).collect::<Result<Vec<_>, _>>()?;
     run.begin()?;
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let (mut phases, mut runs) = (Phases::new(), Vec::new());
@@ -127,10 +129,16 @@ pub fn explain(source: &Source, scene: &PointScene, quick: bool) -> Result<Vec<S
         };
         lines.push(format!("point {}: {drive}; {steps}", point.name));
     }
-    for nodes in scene.nodes.iter().filter(|nodes| !quick || nodes.quick) {
-        lines.push(format!("nodes {}: at every node of {}", nodes.name, nodes.file.display()));
+    for (index, nodes) in scene.nodes.iter().enumerate().filter(|(_, nodes)| !quick || nodes.quick) {
+        lines.push(format!("nodes {}: {}", nodes.name, opened(source, index, nodes)?));
     }
     Ok(lines)
+}
+
+/// What the file of a thermal analysis holds.
+fn opened(source: &Source, index: usize, nodes: &NodesSpec) -> Result<String, SceneError> {
+    let told = super::nodes::explain(nodes, &source.file(&nodes.file));
+    told.map_err(|error| source.refused(&format!("nodes[{index}].file"), &error))
 }
 
 /// Rows with a value that is not finite: its name and the time.

@@ -65,7 +65,7 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
         }
     }
     table(&report, scene, &rows, output)?;
-    let text = rows.text() + &report.verdict() + &survivors;
+    let text = rows.text() + &report.verdict() + &survivors + &part::warnings(&report);
     Ok(Finished { report, text })
 }
 

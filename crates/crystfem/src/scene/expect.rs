@@ -44,8 +44,10 @@ impl PartScene {
             all.extend(stresses.map(Named::from));
             all.extend(mechanics.law.strength.is_finite().then(|| q::MISES_OVER_STRENGTH.into()));
         }
-        if task.interfaces.is_some() {
+        if let Some(interfaces) = &task.interfaces {
             all.extend([q::LEAST_HEALING, q::MEAN_HEALING].map(Named::from));
+            let strengths = [q::LEAST_INTERLAYER_STRENGTH, q::MEAN_INTERLAYER_STRENGTH];
+            all.extend(interfaces.strength.iter().flat_map(|_| strengths.map(Named::from)));
         }
         let unit = |field: &str| if field == "temperature" { "degC" } else { "" };
         let with_temperature = || std::iter::once("temperature").chain(fields.iter().copied());

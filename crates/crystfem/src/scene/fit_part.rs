@@ -78,6 +78,9 @@ impl FitSpec {
             let [times, degrees] = table(source, &key(&format!("data[{i}].file")), &data.file, columns)?;
             curves.push((index, times, degrees));
         }
+        // opens the files that the part reads
+        let task = scene.mesh.build(&part).and_then(|built| scene.task(&part, built));
+        task.map_err(|error| source.error(&key("part"), error.message(), "the scene of a valid part"))?;
         let material = name.to_owned();
         Ok(PartFit { source: part, scene, material, constants, curves })
     }

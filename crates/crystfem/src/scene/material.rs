@@ -246,7 +246,7 @@ impl MaterialSpec {
     }
 
     /// Conductivity and specific heat.
-    fn properties(&self, source: &Source, key: &str) -> Result<[Property; 2], SceneError> {
+    pub(crate) fn properties(&self, source: &Source, key: &str) -> Result<[Property; 2], SceneError> {
         let of = |name: &str| format!("{key}.{name}");
         Ok([
             self.conductivity.build(source, &of("conductivity"), "conductivity, W/(m K)")?,
@@ -266,11 +266,11 @@ impl MaterialSpec {
         }
     }
 
-    /// The polymer of a `semicrystalline` block.
+    /// The constants of a `semicrystalline` block.
     ///
     /// # Errors
     /// As [`MaterialSpec::build`].
-    pub fn semicrystalline(&self, source: &Source, key: &str) -> Result<Semicrystalline, SceneError> {
+    pub fn polymer(&self, source: &Source, key: &str) -> Result<Polymer, SceneError> {
         self.check_keys(source, key)?;
         let constants = self.constants(source, key)?;
         let melting = match &self.melting {
@@ -288,7 +288,7 @@ impl MaterialSpec {
         let [conductivity, specific_heat] = self.properties(source, key)?;
         let kinetics = Kinetics::new(constants)
             .map_err(|error| located_in(source, &property("kinetics"), &KINETICS_KEYS, &error))?;
-        let polymer = Polymer {
+        Ok(Polymer {
             density: self.density.si(),
             conductivity,
             specific_heat,
@@ -297,8 +297,15 @@ impl MaterialSpec {
             ultimate_crystallinity: self.crystallinity.map_or(0.0, Quantity::si),
             latent_heat: self.latent_heat.map(Quantity::si),
             seed: self.initial_alpha.map_or(0.0, Quantity::si),
-        };
-        let built = Semicrystalline::new(polymer);
+        })
+    }
+
+    /// The material of a `semicrystalline` block.
+    ///
+    /// # Errors
+    /// As [`MaterialSpec::build`].
+    pub fn semicrystalline(&self, source: &Source, key: &str) -> Result<Semicrystalline, SceneError> {
+        let built = Semicrystalline::new(self.polymer(source, key)?);
         let factors = self.conductivity_factors.unwrap_or([1.0; 3]);
         built.and_then(|built| built.with_directions(factors)).map_err(|error| {
             let name = match &error {
@@ -306,7 +313,7 @@ impl MaterialSpec {
                 Error::Parameter { name: "initial relative crystallinity", .. } => "initial_alpha",
                 _ => "crystallinity",
             };
-            located(source, &property(name), &error)
+            located(source, &format!("{key}.{name}"), &error)
         })
     }
 }

@@ -2,8 +2,9 @@
 
 use super::PartScene;
 use super::fault::located;
-use crate::mechanics::{Hexahedron, SolidifyingMaxwell};
+use crate::mechanics::{SolidifyingMaxwell, is_known, key};
 use crate::mesh::Mesh;
+use crate::mesh::path::ToolPath;
 use crate::mesh::surface::Surface;
 use polycore::scene::{SceneError, Source};
 use polycore::units::{PerTemperature, Ratio, Stress};
@@ -12,6 +13,10 @@ use std::collections::{HashMap, HashSet};
 
 /// Largest change of the free strain between two solutions, unless a scene says otherwise.
 const STRAIN_STEP: f64 = 2e-4;
+
+/// Bytes of the matrices of a hexahedron, and of tetrahedra of 4 and 10 nodes.
+const HEXAHEDRON: f64 = 26e3;
+const TETRAHEDRON: [f64; 2] = [2e3, 10e3];
 
 /// Stress and warpage beside the heat: what happens to the shape does not act back on temperatures.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -94,8 +99,12 @@ pub struct Mechanics {
     pub fresh: f64,
     /// Of each element, whether it bears stress.
     pub bears: Vec<bool>,
-    /// How many do, and of how many shapes all hexahedra are.
+    /// How many do, and of how many shapes all elements are.
     pub counts: [usize; 2],
+    /// Bytes of the matrices of all shapes.
+    pub matrices: f64,
+    /// Whether all that bears stress are tetrahedra of 4 nodes, which are too stiff.
+    pub stiff: bool,
     /// Nodes on the bed.
     pub bed: Vec<u32>,
     /// See [`MechanicsSpec`].
@@ -106,16 +115,17 @@ pub struct Mechanics {
 
 impl PartScene {
     /// The mechanics of a scene on a mesh, where it has any; `material_of` are the materials of elements by their place in the scene, and `absent`
-    /// elements are never printed.
+    /// elements are never printed; `path` is that of a mesh of one.
     ///
     /// # Errors
-    /// A [`SceneError`] for unknown names, elements that are no hexahedra of first order, and a part that nothing holds.
+    /// A [`SceneError`] for unknown names, elements that are neither hexahedra of first order nor tetrahedra, and a part that nothing holds.
     pub(super) fn mechanics(
         &self,
         source: &Source,
         mesh: &Mesh,
         material_of: &[u16],
         absent: &[u32],
+        path: Option<&ToolPath>,
     ) -> Result<Option<Mechanics>, SceneError> {
         let Some(spec) = &self.mechanics else { return Ok(None) };
         let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
@@ -134,14 +144,13 @@ impl PartScene {
         let mut bears: Vec<bool> =
             material_of.iter().map(|&material| usize::from(material) == index).collect();
         absent.iter().for_each(|&element| bears[element as usize] = false);
-        let others = mesh.element_count() - mesh.hexahedra.len();
+        let all = || (0..mesh.element_count() as u32).map(|element| mesh.nodes(element));
+        let others = all().filter(|nodes| !is_known(nodes.len())).count();
         if others > 0 {
-            let found = format!("a mesh with {others} other elements");
-            return Err(source.error(
-                "mechanics",
-                found,
-                "8-node hexahedra: layers, bricks, cells of a path",
-            ));
+            let found = format!("a mesh with {others} wedges, or hexahedra of second order");
+            let allowed = "hexahedra of 8 nodes, tetrahedra of 4 or 10 (tetrahedra fill any shape: \
+                           `cells` of a bar or brick, any mesher)";
+            return Err(source.error("mechanics", found, allowed));
         }
         let nodes_of = |own: bool| -> HashSet<u32> {
             let chosen = (0..bears.len() as u32).filter(|&element| bears[element as usize] == own);
@@ -172,24 +181,44 @@ impl PartScene {
         let loose = loose(mesh, &bears, &bed);
         if loose > 0 {
             let found = format!("{loose} elements that nothing connects with the bed");
-            return Err(source.error(
-                "mechanics.bed",
-                found,
-                "a part that hangs together and touches the bed",
-            ));
+            let mut allowed = "a part that hangs together and touches the bed".to_owned();
+            if let Some(path) = path {
+                let names: Vec<&str> =
+                    path.shares().iter().map(|share| share.0).filter(|name| !name.is_empty()).collect();
+                allowed += "; `mesh.path.leave_out` takes skirts, brims and purge lines out of it";
+                allowed += &format!(
+                    " (the file names {})",
+                    if names.is_empty() { "none".into() } else { names.join(", ") }
+                );
+            }
+            return Err(source.error("mechanics.bed", found, allowed));
         }
-        let shapes: HashSet<_> =
-            mesh.hexahedra.iter().map(|nodes| Hexahedron::key(&corners(mesh, nodes))).collect();
+        let places =
+            |nodes: &[u32]| -> Vec<_> { nodes.iter().map(|&node| mesh.points[node as usize]).collect() };
+        let shapes: HashSet<(usize, Vec<i64>)> =
+            all().map(|nodes| (nodes.len(), key(&places(nodes)))).collect();
         let counts = [bears.iter().filter(|bears| **bears).count(), shapes.len()];
+        // K̂ and gradients
+        let matrices = shapes
+            .iter()
+            .map(|(nodes, _)| if *nodes == 8 { HEXAHEDRON } else { TETRAHEDRON[usize::from(*nodes > 4)] });
+        let matrices = matrices.sum();
+        let stiff = all().zip(&bears).all(|(nodes, bears)| nodes.len() == 4 || !bears);
         let share = |given: Option<Ratio>| given.map_or(0.0, |ratio| ratio.si());
         let law = spec.law.solve(source, share(material.crystallinity))?;
         let fresh = share(material.initial_alpha);
-        Ok(Some(Mechanics { law, fresh, bears, counts, bed, strain_step, release: spec.release }))
+        Ok(Some(Mechanics {
+            law,
+            fresh,
+            bears,
+            counts,
+            matrices,
+            stiff,
+            bed,
+            strain_step,
+            release: spec.release,
+        }))
     }
-}
-
-fn corners(mesh: &Mesh, nodes: &[u32; 8]) -> [[f64; 3]; 8] {
-    nodes.map(|node| mesh.points[node as usize])
 }
 
 /// How many of the elements that bear stress have no way to a node of the bed, through nodes they share.

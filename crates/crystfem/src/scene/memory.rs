@@ -23,9 +23,8 @@ const ADAPTIVE: f64 = 40.0;
 /// An element that is printed: births, layers, equations that are rebuilt.
 const PRINTED: f64 = 300.0;
 /// An element that bears stress: six branches and the stress at eight Gauss points, a copy of them and its bytes while a checkpoint is written; what it does
-/// in a step. Matrices of a shape of element. Motions, blocks and vectors of the solver at a node.
+/// in a step. Motions, blocks and vectors of the solver at a node.
 const STRESSED: f64 = 3.0 * 7.0 * 8.0 * 48.0 + 1800.0;
-const SHAPE: f64 = 26e3;
 const STRESSED_NODE: f64 = 450.0;
 /// Nodes of a group of the coarse level, six unknowns each.
 const GROUP: f64 = 64.0;
@@ -110,8 +109,8 @@ impl PartScene {
             bytes += elements * HEALED;
         }
         if let Some(mechanics) = mechanics {
-            let [bearing, shapes] = mechanics.counts.map(|count| count as f64);
-            bytes += bearing * STRESSED + shapes * SHAPE + nodes * STRESSED_NODE;
+            let bearing = mechanics.counts[0] as f64;
+            bytes += bearing * STRESSED + mechanics.matrices + nodes * STRESSED_NODE;
             // a band as wide as the section of a compact body
             let groups = nodes / GROUP + 1.0;
             bytes += 36.0 * groups * (groups.powf(2.0 / 3.0) + 2.0 * groups.cbrt() + 2.0) * 8.0;

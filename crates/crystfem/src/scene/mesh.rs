@@ -2,7 +2,7 @@
 
 use super::fault::{located, located_in};
 use super::memory;
-use super::voxels::{Filling, PathSpec, StlSpec};
+use super::voxels::{Filling, PRINTED, PathSpec, StlSpec, box_of};
 use crate::error::Error;
 use crate::mesh::{Bar, Block, Grid, Mesh, Split, Substrate, Tube, quality, read};
 use polycore::scene::{SceneError, Source};
@@ -60,7 +60,7 @@ pub struct MeshSpec {
     pub path: Option<PathSpec>,
     /// The cells inside an STL surface.
     pub stl: Option<StlSpec>,
-    /// A Gmsh `.msh` (4.1) or an Abaqus or CalculiX `.inp`.
+    /// A Gmsh `.msh` (2 or 4) or an Abaqus or CalculiX `.inp`.
     pub file: Option<PathBuf>,
     /// Length of one unit of the file; default 1 m.
     pub unit: Option<Length>,
@@ -199,8 +199,13 @@ impl MeshSpec {
             let found = read(&path, unit).map_err(|error| at("mesh.file", error))?;
             notes = found.notes;
             if let Some(suspicion) = self.without_unit(source, &found.mesh) {
+                let [low, high] = found.mesh.bounds().unwrap_or_default();
+                if (0..3).any(|d| high[d] - low[d] > PRINTED[1]) {
+                    return Err(suspicion);
+                }
                 notes.push(suspicion.message().to_owned());
             }
+            notes.extend(found.mesh.bounds().map(|bounds| format!("the part is {}", box_of(bounds))));
             notes.extend(found.quality.notes.clone());
             return Ok(Built { volume: found.quality.volume, mesh: found.mesh, notes, filling: None });
         };

@@ -5,6 +5,7 @@ mod curve;
 mod either;
 mod expect;
 mod fault;
+mod file;
 mod fit;
 mod fit_part;
 mod fit_spec;
@@ -21,6 +22,7 @@ mod powder;
 mod print;
 mod problem;
 mod schedule;
+mod setting;
 mod study;
 mod voxels;
 

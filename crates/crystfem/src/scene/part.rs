@@ -110,9 +110,13 @@ pub struct PrintSpec {
     /// is not printed.
     #[serde(default)]
     pub fill: bool,
-    /// Diameter of the filament, for the volume that G-code extrudes; default 1.75 mm.
+    /// Diameter of the filament, for the volume that G-code extrudes; default: as the file states it, or 1.75
+    /// mm.
     pub filament: Option<Length>,
-    /// Limit of acceleration along G-code, for times; default: none, velocity is F.
+    /// Features of G-code that print nothing of the part, as of `mesh.path`.
+    #[serde(default)]
+    pub leave_out: Vec<String>,
+    /// Limit of acceleration along G-code, for times; default: as the file states, or none: velocity is F.
     pub acceleration: Option<Acceleration>,
     /// Step of velocity at corners, with `acceleration`.
     pub jerk: Option<Speed>,
@@ -124,7 +128,8 @@ pub struct PrintSpec {
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoundarySpec {
-    /// `outer` (the current outer surface), a surface of the mesh, an element set, or a side of the box around the mesh:
+    /// `outer` (the current outer surface), a surface of the mesh, an element set, a node set (a temperature acts on its nodes, else its
+    /// outer faces count), or a side of the box around the mesh:
     /// `left`, `right`, `front`, `back`, `bottom`, `top`.
     pub surface: String,
     /// Surfaces that are left out of `outer`.
@@ -217,7 +222,30 @@ impl Default for PartOutput {
     }
 }
 
+/// Fields written unless the scene says how often.
+const FRAMES: f64 = 50.0;
+
 impl PartScene {
+    /// Time between fields of a run to `end`, s; fixed steps are not cut unless the scene says so.
+    pub fn every(&self, end: f64) -> f64 {
+        let frame = end / FRAMES;
+        match (self.output.every, self.time.step.map(|step| step.si())) {
+            (Some(every), _) => every.si(),
+            (None, Some(step)) => step * (frame / step).ceil().max(1.0),
+            (None, None) => frame,
+        }
+    }
+
+    /// What is to be said where the times of fields cut fixed steps.
+    pub fn cut_steps(&self) -> Option<String> {
+        let [step, every] = [self.time.step?.si(), self.output.every?.si()];
+        let count = every / step;
+        let cuts = (count - count.round()).abs() > 1e-9 * count || count < 0.5;
+        cuts.then(|| {
+            format!("steps of {step} s end at the times of fields, too: `output.every` of {every} s is no multiple of `time.step`")
+        })
+    }
+
     /// Checks what can be judged without a mesh.
     ///
     /// # Errors
@@ -340,6 +368,7 @@ impl PrintSpec {
                 ("offset", self.offset.is_some()),
                 ("fill", self.fill),
                 ("filament", self.filament.is_some()),
+                ("leave_out", !self.leave_out.is_empty()),
                 ("acceleration", self.acceleration.is_some()),
                 ("jerk", self.jerk.is_some()),
             ] {
@@ -355,6 +384,7 @@ impl PrintSpec {
             ("temperature", self.temperature.is_some(), !path, true),
             ("layer_time", self.layer_time.is_some(), !path, !path),
             ("filament", self.filament.is_some(), false, path),
+            ("leave_out", !self.leave_out.is_empty(), false, path),
             ("acceleration", self.acceleration.is_some(), false, path),
             ("jerk", self.jerk.is_some(), false, path),
             ("layer_height", self.layer_height.is_some(), false, !path && self.elements.is_some()),

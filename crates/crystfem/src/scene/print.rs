@@ -1,9 +1,10 @@
 //! What is laid down when: in layers, or along a path.
 
 use super::fault::located;
+use super::file;
 use super::part::PrintSpec;
 use super::places::{elements, millimetres};
-use super::voxels::{FILAMENT, Filling, limited};
+use super::voxels::Filling;
 use crate::element;
 use crate::error::Error;
 use crate::mesh::Mesh;
@@ -12,6 +13,7 @@ use crate::mesh::layers::{Layers, groups};
 use crate::mesh::path::{Bead, Setting, ToolPath, read_csv, read_gcode};
 use crate::problem::Birth;
 use polycore::scene::{SceneError, Source};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Elements and times of births.
@@ -76,21 +78,31 @@ impl PrintSpec {
             None => None,
         };
         let nozzle = tool.map_or_else(Vec::new, |tool| tool.setting(Setting::Nozzle));
-        let birth = |(time, elements): (f64, Vec<u32>)| {
-            // as the last of them is laid down, not when all appear
-            let laid =
-                elements.iter().map(|&element| times.get(element as usize).copied().unwrap_or(time - start));
-            let laid = laid.fold(f64::NEG_INFINITY, f64::max);
-            let set = || nozzle.iter().rev().find(|(from, _)| *from <= laid).map(|pair| pair.1);
-            match schedule.as_ref().map(|schedule| schedule.at(time)).or_else(set) {
-                Some(temperature) => Ok(Birth { time, elements, temperature }),
-                None => {
-                    let found = format!("nothing, and no M104 or M109 in the file before {time} s");
-                    Err(source.error("print.temperature", found, "a temperature"))
-                }
+        let mut births = Vec::with_capacity(groups.len());
+        for (time, elements) in groups {
+            if let Some(schedule) = &schedule {
+                births.push(Birth { time, elements, temperature: schedule.at(time) });
+                continue;
             }
-        };
-        groups.into_iter().map(birth).collect()
+            // each as it is laid down, not when all appear: tools differ
+            let mut by_temperature: BTreeMap<u64, Vec<u32>> = BTreeMap::new();
+            for element in elements {
+                let laid = times.get(element as usize).copied().unwrap_or(time - start);
+                let before = nozzle.partition_point(|(from, _)| *from <= laid);
+                let Some(set) = before.checked_sub(1).map(|at| nozzle[at].1) else {
+                    let found = format!("nothing, and no M104 or M109 in the file before {time} s");
+                    return Err(source.error("print.temperature", found, "a temperature"));
+                };
+                by_temperature.entry(set.to_bits()).or_default().push(element);
+            }
+            let births_of = by_temperature.into_iter();
+            births.extend(births_of.map(|(bits, elements)| Birth {
+                time,
+                elements,
+                temperature: f64::from_bits(bits),
+            }));
+        }
+        Ok(births)
     }
 
     /// Elements at their times along a path.
@@ -125,7 +137,14 @@ impl PrintSpec {
         let tool = if table { read_csv(&path) } else { read_gcode(&path) };
         let mut tool = tool.map_err(|error| at("print.path", error))?;
         notes.append(&mut tool.notes);
-        tool = limited(source, "print", tool, self.acceleration, self.jerk)?;
+        let fed = file::filament(source, "print", &tool, self.filament)?;
+        if !table || self.acceleration.is_some() || self.jerk.is_some() {
+            tool = file::timed(source, "print", tool, self.acceleration, self.jerk, notes)?;
+        }
+        if tool.is_fed() {
+            notes.extend(tool.told(fed));
+        }
+        file::leave_out(source, "print", &self.leave_out, &mut tool, notes)?;
         let elements = elements(source, mesh, "print.elements", self.elements.as_deref())?;
         let bead = Bead {
             width: self.bead_width.map_or(0.0, |width| width.si()),
@@ -169,7 +188,6 @@ impl PrintSpec {
             told += "; what they do not cover is not printed (`fill = true` fills gaps)";
         }
         notes.push(told);
-        let fed = self.filament.map_or(FILAMENT, |filament| filament.si());
         let extruded: f64 = tool.printing().map(|one| one.volume(fed)).sum();
         if extruded > 0.0 {
             let ratio = (whole - volume(&activation.missed)) / extruded;

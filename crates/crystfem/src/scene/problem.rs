@@ -124,11 +124,15 @@ impl PartScene {
             })?,
             None => Laid::default(),
         };
-        let mechanics = self.mechanics(source, &mesh, &material_of, &absent)?;
+        let mechanics = {
+            let path = filling.as_ref().and_then(|filling| filling.path.as_ref()).map(|(path, _)| path);
+            self.mechanics(source, &mesh, &material_of, &absent, path)?
+        };
         let appearing = births.iter().map(|birth| birth.elements.as_slice());
         let interfaces = self.interfaces(source, &mesh, &material_of, appearing)?;
         let end = self.time.end.map_or(by_itself, |end| end.si());
         memory::refuse_times(source, self, end)?;
+        self.note_hot_bed(source, end, &mut notes)?;
         if let Some(last) = births.iter().map(|birth| birth.time).reduce(f64::max).filter(|last| *last >= end)
         {
             let allowed = format!("after the last birth, at {last} s");
@@ -202,6 +206,23 @@ impl PartScene {
         for (key, kelvin) in written.into_iter().filter(|(_, kelvin)| *kelvin < COLD) {
             notes
                 .push(format!("`{key}` is {kelvin} K, which is {:.2} °C: is `degC` meant?", kelvin - 273.15));
+        }
+        Ok(())
+    }
+
+    /// Notes a bed that its G-code switches off and that is still hot at the end, s.
+    fn note_hot_bed(&self, source: &Source, end: f64, notes: &mut Vec<String>) -> Result<(), SceneError> {
+        for (index, boundary) in self.boundary.iter().enumerate() {
+            for (name, given) in [("temperature", &boundary.temperature), ("ambient", &boundary.ambient)] {
+                let key = format!("boundary[{index}].{name}");
+                let Some(given) = given else { continue };
+                if let Some((off, then)) = given.still_hot(source, &key, end)? {
+                    let celsius = then - 273.15;
+                    notes.push(format!(
+                        "`{key}`: the file switches the bed off at {off:.1} s, at the end of the run, {end:.1} s, it has {celsius:.1} °C: a later `time.end` lets the part cool"
+                    ));
+                }
+            }
         }
         Ok(())
     }
@@ -297,6 +318,14 @@ impl PartScene {
             for name in &spec.except {
                 except.extend(faces(&format!("{key}.except"), name)?);
             }
+            // nodes without faces
+            if let (Some(temperature), Some(nodes)) = (&spec.temperature, spec.node_set(mesh)) {
+                let value = Field::Uniform(temperature.build(source, &format!("{key}.temperature"))?);
+                let condition = Condition::Temperature { nodes, value };
+                condition.check().map_err(|error| located_in(source, &key, &CONDITION_KEYS, &error))?;
+                conditions.push(condition);
+                continue;
+            }
             let place = if let Some([min, max]) = spec.corners() {
                 let mut inside = faces(&format!("{key}.surface"), &spec.surface)?;
                 inside.retain(|face| {
@@ -356,6 +385,17 @@ impl PartScene {
 }
 
 impl BoundarySpec {
+    /// Nodes of a set of the mesh, where no surface has its name; in the box where there is one.
+    fn node_set(&self, mesh: &Mesh) -> Option<Vec<u32>> {
+        let set = mesh.node_sets.get(&self.surface).filter(|_| !mesh.surfaces.contains_key(&self.surface))?;
+        let Some([min, max]) = self.corners() else { return Some(set.clone()) };
+        let inside = |node: &&u32| {
+            let at = mesh.points[**node as usize];
+            (0..3).all(|d| (min[d]..=max[d]).contains(&at[d]))
+        };
+        Some(set.iter().filter(inside).copied().collect()).filter(|nodes: &Vec<u32>| !nodes.is_empty())
+    }
+
     fn conditions(
         &self,
         source: &Source,

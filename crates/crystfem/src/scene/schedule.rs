@@ -3,10 +3,9 @@
 use super::either::{self, TextOrTable};
 use super::fault::{located, located_in};
 use crate::boundary::Schedule;
-use crate::mesh::path::{Setting, read_gcode};
 use crate::table::{Column, read};
 use polycore::scene::{SceneError, Source};
-use polycore::units::dimension::{TemperatureDimension, TimeDimension};
+use polycore::units::dimension::TimeDimension;
 use polycore::units::{Dimension, Quantity, Time};
 use serde::{Deserialize, Deserializer};
 use std::path::PathBuf;
@@ -41,6 +40,10 @@ pub struct TimesSpec<D> {
     pub period: Option<Time>,
     /// Of `file`, where that is G-code: the temperature of its nozzle or bed, or its fan from `low` (off) to `high`.
     pub of: Option<FileSetting>,
+    /// Of a bed: what it cools towards once it is switched off or set lower; default 25 °C.
+    pub cools_to: Option<Quantity<D>>,
+    /// Time constant of this cooling; default 10 min.
+    pub cooling_time: Option<Time>,
 }
 
 /// What a G-code file sets.
@@ -54,9 +57,6 @@ pub enum FileSetting {
     /// M106 and M107.
     Fan,
 }
-
-/// How long a setting of a file takes to be reached, s.
-const CHANGE: f64 = 1.0;
 
 /// Where parameters of a swing stand in its block.
 const SWING_KEYS: [(&str, &str); 3] = [("low value", "low"), ("high value", "high"), ("period, s", "period")];
@@ -74,6 +74,14 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
         let table = !(over.time.is_empty() && over.value.is_empty());
         if let Some(of) = over.of {
             return over.of_file(source, key, of, table);
+        }
+        if over.cools_to.is_some() || over.cooling_time.is_some() {
+            let name = if over.cools_to.is_some() { "cools_to" } else { "cooling_time" };
+            return Err(source.error(
+                &format!("{key}.{name}"),
+                "cooling of no bed",
+                "`of = \"bed\"` of a G-code file",
+            ));
         }
         if let Some(swing) = over.swing(source, key, table)? {
             return Ok(swing);
@@ -102,57 +110,6 @@ impl<D: Dimension + Copy> ScheduleSpec<D> {
 }
 
 impl<D: Dimension + Copy> TimesSpec<D> {
-    /// A setting of a G-code file over its time, at F without limits of acceleration; each command changes it within a
-    /// second. Before the first one it has that one's value, and the fan is off.
-    fn of_file(
-        &self,
-        source: &Source,
-        key: &str,
-        of: FileSetting,
-        table: bool,
-    ) -> Result<Schedule, SceneError> {
-        let fault =
-            |name: &str, found: &str, allowed: &str| source.error(&format!("{key}.{name}"), found, allowed);
-        let Some(file) = &self.file else { return Err(fault("file", "nothing", "a G-code file")) };
-        if table || self.period.is_some() {
-            return Err(source.error(key, "a table or a sine beside `of`", "`file` and `of`"));
-        }
-        let setting = match of {
-            FileSetting::Nozzle => Setting::Nozzle,
-            FileSetting::Bed => Setting::Bed,
-            FileSetting::Fan => Setting::Fan,
-        };
-        let place = format!("{key}.file");
-        let path = read_gcode(&source.file(file)).map_err(|error| located(source, &place, &error))?;
-        let mut pairs = path.setting(setting);
-        match (setting, self.low, self.high) {
-            (Setting::Fan, Some(low), Some(high)) => {
-                for (_, value) in &mut pairs {
-                    *value = low.si() + (high.si() - low.si()) * *value;
-                }
-                pairs.insert(0, (f64::NEG_INFINITY, low.si()));
-            }
-            (Setting::Fan, ..) => {
-                return Err(fault("low", "nothing", "`low` and `high`: values with the fan off and on"));
-            }
-            (_, None, None) if D::NAME == TemperatureDimension::NAME => {}
-            (_, None, None) => return Err(fault("of", "a temperature", "`fan` with `low` and `high`")),
-            _ => return Err(fault("low", "`low` or `high` of a temperature", "nothing")),
-        }
-        let mut points: Vec<(f64, f64)> = Vec::new();
-        for (time, value) in pairs {
-            match points.last().copied() {
-                None => points.push((time.max(-CHANGE), value)),
-                // commands within a second of one another: the last holds
-                Some((last, before)) => {
-                    let from = time.max(last + 1e-6 * CHANGE);
-                    points.extend([(from, before), (from + CHANGE, value)]);
-                }
-            }
-        }
-        Schedule::linear(&points).map_err(|error| located(source, &place, &error))
-    }
-
     /// The swing, where it is one; `table`: there is a table beside it.
     fn swing(&self, source: &Source, key: &str, table: bool) -> Result<Option<Schedule>, SceneError> {
         if self.low.is_none() && self.high.is_none() && self.period.is_none() {
@@ -214,6 +171,14 @@ impl<D: Dimension> schemars::JsonSchema for ScheduleSpec<D> {
                         "type": "string",
                         "enum": ["nozzle", "bed", "fan"],
                         "description": "Of a G-code `file`: a temperature that it sets, or its fan from `low` (off) to `high`.",
+                    },
+                    "cools_to": {
+                        "anyOf": [constant],
+                        "description": "Of a bed: what it cools towards once it is switched off or set lower; default 25 °C.",
+                    },
+                    "cooling_time": {
+                        "anyOf": [time],
+                        "description": "Time constant of this cooling; default 10 min.",
                     },
                 },
                 "additionalProperties": false,

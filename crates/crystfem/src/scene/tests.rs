@@ -51,7 +51,12 @@ fn a_good_scene_is_explained() {
     assert!(lines.contains("point a: prescribed temperature, 1 segments, 4800 s; adaptive steps"), "{lines}");
     std::fs::write(folder.path().join("a.csv"), "temperature [degC],alpha\n160,0.1\n150,0.5\n").unwrap();
     let lines = complaint(&head(FIT), folder.path());
-    assert_eq!(lines, "fit a: Nakamura, K0, K_G and n from 2 measurements in 1 runs");
+    let how =
+        "separator `,`, decimal point, UTF-8, headings in line 1, columns `temperature [degC]`, `alpha`";
+    assert_eq!(
+        lines,
+        format!("data a.csv: {how}\nfit a: Nakamura, K0, K_G and n from 2 measurements in 1 runs")
+    );
 }
 
 /// Every fault is named with key, what was found and what is allowed.
@@ -186,7 +191,7 @@ fn bad_fits() {
         ("file = \"a.csv\"", "file = \"rising.csv\"", &["measurement 2", "temperatures that fall"]),
         ("file = \"a.csv\"", "file = \"text.csv\"", &["text.csv:2: column 2, `alpha`: found \"much\""]),
         ("rate = \"1 K/min\"", "rate = \"0 K/min\"", &["`fit[0].data[0].rate`", "above 0"]),
-        (", rate = \"1 K/min\"", "", &["a.csv:1: header", "`time [unit]`"]),
+        (", rate = \"1 K/min\"", "", &["a.csv:1: headings", "`time [unit]`"]),
         ("frozen = \"21 degC\"", "", &["`fit[0].frozen`", "`glass_transition`"]),
         ("frozen = \"21 degC\"", "frozen = \"200 degC\"", &["above the temperature of frozen chains"]),
         ("equilibrium_melting = \"193.2 degC\"", "", &["`fit[0].equilibrium_melting`", "Hoffman–Weeks"]),
@@ -234,7 +239,7 @@ fn bad_fits() {
             flow("back.csv", ", mass = \"2 mg\"", "down"),
             &["back.csv:5: column `time`", "8 s", "9 s or later"],
         ),
-        (flow("a.csv", "", "up"), &["a.csv:1: header", "`time [unit]`"]),
+        (flow("a.csv", "", "up"), &["a.csv:1: headings", "`time [unit]`"]),
         (flow("w.csv", ", from = \"20 s\"", "up"), &["`fit[0].data[0].from`", "20 s", "0 to 18 s"]),
         (
             flow("w.csv", ", to = \"150 degC\"", "up"),
@@ -282,4 +287,26 @@ fn bad_fits() {
     let result = polycore::case::run::<crate::run::Crystfem>(&source, polycore::case::Options::new(&output));
     let error = result.unwrap_err().to_string();
     assert!(error.contains("`fit[0].data`") && error.contains("2 measurements for 3 parameters"), "{error}");
+}
+
+/// An export of Netzsch Proteus as it is: `##` before the headings, `;`, decimal commas, Latin-1. The peak
+/// q = 0.5 W/g e^{−((T − 170 °C)/4 K)²} of a run at 10 K/min over 0.05 W/g has ΔH = √π · 4 K · 0.5 W/g · 6 s/K = 21.2694 J/g.
+#[test]
+fn an_export_of_netzsch() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "#EXO:1\r\n#DECIMAL:COMMA\r\n#SEPARATOR:SEMICOLON\r\n#SAMPLE MASS /mg:5,21\r\n".to_owned();
+    text += "##Temp./°C;Time/min;DSC/(mW/mg)\r\n";
+    for row in 0..=600 {
+        let celsius = 200.0 - f64::from(row) / 12.0;
+        let flow = 0.05 + 0.5 * (-((celsius - 170.0) / 4.0).powi(2)).exp();
+        text += &format!("{celsius:.4};{:.5};{flow:.6}\r\n", f64::from(row) / 120.0).replace('.', ",");
+    }
+    let latin: Vec<u8> = text.chars().map(|c| u8::try_from(c).unwrap()).collect();
+    std::fs::write(folder.path().join("proteus.csv"), latin).unwrap();
+    let fit = "[[fit]]\nname = \"cool\"\nlaw = \"nakamura\"\nequilibrium_melting = \"193.2 degC\"\nglass_transition = \"51 degC\"\n\
+               heat_flow = { exothermal = \"up\" }\n\
+               data = [{ file = \"proteus.csv\", rate = \"10 K/min\", from = \"185 degC\", to = \"155 degC\" }]\n";
+    let lines = complaint(&head(fit), folder.path());
+    assert!(lines.ends_with("; peaks of 21.2694 J/g"), "{lines}");
+    assert!(lines.contains("separator `;`, decimal comma, Latin-1, headings in line 5"), "{lines}");
 }

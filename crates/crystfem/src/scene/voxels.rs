@@ -1,6 +1,7 @@
 //! Meshes of cells that a G-code file or an STL surface fills.
 
 use super::fault::{located, located_in};
+use super::file;
 use super::memory;
 use super::mesh::Built;
 use crate::error::Error;
@@ -11,10 +12,11 @@ use polycore::units::{Acceleration, Length, Speed};
 use serde::Deserialize;
 use std::path::PathBuf;
 
-/// Diameter of a filament unless a scene says otherwise, m.
-pub(super) const FILAMENT: f64 = 1.75e-3;
 /// Cells are left out that are filled less: with the part that is filled, and where cells are full.
 const LEAST: [f64; 2] = [0.1, 0.5];
+
+/// Largest sides that printed parts have, m.
+pub(super) const PRINTED: [f64; 2] = [1e-4, 10.0];
 
 /// Where parameters stand in their block.
 const KEYS: [(&str, &str); 7] = [
@@ -41,17 +43,21 @@ pub struct PathSpec {
     pub file: PathBuf,
     /// Edges of a cell.
     pub cell: [Length; 3],
-    /// Diameter of the filament; default 1.75 mm.
+    /// Diameter of the filament; default: as the file states it, or 1.75 mm.
     pub filament: Option<Length>,
-    /// Height of all beads; default: down to the level below in the file.
+    /// Height of all beads; default: as the file tells, or down to what lies below.
     pub bead_height: Option<Length>,
+    /// Features that are printed but left out of the part, as the file names them, or by one name for all
+    /// slicers: `skirt`, `brim`, `raft`, `purge`, `support`, `wipe-tower`, ….
+    #[serde(default)]
+    pub leave_out: Vec<String>,
     /// Whether ρ and k of an element are scaled by the part of it that is filled, so that the printed mass is that of the file;
     /// otherwise elements are full.
     #[serde(default = "yes")]
     pub fill: bool,
     /// Cells filled to less are left out, their volume goes to the others; default 0.1, of full elements 0.5.
     pub least: Option<f64>,
-    /// Limit of acceleration, for times; default: none, velocity is F.
+    /// Limit of acceleration, for times; default: as the file states, or none: velocity is F.
     pub acceleration: Option<Acceleration>,
     /// Step of velocity at corners, with `acceleration`.
     pub jerk: Option<Speed>,
@@ -96,18 +102,31 @@ impl PathSpec {
         let at = |error: Error| located_in(source, block, &KEYS, &error);
         let file = source.file(&self.file);
         let mut path = read_gcode(&file).map_err(|error| located(source, "mesh.path.file", &error))?;
-        path = limited(source, block, path, self.acceleration, self.jerk)?;
+        let mut notes = std::mem::take(&mut path.notes);
+        let filament = file::filament(source, block, &path, self.filament)?;
+        path = file::timed(source, block, path, self.acceleration, self.jerk, &mut notes)?;
+        notes.extend(path.told(filament));
+        path = file::purged(source, "mesh.path.file", path, &mut notes)?;
+        let height = self.bead_height.map(|x| x.si());
+        if height.is_none_or(|height| height > 0.0) && filament > 0.0 {
+            path = path.with_heights(filament, height);
+        }
+        file::leave_out(source, block, &self.leave_out, &mut path, &mut notes)?;
         let cells = Cells {
             size: self.cell.map(|x| x.si()),
-            filament: self.filament.map_or(FILAMENT, |x| x.si()),
-            height: self.bead_height.map(|x| x.si()),
+            filament,
+            height,
             least: self.least.unwrap_or(LEAST[usize::from(!self.fill)]),
         };
         memory::refuse_mesh(source, "mesh.path.cell", path.cells(&cells).map_err(at)?, 1)?;
-        let Deposit { voxels, times } = path.deposit(&cells).map_err(at)?;
-        let mut notes = std::mem::take(&mut path.notes);
-        let print = 1e-9 * (1e9 * path.duration()).round();
-        notes.push(format!("the path takes {print} s, waits for temperatures left out"));
+        let Deposit { voxels, times, tools } = path.deposit(&cells).map_err(at)?;
+        if !tools.is_empty() {
+            let sets: Vec<String> = path.tools().iter().map(|tool| format!("`tool-{tool}`")).collect();
+            notes.push(format!(
+                "several tools print: element sets {} for the materials of regions",
+                sets.join(", ")
+            ));
+        }
         built(source, block, voxels, self.fill, notes, Some((path, times)))
     }
 }
@@ -117,38 +136,53 @@ impl StlSpec {
         let block = "mesh.stl";
         let at = |error: Error| located_in(source, block, &KEYS, &error);
         let file = source.file(&self.file);
-        let surface =
+        let mut surface =
             stl::read(&file, self.unit.si()).map_err(|error| located(source, "mesh.stl.file", &error))?;
         let size = self.cell.map(|x| x.si());
+        self.plausible(source, surface.bounds(), size)?;
         memory::refuse_mesh(source, "mesh.stl.cell", surface.cells(size).map_err(at)?, 1)?;
-        let voxels =
-            surface.voxels(size, self.least.unwrap_or(LEAST[usize::from(!self.fill)])).map_err(at)?;
+        let least = self.least.unwrap_or(LEAST[usize::from(!self.fill)]);
+        let (voxels, overlaps) = surface.voxels(size, least).map_err(at)?;
+        surface.notes.extend(overlaps);
+        surface.notes.push(format!("the part is {}", box_of(surface.bounds())));
         built(source, block, voxels, self.fill, surface.notes, None)
+    }
+
+    /// Refuses a part that is too small or too large to be printed, or smaller than a cell: its unit is another.
+    fn plausible(
+        &self,
+        source: &Source,
+        [low, high]: [[f64; 3]; 2],
+        cell: [f64; 3],
+    ) -> Result<(), SceneError> {
+        let size = [0, 1, 2].map(|d| high[d] - low[d]);
+        let largest = size.into_iter().fold(0.0, f64::max);
+        let [least, most] = PRINTED;
+        let fits = (0..3).any(|d| size[d] >= 0.5 * cell[d]);
+        if largest >= least && largest < most && fits {
+            return Ok(());
+        }
+        let unit = self.unit.si();
+        let found = format!("{unit} m per unit of the file, which makes the part {}", box_of([low, high]));
+        let [x, y, z] = size.map(|x| rounded(x / unit));
+        let allowed = format!(
+            "a `unit` with which its largest side is between {} mm and {most} m, and it is no smaller than a cell: \
+             the file's own numbers are {x} × {y} × {z}, e.g. \"1 m\" if these are metres",
+            1e3 * least
+        );
+        Err(source.error("mesh.stl.unit", found, allowed))
     }
 }
 
-/// A path with limits on its acceleration, where there are some.
-pub(super) fn limited(
-    source: &Source,
-    block: &str,
-    path: ToolPath,
-    acceleration: Option<Acceleration>,
-    jerk: Option<Speed>,
-) -> Result<ToolPath, SceneError> {
-    match (acceleration, jerk) {
-        (None, None) => Ok(path),
-        (Some(acceleration), Some(jerk)) => path
-            .accelerated(acceleration.si(), jerk.si())
-            .map_err(|error| located_in(source, block, &KEYS, &error)),
-        (given, _) => {
-            let missing = if given.is_some() { "jerk" } else { "acceleration" };
-            Err(source.error(
-                &format!("{block}.{missing}"),
-                "nothing",
-                "`acceleration` and `jerk`, or neither",
-            ))
-        }
-    }
+/// The sides of a box, in mm.
+pub(super) fn box_of([low, high]: [[f64; 3]; 2]) -> String {
+    let [x, y, z] = [0, 1, 2].map(|d| rounded(1e3 * (high[d] - low[d])));
+    format!("{x} × {y} × {z} mm")
+}
+
+/// To five digits.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.4e}").parse().unwrap_or(x)
 }
 
 fn built(

@@ -1,7 +1,7 @@
 //! Exodus II, as MOOSE, Cubit and ParaView write it (Schoof & Yarberry 1994, SAND92-2137, "EXODUS II: A Finite Element Data Model").
 
 use super::netcdf::Netcdf;
-use super::{Analysis, Frame, chosen, push, unusable};
+use super::{Analysis, Frame, Shapes, chosen, unusable};
 use crate::error::Error;
 use polycore::output::vtkhdf::Cells;
 use std::path::Path;
@@ -48,17 +48,18 @@ fn points(file: &mut Netcdf, path: &Path) -> Result<Vec<[f64; 3]>, Error> {
             .map(|name| file.numbers(name, None))
             .collect::<Result<_, _>>()?,
     };
-    let [x, y, z] = &axes[..] else {
-        return Err(unusable(path, &format!("{} axes of coordinates; allowed: 3", axes.len())));
-    };
-    for axis in [y, z] {
-        same(path, "coord", axis.len(), x.len())?;
+    let count = axes.first().map_or(0, Vec::len);
+    if !(1..=3).contains(&axes.len()) || count == 0 {
+        return Err(unusable(path, &format!("{} axes of coordinates; allowed: 1 to 3", axes.len())));
     }
-    Ok(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]).collect())
+    for axis in &axes {
+        same(path, "coord", axis.len(), count)?;
+    }
+    Ok((0..count).map(|k| [0, 1, 2].map(|d| axes.get(d).map_or(0.0, |axis| axis[k]))).collect())
 }
 
 fn cells(file: &mut Netcdf, path: &Path, nodes: usize) -> Result<Cells, Error> {
-    let mut cells = Cells::default();
+    let mut cells = Shapes::default();
     for block in 1.. {
         let name = format!("connect{block}");
         let Some(shape) = file.shape(&name) else { break };
@@ -68,6 +69,14 @@ fn cells(file: &mut Netcdf, path: &Path, nodes: usize) -> Result<Cells, Error> {
             kind if kind.starts_with("HEX") => 12,
             kind if kind.starts_with("TET") => 10,
             kind if kind.starts_with("WEDGE") => 13,
+            kind if kind.starts_with("PYR") => 14,
+            kind if kind.starts_with("TRI") => 5,
+            kind if kind.starts_with("QUAD") || kind.starts_with("SHELL") => match own {
+                // shells of triangles
+                3 | 6 | 7 => 5,
+                _ => 9,
+            },
+            kind if ["BAR", "BEAM", "TRUSS", "EDGE"].iter().any(|name| kind.starts_with(name)) => 3,
             _ => continue,
         };
         for element in file.numbers(&name, None)?.chunks(own.max(1)) {
@@ -78,13 +87,11 @@ fn cells(file: &mut Netcdf, path: &Path, nodes: usize) -> Result<Cells, Error> {
                 }
                 places.push(node as u32 - 1);
             }
-            push(&mut cells, kind, &places);
+            cells.push(kind, &places);
         }
     }
-    if cells.is_empty() {
-        return Err(unusable(path, "no solid; allowed: blocks of HEX, WEDGE or TET"));
-    }
-    Ok(cells)
+    let allowed = "blocks of HEX, WEDGE, PYRAMID, TET, QUAD, SHELL, TRI, BAR, BEAM or EDGE";
+    cells.highest().ok_or_else(|| unusable(path, &format!("no element; allowed: {allowed}")))
 }
 
 /// Names of the variables of nodes.

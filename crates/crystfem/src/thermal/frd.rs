@@ -3,7 +3,7 @@
 //! Fixed columns (CalculiX GraphiX manual, "Result Format"): a line of data begins with −1 in three columns, then a number in
 //! ten, then numbers in twelve each.
 
-use super::{Analysis, Frame};
+use super::{Analysis, Frame, Shapes};
 use crate::error::Error;
 use polycore::output::vtkhdf::Cells;
 use std::collections::HashMap;
@@ -12,8 +12,20 @@ use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 /// CalculiX' element types with their corners, and VTK's number.
-const SOLIDS: [(u32, usize, u8); 6] =
-    [(1, 8, 12), (4, 8, 12), (3, 4, 10), (6, 4, 10), (2, 6, 13), (5, 6, 13)];
+const SHAPES: [(u32, usize, u64); 12] = [
+    (1, 8, 12),
+    (4, 8, 12),
+    (3, 4, 10),
+    (6, 4, 10),
+    (2, 6, 13),
+    (5, 6, 13),
+    (7, 3, 5),
+    (8, 3, 5),
+    (9, 4, 9),
+    (10, 4, 9),
+    (11, 2, 3),
+    (12, 2, 3),
+];
 
 /// Opens a file and reads its mesh.
 pub fn open(path: &Path) -> Result<Analysis, Error> {
@@ -29,7 +41,7 @@ struct Frd {
     line: usize,
     /// Places of the nodes, in the order of the file.
     points: Vec<[f64; 3]>,
-    /// The solids, by their corners.
+    /// The elements of highest dimension, by their corners.
     cells: Cells,
     places: HashMap<u32, u32>,
 }
@@ -123,11 +135,11 @@ impl Frd {
 
     fn elements(&mut self) -> Result<(), Error> {
         let (mut kind, mut wanted, mut own) = (0, 0, Vec::new());
+        let mut cells = Shapes::default();
         while let Some(line) = self.data("elements")? {
             if line.starts_with(" -1") {
                 let number: u32 = self.number(&line, 13..18, "type of element")?;
-                // shells and beams have temperatures at their nodes all the same
-                (wanted, kind) = SOLIDS
+                (wanted, kind) = SHAPES
                     .iter()
                     .find(|(code, ..)| *code == number)
                     .map_or((0, 0), |&(_, corners, vtk)| (corners, vtk));
@@ -144,13 +156,12 @@ impl Frd {
                 column += 10;
             }
             if wanted > 0 && own.len() == wanted {
-                self.cells.push(kind, &own);
+                cells.push(kind, &own);
                 wanted = 0;
             }
         }
-        if self.cells.is_empty() {
-            return Err(self.wrong("elements", "no solid", "hexahedra, wedges or tetrahedra"));
-        }
+        let none = || self.wrong("elements", "none", "solids, shells or beams");
+        self.cells = cells.highest().ok_or_else(none)?;
         Ok(())
     }
 
@@ -244,6 +255,33 @@ mod tests {
         );
         assert_eq!((frames.len(), frames[0].time), (1, 6.0));
         assert_eq!(frames[0].temperature, [472.15, 472.16, 472.17, 472.18, -100.0]);
+    }
+
+    /// Without solids shells are the mesh, without those beams.
+    #[test]
+    fn shells_and_beams() {
+        let shells = GOOD.replace(
+            " -1         1    3    0    1\n -2         1         2         3         7",
+            " -1         1    7    0    1\n -2         1         2         3",
+        );
+        let (frd, frames) = read(&shells).unwrap();
+        assert_eq!(
+            (frd.cells.types.as_slice(), frd.cells.connectivity.as_slice()),
+            (&[5][..], &[0, 1, 2][..])
+        );
+        assert_eq!(frames[0].temperature.len(), 5);
+        let beams = shells.replace(
+            "    7    0    1\n -2         1         2         3",
+            "   11    0    1\n -2         1         2",
+        );
+        let (frd, _) = read(&beams).unwrap();
+        assert_eq!(
+            (frd.cells.types.as_slice(), frd.cells.connectivity.as_slice()),
+            (&[3, 3][..], &[0, 1, 0, 4][..])
+        );
+        let none =
+            GOOD.replace("    3    0    1", "   99    0    1").replace("   11    0    1", "   99    0    1");
+        assert!(read(&none).err().unwrap().to_string().contains("solids, shells or beams"));
     }
 
     /// Cut at any line and changed anywhere: an error with a line, or fewer results; never a panic.

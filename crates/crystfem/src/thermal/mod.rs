@@ -4,6 +4,8 @@ mod exodus;
 pub mod frd;
 mod netcdf;
 mod vtu;
+mod xdmf;
+mod xml;
 
 use crate::error::Error;
 use polycore::output::vtkhdf::Cells;
@@ -13,7 +15,7 @@ use std::path::Path;
 pub struct Analysis {
     /// Places of the nodes, in the order of the file.
     pub points: Vec<[f64; 3]>,
-    /// The solids, by their corners.
+    /// The elements of highest dimension, by their corners: solids, shells where there are none, lines where there are no shells.
     pub cells: Cells,
     /// The temperatures, time by time.
     pub frames: Box<dyn Iterator<Item = Result<Frame, Error>>>,
@@ -27,19 +29,29 @@ pub struct Frame {
     pub temperature: Vec<f64>,
 }
 
-/// Opens `.frd` of CalculiX, `.pvd` and `.vtu` of VTK, or Exodus II (`.e`, `.ex2`, `.exo`, `.g`); `array` is the name of the temperature
-/// where a file names its arrays, by default that of its only scalar of nodes.
+/// Opens `.frd` of CalculiX, `.pvd`, `.vtu` and `.pvtu` of VTK, `.xdmf` (`.xmf`), or Exodus II (`.e`, `.ex2`, `.exo`, `.g`); `array` is the
+/// name of the temperature where a file names its arrays, by default that of its only scalar of nodes. Meshes are of one, two or three dimensions.
 ///
 /// # Errors
-/// Other endings; files that are none of these, damaged ones, meshes without solids, names of arrays that there are not; I/O errors.
+/// Other endings; files that are none of these, damaged ones, meshes without elements, names of arrays that there are not; I/O errors.
 pub fn open(path: &Path, array: Option<&str>) -> Result<Analysis, Error> {
-    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-    match ending {
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_lowercase();
+    match ending.as_str() {
         "frd" => frd::open(path),
-        "pvd" | "vtu" => vtu::open(path, array),
+        "pvd" | "vtu" | "pvtu" => vtu::open(path, array),
+        "xdmf" | "xdmf3" | "xmf" => xdmf::open(path, array),
         "e" | "ex2" | "exo" | "g" => exodus::open(path, array),
         _ => {
-            let reason = format!("ending `{ending}`; allowed: frd, pvd, vtu, e, ex2, exo, g");
+            let advice = match ending.as_str() {
+                "vtk" | "vtp" | "vts" | "vtr" | "vti" => " (save it as .vtu, e.g. with ParaView)",
+                "h5" | "hdf5" => " (open the .xdmf beside it)",
+                "odb" | "rth" | "rst" | "inp" | "msh" => {
+                    " (save the temperatures of the nodes as one of these)"
+                }
+                _ => "",
+            };
+            let reason =
+                format!("ending `{ending}`; allowed: frd, pvd, vtu, pvtu, xdmf, xmf, e, ex2, exo, g{advice}");
             Err(unusable(path, &reason))
         }
     }
@@ -63,21 +75,68 @@ fn chosen<'a>(path: &Path, names: &'a [String], array: Option<&str>) -> Result<&
     })
 }
 
-/// The corners of a solid from VTK's number of its type and its nodes.
-fn push(cells: &mut Cells, kind: u64, nodes: &[u32]) {
-    let (corners, linear) = match kind {
-        10 | 24 => (4, 10),
-        12 | 25 | 29 => (8, 12),
-        13 | 26 | 32 => (6, 13),
-        11 if nodes.len() == 8 => {
-            // a voxel counts its corners along x first
-            return cells.push(12, &[0, 1, 3, 2, 4, 5, 7, 6].map(|corner: usize| nodes[corner]));
+/// VTK's number of a type, its corners, the number of the type of first order, its dimension.
+const TYPES: [(u64, usize, u8, usize); 28] = [
+    (1, 1, 1, 0),
+    (3, 2, 3, 1),
+    (21, 2, 3, 1),
+    (35, 2, 3, 1),
+    (68, 2, 3, 1),
+    (5, 3, 5, 2),
+    (22, 3, 5, 2),
+    (34, 3, 5, 2),
+    (69, 3, 5, 2),
+    (9, 4, 9, 2),
+    (23, 4, 9, 2),
+    (28, 4, 9, 2),
+    (30, 4, 9, 2),
+    (70, 4, 9, 2),
+    (10, 4, 10, 3),
+    (24, 4, 10, 3),
+    (71, 4, 10, 3),
+    (12, 8, 12, 3),
+    (25, 8, 12, 3),
+    (29, 8, 12, 3),
+    (33, 8, 12, 3),
+    (72, 8, 12, 3),
+    (13, 6, 13, 3),
+    (26, 6, 13, 3),
+    (32, 6, 13, 3),
+    (31, 6, 13, 3),
+    (73, 6, 13, 3),
+    (14, 5, 14, 3),
+];
+
+/// Elements by their dimension.
+#[derive(Default)]
+struct Shapes([Cells; 4]);
+
+impl Shapes {
+    /// An element from VTK's number of its type and its nodes; types that are not known are passed over, their nodes stay.
+    fn push(&mut self, kind: u64, nodes: &[u32]) {
+        match kind {
+            // pixels and voxels count their corners along x first
+            8 if nodes.len() == 4 => self.0[2].push(9, &[0, 1, 3, 2].map(|corner: usize| nodes[corner])),
+            11 if nodes.len() == 8 => {
+                self.0[3].push(12, &[0, 1, 3, 2, 4, 5, 7, 6].map(|corner: usize| nodes[corner]));
+            }
+            2 => nodes.iter().for_each(|node| self.0[0].push(1, &[*node])),
+            4 => nodes.windows(2).for_each(|two| self.0[1].push(3, two)),
+            6 => nodes.windows(3).for_each(|three| self.0[2].push(5, three)),
+            7 if nodes.len() > 2 => self.0[2].push(7, nodes),
+            27 if nodes.len() == 13 => self.0[3].push(14, &nodes[..5]),
+            _ => {
+                let known = TYPES.iter().find(|(own, corners, ..)| *own == kind && nodes.len() >= *corners);
+                if let Some(&(_, corners, linear, dimension)) = known {
+                    self.0[dimension].push(linear, &nodes[..corners]);
+                }
+            }
         }
-        // shells and beams have temperatures at their nodes all the same
-        _ => return,
-    };
-    if nodes.len() >= corners {
-        cells.push(linear, &nodes[..corners]);
+    }
+
+    /// Those of the highest dimension; `None` of none.
+    fn highest(self) -> Option<Cells> {
+        self.0.into_iter().rev().find(|cells| !cells.is_empty())
     }
 }
 
@@ -86,79 +145,4 @@ fn unusable(path: &Path, reason: &str) -> Error {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn file(name: &str) -> std::path::PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/thermal").join(name)
-    }
-
-    /// Files that VTK and netCDF wrote (`make.py` beside them): T = 400 + 100 x + 10 y + z + t.
-    #[test]
-    fn files_of_others() {
-        for (name, array) in [
-            ("blocks.pvd", None),
-            ("blocks.pvd", Some("Temperature")),
-            ("blocks.e", Some("temperature")),
-            ("blocks-netcdf4.e", Some("temperature")),
-        ] {
-            let analysis = open(&file(name), array).unwrap();
-            let cells = &analysis.cells;
-            assert_eq!((analysis.points.len(), cells.types.as_slice()), (14, &[12, 12, 13][..]), "{name}");
-            assert_eq!(cells.connectivity[16..], [2, 12, 5, 8, 13, 11], "{name}");
-            let points = analysis.points;
-            let mut times = Vec::new();
-            for frame in analysis.frames {
-                let frame = frame.unwrap();
-                times.push(frame.time);
-                for ([x, y, z], found) in points.iter().zip(&frame.temperature) {
-                    let expected = 400.0 + 100.0 * x + 10.0 * y + z + frame.time;
-                    assert!((found - expected).abs() < 1e-9, "{name}: {found}, {expected}");
-                }
-            }
-            assert_eq!(times, [0.0, 2.0, 5.0], "{name}");
-        }
-    }
-
-    #[test]
-    fn names_that_there_are_not() {
-        for (name, array, says) in [
-            ("blocks.e", None, "allowed: one scalar array"),
-            ("blocks.e", Some("temprature"), "allowed: velocity, temperature"),
-            ("blocks.pvd", Some("T"), "allowed: Temperature"),
-            ("make.py", None, "allowed: frd"),
-        ] {
-            let error = open(&file(name), array).err().unwrap().to_string();
-            assert!(error.contains(says), "{name}: {error}");
-        }
-    }
-
-    /// Cut anywhere and with any byte changed: an error or other numbers, never a panic, and no more memory than a file can fill.
-    #[test]
-    fn damaged_files() {
-        let directory = tempfile::tempdir().unwrap();
-        for name in ["blocks_0.vtu", "blocks_1.vtu", "blocks_2.vtu", "blocks.e", "blocks-netcdf4.e"] {
-            let good = std::fs::read(file(name)).unwrap();
-            let path = directory.path().join(name);
-            let mut refused = 0;
-            let mut read = |bytes: &[u8]| {
-                std::fs::write(&path, bytes).unwrap();
-                let array = if name.ends_with(".e") { "temperature" } else { "Temperature" };
-                let whole = open(&path, Some(array)).and_then(|analysis| {
-                    analysis.frames.collect::<Result<Vec<Frame>, Error>>().map(|frames| frames.len())
-                });
-                refused += usize::from(whole.is_err());
-            };
-            let stride = 1 + good.len() / 700;
-            for place in (0..good.len()).step_by(stride) {
-                read(&good[..place]);
-                let mut changed = good.clone();
-                changed[place] ^= 0xff;
-                read(&changed);
-                changed[place] = good[place] ^ 0x04;
-                read(&changed);
-            }
-            assert!(refused > good.len() / stride, "{name}: {refused}");
-        }
-    }
-}
+mod tests;

@@ -1,12 +1,11 @@
-//! VTK's unstructured grids in XML (`.vtu`) and their series (`.pvd`): text, base64 and raw blocks, packed by zlib or not.
+//! VTK's unstructured grids in XML (`.vtu`), in parts (`.pvtu`), and their series (`.pvd`): text, base64 and raw blocks, packed by zlib or not.
 //!
 //! The format: <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>. `vtkio` 0.7 was tried: it panics on damaged files.
 
-use super::{Analysis, Frame, chosen, push, unusable};
+use super::{Analysis, Frame, Shapes, chosen, unusable};
 use crate::error::Error;
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
-use polycore::output::vtkhdf::Cells;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::collections::HashMap;
@@ -15,47 +14,61 @@ use std::path::{Path, PathBuf};
 
 type Attributes = HashMap<String, String>;
 
-/// Opens a grid, at t = 0, or a series of them, all with the same nodes.
+/// Opens a grid, at t = 0, or a series of them, all with the same nodes. Files of one time are parts of one grid.
 pub fn open(path: &Path, array: Option<&str>) -> Result<Analysis, Error> {
-    let files = if path.extension().is_some_and(|ending| ending == "pvd") {
-        series(path)?
-    } else {
-        vec![(0.0, path.to_path_buf())]
-    };
+    let files = if has_ending(path, "pvd") { series(path)? } else { vec![(0.0, vec![path.to_path_buf()])] };
     let Some((_, first)) = files.first() else {
         return Err(unusable(path, "no DataSet; allowed: one at least"));
     };
-    let Grid { points, cells, scalars } = Grid::read(first)?;
-    if cells.is_empty() {
-        return Err(unusable(first, "no solid; allowed: hexahedra, voxels, wedges or tetrahedra"));
-    }
+    let Grid { points, cells, scalars } = Grid::of_parts(first)?;
+    let first = first.first().map_or(path, PathBuf::as_path);
+    let allowed = "lines, triangles, quadrilaterals, tetrahedra, pyramids, wedges, hexahedra";
+    let Some(cells) = cells.highest() else {
+        return Err(unusable(first, &format!("no element; allowed: {allowed}")));
+    };
     let names: Vec<String> = scalars.into_iter().map(|(name, _)| name).collect();
     let name = chosen(first, &names, array)?.to_owned();
     let nodes = points.len();
-    let frames = files.into_iter().map(move |(time, path)| {
-        let mut scalars = Grid::read(&path)?.scalars;
+    if let Some(missing) = files.iter().flat_map(|(_, parts)| parts).find(|file| !file.is_file()) {
+        return Err(unusable(path, &format!("{}, which is not there", missing.display())));
+    }
+    let frames = files.into_iter().map(move |(time, parts)| {
+        let mut scalars = Grid::of_parts(&parts)?.scalars;
         let index = scalars.iter().position(|(own, _)| *own == name);
         let temperature = index.map(|index| scalars.swap_remove(index).1).unwrap_or_default();
         if temperature.len() != nodes {
             let found = format!("{} values of `{name}`", temperature.len());
-            return Err(unusable(&path, &format!("{found}; allowed: {nodes}, the nodes of the first file")));
+            let path = parts.first().map_or(Path::new(""), PathBuf::as_path);
+            return Err(unusable(path, &format!("{found}; allowed: {nodes}, the nodes of the first time")));
         }
         Ok(Frame { time, temperature })
     });
     Ok(Analysis { points, cells, frames: Box::new(frames) })
 }
 
+fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending))
+}
+
+/// A file or folder named in another, which may be below another path there.
+fn beside(path: &Path, name: &str) -> PathBuf {
+    path.with_file_name(name.replace('\\', "/"))
+}
+
 /// Times and files of a series.
-fn series(path: &Path) -> Result<Vec<(f64, PathBuf)>, Error> {
+fn series(path: &Path) -> Result<Vec<(f64, Vec<PathBuf>)>, Error> {
     let text = std::fs::read_to_string(path).map_err(polycore::Error::io("read", path))?;
-    let mut files = Vec::new();
+    let mut files: Vec<(f64, Vec<PathBuf>)> = Vec::new();
     elements(path, text.as_bytes(), |name, attributes, _| {
         if name == "DataSet" {
             let number = attributes.get("timestep").and_then(|time| time.parse::<f64>().ok());
             let (Some(time), Some(file)) = (number, attributes.get("file")) else {
                 return Err(unusable(path, "a DataSet; allowed: with `timestep`, a number, and `file`"));
             };
-            files.push((time, path.with_file_name(file)));
+            match files.iter_mut().find(|(other, _)| *other == time) {
+                Some((_, parts)) => parts.push(beside(path, file)),
+                None => files.push((time, vec![beside(path, file)])),
+            }
         }
         Ok(())
     })?;
@@ -121,7 +134,7 @@ fn of(path: &Path, start: &BytesStart) -> Result<(String, Attributes), Error> {
 #[derive(Default)]
 struct Grid {
     points: Vec<[f64; 3]>,
-    cells: Cells,
+    cells: Shapes,
     /// Name and values at the nodes.
     scalars: Vec<(String, Vec<f64>)>,
 }
@@ -138,7 +151,33 @@ struct Coding<'a> {
 }
 
 impl Grid {
-    fn read(path: &Path) -> Result<Self, Error> {
+    /// A grid in several files, `.pvtu` among them, whose pieces are files in turn. Nodes between parts are there in each of them.
+    fn of_parts(files: &[PathBuf]) -> Result<Self, Error> {
+        let mut grid = Self::default();
+        for file in files {
+            if !has_ending(file, "pvtu") {
+                grid.read(file)?;
+                continue;
+            }
+            let text = std::fs::read_to_string(file).map_err(polycore::Error::io("read", file))?;
+            let mut pieces = Vec::new();
+            elements(file, text.as_bytes(), |name, attributes, _| {
+                if let ("Piece", Some(source)) = (name, attributes.get("Source")) {
+                    pieces.push(beside(file, source));
+                }
+                Ok(())
+            })?;
+            if pieces.is_empty() {
+                return Err(unusable(file, "no Piece with a Source; allowed: one at least"));
+            }
+            pieces.iter().try_for_each(|piece| grid.read(piece))?;
+        }
+        // a part of a parallel run may be empty, a whole grid not
+        let first = files.first().filter(|_| grid.points.is_empty());
+        first.map_or(Ok(grid), |path| Err(unusable(path, "no points; allowed: a Piece with Points at least")))
+    }
+
+    fn read(&mut self, path: &Path) -> Result<(), Error> {
         let bytes = std::fs::read(path).map_err(polycore::Error::io("read", path))?;
         let wrong = |reason: &str| unusable(path, reason);
         // raw bytes are no XML: what is appended is cut off before it is parsed
@@ -148,7 +187,7 @@ impl Grid {
         let base64 = !tail[..begin].windows(5).any(|window| window == b"\"raw\"");
         let mut coding =
             Coding { path, big: false, header: 4, packed: false, appended: (&tail[begin..], base64) };
-        let (mut grid, mut section) = (Self::default(), String::new());
+        let (grid, mut section) = (self, String::new());
         let mut piece = Piece::default();
         elements(path, text, |name, attributes, content| {
             let attribute = |key: &str| attributes.get(key).map(String::as_str).unwrap_or_default();
@@ -189,10 +228,7 @@ impl Grid {
             }
             Ok(())
         })?;
-        if grid.points.is_empty() {
-            return Err(wrong("no points; allowed: a Piece with Points at least"));
-        }
-        Ok(grid)
+        Ok(())
     }
 
     fn add(&mut self, piece: Piece, path: &Path) -> Result<(), Error> {
@@ -208,7 +244,7 @@ impl Grid {
                 return Err(unusable(path, &reason));
             };
             let own: Vec<u32> = own.iter().map(|&node| first as u32 + node as u32).collect();
-            push(&mut self.cells, kind as u64, &own);
+            self.cells.push(kind as u64, &own);
             begin = end as usize;
         }
         for (name, values) in piece.scalars {
@@ -303,7 +339,7 @@ impl Coding<'_> {
     }
 }
 
-fn numbers(bytes: &[u8], kind: &str, big: bool) -> Option<Vec<f64>> {
+pub(super) fn numbers(bytes: &[u8], kind: &str, big: bool) -> Option<Vec<f64>> {
     fn of<const N: usize>(bytes: &[u8], big: bool, number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
         let one = |chunk: &[u8]| {
             let mut own = [0; N];

@@ -6,6 +6,8 @@ mod brick;
 mod extremes;
 mod fields;
 mod followers;
+#[cfg(feature = "case")]
+mod geometry;
 mod order;
 mod patch;
 #[cfg(feature = "case")]
@@ -17,4 +19,5 @@ mod same_bits;
 mod schedules;
 mod solvers;
 mod stresses;
+mod tetrahedra;
 mod verification;

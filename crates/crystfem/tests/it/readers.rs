@@ -8,11 +8,14 @@ use proptest::prelude::*;
 
 type Parse = fn(&Path, &[u8], f64) -> Result<ReadMesh, crystfem::Error>;
 
-const FILES: [(&str, Parse); 6] = [
+const FILES: [(&str, Parse); 9] = [
     ("hexes_ascii.msh", gmsh::parse),
     ("hexes_binary.msh", gmsh::parse),
     ("tets_ascii.msh", gmsh::parse),
     ("tets_binary.msh", gmsh::parse),
+    ("hexes_ascii_40.msh", gmsh::parse),
+    ("hexes_ascii_22.msh", gmsh::parse),
+    ("hexes_binary_22.msh", gmsh::parse),
     ("hexes.inp", abaqus::parse),
     ("tets.inp", abaqus::parse),
 ];

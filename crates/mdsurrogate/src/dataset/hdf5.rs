@@ -4,20 +4,26 @@
 //! (N, 6), all SI, `sample`, `path` (N, i64), `time` (N, s); group `paths`: `id`, `kind` (P, strings), `rates`
 //! (P, 3, 1/s, NaN where an axis is not pulled); `provenance` (strings). A written split adds `split` (N, u8: 0
 //! train, 1 validation, 2 test) and the standardisation of the training rows, `mean` and `deviation` (6) of group
-//! `standardisation`. Files of others need `C` and `S` only; without `path` they are one path.
+//! `standardisation`. Files of others need `C` and `S` only, (N, 6) or (N, 3, 3), of any type of numbers, or `F` (N, 9 or 3, 3) with
+//! `cauchy` or `P` (first Piola–Kirchhoff stress); without `path` they are one path.
 
+use super::stress::{Symmetry, cauchy_of_first};
 use super::{Dataset, Path, Row, Split, Standardisation};
 use crate::Error;
-use crate::kinematics::{cauchy_of_material, stretch_of};
+use crate::kinematics::{cauchy_of_material, material_pair, stretch_of};
 use polycore::output::hdf5::{Created, dataset};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
-use rust_hdf5::{H5File, H5Group};
+use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
 
 /// The value of the attribute `format`.
 pub const FORMAT: &str = "mdsurrogate data 1";
 
 const DEFLATE_LEVEL: u32 = 4;
 const CHUNK_ROWS: usize = 4096;
+/// Whole numbers up to here are exact in f64.
+const LARGEST_WHOLE: f64 = 9_007_199_254_740_992.0;
+/// Single precision rounds a symmetric tensor to this.
+const ROUNDED: f64 = 1e-5;
 
 type Hdf5<T> = Result<T, rust_hdf5::Hdf5Error>;
 
@@ -110,10 +116,17 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
         }
         let dataset = dataset(&file, name, size).map_err(none)?;
         let shape = dataset.shape();
-        if shape.len() != 2 || shape[1] != columns {
-            return Err(fail(format!("dataset `{name}` of shape {shape:?}"), &format!("(N, {columns})")));
+        let tensors = shape.len() == 3 && shape[1..] == [3, 3];
+        if !(tensors || shape.len() == 2 && shape[1] == columns) {
+            let allowed = format!("(N, {columns}) or (N, 3, 3)");
+            return Err(fail(format!("dataset `{name}` of shape {shape:?}"), &allowed));
         }
-        let data = dataset.read_raw::<f64>().map_err(none)?;
+        let mut data = floats(&dataset, name, path)?;
+        if tensors && columns == 6 {
+            data = symmetric(&data).ok_or_else(|| {
+                fail(format!("tensors of dataset `{name}` that are not symmetric"), "symmetric tensors")
+            })?;
+        }
         match data.iter().position(|value| !value.is_finite()) {
             Some(at) => Err(fail(
                 format!("{} in row {} of dataset `{name}`", data[at], at / columns),
@@ -126,19 +139,28 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
         if !names.iter().any(|other| other == name) {
             return Ok(None);
         }
-        let data = dataset(&file, name, size).and_then(|dataset| dataset.read_raw::<i64>()).map_err(none)?;
-        if data.len() != rows || data.iter().any(|value| *value < 0) {
-            let found = format!("{} numbers in dataset `{name}`", data.len());
-            return Err(fail(found, &format!("{rows}, none negative")));
+        let data = floats(&dataset(&file, name, size).map_err(none)?, name, path)?;
+        let whole = |value: &f64| value.fract() == 0.0 && (0.0..=LARGEST_WHOLE).contains(value);
+        if let Some(wrong) = data.iter().find(|value| !whole(value)) {
+            return Err(fail(format!("{wrong} in dataset `{name}`"), "whole numbers, none negative"));
         }
-        Ok(Some(data))
+        if data.len() != rows {
+            return Err(fail(format!("{} numbers in dataset `{name}`", data.len()), &rows.to_string()));
+        }
+        Ok(Some(data.into_iter().map(|value| value as i64).collect()))
     };
-    let (c, s) = (numbers("C", 6)?, numbers("S", 6)?);
+    let has = |name: &str| names.iter().any(|other| other == name);
+    let of_gradient = !has("C") && has("F");
+    let (c, s) = if of_gradient {
+        of_gradients(path, &numbers, has("P"))?
+    } else {
+        (numbers("C", 6)?, numbers("S", 6)?)
+    };
     let rows = c.len() / 6;
     if s.len() != c.len() {
         return Err(fail(format!("{} rows of S for {rows} of C", s.len() / 6), "as many"));
     }
-    let full = ["F", "cauchy"].iter().all(|name| names.iter().any(|other| other == name));
+    let full = ["F", "cauchy"].into_iter().all(has);
     let gradients = if full { Some((numbers("F", 9)?, numbers("cauchy", 6)?)) } else { None };
     if let Some((f, cauchy)) = &gradients
         && (f.len() != 9 * rows || cauchy.len() != 6 * rows)
@@ -147,8 +169,8 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
     }
     let samples = integers("sample", rows)?;
     let of_rows = integers("path", rows)?.unwrap_or_else(|| vec![0; rows]);
-    let times = match names.iter().any(|name| name == "time") {
-        true => dataset(&file, "time", size).and_then(|dataset| dataset.read_raw::<f64>()).map_err(none)?,
+    let times = match has("time") {
+        true => floats(&dataset(&file, "time", size).map_err(none)?, "time", path)?,
         false => Vec::new(),
     };
     let mut set = Dataset { paths: paths(&file, path, size, &of_rows)?, ..Dataset::default() };
@@ -171,12 +193,80 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
         };
         target.push(Row { sample, time, deformation, cauchy, c, s, nominal: None });
     }
-    if names.iter().any(|name| name == "provenance") {
+    if has("provenance") {
         let lines = dataset(&file, "provenance", size).and_then(|dataset| dataset.read_vlen_strings());
         set.provenance = lines.map_err(none)?;
     }
     set.provenance.push(format!("{}: {size} bytes, HDF5, {rows} rows", super::table::name_of(path)));
     Ok(set)
+}
+
+/// C and S, six numbers a row, of F and either P (nine) or σ (six).
+fn of_gradients(
+    path: &std::path::Path,
+    numbers: &impl Fn(&str, usize) -> Result<Vec<f64>, Error>,
+    first: bool,
+) -> Result<(Vec<f64>, Vec<f64>), Error> {
+    let (name, width) = if first { ("P", 9) } else { ("cauchy", 6) };
+    let (f, stress) = (numbers("F", 9)?, numbers(name, width)?);
+    let (mut c, mut s) = (Vec::new(), Vec::new());
+    let mut symmetry = Symmetry::default();
+    if stress.len() / width != f.len() / 9 {
+        let found = format!("{} rows of {name} for {} of F", stress.len() / width, f.len() / 9);
+        return Err(Error::file(path, found, "as many"));
+    }
+    for (row, (f, stress)) in f.chunks_exact(9).zip(stress.chunks_exact(width)).enumerate() {
+        let f = DeformationGradient::new(Tensor::from_row_slice(f));
+        let f = f.map_err(|error| Error::file(path, format!("row {row}: {error}"), "a deformation"))?;
+        let cauchy = if first { cauchy_of_first(&f, stress) } else { Voigt::from_row_slice(stress) };
+        if first {
+            symmetry.add(&f, stress);
+        }
+        let (c_, s_) = material_pair(&f, &cauchy);
+        c.extend(c_.iter());
+        s.extend(s_.iter());
+    }
+    symmetry.check(path)?;
+    Ok((c, s))
+}
+
+/// The numbers of a dataset of floats or whole numbers of any width and order of bytes.
+fn floats(dataset: &H5Dataset, name: &str, path: &std::path::Path) -> Result<Vec<f64>, Error> {
+    let damaged =
+        |error: rust_hdf5::Hdf5Error| Error::file(path, format!("dataset `{name}`: {error}"), "HDF5");
+    match dataset.datatype().map_err(damaged)? {
+        DatatypeMessage::FixedPoint { signed: true, .. } => Ok(dataset
+            .read_numeric_as::<i64>()
+            .map_err(damaged)?
+            .into_iter()
+            .map(|value| value as f64)
+            .collect()),
+        DatatypeMessage::FixedPoint { .. } => Ok(dataset
+            .read_numeric_as::<u64>()
+            .map_err(damaged)?
+            .into_iter()
+            .map(|value| value as f64)
+            .collect()),
+        DatatypeMessage::FloatingPoint { .. } => dataset.read_numeric_as::<f64>().map_err(damaged),
+        other => {
+            let found = format!("dataset `{name}` of type {other}");
+            Err(Error::file(path, found, "floats or integers"))
+        }
+    }
+}
+
+/// Components in the order 11, 22, 33, 12, 13, 23 of tensors of nine; none where one is not symmetric.
+fn symmetric(data: &[f64]) -> Option<Vec<f64>> {
+    let mut six = Vec::with_capacity(data.len() / 9 * 6);
+    for tensor in data.chunks_exact(9) {
+        let size = tensor.iter().fold(0.0, |size: f64, value| size.max(value.abs()));
+        if [(1, 3), (2, 6), (5, 7)].iter().any(|&(a, b)| (tensor[a] - tensor[b]).abs() > ROUNDED * size) {
+            return None;
+        }
+        let mean = |a: usize, b: usize| 0.5 * (tensor[a] + tensor[b]);
+        six.extend([tensor[0], tensor[4], tensor[8], mean(1, 3), mean(2, 6), mean(5, 7)]);
+    }
+    Some(six)
 }
 
 /// Empty paths with their names, kinds and rates.
@@ -202,7 +292,7 @@ fn paths(file: &H5File, path: &std::path::Path, size: u64, of_rows: &[i64]) -> R
         dataset.and_then(|dataset| dataset.read_vlen_strings()).map_err(none)
     };
     let (ids, kinds) = (strings("id")?, strings("kind")?);
-    let rates = dataset(file, "paths/rates", size).and_then(|d| d.read_raw::<f64>()).map_err(none)?;
+    let rates = floats(&dataset(file, "paths/rates", size).map_err(none)?, "paths/rates", path)?;
     if kinds.len() != ids.len() || rates.len() != 3 * ids.len() || count > ids.len() {
         let found = format!("{} ids, {} kinds, {} rates", ids.len(), kinds.len(), rates.len());
         return Err(Error::file(path, found, "one id, one kind and three rates a path"));

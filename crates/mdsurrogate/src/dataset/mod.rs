@@ -1,15 +1,20 @@
 //! Data sets of (C, S) by path: read, checked, standardised, split, and measured for noise and leaks.
 
+mod boxes;
 #[cfg(feature = "hdf5")]
 pub mod hdf5;
+mod lammps;
+mod options;
 mod read;
 mod split;
 mod standardise;
 mod statistics;
 mod strains;
+mod stress;
 mod table;
 
-pub use read::{Columns, ReadOptions, read};
+pub use options::{Columns, LammpsUnits, Measure, Origin, PROPERTIES, ReadOptions};
+pub use read::read;
 pub use split::{Fractions, Method, Split, split};
 pub use standardise::Standardisation;
 pub use statistics::{Leak, Noise, leak, noise};
@@ -197,6 +202,26 @@ impl Dataset {
         Ok(())
     }
 
+    /// Whether a run of another set has the name of one here.
+    pub fn shares_a_name(&self, other: &Self) -> bool {
+        let names: HashSet<&str> = self.paths.iter().map(|path| path.id.as_str()).collect();
+        other.paths.iter().any(|path| names.contains(path.id.as_str()))
+    }
+
+    /// The runs of a file with its folder before their names where they are named after the file (`shear/log.lammps`:
+    /// `shear-log.lammps`).
+    #[must_use]
+    pub fn of_folder(mut self, file: &std::path::Path) -> Self {
+        let [name, folder] = [file.file_name(), file.parent().and_then(std::path::Path::file_name)]
+            .map(|name| name.unwrap_or_default().to_string_lossy());
+        for path in &mut self.paths {
+            if path.id.starts_with(&*name) && !folder.is_empty() {
+                path.id = format!("{folder}-{}", path.id);
+            }
+        }
+        self
+    }
+
     /// Smallest and largest C of each component; (+∞, −∞) of an empty set.
     pub fn box_of_c(&self) -> [[f64; 2]; 6] {
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 6];
@@ -322,5 +347,7 @@ fn bits(row: &Row) -> [u64; 12] {
     bits
 }
 
+#[cfg(test)]
+mod md_tests;
 #[cfg(test)]
 pub(crate) mod tests;

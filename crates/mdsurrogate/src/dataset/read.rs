@@ -1,63 +1,36 @@
-//! Data sets from CSV tables in three forms, and from HDF5.
+//! Data sets from CSV tables in four forms, from LAMMPS' own files, and from HDF5.
 
+use super::boxes::Boxes;
+use super::options::{Columns, LENGTHS, Origin, ReadOptions};
+use super::stress::{Stress, Symmetry, nine};
 use super::table::{Column, Table};
 use super::{Dataset, Path, Row};
 use crate::Error;
-use crate::kinematics::{PeriodicBox, cauchy_of_material, stretch_of};
+use crate::kinematics::{NAMES, stretch_of};
 use polycore::constitutive::{self, hyperelastic};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
-use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// Seconds in a femtosecond.
 const FEMTOSECOND: f64 = 1e-15;
 
-const STRESSES: [&str; 6] = ["sxx", "syy", "szz", "sxy", "sxz", "syz"];
-const LENGTHS: [&str; 3] = ["lx", "ly", "lz"];
-const TILTS: [&str; 3] = ["xy", "xz", "yz"];
-
-/// Which columns of a molecular dynamics table are read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
-#[serde(rename_all = "lowercase")]
-pub enum Columns {
-    /// `avg_…`: means over the interval before each sample. Stress at one instant in a small cell is mostly the
-    /// vibration of bonds (formulation.md, chapter 3).
-    #[default]
-    Averaged,
-    /// The values at the instant of sampling.
-    Instantaneous,
-}
-
-/// How a table is to be understood.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReadOptions {
-    /// Averaged or instantaneous.
-    pub columns: Columns,
-    /// Edges of the undeformed box, Å; without it, lengths are referred to the row where the file's own F is 1.
-    pub reference: Option<PeriodicBox>,
-    /// Pa in one unit of stress, for columns whose heading has no `[unit]`.
-    pub stress_unit: f64,
-}
-
-impl Default for ReadOptions {
-    /// Averaged columns, MPa.
-    fn default() -> Self {
-        Self { columns: Columns::Averaged, reference: None, stress_unit: 1e6 }
-    }
-}
-
 /// Reads a CSV table (also gzip) or HDF5 file, and checks it ([`Dataset::check`]).
 ///
 /// Forms of a table, told by its headings:
-/// - `lx ly lz` (Å; with `xy xz yz` if the box is tilted) and `sxx syy szz sxy sxz syz` (σ), or the same with `avg_`;
-/// - `F11 F12 … F33` (all nine) and `sxx …` or `avg_sxx …`;
+/// - `lx ly lz` (Å; with `xy xz yz` if the box is tilted) and `sxx syy szz sxy sxz syz` (σ), or the same with `avg_`; F is
+///   H H₀⁻¹ of each run's own undeformed box H₀, and flips of a tilted box are undone;
+/// - `F11 F12 … F33` (all nine) and `sxx …` or `avg_sxx …`, `S11 …`, or nine components `P11 P12 … P33` of the first
+///   Piola–Kirchhoff stress;
+/// - thermo output of LAMMPS in logs (also `thermo_style yaml`) and files of `fix ave/time`;
 /// - `C11 C22 C33 C12 C13 C23` and `S11 … S23`;
 /// - nominal stresses of an incompressible body, as [`hyperelastic::data::Table`] has them: `stretch,nominal_MPa`,
 ///   `mode,stretch,nominal_MPa` (a run for each mode) or `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`.
 ///
 /// Optional columns: `run_id` (without it a file is one path), `kind`, `rate_x rate_y rate_z` (1/fs), `sample`,
-/// `time_fs`. Stress is in MPa, or in the unit of its heading. A row whose averaged cells are all empty (the state before a run) is skipped and counted.
+/// `time_fs`. Stress is in MPa, or in the unit of its heading. Pressures (`pxx …`, σ = −p) are read where [`Measure`] says so.
+/// A row whose averaged cells are all empty (the state before a run) is skipped and counted.
+///
+/// [`Measure`]: super::Measure
 ///
 /// # Errors
 /// File, line, column, what was found and what is allowed; [`Dataset::check`].
@@ -71,7 +44,7 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
         #[cfg(feature = "hdf5")]
         set
     } else {
-        let text = Table::read(path)?;
+        let text = Table::read(path, options)?;
         if ["mode", "stretch", "stretch_1"].iter().any(|name| text.has(name)) {
             nominal(&text)?
         } else {
@@ -90,7 +63,7 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
     Ok(set)
 }
 
-fn is_hdf5(path: &std::path::Path) -> Result<bool, Error> {
+pub(super) fn is_hdf5(path: &std::path::Path) -> Result<bool, Error> {
     use std::io::Read;
     let mut start = Vec::new();
     let file = std::fs::File::open(path).map_err(Error::io("open", path))?;
@@ -99,111 +72,175 @@ fn is_hdf5(path: &std::path::Path) -> Result<bool, Error> {
     Ok(named || start == b"\x89HDF\r\n\x1a\n")
 }
 
-/// Where a table keeps the deformation and the stress.
-enum Form {
-    Box { lengths: [Column; 3], tilts: Option<[Column; 3]>, reference: PeriodicBox, stress: [Column; 6] },
-    Gradient { components: [Column; 9], stress: [Column; 6] },
-    Material { c: [Column; 6], s: [Column; 6] },
+/// The rows of one run.
+pub(super) struct Run {
+    /// Its name.
+    pub id: String,
+    /// All its rows, as they stand in the file.
+    pub all: Vec<usize>,
+    /// The first of them.
+    pub first: usize,
+    /// Those with values, with their samples, in the order of the samples.
+    pub rows: Vec<(u64, usize)>,
 }
 
-impl Form {
-    fn new(table: &Table, options: &ReadOptions) -> Result<Self, Error> {
+/// Where a table keeps the deformation.
+enum Form {
+    Box(Boxes),
+    Gradient([Column; 9]),
+    Material([Column; 6]),
+}
+
+/// Where a table keeps its values.
+pub(super) struct Layout {
+    form: Form,
+    stress: Option<Stress>,
+    /// What was taken for what, in words.
+    name: String,
+}
+
+impl Layout {
+    /// The layout of a table; without its stress for predictions.
+    pub fn new(table: &Table, options: &ReadOptions, stressed: bool) -> Result<Self, Error> {
         if table.has("C11") {
-            let names = |letter: &str| crate::kinematics::NAMES.map(|name| format!("{letter}{name}"));
-            let all: Vec<String> = names("C").into_iter().chain(names("S")).collect();
-            if let Some(missing) = all.iter().find(|name| !table.has(name)) {
-                let others = table.headings.iter().map(|(name, _)| name).filter(|name| !all.contains(name));
-                let similar = crate::error::nearest(missing, others.map(String::as_str));
-                if similar.is_some() {
-                    let (path, column) = (table.path.clone(), missing.clone());
-                    return Err(Error::MissingColumn { path, column, similar });
-                }
-                let mut allowed = "C11 C22 C33 C12 C13 C23 and S11 S22 S33 S12 S13 S23".to_owned();
-                if missing.ends_with(['2', '3']) && !missing.ends_with("22") && !missing.ends_with("33") {
-                    allowed += "; where there is no shear, add columns of zeros";
-                }
-                return Err(Error::file(&table.path, format!("no column `{missing}`"), allowed));
+            let names = |letter: &str| NAMES.map(|name| format!("{letter}{name}"));
+            require_material(table, [names("C"), names("S")].as_flattened())?;
+            let (c, s) = (table.columns(names("C"))?, table.columns(names("S"))?);
+            return Ok(Self {
+                form: Form::Material(c),
+                stress: Some(Stress::Second(s)),
+                name: "C and S".into(),
+            });
+        }
+        let (mut prefix, mut name) = match (table.is_lammps(), options.columns) {
+            (true, _) => ("", "LAMMPS"),
+            (_, Columns::Averaged) => ("avg_", "averaged columns"),
+            (_, Columns::Instantaneous) => ("", "instantaneous columns"),
+        };
+        let form = if table.has("F12") {
+            // a table without any averaged column has nothing to choose from
+            if !prefix.is_empty() && !table.headings.iter().any(|(name, _)| name.starts_with(prefix)) {
+                (prefix, name) = ("", "F");
             }
-            return Ok(Self::Material { c: table.columns(names("C"))?, s: table.columns(names("S"))? });
-        }
-        let prefix = match options.columns {
-            Columns::Averaged => "avg_",
-            Columns::Instantaneous => "",
-        };
-        let prefixed = |name: &str| format!("{prefix}{name}");
-        let stress = || table.columns(STRESSES.map(prefixed));
-        if table.has("F12") {
-            let name = |k: usize| format!("F{}{}", k / 3 + 1, k % 3 + 1);
-            let components = table.columns(std::array::from_fn::<_, 9, _>(name))?;
-            return Ok(Self::Gradient { components, stress: stress()? });
-        }
-        if !LENGTHS.iter().any(|name| table.has(&prefixed(name))) {
+            Form::Gradient(table.columns(nine("F"))?)
+        } else if LENGTHS.iter().any(|name| table.has(&format!("{prefix}{name}"))) {
+            Form::Box(Boxes::new(table, prefix)?)
+        } else {
             return Err(unknown_form(table, options.columns));
-        }
-        let lengths = table.columns(LENGTHS.map(prefixed))?;
-        let tilted = table.has(&prefixed("xy"));
-        let tilts = if tilted { Some(table.columns(TILTS.map(prefixed))?) } else { None };
-        let reference = match options.reference {
-            Some(reference) => reference,
-            None => undeformed(table)?,
         };
-        Ok(Self::Box { lengths, tilts, reference, stress: stress()? })
+        let stress = if stressed { Some(Stress::of_deformation(table, prefix, options)?) } else { None };
+        let name = match stress {
+            None | Some(Stress::Cauchy(_)) => name.to_owned(),
+            Some(stress) => format!("{name}, {}", stress.name()),
+        };
+        Ok(Self { form, stress, name })
     }
 
     fn stress(&self) -> &[Column] {
-        match self {
-            Self::Box { stress, .. } | Self::Gradient { stress, .. } => stress,
-            Self::Material { s, .. } => s,
-        }
+        self.stress.as_ref().map_or(&[], Stress::columns)
     }
 
     /// Whether a row has none of the values looked for.
     fn is_blank(&self, table: &Table, row: usize) -> bool {
         let blank = |column: &Column| table.text(row, *column).is_empty();
-        match self {
-            Self::Box { lengths, stress, .. } => lengths.iter().chain(stress).all(blank),
-            Self::Gradient { stress, .. } => stress.iter().all(blank),
-            Self::Material { .. } => false,
+        match &self.form {
+            Form::Box(boxes) => boxes.lengths().iter().chain(self.stress()).all(blank),
+            Form::Gradient(_) => !self.stress().is_empty() && self.stress().iter().all(blank),
+            Form::Material(_) => false,
         }
     }
 
-    fn row(
+    /// F of each row of each run, and lines that tell what was done.
+    pub fn deformations(
         &self,
         table: &Table,
-        row: usize,
-        units: &[f64; 6],
-    ) -> Result<(DeformationGradient, Voigt), Error> {
-        // stresses without a column are 0
-        let mut stress = Voigt::zeros();
-        for ((value, column), unit) in stress.iter_mut().zip(self.stress()).zip(units) {
-            *value = table.number(row, *column)? * unit;
-        }
-        let at = |error: Error| {
-            let (found, allowed) = match error {
-                Error::Parameter { name, found, allowed } => (format!("{name}: {found}"), allowed),
-                other => (other.to_string(), "a deformation with positive determinant".into()),
-            };
-            Error::file(&table.path, format!("line {}: {found}", table.line(row)), allowed)
+        runs: &[Run],
+        options: &ReadOptions,
+    ) -> Result<(Vec<Vec<DeformationGradient>>, Vec<String>), Error> {
+        let of = |&(_, row): &(u64, usize)| -> Result<DeformationGradient, Error> {
+            match &self.form {
+                Form::Material(c) => stretch_of(&Voigt::from_row_slice(&table.numbers(row, c)?))
+                    .map_err(|error| table.at_row(row, error)),
+                Form::Gradient(columns) => {
+                    DeformationGradient::new(Tensor::from_row_slice(&table.numbers(row, columns)?))
+                        .map_err(|error| table.at_row(row, error.into()))
+                }
+                Form::Box(_) => Err(Error::file(&table.path, "a box", "a deformation")),
+            }
         };
-        match self {
-            Self::Box { lengths, tilts, reference, .. } => {
-                let lengths = table.numbers(row, lengths)?;
-                let tilts = tilts.map_or(Ok([0.0; 3]), |tilts| table.numbers(row, &tilts))?;
-                let current = PeriodicBox { lengths, tilts };
-                Ok((current.deformation_from(reference).map_err(at)?, stress))
-            }
-            Self::Gradient { components, .. } => {
-                let numbers = table.numbers(row, components)?;
-                let f = DeformationGradient::new(Tensor::from_row_slice(&numbers));
-                Ok((f.map_err(|error| at(error.into()))?, stress))
-            }
-            Self::Material { c, .. } => {
-                let c = Voigt::from_row_slice(&table.numbers(row, c)?);
-                let f = stretch_of(&c).map_err(at)?;
-                Ok((f, cauchy_of_material(&f, &stress)))
+        match &self.form {
+            Form::Box(boxes) => boxes.deformations(table, runs, options),
+            _ => {
+                let all =
+                    runs.iter().map(|run| run.rows.iter().map(of).collect()).collect::<Result<_, _>>()?;
+                Ok((all, Vec::new()))
             }
         }
     }
+
+    /// The runs of a table, in order of appearance, and how many rows are blank.
+    pub fn runs(&self, table: &Table) -> Result<(Vec<Run>, usize), Error> {
+        let [id, sample] = ["run_id", "sample"].map(|name| table.find(name));
+        let file_name = super::table::name_of(&table.path);
+        let mut runs: Vec<Run> = Vec::new();
+        let mut index: HashMap<String, usize> = HashMap::new();
+        let mut samples: HashMap<(usize, u64), u64> = HashMap::new();
+        let mut skipped = 0;
+        for row in 0..table.rows() {
+            let id = id.map_or(file_name.as_str(), |column| table.text(row, column));
+            let number = *index.entry(id.to_owned()).or_insert_with(|| {
+                runs.push(Run { id: id.to_owned(), all: Vec::new(), first: row, rows: Vec::new() });
+                runs.len() - 1
+            });
+            let run = &mut runs[number];
+            run.all.push(row);
+            if self.is_blank(table, row) {
+                skipped += 1;
+                continue;
+            }
+            let sample = match sample {
+                Some(column) => table
+                    .text(row, column)
+                    .parse()
+                    .map_err(|_| table.cell(row, column, "a whole number, not negative"))?,
+                None => run.rows.len() as u64,
+            };
+            if let Some(line) = samples.insert((number, sample), table.line(row)) {
+                return Err(Error::Data {
+                    what: "data set",
+                    found: format!(
+                        "sample {sample} of run `{id}` twice, in lines {line} and {} of {}",
+                        table.line(row),
+                        table.path.display()
+                    ),
+                    allowed: "each sample of a run once".into(),
+                });
+            }
+            run.rows.push((sample, row));
+        }
+        for run in &mut runs {
+            run.rows.sort_by_key(|(sample, _)| *sample);
+        }
+        runs.retain(|run| !run.rows.is_empty());
+        Ok((runs, skipped))
+    }
+}
+
+/// # Errors
+/// A component of C or S without a column.
+fn require_material(table: &Table, all: &[String]) -> Result<(), Error> {
+    let Some(missing) = all.iter().find(|name| !table.has(name)) else { return Ok(()) };
+    let others = table.headings.iter().map(|(name, _)| name).filter(|name| !all.contains(name));
+    let similar = crate::error::nearest(missing, others.map(String::as_str));
+    if similar.is_some() {
+        let (path, column) = (table.path.clone(), missing.clone());
+        return Err(Error::MissingColumn { path, column, similar });
+    }
+    let mut allowed = "C11 C22 C33 C12 C13 C23 and S11 S22 S33 S12 S13 S23".to_owned();
+    if missing.ends_with(['2', '3']) && !missing.ends_with("22") && !missing.ends_with("33") {
+        allowed += "; where there is no shear, add columns of zeros";
+    }
+    Err(Error::file(&table.path, format!("no column `{missing}`"), allowed))
 }
 
 /// Nominal stresses over stretches: a run for each test, in order of appearance.
@@ -254,7 +291,9 @@ fn unknown_form(table: &Table, columns: Columns) -> Error {
     let forms = "C11 C22 C33 C12 C13 C23 and S11 … S23, or F11 F12 … F33 or lx ly lz and sxx syy szz sxy sxz syz, or (rubber) \
          mode, stretch, nominal_MPa";
     let allowed = match columns {
-        _ if headings.len() == 1 => format!("{forms}, separated by commas"),
+        _ if table.has("F11") => {
+            "all nine of F11 F12 F13 F21 … F33; where there is no shear, add columns of zeros".into()
+        }
         Columns::Averaged if table.has("lx") => {
             "avg_lx … avg_syz; for lx … syz as they are, `columns = \"instantaneous\"` (`--instantaneous`)"
                 .into()
@@ -265,98 +304,65 @@ fn unknown_form(table: &Table, columns: Columns) -> Error {
     Error::file(&table.path, found, allowed)
 }
 
-/// The box of the first row in which the file's own F is 1.
-fn undeformed(table: &Table) -> Result<PeriodicBox, Error> {
-    let columns = ["F11", "F22", "F33"].map(|name| table.find(name));
-    let lengths = LENGTHS.map(|name| table.find(name));
-    if let ([Some(a), Some(b), Some(c)], [Some(x), Some(y), Some(z)]) = (columns, lengths) {
-        for row in 0..table.rows() {
-            if table.numbers(row, &[a, b, c])? == [1.0; 3] {
-                return Ok(PeriodicBox::orthogonal(table.numbers(row, &[x, y, z])?));
-            }
-        }
-    }
-    Err(Error::file(
-        &table.path,
-        "box lengths, but no row with F11 = F22 = F33 = 1 and its lx, ly, lz",
-        "such a row, or `reference_lengths` in the scene",
-    ))
-}
-
 fn table(table: &Table, options: &ReadOptions) -> Result<Dataset, Error> {
-    let form = Form::new(table, options)?;
-    let mut units = [0.0; 6];
-    for (unit, column) in units.iter_mut().zip(form.stress()) {
-        *unit = table.stress_unit(*column, options.stress_unit)?;
+    let mut options = options.clone();
+    if let Some(origin) = table.lammps() {
+        options.origin = options.origin.or(origin.first_is_undeformed.then_some(Origin::Run));
     }
-    let [run, kind, sample, time] = ["run_id", "kind", "sample", "time_fs"].map(|name| table.find(name));
+    let layout = Layout::new(table, &options, true)?;
+    let Some(stress) = &layout.stress else { return Ok(Dataset::default()) };
+    let units = stress.units(table, &options)?;
+    let (runs, skipped) = layout.runs(table)?;
+    let [kind, time] = ["kind", "time_fs"].map(|name| table.find(name));
     let rates = ["rate_x", "rate_y", "rate_z"].map(|name| table.find(name));
-    let file_name = table.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut set = Dataset::default();
-    let mut index: HashMap<String, usize> = HashMap::new();
-    let mut samples: HashMap<(usize, u64), u64> = HashMap::new();
-    for row in 0..table.rows() {
-        let id = run.map_or(file_name.as_str(), |column| table.text(row, column));
-        if form.is_blank(table, row) {
-            set.skipped += 1;
-            continue;
-        }
-        let (deformation, cauchy) = form.row(table, row, &units)?;
-        let path = match index.get(id) {
-            Some(&path) => path,
-            None => {
-                let mut of_axes = [f64::NAN; 3];
-                for (rate, column) in of_axes.iter_mut().zip(rates) {
-                    if let Some(column) = column.filter(|column| !table.text(row, *column).is_empty()) {
-                        *rate = table.number(row, column)? / FEMTOSECOND;
-                    }
-                }
-                let kind = kind.map(|column| table.text(row, column)).filter(|kind| !kind.is_empty());
-                let kind = kind.unwrap_or("unknown").to_owned();
-                set.paths.push(Path { id: id.to_owned(), kind, rates: of_axes, rows: Vec::new() });
-                index.insert(id.to_owned(), set.paths.len() - 1);
-                set.paths.len() - 1
+    let (deformations, notes) = layout.deformations(table, &runs, &options)?;
+    let mut set = Dataset { skipped, ..Dataset::default() };
+    let mut symmetry = Symmetry::default();
+    for (run, deformations) in runs.iter().zip(deformations) {
+        let Some(&(_, row)) = run.rows.first() else { continue };
+        let mut of_axes = [f64::NAN; 3];
+        for (rate, column) in of_axes.iter_mut().zip(rates) {
+            if let Some(column) = column.filter(|column| !table.text(row, *column).is_empty()) {
+                *rate = table.number(row, column)? / FEMTOSECOND;
             }
-        };
-        let number = match sample {
-            Some(column) => table
-                .text(row, column)
-                .parse()
-                .map_err(|_| table.cell(row, column, "a whole number, not negative"))?,
-            None => set.paths[path].rows.len() as u64,
-        };
-        if let Some(line) = samples.insert((path, number), table.line(row)) {
-            return Err(Error::Data {
-                what: "data set",
-                found: format!(
-                    "sample {number} of run `{id}` twice, in lines {line} and {} of {}",
-                    table.line(row),
-                    table.path.display()
-                ),
-                allowed: "each sample of a run once".into(),
-            });
         }
-        let time = match time {
-            Some(column) => table.number(row, column)? * FEMTOSECOND,
-            None => f64::NAN,
-        };
-        set.paths[path].rows.push(Row::new(number, time, deformation, cauchy));
+        let kind = kind.map(|column| table.text(row, column)).filter(|kind| !kind.is_empty());
+        let kind = kind.unwrap_or("unknown").to_owned();
+        let mut rows = Vec::new();
+        for (&(sample, row), f) in run.rows.iter().zip(deformations) {
+            let mut numbers = Vec::new();
+            for (column, unit) in stress.columns().iter().zip(&units) {
+                numbers.push(table.number(row, *column)? * unit);
+            }
+            if matches!(stress, Stress::First(_)) {
+                symmetry.add(&f, &numbers);
+            }
+            let time = match time {
+                Some(column) => table.number(row, column)? * FEMTOSECOND,
+                None => f64::NAN,
+            };
+            rows.push(Row::new(sample, time, f, stress.cauchy(&f, &numbers)));
+        }
+        set.paths.push(Path { id: run.id.clone(), kind, rates: of_axes, rows });
     }
-    for path in &mut set.paths {
-        path.rows.sort_by_key(|row| row.sample);
-    }
-    let columns = match (&form, options.columns) {
-        (Form::Material { .. }, _) => "C and S",
-        (_, Columns::Averaged) => "averaged columns",
-        (_, Columns::Instantaneous) => "instantaneous columns",
-    };
-    set.provenance.push(format!(
-        "{}: {}, {columns}, {} rows of {} runs, {} skipped",
+    symmetry.check(&table.path)?;
+    let mut line = format!(
+        "{}: {}, {}, {} rows of {} runs, {} skipped",
         super::table::name_of(&table.path),
         table.fingerprint,
+        layout.name,
         set.len(),
         set.paths.len(),
         set.skipped
-    ));
+    );
+    if let Some(how) = table.understood() {
+        line += "; ";
+        line += &how;
+    }
+    for note in table.lammps().iter().flat_map(|origin| &origin.notes).chain(&notes) {
+        line += "; ";
+        line += note;
+    }
+    set.provenance.push(line);
     Ok(set)
 }

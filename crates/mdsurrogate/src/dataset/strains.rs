@@ -1,8 +1,10 @@
 //! Strains at which laws are asked: tables with or without stresses.
 
+use super::options::{Columns, Origin, ReadOptions};
+use super::read::Layout;
 use super::table::{Column, Table};
 use crate::Error;
-use polycore::tensor::Voigt;
+use polycore::tensor::{DeformationGradient, Voigt, voigt};
 
 /// Columns of principal stretches; those without one follow from λ₁λ₂λ₃ = 1, two of them alike.
 #[derive(Clone, Copy)]
@@ -42,14 +44,19 @@ impl Stretches {
     }
 }
 
-/// C in each row of a CSV table: columns C11, C22, C33 and, where there is shear, C12, C13, C23, or stretches as of
-/// [`super::read`]. Other columns are left alone.
+/// C in each row of a table: columns C11, C22, C33 and, where there is shear, C12, C13, C23, stretches, or F or boxes as of
+/// [`super::read`]. Other columns are left alone. Of an HDF5 file its C.
 ///
 /// # Errors
 /// A table without rows, a column that is missing or named almost as one of these, a cell that is no finite number.
 pub fn read_strains(path: impl AsRef<std::path::Path>) -> Result<Vec<Voigt>, Error> {
     let path = path.as_ref();
-    let table = Table::read(path)?;
+    #[cfg(feature = "hdf5")]
+    if super::read::is_hdf5(path)? {
+        return Ok(super::hdf5::read(path)?.rows().map(|row| row.c).collect());
+    }
+    let mut options = ReadOptions::default();
+    let table = Table::read(path, &options)?;
     let known = crate::kinematics::NAMES.map(|name| format!("C{name}"));
     if table.has("stretch_1") || table.has("stretch") {
         if table.has("mode") && !table.has("stretch_1") {
@@ -61,6 +68,20 @@ pub fn read_strains(path: impl AsRef<std::path::Path>) -> Result<Vec<Voigt>, Err
         let c =
             |row| stretches.row(&table, row).map(|[x, y, z]| Voigt::new(x * x, y * y, z * z, 0.0, 0.0, 0.0));
         return (0..table.rows()).map(c).collect();
+    }
+    let boxed = |prefix: &str| table.has(&format!("{prefix}lx"));
+    if !table.has("C11") && (table.has("F12") || boxed("avg_") || boxed("")) {
+        if !boxed("avg_") {
+            options.columns = Columns::Instantaneous;
+        }
+        if table.lammps().is_some_and(|origin| origin.first_is_undeformed) {
+            options.origin = Some(Origin::Run);
+        }
+        let layout = Layout::new(&table, &options, false)?;
+        let (runs, _) = layout.runs(&table)?;
+        let (found, _) = layout.deformations(&table, &runs, &options)?;
+        let c = |f: &DeformationGradient| voigt::from_stress(&f.right_cauchy_green());
+        return Ok(found.iter().flatten().map(c).collect());
     }
     // a slip in a name must not become a shear of 0
     let slip = |name: &&String| name.len() == 3 && name.starts_with(['C', 'c']) && !known.contains(name);

@@ -1,10 +1,13 @@
 //! Tables of text, packed (gzip) or not, with the place of each cell.
 
+use super::lammps;
+use super::options::{PROPERTIES, ReadOptions, is_sampled};
 use crate::Error;
 use crate::error::nearest;
 use flate2::Crc;
 use flate2::read::MultiGzDecoder;
-use polycore::units::Stress;
+use polycore::table;
+use polycore::units::{Length, Stress};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -12,14 +15,30 @@ use std::path::{Path, PathBuf};
 /// A larger text is refused: no table of this kind, but perhaps a bomb.
 pub(super) const LARGEST: u64 = 2 << 30;
 
-/// Headings and rows of a CSV file.
+/// Å in a metre.
+const METRE: f64 = 1e10;
+
+/// How programs write a table, where nothing needs to be said about it.
+const USUAL: &str = "separator `,`, decimal point, UTF-8, headings in line";
+
+/// The rows of a file.
+enum Cells {
+    /// Of a table of people and programs.
+    Table(Box<table::Table>),
+    /// Of a file of LAMMPS.
+    Lammps(Vec<csv::StringRecord>),
+}
+
+/// Headings and rows of a file.
 pub(super) struct Table {
     pub path: PathBuf,
     /// Bytes and checksum of the file, for provenance.
     pub fingerprint: String,
-    /// Name, and unit in square brackets if there is one.
+    /// Names, and units if there are any.
     pub headings: Vec<(String, Option<String>)>,
-    records: Vec<csv::StringRecord>,
+    cells: Cells,
+    /// How a file of LAMMPS was understood.
+    lammps: Option<lammps::Origin>,
 }
 
 /// A column that was looked up.
@@ -27,48 +46,91 @@ pub(super) struct Table {
 pub(super) struct Column(usize);
 
 impl Table {
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let mut packed = Vec::new();
-        File::open(path)
-            .and_then(|file| file.take(LARGEST + 1).read_to_end(&mut packed))
-            .map_err(Error::io("read", path))?;
-        let mut crc = Crc::new();
-        crc.update(&packed);
-        let fingerprint = format!("{} bytes, CRC-32 {:08x}", packed.len(), crc.sum());
-        let gzip = packed.starts_with(&[0x1f, 0x8b]);
-        let mut text = Vec::new();
-        if gzip {
-            let unpack = MultiGzDecoder::new(&packed[..]).take(LARGEST + 1).read_to_end(&mut text);
-            unpack.map_err(|error| {
-                Error::file(
-                    path,
-                    format!("a gzip file that is truncated or damaged after {} bytes ({error})", text.len()),
-                    "a complete gzip file",
-                )
-            })?;
-        } else {
-            text = packed;
+    /// Reads a table, of LAMMPS' own files too.
+    pub fn read(path: &Path, options: &ReadOptions) -> Result<Self, Error> {
+        let (text, fingerprint) = unpacked(path)?;
+        if let Some(kind) = lammps::kind(&text) {
+            let (headings, records, origin) = lammps::read(path, &text, kind, options)?;
+            let (path, cells) = (path.to_path_buf(), Cells::Lammps(records));
+            return Ok(Self { path, fingerprint, headings, cells, lammps: Some(origin) });
         }
-        if text.len() as u64 > LARGEST {
-            return Err(Error::file(path, "more than 2 GiB of text", "tables up to 2 GiB"));
-        }
-        if text.iter().all(u8::is_ascii_whitespace) {
-            return Err(Error::file(path, "an empty file", "a CSV table with a line of headings"));
-        }
-        let fail =
-            |error: csv::Error| Error::file(path, error, "a CSV table, all rows as long as the headings");
-        let mut reader =
-            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(&text[..]);
-        let headings = reader.headers().map_err(fail)?.iter().map(heading).collect();
-        let records = reader.records().collect::<Result<Vec<_>, _>>().map_err(fail)?;
-        if records.is_empty() {
+        let read = table::Table::parse(path, text).map_err(polycore::Error::from)?;
+        if read.rows() == 0 {
             return Err(Error::file(path, "headings without rows", "at least one row"));
         }
-        Ok(Self { path: path.to_path_buf(), fingerprint, headings, records })
+        let heading = |heading: &table::Heading| {
+            let unit = heading.unit.as_ref().filter(|unit| !unit.is_empty());
+            // `c_p[1]` has a number in its brackets, no unit
+            let name =
+                if unit.is_none() && heading.text.ends_with(']') { &heading.text } else { &heading.name };
+            (name.clone(), unit.cloned())
+        };
+        let headings = read.headings.iter().map(heading).collect();
+        let (path, cells) = (path.to_path_buf(), Cells::Table(Box::new(read)));
+        let mut table = Self { path, fingerprint, headings, cells, lammps: None };
+        table.rename(options)?;
+        Ok(table)
+    }
+
+    /// Gives columns the names of the properties that they are said to be.
+    fn rename(&mut self, options: &ReadOptions) -> Result<(), Error> {
+        let averaged = options.prefix();
+        let mut named = Vec::new();
+        for (property, name) in &options.names {
+            if !PROPERTIES.contains(&property.as_str()) {
+                let similar = nearest(property, PROPERTIES.into_iter());
+                let allowed = similar.map_or(PROPERTIES.join(", "), |name| format!("`{name}`?"));
+                return Err(Error::parameter("names", format!("`{property}`"), allowed));
+            }
+            let Some(Column(column)) = self.find(name) else {
+                let similar = nearest(name, self.headings.iter().map(|(other, _)| other.as_str()));
+                return Err(Error::MissingColumn { path: self.path.clone(), column: name.clone(), similar });
+            };
+            let prefix = if is_sampled(property) { averaged } else { "" };
+            named.push((column, format!("{prefix}{property}")));
+        }
+        for (column, name) in named {
+            self.headings[column].0 = name;
+        }
+        Ok(())
+    }
+
+    /// Whether LAMMPS wrote the file.
+    pub fn is_lammps(&self) -> bool {
+        self.lammps.is_some()
+    }
+
+    /// How a file of LAMMPS was understood.
+    pub fn lammps(&self) -> Option<&lammps::Origin> {
+        self.lammps.as_ref()
+    }
+
+    /// Pa in LAMMPS' unit of pressure.
+    pub fn pressure_unit(&self) -> Option<f64> {
+        self.lammps.as_ref()?.units.map(|units| units.sizes()[0])
+    }
+
+    /// An error of the numbers of a row, with its line.
+    pub fn at_row(&self, row: usize, error: Error) -> Error {
+        let (found, allowed) = match error {
+            Error::Parameter { name, found, allowed } => (format!("{name}: {found}"), allowed),
+            other => (other.to_string(), "a deformation with positive determinant".into()),
+        };
+        Error::file(&self.path, format!("line {}: {found}", self.line(row)), allowed)
+    }
+
+    /// How the file is written, where that is not as programs do.
+    pub fn understood(&self) -> Option<String> {
+        let Cells::Table(table) = &self.cells else { return None };
+        let layout = table.layout().to_string();
+        (!layout.starts_with(USUAL) || layout.contains("units in line")).then_some(layout)
     }
 
     pub fn rows(&self) -> usize {
-        self.records.len()
+        match &self.cells {
+            Cells::Table(table) => table.rows(),
+            Cells::Lammps(records) => records.len(),
+        }
     }
 
     pub fn has(&self, name: &str) -> bool {
@@ -94,20 +156,30 @@ impl Table {
     }
 
     pub fn text(&self, row: usize, column: Column) -> &str {
-        self.records[row].get(column.0).unwrap_or_default()
+        match &self.cells {
+            Cells::Table(table) => table.text(row, column.0),
+            Cells::Lammps(records) => records[row].get(column.0).unwrap_or_default(),
+        }
     }
 
     pub fn line(&self, row: usize) -> u64 {
-        self.records[row].position().map_or(0, csv::Position::line)
+        match &self.cells {
+            Cells::Table(table) => table.line(row) as u64,
+            Cells::Lammps(records) => records[row].position().map_or(0, csv::Position::line),
+        }
     }
 
     /// A finite number.
     pub fn number(&self, row: usize, column: Column) -> Result<f64, Error> {
         let text = self.text(row, column);
-        match text.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(self.cell(row, column, "a finite number")),
-        }
+        let number = match &self.cells {
+            Cells::Table(table) => table.layout().decimal.number(text),
+            Cells::Lammps(_) => text.parse().ok(),
+        };
+        number.filter(|number| number.is_finite()).ok_or_else(|| {
+            let how = self.understood().map_or(String::new(), |how| format!(" ({how})"));
+            self.cell(row, column, &format!("a finite number{how}"))
+        })
     }
 
     pub fn numbers<const N: usize>(&self, row: usize, columns: &[Column; N]) -> Result<[f64; N], Error> {
@@ -129,26 +201,74 @@ impl Table {
         }
     }
 
-    /// Pa in one unit of a column: that of its heading (`S11 [GPa]`), else `default`.
-    pub fn stress_unit(&self, column: Column, default: f64) -> Result<f64, Error> {
+    /// Pa in one unit of a column by its heading (`S11 [GPa]`, `pxx (eV/Å³)`).
+    pub fn stress_unit(&self, column: Column) -> Result<Option<f64>, Error> {
+        // an ampere has no place in a stress
+        let plain = |unit: &str| table::plain_unit(unit).replace("/A", "/Å");
+        let one = |unit: &str| format!("1 {}", plain(unit)).parse::<Stress>().map(|one| one.si());
+        self.unit(column, one, "a unit of stress, as in `S11 [MPa]`")
+    }
+
+    /// Å in one unit of a column by its heading.
+    pub fn length_unit(&self, column: Column) -> Result<f64, Error> {
+        let plain = |unit: &str| if unit == "A" { "Å".to_owned() } else { table::plain_unit(unit) };
+        let one = |unit: &str| format!("1 {}", plain(unit)).parse::<Length>().map(|one| one.si() * METRE);
+        Ok(self.unit(column, one, "a unit of length, as in `lx [nm]`")?.unwrap_or(1.0))
+    }
+
+    fn unit(
+        &self,
+        column: Column,
+        one: impl Fn(&str) -> Result<f64, polycore::units::UnitError>,
+        allowed: &str,
+    ) -> Result<Option<f64>, Error> {
         let (name, unit) = &self.headings[column.0];
-        let Some(unit) = unit else { return Ok(default) };
-        let one = format!("1 {unit}").parse::<Stress>().map_err(|error| Error::Cell {
+        let Some(unit) = unit else { return Ok(None) };
+        let line = match &self.cells {
+            Cells::Table(table) => table.layout().unit_line.unwrap_or(table.layout().heading_line),
+            Cells::Lammps(_) => 1,
+        };
+        let found = one(unit).map_err(|error| Error::Cell {
             path: self.path.clone(),
-            line: 1,
+            line: line as u64,
             column: name.clone(),
             found: format!("the unit `{unit}` ({error})"),
-            allowed: "a unit of stress, as in `S11 [MPa]`".into(),
+            allowed: allowed.into(),
         })?;
-        Ok(one.si())
+        Ok(Some(found))
     }
 }
 
-fn heading(text: &str) -> (String, Option<String>) {
-    match text.strip_suffix(']').and_then(|text| text.split_once('[')) {
-        Some((name, unit)) => (name.trim().to_owned(), Some(unit.trim().to_owned())),
-        None => (text.to_owned(), None),
+/// The text of a file, and its bytes and checksum.
+fn unpacked(path: &Path) -> Result<(Vec<u8>, String), Error> {
+    let mut packed = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(LARGEST + 1).read_to_end(&mut packed))
+        .map_err(Error::io("read", path))?;
+    let mut crc = Crc::new();
+    crc.update(&packed);
+    let fingerprint = format!("{} bytes, CRC-32 {:08x}", packed.len(), crc.sum());
+    let gzip = packed.starts_with(&[0x1f, 0x8b]);
+    let mut text = Vec::new();
+    if gzip {
+        let unpack = MultiGzDecoder::new(&packed[..]).take(LARGEST + 1).read_to_end(&mut text);
+        unpack.map_err(|error| {
+            Error::file(
+                path,
+                format!("a gzip file that is truncated or damaged after {} bytes ({error})", text.len()),
+                "a complete gzip file",
+            )
+        })?;
+    } else {
+        text = packed;
     }
+    if text.len() as u64 > LARGEST {
+        return Err(Error::file(path, "more than 2 GiB of text", "tables up to 2 GiB"));
+    }
+    if text.iter().all(u8::is_ascii_whitespace) {
+        return Err(Error::file(path, "an empty file", "a CSV table with a line of headings"));
+    }
+    Ok((text, fingerprint))
 }
 
 /// A file's name without its folder: provenance is the same from wherever a file is read.

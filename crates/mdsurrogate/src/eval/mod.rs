@@ -1,8 +1,10 @@
 //! How good a law is: errors on data, and whether it obeys what every elastic solid does.
 
+mod ellipticity;
 mod physics;
 mod uncertainty;
 
+pub use ellipticity::Ellipticity;
 pub use physics::Physics;
 pub use uncertainty::{FLAGS, Uncertainty};
 

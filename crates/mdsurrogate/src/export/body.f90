@@ -219,6 +219,31 @@
         end do
         s = exp(-total) * s
     end subroutine soften
+
+    ! of a law with damage, J/m3: what an unloading to rest gives back at W = energy with the greatest energy of the history,
+    ! the integral of exp(-total) over W; Gauss points of 200 intervals that shrink towards the greatest energy
+    real(dp) function recovered(energy, greatest)
+        real(dp), intent(in) :: energy, greatest
+        real(dp), parameter :: place = 0.5773502691896257_dp
+        real(dp) :: total, w, low, high
+        integer :: interval, side, k
+        recovered = energy
+        if (UNITS == 0 .or. greatest <= 0) return
+        recovered = 0
+        do interval = 1, 200
+            low = energy * (1 - ((201 - interval) / 200.0_dp)**3)
+            high = energy * (1 - ((200 - interval) / 200.0_dp)**3)
+            do side = -1, 1, 2
+                w = 0.5_dp * (low + high + side * place * (high - low))
+                total = 0
+                do k = 1, size(softening), 3
+                    total = total + softening(k) * min(1d12, (greatest / GREATEST_SEEN)**softening(k + 2)) &
+                        * tanh(softening(k + 1) * (1 - w / greatest))
+                end do
+                recovered = recovered + 0.5_dp * (high - low) * exp(-total)
+            end do
+        end do
+    end function recovered
 end module NAME_law
 
 ! c(6): C, order 11 22 33 12 13 23, C_12 counted once. s(6): second Piola-Kirchhoff stress, Pa. tangent(6, 6): 2 dS/dC, Pa.
@@ -239,10 +264,11 @@ end subroutine NAME
 ! stress over J (Sun, Chaikof, Levenston 2008, doi 10.1115/1.2979872):
 ! F_iI F_jJ F_kK F_lL C_IJKL / J + (s_ik d_jl + s_jk d_il + s_il d_jk + s_jl d_ik) / 2.
 ! PROPS(1): pascals in a unit of stress, for example 1e6 for MPa. STATEV(1): flags, STATEV(2): spread.
+! SSE of an energy: W / J, of a unit of the deformed volume; with damage the part that unloading gives back, and SPD the rest.
 recursive subroutine umat(stress, statev, ddsdde, sse, spd, scd, rpl, ddsddt, drplde, drpldt, stran, dstran, time, dtime, &
     temp, dtemp, predef, dpred, cmname, ndi, nshr, ntens, nstatv, props, nprops, coords, drot, pnewdt, celent, &
     dfgrd0, dfgrd1, noel, npt, layer, kspt, jstep, kinc)
-    use NAME_law, only: evaluate, soften, UNITS
+    use NAME_law, only: evaluate, soften, recovered, UNITS, ENERGETIC
     implicit none
     integer :: ndi, nshr, ntens, nstatv, nprops, noel, npt, layer, kspt, jstep(4), kinc
     double precision :: stress(ntens), statev(nstatv), ddsdde(ntens, ntens), sse, spd, scd, rpl, ddsddt(ntens), &
@@ -278,6 +304,13 @@ recursive subroutine umat(stress, statev, ddsdde, sse, spd, scd, rpl, ddsddt, dr
         greatest = statev(3)
         call soften(energy, greatest, s, tangent)
         statev(3) = greatest
+    end if
+    if (ENERGETIC == 1) then
+        sse = energy / (jacobian * unit_of_stress)
+        if (UNITS > 0) then
+            sse = recovered(energy, statev(3)) / (jacobian * unit_of_stress)
+            spd = (statev(3) - recovered(statev(3), statev(3))) / (jacobian * unit_of_stress)
+        end if
     end if
     do b = 1, 6
         do a = 1, 6

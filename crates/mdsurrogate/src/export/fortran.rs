@@ -16,7 +16,8 @@ const LINES: usize = 100;
 ///
 /// `umat` reads `PROPS(1)`, the pascals in a unit of stress (1 without it), sets `STATEV(1)` to the flags and
 /// `STATEV(2)` to the spread where there are so many, and asks for a smaller increment (`PNEWDT` = 0.25) where the
-/// model refuses C. With softening `STATEV(3)` holds the greatest energy of the history.
+/// model refuses C. With softening `STATEV(3)` holds the greatest energy of the history. `SSE` is W/J of an energy, with
+/// softening what unloading gives back, and `SPD` the rest; an `ann` has no energy and leaves them.
 ///
 /// `umat_user` is the same for CalculiX (Green's strain → S, 21 constants of 2 ∂S/∂C, symmetrised).
 ///
@@ -30,7 +31,9 @@ pub fn fortran_source(model: &Surrogate, name: &str) -> Result<String, Error> {
     let law = Model::new(model).description();
     let mut text =
         format!("! {name}: a constitutive law C -> S, written by mdsurrogate.\nmodule {name}_law\n");
-    text.push_str("    implicit none\n    private\n    public :: evaluate, soften, UNITS\n");
+    text.push_str(
+        "    implicit none\n    private\n    public :: evaluate, soften, recovered, UNITS, ENERGETIC\n",
+    );
     text.push_str("    integer, parameter :: dp = kind(1.0d0)\n    integer :: entry_\n");
     let softening = model.header().softening.as_ref();
     let count = ("UNITS", softening.map_or(0, |softening| softening.units.len()));

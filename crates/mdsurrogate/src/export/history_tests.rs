@@ -35,7 +35,8 @@ fn stresses(law: &Surrogate) -> Vec<Voigt> {
 #[test]
 fn routines_follow_the_history() {
     assert!(
-        c_source(&law(), "law").unwrap_err().to_string().contains("--form fortran") && onnx(&law()).is_err()
+        c_source(&law(), "law").unwrap_err().to_string().contains("--form fortran")
+            && onnx(&law(), OnnxOptions::default()).is_err()
     );
     if !there("gfortran") {
         return;
@@ -57,6 +58,9 @@ fn routines_follow_the_history() {
     build.args(["-std=f2008", "-O1", "-Wall", "-Werror", "-Wno-unused-dummy-argument", "-J"]);
     run(build.arg(directory.path()).arg("-o").arg(file("law")).args([file("law.f90"), file("main.f90")]));
     let text = run(&mut Command::new(file("law")));
+    let (mut before, mut work, mut lost) =
+        ((Voigt::new(1.0, 1.0, 1.0, 0.0, 0.0, 0.0), Voigt::zeros()), 0.0, 0.0);
+    let mut sums = Vec::new();
     for (line, (f, s)) in text.lines().zip(path().iter().zip(stresses(&law()))) {
         let numbers = numbers_of(line);
         let cauchy = voigt::from_stress(&(f.matrix() * voigt::to_stress(&s) * f.matrix().transpose()))
@@ -66,7 +70,21 @@ fn routines_follow_the_history() {
         assert!((Voigt::from_row_slice(&numbers[6..12]) - s).norm() < 1e-12 * size, "{line}");
         // largest difference of a column of the tangent from central differences, over the tangent
         assert!(numbers[12] < 1e-7, "{line}");
+        // SSE and SPD of the undeformed volume are the work so far, and SPD is that of the greatest energy alone
+        let [sse, spd] = [numbers[13], numbers[14]].map(|energy| energy * f.matrix().determinant());
+        let strain = 0.5 * (voigt::from_stress(&f.right_cauchy_green()) - before.0);
+        let doubled = Voigt::from_fn(|k, _| strain[k] * if k < 3 { 1.0 } else { 2.0 });
+        work += 0.5 * (s + before.1).dot(&doubled);
+        before = (voigt::from_stress(&f.right_cauchy_green()), s);
+        assert!(spd >= lost - 1e-12 && sse > 0.0, "{line}");
+        lost = spd;
+        sums.push((sse + spd, work));
     }
+    // ten steps and back: the trapezoidal rule, where the slope jumps at the turn
+    for (sum, work) in &sums[2..] {
+        assert!((sum / work - 1.0).abs() < 0.03, "{sums:?}");
+    }
+    assert!(lost > 0.01 * sums[14].1, "{sums:?}");
     assert_eq!(text.lines().count(), path().len());
 }
 
@@ -80,7 +98,7 @@ contains
         double precision, intent(in) :: f(3, 3)
         logical, intent(in) :: back
         double precision :: cauchy(6), ddsdde(6, 6), unused, six(6), two(2), square(3, 3), pnewdt, one(1)
-        double precision :: e(3, 3), emec(6), s(6), stiff(21), up(6), low(6), dense(6, 6), worst, none(21)
+        double precision :: e(3, 3), emec(6), s(6), stiff(21), up(6), low(6), dense(6, 6), worst, none(21), energies(2)
         integer :: jstep(4), a, b
         unused = 0
         six = 0
@@ -89,8 +107,10 @@ contains
         jstep = 1
         pnewdt = 1
         one = 1d6
-        call umat(cauchy, statev, ddsdde, unused, unused, unused, unused, six, six, unused, six, six, two, unused, unused, &
-            unused, two, two, repeat('x', 80), 3, 3, 6, 3, one, 1, two, square, pnewdt, unused, square, f, 1, 1, 1, 1, jstep, 1)
+        energies = 0
+        call umat(cauchy, statev, ddsdde, energies(1), energies(2), unused, unused, six, six, unused, six, six, two, &
+            unused, unused, unused, two, two, repeat('x', 80), 3, 3, 6, 3, one, 1, two, square, pnewdt, &
+            unused, square, f, 1, 1, 1, 1, jstep, 1)
         e = matmul(transpose(f), f) / 2
         emec = [e(1, 1) - 0.5d0, e(2, 2) - 0.5d0, e(3, 3) - 0.5d0, e(1, 2), e(1, 3), e(2, 3)]
         call material(emec, s, stiff, 0)
@@ -113,7 +133,7 @@ contains
             ! a shear stands for both of its entries
             worst = max(worst, norm2((up - low) / 2d-5 - merge(1, 2, b < 4) * dense(:, b)))
         end do
-        print '(13es26.17e3)', cauchy, s, worst / norm2(dense)
+        print '(15es26.17e3)', cauchy, s, worst / norm2(dense), energies
     end subroutine show
     subroutine material(emec, s, stiff, icmd)
         double precision, intent(in) :: emec(6)

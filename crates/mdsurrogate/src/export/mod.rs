@@ -2,12 +2,13 @@
 
 mod c;
 mod fortran;
+mod graph;
 mod onnx;
 mod protobuf;
 
 pub use c::{CSource, c_source};
 pub use fortran::fortran_source;
-pub use onnx::onnx;
+pub use onnx::{OnnxOptions, onnx};
 
 use crate::Error;
 use crate::network::{Activation, LANES, Network};

@@ -1,50 +1,77 @@
-//! A law as ONNX: operators of set 17 in double precision, W's derivatives written out.
+//! A law as ONNX: operators of set 17, W's derivatives written out.
 
-use super::protobuf::{
-    Attribute, Dimension, Graph, Model as File, Node, OperatorSet, Shape, Tensor, TensorType, Type, ValueInfo,
-};
+use super::graph::{BOOLEAN, Builder, refs};
+use super::protobuf::{Dimension, Graph, Model as File, OperatorSet, Shape, TensorType, Type, ValueInfo};
 use super::{Model, refuse_history};
 use crate::Error;
-use crate::network::{Activation, Layer};
 use crate::surrogate::{Kind, Surrogate, UNSEEN, derivative};
 use prost::Message;
 
 /// The operator set, and the version of the format that came with it.
 const OPERATORS: i64 = 17;
 const FORMAT: i64 = 8;
-const DOUBLE: i32 = 11;
-const INTEGER: i32 = 7;
-const BOOLEAN: i32 = 9;
 
-/// A model as the bytes of an ONNX model (operator set 17, doubles).
+/// What an ONNX model has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OnnxOptions {
+    /// Numbers of 32 bits instead of 64.
+    pub single: bool,
+    /// The output `tangent`, too.
+    pub tangent: bool,
+}
+
+/// A model as the bytes of an ONNX model (operator set 17, doubles unless the options say otherwise).
 ///
 /// Input `C` (points, 6), C_12 not doubled. Outputs: `S` (points, 6) in Pa; `W` (points, 1) in J/m³ of an energy;
-/// `spread` (points, 1) in Pa; `outside` (points, 6), whether a component leaves the training box; `far` (points, 1) of
-/// a model with a [`Support`](crate::surrogate::Support). C is not checked: the result at a C that is not positive definite
+/// `spread` (points, 1) in Pa; `tangent` (points, 6, 6), ℂ = 2 ∂S/∂C in Pa, if asked for; `outside` (points, 6), whether a
+/// component leaves the training box; `far` (points, 1) of a model with a [`Support`](crate::surrogate::Support). C is not checked: the result at a C that is not positive definite
 /// means nothing.
 ///
 /// # Errors
 /// [`Error::Parameter`] for a law with softening.
-pub fn onnx(model: &Surrogate) -> Result<Vec<u8>, Error> {
+pub fn onnx(model: &Surrogate, options: OnnxOptions) -> Result<Vec<u8>, Error> {
     refuse_history(model)?;
-    Ok(Model::new(model).onnx())
+    Ok(Model::new(model).onnx(options))
+}
+
+/// The invariants and what their derivatives are made of.
+struct Invariant {
+    /// (points, inputs).
+    x: String,
+    /// Slopes of the polynomials by each component, (points, inputs).
+    slopes: Vec<String>,
+    /// ∂x/∂p where some are roots of p, (points, inputs).
+    root: Option<String>,
+    /// All monomials, (points, monomials), and which they are.
+    powers: String,
+    monomials: Vec<Vec<usize>>,
+}
+
+/// S, W and ℂ of each member.
+#[derive(Default)]
+struct Members {
+    stresses: Vec<String>,
+    energies: Vec<String>,
+    tangents: Vec<String>,
 }
 
 impl Model<'_> {
-    fn onnx(&self) -> Vec<u8> {
-        let mut graph = Builder::default();
-        let mut outputs = vec![("S", DOUBLE, 6)];
-        let stresses = match self.header.kind {
-            Kind::Ann => self.mapped_stresses(&mut graph),
-            Kind::Energy { .. } => {
-                let (stresses, energies) = self.energetic_stresses(&mut graph);
-                let all = graph.node("Sum", &refs(&energies));
-                let count = graph.scalar(1.0 / energies.len() as f64);
-                graph.named("Mul", &[&all, &count], "W");
-                outputs.push(("W", DOUBLE, 1));
-                stresses
-            }
+    fn onnx(&self, options: OnnxOptions) -> Vec<u8> {
+        let mut graph = Builder::new(options.single);
+        let element = graph.element;
+        let mut outputs = vec![("S", element, vec![6])];
+        let Members { stresses, energies, tangents } = match self.header.kind {
+            Kind::Ann => self.mapped_stresses(&mut graph, options.tangent),
+            Kind::Energy { .. } => self.energetic_stresses(&mut graph, options.tangent),
         };
+        for (list, name, shape) in [(&energies, "W", vec![1]), (&tangents, "tangent", vec![6, 6])] {
+            if !list.is_empty() {
+                let all = graph.node("Sum", &refs(list));
+                let count = graph.scalar(1.0 / list.len() as f64);
+                graph.named("Mul", &[&all, &count], name);
+                outputs.push((name, element, shape));
+            }
+        }
         let count = graph.scalar(1.0 / stresses.len() as f64);
         let all = graph.node("Sum", &refs(&stresses));
         graph.named("Mul", &[&all, &count], "S");
@@ -59,22 +86,25 @@ impl Model<'_> {
         let norm = graph.sum_of_columns(&all);
         let mean = graph.node("Mul", &[&norm, &count]);
         graph.named("Sqrt", &[&mean], "spread");
-        outputs.push(("spread", DOUBLE, 1));
+        outputs.push(("spread", element, vec![1]));
         self.box_flags(&mut graph);
-        outputs.push(("outside", BOOLEAN, 6));
+        outputs.push(("outside", BOOLEAN, vec![6]));
         if self.distance_flag(&mut graph) {
-            outputs.push(("far", BOOLEAN, 1));
+            outputs.push(("far", BOOLEAN, vec![1]));
         }
-        let value = |&(name, element, width): &(&str, i32, i64)| ValueInfo {
-            name: name.into(),
+        let value = |(name, element, widths): &(&str, i32, Vec<i64>)| ValueInfo {
+            name: (*name).into(),
             r#type: Some(Type {
                 tensor_type: Some(TensorType {
-                    elem_type: element,
+                    elem_type: *element,
                     shape: Some(Shape {
-                        dim: vec![
-                            Dimension { dim_value: None, dim_param: Some("points".into()) },
-                            Dimension { dim_value: Some(width), dim_param: None },
-                        ],
+                        dim: std::iter::once(Dimension { dim_value: None, dim_param: Some("points".into()) })
+                            .chain(
+                                widths
+                                    .iter()
+                                    .map(|width| Dimension { dim_value: Some(*width), dim_param: None }),
+                            )
+                            .collect(),
                     }),
                 }),
             }),
@@ -89,7 +119,7 @@ impl Model<'_> {
                 node: graph.nodes,
                 name: "law".into(),
                 initializer: graph.constants,
-                input: vec![value(&("C", DOUBLE, 6))],
+                input: vec![value(&("C", element, vec![6]))],
                 output: outputs.iter().map(value).collect(),
             }),
             opset_import: vec![OperatorSet { domain: String::new(), version: OPERATORS }],
@@ -97,22 +127,38 @@ impl Model<'_> {
         model.encode_to_vec()
     }
 
-    fn mapped_stresses(&self, graph: &mut Builder) -> Vec<String> {
+    fn mapped_stresses(&self, graph: &mut Builder, tangent: bool) -> Members {
         let input = self.standardised(graph, "C");
         let (scale, shift) = (graph.row(self.of.output), graph.row(self.of.output_mean));
-        let stress = |member: &crate::network::Network<f64>| {
+        let mut found = Members::default();
+        for member in self.members {
             let mut y = input.clone();
+            // ∂y/∂c: at first a constant matrix
+            let start: Vec<f64> =
+                (0..36).map(|i| if i / 6 == i % 6 { self.of.inverse[i / 6] } else { 0.0 }).collect();
+            let mut change = graph.matrix(&start, 6);
             for layer in member.layers() {
-                y = graph.layer(layer, &y, false).0;
+                let (value, slope, _) = graph.layer(layer, &y, u8::from(tangent));
+                y = value;
+                if tangent {
+                    change = graph.through(layer, &change, slope.as_deref());
+                }
             }
             let scaled = graph.node("Mul", &[&y, &scale]);
-            graph.node("Add", &[&scaled, &shift])
-        };
-        self.members.iter().map(stress).collect()
+            found.stresses.push(graph.node("Add", &[&scaled, &shift]));
+            if tangent {
+                // 2 ∂S/∂C of the normal components, ∂S/∂C of shears, which count once
+                let factors: Vec<f64> =
+                    (0..36).map(|i| self.of.output[i / 6] * if i % 6 < 3 { 2.0 } else { 1.0 }).collect();
+                let factors = graph.matrix(&factors, 6);
+                found.tangents.push(graph.of_points(&change, &factors));
+            }
+        }
+        found
     }
 
-    /// S and W of each member.
-    fn energetic_stresses(&self, graph: &mut Builder) -> (Vec<String>, Vec<String>) {
+    /// S and W of each member, and ℂ.
+    fn energetic_stresses(&self, graph: &mut Builder, tangent: bool) -> Members {
         let turn = self.of.turn.map(|turn| {
             let flat = turn.as_flattened();
             let transposed: Vec<f64> = (0..36).map(|i| flat[6 * (i % 6) + i / 6]).collect();
@@ -122,23 +168,40 @@ impl Model<'_> {
             Some((_, transposed)) => graph.node("MatMul", &["C", transposed]),
             None => "C".to_owned(),
         };
-        let (x, slopes, root) = self.polynomials(graph, &local);
-        let input = self.standardised(graph, &x);
+        let invariants = self.polynomials(graph, &local);
+        let Invariant { x, slopes, root, .. } = &invariants;
+        let curvature = tangent.then(|| self.curvatures(graph, &invariants));
+        let input = self.standardised(graph, x);
         let identity = graph.row(&[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
         let strain = graph.node("Sub", &["C", &identity]);
-        let two = graph.row(&[2.0, 2.0, 2.0, 1.0, 1.0, 1.0]);
-        let (mut stresses, mut energies) = (Vec::new(), Vec::new());
+        let twice = [2.0, 2.0, 2.0, 1.0, 1.0, 1.0];
+        let two = graph.row(&twice);
+        let mut found = Members::default();
         for (member, rest) in self.members.iter().zip(self.of.rest) {
             let inputs = self.of.mean.len();
             let (mut y, mut slopes_of_layers) = (input.clone(), Vec::new());
+            // ∂z/∂x̂ of each layer, and σ″
+            let mut changes = Vec::new();
+            let start: Vec<f64> =
+                (0..inputs * inputs).map(|i| f64::from(u8::from(i / inputs == i % inputs))).collect();
+            let mut change = if tangent { graph.matrix(&start, inputs) } else { String::new() };
             for layer in member.layers() {
-                let (value, slope) = graph.layer(layer, &y, true);
+                let (value, slope, bend) = graph.layer(layer, &y, if tangent { 2 } else { 1 });
+                if tangent {
+                    changes.push((graph.through(layer, &change, None), bend));
+                    change = graph.through(layer, &change, slope.as_deref());
+                }
                 y = value;
                 slopes_of_layers.push(slope);
             }
             // reverse mode: δ = g σ′, g of the layer before = δ W
             let mut g = graph.matrix(&[1.0], 1);
-            for (layer, slope) in member.layers().iter().zip(&slopes_of_layers).rev() {
+            let mut bent: Vec<String> = Vec::new();
+            for (number, (layer, slope)) in member.layers().iter().zip(&slopes_of_layers).enumerate().rev() {
+                if let Some((change, Some(bend))) = changes.get(number) {
+                    let factor = graph.node("Mul", &[&g, bend]);
+                    bent.push(graph.quadratic(change, &factor));
+                }
                 if let Some(slope) = slope {
                     g = graph.node("Mul", &[&g, slope]);
                 }
@@ -148,8 +211,9 @@ impl Model<'_> {
             let scale: Vec<f64> = self.of.inverse.iter().map(|inverse| self.of.output[0] * inverse).collect();
             let (scale, added) = (graph.row(&scale), graph.row(&rest.invariants[..inputs]));
             let scaled = graph.node("Mul", &[&g, &scale]);
-            let mut weights = graph.node("Add", &[&scaled, &added]);
-            if let Some(half) = &root {
+            let by_invariant = graph.node("Add", &[&scaled, &added]);
+            let mut weights = by_invariant.clone();
+            if let Some(half) = root {
                 weights = graph.node("Mul", &[&weights, half]);
             }
             let columns: Vec<String> = slopes
@@ -165,31 +229,117 @@ impl Model<'_> {
             }
             let at_rest = graph.row(&rest.slope);
             let difference = graph.node("Sub", &[&first, &at_rest]);
-            stresses.push(graph.node("Mul", &[&difference, &two]));
+            found.stresses.push(graph.node("Mul", &[&difference, &two]));
+            if let Some((gradient, seconds)) = &curvature {
+                // Σₖ ∂W/∂xₖ ∂²xₖ/∂c∂c
+                let columns: Vec<String> = seconds
+                    .iter()
+                    .map(|second| {
+                        let product = graph.node("Mul", &[&weights, second]);
+                        graph.sum_of_columns(&product)
+                    })
+                    .collect();
+                let all: Vec<String> = (0..36).map(|i| columns[pair(i / 6, i % 6)].clone()).collect();
+                let flat = graph.concatenated(&all);
+                let shape = graph.integers(&[-1, 6, 6]);
+                let mut hessian = graph.node("Reshape", &[&flat, &shape]);
+                if root.is_some() {
+                    // ∂²√p = ½ ∂²p/√p − ∂√p ∂√p/√p, of the roots alone
+                    let is_root: Vec<f64> =
+                        (0..inputs).map(|k| f64::from(u8::from(self.invariants().polynomial(k).1))).collect();
+                    let is_root = graph.row(&is_root);
+                    let of_roots = graph.node("Mul", &[&by_invariant, &is_root]);
+                    let factor = graph.node("Div", &[&of_roots, x]);
+                    let less = graph.quadratic(gradient, &factor);
+                    hessian = graph.node("Sub", &[&hessian, &less]);
+                }
+                if !bent.is_empty() {
+                    // (∂x/∂c)ᵀ ∂²W/∂x∂x ∂x/∂c
+                    let sum = graph.node("Sum", &refs(&bent));
+                    let scales: Vec<f64> = (0..inputs * inputs)
+                        .map(|i| {
+                            self.of.output[0] * self.of.inverse[i / inputs] * self.of.inverse[i % inputs]
+                        })
+                        .collect();
+                    let scales = graph.matrix(&scales, inputs);
+                    let of_network = graph.node("Mul", &[&sum, &scales]);
+                    let transposed = graph.transposed(gradient);
+                    let half = graph.node("MatMul", &[&transposed, &of_network]);
+                    let whole = graph.node("MatMul", &[&half, gradient]);
+                    hessian = graph.node("Add", &[&hessian, &whole]);
+                }
+                if let Some((turn, transposed)) = &turn {
+                    let half = graph.node("MatMul", &[transposed, &hessian]);
+                    hessian = graph.node("MatMul", &[&half, turn]);
+                }
+                let factors: Vec<f64> = (0..36).map(|i| twice[i / 6] * twice[i % 6]).collect();
+                let factors = graph.matrix(&factors, 6);
+                found.tangents.push(graph.node("Mul", &[&hessian, &factors]));
+            }
             let (unit, value) = (graph.scalar(self.of.output[0]), graph.scalar(rest.value));
             let energy = graph.node("Mul", &[&y, &unit]);
             let at = graph.row(&rest.at[..inputs]);
-            let from_rest = graph.node("Sub", &[&x, &at]);
+            let from_rest = graph.node("Sub", &[x, &at]);
             let column = graph.matrix(&rest.invariants[..inputs], 1);
             let correction = graph.node("MatMul", &[&from_rest, &column]);
             let energy = graph.node("Add", &[&energy, &correction]);
             let column = graph.matrix(&rest.slope, 1);
             let linear = graph.node("MatMul", &[&strain, &column]);
             let energy = graph.node("Sub", &[&energy, &linear]);
-            energies.push(graph.node("Sub", &[&energy, &value]));
+            found.energies.push(graph.node("Sub", &[&energy, &value]));
         }
-        (stresses, energies)
+        found
     }
 
-    /// The invariants (points, inputs), their derivatives by each component, and a factor on ∂W/∂x where some are roots:
-    /// all polynomials as products of one list of monomials with constant matrices.
-    fn polynomials(&self, graph: &mut Builder, c: &str) -> (String, Vec<String>, Option<String>) {
+    /// ∂x/∂c, (points, inputs, 6), and second derivatives of the polynomials by each pair of components, (points, inputs).
+    fn curvatures(&self, graph: &mut Builder, invariants: &Invariant) -> (String, Vec<String>) {
+        let axis = graph.integers(&[2]);
+        let columns: Vec<String> = invariants
+            .slopes
+            .iter()
+            .map(|slope| {
+                let slope = match &invariants.root {
+                    Some(root) => graph.node("Mul", &[slope, root]),
+                    None => slope.clone(),
+                };
+                graph.node("Unsqueeze", &[&slope, &axis])
+            })
+            .collect();
+        let gradient = graph.joined(&columns, 2);
+        let pairs = (0..6).flat_map(|b| (0..=b).map(move |a| [a, b]));
+        let seconds = pairs
+            .map(|pair| self.combined(graph, &invariants.powers, &invariants.monomials, &pair))
+            .collect();
+        (gradient, seconds)
+    }
+
+    /// Derivatives of all polynomials by some components, (points, inputs).
+    fn combined(&self, graph: &mut Builder, powers: &str, monomials: &[Vec<usize>], by: &[usize]) -> String {
         let invariants = self.invariants();
         let count = invariants.count();
-        let list = |k: usize, by: &[usize]| derivative(invariants.polynomial(k).0, by);
+        let (mut matrix, mut constant) = (vec![0.0; monomials.len() * count], vec![0.0; count]);
+        for k in 0..count {
+            for (coefficient, mut factors) in derivative(invariants.polynomial(k).0, by) {
+                factors.sort_unstable();
+                match monomials.iter().position(|other| *other == factors) {
+                    Some(row) => matrix[row * count + k] += coefficient,
+                    None => constant[k] += coefficient,
+                }
+            }
+        }
+        let (matrix, constant) = (graph.matrix(&matrix, count), graph.row(&constant));
+        let product = graph.node("MatMul", &[powers, &matrix]);
+        graph.node("Add", &[&product, &constant])
+    }
+
+    /// The invariants and their slopes: all polynomials as products of one list of monomials with constant matrices.
+    fn polynomials(&self, graph: &mut Builder, c: &str) -> Invariant {
+        let invariants = self.invariants();
+        let count = invariants.count();
         let mut monomials: Vec<Vec<usize>> = (0..6).map(|a| vec![a]).collect();
         for (k, a) in (0..count).flat_map(|k| (0..7).map(move |a| (k, a))) {
-            for (_, mut factors) in list(k, if a == 6 { &[] } else { std::slice::from_ref(&a) }) {
+            let by = if a == 6 { &[] } else { std::slice::from_ref(&a) };
+            for (_, mut factors) in derivative(invariants.polynomial(k).0, by) {
                 factors.sort_unstable();
                 if !factors.is_empty() && !monomials.contains(&factors) {
                     monomials.push(factors);
@@ -206,26 +356,11 @@ impl Model<'_> {
             columns.push(product);
         }
         let powers = graph.concatenated(&columns);
-        let mut polynomial = |by: &[usize]| {
-            let (mut matrix, mut constant) = (vec![0.0; monomials.len() * count], vec![0.0; count]);
-            for k in 0..count {
-                for (coefficient, mut factors) in list(k, by) {
-                    factors.sort_unstable();
-                    match monomials.iter().position(|other| *other == factors) {
-                        Some(row) => matrix[row * count + k] += coefficient,
-                        None => constant[k] += coefficient,
-                    }
-                }
-            }
-            let (matrix, constant) = (graph.matrix(&matrix, count), graph.row(&constant));
-            let product = graph.node("MatMul", &[&powers, &matrix]);
-            graph.node("Add", &[&product, &constant])
-        };
-        let x = polynomial(&[]);
-        let slopes: Vec<String> = (0..6).map(|a| polynomial(&[a])).collect();
+        let x = self.combined(graph, &powers, &monomials, &[]);
+        let slopes: Vec<String> = (0..6).map(|a| self.combined(graph, &powers, &monomials, &[a])).collect();
         let is_root = |k: usize| invariants.polynomial(k).1;
         if !(0..count).any(is_root) {
-            return (x, slopes, None);
+            return Invariant { x, slopes, root: None, powers, monomials };
         }
         // √p instead of p, and ½/√p before its slopes
         let half = graph.scalar(0.5);
@@ -237,8 +372,8 @@ impl Model<'_> {
             factors.push(graph.node("Div", &[over, &value]));
             all.push(value);
         }
-        let (x, factors) = (graph.concatenated(&all), graph.concatenated(&factors));
-        (x, slopes, Some(factors))
+        let (x, root) = (graph.concatenated(&all), Some(graph.concatenated(&factors)));
+        Invariant { x, slopes, root, powers, monomials }
     }
 
     fn standardised(&self, graph: &mut Builder, x: &str) -> String {
@@ -252,7 +387,7 @@ impl Model<'_> {
         let limits = &self.header.training_box;
         let low: Vec<f64> = limits.iter().map(|limit| limit[0] - slack(limit)).collect();
         let high: Vec<f64> = limits.iter().map(|limit| limit[1] + slack(limit)).collect();
-        let (low, high) = (graph.row(&low), graph.row(&high));
+        let (low, high) = (graph.limit(&low, f32::next_down), graph.limit(&high, f32::next_up));
         let below = graph.node("Less", &["C", &low]);
         let above = graph.node("Greater", &["C", &high]);
         graph.named("Or", &[&below, &above], "outside");
@@ -268,9 +403,9 @@ impl Model<'_> {
         let weighted = graph.node("Mul", &[&difference, &weights]);
         let square = graph.node("Mul", &[&weighted, &weighted]);
         let axis = graph.integers(&[2]);
-        let sum = graph.with("ReduceSum", &[&square, &axis], vec![integer("keepdims", 0)]);
-        let axes = Attribute { name: "axes".into(), i: 0, ints: vec![1], r#type: 7 };
-        let least = graph.with("ReduceMin", &[&sum], vec![axes, integer("keepdims", 1)]);
+        let sum = graph.with("ReduceSum", &[&square, &axis], vec![super::graph::integer("keepdims", 0)]);
+        let axes = super::graph::integers("axes", &[1]);
+        let least = graph.with("ReduceMin", &[&sum], vec![axes, super::graph::integer("keepdims", 1)]);
         let distance = graph.node("Sqrt", &[&least]);
         let limit = graph.scalar(farthest);
         graph.named("Greater", &[&distance, &limit], "far");
@@ -278,149 +413,8 @@ impl Model<'_> {
     }
 }
 
-/// A graph as it grows.
-#[derive(Default)]
-struct Builder {
-    nodes: Vec<Node>,
-    constants: Vec<Tensor>,
-}
-
-impl Builder {
-    fn with(&mut self, operator: &str, inputs: &[&str], attribute: Vec<Attribute>) -> String {
-        let name = format!("n{}", self.nodes.len());
-        self.named(operator, inputs, &name);
-        if let Some(node) = self.nodes.last_mut() {
-            node.attribute = attribute;
-        }
-        name
-    }
-
-    fn node(&mut self, operator: &str, inputs: &[&str]) -> String {
-        self.with(operator, inputs, Vec::new())
-    }
-
-    fn named(&mut self, operator: &str, inputs: &[&str], output: &str) {
-        self.nodes.push(Node {
-            input: inputs.iter().map(|&input| input.to_owned()).collect(),
-            output: vec![output.to_owned()],
-            op_type: operator.to_owned(),
-            attribute: Vec::new(),
-        });
-    }
-
-    fn constant(&mut self, dims: Vec<i64>, data_type: i32, raw_data: Vec<u8>) -> String {
-        let name = format!("c{}", self.constants.len());
-        self.constants.push(Tensor { dims, data_type, name: name.clone(), raw_data });
-        name
-    }
-
-    /// (rows, columns), row by row.
-    fn matrix(&mut self, values: &[f64], columns: usize) -> String {
-        let bytes = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        self.constant(vec![(values.len() / columns) as i64, columns as i64], DOUBLE, bytes)
-    }
-
-    fn row(&mut self, values: &[f64]) -> String {
-        self.matrix(values, values.len())
-    }
-
-    fn scalar(&mut self, value: f64) -> String {
-        self.constant(Vec::new(), DOUBLE, value.to_le_bytes().to_vec())
-    }
-
-    fn integers(&mut self, values: &[i64]) -> String {
-        let bytes = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        self.constant(vec![values.len() as i64], INTEGER, bytes)
-    }
-
-    fn column(&mut self, x: &str, index: usize) -> String {
-        let index = self.integers(&[index as i64]);
-        self.with("Gather", &[x, &index], vec![integer("axis", 1)])
-    }
-
-    fn concatenated(&mut self, columns: &[String]) -> String {
-        self.with("Concat", &refs(columns), vec![integer("axis", 1)])
-    }
-
-    fn sum_of_columns(&mut self, x: &str) -> String {
-        let axis = self.integers(&[1]);
-        self.node("ReduceSum", &[x, &axis])
-    }
-
-    /// σ(W x + b), and σ′ if it is wanted and not 1.
-    fn layer(&mut self, layer: &Layer<f64>, x: &str, slope: bool) -> (String, Option<String>) {
-        let (weights, bias) =
-            (self.matrix(&layer.weights, layer.weights.len() / layer.bias.len()), self.row(&layer.bias));
-        let z = self.with("Gemm", &[x, &weights, &bias], vec![integer("transB", 1)]);
-        let unit = self.scalar(1.0);
-        let value = match layer.activation {
-            Activation::Linear => return (z, None),
-            Activation::Relu => self.node("Relu", &[&z]),
-            Activation::Softplus => {
-                // max(z, 0) + ln(1 + e^−|z|)
-                let (positive, size) = (self.node("Relu", &[&z]), self.node("Abs", &[&z]));
-                let negative = self.node("Neg", &[&size]);
-                let small = self.node("Exp", &[&negative]);
-                let sum = self.node("Add", &[&small, &unit]);
-                let logarithm = self.node("Log", &[&sum]);
-                self.node("Add", &[&positive, &logarithm])
-            }
-            Activation::Tanh => self.node("Tanh", &[&z]),
-            Activation::Sigmoid => self.node("Sigmoid", &[&z]),
-            Activation::Silu => {
-                let s = self.node("Sigmoid", &[&z]);
-                self.node("Mul", &[&z, &s])
-            }
-            Activation::Elu => {
-                let (positive, small) = (self.node("Relu", &[&z]), self.exp_of_negative_part(&z));
-                let below = self.node("Sub", &[&small, &unit]);
-                self.node("Add", &[&positive, &below])
-            }
-        };
-        if !slope {
-            return (value, None);
-        }
-        let slope = match layer.activation {
-            Activation::Linear => return (value, None),
-            Activation::Relu => {
-                let zero = self.scalar(0.0);
-                let on = self.node("Greater", &[&z, &zero]);
-                self.with("Cast", &[&on], vec![integer("to", DOUBLE.into())])
-            }
-            Activation::Softplus => self.node("Sigmoid", &[&z]),
-            Activation::Tanh => {
-                let square = self.node("Mul", &[&value, &value]);
-                self.node("Sub", &[&unit, &square])
-            }
-            Activation::Sigmoid => {
-                let rest = self.node("Sub", &[&unit, &value]);
-                self.node("Mul", &[&value, &rest])
-            }
-            Activation::Silu => {
-                // s + z s (1 − s)
-                let s = self.node("Sigmoid", &[&z]);
-                let rest = self.node("Sub", &[&unit, &s]);
-                let bent = self.node("Mul", &[&value, &rest]);
-                self.node("Add", &[&s, &bent])
-            }
-            Activation::Elu => self.exp_of_negative_part(&z),
-        };
-        (value, Some(slope))
-    }
-
-    /// e^min(z, 0).
-    fn exp_of_negative_part(&mut self, z: &str) -> String {
-        let turned = self.node("Neg", &[z]);
-        let below = self.node("Relu", &[&turned]);
-        let back = self.node("Neg", &[&below]);
-        self.node("Exp", &[&back])
-    }
-}
-
-fn integer(name: &str, value: i64) -> Attribute {
-    Attribute { name: name.into(), i: value, ints: Vec::new(), r#type: 2 }
-}
-
-fn refs(list: &[String]) -> Vec<&str> {
-    list.iter().map(String::as_str).collect()
+/// The place of a pair of components, upper triangle column by column.
+fn pair(a: usize, b: usize) -> usize {
+    let (a, b) = (a.min(b), a.max(b));
+    b * (b + 1) / 2 + a
 }

@@ -22,20 +22,29 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// [`Failure`]: reference lengths or a unit out of range, and all of [`read`].
 pub fn load(source: &Source, data: &Data, files: &[PathBuf], key: &str) -> Result<Dataset, Failure> {
-    let mut options = ReadOptions { columns: data.columns, ..ReadOptions::default() };
+    let mut options = ReadOptions {
+        columns: data.columns,
+        origin: data.reference,
+        measure: data.stress,
+        units: data.units,
+        names: data.names.clone(),
+        blocks: data.blocks.clone(),
+        ..ReadOptions::default()
+    };
     if let Some(lengths) = data.reference_lengths {
         let lengths = lengths.map(|length| length.si() / ANGSTROM);
         if let Some(length) = lengths.iter().find(|length| !(0.1..=1e7).contains(*length)) {
             let found = format!("{length:e} Å");
             return Err(source.error("data.reference_lengths", found, "0.1 Å to 1 mm").into());
         }
-        options.reference = Some(PeriodicBox::orthogonal(lengths));
+        let tilts = data.reference_tilts.map_or([0.0; 3], |tilts| tilts.map(|tilt| tilt.si() / ANGSTROM));
+        options.reference = Some(PeriodicBox { lengths, tilts });
     }
     if let Some(unit) = data.stress_unit {
         if unit.si() <= 0.0 {
             return Err(source.error("data.stress_unit", unit, "a positive stress, as \"1 MPa\"").into());
         }
-        options.stress_unit = unit.si();
+        options.stress_unit = Some(unit.si());
     }
     if files.is_empty() {
         return Err(source.error(key, "no file", "at least one").into());
@@ -50,7 +59,7 @@ pub fn load(source: &Source, data: &Data, files: &[PathBuf], key: &str) -> Resul
             }
             other => other.into(),
         })?;
-        set.append(part)?;
+        set.append(if set.shares_a_name(&part) { part.of_folder(&path) } else { part })?;
     }
     set.check()?;
     Ok(set)

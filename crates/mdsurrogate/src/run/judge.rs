@@ -5,7 +5,8 @@ use super::{Failure, Prepared, draw, short};
 use crate::dataset::{Method, Row, noise};
 use crate::error::Error;
 use crate::eval::{
-    Errors, FLAGS, Physics, Uncertainty, agreement, errors, errors_along, seconds_of_a_stress, within_rates,
+    Ellipticity, Errors, FLAGS, Physics, Uncertainty, agreement, errors, errors_along, seconds_of_a_stress,
+    within_rates,
 };
 use crate::quantities as q;
 use crate::surrogate::{History, Surrogate, Workspace};
@@ -15,6 +16,9 @@ use std::path::Path;
 
 /// Rows at which physics is measured, at most.
 const PROBED: usize = 200;
+
+/// Strains at which ellipticity is looked for, at most.
+const SCANNED: usize = 500;
 
 /// A law whose mean square error is so many times the noise of the data …
 const FAR_ABOVE_NOISE: f64 = 100.0;
@@ -97,6 +101,13 @@ pub fn judge_laws(
         let every = test.len().div_ceil(PROBED).max(1);
         let physics = Physics::of(law, &test.iter().step_by(every).copied().collect::<Vec<_>>())?;
         obey(report, name, &physics);
+        // an incompressible body has no waves along their direction: its pressure is not in these laws
+        if !data.set.is_nominal() {
+            let learnt = data.rows_of(&split.train, runs);
+            let every = learnt.len().div_ceil(SCANNED).max(1);
+            let strains: Vec<_> = learnt.iter().step_by(every).map(|row| row.c).collect();
+            warnings.extend(waves(report, name, Ellipticity::of(*law, &strains)?));
+        }
         let stress = seconds_of_a_stress(law, &test)?;
         report.seconds(&format!("one stress of {name}"), stress);
         let found = errors(law, test.iter().copied())?;
@@ -255,6 +266,27 @@ fn uncertain(report: &mut Report, name: &str, set: &str, law: &Surrogate, uncert
             report.value(q::WITHIN.of(&[name, set, count, component]), share);
         }
     }
+}
+
+/// The slowest wave, and a line where there is none any more.
+fn waves(report: &mut Report, name: &str, found: Option<Ellipticity>) -> Option<String> {
+    let Ellipticity { states, lost, least, at, direction } = found?;
+    report.value(q::LEAST_WAVE.of(&[name]), least / 1e6);
+    for (component, value) in crate::kinematics::NAMES.iter().zip(&at) {
+        report.value(q::LEAST_WAVE_AT.of(&[name, component]), *value);
+    }
+    report.value(q::NOT_ELLIPTIC.of(&[name]), lost as f64 / states as f64);
+    let numbers =
+        |values: &[f64]| values.iter().map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(", ");
+    (lost > 0).then(|| {
+        format!(
+            "{name}: loses ellipticity at {lost} of {states} training strains; the worst has C = ({}), waves along N = ({}): {} MPa. \
+             Finite elements localise there; `polyconvex` excludes it",
+            numbers(at.as_slice()),
+            numbers(&direction),
+            short(least / 1e6)
+        )
+    })
 }
 
 fn obey(report: &mut Report, name: &str, physics: &Physics) {

@@ -1,11 +1,12 @@
 //! Scenes, as written in TOML: data and what is learnt from them.
 
-use crate::dataset::{Columns, Fractions, Method};
+use crate::dataset::{Columns, Fractions, LammpsUnits, Measure, Method, Origin, PROPERTIES};
 use crate::quantities;
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
 use polycore::units::{Length, Stress};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 mod memory;
@@ -70,6 +71,9 @@ impl Scene {
                 return Err(source.error(key, "laws without data", "`[data]` with `files`"));
             }
         }
+        if let Some(data) = &self.data {
+            data.check(source)?;
+        }
         if let Some(crystal) = &self.crystal {
             crystal.check(source)?;
         }
@@ -110,10 +114,47 @@ pub struct Data {
     /// `averaged` or `instantaneous` columns of molecular dynamics tables.
     #[serde(default)]
     pub columns: Columns,
-    /// Edges of the undeformed box; default: where the file's own F is 1.
+    /// The row of undeformed lengths: `run`, the first of each run, or `file`, the first of the file; default: where the
+    /// run's own F is 1, and the first row of a LAMMPS log with one run.
+    pub reference: Option<Origin>,
+    /// Edges of the undeformed box.
     pub reference_lengths: Option<[Length; 3]>,
+    /// Its tilts xy, xz, yz; default 0.
+    pub reference_tilts: Option<[Length; 3]>,
     /// The unit of stress columns without a unit in their heading; default 1 MPa.
     pub stress_unit: Option<Stress>,
+    /// `pressure`: columns `pxx …` are read as pressures of LAMMPS, σ = −p.
+    pub stress: Option<Measure>,
+    /// Units of files of LAMMPS: `real`, `metal`, `si`, `cgs`, `electron`, `micro`, `nano`; default: as a log says.
+    pub units: Option<LammpsUnits>,
+    /// Headings of columns by property, as `{ lx = "v_lx", pxx = "c_p[1]" }`.
+    #[serde(default)]
+    pub names: BTreeMap<String, String>,
+    /// Runs of a LAMMPS log that are read, from 1; default all.
+    #[serde(default)]
+    pub blocks: Vec<usize>,
+}
+
+impl Data {
+    /// # Errors
+    /// What is wrong and where.
+    fn check(&self, source: &Source) -> Result<(), SceneError> {
+        if let Some(wrong) = self.names.keys().find(|name| !PROPERTIES.contains(&name.as_str())) {
+            return Err(source.unknown("data.names", wrong, &PROPERTIES));
+        }
+        if self.reference.is_some() && self.reference_lengths.is_some() {
+            let allowed = "one of `reference` and `reference_lengths`";
+            return Err(source.error("data.reference", "two references", allowed));
+        }
+        if self.reference_tilts.is_some() && self.reference_lengths.is_none() {
+            let allowed = "`reference_lengths` beside them";
+            return Err(source.error("data.reference_tilts", "tilts alone", allowed));
+        }
+        if self.blocks.contains(&0) {
+            return Err(source.error("data.blocks", 0, "numbers of runs, from 1"));
+        }
+        Ok(())
+    }
 }
 
 /// The γ-PA12 crystal of Table 3.1 and the grid of Table 3.2.

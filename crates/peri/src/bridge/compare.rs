@@ -25,7 +25,7 @@ pub struct Comparison {
 pub fn compare(folder: &Path, python: &Path) -> Result<Vec<Comparison>, Error> {
     // it runs in the folder, where a relative path would lead elsewhere
     let python = match python.components().count() {
-        1 => python.to_path_buf(),
+        1 => of_environment(python, std::env::var_os("VIRTUAL_ENV"), std::env::var_os("PATH")),
         _ => std::path::absolute(python).map_err(Shared::io("find", python))?,
     };
     let python = &*python;
@@ -37,6 +37,16 @@ pub fn compare(folder: &Path, python: &Path) -> Result<Vec<Comparison>, Error> {
         found.push(on(folder, python, Some(&mpiexec), &own)?);
     }
     Ok(found)
+}
+
+/// The program of a bare name: of the active virtual environment, else the first of the path, so that what lies beside it (MPI) is
+/// found.
+fn of_environment(name: &Path, active: Option<OsString>, path: Option<OsString>) -> PathBuf {
+    let own = active.into_iter().map(|folder| PathBuf::from(folder).join("bin"));
+    let paths = path.iter().flat_map(std::env::split_paths);
+    let found =
+        own.chain(paths).map(|folder| folder.join(name)).find(|file| file.is_absolute() && file.is_file());
+    found.unwrap_or_else(|| name.to_path_buf())
 }
 
 fn on(folder: &Path, python: &Path, mpiexec: Option<&Path>, own: &[[f64; 3]]) -> Result<Comparison, Error> {
@@ -127,4 +137,33 @@ fn libraries(python: &Path) -> Option<OsString> {
         std::iter::once(own).chain(std::env::split_paths(&given).filter(|p| !p.as_os_str().is_empty())),
     )
     .ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An activated environment comes first; its libraries are beside its `bin`.
+    #[test]
+    fn python_of_an_environment() {
+        let folder = tempfile::tempdir().unwrap();
+        let make = |name: &str| {
+            let bin = folder.path().join(name).join("bin");
+            std::fs::create_dir_all(&bin).unwrap();
+            std::fs::create_dir_all(folder.path().join(name).join("lib")).unwrap();
+            std::fs::write(bin.join("python3"), "").unwrap();
+            bin
+        };
+        let (active, system) = (make("active"), make("system"));
+        let path = || Some(std::env::join_paths([&system, &active]).unwrap());
+        let root = || active.parent().map(|root| root.as_os_str().to_owned());
+        let found = |active, path| of_environment(Path::new("python3"), active, path);
+        assert_eq!(found(root(), path()), active.join("python3"));
+        assert_eq!(found(None, path()), system.join("python3"));
+        assert_eq!(found(Some("/nowhere".into()), None), Path::new("python3"));
+        assert_eq!(
+            libraries(&found(root(), path())).unwrap(),
+            active.parent().unwrap().join("lib").into_os_string()
+        );
+    }
 }

@@ -9,6 +9,8 @@ use crate::bonds::{Bonds, CloudBonds, LatticeBonds};
 use crate::geometry::{Cut, Gaps, recognise};
 use polycore::memory::{available, gib};
 use polycore::scene::{SceneError, Source};
+use polycore::table::Table;
+use polycore::units::dimension::{LengthDimension, VolumeDimension};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -149,34 +151,27 @@ fn read<const D: usize>(source: &Source, path: &Path) -> Result<Points<D>, Scene
     };
     let names: &[&str] = if D == 2 { &["x", "y", "volume"] } else { &["x", "y", "z", "volume"] };
     let columns = format!("columns {} (m, m³)", names.join(", "));
-    let mut reader = csv::ReaderBuilder::new()
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(|error| bad(format!(": {error}"), "a readable CSV file"))?;
-    let headers = reader.headers().map_err(|error| bad(format!(": {error}"), &columns))?;
-    if headers.iter().ne(names.iter().copied()) {
-        let found = headers.iter().collect::<Vec<_>>().join(", ");
-        return Err(bad(format!(", first line: `{found}`"), &columns));
+    let table = Table::read(path).map_err(|error| bad(format!(": {error}"), &columns))?;
+    let headings: Vec<&str> = table.headings.iter().map(|heading| heading.text.as_str()).collect();
+    let found = names.iter().filter_map(|name| table.find(name)).collect::<Vec<usize>>();
+    if found.len() != names.len() || headings.len() != names.len() {
+        let line = table.layout().heading_line;
+        return Err(bad(format!(", headings in line {line}: `{}`", headings.join(", ")), &columns));
     }
+    let in_si = |&column: &usize| match table.headings[column].name.as_str() {
+        "volume" => table.column::<VolumeDimension>(column, Some("m^3")),
+        _ => table.column::<LengthDimension>(column, Some("m")),
+    };
+    let values = found.iter().map(in_si).collect::<Result<Vec<_>, _>>();
+    let values = values.map_err(|error| bad(format!(": {error}"), &columns))?;
     let (mut positions, mut volumes) = (Vec::new(), Vec::new());
-    for record in reader.records() {
-        let record = record.map_err(|error| bad(format!(": {error}"), &columns))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let mut values = [0.0_f64; 4];
-        for (value, field) in values.iter_mut().zip(&record) {
-            *value = field
-                .parse()
-                .map_err(|_| bad(format!(", line {line}: `{field}` is not a number"), &columns))?;
+    for row in 0..table.rows() {
+        let volume = values[D][row];
+        if volume <= 0.0 {
+            return Err(bad(format!(", line {}: volume {volume}", table.line(row)), "a volume above 0"));
         }
-        if let Some(value) = values.iter().find(|v| !v.is_finite()) {
-            return Err(bad(format!(", line {line}: {value}"), "finite numbers"));
-        }
-        if values[D] <= 0.0 {
-            return Err(bad(format!(", line {line}: volume {}", values[D]), "a volume above 0"));
-        }
-        positions.push(std::array::from_fn(|d| values[d]));
-        volumes.push(values[D]);
+        positions.push(std::array::from_fn(|d| values[d][row]));
+        volumes.push(volume);
     }
     if positions.len() < 2 {
         let found = format!(": {} points", positions.len());

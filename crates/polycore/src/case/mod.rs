@@ -233,9 +233,28 @@ impl<'a> Run<'a> {
             self.lock = Some(resume_run(directory)?);
             return Header::read(directory, self.program.magic)?.check(directory);
         }
+        self.refuse_another()?;
         self.lock = Some(prepare_run(directory)?);
         self.header.stamp = self.source.stamp(self.options.quick);
         checkpoint::save(directory, self.program.magic, &self.header, None::<&()>)
+    }
+
+    /// Refuses a directory with results of another scene, whose file is still there.
+    fn refuse_another(&self) -> Result<(), Error> {
+        let directory = self.options.output;
+        let finished = || Report::read(directory.join(crate::report::FILE_NAME)).ok()?.provenance.path;
+        let begun = || Header::read(directory, self.program.magic).ok().map(|header| header.scene_path);
+        let file = |path: &Path| std::fs::canonicalize(path).ok();
+        match finished().or_else(begun).and_then(|path| file(&path)) {
+            Some(other) if file(&self.source.path).is_some_and(|own| own != other) => {
+                let reason = format!(
+                    "it has the results of another scene, {}; choose another folder with --output, or remove this one",
+                    other.display()
+                );
+                Err(Error::OutputDirectory { path: directory.to_path_buf(), reason })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// What the last [`Run::save`] wrote, where the run is resumed and one did.
@@ -309,6 +328,7 @@ impl<'a> Run<'a> {
     /// It cannot be written.
     pub fn finish(&mut self, report: &Report) -> Result<(), Error> {
         let mut report = report.clone();
+        report.provenance.path = std::path::absolute(&self.source.path).ok();
         report.provenance.stamp = Some(self.source.stamp(self.options.quick));
         report.write(self.options.output)?;
         let _ = std::fs::remove_file(self.options.output.join(checkpoint::FILE_NAME));

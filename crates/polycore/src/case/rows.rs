@@ -36,6 +36,14 @@ impl Rows {
         self.rows.iter().all(|row| row.outcome.is_ok())
     }
 
+    /// Whether some run has a value.
+    pub fn has(&self, name: &str) -> bool {
+        self.rows
+            .iter()
+            .filter_map(|row| row.outcome.as_ref().ok())
+            .any(|report| report.scalar(name).is_some())
+    }
+
     /// Fields whose statistics some run tells, the temperature first.
     pub fn fields(&self) -> Vec<String> {
         let mut fields: Vec<String> = self

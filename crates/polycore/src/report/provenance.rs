@@ -19,6 +19,9 @@ pub struct Provenance {
     pub git: Option<Git>,
     /// The scene as it was run.
     pub scene: String,
+    /// Its file, once the run is finished.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<PathBuf>,
     /// What else the results were computed from, once the run is finished.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stamp: Option<Stamp>,
@@ -59,6 +62,7 @@ impl Provenance {
             version: version.to_owned(),
             git: Git::find(),
             scene: scene.to_owned(),
+            path: None,
             stamp: None,
             host: Host::find(),
             date: date(SystemTime::now()),

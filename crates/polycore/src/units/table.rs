@@ -57,6 +57,10 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
             table.entry(alias).or_insert(entry);
         }
     }
+    // ab initio programs tell pressures in it
+    if let Some(&([bar, one], exponents)) = table.get("bar") {
+        table.entry("kbar").or_insert(([1000.0 * bar, one], exponents));
+    }
     table
 });
 
@@ -87,7 +91,7 @@ pub(super) fn affine(unit: &str) -> Option<(f64, f64)> {
 
 /// The nearest known symbol, for "did you mean".
 pub(super) fn nearest(text: &str) -> Option<String> {
-    const OFTEN: &str = "m mm cm km nm µm kg g mg t s ms min h d K degC N kN mN MN Pa kPa MPa GPa bar J kJ mJ MJ W mW kW \
+    const OFTEN: &str = "m mm cm km nm µm kg g mg t s ms min h d K degC N kN mN MN Pa kPa MPa GPa bar kbar atm J kJ mJ MJ W mW kW \
                          Hz kHz L mL rad deg % mol A cal eV";
     let names = [
         ("celsius", "degC"),

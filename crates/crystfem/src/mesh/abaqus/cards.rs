@@ -1,6 +1,6 @@
 //! Keyword lines and data lines of an input file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::Error;
 use crate::mesh::labelled::line_error;
@@ -65,17 +65,62 @@ impl Row<'_> {
     }
 }
 
-/// The file, card by card.
-pub(super) struct Cards<'a> {
-    path: &'a Path,
-    bytes: &'a [u8],
+/// A file that is being read.
+struct Open {
+    path: PathBuf,
+    bytes: Vec<u8>,
     at: usize,
     line: usize,
 }
 
+/// The file, card by card, with those that it includes. Lines are counted through all of them.
+pub(super) struct Cards<'a> {
+    path: &'a Path,
+    files: Vec<Open>,
+    line: usize,
+    /// From which line on which file is read, and the line there.
+    parts: Vec<(usize, PathBuf, usize)>,
+    /// Bytes of all files.
+    pub bytes: usize,
+    fault: Option<Error>,
+}
+
+/// Files that include each other.
+const DEPTH: usize = 10;
+
 impl<'a> Cards<'a> {
-    pub fn new(path: &'a Path, bytes: &'a [u8]) -> Self {
-        Self { path, bytes, at: 0, line: 0 }
+    pub fn new(path: &'a Path, bytes: &[u8]) -> Self {
+        let mut cards = Self { path, files: Vec::new(), line: 0, parts: Vec::new(), bytes: 0, fault: None };
+        cards.open(path.to_path_buf(), bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).to_vec());
+        cards
+    }
+
+    fn open(&mut self, path: PathBuf, bytes: Vec<u8>) {
+        self.bytes += bytes.len();
+        self.parts.push((self.line, path.clone(), 0));
+        self.files.push(Open { path, bytes, at: 0, line: 0 });
+    }
+
+    /// Files that were included.
+    pub fn included(&self) -> usize {
+        let mut files: Vec<&PathBuf> = self.parts.iter().map(|part| &part.1).collect();
+        files.sort_unstable();
+        files.dedup();
+        files.len() - 1
+    }
+
+    /// An error with the file and the line there.
+    pub fn placed(&self, error: Error) -> Error {
+        match error {
+            Error::File { line, what, found, allowed, .. } => {
+                let part = self.parts.iter().rev().find(|part| part.0 < line);
+                let (path, line) = part.map_or((self.path.to_owned(), line), |(first, path, own)| {
+                    (path.clone(), line - first + own)
+                });
+                Error::File { path, line, what, found, allowed }
+            }
+            other => other,
+        }
     }
 
     /// The next keyword line; data lines before it are passed over. A parameter list that ends with a comma goes on in
@@ -84,28 +129,24 @@ impl<'a> Cards<'a> {
         while let Some((text, line, end)) = self.peek() {
             self.move_to(line, end);
             let Some(text) = text.strip_prefix('*') else { continue };
-            let mut text = text.to_owned();
-            while text.ends_with(',') {
-                let Some((more, line, end)) = self.peek() else { break };
-                if more.starts_with('*') {
-                    break;
-                }
-                self.move_to(line, end);
-                text.push_str(&more);
-            }
-            let mut parts = text.split(',').map(str::trim);
-            let words: Vec<&str> = parts.next().unwrap_or("").split_whitespace().collect();
-            let keyword = words.join(" ").to_uppercase();
-            if keyword.is_empty() {
-                return Err(line_error(self.path, line, "keyword", text, "a name after *"));
-            }
-            let parameters = parts.filter(|part| !part.is_empty()).map(|part| {
-                let (name, value) = part.split_once('=').unwrap_or((part, ""));
-                (name.trim().to_uppercase(), value.trim().trim_matches('"').to_owned())
-            });
-            return Ok(Some(Card { keyword, parameters: parameters.collect(), line }));
+            let text = self.whole(text);
+            return card(self.path, &text, line).map(Some);
         }
-        Ok(None)
+        self.fault.take().map_or(Ok(None), Err)
+    }
+
+    /// A keyword line with those that continue it.
+    fn whole(&mut self, text: &str) -> String {
+        let mut text = text.to_owned();
+        while text.ends_with(',') {
+            let Some((more, line, end)) = self.line_ahead() else { break };
+            if more.starts_with('*') {
+                break;
+            }
+            self.move_to(line, end);
+            text.push_str(&more);
+        }
+        text
     }
 
     /// The next data line before the next keyword.
@@ -118,13 +159,63 @@ impl<'a> Cards<'a> {
         Some(Row { path: self.path, text, line })
     }
 
-    /// The next line that is neither empty nor a comment, its number, and where it ends.
+    /// The next line of any file that says something else than to include another, see [`Self::line_ahead`].
     fn peek(&mut self) -> Option<(String, usize, usize)> {
         loop {
-            let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
+            let Some((text, line, end)) = self.line_ahead() else {
+                // back to the file that included this one
+                if self.files.len() < 2 || self.fault.is_some() {
+                    return None;
+                }
+                self.files.pop();
+                let outer = self.files.last()?;
+                self.parts.push((self.line, outer.path.clone(), outer.line));
+                continue;
+            };
+            let keyword = text.split(',').next().unwrap_or_default().trim();
+            if !keyword.eq_ignore_ascii_case("*INCLUDE") {
+                return Some((text, line, end));
+            }
+            self.move_to(line, end);
+            let text = self.whole(text.strip_prefix('*')?);
+            if let Err(error) = self.include(&text, line) {
+                self.fault = Some(error);
+                return None;
+            }
+        }
+    }
+
+    fn include(&mut self, text: &str, line: usize) -> Result<(), Error> {
+        let card = card(self.path, text, line)?;
+        let name = card.parameter("INPUT").unwrap_or_default();
+        let wrong =
+            |what: &str, found: &str, allowed: &str| Err(line_error(self.path, line, what, found, allowed));
+        if name.is_empty() {
+            return wrong("file that is included", "", "*INCLUDE, INPUT=FILE");
+        }
+        if self.files.len() > DEPTH {
+            return wrong("files in each other", name, "10: does one include itself?");
+        }
+        let path =
+            self.files.last().map_or(self.path, |file| &file.path).with_file_name(name.replace('\\', "/"));
+        match std::fs::read(&path) {
+            Ok(bytes) => self.open(path, bytes),
+            Err(error) => {
+                let allowed = format!("a file beside this one ({}: {error})", path.display());
+                return wrong("file that is included", name, &allowed);
+            }
+        }
+        Ok(())
+    }
+
+    /// The next line of this file that is neither empty nor a comment, its number, and where it ends.
+    fn line_ahead(&mut self) -> Option<(String, usize, usize)> {
+        loop {
+            let file = self.files.last()?;
+            let rest = file.bytes.get(file.at..).filter(|rest| !rest.is_empty())?;
             let length = rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len());
             let text = rest[..length].trim_ascii();
-            let end = self.at + (length + 1).min(rest.len());
+            let end = file.at + (length + 1).min(rest.len());
             if !text.is_empty() && !text.starts_with(b"**") {
                 return Some((String::from_utf8_lossy(text).into_owned(), self.line + 1, end));
             }
@@ -133,7 +224,24 @@ impl<'a> Cards<'a> {
     }
 
     fn move_to(&mut self, line: usize, end: usize) {
+        if let Some(file) = self.files.last_mut() {
+            (file.at, file.line) = (end, file.line + line - self.line);
+        }
         self.line = line;
-        self.at = end;
     }
+}
+
+/// A keyword with its parameters, after the `*`.
+fn card(path: &Path, text: &str, line: usize) -> Result<Card, Error> {
+    let mut parts = text.split(',').map(str::trim);
+    let words: Vec<&str> = parts.next().unwrap_or("").split_whitespace().collect();
+    let keyword = words.join(" ").to_uppercase();
+    if keyword.is_empty() {
+        return Err(line_error(path, line, "keyword", text, "a name after *"));
+    }
+    let parameters = parts.filter(|part| !part.is_empty()).map(|part| {
+        let (name, value) = part.split_once('=').unwrap_or((part, ""));
+        (name.trim().to_uppercase(), value.trim().trim_matches('"').to_owned())
+    });
+    Ok(Card { keyword, parameters: parameters.collect(), line })
 }

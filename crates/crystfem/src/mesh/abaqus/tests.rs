@@ -100,7 +100,12 @@ fn all_that_is_understood() {
     assert_eq!(mesh.surfaces["skin"].len(), 6);
     assert_eq!(
         read.notes,
-        ["keywords not used: *CONDUCTIVITY (1), *END STEP (1), *HEAT TRANSFER (1), *MATERIAL (1), *STEP (1)"]
+        [
+            "*CONDUCTIVITY (line 41, `0.25`) is NOT used: the deck has no units; give `conductivity` of [materials.NAME]",
+            "*HEAT TRANSFER (line 44) is NOT used: the deck has no units; give [time]",
+            "*MATERIAL (line 40, `PA12`) is NOT used: the deck has no units; give [materials.NAME]",
+            "keywords not used: *END STEP (1), *STEP (1)",
+        ]
     );
 }
 
@@ -131,9 +136,17 @@ fn what_is_wrong_is_named_with_its_line() {
     refused(&with("low, 8", "low, 9"), &["member of a set of nodes: found \"9\""]);
     refused(&with("1, 4\n", "1, 4, 0\n"), &["a.inp:24: range: found \"1, 4, 0\""]);
     refused(&with("again, S2", "again, SPOS"), &["side: found \"SPOS\"; allowed: S1 … S6"]);
-    refused(&with("*Assembly", "*Include, input=b.inp"), &["a.inp:20: keyword: found \"*INCLUDE\""]);
-    refused(&with("*Assembly", "*Part"), &["a.inp:20: keyword: found \"*PART\"", "also on line 4"]);
-    refused(&with("*End Instance", "1., 0., 0."), &["place of an instance"]);
+    refused(
+        &with("*Assembly", "*Include, input=b.inp"),
+        &["a.inp:20: file that is included: found \"b.inp\""],
+    );
+    refused(&with("*Assembly", "*Include"), &["a.inp:20: file that is included", "INPUT=FILE"]);
+    refused(&with("*Assembly", "*Part"), &["a.inp:20: keyword: found \"*PART, after that of line 4"]);
+    refused(&with("*End Instance", "1., 0., 0., 4."), &["place of an instance", "x, y, z"]);
+    refused(
+        &with("*End Instance", "1., 0., 0.\n1,1,1,1,1,1,90"),
+        &["a.inp:23: place", "two different points"],
+    );
     refused(&with("nset=mixed", "color=red"), &["name of a set", "*NSET, NSET=NAME"]);
     refused(&with("5, 6, 7, 8", "7, 6, 5, 8"), &["a.inp: hexahedron 10 at", "inverted"]);
     refused(&with("*Assembly", "*"), &["a.inp:20: keyword"]);
@@ -241,4 +254,70 @@ fn orders_do_not_mix() {
     mesh.others.push(cell);
     let error = crate::mesh::quality::check(&mesh, None).unwrap_err().to_string();
     assert!(error.contains("elements 0 and 1 have the corners of one face and different nodes"), "{error}");
+}
+
+/// Keywords with a meaning here are told one by one, with how often and what they say first.
+#[test]
+fn what_is_not_used_says_what_to_give_instead() {
+    let more = "*Tie, name=glue\na, b\n*Dflux\nBricks, BF, 1.\n*DFLUX, amplitude=RAMP\nagain, BF, 2.\n*initial conditions, type=temperature\nAll, 20.\n\
+                *Node File\nNT\n*NODE FILE\nNT\n";
+    let notes = parsed(&format!("{BRICK}{more}")).notes;
+    for told in [
+        "*TIE (line 46, `glue`) is NOT used: heat passes only between elements that share nodes",
+        "*DFLUX (line 48, `Bricks, BF, 1.`, 2 times) is NOT used: the deck has no units; give `flux` of [[boundary]], or `power`",
+        "*INITIAL CONDITIONS (line 52, `All, 20.`) is NOT used: the deck has no units; give `temperature` of [[region]]",
+        "keywords not used: *END STEP (1), *NODE FILE (2), *STEP (1)",
+    ] {
+        assert!(notes.iter().any(|note| note.starts_with(told)), "{told}: {notes:#?}");
+    }
+}
+
+/// An instance is moved, then turned about a line.
+#[test]
+fn instances_are_placed() {
+    let with = |lines: &str| BRICK.replace("*End Instance", &format!("{lines}\n*End Instance"));
+    for (lines, lower, upper) in [
+        ("0., 0., 0.", [0.0; 3], [1.0; 3]),
+        ("10., 0., -2.", [10.0, 0.0, -2.0], [11.0, 1.0, -1.0]),
+        ("10.\n0,0,0, 0,0,1, 90.", [-1.0, 10.0, 0.0], [0.0, 11.0, 1.0]),
+        ("0,0,0\n5., 0., 0., 5., 3., 0., 180.", [9.0, 0.0, -1.0], [10.0, 1.0, 0.0]),
+    ] {
+        let found = parsed(&with(lines)).mesh.bounds().unwrap();
+        for (found, exact) in found.iter().flatten().zip([lower, upper].iter().flatten()) {
+            assert!((found - exact).abs() < 1e-14, "{lines}: {found} {exact}");
+        }
+    }
+}
+
+/// Files in files, with data lines alone or keywords, and errors at their lines.
+#[test]
+fn files_are_included() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = |name: &str| directory.path().join(name);
+    let write = |name: &str, text: &str| std::fs::write(at(name), text).unwrap();
+    std::fs::create_dir(at("sub")).unwrap();
+    write("nodes.txt", "1,0,0,0\n** a comment\n2,1,0,0\n3,0,1,0\n");
+    write("sub/elements.inp", "*ELEMENT, TYPE=C3D4, ELSET=E\n*INCLUDE, INPUT=rows.inp\n");
+    write("sub/rows.inp", "1,1,2,3,4\n");
+    write("bad.txt", "1,0,0,0\n\n2,1,x,0\n");
+    write("again.inp", "*INCLUDE, INPUT=again.inp\n");
+    let deck = "*NODE, NSET=N\n*INCLUDE, INPUT=nodes.txt\n4,0,0,1\n*Include,\n input=sub\\elements.inp\n*NSET, NSET=low\n1,2,3\n";
+    let read_from = |text: &str| {
+        write("deck.inp", text);
+        read(&at("deck.inp"), 1.0)
+    };
+    let mesh = read_from(deck).unwrap();
+    assert!((mesh.quality.volume - 1.0 / 6.0).abs() < 1e-15);
+    assert_eq!((mesh.mesh.node_sets["N"].len(), mesh.mesh.node_sets["low"].len()), (4, 3));
+    assert_eq!(mesh.notes, ["3 files are included"]);
+    for (from, to, says) in [
+        ("nodes.txt", "bad.txt", "bad.txt:3: coordinate: found \"x\""),
+        ("nodes.txt", "none.txt", "deck.inp:2: file that is included: found \"none.txt\""),
+        ("nodes.txt", "again.inp", "again.inp:1: files in each other"),
+        ("4,0,0,1", "4,0,y,1", "deck.inp:3: coordinate: found \"y\""),
+        ("1,2,3\n", "1,2,9\n", "deck.inp:7: member of a set of nodes: found \"9\""),
+    ] {
+        let error = read_from(&deck.replace(from, to)).unwrap_err().to_string();
+        assert!(error.contains(says), "{to}: {error}");
+    }
 }

@@ -16,6 +16,17 @@ enum Form {
     },
 }
 
+/// Versions of the format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Version {
+    /// 2.0 to 2.2.
+    Two,
+    /// 4.0.
+    Four,
+    /// 4.1.
+    FourOne,
+}
+
 /// A place in the file.
 pub(super) struct Numbers<'a> {
     path: &'a Path,
@@ -45,17 +56,36 @@ impl<'a> Numbers<'a> {
         line_error(self.path, self.line, what, found, allowed)
     }
 
-    /// `$MeshFormat`: version 4.1, 0 or 1 (binary), bytes of a size; in binary the number 1 in the file's byte order.
-    pub fn header(&mut self) -> Result<(), Error> {
-        let line = self.text_line();
-        if line.trim() != "$MeshFormat" {
-            return Err(self.error("first line", line, "$MeshFormat"));
+    /// `$MeshFormat`: a version, 0 or 1 (binary), bytes of a size; in binary the number 1 in the file's byte order.
+    pub fn header(&mut self) -> Result<Version, Error> {
+        let mut line = self.text_line();
+        // comments may stand before it
+        while line.trim().is_empty() && self.at < self.bytes.len() || line.trim() == "$Comments" {
+            if line.trim() == "$Comments" {
+                self.skip("Comments")?;
+            }
+            line = self.text_line();
+        }
+        if line.trim_start_matches('\u{feff}').trim() != "$MeshFormat" {
+            let advice = if line.trim() == "$NOD" { ": this is format 1" } else { "" };
+            return Err(self.error(
+                "first line",
+                line,
+                format!("$MeshFormat{advice} (versions 2 and 4 are read)"),
+            ));
         }
         let line = self.text_line();
         let words: Vec<&str> = line.split_whitespace().collect();
-        let allowed = "4.1, then 0 (ASCII) or 1 (binary), then 4 or 8 (in Gmsh: Mesh.MshFileVersion = 4.1)";
-        let ["4.1", form @ ("0" | "1"), width @ ("4" | "8")] = words[..] else {
+        let allowed = "2, 2.1, 2.2, 4, 4.0 or 4.1, then 0 (ASCII) or 1 (binary), then 4 or 8 (in Gmsh: \
+                       Mesh.MshFileVersion = 4.1)";
+        let [version, form @ ("0" | "1"), width @ ("4" | "8")] = words[..] else {
             return Err(self.error("version, form, bytes of a size", line, allowed));
+        };
+        let version = match version {
+            "2" | "2.0" | "2.1" | "2.2" => Version::Two,
+            "4" | "4.0" => Version::Four,
+            "4.1" => Version::FourOne,
+            _ => return Err(self.error("version, form, bytes of a size", line, allowed)),
         };
         if form == "1" {
             let width = if width == "4" { 4 } else { 8 };
@@ -67,7 +97,8 @@ impl<'a> Numbers<'a> {
             };
             self.form = Form::Binary { width, little };
         }
-        self.end("MeshFormat")
+        self.end("MeshFormat")?;
+        Ok(version)
     }
 
     /// The name after the next `$`; `None` at the end of the file.
@@ -154,6 +185,11 @@ impl<'a> Numbers<'a> {
                 Ok(if little { u64::from_le_bytes(bytes) } else { u64::from_be_bytes(bytes) })
             }
         }
+    }
+
+    /// Whether numbers are bytes.
+    pub fn is_binary(&self) -> bool {
+        self.form != Form::Text
     }
 
     /// The four counts that `$Nodes` and `$Elements` begin with.

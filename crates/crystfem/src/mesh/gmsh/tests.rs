@@ -12,10 +12,18 @@ fn refused(text: &str, words: &[&str]) {
     assert!(words.iter().all(|word| error.contains(word)), "{error}");
 }
 
-/// Two boxes of 3 × 1 × 1, one on the other, meshed by Gmsh 4.15.
+/// Two boxes of 3 × 1 × 1, one on the other, meshed by Gmsh 4.15 and saved as 4.1, 4.0 and 2.2.
 #[test]
 fn meshes_written_by_gmsh() {
-    for name in ["hexes_ascii.msh", "hexes_binary.msh", "tets_ascii.msh", "tets_binary.msh"] {
+    for name in [
+        "hexes_ascii.msh",
+        "hexes_binary.msh",
+        "tets_ascii.msh",
+        "tets_binary.msh",
+        "hexes_ascii_40.msh",
+        "hexes_ascii_22.msh",
+        "hexes_binary_22.msh",
+    ] {
         let (path, _) = fixture(name);
         let read = read(&path, 1e-3).unwrap();
         let mesh = &read.mesh;
@@ -138,10 +146,10 @@ fn what_is_wrong_is_named_with_its_line() {
         TETRAHEDRON.replace(from, to)
     };
     refused("", &["a.msh:1: first line", "$MeshFormat"]);
-    refused(&with("4.1 0 8", "2.2 0 8"), &["a.msh:2:", "found \"2.2 0 8\"", "Mesh.MshFileVersion = 4.1"]);
+    refused(&with("4.1 0 8", "3.1 0 8"), &["a.msh:2:", "found \"3.1 0 8\"", "Mesh.MshFileVersion = 4.1"]);
     refused(
-        &with("3 7 4 1\n11", "3 7 12 1\n11"),
-        &["a.msh:27: type of elements: found \"12\"", "4, 11 (tetrahedra)", "SecondOrderIncomplete"],
+        &with("3 7 4 1\n11", "3 7 14 1\n11"),
+        &["a.msh:27: type of elements: found \"14\"", "4, 11 (tetrahedra)", "pyramids are none"],
     );
     refused(&with("11 1 2 3 4", "11 1 2 3 9"), &["a.msh:28: node of element 11: found \"9\""]);
     refused(&with("0 1 0\n0 0", "0 x 0\n0 0"), &["a.msh:21: coordinate: found \"x\"; allowed: a number"]);
@@ -214,4 +222,63 @@ fn second_order_meshes_written_by_gmsh() {
         assert_eq!(again.mesh.others, msh.mesh.others);
         assert_eq!(again.mesh.surfaces, msh.mesh.surfaces);
     }
+}
+
+/// The two boxes of complete second order: 27 nodes of each hexahedron, 20 are kept.
+#[test]
+fn complete_second_order_is_reduced() {
+    let read = read(&fixture("hexes27.msh").0, 1e-3).unwrap();
+    assert!(read.mesh.others.len() == 16 && read.mesh.is_second_order());
+    assert!((read.quality.volume / 6e-9 - 1.0).abs() < 1e-12);
+    assert!(read.notes[0].contains("16 elements of complete second order"), "{:?}", read.notes);
+    // faces of their surfaces are found, by nodes that are kept
+    let total: f64 = read.mesh.surfaces["bottom"].iter().map(|face| area(&read.mesh, *face)).sum();
+    assert!((total / 3e-6 - 1.0).abs() < 1e-12);
+}
+
+/// One tetrahedron in all versions, by hand: parametric nodes, several groups, no groups, comments, negative tags.
+#[test]
+fn versions_by_hand() {
+    let points = ["0 0 0", "1 0 0", "0 1 0", "0 0 1"];
+    let names = "$PhysicalNames\n2\n3 1 \"a\"\n3 2 \"b c\"\n$EndPhysicalNames\n";
+    let numbered =
+        |more: &str| -> String { (1..).zip(points).map(|(k, at)| format!("{k} {at}{more}\n")).collect() };
+    let two = |elements: &str| {
+        let head = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
+        format!("{head}{names}$Nodes\n4\n{}$EndNodes\n$Elements\n{elements}$EndElements\n", numbered(""))
+    };
+    let four = |head: &str, physical: &str, parametric: &str, more: &str| {
+        let box_of = "0 0 0 1 1 1";
+        format!(
+            "{head}$MeshFormat\n4 0 8\n$EndMeshFormat\n{names}$Entities\n0 0 0 1\n7 {box_of} {physical} 0\n$EndEntities\n$Nodes\n1 4\n\
+             7 3 {parametric} 4\n{}$EndNodes\n$Elements\n1 1\n7 3 4 1\n1 1 2 3 4\n$EndElements\n",
+            numbered(more)
+        )
+    };
+    for (name, text, sets) in [
+        ("2.2", two("1\n1 4 2 1 7 1 2 3 4\n"), &["a"][..]),
+        ("2.2 without tags", two("1\n1 4 0 1 2 3 4\n"), &[]),
+        ("2.2, no group", two("1\n1 4 2 0 7 1 2 3 4\n"), &[]),
+        ("2.2, partitions", two("1\n1 4 4 2 7 1 1 1 2 3 4\n"), &["b c"]),
+        ("2.2, two groups", two("2\n1 4 2 1 7 1 2 3 4\n2 4 2 2 7 1 2 3 4\n"), &["a", "b c"]),
+        ("2.2, a group without a name", two("1\n1 4 2 9 7 1 2 3 4\n"), &["physical-9"]),
+        ("2.2, carriage returns", two("1\n1 4 2 1 7 1 2 3 4\n").replace('\n', "\r\n"), &["a"]),
+        ("4.0", four("", "1 2", "0", ""), &["b c"]),
+        ("4.0, two groups, turned", four("", "2 -1 2", "0", ""), &["a", "b c"]),
+        (
+            "4.0, parametric, comments",
+            four("$Comments\nby hand\n$EndComments\n", "0", "1", " 0.1 0.2 0.3"),
+            &[],
+        ),
+    ] {
+        let read =
+            parse(Path::new("a.msh"), text.as_bytes(), 1.0).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!((read.quality.volume - 1.0 / 6.0).abs() < 1e-15 && read.mesh.tetrahedra.len() == 1, "{name}");
+        let found: Vec<&str> = read.mesh.element_sets.keys().map(String::as_str).collect();
+        assert_eq!(found, sets, "{name}");
+    }
+    refused("$NOD\n4\n", &["this is format 1"]);
+    refused("$MeshFormat\n3 0 8\n$EndMeshFormat\n", &["2.2, 4, 4.0 or 4.1"]);
+    refused(&two("2\n1 4 2 1 7 1 2 3 4\n"), &["a.msh:"]);
+    refused(&two("1\n1 7 2 1 7 1 2 3 4 4\n"), &["pyramids are none"]);
 }

@@ -34,7 +34,7 @@ pub fn read_csv(path: &Path) -> Result<ToolPath, Error> {
             start,
             end,
             prints: print[row] != 0.0,
-            fed: 0.0,
+            ..Move::default()
         });
     }
     Ok(ToolPath { moves, ..ToolPath::default() })

@@ -17,7 +17,7 @@ pub struct Cells {
     pub size: [f64; 3],
     /// Diameter of the filament, m.
     pub filament: f64,
-    /// Height of all beads, m; `None`: down to the level of the path below.
+    /// Height of all beads, m; `None`: as the file tells, or down to what lies below.
     pub height: Option<f64>,
     /// Cells with a smaller filled part are left out; the volume in them goes to the others in equal proportion.
     pub least: f64,
@@ -30,6 +30,9 @@ pub struct Deposit {
     pub voxels: Voxels,
     /// When half of what is in each element is there, s.
     pub times: Vec<f64>,
+    /// The tool that laid most of each element, where several print: then element sets `tool-0` and so on are
+    /// theirs.
+    pub tools: Vec<u16>,
 }
 
 impl ToolPath {
@@ -57,7 +60,7 @@ impl ToolPath {
             volume += one.volume(cells.filament);
             pieces(one, *height, cells, |at, own, _| filled[frame.cell(at)] += own);
         }
-        let (voxels, taken) = frame.voxels(&filled, cells.least, volume)?;
+        let (mut voxels, taken) = frame.voxels(&filled, cells.least, volume)?;
         // when half of what a cell takes is in it
         let mut sum = vec![0.0; count];
         let mut times = vec![f64::INFINITY; count];
@@ -72,7 +75,13 @@ impl ToolPath {
         }
         let times =
             times.into_iter().zip(&taken).filter(|(_, taken)| **taken).map(|(time, _)| time).collect();
-        Ok(Deposit { voxels, times })
+        let tools = by_tool(&beads, &frame, cells, count);
+        let tools: Vec<u16> =
+            tools.into_iter().zip(&taken).filter(|(_, taken)| **taken).map(|(tool, _)| tool).collect();
+        for (element, tool) in (0..).zip(&tools) {
+            voxels.mesh.element_sets.entry(format!("tool-{tool}")).or_default().push(element);
+        }
+        Ok(Deposit { voxels, times, tools })
     }
 
     /// Printing moves that feed filament, and the heights of their beads.
@@ -88,16 +97,42 @@ impl ToolPath {
                 "the path extrudes nothing; allowed: G-code with E in printing moves".into(),
             ));
         }
-        let beads: Vec<(&Move, f64)> =
-            self.printing().zip(self.heights(cells.height)).filter(|(one, _)| one.fed > 0.0).collect();
+        let beads: Vec<(&Move, f64)> = self
+            .printing()
+            .zip(self.heights(cells.filament, cells.height))
+            .filter(|(one, _)| one.fed > 0.0)
+            .collect();
         if let Some((one, height)) = beads.iter().find(|(_, height)| !(*height > 0.0 && height.is_finite())) {
-            let [x, y, z] = one.to.map(|x| 1e3 * x);
+            let ([x, y, z], line) = (one.to.map(|x| 1e3 * x), one.line);
             return Err(Error::Mesh(format!(
-                "bead to ({x}, {y}, {z}) mm: height {height} m; allowed: above 0, above the bed at z = 0"
+                "line {line} of the path, bead to ({x}, {y}, {z}) mm: height {height} m; allowed: above 0, above the bed at z = 0"
             )));
         }
         Ok(beads)
     }
+}
+
+/// The tool that lays most in each cell; nothing where one prints all.
+fn by_tool(beads: &[(&Move, f64)], frame: &Frame, cells: &Cells, count: usize) -> Vec<u16> {
+    let mut known: Vec<u16> = beads.iter().map(|(one, _)| one.tool).collect();
+    known.sort_unstable();
+    known.dedup();
+    if known.len() < 2 {
+        return Vec::new();
+    }
+    let (mut most, mut of) = (vec![0.0; count], vec![known[0]; count]);
+    for tool in known {
+        let mut own = vec![0.0; count];
+        for (one, height) in beads.iter().filter(|(one, _)| one.tool == tool) {
+            pieces(one, *height, cells, |at, volume, _| own[frame.cell(at)] += volume);
+        }
+        for (cell, volume) in own.into_iter().enumerate().filter(|(_, volume)| *volume > 0.0) {
+            if volume > most[cell] {
+                (most[cell], of[cell]) = (volume, tool);
+            }
+        }
+    }
+    of
 }
 
 /// The grid around all beads.
@@ -168,7 +203,7 @@ mod tests {
             text += &format!("G0 X0 Y{y} Z{z}\nG1 X10 E{fed}\n");
         }
         let path = parsed(&text);
-        let Deposit { voxels: found, times } = path.deposit(&MILLIMETRE).unwrap();
+        let Deposit { voxels: found, times, .. } = path.deposit(&MILLIMETRE).unwrap();
         assert_eq!(found.mesh.element_count(), 20 * 20 * 2);
         assert_eq!(found.mesh.element_sets["layer-2"].len(), 400);
         assert!((found.volume * 1e9 - 0.8 * 10.0 * 10.0 * 0.5).abs() < 1e-9);
@@ -208,14 +243,15 @@ mod tests {
         }
     }
 
-    /// Files of slicers in cells: as counted by reference/print/gcode.py, its grid around both ends of all moves.
+    /// Files of slicers in cells: as counted by reference/print/gcode.py, its grid around both ends of all moves, with
+    /// the purge line at 0.3 mm down to the bed.
     #[test]
     fn files_in_cells() {
         let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
         let other = std::env::var_os("CRYSTFEM_GCODE").map_or_else(|| own.clone(), std::path::PathBuf::from);
         for (file, folder, size, count, volume, ratio) in [
-            ("Zugstab_small.gcode", &own, [1e-3, 1e-4], 8231, 770.0621, 1.0689),
-            ("Zugstab_small.gcode", &own, [5e-4, 1e-4], 32348, 770.0621, 1.0502),
+            ("Zugstab_small.gcode", &own, [1e-3, 1e-4], 8971, 770.0621, 1.1650),
+            ("Zugstab_small.gcode", &own, [5e-4, 1e-4], 33088, 770.0621, 1.0742),
             ("20x20x20_1wall_1bottom.gcode", &other, [5e-4, 2.5e-4], 29504, 1771.7213, 1.0408),
             ("20x20x20_1wall_1bottom.gcode", &other, [1e-3, 2.5e-4], 13316, 1771.7213, 1.8790),
         ] {

@@ -42,24 +42,22 @@ impl ToolPath {
         levels
     }
 
-    /// Height of each printing move's bead, m: down to the level below it, the first down to z = 0, or `height` of all.
-    pub(super) fn heights(&self, height: Option<f64>) -> Vec<f64> {
-        let levels = self.levels();
-        let below = |z: f64| {
-            let at = levels.partition_point(|level| *level < z - SAME);
-            at.checked_sub(1).map_or(0.0, |at| levels[at])
-        };
-        self.printing().map(|one| height.unwrap_or_else(|| one.to[2] - below(one.to[2]))).collect()
-    }
-
-    /// A setting over time: pairs of time, s, and value, each from its time on. Of commands at one time the last holds.
+    /// A setting over time: pairs of time, s, and value, each from its time on. Of commands at one time the
+    /// last holds. Of the bed NaN is off.
     pub fn setting(&self, of: Setting) -> Vec<(f64, f64)> {
         let mut pairs: Vec<(f64, f64)> = Vec::new();
-        for command in self.commands.iter().filter(|command| command.setting == of) {
-            pairs.retain(|pair| pair.0 < command.time);
-            pairs.push((command.time, command.value));
+        for command in &self.commands {
+            let value = match command.setting {
+                Setting::BedOff if of == Setting::Bed => f64::NAN,
+                own if own == of => command.value,
+                _ => continue,
+            };
+            while pairs.last().is_some_and(|pair| pair.0 >= command.time) {
+                pairs.pop();
+            }
+            pairs.push((command.time, value));
         }
-        pairs.dedup_by(|next, kept| next.1 == kept.1);
+        pairs.dedup_by(|next, kept| next.1.to_bits() == kept.1.to_bits());
         pairs
     }
 }

@@ -1,14 +1,49 @@
 //! Times of moves of a machine that cannot change its velocity at once.
 
-use super::ToolPath;
+use super::limits::Limits;
+use super::{Motion, ToolPath};
 use crate::error::Error;
 use nalgebra::Vector3;
 
+/// A straight motion: how long it is, m, how fast, m/s, how it gets there, m/s², and with which velocity it
+/// may begin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ramp {
+    pub length: f64,
+    pub velocity: f64,
+    pub acceleration: f64,
+    pub enter: f64,
+}
+
+/// Durations of motions one after another, s, by trapezoids of velocity from rest to rest: passes back and
+/// forth give the velocity at each corner. `exit`: the velocity of the last at its end.
+fn durations(ramps: &[Ramp], exit: f64) -> Vec<f64> {
+    let mut corner: Vec<f64> = ramps.iter().map(|ramp| ramp.enter).collect();
+    corner.push(exit);
+    let reach =
+        |velocity: f64, ramp: &Ramp| (velocity * velocity + 2.0 * ramp.acceleration * ramp.length).sqrt();
+    for (k, ramp) in ramps.iter().enumerate().rev() {
+        corner[k] = corner[k].min(reach(corner[k + 1], ramp));
+    }
+    for (k, ramp) in ramps.iter().enumerate() {
+        corner[k + 1] = corner[k + 1].min(reach(corner[k], ramp));
+    }
+    let time = |(ramp, ends): (&Ramp, &[f64])| {
+        let (length, acceleration) = (ramp.length, ramp.acceleration);
+        let [a, b] = [ends[0], ends[1]];
+        let squares = a * a + b * b;
+        let top = ramp.velocity.min((acceleration * length + 0.5 * squares).sqrt()).max(a).max(b);
+        let even = (length - (2.0 * top * top - squares) / (2.0 * acceleration)).max(0.0);
+        let time = (2.0 * top - a - b) / acceleration + even / top;
+        if time.is_finite() { time } else { 0.0 }
+    };
+    ramps.iter().zip(corner.windows(2)).map(time).collect()
+}
+
 impl ToolPath {
     /// The same path with trapezoidal velocities: along each move the velocity changes by `acceleration` at most, m/s², and
-    /// from move to move by `jerk` along each axis, m/s (as Marlin's classic jerk): passes back and forth over the moves give
-    /// the velocity at each corner. Waits, and filament alone, keep their time and let velocity pass. Velocity is
-    /// even along each move of the result.
+    /// from move to move by `jerk` along each axis, m/s (as Marlin's classic jerk). Waits, and filament
+    /// alone, keep their time and let velocity pass. Velocity is even along each move of the result.
     ///
     /// # Errors
     /// An acceleration or a jerk that is not positive.
@@ -18,44 +53,87 @@ impl ToolPath {
                 return Err(Error::Parameter { name, found, allowed: "positive and finite".into() });
             }
         }
-        let moves: Vec<(f64, f64, Vector3<f64>)> = (self.moves.iter())
-            .map(|one| {
-                let length = one.length();
-                let along = Vector3::from(one.to) - Vector3::from(one.from);
-                (length, length / (one.end - one.start), along / length)
-            })
+        let mut last: Option<(f64, Vector3<f64>)> = None;
+        let mut ramps = Vec::with_capacity(self.moves.len());
+        for one in &self.moves {
+            let length = one.length();
+            let velocity = length / (one.end - one.start);
+            let along = (Vector3::from(one.to) - Vector3::from(one.from)) / length;
+            let enter = last.map_or(0.0, |(before, from)| {
+                let jump = (along * velocity - from * before).amax();
+                before.min(velocity) * if jump > jerk { jerk / jump } else { 1.0 }
+            });
+            last = Some((velocity, along));
+            ramps.push(Ramp { length, velocity, acceleration, enter });
+        }
+        let mut moved = Vec::with_capacity(ramps.len());
+        for (one, took) in self.moves.iter().zip(durations(&ramps, 0.0)) {
+            moved.push([one.start, one.end, took]);
+        }
+        self.retime(&moved);
+        Ok(self)
+    }
+
+    /// The same path with the limits that its file states, filament alone too: with each axis' velocity,
+    /// acceleration and jerk, or the deviation at junctions, of their time in the file. Waits are stops.
+    pub fn as_stated(mut self) -> Self {
+        let mut last: Option<(Ramp, [f64; 4])> = None;
+        let (mut ramps, mut kept): (Vec<Ramp>, Vec<usize>) = Default::default();
+        for (k, motion) in self.motions.iter().enumerate() {
+            let limits: &Limits = &self.limits[motion.limits as usize];
+            let velocity = motion.length() / (motion.end - motion.start);
+            let Some((mut ramp, along)) = limits.ramp(motion.delta, velocity) else { continue };
+            let before = last.filter(|_| !motion.stop);
+            ramp.enter = limits.corner(before.as_ref().map(|(ramp, from)| (ramp, *from)), (&ramp, along));
+            last = Some((ramp, along));
+            ramps.push(ramp);
+            kept.push(k);
+        }
+        let took = durations(&ramps, 0.0);
+        let moved: Vec<[f64; 3]> = (kept.iter().zip(took))
+            .map(|(&k, took)| [self.motions[k].start, self.motions[k].end, took])
             .collect();
-        // at the beginning of each move, and at the end of the last: rest at both ends
-        let mut corner = vec![0.0; moves.len() + 1];
-        for (k, pair) in (1..).zip(moves.windows(2)) {
-            let [(_, before, from), (_, after, to)] = [pair[0], pair[1]];
-            let jump = (to * after - from * before).amax();
-            corner[k] = before.min(after) * if jump > jerk { jerk / jump } else { 1.0 };
+        self.retime(&moved);
+        self
+    }
+
+    /// The limits that the file states, in a line; `None` where it states none of motion.
+    pub fn limits_told(&self) -> Option<String> {
+        let acts = |motion: &Motion| self.limits[motion.limits as usize].stated;
+        let last = self.motions.iter().rfind(|motion| acts(motion))?;
+        Some(self.limits[last.limits as usize].told())
+    }
+
+    /// Gives motions, with start and end of each, s, new durations; all else keeps its own.
+    fn retime(&mut self, moved: &[[f64; 3]]) {
+        // by how much all is later from the end of a motion on
+        let mut shift = Vec::with_capacity(moved.len());
+        let mut late = 0.0;
+        for [start, end, took] in moved {
+            late += took - (end - start);
+            shift.push((*start, *end, late));
         }
-        let reach = |velocity: f64, length: f64| (velocity * velocity + 2.0 * acceleration * length).sqrt();
-        for k in (0..moves.len()).rev() {
-            corner[k] = corner[k].min(reach(corner[k + 1], moves[k].0));
-        }
-        for k in 0..moves.len() {
-            corner[k + 1] = corner[k + 1].min(reach(corner[k], moves[k].0));
-        }
-        let (mut time, mut last) = (0.0, 0.0);
-        let mut shift = Vec::with_capacity(moves.len());
-        for ((k, one), (length, velocity, _)) in self.moves.iter_mut().enumerate().zip(moves) {
-            let [a, b] = [corner[k], corner[k + 1]];
-            let squares = a * a + b * b;
-            let top = velocity.min((acceleration * length + 0.5 * squares).sqrt()).max(a).max(b);
-            let even = (length - (2.0 * top * top - squares) / (2.0 * acceleration)).max(0.0);
-            let start = time + (one.start - last);
-            time = start + (2.0 * top - a - b) / acceleration + even / top;
-            shift.push((one.end, time - one.end));
-            last = one.end;
-            (one.start, one.end) = (start, time);
+        let later = |time: f64| {
+            let after = shift.partition_point(|(_, end, _)| *end <= time);
+            let before = after.checked_sub(1).map_or(0.0, |k| shift[k].2);
+            match shift.get(after) {
+                // within a motion, in proportion
+                Some((start, end, late)) if *start < time => {
+                    time + before + (late - before) * (time - start) / (end - start)
+                }
+                _ => time + before,
+            }
+        };
+        let whole = self.duration();
+        for one in &mut self.moves {
+            (one.start, one.end) = (later(one.start), later(one.end));
         }
         for command in &mut self.commands {
-            let before = shift.partition_point(|(end, _)| *end <= command.time);
-            command.time += before.checked_sub(1).map_or(0.0, |k| shift[k].1);
+            command.time = later(command.time);
         }
-        Ok(self)
+        for motion in &mut self.motions {
+            (motion.start, motion.end) = (later(motion.start), later(motion.end));
+        }
+        self.rest = later(whole) - self.moves.last().map_or(0.0, |last| last.end);
     }
 }

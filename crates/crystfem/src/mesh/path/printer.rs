@@ -1,7 +1,8 @@
 //! The state of a printer, and what its moves and arcs do to it.
 
-use super::Move;
-use std::f64::consts::TAU;
+use super::{Motion, Move};
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
 
 /// Distance of chords from their arc at most, m.
 const CHORD: f64 = 1e-5;
@@ -35,10 +36,41 @@ pub(super) struct Printer {
     /// Filament fed, as named, in units of the file.
     feed: f64,
     pub relative: bool,
-    pub relative_feed: bool,
+    /// Since M82 or M83, which alone rule then; before them E goes with the axes.
+    pub relative_feed: Option<bool>,
     /// m/s; 0 before the first F.
     velocity: f64,
     pub time: f64,
+    /// The selected tool.
+    pub tool: u16,
+    /// Diameters of filament, m, of tools whose E is a volume (M200).
+    pub volumetric: BTreeMap<u16, f64>,
+    /// Moves that feed between G91 and G90 without M83, which firmwares read in two ways, and the line of the
+    /// first.
+    pub doubtful: (usize, u32),
+    /// States that SAVE_GCODE_STATE kept, by name.
+    saved: BTreeMap<String, Saved>,
+}
+
+/// Modes, velocity and names of places, as [`Printer`] has them.
+#[derive(Clone, Copy, Debug)]
+struct Saved {
+    relative: bool,
+    relative_feed: Option<bool>,
+    velocity: f64,
+    offset: [f64; 3],
+    feed: f64,
+}
+
+/// What comes with each move.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct With {
+    pub height: f64,
+    pub feature: u16,
+    pub limits: u32,
+    pub line: u32,
+    /// Whether the machine stood before it.
+    pub stop: bool,
 }
 
 impl Printer {
@@ -52,7 +84,9 @@ impl Printer {
         &mut self,
         value: impl Fn(char) -> Option<f64>,
         arc: Option<f64>,
+        with: With,
         moves: &mut Vec<Move>,
+        motions: &mut Vec<Motion>,
     ) -> Result<(), Wrong> {
         let velocity = |found| Wrong {
             what: "velocity F",
@@ -60,9 +94,11 @@ impl Printer {
             allowed: "positive and finite, before or in the first move".into(),
         };
         if let Some(feed) = value('F') {
-            // per minute
-            self.velocity = feed * self.unit / 60.0;
-            if !(self.velocity > 0.0 && self.velocity.is_finite()) {
+            // per minute; of 0 firmwares keep the one before
+            if feed != 0.0 {
+                self.velocity = feed * self.unit / 60.0;
+            }
+            if feed < 0.0 || !self.velocity.is_finite() {
                 return Err(velocity(feed));
             }
         }
@@ -75,10 +111,20 @@ impl Printer {
         }
         let fed = match value('E') {
             None => 0.0,
-            Some(number) if self.relative_feed => number,
+            Some(number) if self.relative_feed.unwrap_or(self.relative) => number,
             Some(number) => number - self.feed,
         };
         self.feed += fed;
+        if self.relative && self.relative_feed != Some(true) && value('E').is_some_and(|number| number > 0.0)
+        {
+            self.doubtful =
+                (self.doubtful.0 + 1, if self.doubtful.0 == 0 { with.line } else { self.doubtful.1 });
+        }
+        // m of filament
+        let fed = match self.volumetric.get(&self.tool) {
+            Some(diameter) => fed * self.unit.powi(3) / (0.25 * PI * diameter * diameter),
+            None => fed * self.unit,
+        };
         let (length, places) = match arc {
             Some(turn) => self.arc(from, turn, value)?,
             None => {
@@ -87,7 +133,7 @@ impl Printer {
             }
         };
         // filament alone takes its time too
-        let way = if length > 0.0 { length } else { fed.abs() * self.unit };
+        let way = if length > 0.0 { length } else { fed.abs() };
         if way == 0.0 {
             return Ok(());
         }
@@ -96,7 +142,15 @@ impl Printer {
         }
         let start = self.time;
         self.time += way / self.velocity;
+        let mut motion = Motion {
+            delta: [0.0, 0.0, 0.0, fed],
+            start,
+            end: self.time,
+            limits: with.limits,
+            stop: with.stop,
+        };
         if length == 0.0 {
+            motions.push(motion);
             return Ok(());
         }
         // filament that comes while the nozzle goes up or down alone fills it again after a retraction
@@ -109,8 +163,14 @@ impl Printer {
             } else {
                 start + (self.time - start) * (f64::from(k) / count)
             };
-            let (prints, fed) = (fed > 0.0 && across, fed * self.unit / count);
-            moves.push(Move { from: before.0, to, start: before.1, end, prints, fed });
+            let (prints, fed) = (fed > 0.0 && across, fed / count);
+            let (from, start) = before;
+            let With { height, feature, line, .. } = with;
+            moves.push(Move { from, to, start, end, prints, fed, height, feature, tool: self.tool, line });
+            motion.delta = [to[0] - from[0], to[1] - from[1], to[2] - from[2], fed];
+            (motion.start, motion.end) = (start, end);
+            motions.push(motion);
+            motion.stop = false;
             before = (to, end);
         }
         Ok(())
@@ -205,6 +265,26 @@ impl Printer {
         }
         if let Some(number) = value('E') {
             self.feed = number;
+        }
+        // all axes, without a word
+        if ['X', 'Y', 'Z', 'E'].into_iter().all(|letter| value(letter).is_none()) {
+            self.feed = 0.0;
+            self.offset = self.place.map(|x| -x);
+        }
+    }
+
+    /// Keeps modes, velocity and names of places under a name, as Klipper does.
+    pub fn save(&mut self, name: &str) {
+        let Self { relative, relative_feed, velocity, offset, feed, .. } = *self;
+        let state = Saved { relative, relative_feed, velocity, offset, feed };
+        self.saved.insert(name.to_owned(), state);
+    }
+
+    /// Takes them back; places stay where they are.
+    pub fn restore(&mut self, name: &str) {
+        if let Some(saved) = self.saved.get(name).copied() {
+            (self.relative, self.relative_feed) = (saved.relative, saved.relative_feed);
+            (self.velocity, self.offset, self.feed) = (saved.velocity, saved.offset, saved.feed);
         }
     }
 }

@@ -22,14 +22,13 @@ pub(super) fn together(program: &Program, source: &Source, vary: &[Vary], rows: 
             columns.push((vary.key.clone(), unit, list));
         }
     }
+    let mut names = Vec::new();
     for field in rows.fields() {
         for statistic in STATISTICS {
-            let name = format!("{statistic}{field}");
-            let list = finished().map(|(_, report)| report.scalar(&name).unwrap_or(0.0)).collect();
-            columns.push((name, String::new(), list));
+            names.push(format!("{statistic}{field}"));
         }
     }
-    for name in rows.asked() {
+    for name in names.into_iter().chain(rows.asked()) {
         let list = finished().map(|(_, report)| report.scalar(&name).unwrap_or(f64::NAN)).collect::<Vec<_>>();
         // a curve has no gaps
         if list.iter().all(|value| value.is_finite()) {
@@ -95,7 +94,8 @@ pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), crat
         let plot = |statistics: &[&str], what: &str| {
             let mut plot = LinePlot::new("At the end").axes(&label, what).size(800.0, 480.0);
             for other in &others {
-                for statistic in statistics {
+                // not every field has all of them: healing has no largest
+                for statistic in statistics.iter().filter(|name| rows.has(&format!("{name}{field}"))) {
                     plot = plot.series(line(other, statistic));
                 }
             }
@@ -111,7 +111,9 @@ pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), crat
         plot(shown, what).write(output.join(format!("sweep_{field}.png")))?;
         let deviation = format!("deviation of {field}");
         let what = if unit[1].is_empty() { deviation.as_str() } else { unit[1] };
-        plot(&STATISTICS[3..], what).write(output.join(format!("sweep_deviation_of_{field}.png")))?;
+        if rows.has(&format!("{}{field}", STATISTICS[3])) {
+            plot(&STATISTICS[3..], what).write(output.join(format!("sweep_deviation_of_{field}.png")))?;
+        }
     }
     Ok(())
 }

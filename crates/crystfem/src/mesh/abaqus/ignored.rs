@@ -1,0 +1,70 @@
+//! Keywords that say nothing about the mesh, with the keys of a scene that mean the same.
+
+use std::collections::BTreeMap;
+
+use super::cards::{Card, Cards};
+
+/// What a scene says instead.
+const INSTEAD: [(&str, &[&str]); 14] = [
+    ("`density` of [materials.NAME]", &["DENSITY"]),
+    ("`conductivity` of [materials.NAME]", &["CONDUCTIVITY"]),
+    ("`specific_heat` of [materials.NAME]", &["SPECIFIC HEAT"]),
+    ("`latent_heat` of [materials.NAME]", &["LATENT HEAT"]),
+    ("[materials.NAME]", &["MATERIAL", "USER MATERIAL", "DEPVAR"]),
+    ("[[region]] with `elements`", &["SOLID SECTION"]),
+    ("`temperature` of [[region]]", &["INITIAL CONDITIONS"]),
+    ("`temperature` of [[boundary]], whose `surface` may be a node set", &["BOUNDARY", "TEMPERATURE"]),
+    ("`film` and `ambient` of [[boundary]]", &["FILM", "SFILM", "FILM PROPERTY"]),
+    ("`emissivity` and `ambient` of [[boundary]]", &["RADIATE", "SRADIATE"]),
+    ("`flux` of [[boundary]], or `power` of [[source]]", &["DFLUX", "DSFLUX", "CFLUX"]),
+    ("values over time, `{ time = […], value = […] }`", &["AMPLITUDE"]),
+    ("[time]", &["HEAT TRANSFER", "COUPLED TEMPERATURE-DISPLACEMENT", "UNCOUPLED TEMPERATURE-DISPLACEMENT"]),
+    ("[mechanics]", &["ELASTIC", "EXPANSION", "PLASTIC", "VISCOELASTIC"]),
+];
+
+/// Keywords that join parts which share no nodes.
+const JOINING: [&str; 7] =
+    ["TIE", "CONTACT PAIR", "CONTACT", "EQUATION", "MPC", "GAP CONDUCTANCE", "EMBEDDED ELEMENT"];
+
+/// Keywords with their number, the first line and what it says.
+#[derive(Default)]
+pub(super) struct Ignored(BTreeMap<String, (usize, usize, String)>);
+
+impl Ignored {
+    /// Passes over a keyword; its first data line is kept for the note.
+    pub fn add(&mut self, card: &Card, cards: &mut Cards) {
+        let entry = self.0.entry(card.keyword.clone()).or_insert((0, card.line, String::new()));
+        if entry.0 == 0 {
+            entry.2 = card.parameter("NAME").map(str::to_owned).unwrap_or_default();
+            if let (true, Some(row)) = (entry.2.is_empty(), cards.row()) {
+                entry.2 = row.text().chars().take(40).collect();
+            }
+        }
+        entry.0 += 1;
+    }
+
+    /// One line each of those with a meaning here, one for the rest.
+    pub fn tell(self, notes: &mut Vec<String>) {
+        let mut rest = Vec::new();
+        for (keyword, (count, line, said)) in self.0 {
+            let instead = INSTEAD.iter().find(|(_, all)| all.contains(&keyword.as_str()));
+            let why = match instead {
+                Some((instead, _)) => format!("the deck has no units; give {instead}"),
+                None if JOINING.contains(&keyword.as_str()) => {
+                    "heat passes only between elements that share nodes: merge the nodes of the parts"
+                        .to_owned()
+                }
+                None => {
+                    rest.push(format!("*{keyword} ({count})"));
+                    continue;
+                }
+            };
+            let said = if said.is_empty() { String::new() } else { format!(", `{said}`") };
+            let times = if count > 1 { format!(", {count} times") } else { String::new() };
+            notes.push(format!("*{keyword} (line {line}{said}{times}) is NOT used: {why}"));
+        }
+        if !rest.is_empty() {
+            notes.push(format!("keywords not used: {}", rest.join(", ")));
+        }
+    }
+}

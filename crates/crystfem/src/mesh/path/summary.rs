@@ -1,0 +1,108 @@
+//! What a file prints, in lines for who wrote it.
+
+use super::ToolPath;
+
+/// A printing move that falls by more than this, and more steeply, lays nothing on anything, m.
+const FALL: f64 = 1e-3;
+const STEEP: f64 = 0.2;
+/// Features that are listed.
+const LISTED: usize = 12;
+
+impl ToolPath {
+    /// Tools that lay something, ascending.
+    pub fn tools(&self) -> Vec<u16> {
+        let mut tools: Vec<u16> = self.printing().map(|one| one.tool).collect();
+        tools.sort_unstable();
+        tools.dedup();
+        tools
+    }
+
+    /// The same path without what has no room above the bed (z ≤ 0) or falls through the air, as the purges
+    /// of some printers do: how many moves, the line of the first, and the share of the filament.
+    pub fn without_loose(&mut self) -> Option<(usize, u32, f64)> {
+        let whole = self.fed();
+        let (mut count, mut line, mut fed) = (0, 0, 0.0);
+        for one in self.moves.iter_mut().filter(|one| one.prints && one.fed > 0.0) {
+            let across = (one.to[0] - one.from[0]).hypot(one.to[1] - one.from[1]);
+            let fall = one.from[2] - one.to[2];
+            if one.to[2].max(one.from[2]) <= 0.0 || (fall > FALL && fall > STEEP * across) {
+                line = if count == 0 { one.line } else { line };
+                count += 1;
+                fed += one.fed;
+                (one.prints, one.fed) = (false, 0.0);
+            }
+        }
+        (count > 0).then(|| (count, line, fed / whole))
+    }
+
+    /// Layers, box, filament, volume and time of what is printed, and the share of each feature in its
+    /// volume. `filament`: its diameter, m.
+    pub fn told(&self, filament: f64) -> Vec<String> {
+        let ends = || self.printing().flat_map(|one| [one.from, one.to]);
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for end in ends() {
+            for d in 0..3 {
+                (low[d], high[d]) = (low[d].min(end[d]), high[d].max(end[d]));
+            }
+        }
+        let place = |at: [f64; 3]| {
+            let [x, y, z] = at.map(|x| (1e6 * x).round() / 1e3);
+            format!("({x}, {y}, {z}) mm")
+        };
+        let layers = if self.layers > 0 { self.layers } else { self.levels().len() };
+        let volume: f64 = self.printing().map(|one| one.volume(filament)).sum();
+        let mut lines = vec![format!(
+            "the file prints {layers} {}, middle lines from {} to {}, {:.3} mm³ of {:.1} mm of filament, in {}",
+            match (self.layers > 0, layers) {
+                (true, 1) => "marked layer",
+                (true, _) => "marked layers",
+                (false, 1) => "level",
+                (false, _) => "levels",
+            },
+            place(low),
+            place(high),
+            1e9 * volume,
+            1e3 * self.fed(),
+            clock(self.duration())
+        )];
+        let shares = self.shares();
+        if shares.iter().any(|(name, _)| !name.is_empty()) {
+            let name =
+                |name: &str| if name.is_empty() { "without a name".to_owned() } else { format!("`{name}`") };
+            let list =
+                shares.iter().take(LISTED).map(|(of, share)| format!("{} {:.1} %", name(of), 100.0 * share));
+            let more = shares.len().saturating_sub(LISTED);
+            let more = if more > 0 { format!(", {more} more") } else { String::new() };
+            lines.push(format!("by feature: {}{more}", list.collect::<Vec<_>>().join(", ")));
+        }
+        lines
+    }
+
+    /// How the duration compares with the slicer's estimate, where the file has one; what it was computed
+    /// with. An estimate that differs by more than a twentieth says what to do.
+    pub fn compared(&self, with: &str) -> Option<String> {
+        let estimate = self.estimate?;
+        let start = self.moves.get(self.first).map_or(0.0, |one| one.start);
+        let own = self.duration() - start;
+        let off = 100.0 * (own / estimate - 1.0);
+        let (own, said) = (clock(own), clock(estimate));
+        let from = if self.first > 0 { "from the first layer on " } else { "" };
+        let told =
+            format!("{from}the path takes {own} {with}, and {said} as its slicer estimates ({off:+.1} %)");
+        Some(match off.abs() > 5.0 {
+            true => format!("{told}: `acceleration` and `jerk` set other limits"),
+            false => told,
+        })
+    }
+}
+
+/// A duration to read: `1 h 2 min 3.5 s`.
+pub(super) fn clock(seconds: f64) -> String {
+    let (hours, minutes) = ((seconds / 3600.0).floor(), (seconds % 3600.0 / 60.0).floor());
+    let rest = (10.0 * (seconds - 3600.0 * hours - 60.0 * minutes)).round() / 10.0;
+    match (hours > 0.0, minutes > 0.0) {
+        (true, _) => format!("{hours} h {minutes} min {rest:.0} s"),
+        (false, true) => format!("{minutes} min {rest} s"),
+        (false, false) => format!("{rest} s"),
+    }
+}

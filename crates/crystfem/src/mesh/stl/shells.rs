@@ -1,0 +1,285 @@
+//! Shells of a surface: whether they are closed, and which side of each is outside.
+
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
+
+use super::crossing;
+use crate::error::Error;
+use nalgebra::Vector3;
+
+/// By how much a point that tells where a shell is lies inside its box, in parts of it: not on another shell's edges.
+const INWARDS: f64 = 1.37e-4;
+
+/// Corners closer than this part of the largest extent are one.
+const WELD: f64 = 1e-6;
+
+/// Times that triangles are split, and open edges times their corners that are looked at.
+const ROUNDS: usize = 30;
+const MOST_PAIRS: usize = 100_000_000;
+
+/// A shell: triangles joined by edges.
+pub(super) struct Shell {
+    triangles: Vec<u32>,
+    bounds: [[f64; 3]; 2],
+    /// Six times its signed volume, m³.
+    six: f64,
+}
+
+/// The number of each point after points closer than [`WELD`] became one, the first of them.
+pub(super) fn weld(points: &[[f64; 3]]) -> Vec<u32> {
+    let [low, high] = bounds(points.iter());
+    let size = (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+    let near = WELD * size;
+    if !(near > 0.0 && near.is_finite()) {
+        return (0..points.len() as u32).collect();
+    }
+    // cells twice as large: those near a point are its own and its neighbour on the nearer side
+    let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    let mut first = Vec::with_capacity(points.len());
+    for (number, point) in (0_u32..).zip(points) {
+        let at = [0, 1, 2].map(|d| (point[d] - low[d]) / (2.0 * near));
+        let own = at.map(|x| x.floor() as i64);
+        let side = [0, 1, 2].map(|d| if at[d] - own[d] as f64 > 0.5 { 1 } else { -1 });
+        let mut known = None;
+        for k in 0..8 {
+            let cell = [0, 1, 2].map(|d| own[d] + if k >> d & 1 == 1 { side[d] } else { 0 });
+            let close = |other: &&u32| {
+                let other = points[**other as usize];
+                (0..3).map(|d| (other[d] - point[d]).powi(2)).sum::<f64>() <= near * near
+            };
+            let found = cells.get(&cell).and_then(|all| all.iter().find(close)).copied();
+            known = match (known, found) {
+                (Some(a), Some(b)) => Some(std::cmp::min::<u32>(a, b)),
+                (a, b) => a.or(b),
+            };
+        }
+        if known.is_none() {
+            cells.entry(own).or_default().push(number);
+        }
+        first.push(known.unwrap_or(number));
+    }
+    first
+}
+
+/// The shells of a closed surface: along every edge as many triangles pass one way as the other. Two bodies may share an edge, or a
+/// face. Triangles that are there twice are left out if the surface is not closed with them.
+///
+/// # Errors
+/// [`Error::Mesh`] with the edges that are not so.
+pub(super) fn shells(
+    path: &Path,
+    points: &[[f64; 3]],
+    triangles: &mut Vec<[u32; 3]>,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Shell>, Error> {
+    let mut edges = edges(triangles);
+    if !is_closed(&edges) {
+        let mut known = HashSet::new();
+        let before = triangles.len();
+        triangles.retain(|&[a, b, c]| {
+            let least = a.min(b).min(c);
+            let turned = [[a, b, c], [b, c, a], [c, a, b]].into_iter().find(|three| three[0] == least);
+            known.insert(turned)
+        });
+        let doubled = before - triangles.len();
+        if doubled > 0 {
+            notes.push(format!("{doubled} triangles that are there twice are left out"));
+            edges = self::edges(triangles);
+        }
+    }
+    if !is_closed(&edges) {
+        let split = split(points, triangles, &mut edges);
+        if split > 0 {
+            notes.push(format!("{split} triangles are split where corners of others lie on their edges"));
+        }
+    }
+    closed(path, points, &edges)?;
+    // the first of the triangles that each is joined to
+    let mut of: Vec<u32> = (0..triangles.len() as u32).collect();
+    let root = |of: &mut Vec<u32>, mut k: u32| {
+        while of[k as usize] != k {
+            of[k as usize] = of[of[k as usize] as usize];
+            k = of[k as usize];
+        }
+        k
+    };
+    for (k, &[a, b, c]) in (0_u32..).zip(&*triangles) {
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            let other = edges.get(&[p.min(q), p.max(q)]).map_or(k, |edge| edge.1);
+            let [one, two] = [root(&mut of, k), root(&mut of, other)];
+            of[one.max(two) as usize] = one.min(two);
+        }
+    }
+    let mut number: HashMap<u32, usize> = HashMap::new();
+    let mut shells: Vec<Shell> = Vec::new();
+    for k in 0..triangles.len() as u32 {
+        let next = shells.len();
+        let own = *number.entry(root(&mut of, k)).or_insert(next);
+        if own == next {
+            let bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+            shells.push(Shell { triangles: Vec::new(), bounds, six: 0.0 });
+        }
+        shells[own].triangles.push(k);
+    }
+    for shell in &mut shells {
+        let all = shell.triangles.iter().map(|&k| triangles[k as usize]);
+        shell.bounds = bounds(all.clone().flatten().map(|n| &points[n as usize]));
+        let at = |n: u32| Vector3::from(points[n as usize]) - Vector3::from(shell.bounds[0]);
+        shell.six = all.map(|[a, b, c]| at(a).cross(&at(b)).dot(&at(c))).sum();
+    }
+    Ok(shells)
+}
+
+/// Of each edge, lower corner first: how often it is passed either way, and its first triangle.
+type Edges = HashMap<[u32; 2], ([u32; 2], u32)>;
+
+fn edges(triangles: &[[u32; 3]]) -> Edges {
+    let mut edges = Edges::new();
+    for (k, &[a, b, c]) in (0..).zip(triangles) {
+        for [p, q] in [[a, b], [b, c], [c, a]] {
+            edges.entry([p.min(q), p.max(q)]).or_insert(([0; 2], k)).0[usize::from(p > q)] += 1;
+        }
+    }
+    edges
+}
+
+fn is_closed(edges: &Edges) -> bool {
+    edges.values().all(|(count, _)| count[0] == count[1])
+}
+
+/// Splits triangles at corners of others that lie on their edges, where the surface is open; how many.
+fn split(points: &[[f64; 3]], triangles: &mut Vec<[u32; 3]>, edges: &mut Edges) -> usize {
+    let [low, high] = bounds(points.iter());
+    let near = WELD * (0..3).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+    let at = |n: u32| Vector3::from(points[n as usize]);
+    let before = triangles.len();
+    for _ in 0..ROUNDS {
+        let mut open: Vec<[u32; 2]> =
+            edges.iter().filter(|(_, (count, _))| count[0] != count[1]).map(|(ends, _)| *ends).collect();
+        open.sort_unstable();
+        let mut corners = open.as_flattened().to_vec();
+        corners.sort_unstable();
+        corners.dedup();
+        if open.len() * corners.len() > MOST_PAIRS {
+            break;
+        }
+        let on = |&[p, q]: &[u32; 2]| {
+            let along = at(q) - at(p);
+            let inside = |r: &u32| {
+                let arm = at(*r) - at(p);
+                let part = arm.dot(&along) / along.norm_squared();
+                let apart = (arm - along * part).norm();
+                part > 0.0 && part < 1.0 && apart <= near && *r != p && *r != q
+            };
+            corners.iter().copied().find(inside).map(|r| ([p, q], r))
+        };
+        let found: HashMap<[u32; 2], u32> = open.iter().filter_map(on).collect();
+        if found.is_empty() {
+            break;
+        }
+        for k in 0..triangles.len() {
+            let [a, b, c] = triangles[k];
+            for [p, q, third] in [[a, b, c], [b, c, a], [c, a, b]] {
+                if let Some(&r) = found.get(&[p.min(q), p.max(q)]).filter(|r| **r != third) {
+                    triangles[k] = [p, r, third];
+                    triangles.push([r, q, third]);
+                    break;
+                }
+            }
+        }
+        *edges = self::edges(triangles);
+    }
+    triangles.len() - before
+}
+
+/// Every edge is passed as often one way as the other.
+fn closed(path: &Path, points: &[[f64; 3]], edges: &Edges) -> Result<(), Error> {
+    let unequal = edges.iter().filter(|(_, (count, _))| count[0] != count[1]);
+    let mut wrong: Vec<([u32; 2], [u32; 2])> = unequal.map(|(ends, (count, _))| (*ends, *count)).collect();
+    wrong.sort_unstable();
+    let Some((ends, _)) = wrong.first() else { return Ok(()) };
+    let count = |is: &dyn Fn(u32, u32) -> bool| wrong.iter().filter(|(_, [a, b])| is(*a, *b)).count();
+    let open = count(&|a, b| a + b == 1);
+    let many = count(&|a, b| a + b > 2);
+    let turned = count(&|a, b| a + b == 2);
+    let [p, q] = ends.map(|node| points[node as usize].map(|x| (1e9 * x).round() / 1e6));
+    Err(Error::Mesh(format!(
+        "{}: not a closed surface: {open} edges of one triangle, {many} of more than two, {turned} of two that \
+         face opposite ways, the first from {p:?} to {q:?} mm; allowed: 0 (repair it where it was drawn)",
+        path.display()
+    )))
+}
+
+/// Turns what is inside out: all, where the shells together have no volume otherwise, then shells that leave a place inside or
+/// outside of them that none surrounds. What faces inwards inside another shell is a cavity. Returns the volume, m³.
+pub(super) fn orient(
+    points: &[[f64; 3]],
+    triangles: &mut [[u32; 3]],
+    mut shells: Vec<Shell>,
+    notes: &mut Vec<String>,
+) -> f64 {
+    if shells.iter().map(|shell| shell.six).sum::<f64>() < 0.0 {
+        notes.push("triangles are clockwise seen from outside: turned".to_owned());
+        triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        shells.iter_mut().for_each(|shell| shell.six = -shell.six);
+    }
+    let around = |k: usize, at: [f64; 3]| -> i32 {
+        let others = shells.iter().enumerate().filter(|(other, shell)| {
+            let [low, high] = shell.bounds;
+            *other != k && (0..3).all(|d| low[d] <= at[d] && at[d] <= high[d])
+        });
+        let own = others.flat_map(|(_, shell)| shell.triangles.iter().map(|&n| &triangles[n as usize]));
+        own.filter_map(|triangle| crossing(triangle, points, [at[0], at[1]]))
+            .filter(|(z, _)| *z > at[2])
+            .map(|(_, way)| way)
+            .sum()
+    };
+    let wrong: Vec<usize> = (0..shells.len())
+        .filter(|&k| {
+            let shell = &shells[k];
+            let places = extremes(shell, points, triangles).map(|at| around(k, at));
+            match shell.six < 0.0 {
+                true => places.into_iter().min() < Some(1),
+                false => places.into_iter().max() < Some(0),
+            }
+        })
+        .filter(|_| shells.len() > 1)
+        .collect();
+    if !wrong.is_empty() {
+        let [count, all] = [wrong.len(), shells.len()];
+        notes.push(format!("{count} of {all} shells are inside out and no cavities: turned"));
+    }
+    for k in wrong {
+        shells[k].triangles.iter().for_each(|&n| triangles[n as usize].swap(1, 2));
+        shells[k].six *= -1.0;
+    }
+    if shells.len() > 1 {
+        let cavities = shells.iter().filter(|shell| shell.six < 0.0).count();
+        notes.push(format!("{} shells, {cavities} of them cavities", shells.len()));
+    }
+    shells.iter().map(|shell| shell.six).sum::<f64>() / 6.0
+}
+
+/// The ends of a shell along each axis, a little inside its box.
+fn extremes(shell: &Shell, points: &[[f64; 3]], triangles: &[[u32; 3]]) -> [[f64; 3]; 6] {
+    let [low, high] = shell.bounds;
+    let corners = || shell.triangles.iter().flat_map(|&n| triangles[n as usize]).map(|n| points[n as usize]);
+    std::array::from_fn(|k| {
+        let (d, end) = (k % 3, if k < 3 { low } else { high });
+        let at = corners().find(|at| at[d] == end[d]).unwrap_or(low);
+        std::array::from_fn(|e| {
+            let middle = 0.5 * (low[e] + high[e]);
+            at[e] + INWARDS * (1.0 + 0.3 * e as f64) * (middle - at[e])
+        })
+    })
+}
+
+/// Box around points.
+pub(super) fn bounds<'a>(points: impl Iterator<Item = &'a [f64; 3]>) -> [[f64; 3]; 2] {
+    points.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[mut low, mut high], point| {
+        for d in 0..3 {
+            (low[d], high[d]) = (low[d].min(point[d]), high[d].max(point[d]));
+        }
+        [low, high]
+    })
+}

@@ -1,0 +1,84 @@
+//! Constants that a host does not pass: CalculiX takes six of a thermal material.
+
+use crate::constants::{HEAD, NAMES};
+use std::cell::RefCell;
+use std::path::PathBuf;
+
+/// Value of constant `kinetics` that asks for the file.
+const IN_FILE: f64 = 3.0;
+
+thread_local! {
+    /// The name and the constants of the last call on this thread, and the whole list.
+    static LAST: RefCell<Option<(String, Vec<f64>, Vec<f64>)>> = const { RefCell::new(None) };
+}
+
+/// The list of constants of a material by its name in the host: with `kinetics` 3 constants 7 to 15 come from `name.umatht` in the
+/// working directory, name in small letters, a line `growth_rate = 37869.0` (TOML) for each.
+///
+/// # Errors
+/// A file that cannot be read, a missing or unknown name, a value that is no number.
+pub fn complete(name: &str, list: &[f64]) -> Result<Vec<f64>, String> {
+    if list.get(3) != Some(&IN_FILE) {
+        return Ok(list.to_vec());
+    }
+    let name = name.trim().to_lowercase();
+    LAST.with_borrow_mut(|last| {
+        if let Some((known, given, whole)) = last
+            && *known == name
+            && given == list
+        {
+            return Ok(whole.clone());
+        }
+        let path = PathBuf::from(format!("{name}.umatht"));
+        let text = std::fs::read_to_string(&path).map_err(|error| {
+            format!("umatht: {}, asked for by constant `kinetics` 3: {error}", path.display())
+        })?;
+        let mut whole = list[..list.len().min(HEAD)].to_vec();
+        whole.resize(HEAD, 0.0);
+        whole[3] = 0.0;
+        whole.extend(parse(&text).map_err(|error| format!("umatht: {}: {error}", path.display()))?);
+        *last = Some((name, list.to_vec(), whole.clone()));
+        Ok(whole)
+    })
+}
+
+/// Constants 7 to 15, in their order.
+fn parse(text: &str) -> Result<Vec<f64>, String> {
+    let table: toml::Table = text.parse().map_err(|error: toml::de::Error| error.to_string())?;
+    let names = &NAMES[HEAD..];
+    if let Some(other) = table.keys().find(|key| !names.contains(&key.as_str())) {
+        return Err(format!("found `{other}`; allowed: {}", names.join(", ")));
+    }
+    let number = |name: &&str| -> Result<f64, String> {
+        let value = table.get(*name).ok_or_else(|| format!("`{name}` is missing"))?;
+        let number = value.as_float().or(value.as_integer().map(|whole| whole as f64));
+        number.ok_or_else(|| format!("{name}: found {value}; allowed: a number, SI"))
+    };
+    names.iter().map(number).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_has_the_rest() {
+        let text = "growth_rate = 37869\nnucleation = 136235.0\nactivation_energy = 6270.0\nequilibrium_melting = 466.35\n\
+                    frozen = 294.15\navrami_exponent = 2.678\nmelting_sharpness = 0.965\nmelting_shape = 8.584 # d\nmelting_peak = 450\n";
+        assert_eq!(
+            parse(text).unwrap(),
+            [37869.0, 136_235.0, 6270.0, 466.35, 294.15, 2.678, 0.965, 8.584, 450.0]
+        );
+        for (wrong, told) in [
+            (text.replace("frozen", "frosen"), "frosen"),
+            (text.replace("frozen = 294.15\n", ""), "`frozen` is missing"),
+            (text.replace("294.15", "\"21 degC\""), "a number"),
+            (text.replace("= 450", "450"), "TOML"),
+        ] {
+            let found = parse(&wrong).unwrap_err();
+            assert!(found.contains(told), "{found}");
+        }
+        assert_eq!(complete("X", &[1.0, 2.0, 0.0, 1.0]).unwrap(), [1.0, 2.0, 0.0, 1.0]);
+        assert!(complete("NO_SUCH", &[1.0, 2.0, 0.0, 3.0]).unwrap_err().contains("no_such.umatht"));
+    }
+}
