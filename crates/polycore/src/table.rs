@@ -222,12 +222,14 @@ impl Table {
         number.ok_or_else(|| self.refuse_cell(row, column, &self.why_no_number(text)))
     }
 
-    /// As [`Table::number`], nothing of a blank cell.
+    /// As [`Table::number`], nothing of a cell that is blank or says that there is no number (`n/a`, `-`).
     ///
     /// # Errors
     /// A cell that is neither blank nor a finite number.
     pub fn number_or_blank(&self, row: usize, column: usize) -> Result<Option<f64>, Error> {
-        if self.text(row, column).is_empty() { Ok(None) } else { self.number(row, column).map(Some) }
+        let blank = ["", "n/a", "na", "n.a."].contains(&self.text(row, column).to_lowercase().as_str())
+            || self.text(row, column).chars().all(|c| c == '-');
+        if blank { Ok(None) } else { self.number(row, column).map(Some) }
     }
 
     /// The unit of a column: that of its heading, or the one given for headings without.

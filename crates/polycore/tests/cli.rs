@@ -129,14 +129,15 @@ fn what_a_newcomer_sees() {
     }
     assert!(folder.path().join("out/chains/report.json").exists());
     assert_eq!(std::fs::read_dir(folder.path().join("out")).unwrap().count(), 2);
-    assert!(texts[0].contains("neo-hookean           shear_modulus 0.50000 ± "), "{}", texts[0]);
+    assert!(texts[0].contains("neo-hookean           shear_modulus 0.500000 ± "), "{}", texts[0]);
     assert!(
-        texts[0].contains("shear_modulus = \"0.500000 MPa\"") && texts[0].contains("model = \"neo-hookean\""),
+        texts[0].contains("shear_modulus = \"0.5000000 MPa\"")
+            && texts[0].contains("model = \"neo-hookean\""),
         "{}",
         texts[0]
     );
     assert!(texts[1].contains("links "), "{}", texts[1]);
-    let blocks = std::fs::read_to_string(folder.path().join("out/chains/materials.toml")).unwrap();
+    let blocks = std::fs::read_to_string(folder.path().join("out/case/materials.toml")).unwrap();
     assert!(toml::from_str::<toml::Table>(&blocks).unwrap().contains_key("material"), "{blocks}");
     let plan = text(&polycore(&["check", scene.to_str().unwrap()]).stdout);
     assert!(plan.contains("no line `# source: …` in it"), "{plan}");
@@ -227,7 +228,7 @@ fn check_says_what_run_would_do() {
     let text = text(&result.stdout);
     assert!(text.contains("data treloar: 21 states, 20 measured stresses"), "{text}");
     assert!(text.contains("law eight-chain: chain_modulus, links"), "{text}");
-    assert!(text.contains("18 fits, 0 trials, 8 expectations"), "{text}");
+    assert!(text.contains("20 fits, 0 trials, 8 expectations"), "{text}");
 }
 
 #[test]
@@ -259,5 +260,154 @@ fn completions() {
         let result = polycore(&["completions", shell]);
         assert_eq!(result.status.code(), Some(0));
         assert!(text(&result.stdout).contains("polycore"));
+    }
+}
+
+/// A scene of one table, all laws, `keys` in its entry.
+fn fitted(table: &str, keys: &str) -> (tempfile::TempDir, Output) {
+    let scene = format!(
+        "version = 1\nprogram = \"polycore\"\n[fit]\n[[fit.data]]\nname = \"t\"\nfile = \"bar.csv\"\n{keys}\n"
+    );
+    let (folder, scene) = folder(&scene);
+    std::fs::write(folder.path().join("bar.csv"), table).unwrap();
+    let result = run(&scene, &folder.path().join("out"));
+    (folder, result)
+}
+
+/// Exact neo-Hookean stresses λ − λ⁻² times a modulus.
+fn neo_hookean(unit: &str, modulus: f64, stretches: impl IntoIterator<Item = f64>) -> String {
+    let row = |l: f64| format!("{l},{}\n", modulus * (l - 1.0 / (l * l)));
+    format!("stretch,nominal_{unit}\n{}", stretches.into_iter().map(row).collect::<String>())
+}
+
+/// Compression, one-term data, gels: every law is fitted or named, and what is written has its digits.
+#[test]
+fn ordinary_tables_give_every_law() {
+    let laws = 10;
+    let squeezed = neo_hookean("MPa", 0.4, [0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.65, 0.6]);
+    let gel = neo_hookean("Pa", 5.123_45, (1..12).map(|i| 1.0 + 0.1 * f64::from(i)));
+    let stiff = neo_hookean("GPa", 1.25, (1..12).map(|i| 1.0 + 0.01 * f64::from(i)));
+    for (table, modulus, written) in [
+        (&squeezed, 0.4, "\"0.4000000 MPa\""),
+        (&gel, 5.123_45e-6, "\"5.123450 Pa\""),
+        (&stiff, 1250.0, "\"1.250000 GPa\""),
+    ] {
+        let (folder, result) = fitted(table, "");
+        let shown = text(&result.stdout);
+        assert_eq!(result.status.code(), Some(0), "{shown}{}", text(&result.stderr));
+        assert!(!shown.contains("failed") && shown.contains("separator `,`, decimal point"), "{shown}");
+        assert!(shown.contains("mooney-rivlin") && shown.contains("C2 absent"), "{shown}");
+        let report = Report::read(folder.path().join("out/report.json")).unwrap();
+        let found = report.scalar("t.neo-hookean.shear_modulus").unwrap();
+        assert!((found / modulus - 1.0).abs() < 1e-6, "{found} {modulus}");
+        assert_eq!(report.scalar("t.ogden-3.stable"), Some(1.0));
+        let materials = std::fs::read_to_string(folder.path().join("out/materials.toml")).unwrap();
+        assert!(materials.contains(written), "{materials}");
+        assert!(
+            materials.contains("# mooney-rivlin, rms") && materials.contains("take `neo-hookean`"),
+            "{materials}"
+        );
+        let fits = std::fs::read_to_string(folder.path().join("out/fits.csv")).unwrap();
+        let keys = fits.lines().filter(|line| line.contains(",r2,")).count();
+        assert_eq!(keys, laws, "{fits}");
+        assert!(fits.lines().all(|line| line.split(',').all(|cell| cell.len() < 24)), "{fits}");
+    }
+}
+
+/// Few data: laws of more parameters are named as failed, the others are kept.
+#[test]
+fn a_law_that_fails_is_named() {
+    let (folder, result) = fitted("stretch,nominal_MPa\n1.5,0.4\n2,0.7\n3,1.1\n", "");
+    let shown = text(&result.stdout);
+    assert_eq!(result.status.code(), Some(0), "{shown}{}", text(&result.stderr));
+    assert!(
+        shown.contains("failed  ogden-3 on t: fit of `ogden-3`: 3 measurements for 6 parameters"),
+        "{shown}"
+    );
+    let report = Report::read(folder.path().join("out/report.json")).unwrap();
+    assert_eq!(report.scalar("t.ogden-2.failed"), Some(1.0));
+    assert!(report.scalar("t.gent.rms").is_some() && report.scalar("t.ogden-2.rms").is_none());
+}
+
+/// What a table leaves open is settled by a key, and what it cannot be is said.
+#[test]
+fn tables_of_laboratories() {
+    let laboratory = "Test;Specimen;Strain (%);Stress (MPa)\nuniaxial;1;0,0;0\nuniaxial;1;50,0;0,527778\n\
+                      uniaxial;1;100,0;0,875\nequibiaxial;1;50,0;0,684156\nplanar;1;50,0;0,601852\nplanar;1;60,0;0,7\n";
+    let (_folder, result) = fitted(laboratory, "");
+    let shown = text(&result.stdout);
+    assert_eq!(result.status.code(), Some(0), "{shown}{}", text(&result.stderr));
+    for part in [
+        "separator `;`, decimal comma, UTF-8, headings in line 1, columns `Test`, `Strain (%)`, `Stress (MPa)`",
+        "engineering strain and nominal stress (the headings do not say which; keys `strain` and `stress`)",
+        "stretches 1.0000 to 2.0000",
+    ] {
+        assert!(shown.contains(part), "{shown}");
+    }
+    // σ = λP of the same bar
+    let (folder, result) = fitted(
+        "eps;sigma\n0.5;0.791667\n1;1.75\n2;4.33333\n",
+        "strain = \"engineering\"\nstress = \"true\"\nstress_unit = \"MPa\"",
+    );
+    assert_eq!(result.status.code(), Some(0), "{}", text(&result.stderr));
+    let report = Report::read(folder.path().join("out/report.json")).unwrap();
+    assert!((report.scalar("t.neo-hookean.shear_modulus").unwrap() / 0.5 - 1.0).abs() < 1e-5);
+    let strains = "stretch,nominal_MPa\n0.05,0.05719\n0.1,0.10942\n0.4,0.35592\n0.8,0.59654\n1.2,0.79736\n";
+    for (table, keys, parts) in [
+        (strains, "", &["bar.csv", "line 2: column 1, `stretch`", "is this a strain?"][..]),
+        ("eps;sigma\n0.5;0.79\n", "", &["unit of column 2, `sigma`", "stress_unit"]),
+        ("eps;sigma/MPa\n0.5;0,79\n", "", &["line 2", "decimal"]),
+        ("Force (N),Extension (mm)\n1,2\n", "", &["divided by the undeformed area"]),
+    ] {
+        let (_folder, result) = fitted(table, keys);
+        let error = text(&result.stderr).replace(['\n', '│'], " ");
+        let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(result.status.code(), Some(2), "{error}");
+        assert!(parts.iter().all(|part| error.contains(part)), "{error}");
+    }
+    // strains that are named as such by the key
+    let (_folder, result) = fitted(strains, "strain = \"engineering\"");
+    assert_eq!(result.status.code(), Some(0), "{}", text(&result.stderr));
+}
+
+/// `cross` says where a law may be used: Ogden's term of α < 0, which fits bars, is far off in equibiaxial tension.
+#[test]
+fn cross_ends_in_a_verdict() {
+    let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../../cases/external/treloar-fits/treloar1944_20C.csv");
+    let scene = "version = 1\nprogram = \"polycore\"\n[fit]\ncross = true\nlaws = [\"ogden-1\", \"eight-chain-root-i2\"]\n\
+                 [[fit.data]]\nname = \"bar\"\nfile = \"t.csv\"\nmode = \"uniaxial\"\n\
+                 [[fit.data]]\nname = \"sheet\"\nfile = \"t.csv\"\nmode = \"equibiaxial\"\n";
+    let (folder, scene) = folder(scene);
+    std::fs::copy(case, folder.path().join("t.csv")).unwrap();
+    let result = run(&scene, &folder.path().join("out"));
+    let shown = text(&result.stdout);
+    assert_eq!(result.status.code(), Some(0), "{shown}{}", text(&result.stderr));
+    assert!(shown.contains("; unsafe outside bar"), "{shown}");
+    let lines: Vec<&str> = shown.lines().filter(|line| line.contains("safe outside bar")).collect();
+    assert!(lines[0].trim_start().starts_with("ogden-1") && lines[0].contains("; unsafe"), "{shown}");
+    assert!(
+        lines[1].trim_start().starts_with("eight-chain-root-i2") && lines[1].contains("; safe"),
+        "{shown}"
+    );
+    let fits = std::fs::read_to_string(folder.path().join("out/fits.csv")).unwrap();
+    assert!(fits.contains("bar,ogden-1,r2.sheet,-"), "{fits}");
+}
+
+/// Names of other programs lead to the law that they are here.
+#[test]
+fn laws_of_other_names_get_advice() {
+    for (name, advice) in [
+        ("arruda-boyce", "`eight-chain`: that is Arruda and Boyce's law"),
+        ("reduced-polynomial", "`yeoh`"),
+        ("prony", "rates and relaxation are not modelled"),
+        ("poisson_ratio", "incompressible"),
+        ("ogden", "by the number of terms"),
+    ] {
+        let (_folder, scene) = folder(&SCENE.replace("\"neo-hookean\"]", &format!("\"{name}\"]")));
+        let result = polycore(&["check", scene.to_str().unwrap()]);
+        let error = text(&result.stderr).replace(['\n', '│'], " ");
+        let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(result.status.code(), Some(2), "{error}");
+        assert!(error.contains(advice), "{error}");
     }
 }

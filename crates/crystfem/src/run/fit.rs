@@ -90,9 +90,13 @@ pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneEr
         let of = if heats.is_empty() { String::new() } else { format!("; peaks of {}", heats.join(", ")) };
         format!("fit {}: {:?}, {what}{of}", spec.name, spec.law)
     };
+    Ok(read(source, scene).chain(scene.fit.iter().zip(&jobs).map(line)).collect())
+}
+
+/// How the tables of a scene are understood, a line each.
+pub fn read<'a>(source: &'a Source, scene: &'a FitScene) -> impl Iterator<Item = String> + 'a {
     let tables = scene.fit.iter().flat_map(|spec| &spec.data);
-    let tables = tables.filter_map(|data| crate::table::understood(&source.file(&data.file)));
-    Ok(tables.chain(scene.fit.iter().zip(&jobs).map(line)).collect())
+    tables.filter_map(|data| crate::table::understood(&source.file(&data.file)))
 }
 
 fn solve(spec: &FitSpec, job: Job, run: &mut polycore::case::Run) -> Result<Vec<Done>, Failure> {

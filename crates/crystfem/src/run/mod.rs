@@ -38,7 +38,12 @@ pub type Failure = polycore::scene::Failure<Error>;
 pub fn run(source: &Source, run: &mut Run) -> Result<Finished, Failure> {
     match scene::kind(source)? {
         Kind::Point => self::point::run(source, &points(source)?, run).map(Finished::from),
-        Kind::Fit => self::fit::run(source, &fits(source)?, run).map(Finished::from),
+        Kind::Fit => {
+            let scene = fits(source)?;
+            let report = self::fit::run(source, &scene, run)?;
+            let read: String = self::fit::read(source, &scene).map(|line| line + "\n").collect();
+            Ok(Finished { text: read + &report.table(), report })
+        }
         Kind::Part => {
             let scene = source.parse::<PartScene>()?;
             match scene.study.is_empty() {

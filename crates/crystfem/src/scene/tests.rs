@@ -288,3 +288,25 @@ fn bad_fits() {
     let error = result.unwrap_err().to_string();
     assert!(error.contains("`fit[0].data`") && error.contains("2 measurements for 3 parameters"), "{error}");
 }
+
+/// An export of Netzsch Proteus as it is: `##` before the headings, `;`, decimal commas, Latin-1. The peak
+/// q = 0.5 W/g e^{−((T − 170 °C)/4 K)²} of a run at 10 K/min over 0.05 W/g has ΔH = √π · 4 K · 0.5 W/g · 6 s/K = 21.2694 J/g.
+#[test]
+fn an_export_of_netzsch() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "#EXO:1\r\n#DECIMAL:COMMA\r\n#SEPARATOR:SEMICOLON\r\n#SAMPLE MASS /mg:5,21\r\n".to_owned();
+    text += "##Temp./°C;Time/min;DSC/(mW/mg)\r\n";
+    for row in 0..=600 {
+        let celsius = 200.0 - f64::from(row) / 12.0;
+        let flow = 0.05 + 0.5 * (-((celsius - 170.0) / 4.0).powi(2)).exp();
+        text += &format!("{celsius:.4};{:.5};{flow:.6}\r\n", f64::from(row) / 120.0).replace('.', ",");
+    }
+    let latin: Vec<u8> = text.chars().map(|c| u8::try_from(c).unwrap()).collect();
+    std::fs::write(folder.path().join("proteus.csv"), latin).unwrap();
+    let fit = "[[fit]]\nname = \"cool\"\nlaw = \"nakamura\"\nequilibrium_melting = \"193.2 degC\"\nglass_transition = \"51 degC\"\n\
+               heat_flow = { exothermal = \"up\" }\n\
+               data = [{ file = \"proteus.csv\", rate = \"10 K/min\", from = \"185 degC\", to = \"155 degC\" }]\n";
+    let lines = complaint(&head(fit), folder.path());
+    assert!(lines.ends_with("; peaks of 21.2694 J/g"), "{lines}");
+    assert!(lines.contains("separator `;`, decimal comma, Latin-1, headings in line 5"), "{lines}");
+}

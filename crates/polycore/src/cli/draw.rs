@@ -81,14 +81,13 @@ pub fn pictures(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Re
 fn curves(name: &str, test: &Test, states: &[&State], fits: &[&Fit]) -> LinePlot {
     let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
     let y: Vec<f64> = states.iter().map(|state| state.nominal[0] / MPA).collect();
-    let longest = 1.0 + 1.03 * x.iter().map(|l| l - 1.0).fold(0.0, f64::max);
-    let highest = 1.1 * y.iter().copied().fold(0.0, f64::max);
-    let stretches: Vec<f64> =
-        (0..=POINTS).map(|i| 1.0 + (longest - 1.0) * i as f64 / POINTS as f64).collect();
+    let [low, high] = span(&x, 1.0).map(|l| 1.0 + 1.03 * (l - 1.0)).map(|l| l.max(0.01));
+    let [least, most] = span(&y, 0.0).map(|nominal| 1.1 * nominal);
+    let stretches: Vec<f64> = (0..=POINTS).map(|i| low + (high - low) * i as f64 / POINTS as f64).collect();
     let mut plot = LinePlot::new(&format!("{name}: {}", test.title))
         .axes("stretch", "nominal stress, MPa")
-        .x_range(1.0, longest)
-        .y_range(0.0, highest)
+        .x_range(low, high)
+        .y_range(least, most)
         .series(Series::markers("measured", &x, &y));
     for fit in fits {
         // beyond locking a curve just ends
@@ -110,16 +109,21 @@ fn parity(name: &str, table: &Table, fits: &[&Fit]) -> Result<LinePlot, Error> {
         .filter(|nominal| *nominal != 0.0)
         .map(|nominal| nominal / MPA)
         .collect();
-    let highest = 1.1 * measured.iter().copied().fold(0.0, f64::max);
+    let [lowest, highest] = span(&measured, 0.0).map(|nominal| 1.1 * nominal);
     let mut plot = LinePlot::new(&format!("{name}: all measured stresses"))
         .axes("measured nominal stress, MPa", "nominal stress of the law, MPa")
-        .x_range(0.0, highest)
-        .y_range(0.0, highest)
-        .series(Series::reference("equal", &[0.0, highest], &[0.0, highest]));
+        .x_range(lowest, highest)
+        .y_range(lowest, highest)
+        .series(Series::reference("equal", &[lowest, highest], &[lowest, highest]));
     for fit in fits {
         let residuals = fit::residuals(&fit.law, table)?;
         let model: Vec<f64> = residuals.iter().zip(&measured).map(|(r, data)| r / MPA + data).collect();
         plot = plot.series(Series::markers(fit.model.key, &measured, &model));
     }
     Ok(plot)
+}
+
+/// Least and largest of some values and of that at rest.
+fn span(values: &[f64], rest: f64) -> [f64; 2] {
+    values.iter().fold([rest, rest], |[low, high], value| [value.min(low), value.max(high)])
 }

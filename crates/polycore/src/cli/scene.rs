@@ -4,7 +4,10 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use polycore::constitutive::hyperelastic::data::{Mode, Table};
-use polycore::constitutive::hyperelastic::{self, MODELS, ModelDescriptor};
+use polycore::constitutive::hyperelastic::fit::neo_hookean_modulus;
+use polycore::constitutive::hyperelastic::{
+    self, MODELS, Meaning, ModelDescriptor, StrainMeasure, StressMeasure,
+};
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
 use serde::Deserialize;
@@ -62,8 +65,26 @@ struct Data {
     name: String,
     /// The CSV file, relative to the scene.
     file: PathBuf,
-    /// Only the states of this test.
+    /// Only the states of this test; of a table without a column of tests, the test of all its states.
     mode: Option<Mode>,
+    /// Measure of the strain where its heading leaves it open.
+    strain: Option<StrainMeasure>,
+    /// Measure of the stress where its heading leaves it open.
+    stress: Option<StressMeasure>,
+    /// Unit of a stress whose heading has none: `MPa`.
+    stress_unit: Option<String>,
+    /// Heading of the strain, of several.
+    strain_column: Option<String>,
+    /// Heading of the stress, of several.
+    stress_column: Option<String>,
+}
+
+/// A table to be fitted.
+pub struct DataSet {
+    pub name: String,
+    pub table: Table,
+    /// How its file was understood, and what was left out of it, a line each.
+    pub read: Vec<String>,
 }
 
 /// The JSON Schema of scenes.
@@ -77,7 +98,7 @@ pub struct Case {
     pub title: String,
     pub laws: Vec<&'static ModelDescriptor>,
     pub cross: bool,
-    pub data: Vec<(String, Table)>,
+    pub data: Vec<DataSet>,
     pub trials: Vec<Trial>,
     pub expect: Vec<Expect>,
 }
@@ -90,7 +111,7 @@ impl Case {
             None => MODELS.iter().collect(),
             Some(names) => selected(source, names)?,
         };
-        let mut data: Vec<(String, Table)> = Vec::new();
+        let mut data: Vec<DataSet> = Vec::new();
         for (i, entry) in fit.data.into_iter().enumerate() {
             let key = |field: &str| format!("fit.data[{i}].{field}");
             let valid = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
@@ -98,29 +119,39 @@ impl Case {
                 let allowed = "letters, digits, `-` and `_`: it names files";
                 return Err(source.error(&key("name"), format!("`{}`", entry.name), allowed));
             }
-            if data.iter().any(|(name, _)| *name == entry.name) {
+            if data.iter().any(|other| other.name == entry.name) {
                 return Err(source.error(
                     &key("name"),
                     format!("`{}` a second time", entry.name),
                     "another name",
                 ));
             }
-            let mut table = Table::read(source.file(&entry.file)).map_err(|error| {
-                source.error(&key("file"), error, "a CSV table of stretches and nominal stresses")
-            })?;
+            let meaning = Meaning {
+                mode: entry.mode,
+                strain: entry.strain,
+                stress: entry.stress,
+                stress_unit: entry.stress_unit,
+                strain_column: entry.strain_column,
+                stress_column: entry.stress_column,
+            };
+            let reading = Table::read_as(source.file(&entry.file), &meaning)
+                .map_err(|error| source.refused(&key("file"), error))?;
+            let read = [vec![reading.understood], reading.notes].concat();
+            let mut table = reading.table;
             if let Some(mode) = entry.mode {
                 table = table.of(mode).map_err(|error| {
                     source.error(&key("mode"), error, "a test of which the table has a stress")
                 })?;
             }
-            for model in &laws {
+            neo_hookean_modulus(&table).map_err(|error| source.refused(&key("file"), error))?;
+            for model in laws.iter().filter(|_| fit.laws.is_some()) {
                 if table.measurements() < model.parameters.len() {
                     let found = format!("{} measured stresses", table.measurements());
                     let allowed = format!("at least {} for `{}`", model.parameters.len(), model.key);
                     return Err(source.error(&key("file"), found, allowed));
                 }
             }
-            data.push((entry.name, table));
+            data.push(DataSet { name: entry.name, table, read });
         }
         if data.is_empty() && trial.is_empty() {
             return Err(source.error(
@@ -139,11 +170,12 @@ impl Case {
     /// What a run will do, in lines.
     pub fn plan(&self) -> String {
         let mut text = format!("{}: {}\n", self.source.path.display(), self.title);
-        for (name, table) in &self.data {
+        for DataSet { name, table, read } in &self.data {
             let (states, measured) = (table.states.len(), table.measurements());
             let source =
                 if table.source.is_empty() { "no line `# source: …` in it" } else { &table.source };
             let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
+            read.iter().for_each(|line| text += &format!("  {line}\n"));
         }
         for model in &self.laws {
             let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
@@ -163,16 +195,15 @@ impl Case {
     /// Names of all scalars that the report will have.
     fn quantities(&self) -> Vec<String> {
         let mut names = Vec::new();
-        for (data, _) in &self.data {
+        for DataSet { name: data, .. } in &self.data {
             for model in &self.laws {
                 let fit = format!("{data}.{}", model.key);
-                names.extend(
-                    [q::RMS, q::MAE, q::R2, q::SHEAR_MODULUS].map(|quantity| quantity.of(&[&fit]).name),
-                );
+                let own = [q::RMS, q::MAE, q::R2, q::SHEAR_MODULUS, q::STABLE, q::FAILED];
+                names.extend(own.map(|quantity| quantity.of(&[&fit]).name));
                 let parameters = model.parameters.iter().map(|parameter| parameter.name);
                 names.extend(parameters.map(|parameter| q::PARAMETER.of(&[&fit, parameter]).name));
-                for (other, _) in self.data.iter().filter(|(other, _)| self.cross && other != data) {
-                    let fit = format!("{fit}.{other}");
+                for other in self.data.iter().filter(|other| self.cross && other.name != *data) {
+                    let fit = format!("{fit}.{}", other.name);
                     names
                         .extend([q::RMS, q::MAE, q::R2, q::LOCKED].map(|quantity| quantity.of(&[&fit]).name));
                 }
@@ -201,7 +232,10 @@ fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescr
     for (i, name) in names.iter().enumerate() {
         let all = || MODELS.iter().map(|model| model.key).collect::<Vec<_>>().join(", ");
         let key = format!("fit.laws[{i}]");
-        let model = hyperelastic::model(name).map_err(|_| source.error(&key, format!("`{name}`"), all()))?;
+        let model = hyperelastic::model(name).map_err(|_| match advice(name) {
+            Some(advice) => source.error(&key, format!("`{name}`"), advice),
+            None => source.error(&key, format!("`{name}`"), all()),
+        })?;
         if laws.iter().any(|law| law.key == model.key) {
             return Err(source.error(&key, format!("`{name}` a second time"), "every law once"));
         }
@@ -211,4 +245,28 @@ fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescr
         return Err(source.error("fit.laws", "no law", "at least one, or no key `laws` for all"));
     }
     Ok(laws)
+}
+
+/// What to take for a law of another name, or for what no law here is.
+fn advice(name: &str) -> Option<&'static str> {
+    let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
+    Some(match plain.as_str() {
+        "arrudaboyce" | "8chain" => "`eight-chain`: that is Arruda and Boyce's law",
+        "ogden" => "`ogden-1`, `ogden-2` or `ogden-3`: by the number of terms",
+        "mooney" | "polynomial" | "polynomial1" => "`mooney-rivlin`: the polynomial of first order",
+        "reducedpolynomial" | "reducedpolynomial3" | "polynomial3" | "yeoh3" => {
+            "`yeoh`: the reduced polynomial of third order"
+        }
+        "biderman" => "`yeoh`: of I1 alone",
+        "neohooke" | "neohookean" | "neo" => "`neo-hookean`",
+        "marlow" | "vanderwaals" | "extendedtube" => "`eight-chain-root-i2`, the nearest by its behaviour",
+        "prony" | "viscoelastic" | "maxwell" | "creep" => {
+            "an elastic law: rates and relaxation are not modelled; fit the curve of the slowest test"
+        }
+        "poissonratio" | "nu" => {
+            "nothing: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in a scene of peri"
+        }
+        "hyperfoam" | "ogdenfoam" | "blatzko" => "an incompressible law: foams are not among them",
+        _ => return None,
+    })
 }

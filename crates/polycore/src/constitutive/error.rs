@@ -61,6 +61,9 @@ pub enum Error {
         /// The last residual.
         residual: f64,
     },
+    /// A fit was stopped on request.
+    #[error("stopped on request")]
+    Stopped,
     /// Data that no law can be fitted to.
     #[error("{what}: {reason}")]
     Data {

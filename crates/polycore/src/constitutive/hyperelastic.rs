@@ -22,20 +22,30 @@ use crate::tensor::{DeformationGradient, PrincipalFrame, Tensor, Voigt6x6, voigt
 mod chain;
 mod compressible;
 mod descriptor;
+mod fit_map;
 mod gent;
 mod models;
 mod ogden;
+mod ogden_project;
 mod ogden_starts;
 mod polynomial;
 mod principal;
 
+#[cfg(feature = "tables")]
+mod columns;
 pub mod data;
 pub mod fit;
 pub mod homogeneous;
 #[cfg(feature = "tables")]
+mod plausible;
+pub mod stability;
+#[cfg(feature = "tables")]
 mod table;
+mod yeoh;
 
 pub use chain::{EightChain, EightChainRootI2, ThreeChain};
+#[cfg(feature = "tables")]
+pub use columns::{StrainMeasure, StressMeasure};
 pub use compressible::{Compressible, Coupling, Volumetric};
 pub use descriptor::{Domain, Kind, ModelDescriptor, Parameter};
 pub use gent::Gent;
@@ -44,6 +54,9 @@ pub use models::{MODELS, all, model};
 pub use ogden::{Ogden, OgdenConvention};
 pub use polynomial::{MooneyRivlin, NeoHookean};
 pub use principal::PrincipalResponse;
+#[cfg(feature = "tables")]
+pub use table::{Meaning, Reading};
+pub use yeoh::Yeoh;
 
 /// An isotropic hyperelastic law. Stresses and moduli in Pa, energies in J/m³.
 pub trait Hyperelastic: Send + Sync {

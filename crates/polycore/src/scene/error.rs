@@ -257,9 +257,27 @@ impl SceneError {
         let list = if list.is_empty() { "nothing".to_owned() } else { list };
         let hint = suggestion.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default();
         let label = suggestion.map_or("not known".to_owned(), |name| format!("did you mean `{name}`?"));
-        let message = format!("{what}; allowed: {list}{hint}");
+        let advice = advice(name)
+            .filter(|_| suggestion.is_none())
+            .map(|advice| format!("; {advice}"))
+            .unwrap_or_default();
+        let message = format!("{what}; allowed: {list}{hint}{advice}");
         Self::at(source, code, Some(key), span, message).label(label)
     }
+}
+
+/// What a word of other programs is here.
+fn advice(name: &str) -> Option<&'static str> {
+    let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
+    Some(match plain.as_str() {
+        "arrudaboyce" => "Arruda and Boyce's law is `eight-chain` here",
+        "reducedpolynomial" => "the reduced polynomial of third order is `yeoh` here",
+        "prony" | "viscoelastic" => "rates and relaxation are not modelled: laws are elastic",
+        "poissonratio" | "poissonsratio" => {
+            "Poisson's ratio follows from `bulk_modulus` and the shear modulus, ν = (3K − 2G)/(6K + 2G), or from the law"
+        }
+        _ => return None,
+    })
 }
 
 impl fmt::Display for SceneError {

@@ -102,14 +102,22 @@ impl Separator {
         [joined, apart].into_iter().find(|found| found.len() == width).unwrap_or(cells)
     }
 
-    /// Cells that are numbers, less twice those that begin like one and are none.
+    /// Cells that are numbers, less those of several numbers in which another separator stands, twice, or a blank.
     fn score(self, lines: &[(usize, &str)]) -> i64 {
+        let digit = |text: &str, end: bool| {
+            let letter = if end { text.chars().next_back() } else { text.chars().next() };
+            letter.is_some_and(|letter| letter.is_ascii_digit())
+        };
         let of = |cell: &str| {
-            let digits = cell.trim_start_matches(['+', '-', '.', '−']);
             if is_number(cell) {
                 1
-            } else if digits.starts_with(|c: char| c.is_ascii_digit()) {
+            } else if cell.contains([';', ',', '\t']) && cell.contains(|c: char| c.is_ascii_digit()) {
                 -2
+            } else if cell
+                .split_once(' ')
+                .is_some_and(|(one, two)| digit(one, true) && digit(two.trim_start(), false))
+            {
+                -1
             } else {
                 0
             }

@@ -1,6 +1,6 @@
 //! Langevin chain networks: three chains, eight chains, and eight chains with a √I₂ term.
 
-use super::descriptor::{Domain, Kind, ModelDescriptor, Parameter, Start};
+use super::descriptor::{ABSENT, Contained, Domain, Kind, ModelDescriptor, Parameter, Start, UNLIMITED};
 use super::polynomial::{first_invariant_excess, second_invariant_excess};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
@@ -41,6 +41,8 @@ pub(super) const THREE_CHAIN: ModelDescriptor = ModelDescriptor {
     build: |p| Ok(Box::new(ThreeChain::new(p[0], p[1])?)),
     example: &[0.3e6, 60.0],
     starts,
+    contains: &[UNLOCKED],
+    slopes: None,
 };
 
 pub(super) const EIGHT_CHAIN: ModelDescriptor = ModelDescriptor {
@@ -50,6 +52,8 @@ pub(super) const EIGHT_CHAIN: ModelDescriptor = ModelDescriptor {
     build: |p| Ok(Box::new(EightChain::new(p[0], p[1])?)),
     example: &[0.27e6, 25.0],
     starts,
+    contains: &[UNLOCKED],
+    slopes: None,
 };
 
 pub(super) const EIGHT_CHAIN_ROOT_I2: ModelDescriptor = ModelDescriptor {
@@ -63,7 +67,16 @@ pub(super) const EIGHT_CHAIN_ROOT_I2: ModelDescriptor = ModelDescriptor {
     build: |p| Ok(Box::new(EightChainRootI2::new(p[0], p[1], p[2])?)),
     example: &[0.25e6, 26.0, 0.1e6],
     starts: |start| starts(start).into_iter().map(|p| vec![p[0], p[1], 0.3 * start.modulus]).collect(),
+    contains: &[Contained {
+        key: "eight-chain",
+        embed: |p, start| [ABSENT * p[0], 0.1 * start.modulus].map(|c| vec![p[0], p[1], c]).to_vec(),
+    }],
+    slopes: None,
 };
+
+/// Chains so long that they never lock.
+const UNLOCKED: Contained =
+    Contained { key: "neo-hookean", embed: |p, start| vec![vec![p[0], UNLIMITED * start.limits[1]]] };
 
 fn starts(start: &Start<'_>) -> Vec<Vec<f64>> {
     [1.02, 1.3, 3.0].map(|r| vec![0.8 * start.modulus, r * start.limits[1]]).to_vec()

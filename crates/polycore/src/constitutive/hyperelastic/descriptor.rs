@@ -20,7 +20,29 @@ pub struct ModelDescriptor {
     pub example: &'static [f64],
     /// Where fits start.
     pub(super) starts: fn(&Start<'_>) -> Vec<Vec<f64>>,
+    /// Laws that this one becomes at some parameters: it fits no worse than they do.
+    pub(super) contains: &'static [Contained],
+    /// Nominal stresses and their derivatives with respect to the parameters, where they are known in closed form.
+    pub(super) slopes: Option<Slopes>,
 }
+
+/// A law inside another one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Contained {
+    /// Its name.
+    pub key: &'static str,
+    /// Of its best parameters: those of the outer law at which it is this one, or indistinguishable from it, and more starts.
+    pub embed: fn(&[f64], &Start<'_>) -> Vec<Vec<f64>>,
+}
+
+/// Of parameters and λ₁, λ₂: P₁, P₂ and, for each parameter, their derivatives.
+pub(super) type Slopes = fn(&[f64], [f64; 2], &mut [[f64; 2]]) -> [f64; 2];
+
+/// Share of a modulus at which a term is absent.
+pub(super) const ABSENT: f64 = 1e-17;
+
+/// Part by which a locking limit exceeds the least one where it is beyond what data can tell from infinity.
+pub(super) const UNLIMITED: f64 = 1e6;
 
 /// The thesis' two categories of laws (§1.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 //! Gent's law of limited chain extensibility.
 
-use super::descriptor::{Domain, Kind, ModelDescriptor, Parameter};
+use super::descriptor::{Contained, Domain, Kind, ModelDescriptor, Parameter, UNLIMITED};
 use super::polynomial::first_invariant_excess;
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, positive};
@@ -23,6 +23,11 @@ pub(super) const GENT: ModelDescriptor = ModelDescriptor {
     build: |p| Ok(Box::new(Gent::new(p[0], p[1])?)),
     example: &[0.3e6, 75.0],
     starts: |start| [1.02, 1.3, 3.0].map(|r| vec![0.8 * start.modulus, r * start.limits[1]]).to_vec(),
+    contains: &[Contained {
+        key: "neo-hookean",
+        embed: |p, start| vec![vec![p[0], UNLIMITED * start.limits[1]]],
+    }],
+    slopes: None,
 };
 
 impl Gent {

@@ -1,9 +1,9 @@
 //! The list of laws: every one, for scenes, fits and checks.
 
 use super::descriptor::ModelDescriptor;
-use super::{Compressible, Coupling, Error, Hyperelastic, Volumetric, chain, gent, ogden, polynomial};
+use super::{Compressible, Coupling, Error, Hyperelastic, Volumetric, chain, gent, ogden, polynomial, yeoh};
 
-/// Every law of Chapter 1, and the √I₂ extension.
+/// Every law of Chapter 1, the √I₂ extension, and Yeoh's law.
 pub const MODELS: &[ModelDescriptor] = &[
     polynomial::NEO_HOOKEAN,
     polynomial::MOONEY_RIVLIN,
@@ -14,6 +14,7 @@ pub const MODELS: &[ModelDescriptor] = &[
     chain::THREE_CHAIN,
     chain::EIGHT_CHAIN,
     chain::EIGHT_CHAIN_ROOT_I2,
+    yeoh::YEOH,
 ];
 
 /// The model of that name.

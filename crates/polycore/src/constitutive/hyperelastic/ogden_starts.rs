@@ -3,15 +3,18 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Ogden, OgdenConvention};
-use crate::constitutive::hyperelastic::descriptor::Start;
-use crate::constitutive::hyperelastic::homogeneous;
+use super::descriptor::{ABSENT, Start};
+use super::ogden::slopes;
+use super::ogden_project::projected;
 
 /// |α| of the grid; both signs are tried.
 const EXPONENTS: [f64; 14] = [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0];
 
 /// Starts that are handed to the optimiser.
 const KEPT: usize = 8;
+
+/// Starts from the optimum of a law of one term less.
+const GROWN: usize = 3;
 
 /// Parameter sets [μ₁, α₁, …] in Abaqus' convention, best first, no two of them neighbours on the grid.
 pub(super) fn starts<const TERMS: usize>(start: &Start<'_>) -> Vec<Vec<f64>> {
@@ -53,31 +56,64 @@ pub(super) fn starts<const TERMS: usize>(start: &Start<'_>) -> Vec<Vec<f64>> {
     }
     let parameters = kept.iter().map(|(subset, moduli)| {
         let term = |i: usize| [start.modulus * moduli[i] / norms[subset[i]], exponents[subset[i]]];
-        (0..TERMS).flat_map(term).collect()
+        projected(&(0..TERMS).flat_map(term).collect::<Vec<f64>>(), start)
     });
     parameters.collect()
 }
 
-/// The exponents whose stresses are finite in the data, those stresses in units of the modulus, and the data.
-fn columns(start: &Start<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) {
-    let measured = |of: &dyn Fn([f64; 2]) -> Option<[f64; 2]>| -> Option<DVector<f64>> {
-        let mut values = Vec::new();
-        for state in &start.table.states {
-            let found = of(state.stretches)?;
-            let pairs = found.into_iter().zip(state.nominal).filter(|(_, data)| *data != 0.0);
-            values.extend(pairs.map(|(value, _)| value));
-        }
-        Some(DVector::from_vec(values))
-    };
-    let (mut exponents, mut columns) = (Vec::new(), Vec::new());
-    for exponent in EXPONENTS.iter().rev().map(|a| -a).chain(EXPONENTS) {
-        let Ok(law) = Ogden::new(OgdenConvention::Abaqus, &[(1.0, exponent)]) else { continue };
-        let nominal = measured(&|[a, b]| homogeneous::biaxial(&law, a, b).ok());
-        if let Some(column) = nominal.filter(|column| column.norm().is_finite()) {
-            exponents.push(exponent);
-            columns.push(column);
-        }
+/// A law of one term less as a start, its new term absent; and with a new term of an exponent of the grid that lowers the
+/// misfit, the best three.
+pub(super) fn grown(smaller: &[f64], start: &Start<'_>) -> Vec<Vec<f64>> {
+    let total: f64 = smaller.chunks_exact(2).map(|term| term[0]).sum();
+    let mut all = vec![[smaller, &[ABSENT * total, 1.0]].concat()];
+    let present: Vec<usize> = (0..smaller.len() / 2).filter(|i| smaller[2 * i] > 1e-12 * total).collect();
+    let (exponents, grid, data) = columns(start);
+    let own: Vec<DVector<f64>> =
+        present.iter().filter_map(|&i| column(start, smaller[2 * i + 1])).map(|c| c.normalize()).collect();
+    if own.len() != present.len() {
+        return all;
     }
+    let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
+    for (exponent, new) in exponents.iter().zip(&grid) {
+        let list: Vec<DVector<f64>> = own.iter().cloned().chain([new.normalize()]).collect();
+        let matrix = DMatrix::from_columns(&list);
+        let onto = matrix.tr_mul(&data);
+        let Some(moduli) = matrix.tr_mul(&matrix).cholesky().map(|factor| factor.solve(&onto)) else {
+            continue;
+        };
+        if moduli.iter().any(|modulus| *modulus <= 0.0) {
+            continue;
+        }
+        let mut parameters = smaller.to_vec();
+        let scale = |k: usize, norm: f64| start.modulus * moduli[k] / norm;
+        for (k, &i) in present.iter().enumerate() {
+            let norm = column(start, smaller[2 * i + 1]).map_or(1.0, |c| c.norm());
+            parameters[2 * i] = scale(k, norm);
+        }
+        parameters.extend([scale(present.len(), new.norm()), *exponent]);
+        found.push((-moduli.dot(&onto), parameters));
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all.extend(found.into_iter().take(GROWN).map(|(_, parameters)| projected(&parameters, start)));
+    all
+}
+
+/// The stresses of one term of unit modulus, where they are finite.
+fn column(start: &Start<'_>, exponent: f64) -> Option<DVector<f64>> {
+    let mut values = Vec::with_capacity(start.table.measurements());
+    for state in &start.table.states {
+        let found = slopes(&[1.0, exponent], state.stretches, &mut [[0.0; 2]; 2]);
+        let pairs = found.into_iter().zip(state.nominal).filter(|(_, data)| *data != 0.0);
+        values.extend(pairs.map(|(value, _)| value));
+    }
+    Some(DVector::from_vec(values)).filter(|column| column.norm().is_finite() && column.norm() > 0.0)
+}
+
+/// The exponents whose stresses are finite in the data, those stresses of unit moduli, and the data in units of the modulus.
+fn columns(start: &Start<'_>) -> (Vec<f64>, Vec<DVector<f64>>, DVector<f64>) {
+    let grid = EXPONENTS.iter().rev().map(|a| -a).chain(EXPONENTS);
+    let (exponents, columns) =
+        grid.filter_map(|exponent| column(start, exponent).map(|column| (exponent, column))).unzip();
     let data = start.table.states.iter().flat_map(|state| state.nominal).filter(|data| *data != 0.0);
     let data = DVector::from_iterator(start.table.measurements(), data) / start.modulus;
     (exponents, columns, data)

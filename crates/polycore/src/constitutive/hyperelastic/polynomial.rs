@@ -1,6 +1,6 @@
 //! Neo-Hookean and Mooney–Rivlin: linear in the invariants.
 
-use super::descriptor::{Domain, Kind, ModelDescriptor, Parameter};
+use super::descriptor::{ABSENT, Contained, Domain, Kind, ModelDescriptor, Parameter};
 use super::principal::InvariantDerivatives;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, parameter, positive};
 
@@ -24,6 +24,8 @@ pub(super) const NEO_HOOKEAN: ModelDescriptor = ModelDescriptor {
     build: |p| Ok(Box::new(NeoHookean::new(p[0])?)),
     example: &[0.4e6],
     starts: |start| vec![vec![start.modulus]],
+    contains: &[],
+    slopes: None,
 };
 
 pub(super) const MOONEY_RIVLIN: ModelDescriptor = ModelDescriptor {
@@ -37,7 +39,11 @@ pub(super) const MOONEY_RIVLIN: ModelDescriptor = ModelDescriptor {
     ],
     build: |p| Ok(Box::new(MooneyRivlin::new(p[0], p[1])?)),
     example: &[0.15e6, 0.02e6],
-    starts: |start| vec![vec![0.45 * start.modulus, 0.05 * start.modulus]],
+    starts: |start| {
+        [[0.45, 0.05], [0.05, 0.45]].map(|share| share.map(|c| c * start.modulus).to_vec()).to_vec()
+    },
+    contains: &[Contained { key: "neo-hookean", embed: |p, _| vec![vec![0.5 * p[0], ABSENT * p[0]]] }],
+    slopes: None,
 };
 
 impl NeoHookean {

@@ -1,146 +1,440 @@
-//! Tables of measured states as CSV.
+//! Tables of measured states, as files have them.
 
 use std::path::Path;
 
 use super::Error;
+use super::columns::{MODES, Role, StrainMeasure, StressMeasure, What, mode};
 use super::data::{Mode, State, Table};
-use crate::units::Stress;
+use super::plausible::{Row, plausible};
+use crate::table::{self, plain_unit, plainly};
+use crate::units::Unit;
+use crate::units::dimension::{RatioDimension, StressDimension};
+
+/// What the headings of a table leave open.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Meaning {
+    /// The test of all rows, where no column names it.
+    pub mode: Option<Mode>,
+    /// Measure of the strain.
+    pub strain: Option<StrainMeasure>,
+    /// Measure of the stress.
+    pub stress: Option<StressMeasure>,
+    /// Unit of a stress without one.
+    pub stress_unit: Option<String>,
+    /// Heading of the strain, of several.
+    pub strain_column: Option<String>,
+    /// Heading of the stress, of several.
+    pub stress_column: Option<String>,
+}
+
+/// A table that was read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading {
+    /// Its states.
+    pub table: Table,
+    /// One line: how the file was understood.
+    pub understood: String,
+    /// What was left out or turned round, a line each.
+    pub notes: Vec<String>,
+}
 
 impl Table {
-    /// Reads a CSV file; see [`Table::parse`].
+    /// Reads a file; see [`Table::read_as`].
     ///
     /// # Errors
-    /// [`crate::Error::Io`], and what [`Table::parse`] refuses.
+    /// As [`Table::read_as`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, crate::Error> {
-        let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(crate::Error::io("read", path))?;
-        Ok(Self::parse(&path.display().to_string(), &text)?)
+        Self::read_as(path, &Meaning::default()).map(|reading| reading.table)
     }
 
-    /// Reads CSV text: lines of `#` comments, a header, rows of numbers. The header is `stretch,nominal_UNIT`
-    /// (uniaxial: λ₂ = λ₁^{−1/2}), `mode,stretch,nominal_UNIT` with a [`Mode`] of [`Mode::TESTS`] in each row, of which P₁
-    /// is measured, or `stretch_1,stretch_2,nominal_1_UNIT,nominal_2_UNIT`.
+    /// Reads a text; see [`Table::read_as`].
     ///
     /// # Errors
-    /// [`Error::Data`] naming the line: an unknown header, unit or mode, a missing or non-finite number, a stretch that
-    /// is not positive, no measurement at all.
+    /// As [`Table::read_as`].
     pub fn parse(name: &str, text: &str) -> Result<Self, Error> {
-        let refuse = |reason: String| Error::Data { what: name.to_owned(), reason };
-        let mut reader =
-            csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
-        let header = reader.headers().map_err(|error| refuse(error.to_string()))?.clone();
-        let columns: Vec<&str> = header.iter().collect();
-        let moded = columns.first() == Some(&"mode");
-        let units: Vec<f64> = match columns[usize::from(moded)..] {
-            ["stretch", nominal] => vec![unit(nominal, "nominal_")],
-            ["stretch_1", "stretch_2", first, second] if !moded => {
-                vec![unit(first, "nominal_1_"), unit(second, "nominal_2_")]
-            }
-            _ => vec![None],
-        }
-        .into_iter()
-        .collect::<Option<_>>()
-        .ok_or_else(|| {
-            let expected = "`stretch,nominal_MPa`, `mode,stretch,nominal_MPa` or \
-                            `stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa`";
-            refuse(format!("header `{}`; expected {expected}, or another unit of stress", columns.join(",")))
-        })?;
+        Self::parse_as(name, text.as_bytes().to_vec(), &Meaning::default()).map(|reading| reading.table)
+    }
 
-        let mut states = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(|error| refuse(error.to_string()))?;
-            let line = record.position().map_or(0, csv::Position::line);
-            let mut mode = Mode::Uniaxial;
-            if moded {
-                let name = record.get(0).unwrap_or_default();
-                let names = Mode::TESTS.map(|mode| format!("`{}`", mode.name())).join(", ");
-                mode = Mode::TESTS
-                    .into_iter()
-                    .find(|mode| mode.name() == name)
-                    .ok_or_else(|| refuse(format!("line {line}: mode `{name}`; expected {names}")))?;
-            }
-            let mut numbers = Vec::with_capacity(4);
-            for field in record.iter().skip(usize::from(moded)) {
-                let number = field.parse::<f64>().ok().filter(|number| number.is_finite());
-                numbers
-                    .push(number.ok_or_else(|| refuse(format!("line {line}: `{field}` is not a number")))?);
-            }
-            let state = match numbers[..] {
-                [stretch, nominal] => State {
-                    mode,
-                    stretches: [stretch, mode.second_stretch(stretch)],
-                    nominal: [nominal * units[0], 0.0],
-                },
-                [a, b, first, second] => State {
-                    mode: Mode::Biaxial,
-                    stretches: [a, b],
-                    nominal: [first * units[0], second * units[1]],
-                },
-                // the csv reader has compared the number of fields with the header's
-                _ => continue,
-            };
-            state.principal_stretches().map_err(|error| refuse(format!("line {line}: {error}")))?;
-            states.push(state);
-        }
-        let source = text.lines().find_map(|line| line.strip_prefix("# source:"));
-        let table = Self { source: source.unwrap_or_default().trim().to_owned(), states };
-        if table.measurements() == 0 {
-            return Err(refuse("contains no stress other than zero".to_owned()));
-        }
-        Ok(table)
+    /// Reads a table as [`crate::table`] does: a column of stretches or strains and one of stresses, with a column of the
+    /// [`Mode`] or for one test; or two of each (`stretch_1`, `stretch_2`, `nominal_1 [MPa]`, …). A strain is an engineering
+    /// one and a stress a nominal one where neither heading nor `meaning` says more. Blank stresses were not measured.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], and what [`Table::parse_as`] refuses.
+    pub fn read_as(path: impl AsRef<Path>, meaning: &Meaning) -> Result<Reading, crate::Error> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(crate::Error::io("read", path))?;
+        Ok(Self::parse_as(&path.display().to_string(), bytes, meaning)?)
+    }
+
+    /// As [`Table::read_as`], of what a file holds.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with line and column: headings, units and modes that are not known or leave several possibilities,
+    /// what is no number, a stretch that is not positive, strains that look like stretches or the other way round, a
+    /// stiffness below zero, no measurement at all.
+    pub fn parse_as(name: &str, bytes: Vec<u8>, meaning: &Meaning) -> Result<Reading, Error> {
+        let file = table::Table::parse(name, bytes).map_err(located)?;
+        let columns = Columns::of(&file, meaning).map_err(located)?;
+        columns.read(&file, meaning).map_err(located)
     }
 }
 
-/// Pa per unit of a column such as `nominal_MPa`.
-fn unit(column: &str, prefix: &str) -> Option<f64> {
-    format!("1 {}", column.strip_prefix(prefix)?).parse::<Stress>().ok().map(Stress::si)
+/// With the line in the reason.
+fn located(error: table::Error) -> Error {
+    let table::Error { path, line, what, found, allowed } = error;
+    let line = if line == 0 { String::new() } else { format!("line {line}: ") };
+    let reason = format!("{line}{what}: found `{found}`; allowed: {allowed}");
+    Error::Data { what: path.display().to_string(), reason }
+}
+
+/// A column and its measure.
+#[derive(Clone)]
+struct Chosen<M> {
+    column: usize,
+    measure: M,
+    /// The heading does not say which.
+    assumed: bool,
+    compressive: bool,
+    unit: Option<String>,
+}
+
+struct Columns {
+    mode: Option<usize>,
+    strains: Vec<Chosen<StrainMeasure>>,
+    stresses: Vec<Chosen<StressMeasure>>,
+}
+
+const LAYOUTS: &str = "a strain (`stretch`, `strain [%]`) and a stress (`nominal [MPa]`), with a `mode` in each row if there are \
+                       several tests, or `stretch_1`, `stretch_2`, `nominal_1 [MPa]`, `nominal_2 [MPa]`";
+
+impl Columns {
+    fn of(file: &table::Table, meaning: &Meaning) -> Result<Self, table::Error> {
+        let roles: Vec<Option<Role>> = file.headings.iter().map(Role::of).collect();
+        let strain = |what: What| if let What::Strain(measure) = what { Some(measure) } else { None };
+        let stress = |what: What| if let What::Stress(measure) = what { Some(measure) } else { None };
+        let mut strains = Vec::new();
+        let mut stresses = Vec::new();
+        let paired = |axis| {
+            let has = |test: &dyn Fn(What) -> bool| {
+                roles.iter().flatten().any(|role| role.axis == Some(axis) && test(role.what))
+            };
+            has(&|what| strain(what).is_some()) && has(&|what| stress(what).is_some())
+        };
+        let biaxial = meaning.strain_column.is_none() && paired(0) && paired(1);
+        // `strain 1, stress 1, strain 2, stress 2` are specimens side by side
+        let place = |axis, test: &dyn Fn(What) -> bool| {
+            roles.iter().position(|role| {
+                role.as_ref().is_some_and(|role| role.axis == Some(axis) && role.numbered && test(role.what))
+            })
+        };
+        let (stress_1, strain_2) =
+            (place(0, &|what| stress(what).is_some()), place(1, &|what| strain(what).is_some()));
+        if biaxial && stress_1.zip(strain_2).is_some_and(|(stress, strain)| stress < strain) {
+            let allowed = "`strain_column` and `stress_column` in the data's entry, if these are specimens side by side (an entry \
+                           each); of a biaxial test both strains before both stresses";
+            return Err(file.refuse_headings(allowed));
+        }
+        let axes = if biaxial { vec![Some(0), Some(1)] } else { vec![None] };
+        for &axis in &axes {
+            strains.push(choose(
+                file,
+                &roles,
+                axis,
+                &Wanted {
+                    key: "strain",
+                    name: meaning.strain_column.as_deref(),
+                    measure: meaning.strain,
+                    of: &strain,
+                    order: &[StrainMeasure::Stretch, StrainMeasure::Engineering, StrainMeasure::True],
+                    assumed: StrainMeasure::Engineering,
+                },
+            )?);
+            stresses.push(choose(
+                file,
+                &roles,
+                axis,
+                &Wanted {
+                    key: "stress",
+                    name: meaning.stress_column.as_deref(),
+                    measure: meaning.stress,
+                    of: &stress,
+                    order: &[StressMeasure::Nominal, StressMeasure::True],
+                    assumed: StressMeasure::Nominal,
+                },
+            )?);
+        }
+        let (first, other) = (&strains[0], &stresses[0]);
+        if first.assumed && other.measure == StressMeasure::True && !other.assumed {
+            let allowed = "`strain = \"engineering\"` or `strain = \"true\"` in the data's entry: the stress is a true one";
+            return Err(file.refuse_headings(allowed));
+        }
+        if other.assumed && first.measure == StrainMeasure::True && !first.assumed {
+            let allowed =
+                "`stress = \"nominal\"` or `stress = \"true\"` in the data's entry: the strain is a true one";
+            return Err(file.refuse_headings(allowed));
+        }
+        let named = |(i, role): (usize, &Option<Role>)| {
+            let is_mode = role.as_ref().is_some_and(|role| role.what == What::Mode);
+            let says = || (0..file.rows()).any(|row| mode(file.text(row, i)).is_some());
+            (is_mode && (file.headings[i].plain == MODES[0] || says())).then_some(i)
+        };
+        let mode = if axes.len() == 1 { roles.iter().enumerate().find_map(named) } else { None };
+        Ok(Self { mode, strains, stresses })
+    }
+
+    fn read(&self, file: &table::Table, meaning: &Meaning) -> Result<Reading, table::Error> {
+        let unit = |chosen: &Chosen<StressMeasure>| {
+            let text = chosen.unit.as_deref().or(meaning.stress_unit.as_deref()).unwrap_or_default();
+            Unit::<StressDimension>::parse(&plain_unit(text)).map_err(|error| {
+                let what = format!("unit of column {}, `{}`", chosen.column + 1, file.headings[chosen.column].text);
+                let found = if text.is_empty() { "no unit" } else { text };
+                let allowed =
+                    format!("a unit of stress in the heading, as in `nominal [MPa]`, or `stress_unit = \"MPa\"`; {error}");
+                file.refuse(file.layout().heading_line, &what, found.to_owned(), &allowed)
+            })
+        };
+        let units = self.stresses.iter().map(unit).collect::<Result<Vec<_>, _>>()?;
+        let ratio = |chosen: &Chosen<StrainMeasure>| {
+            Unit::<RatioDimension>::parse(&plain_unit(chosen.unit.as_deref().unwrap_or_default())).map_err(
+                |error| {
+                    let what = format!(
+                        "unit of column {}, `{}`",
+                        chosen.column + 1,
+                        file.headings[chosen.column].text
+                    );
+                    let found = chosen.unit.clone().unwrap_or_default();
+                    file.refuse(
+                        file.layout().heading_line,
+                        &what,
+                        found,
+                        &format!("a strain, in % or without unit; {error}"),
+                    )
+                },
+            )
+        };
+        let ratios = self.strains.iter().map(ratio).collect::<Result<Vec<_>, _>>()?;
+        let mut rows = Vec::with_capacity(file.rows());
+        let mut blank = 0;
+        for index in 0..file.rows() {
+            let (test, compression) = self.test(file, index, meaning)?;
+            let mut row = Row {
+                index,
+                mode: test,
+                compression,
+                written: [0.0; 2],
+                stretches: [0.0; 2],
+                nominal: [0.0; 2],
+            };
+            let mut measured = 0;
+            for (axis, (chosen, unit)) in self.stresses.iter().zip(&units).enumerate() {
+                let Some(number) = file.number_or_blank(index, chosen.column)? else { continue };
+                let si = unit.of(number).map(|stress| stress.si());
+                row.nominal[axis] =
+                    si.map_err(|error| file.refuse_cell(index, chosen.column, &error.to_string()))?;
+                measured += 1;
+            }
+            if measured == 0 {
+                blank += 1;
+                continue;
+            }
+            for (axis, (chosen, ratio)) in self.strains.iter().zip(&ratios).enumerate() {
+                let number = file.number(index, chosen.column)?;
+                row.written[axis] = ratio.of(number).map_or(number, |ratio| ratio.si());
+            }
+            rows.push(row);
+        }
+        let mut notes = Vec::new();
+        if blank > 0 {
+            notes.push(format!("{blank} rows without a stress are left out"));
+        }
+        self.turn(&mut rows, &mut notes);
+        for row in &mut rows {
+            for (axis, chosen) in self.strains.iter().enumerate() {
+                let written = row.written[axis];
+                let stretch = match chosen.measure {
+                    StrainMeasure::Stretch => written,
+                    StrainMeasure::Engineering => 1.0 + written,
+                    StrainMeasure::True => written.exp(),
+                };
+                if !(stretch > 0.0 && stretch.is_finite()) {
+                    let strain = "a stretch above 0; if this is a strain, head it `strain` or write `strain = \"engineering\"`";
+                    let allowed = if chosen.measure == StrainMeasure::Stretch {
+                        strain
+                    } else {
+                        "a strain above −100 %"
+                    };
+                    return Err(file.refuse_cell(row.index, chosen.column, allowed));
+                }
+                row.stretches[axis] = stretch;
+            }
+            if self.strains.len() == 1 {
+                row.stretches[1] = row.mode.second_stretch(row.stretches[0]);
+            }
+            for (axis, chosen) in self.stresses.iter().enumerate() {
+                if chosen.measure == StressMeasure::True {
+                    // J = 1: σ = λP
+                    row.nominal[axis] /= row.stretches[axis];
+                }
+            }
+        }
+        if self.strains.len() == 1 {
+            let chosen = &self.strains[0];
+            let said = meaning.strain.is_some() || meaning.strain_column.is_some();
+            plausible(&mut rows, &mut notes, chosen.measure, said, chosen.unit.is_some())
+                .map_err(|(row, allowed)| file.refuse_cell(row, chosen.column, &allowed))?;
+        }
+        let state = |row: &Row| State { mode: row.mode, stretches: row.stretches, nominal: row.nominal };
+        let source = file.remark("# source:").unwrap_or_default().to_owned();
+        let table = Table { source, states: rows.iter().map(state).collect() };
+        if table.measurements() == 0 {
+            let found = format!("{} rows", file.rows());
+            return Err(file.refuse(
+                0,
+                "table",
+                found,
+                "at least one row; it contains no stress other than zero",
+            ));
+        }
+        Ok(Reading { understood: self.understood(file, &table), table, notes })
+    }
+
+    /// The test of a row, and whether it is compression.
+    fn test(&self, file: &table::Table, row: usize, meaning: &Meaning) -> Result<(Mode, bool), table::Error> {
+        let Some(column) = self.mode else {
+            let one = meaning.mode.unwrap_or(Mode::Uniaxial);
+            return Ok((if self.strains.len() == 2 { Mode::Biaxial } else { one }, false));
+        };
+        mode(file.text(row, column)).ok_or_else(|| {
+            let names = Mode::TESTS.map(|mode| format!("`{}`", mode.name())).join(", ");
+            file.refuse_cell(row, column, &format!("a test: {names}"))
+        })
+    }
+
+    /// Strains and stresses that headings or tests call compressive are below zero.
+    fn turn(&self, rows: &mut [Row], notes: &mut Vec<String>) {
+        let (strain, stress) = (&self.strains[0], &self.stresses[0]);
+        if self.strains.len() == 2 {
+            return;
+        }
+        let strains: fn(&mut Row) -> &mut f64 = |row| &mut row.written[0];
+        let stresses: fn(&mut Row) -> &mut f64 = |row| &mut row.nominal[0];
+        let turned = strain.measure != StrainMeasure::Stretch;
+        for (name, value, may, by_heading) in [
+            ("strains", strains, turned, strain.compressive && turned),
+            ("stresses", stresses, true, stress.compressive),
+        ] {
+            let mut of: Vec<&mut Row> =
+                rows.iter_mut().filter(|row| may && (by_heading || row.compression)).collect();
+            if of.iter_mut().all(|row| *value(row) >= 0.0) && !of.is_empty() {
+                of.iter_mut().for_each(|row| *value(row) = 0.0 - *value(row));
+                notes.push(format!("{name} of compression, positive in the file, are taken as negative"));
+            }
+        }
+    }
+
+    fn understood(&self, file: &table::Table, table: &Table) -> String {
+        let used: Vec<usize> =
+            self.mode.into_iter().chain(self.strains.iter().map(|chosen| chosen.column)).collect();
+        let used: Vec<usize> =
+            used.into_iter().chain(self.stresses.iter().map(|chosen| chosen.column)).collect();
+        let strain = match self.strains[0].measure {
+            StrainMeasure::Stretch => "stretch",
+            StrainMeasure::Engineering => "engineering strain",
+            StrainMeasure::True => "true strain",
+        };
+        let stress = match self.stresses[0].measure {
+            StressMeasure::Nominal => "nominal stress",
+            StressMeasure::True => "true stress",
+        };
+        let biaxial = if self.strains.len() == 2 { "biaxial, " } else { "" };
+        let assumed = match (self.strains[0].assumed, self.stresses[0].assumed) {
+            (true, true) => " (the headings do not say which; keys `strain` and `stress`)",
+            (true, false) => " (the heading does not say which strain; key `strain`)",
+            (false, true) => " (the heading does not say which stress; key `stress`)",
+            (false, false) => "",
+        };
+        let stretches =
+            table.states.iter().flat_map(|state| state.stretches.into_iter().take(self.strains.len()));
+        let (low, high) =
+            stretches.fold((f64::INFINITY, 0.0_f64), |(low, high), l| (low.min(l), high.max(l)));
+        format!(
+            "{}; {biaxial}{strain} and {stress}{assumed}; stretches {low:.4} to {high:.4}",
+            file.understood(&used)
+        )
+    }
+}
+
+/// A column that is looked for.
+struct Wanted<'a, M> {
+    key: &'static str,
+    name: Option<&'a str>,
+    measure: Option<M>,
+    of: &'a dyn Fn(What) -> Option<Option<M>>,
+    order: &'a [M],
+    assumed: M,
+}
+
+fn choose<M: Copy + PartialEq>(
+    file: &table::Table,
+    roles: &[Option<Role>],
+    axis: Option<usize>,
+    wanted: &Wanted<M>,
+) -> Result<Chosen<M>, table::Error> {
+    let key = wanted.key;
+    let chosen = |column: usize, measure: Option<M>, role: Option<&Role>| Chosen {
+        column,
+        measure: wanted.measure.or(measure).unwrap_or(wanted.assumed),
+        assumed: wanted.measure.or(measure).is_none(),
+        compressive: role.is_some_and(|role| role.compressive),
+        unit: role.map_or_else(|| file.headings[column].unit.clone(), |role| role.unit.clone()),
+    };
+    if let Some(name) = wanted.name {
+        let same = |i: &usize| {
+            let heading = &file.headings[*i];
+            heading.text == name || heading.name == name || heading.plain == plainly(name)
+        };
+        let number = name.parse::<usize>().ok().filter(|number| (1..=roles.len()).contains(number));
+        let several = (0..roles.len()).filter(same).count() > 1;
+        if several {
+            let allowed =
+                format!("the number of one of the columns `{name}` as `{key}_column`: \"1\" is the first");
+            return Err(file.refuse_headings(allowed));
+        }
+        let Some(column) = (0..roles.len()).find(same).or(number.map(|number| number - 1)) else {
+            return Err(file.refuse_headings(format!("the heading `{name}` of `{key}_column`")));
+        };
+        let role = roles[column].as_ref();
+        return Ok(chosen(column, role.and_then(|role| (wanted.of)(role.what)).flatten(), role));
+    }
+    let all: Vec<(usize, Option<M>, &Role)> = roles
+        .iter()
+        .enumerate()
+        .filter_map(|(i, role)| role.as_ref().map(|role| (i, role)))
+        .filter(|(_, role)| axis.is_none() || role.axis == axis)
+        .filter_map(|(i, role)| Some((i, (wanted.of)(role.what)?, role)))
+        .collect();
+    let of = |measure: Option<M>| all.iter().filter(move |one| one.1 == measure).collect::<Vec<_>>();
+    // named measures in their order, then those that name none, then the last; what the key says before all
+    let mut order: Vec<Option<M>> = wanted.order.iter().copied().map(Some).collect();
+    order.insert(order.len() - 1, None);
+    if let Some(asked) = wanted.measure {
+        order.splice(0..0, [Some(asked), None]);
+    }
+    let found = order.into_iter().map(of).find(|found| !found.is_empty()).unwrap_or_default();
+    match found[..] {
+        [(column, measure, role)] => Ok(chosen(*column, *measure, Some(role))),
+        [] => {
+            let raw = roles.iter().flatten().any(|role| role.what == What::Raw);
+            let advice = "; forces are divided by the undeformed area, displacements by the free length";
+            Err(file.refuse_headings(format!("{LAYOUTS}{}", if raw { advice } else { "" })))
+        }
+        _ => Err(file.refuse_headings(format!(
+            "one {key}, or `{key}_column = \"…\"` in the data's entry with one of these headings, or its number"
+        ))),
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn both_layouts_and_any_unit_of_stress() {
-        let uniaxial = Table::parse("t", "# source: me, 2024\nstretch,nominal_kPa\n1,0\n4, 1500\n").unwrap();
-        assert_eq!(uniaxial.source, "me, 2024");
-        let expected = State { mode: Mode::Uniaxial, stretches: [4.0, 0.5], nominal: [1.5e6, 0.0] };
-        assert_eq!(uniaxial.states[1], expected);
-        assert_eq!(uniaxial.measurements(), 1);
-        let text = "stretch_1,stretch_2,nominal_1_MPa,nominal_2_N/mm^2\n2,1,0.5,0.25\n";
-        let biaxial = Table::parse("t", text).unwrap();
-        assert_eq!(biaxial.states[0].nominal, [0.5e6, 0.25e6]);
-        assert_eq!(biaxial.source, "");
-        let text =
-            "mode,stretch,nominal_MPa\nuniaxial,4,1.5\nequibiaxial,2,1\npure-shear,3,1\npure-shear,1,0\n";
-        let modes = Table::parse("t", text).unwrap();
-        let stretches: Vec<[f64; 2]> = modes.states.iter().map(|state| state.stretches).collect();
-        assert_eq!(stretches, [[4.0, 0.5], [2.0, 2.0], [3.0, 1.0], [1.0, 1.0]]);
-        assert_eq!(modes.measurements(), 3);
-        let strip = modes.of(Mode::PureShear).unwrap();
-        assert_eq!((strip.states.len(), strip.measurements()), (2, 1));
-        assert!(biaxial.of(Mode::Uniaxial).is_err());
-    }
-
-    #[test]
-    fn bad_tables_are_refused_with_the_line() {
-        for (text, message) in [
-            ("stretch,force_N\n1,0\n", "header `stretch,force_N`"),
-            ("stretch,nominal_kg\n1,0\n", "header `stretch,nominal_kg`"),
-            ("stretch,nominal_MPa\n1,0\n2,x\n", "line 3: `x` is not a number"),
-            ("stretch,nominal_MPa\n1,0\n2,NaN\n", "line 3: `NaN` is not a number"),
-            ("stretch,nominal_MPa\n-2,1\n", "line 2: stretch 1 is -2"),
-            ("stretch,nominal_MPa\n1,2,3\n", "3 fields"),
-            (
-                "mode,stretch,nominal_MPa\nsimple-shear,1,0\n",
-                "line 2: mode `simple-shear`; expected `uniaxial`",
-            ),
-            ("mode,stretch_1,stretch_2,nominal_1_MPa,nominal_2_MPa\n", "header `mode,stretch_1"),
-            ("stretch,nominal_MPa\n1,0\n", "no stress other than zero"),
-            ("", "header ``"),
-        ] {
-            let error = Table::parse("table.csv", text).unwrap_err().to_string();
-            assert!(error.starts_with("table.csv: ") && error.contains(message), "{error}");
-        }
-    }
-}
+#[path = "table_tests.rs"]
+mod tests;

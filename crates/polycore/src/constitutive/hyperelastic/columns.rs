@@ -1,0 +1,174 @@
+//! Which columns of a table are strains and stresses, and of what kind.
+
+use super::data::Mode;
+use crate::table::{Heading, plainly};
+use crate::units::Unit;
+use crate::units::dimension::{RatioDimension, StressDimension};
+
+/// Measures of the extension of a test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum StrainMeasure {
+    /// λ = l/L, 1 at rest.
+    Stretch,
+    /// λ − 1.
+    Engineering,
+    /// ln λ.
+    True,
+}
+
+/// Measures of the stress of a test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
+#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum StressMeasure {
+    /// Force over undeformed area, P (PK1, "engineering").
+    Nominal,
+    /// Force over deformed area, σ = λP.
+    True,
+}
+
+/// What a heading says of its column.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Role {
+    pub what: What,
+    /// Of stretch_1, stretch_2 …: 0, 1.
+    pub axis: Option<usize>,
+    /// The axis is a number, which may also be that of a specimen.
+    pub numbered: bool,
+    /// Counted positive in compression.
+    pub compressive: bool,
+    /// Unit; nothing where the heading has none.
+    pub unit: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum What {
+    /// A strain, of which the heading may name the measure.
+    Strain(Option<StrainMeasure>),
+    /// A stress, of which the heading may name the measure.
+    Stress(Option<StressMeasure>),
+    /// The name of a test.
+    Mode,
+    /// A force or a displacement.
+    Raw,
+}
+
+/// Words that make a column something derived from a strain or stress.
+const OTHERS: [&str; 14] = [
+    "rate",
+    "modulus",
+    "energy",
+    "error",
+    "std",
+    "sd",
+    "deviation",
+    "pk2",
+    "second",
+    "offset",
+    "yield",
+    "break",
+    "limit",
+    "gauge",
+];
+const STRETCHES: [&str; 7] = ["stretch", "lambda", "λ", "lambda1", "lambda2", "λ1", "λ2"];
+const STRAINS: [&str; 6] = ["strain", "dehnung", "ε", "eps", "epsilon", "stauchung"];
+const LENGTHENINGS: [&str; 5] = ["elongation", "extension", "displacement", "traverse", "verlängerung"];
+const STRESSES: [&str; 8] = ["stress", "nominal", "pk1", "p", "σ", "sigma", "spannung", "druckspannung"];
+const FORCES: [&str; 5] = ["force", "load", "kraft", "standardkraft", "prüfkraft"];
+const TRUE: [&str; 6] = ["true", "cauchy", "log", "logarithmic", "hencky", "wahre"];
+const NOMINAL: [&str; 8] = ["engineering", "eng", "nominal", "technical", "pk1", "p", "piola", "technische"];
+
+/// Headings of the names of tests; of all but the first only if the cells are such names.
+pub(super) const MODES: [&str; 9] = [
+    "mode",
+    "test",
+    "test type",
+    "type",
+    "loading",
+    "load case",
+    "deformation",
+    "deformation mode",
+    "experiment",
+];
+
+impl Role {
+    /// Nothing of a heading that is none of these.
+    pub fn of(heading: &Heading) -> Option<Self> {
+        let (plain, unit) = suffixed(heading);
+        let words: Vec<&str> = plain.split(' ').collect();
+        let has = |list: &[&str]| words.iter().any(|word| list.contains(word));
+        let axis = match words.last() {
+            Some(&("1" | "x" | "11" | "lambda1" | "λ1")) if words.len() > 1 || has(&STRETCHES) => Some(0),
+            Some(&("2" | "y" | "22" | "lambda2" | "λ2")) if words.len() > 1 || has(&STRETCHES) => Some(1),
+            _ => None,
+        };
+        let ratio = unit
+            .as_deref()
+            .is_none_or(|unit| Unit::<RatioDimension>::parse(&crate::table::plain_unit(unit)).is_ok());
+        let lengthened = has(&LENGTHENINGS) && unit.is_some() && ratio;
+        let what = if has(&OTHERS) {
+            return None;
+        } else if MODES.contains(&plain.as_str()) {
+            What::Mode
+        } else if has(&STRETCHES) {
+            What::Strain(Some(StrainMeasure::Stretch))
+        } else if has(&STRAINS) || lengthened {
+            let measure = match (has(&TRUE), has(&NOMINAL) || lengthened) {
+                (true, _) => Some(StrainMeasure::True),
+                (_, true) => Some(StrainMeasure::Engineering),
+                _ => None,
+            };
+            What::Strain(measure)
+        } else if has(&STRESSES) {
+            let measure = match (has(&TRUE), has(&NOMINAL)) {
+                (true, _) => Some(StressMeasure::True),
+                (_, true) => Some(StressMeasure::Nominal),
+                _ => None,
+            };
+            What::Stress(measure)
+        } else if has(&FORCES) || has(&LENGTHENINGS) {
+            What::Raw
+        } else {
+            return None;
+        };
+        let compressive = words
+            .iter()
+            .any(|word| ["compress", "stauch", "druck"].iter().any(|start| word.starts_with(start)));
+        let numbered = matches!(words.last(), Some(&("1" | "2")));
+        Some(Self { what, axis, numbered, compressive, unit })
+    }
+}
+
+/// The plain name and the unit, which may stand behind a `_`: `nominal_1_N/mm^2`.
+fn suffixed(heading: &Heading) -> (String, Option<String>) {
+    for (at, _) in heading.text.match_indices('_') {
+        let (name, unit) = (&heading.text[..at], &heading.text[at + 1..]);
+        let percent = unit == "%" || unit == "pct" || unit == "percent";
+        if percent || Unit::<StressDimension>::parse(&crate::table::plain_unit(unit)).is_ok() {
+            return (plainly(name), Some(unit.to_owned()));
+        }
+    }
+    (heading.plain.clone(), heading.unit.clone())
+}
+
+/// The test that a cell names, and whether it is compression.
+pub(super) fn mode(cell: &str) -> Option<(Mode, bool)> {
+    let plain = plainly(cell);
+    let words: Vec<&str> = plain.split(' ').collect();
+    let has = |list: &[&str]| words.iter().any(|word| list.contains(word));
+    let compression = words.iter().any(|word| word.starts_with("compress")) || has(&["uc"]);
+    let shear = has(&["shear", "ps"]);
+    if has(&["planar", "plane", "pt", "ps", "strip", "constrained"]) || (shear && has(&["pure"])) {
+        Some((Mode::PureShear, compression))
+    } else if shear {
+        None
+    } else if has(&["equibiaxial", "equi", "biaxial", "eb", "et", "ebt", "bt", "inflation", "bulge"]) {
+        Some((Mode::Equibiaxial, compression))
+    } else if has(&["uniaxial", "ut", "uc", "tension", "tensile", "simple"]) || compression {
+        Some((Mode::Uniaxial, compression))
+    } else {
+        None
+    }
+}

@@ -1,0 +1,244 @@
+//! Fits in parameters without bounds: the optimiser's problem, and what the data say at its end.
+
+use std::cell::Cell;
+
+use levenberg_marquardt::LeastSquaresProblem;
+use nalgebra::{DMatrix, DVector, Dyn, Owned};
+
+use super::data::{State, Table};
+use super::descriptor::UNLIMITED;
+use super::fit::{Standing, residuals};
+use super::{Domain, Error, ModelDescriptor};
+
+/// The differences carry 1e-10, and an effect below 1e-6 of the stresses tells nothing.
+const EFFECT: f64 = 1e-6;
+
+/// What the data say at a minimum.
+pub(super) struct Uncertainty {
+    /// Standard errors.
+    pub errors: Vec<Option<f64>>,
+    /// Whether parameters are determined.
+    pub standings: Vec<Standing>,
+    /// Draws of all parameters.
+    pub draws: Vec<Vec<f64>>,
+}
+
+/// Axis, state and computed stresses of each measured stress, state by state.
+fn measured<'a>(
+    table: &'a Table,
+    mut nominal: impl FnMut(&State) -> [f64; 2] + 'a,
+) -> impl Iterator<Item = (usize, &'a State, [f64; 2])> + 'a {
+    table.states.iter().flat_map(move |state| {
+        let found = nominal(state);
+        (0..2).filter(|&axis| state.nominal[axis] != 0.0).map(move |axis| (axis, state, found))
+    })
+}
+
+/// Between the parameters p of a law and the unbounded q of the optimiser.
+pub(super) struct Map<'a> {
+    model: &'a ModelDescriptor,
+    /// Lower limit of each p.
+    pub limits: Vec<f64>,
+    modulus: f64,
+}
+
+/// |q| beyond which a parameter is at its limit or at infinity for all purposes; e^±40 = 4e∓18.
+const FARTHEST: f64 = 40.0;
+
+impl<'a> Map<'a> {
+    pub fn new(model: &'a ModelDescriptor, table: &Table, modulus: f64) -> Result<Self, Error> {
+        let mut limits = Vec::new();
+        for parameter in model.parameters {
+            limits.push(match parameter.domain {
+                Domain::Real => f64::NEG_INFINITY,
+                Domain::Positive => 0.0,
+                Domain::Above(limit) => {
+                    let mut most = 0.0_f64;
+                    for state in &table.states {
+                        most = most.max(limit(state.principal_stretches()?));
+                    }
+                    most
+                }
+            });
+        }
+        Ok(Self { model, limits, modulus })
+    }
+
+    fn scale(&self, i: usize) -> f64 {
+        if self.model.parameters[i].unit == "Pa" { self.modulus } else { 1.0 }
+    }
+
+    pub fn parameters(&self, q: &DVector<f64>) -> Vec<f64> {
+        (0..q.len()).map(|i| self.value(i, q[i]).0).collect()
+    }
+
+    /// p and dp/dq.
+    fn value(&self, i: usize, q: f64) -> (f64, f64) {
+        let exponential = q.clamp(-FARTHEST, FARTHEST).exp();
+        match self.model.parameters[i].domain {
+            Domain::Real => (q * self.scale(i), self.scale(i)),
+            Domain::Positive => (exponential * self.scale(i), exponential * self.scale(i)),
+            Domain::Above(_) => {
+                // never the limit itself, where the energy is infinite, nor beyond what data can tell from infinity
+                let excess = self.limits[i] * exponential.clamp(1e-12, UNLIMITED);
+                (self.limits[i] + excess, excess)
+            }
+        }
+    }
+
+    pub fn inverse(&self, p: &[f64]) -> DVector<f64> {
+        DVector::from_fn(p.len(), |i, _| match self.model.parameters[i].domain {
+            Domain::Real => p[i] / self.scale(i),
+            Domain::Positive => (p[i] / self.scale(i)).ln(),
+            Domain::Above(_) => (p[i] / self.limits[i] - 1.0).ln(),
+        })
+    }
+
+    /// Residuals in units of the modulus.
+    pub fn residuals(&self, q: &DVector<f64>, table: &Table) -> Option<DVector<f64>> {
+        let p = self.parameters(q);
+        let residuals = match self.model.slopes {
+            Some(slopes) => {
+                let mut unused = vec![[0.0; 2]; p.len()];
+                measured(table, |state| slopes(&p, state.stretches, &mut unused))
+                    .map(|(i, state, nominal)| nominal[i] - state.nominal[i])
+                    .collect()
+            }
+            None => residuals(&self.model.law(&p).ok()?, table).ok()?,
+        };
+        let residuals = DVector::from_vec(residuals) / self.modulus;
+        residuals.iter().all(|residual| residual.is_finite()).then_some(residuals)
+    }
+
+    /// dr/dq, in closed form or by central differences of step ∛ε, good to 1e-10.
+    fn jacobian(&self, q: &DVector<f64>, table: &Table) -> Option<DMatrix<f64>> {
+        if let Some(slopes) = self.model.slopes {
+            let values: Vec<(f64, f64)> = (0..q.len()).map(|i| self.value(i, q[i])).collect();
+            let p: Vec<f64> = values.iter().map(|value| value.0).collect();
+            let mut rows = DMatrix::zeros(table.measurements(), q.len());
+            let mut of = vec![[0.0; 2]; p.len()];
+            let mut row = 0;
+            for state in &table.states {
+                slopes(&p, state.stretches, &mut of);
+                for axis in (0..2).filter(|&axis| state.nominal[axis] != 0.0) {
+                    for (i, value) in values.iter().enumerate() {
+                        rows[(row, i)] = of[i][axis] * value.1 / self.modulus;
+                    }
+                    row += 1;
+                }
+            }
+            return rows.iter().all(|slope: &f64| slope.is_finite()).then_some(rows);
+        }
+        let mut columns = Vec::with_capacity(q.len());
+        for i in 0..q.len() {
+            let step = f64::EPSILON.cbrt() * q[i].abs().max(1.0);
+            let (mut up, mut down) = (q.clone(), q.clone());
+            up[i] += step;
+            down[i] -= step;
+            let difference = self.residuals(&up, table)? - self.residuals(&down, table)?;
+            columns.push(difference / (up[i] - down[i]));
+        }
+        Some(DMatrix::from_columns(&columns))
+    }
+
+    /// What the data say of the parameters. Without standard errors are those that the residuals do not depend on, and all if the
+    /// rest are collinear.
+    pub fn uncertainty(&self, q: &DVector<f64>, table: &Table) -> Uncertainty {
+        let mut found = Uncertainty {
+            errors: vec![None; q.len()],
+            standings: vec![Standing::Determined; q.len()],
+            draws: Vec::new(),
+        };
+        let effects =
+            self.jacobian(q, table).map(|jacobian| jacobian.column_iter().map(|c| c.norm()).collect());
+        let effects: Vec<f64> = effects.unwrap_or_default();
+        for (i, effect) in effects.iter().enumerate() {
+            let parameter = &self.model.parameters[i];
+            let modulus = matches!(parameter.domain, Domain::Positive) && parameter.unit == "Pa";
+            let unlimited = matches!(parameter.domain, Domain::Above(_)) && q[i].exp() > 0.1 * UNLIMITED;
+            found.standings[i] = match modulus {
+                true if *effect <= EFFECT => Standing::Absent,
+                // the exponent of a term that is absent
+                false if *effect <= EFFECT && i > 0 && found.standings[i - 1] == Standing::Absent => {
+                    Standing::Absent
+                }
+                false if *effect <= EFFECT || unlimited => Standing::Undetermined,
+                _ => Standing::Determined,
+            };
+        }
+        let Some((live, covariance, degrees)) = self.covariance(q, table) else {
+            return found;
+        };
+        for (k, &i) in live.iter().enumerate() {
+            found.errors[i] = Some(covariance[(k, k)].sqrt() * self.value(i, q[i]).1.abs());
+        }
+        let at: Vec<f64> = live.iter().map(|&i| q[i]).collect();
+        let drawn = crate::posterior::draws(&at, &covariance, degrees, crate::posterior::DRAWS, 0);
+        let parameters = |drawn: Vec<f64>| {
+            let mut q = q.clone();
+            live.iter().zip(drawn).for_each(|(&i, value)| q[i] = value);
+            self.parameters(&q)
+        };
+        found.draws = drawn.unwrap_or_default().into_iter().map(parameters).collect();
+        found
+    }
+
+    /// The q that the residuals determine, their covariance s²(JᵀJ)⁻¹ and the degrees of freedom.
+    fn covariance(&self, q: &DVector<f64>, table: &Table) -> Option<(Vec<usize>, DMatrix<f64>, usize)> {
+        let (residuals, jacobian) = (self.residuals(q, table)?, self.jacobian(q, table)?);
+        let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
+        let live: Vec<usize> = (0..q.len()).filter(|&i| norms[i] > EFFECT).collect();
+        let columns: Vec<_> = live.iter().map(|&i| jacobian.column(i) / norms[i]).collect();
+        if columns.is_empty() || residuals.len() <= live.len() {
+            return None;
+        }
+        let scaled = DMatrix::from_columns(&columns);
+        let normal = scaled.tr_mul(&scaled);
+        if normal.clone().symmetric_eigenvalues().min() < 1e-9 {
+            return None;
+        }
+        let degrees = residuals.len() - live.len();
+        let variance = residuals.norm_squared() / degrees as f64;
+        let inverse = normal.cholesky()?.inverse();
+        let covariance = DMatrix::from_fn(live.len(), live.len(), |a, b| {
+            variance * inverse[(a, b)] / (norms[live[a]] * norms[live[b]])
+        });
+        Some((live, covariance, degrees))
+    }
+}
+
+/// A residual in units of the modulus that no step is accepted with.
+pub(super) const REJECTED: f64 = 1e100;
+
+/// A least-squares problem in q.
+pub(super) struct Problem<'a> {
+    pub map: &'a Map<'a>,
+    pub table: &'a Table,
+    pub at: DVector<f64>,
+    pub evaluations: Cell<usize>,
+}
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, q: &DVector<f64>) {
+        self.at.copy_from(q);
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.at.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        self.evaluations.set(self.evaluations.get() + 1);
+        // a trial where the law overflows must be rejected; `None` would end the search
+        let rejected = || DVector::from_element(self.table.measurements(), REJECTED);
+        Some(self.map.residuals(&self.at, self.table).unwrap_or_else(rejected))
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        self.map.jacobian(&self.at, self.table)
+    }
+}
