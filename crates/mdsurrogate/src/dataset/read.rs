@@ -45,7 +45,7 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
         set
     } else {
         let text = Table::read(path, options)?;
-        if ["mode", "stretch", "stretch_1"].iter().any(|name| text.has(name)) {
+        if is_rubber(&text) {
             nominal(&text)?
         } else {
             table(&text, options)?
@@ -61,6 +61,17 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
         other => other,
     })?;
     Ok(set)
+}
+
+/// Whether a table has tests of rubber: stretches or strains, and nothing of a body in space.
+fn is_rubber(table: &Table) -> bool {
+    let of_space = ["C11", "F11", "lx", "avg_lx", "P11", "S11"].iter().any(|name| table.has(name));
+    let words = ["stretch", "strain", "dehnung"];
+    let is = |name: &str| {
+        let lower = name.to_lowercase();
+        lower == "mode" || words.iter().any(|word| lower.contains(word))
+    };
+    !of_space && !table.is_lammps() && table.headings.iter().any(|(name, _)| is(name))
 }
 
 pub(super) fn is_hdf5(path: &std::path::Path) -> Result<bool, Error> {
@@ -246,21 +257,21 @@ fn require_material(table: &Table, all: &[String]) -> Result<(), Error> {
 /// Nominal stresses over stretches: a run for each test, in order of appearance.
 fn nominal(table: &Table) -> Result<Dataset, Error> {
     let path = &table.path;
-    let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
-    let read = hyperelastic::data::Table::parse("", &text).map_err(|error| {
-        let found = match error {
-            constitutive::Error::Data { reason, .. } => reason,
-            other => other.to_string(),
-        };
-        Error::file(path, found, "stretches and nominal stresses of an incompressible body")
+    let reading = hyperelastic::data::Table::read_as(path, &hyperelastic::Meaning::default());
+    let reading = reading.map_err(|error| match error {
+        polycore::Error::Constitutive(constitutive::Error::Data { reason, .. }) => {
+            Error::file(path, reason, "stretches and nominal stresses of an incompressible body")
+        }
+        other => other.into(),
     })?;
+    let named = table.headings.iter().any(|(name, _)| name.eq_ignore_ascii_case("mode"));
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut set = Dataset::default();
-    for state in &read.states {
+    for state in &reading.table.states {
         let kind = state.mode.name();
         let known = set.paths.iter().position(|run| run.kind == kind);
         let run = known.unwrap_or_else(|| {
-            let id = if table.has("mode") { kind.to_owned() } else { stem.to_string() };
+            let id = if named { kind.to_owned() } else { stem.to_string() };
             set.paths.push(Path { id, kind: kind.to_owned(), rates: [f64::NAN; 3], rows: Vec::new() });
             set.paths.len() - 1
         });
@@ -273,14 +284,16 @@ fn nominal(table: &Table) -> Result<Dataset, Error> {
         }
     }
     set.paths.retain(|run| !run.rows.is_empty());
-    set.provenance.push(format!(
+    let line = format!(
         "{}: {}, nominal stresses, {} rows of {} runs, {} at rest or free",
         super::table::name_of(path),
         table.fingerprint,
         set.len(),
         set.paths.len(),
         set.skipped
-    ));
+    );
+    let more = table.understood().map(|_| &reading.understood).into_iter().chain(&reading.notes);
+    set.provenance.push(more.fold(line, |line, note| line + "; " + note));
     Ok(set)
 }
 

@@ -173,13 +173,18 @@ fn nominal_stresses_of_rubber() {
     let set = read_text(biaxial).unwrap();
     assert_eq!((set.paths[0].id.as_str(), set.paths[0].kind.as_str()), ("t", "biaxial"));
     assert_eq!(set.paths[0].rows[0].nominal, Some([3e5, 2e5]));
-    for (text, message) in [
-        ("stretch,nominal_kg\n1,2\n", "header `stretch,nominal_kg`"),
-        ("mode,stretch,nominal_MPa\nshear,1,2\n", "line 2: mode `shear`"),
-        ("stretch,nominal_MPa\n1,x\n", "line 2: `x` is not a number"),
+    // as laboratories write them: strain in per cent, decimal commas
+    let set = read_text("Strain (%);Stress (MPa)\n0,0;0\n100,0;1,0\n200,0;1,8\n").unwrap();
+    assert_eq!((set.len(), set.paths[0].rows[0].nominal), (2, Some([1e6, 0.0])));
+    assert!((set.paths[0].rows[0].c[0] - 4.0).abs() < 1e-12);
+    assert!(set.provenance[0].contains("decimal comma"), "{:?}", set.provenance);
+    for (text, parts) in [
+        ("stretch,nominal_kg\n1,2\n", ["t.csv", "nominal_kg"]),
+        ("mode,stretch,nominal_MPa\nshear,1,2\n", ["line 2", "shear"]),
+        ("stretch,nominal_MPa\n1,x\n", ["line 2", "x"]),
     ] {
         let error = read_text(text).unwrap_err().to_string();
-        assert!(error.contains(message), "{error}");
+        assert!(parts.iter().all(|part| error.contains(part)), "{error}");
     }
 }
 
