@@ -43,11 +43,14 @@ fn names(name: &'static str) -> Vec<&'static str> {
     NAMES.iter().find(|(first, _)| *first == name).map_or(vec![name], |(_, all)| all.to_vec())
 }
 
+/// Reads a column in SI; the unit is that of headings without one.
+type Read = fn(&Table, usize, Option<&str>) -> Result<Vec<f64>, table::Error>;
+
 /// A column that is requested.
 #[derive(Clone, Copy)]
 pub struct Column {
     name: &'static str,
-    read: fn(&Table, usize, Option<&str>) -> Result<Vec<f64>, table::Error>,
+    read: Read,
     example: &'static str,
     unit: Option<&'static str>,
     least: f64,

@@ -7,9 +7,12 @@ use std::path::PathBuf;
 /// Value of constant `kinetics` that asks for the file.
 const IN_FILE: f64 = 3.0;
 
+/// A name, the constants that the host gives, and the whole list.
+type Known = (String, Vec<f64>, Vec<f64>);
+
 thread_local! {
-    /// The name and the constants of the last call on this thread, and the whole list.
-    static LAST: RefCell<Option<(String, Vec<f64>, Vec<f64>)>> = const { RefCell::new(None) };
+    /// Those of the last call on this thread.
+    static LAST: RefCell<Option<Known>> = const { RefCell::new(None) };
 }
 
 /// The list of constants of a material by its name in the host: with `kinetics` 3 constants 7 to 15 come from `name.umatht` in the

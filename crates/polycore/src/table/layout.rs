@@ -162,7 +162,7 @@ impl Decimal {
         if text.contains(own) && !rest.starts_with(|c: char| c.is_ascii_digit()) {
             return None;
         }
-        plain(&format!("{}.{rest}", whole.replace(other, "")).trim_end_matches('.'))
+        plain(format!("{}.{rest}", whole.replace(other, "")).trim_end_matches('.'))
     }
 }
 
