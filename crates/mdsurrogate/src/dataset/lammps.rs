@@ -93,7 +93,7 @@ fn blocks_of_log(text: &str) -> (Vec<Block>, usize, Option<String>) {
         } else if inside && !trimmed.is_empty() && trimmed != "data:" {
             let cells = trimmed.strip_prefix("- [").map_or(trimmed, |cells| cells.trim_end_matches(']'));
             let Some(block) = blocks.last_mut() else { continue };
-            match numbers(cells).filter(|row| row.len() == block.headings.len()) {
+            match numbers(cells).filter(|row| !row.is_empty() && row.len() == block.headings.len()) {
                 Some(row) => block.rows.push((index as u64 + 1, row)),
                 None => strange += 1,
             }
@@ -126,7 +126,7 @@ fn blocks_of_averages(path: &Path, text: &str) -> Result<(Vec<Block>, usize), Er
         if line.trim().is_empty() {
             continue;
         }
-        match numbers(line).filter(|row| row.len() == headings.len()) {
+        match numbers(line).filter(|row| !row.is_empty() && row.len() == headings.len()) {
             Some(row) => {
                 let anew = block.rows.last().is_some_and(|(_, last)| row[0] <= last[0])
                     || block.headings != headings;

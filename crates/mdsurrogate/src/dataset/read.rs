@@ -45,11 +45,7 @@ pub fn read(path: impl AsRef<std::path::Path>, options: &ReadOptions) -> Result<
         set
     } else {
         let text = Table::read(path, options)?;
-        if is_rubber(&text) {
-            nominal(&text)?
-        } else {
-            table(&text, options)?
-        }
+        if is_rubber(&text) { nominal(&text)? } else { table(&text, options)? }
     };
     set.check().map_err(|error| match error {
         Error::Implausible { place, quantity, found, allowed } => {
