@@ -205,6 +205,9 @@ fn lacking(found: &[(String, Place)], options: &ReadOptions) -> Vec<String> {
     missing
 }
 
+/// A block with its number, and its columns by property.
+type Known<'a> = (usize, &'a Block, Vec<(String, Place)>);
+
 /// Headings with their units, rows, and how they were understood.
 type Found = (Vec<(String, Option<String>)>, Vec<csv::StringRecord>, Origin);
 
@@ -231,7 +234,7 @@ pub(super) fn read(path: &Path, text: &[u8], kind: Kind, options: &ReadOptions) 
         .enumerate()
         .map(|(index, block)| (index + 1, block))
         .filter(|(number, _)| chosen(*number));
-    let all: Vec<(usize, &Block, Vec<(String, Place)>)> =
+    let all: Vec<Known> =
         all.map(|(number, block)| (number, block, columns(&block.headings, options))).collect();
     let usable: Vec<_> = all.iter().filter(|(.., found)| lacking(found, options).is_empty()).collect();
     let Some((_, _, properties)) = usable.first() else {
@@ -332,12 +335,7 @@ fn units(path: &Path, told: Option<&str>, options: &ReadOptions) -> Result<Optio
     }
 }
 
-fn none_usable(
-    path: &Path,
-    what: &str,
-    all: &[(usize, &Block, Vec<(String, Place)>)],
-    options: &ReadOptions,
-) -> Error {
+fn none_usable(path: &Path, what: &str, all: &[Known], options: &ReadOptions) -> Error {
     let allowed = "`thermo_style custom step … lx ly lz pxx pyy pzz pxy pxz pyz`, in a tilted box xy xz yz, too; columns of your \
                    own by `names` in `[data]`, as `names = { lx = \"v_lx\", pxx = \"c_p[1]\" }` (`pxy = \"0\"` where there is no shear)";
     let best = all.iter().min_by_key(|(.., found)| lacking(found, options).len());
