@@ -2,7 +2,7 @@
 
 use crate::error::value;
 use crate::pool;
-use crate::watch::{left_alone, stoppable};
+use crate::watch::stoppable;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use polycore::constitutive::Error;
 use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
@@ -242,7 +242,8 @@ pub fn fit_law<'py>(
     }
     let table = Table { source: String::new(), states };
     let model = hyperelastic::model(key).map_err(value)?;
-    let found = left_alone(py, move || fit::fit(model, &table))?.map_err(value)?;
+    let found = stoppable(py, |stop| fit::fit_until(model, &table, &|| stop.load(Ordering::Relaxed)))?;
+    let found = found.map_err(value)?;
     let answer = PyDict::new(py);
     let parameters: Vec<_> =
         found.parameters.iter().map(|p| (p.name, p.unit, p.value, p.standard_error)).collect();

@@ -93,7 +93,7 @@ fn blocks_of_log(text: &str) -> (Vec<Block>, usize, Option<String>) {
         } else if inside && !trimmed.is_empty() && trimmed != "data:" {
             let cells = trimmed.strip_prefix("- [").map_or(trimmed, |cells| cells.trim_end_matches(']'));
             let Some(block) = blocks.last_mut() else { continue };
-            match numbers(cells).filter(|row| row.len() == block.headings.len()) {
+            match numbers(cells).filter(|row| !row.is_empty() && row.len() == block.headings.len()) {
                 Some(row) => block.rows.push((index as u64 + 1, row)),
                 None => strange += 1,
             }
@@ -126,7 +126,7 @@ fn blocks_of_averages(path: &Path, text: &str) -> Result<(Vec<Block>, usize), Er
         if line.trim().is_empty() {
             continue;
         }
-        match numbers(line).filter(|row| row.len() == headings.len()) {
+        match numbers(line).filter(|row| !row.is_empty() && row.len() == headings.len()) {
             Some(row) => {
                 let anew = block.rows.last().is_some_and(|(_, last)| row[0] <= last[0])
                     || block.headings != headings;
@@ -205,6 +205,9 @@ fn lacking(found: &[(String, Place)], options: &ReadOptions) -> Vec<String> {
     missing
 }
 
+/// A block with its number, and its columns by property.
+type Known<'a> = (usize, &'a Block, Vec<(String, Place)>);
+
 /// Headings with their units, rows, and how they were understood.
 type Found = (Vec<(String, Option<String>)>, Vec<csv::StringRecord>, Origin);
 
@@ -231,7 +234,7 @@ pub(super) fn read(path: &Path, text: &[u8], kind: Kind, options: &ReadOptions) 
         .enumerate()
         .map(|(index, block)| (index + 1, block))
         .filter(|(number, _)| chosen(*number));
-    let all: Vec<Numbered> =
+    let all: Vec<Known> =
         all.map(|(number, block)| (number, block, columns(&block.headings, options))).collect();
     let usable: Vec<_> = all.iter().filter(|(.., found)| lacking(found, options).is_empty()).collect();
     let Some((_, _, properties)) = usable.first() else {
@@ -332,10 +335,7 @@ fn units(path: &Path, told: Option<&str>, options: &ReadOptions) -> Result<Optio
     }
 }
 
-/// The number of a block, the block, and where its columns are.
-type Numbered<'a> = (usize, &'a Block, Vec<(String, Place)>);
-
-fn none_usable(path: &Path, what: &str, all: &[Numbered], options: &ReadOptions) -> Error {
+fn none_usable(path: &Path, what: &str, all: &[Known], options: &ReadOptions) -> Error {
     let allowed = "`thermo_style custom step … lx ly lz pxx pyy pzz pxy pxz pyz`, in a tilted box xy xz yz, too; columns of your \
                    own by `names` in `[data]`, as `names = { lx = \"v_lx\", pxx = \"c_p[1]\" }` (`pxy = \"0\"` where there is no shear)";
     let best = all.iter().min_by_key(|(.., found)| lacking(found, options).len());

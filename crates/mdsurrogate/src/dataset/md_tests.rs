@@ -409,6 +409,15 @@ fn yaml_and_averages_of_lammps() {
     assert_eq!(named(100, Some(Origin::Run)).unwrap().len(), 4);
     let vector = "# Time-averaged data for fix 1\n# TimeStep Number-of-rows\n# Row c_1\n100 2\n1 3\n2 4\n";
     assert!(refused(file("v.dat", vector, &real)).contains("mode vector"));
+    // nothing but separators
+    for text in [
+        "# TimeStep\n,\n,\n",
+        "keywords: []\ndata:\n  - []\n  - []\n",
+        "# TimeStep v_a\n",
+        "keywords: ['Step', \n - [1\n",
+    ] {
+        refused(file("out.dat", text, &real));
+    }
     // a job that begins anew is another run
     let twice = format!("{heading}{0}{0}", rows(0)).replace("v_l", "l").replace("v_p", "p");
     let set = file("out.dat", &twice, &ReadOptions { origin: Some(Origin::Run), ..real });
