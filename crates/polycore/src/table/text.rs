@@ -11,7 +11,7 @@ pub(super) fn decode(bytes: Vec<u8>) -> Result<(String, &'static str), [&'static
     }
     let wide = |from: usize, order: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = bytes[from..].chunks_exact(2).map(|pair| order([pair[0], pair[1]])).collect();
-        String::from_utf16_lossy(&units)
+        String::from_utf16_lossy(&units).trim_start_matches('\u{feff}').to_owned()
     };
     match bytes[..] {
         [0xef, 0xbb, 0xbf, ..] => return utf8(bytes[3..].to_vec(), "UTF-8 with BOM"),

@@ -43,6 +43,7 @@ pub(super) const THREE_CHAIN: ModelDescriptor = ModelDescriptor {
     starts,
     contains: &[UNLOCKED],
     slopes: None,
+    refine: None,
 };
 
 pub(super) const EIGHT_CHAIN: ModelDescriptor = ModelDescriptor {
@@ -54,6 +55,7 @@ pub(super) const EIGHT_CHAIN: ModelDescriptor = ModelDescriptor {
     starts,
     contains: &[UNLOCKED],
     slopes: None,
+    refine: None,
 };
 
 pub(super) const EIGHT_CHAIN_ROOT_I2: ModelDescriptor = ModelDescriptor {
@@ -72,6 +74,7 @@ pub(super) const EIGHT_CHAIN_ROOT_I2: ModelDescriptor = ModelDescriptor {
         embed: |p, start| [ABSENT * p[0], 0.1 * start.modulus].map(|c| vec![p[0], p[1], c]).to_vec(),
     }],
     slopes: None,
+    refine: None,
 };
 
 /// Chains so long that they never lock.

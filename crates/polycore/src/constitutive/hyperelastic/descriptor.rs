@@ -24,7 +24,12 @@ pub struct ModelDescriptor {
     pub(super) contains: &'static [Contained],
     /// Nominal stresses and their derivatives with respect to the parameters, where they are known in closed form.
     pub(super) slopes: Option<Slopes>,
+    /// Moves parameters along valleys in which the optimiser of all of them is slow.
+    pub(super) refine: Option<Refine>,
 }
+
+/// Of parameters, better ones.
+pub(super) type Refine = fn(&[f64], &Start<'_>) -> Vec<f64>;
 
 /// A law inside another one.
 #[derive(Debug, Clone, Copy)]

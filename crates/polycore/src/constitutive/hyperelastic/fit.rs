@@ -167,18 +167,29 @@ pub fn fit_until(
         }
         starts.extend(grown);
     }
-    for start in &starts {
-        if stop() {
-            return Err(Error::Stopped);
-        }
-        let problem = Problem { map: &map, table, at: map.inverse(start), evaluations: Cell::new(0) };
+    let mut search = |from: &[f64], ends: &mut Vec<(f64, DVector<f64>)>| {
+        let problem = Problem { map: &map, table, at: map.inverse(from), evaluations: Cell::new(0) };
         let (problem, report) = solver.minimize(problem);
         iterations += problem.evaluations.get();
         if report.objective_function < REJECTED && map.residuals(&problem.at, table).is_some() {
             ends.push((report.objective_function, problem.at));
         }
+    };
+    for from in &starts {
+        if stop() {
+            return Err(Error::Stopped);
+        }
+        search(from, &mut ends);
+        if let Some(refine) = model.refine {
+            search(&refine(from, &start), &mut ends);
+        }
     }
-    let Some((least, best)) = ends.iter().min_by(|a, b| a.0.total_cmp(&b.0)) else {
+    let by_misfit = |a: &&(f64, DVector<f64>), b: &&(f64, DVector<f64>)| a.0.total_cmp(&b.0);
+    let end = ends.iter().min_by(by_misfit).map(|end| map.parameters(&end.1));
+    if let (Some(refine), Some(end)) = (model.refine, end) {
+        search(&refine(&end, &start), &mut ends);
+    }
+    let Some((least, best)) = ends.iter().min_by(by_misfit) else {
         return Err(Error::NoConvergence { iteration: model.key, steps: iterations, residual: f64::NAN });
     };
     let values = map.parameters(best);

@@ -28,6 +28,7 @@ pub(super) const GENT: ModelDescriptor = ModelDescriptor {
         embed: |p, start| vec![vec![p[0], UNLIMITED * start.limits[1]]],
     }],
     slopes: None,
+    refine: None,
 };
 
 impl Gent {

@@ -1,6 +1,7 @@
 //! Ogden's law in powers of the principal stretches.
 
 use super::descriptor::{Contained, Domain, Kind, ModelDescriptor, Parameter};
+use super::ogden_project::projected;
 use super::{Error, Hyperelastic, PrincipalResponse, finite, ogden_starts, parameter, positive};
 
 /// W = Σᵢ cᵢ (λ₁^αᵢ + λ₂^αᵢ + λ₃^αᵢ − 3) (1.24); doi:10.1098/rspa.1972.0026.
@@ -55,6 +56,7 @@ pub(super) const OGDEN_1: ModelDescriptor = ModelDescriptor {
     starts: ogden_starts::starts::<1>,
     contains: &[Contained { key: "neo-hookean", embed: |p, _| vec![vec![p[0], 2.0]] }],
     slopes: Some(slopes),
+    refine: Some(projected),
 };
 
 pub(super) const OGDEN_2: ModelDescriptor = ModelDescriptor {
@@ -69,6 +71,7 @@ pub(super) const OGDEN_2: ModelDescriptor = ModelDescriptor {
         Contained { key: "mooney-rivlin", embed: |p, _| vec![vec![2.0 * p[0], 2.0, 2.0 * p[1], -2.0]] },
     ],
     slopes: Some(slopes),
+    refine: Some(projected),
 };
 
 pub(super) const OGDEN_3: ModelDescriptor = ModelDescriptor {
@@ -81,6 +84,7 @@ pub(super) const OGDEN_3: ModelDescriptor = ModelDescriptor {
     starts: ogden_starts::starts::<3>,
     contains: &[Contained { key: "ogden-2", embed: ogden_starts::grown }],
     slopes: Some(slopes),
+    refine: Some(projected),
 };
 
 /// Pᵢ = Σ 2μ/α (λᵢ^α − λ₃^α)/λᵢ with λ₃ = 1/(λ₁λ₂), in Abaqus' convention, and its derivatives.

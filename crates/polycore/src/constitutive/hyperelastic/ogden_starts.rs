@@ -5,10 +5,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::descriptor::{ABSENT, Start};
 use super::ogden::slopes;
-use super::ogden_project::projected;
 
 /// |α| of the grid; both signs are tried.
-const EXPONENTS: [f64; 14] = [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0];
+const EXPONENTS: [f64; 18] =
+    [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0, 48.0, 68.0, 96.0, 136.0];
 
 /// Starts that are handed to the optimiser.
 const KEPT: usize = 8;
@@ -56,7 +56,7 @@ pub(super) fn starts<const TERMS: usize>(start: &Start<'_>) -> Vec<Vec<f64>> {
     }
     let parameters = kept.iter().map(|(subset, moduli)| {
         let term = |i: usize| [start.modulus * moduli[i] / norms[subset[i]], exponents[subset[i]]];
-        projected(&(0..TERMS).flat_map(term).collect::<Vec<f64>>(), start)
+        (0..TERMS).flat_map(term).collect()
     });
     parameters.collect()
 }
@@ -94,7 +94,7 @@ pub(super) fn grown(smaller: &[f64], start: &Start<'_>) -> Vec<Vec<f64>> {
         found.push((-moduli.dot(&onto), parameters));
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    all.extend(found.into_iter().take(GROWN).map(|(_, parameters)| projected(&parameters, start)));
+    all.extend(found.into_iter().take(GROWN).map(|(_, parameters)| parameters));
     all
 }
 

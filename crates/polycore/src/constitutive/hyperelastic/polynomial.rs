@@ -26,6 +26,7 @@ pub(super) const NEO_HOOKEAN: ModelDescriptor = ModelDescriptor {
     starts: |start| vec![vec![start.modulus]],
     contains: &[],
     slopes: None,
+    refine: None,
 };
 
 pub(super) const MOONEY_RIVLIN: ModelDescriptor = ModelDescriptor {
@@ -44,6 +45,7 @@ pub(super) const MOONEY_RIVLIN: ModelDescriptor = ModelDescriptor {
     },
     contains: &[Contained { key: "neo-hookean", embed: |p, _| vec![vec![0.5 * p[0], ABSENT * p[0]]] }],
     slopes: None,
+    refine: None,
 };
 
 impl NeoHookean {

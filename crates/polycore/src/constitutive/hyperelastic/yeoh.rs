@@ -24,6 +24,7 @@ pub(super) const YEOH: ModelDescriptor = ModelDescriptor {
     starts: |start| vec![vec![0.5 * start.modulus, 0.0, 0.0]],
     contains: &[Contained { key: "neo-hookean", embed: |p, _| vec![vec![0.5 * p[0], 0.0, 0.0]] }],
     slopes: None,
+    refine: None,
 };
 
 impl Yeoh {
