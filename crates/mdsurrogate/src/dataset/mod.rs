@@ -348,6 +348,8 @@ fn bits(row: &Row) -> [u64; 12] {
 }
 
 #[cfg(test)]
+mod lammps_tests;
+#[cfg(test)]
 mod md_tests;
 #[cfg(test)]
 pub(crate) mod tests;
