@@ -7,8 +7,7 @@ use super::descriptor::{ABSENT, Start};
 use super::ogden::slopes;
 
 /// |α| of the grid; both signs are tried.
-const EXPONENTS: [f64; 18] =
-    [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0, 48.0, 68.0, 96.0, 136.0];
+const EXPONENTS: [f64; 14] = [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0];
 
 /// Starts that are handed to the optimiser.
 const KEPT: usize = 8;
