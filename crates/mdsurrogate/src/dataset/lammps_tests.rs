@@ -4,7 +4,7 @@ use super::md_tests::{file, refused};
 use super::*;
 
 /// A log of two runs: equilibration, which prints no stress, and a pull along x with lateral contraction.
-fn log(units: &str, runs: usize) -> String {
+pub(super) fn log(units: &str, runs: usize) -> String {
     let mut text = format!("LAMMPS (2 Aug 2023 - Update 3)\n{units}atom_style charge\nrun 100\n");
     text += "Per MPI rank memory allocation (min/avg/max) = 5.1 | 5.1 | 5.1 Mbytes\n   Step          Temp\n";
     text += "         0   300.1\n       100   299.2\nLoop time of 1.2 on 4 procs for 100 steps with 500 atoms\n\n";

@@ -1,5 +1,6 @@
 //! Tables of boxes, of F beside stresses of all kinds, and LAMMPS' own files.
 
+use super::lammps_tests::log;
 use super::*;
 
 pub(super) fn file(name: &str, text: &str, options: &ReadOptions) -> Result<Dataset, Error> {
