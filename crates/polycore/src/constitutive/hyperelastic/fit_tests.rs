@@ -173,7 +173,7 @@ fn a_double_exponent_is_no_minimum() {
 }
 
 /// Treloar's bar in 24 points: scipy's projected search from 150 starts ends at 0.071481 MPa with two terms. With three it follows
-/// the last point to the exponent 159.7; here a modulus of 4e-18 of the whole ends that at about 34 and 0.0482 MPa.
+/// the last point to the exponent 159.7 (0.0367 MPa), whose modulus lies below the least one here, 4e-18 of the whole: 0.0482 MPa.
 #[test]
 fn three_terms_on_a_bar() {
     let text = include_str!("../../../../../cases/external/treloar-fits/treloar1944_20C.csv");
