@@ -58,7 +58,10 @@ pub struct Table {
     layout: Layout,
     /// Lines above the headings, and comments among the rows, as they stand there.
     pub remarks: Vec<String>,
-    rows: Vec<csv::StringRecord>,
+    /// The text of all cells, where each ends, the first of each row and one more, and the line of each row.
+    cells: String,
+    ends: Vec<usize>,
+    firsts: Vec<usize>,
     lines: Vec<usize>,
 }
 
@@ -104,7 +107,9 @@ impl Table {
             headings: heading::read(&heads.texts, &heads.units),
             remarks: lines[..layout.heading_line.saturating_sub(1)].iter().map(|&l| l.to_owned()).collect(),
             layout,
-            rows: Vec::new(),
+            cells: String::new(),
+            ends: Vec::new(),
+            firsts: vec![0],
             lines: Vec::new(),
         };
         for (index, line) in lines.iter().enumerate().skip(first) {
@@ -125,7 +130,11 @@ impl Table {
             }
             // a line of separators alone
             if record.iter().any(|cell| !cell.is_empty()) {
-                table.rows.push(record);
+                for cell in &record {
+                    table.cells.push_str(cell);
+                    table.ends.push(table.cells.len());
+                }
+                table.firsts.push(table.ends.len());
                 table.lines.push(index + 1);
             }
         }
@@ -151,7 +160,7 @@ impl Table {
 
     /// Number of rows.
     pub fn rows(&self) -> usize {
-        self.rows.len()
+        self.lines.len()
     }
 
     /// Line of a row in the file, from 1.
@@ -209,7 +218,12 @@ impl Table {
 
     /// A cell, without the blanks around it.
     pub fn text(&self, row: usize, column: usize) -> &str {
-        self.rows[row].get(column).unwrap_or_default()
+        let cell = self.firsts[row] + column;
+        if cell >= self.firsts[row + 1] {
+            return "";
+        }
+        let start = cell.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.cells[start..self.ends[cell]]
     }
 
     /// A finite number, in the unit of its column.

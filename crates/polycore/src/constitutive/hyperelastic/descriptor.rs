@@ -66,6 +66,8 @@ pub(super) struct Start<'a> {
     pub modulus: f64,
     /// The data.
     pub table: &'a Table,
+    /// Whether the user asks the fit to end.
+    pub stop: &'a dyn Fn() -> bool,
 }
 
 /// A material parameter.

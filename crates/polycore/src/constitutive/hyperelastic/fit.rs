@@ -147,7 +147,7 @@ pub fn fit_until(
     let solver = LevenbergMarquardt::new().with_patience(200);
     let mut ends: Vec<(f64, DVector<f64>)> = Vec::new();
     let mut iterations = 0;
-    let start = Start { limits: &map.limits, modulus, table };
+    let start = Start { limits: &map.limits, modulus, table, stop };
     let mut starts = (model.starts)(&start);
     for contained in model.contains {
         let inner = super::model(contained.key).and_then(|inner| fit_until(inner, table, stop));
@@ -168,7 +168,7 @@ pub fn fit_until(
         starts.extend(grown);
     }
     let mut search = |from: &[f64], ends: &mut Vec<(f64, DVector<f64>)>| {
-        let problem = Problem { map: &map, table, at: map.inverse(from), evaluations: Cell::new(0) };
+        let problem = Problem { map: &map, table, at: map.inverse(from), evaluations: Cell::new(0), stop };
         let (problem, report) = solver.minimize(problem);
         iterations += problem.evaluations.get();
         if report.objective_function < REJECTED && map.residuals(&problem.at, table).is_some() {
@@ -188,6 +188,9 @@ pub fn fit_until(
     let end = ends.iter().min_by(by_misfit).map(|end| map.parameters(&end.1));
     if let (Some(refine), Some(end)) = (model.refine, end) {
         search(&refine(&end, &start), &mut ends);
+    }
+    if stop() {
+        return Err(Error::Stopped);
     }
     let Some((least, best)) = ends.iter().min_by(by_misfit) else {
         return Err(Error::NoConvergence { iteration: model.key, steps: iterations, residual: f64::NAN });

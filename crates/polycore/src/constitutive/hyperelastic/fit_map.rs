@@ -216,6 +216,8 @@ pub(super) struct Problem<'a> {
     pub table: &'a Table,
     pub at: DVector<f64>,
     pub evaluations: Cell<usize>,
+    /// Whether the user asks the search to end.
+    pub stop: &'a dyn Fn() -> bool,
 }
 
 impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
@@ -239,6 +241,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        self.map.jacobian(&self.at, self.table)
+        // nothing ends the search
+        if (self.stop)() { None } else { self.map.jacobian(&self.at, self.table) }
     }
 }
