@@ -53,6 +53,9 @@ fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
     let (kind, numbers) = match (key, parameters) {
         ("neo-hookean", &[modulus]) => ("NEO HOOKE".to_owned(), vec![0.5 * modulus, compliance]),
         ("mooney-rivlin", &[first, second]) => ("MOONEY-RIVLIN".to_owned(), vec![first, second, compliance]),
+        ("yeoh", &[first, second, third]) => {
+            ("YEOH".to_owned(), vec![first, second, third, compliance, 0.0, 0.0])
+        }
         // five terms of the series of the inverse Langevin function: too soft near locking
         ("eight-chain", &[modulus, links]) => {
             ("ARRUDA-BOYCE".to_owned(), vec![modulus, links.sqrt(), compliance])
@@ -105,6 +108,11 @@ mod tests {
                 "ogden-2",
                 &[0.4, 2.0, 0.1, -1.5],
                 "*HYPERELASTIC, OGDEN, N=2\n4.000000e-1, 2.000000e0, 1.000000e-1, -1.500000e0, 5.000000e-2, 0.000000e0\n",
+            ),
+            (
+                "yeoh",
+                &[0.2, 0.002, 5e-5],
+                "*HYPERELASTIC, YEOH\n2.000000e-1, 2.000000e-3, 5.000000e-5, 5.000000e-2, 0.000000e0, 0.000000e0\n",
             ),
             ("gent", &[0.3, 75.0], "*USER MATERIAL, CONSTANTS=3\n4.000000e1, 3.000000e-1, 7.500000e1\n"),
         ] {
