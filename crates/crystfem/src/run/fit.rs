@@ -6,7 +6,7 @@ use super::{fit_part, heat_flow};
 use crate::error::Error;
 use crate::fit::{Fit, Known, avrami, nakamura, ozawa};
 use crate::quantities as q;
-use crate::scene::{FitScene, FitSpec, Job, Measured};
+use crate::scene::{FitLaw, FitScene, FitSpec, Job, Measured};
 use polycore::case::Finished;
 use polycore::output::picture::{LinePlot, Series};
 use polycore::output::{atomic_write, csv};
@@ -54,7 +54,13 @@ pub fn run(source: &Source, scene: &FitScene, run: &mut polycore::case::Run) -> 
         // data that say nothing are a fault of the scene, which names them
         let fits = fits.map_err(|failure| match failure {
             Failure::Run(Error::Data { what, reason }) => {
-                source.refused(&format!("fit[{index}].data"), format!("{what}: {reason}")).into()
+                let single = spec.law == FitLaw::Nakamura && spec.data.len() == 1;
+                let hint = if single {
+                    "; one cooling rate gives K0 and K_G together only: add runs at others"
+                } else {
+                    ""
+                };
+                source.refused(&format!("fit[{index}].data"), format!("{what}: {reason}{hint}")).into()
             }
             other => other,
         })?;
