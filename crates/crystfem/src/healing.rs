@@ -43,7 +43,7 @@ impl Glass {
         -std::f64::consts::LN_10 * self.steepness * above / (self.width + above)
     }
 
-    /// Where the apparent activation energy R T² ln 10 C₁C₂/(C₂ + T − T_g)² falls to `energy`, J/mol, but T_g + 100 K at most.
+    /// Temperature at which the apparent activation energy R T² ln 10 C₁C₂/(C₂ + T − T_g)² falls to `energy`, J/mol, but T_g + 100 K at most.
     fn border(&self, energy: f64) -> f64 {
         let Self { transition, steepness, width } = *self;
         // √H (C₂ + T − T_g) = √(R ln 10 C₁C₂) T

@@ -1,7 +1,7 @@
 //! Constants of the material as hosts list them.
 
 use crystfem::kinetics::{self, Kinetics};
-use crystfem::material::{Polymer, Property, Semicrystalline};
+use crystfem::material::{CONSTANT_NAMES, Polymer, Property, Semicrystalline};
 use crystfem::melting::Melting;
 use std::cell::RefCell;
 
@@ -13,15 +13,15 @@ pub const NAMES: [&str; 15] = [
     "kinetics",
     "absolute_zero",
     "host",
-    "growth_rate",
-    "nucleation",
-    "activation_energy",
-    "equilibrium_melting",
-    "frozen",
-    "avrami_exponent",
-    "melting_sharpness",
-    "melting_shape",
-    "melting_peak",
+    CONSTANT_NAMES[0],
+    CONSTANT_NAMES[1],
+    CONSTANT_NAMES[2],
+    CONSTANT_NAMES[3],
+    CONSTANT_NAMES[4],
+    CONSTANT_NAMES[5],
+    CONSTANT_NAMES[6],
+    CONSTANT_NAMES[7],
+    CONSTANT_NAMES[8],
 ];
 /// How many a host lists before those of its own kinetics.
 pub const HEAD: usize = 6;

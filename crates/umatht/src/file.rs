@@ -2,37 +2,40 @@
 
 use crate::constants::{HEAD, NAMES};
 use std::cell::RefCell;
-use std::path::PathBuf;
+use std::path::Path;
+use std::rc::Rc;
 
 /// Value of constant `kinetics` that asks for the file.
 const IN_FILE: f64 = 3.0;
 
 /// A name, the constants that the host gives, and the whole list.
-type Known = (String, Vec<f64>, Vec<f64>);
+type Known = (String, Vec<f64>, Rc<[f64]>);
 
 thread_local! {
     /// Those of the last call on this thread.
     static LAST: RefCell<Option<Known>> = const { RefCell::new(None) };
 }
 
-/// The list of constants of a material by its name in the host: with `kinetics` 3 constants 7 to 15 come from `name.umatht` in the
-/// working directory, name in small letters, a line `growth_rate = 37869.0` (TOML) for each.
+/// Whether constants 7 to 15 of a list are in a file.
+pub fn is_asked(list: &[f64]) -> bool {
+    list.get(3) == Some(&IN_FILE)
+}
+
+/// The whole list of constants of a material: 7 to 15 from `name.umatht` in a folder, the host's name of the material in small letters, a
+/// line `growth_rate = 37869.0` (TOML) for each.
 ///
 /// # Errors
 /// A file that cannot be read, a missing or unknown name, a value that is no number.
-pub fn complete(name: &str, list: &[f64]) -> Result<Vec<f64>, String> {
-    if list.get(3) != Some(&IN_FILE) {
-        return Ok(list.to_vec());
-    }
+pub fn complete(folder: &Path, name: &str, list: &[f64]) -> Result<Rc<[f64]>, String> {
     let name = name.trim().to_lowercase();
     LAST.with_borrow_mut(|last| {
         if let Some((known, given, whole)) = last
             && *known == name
             && given == list
         {
-            return Ok(whole.clone());
+            return Ok(Rc::clone(whole));
         }
-        let path = PathBuf::from(format!("{name}.umatht"));
+        let path = folder.join(format!("{name}.umatht"));
         let text = std::fs::read_to_string(&path).map_err(|error| {
             format!("umatht: {}, asked for by constant `kinetics` 3: {error}", path.display())
         })?;
@@ -40,7 +43,8 @@ pub fn complete(name: &str, list: &[f64]) -> Result<Vec<f64>, String> {
         whole.resize(HEAD, 0.0);
         whole[3] = 0.0;
         whole.extend(parse(&text).map_err(|error| format!("umatht: {}: {error}", path.display()))?);
-        *last = Some((name, list.to_vec(), whole.clone()));
+        let whole = Rc::from(whole);
+        *last = Some((name, list.to_vec(), Rc::clone(&whole)));
         Ok(whole)
     })
 }
@@ -81,7 +85,12 @@ mod tests {
             let found = parse(&wrong).unwrap_err();
             assert!(found.contains(told), "{found}");
         }
-        assert_eq!(complete("X", &[1.0, 2.0, 0.0, 1.0]).unwrap(), [1.0, 2.0, 0.0, 1.0]);
-        assert!(complete("NO_SUCH", &[1.0, 2.0, 0.0, 3.0]).unwrap_err().contains("no_such.umatht"));
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("own_pp.umatht"), text).unwrap();
+        let list = [0.2, 1900.0, 0.0, 3.0, 273.15, 1.0];
+        let whole = complete(folder.path(), "OWN_PP    ", &list).unwrap();
+        assert_eq!(whole[..7], [0.2, 1900.0, 0.0, 0.0, 273.15, 1.0, 37869.0]);
+        assert!(is_asked(&list) && !is_asked(&whole) && whole.len() == NAMES.len());
+        assert!(complete(folder.path(), "NO_SUCH", &list).unwrap_err().contains("no_such.umatht"));
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::{Answer, Increment, NAMES, State, file, respond};
 use std::ffi::{CStr, c_char, c_int};
+use std::path::Path;
 
 /// Length of a name in Fortran.
 const NAME: usize = 80;
@@ -63,9 +64,15 @@ pub unsafe extern "C" fn umatht_(
     let mut at = Increment { temperature, change, time, gradient: [0.0; 3] };
     at.gradient[..directions].copy_from_slice(gradient);
     let state = State { z: states[0], degree: states[1], temperature: states[2] };
-    // SAFETY: the caller's promise: 80 characters
-    let name = String::from_utf8_lossy(unsafe { std::slice::from_raw_parts(cmname.cast::<u8>(), NAME) });
-    let constants = &*file::complete(&name, constants).unwrap_or_else(|error| end(&error));
+    let whole;
+    let constants = if file::is_asked(constants) {
+        // SAFETY: the caller's promise: 80 characters
+        let name = String::from_utf8_lossy(unsafe { std::slice::from_raw_parts(cmname.cast::<u8>(), NAME) });
+        whole = file::complete(Path::new(""), &name, constants).unwrap_or_else(|error| end(&error));
+        &whole
+    } else {
+        constants
+    };
     let answer = respond(constants, &at, &state).unwrap_or_else(|error| end(&error.to_string()));
     states[..3].copy_from_slice(&[answer.state.z, answer.state.degree, answer.state.temperature]);
     if let Some(heat) = states.get_mut(3) {

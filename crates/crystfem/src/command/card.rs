@@ -1,6 +1,6 @@
 //! `crystfem card`: the thermal materials of a scene as cards of other programs.
 
-use crate::material::{Polymer, Property};
+use crate::material::{CONSTANT_NAMES, Polymer, Property};
 use crate::run::Failure;
 use crate::scene::{Kind, Law, MaterialSpec, PartScene, PointScene, kind};
 use polycore::output::atomic_write;
@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-/// What to write, and for whom.
+/// Options of `crystfem card`.
 #[derive(clap::Args)]
 pub struct Options {
     /// The scene whose materials are written.
@@ -17,10 +17,10 @@ pub struct Options {
     /// The program that reads them.
     #[arg(long, value_enum, default_value_t = Host::Abaqus)]
     host: Host,
-    /// Its units.
+    /// Units of that program.
     #[arg(long, value_enum, default_value_t = Units::Si)]
     units: Units,
-    /// Its temperatures are in °C; otherwise in K.
+    /// Write temperatures in °C instead of K.
     #[arg(long)]
     celsius: bool,
     /// Folder of the cards, NAME.inp, one for each material.
@@ -104,7 +104,7 @@ fn materials(source: &Source) -> Result<Vec<(String, MaterialSpec, String)>, Fai
     }
 }
 
-/// As hosts have names: capitals, no blanks.
+/// Returns a name as hosts have it: capitals, no blanks.
 fn host_name(name: &str) -> String {
     name.to_uppercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }
@@ -146,7 +146,8 @@ fn card(
     let (listed, rest) = match options.host {
         Host::Abaqus => (constants, None),
         Host::Calculix => {
-            let rest = umatht_names()
+            let rest = CONSTANT_NAMES
+                .iter()
                 .zip(&constants[6..])
                 .map(|(name, value)| format!("{name} = {}\n", digits(*value)));
             let head = [&constants[..3], &[3.0], &constants[4..6]].concat();
@@ -168,22 +169,6 @@ fn card(
     Ok((text, rest))
 }
 
-/// Names of the constants that have no place in CalculiX.
-fn umatht_names() -> impl Iterator<Item = &'static str> {
-    [
-        "growth_rate",
-        "nucleation",
-        "activation_energy",
-        "equilibrium_melting",
-        "frozen",
-        "avrami_exponent",
-        "melting_sharpness",
-        "melting_shape",
-        "melting_peak",
-    ]
-    .into_iter()
-}
-
 /// The fifteen constants of UMATHT in the host's units; none with properties over temperature.
 fn constants(polymer: &Polymer, options: &Options) -> Option<Vec<f64>> {
     let (Property::Constant(conductivity), Property::Constant(capacity)) =
@@ -195,11 +180,8 @@ fn constants(polymer: &Polymer, options: &Options) -> Option<Vec<f64>> {
     let latent = polymer.latent_heat.unwrap_or(0.0) * polymer.ultimate_crystallinity;
     let zero = if options.celsius { 273.15 } else { 0.0 };
     let host = if options.host == Host::Calculix { 1.0 } else { 0.0 };
-    let of = polymer.kinetics.constants();
     let mut all = vec![*conductivity, heat * capacity, heat * latent, 0.0, zero, host];
-    all.extend([of.growth_rate, of.nucleation, of.activation_energy]);
-    all.extend([of.equilibrium_melting, of.frozen, of.avrami_exponent]);
-    all.extend(polymer.melting.map_or([0.0; 3], |melting| melting.constants()));
+    all.extend(polymer.growth_and_melting());
     Some(all)
 }
 

@@ -17,7 +17,7 @@ pub use filled::Filled;
 pub use powder::Powder;
 pub use property::{Property, REFERENCE_TEMPERATURE, Table};
 pub(crate) use rows::{Increments, Scratch};
-pub use semicrystalline::{LARGEST_CHANGE, Polymer, Semicrystalline};
+pub use semicrystalline::{CONSTANT_NAMES, LARGEST_CHANGE, Polymer, Semicrystalline};
 
 use crate::error::Error;
 use nalgebra::{Matrix3, Vector3};

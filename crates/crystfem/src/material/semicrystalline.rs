@@ -10,6 +10,19 @@ pub const LARGEST_CHANGE: f64 = 0.1;
 /// The largest suggested step over the one taken.
 pub(super) const LONGEST: f64 = 10.0;
 
+/// Names of the constants of growth and melting as other programs list them, in the order of [`Polymer::growth_and_melting`].
+pub const CONSTANT_NAMES: [&str; 9] = [
+    "growth_rate",
+    "nucleation",
+    "activation_energy",
+    "equilibrium_melting",
+    "frozen",
+    "avrami_exponent",
+    "melting_sharpness",
+    "melting_shape",
+    "melting_peak",
+];
+
 /// What makes up a [`Semicrystalline`] material, SI.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polymer {
@@ -29,6 +42,25 @@ pub struct Polymer {
     pub latent_heat: Option<f64>,
     /// Relative crystallinity α of fresh material.
     pub seed: f64,
+}
+
+impl Polymer {
+    /// The constants of growth and melting, SI, by the names of [`CONSTANT_NAMES`]; 0, 0, 0 of crystals that never melt.
+    pub fn growth_and_melting(&self) -> [f64; 9] {
+        let of = self.kinetics.constants();
+        let [sharpness, shape, peak] = self.melting.map_or([0.0; 3], |melting| melting.constants());
+        [
+            of.growth_rate,
+            of.nucleation,
+            of.activation_energy,
+            of.equilibrium_melting,
+            of.frozen,
+            of.avrami_exponent,
+            sharpness,
+            shape,
+            peak,
+        ]
+    }
 }
 
 /// The material. Its state is z = \[−ln(1−α)\]^{1/n}; with latent heat U = ∫c dT − ΔH X∞ α.

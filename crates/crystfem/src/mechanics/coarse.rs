@@ -23,7 +23,7 @@ pub struct Coarse {
 }
 
 impl Coarse {
-    /// Of elements on nodes at `points`.
+    /// Builds the space of elements on nodes at `points`.
     pub fn new(elements: &Elements, points: &[[f64; 3]]) -> Self {
         let free = elements.free();
         let mut exists = vec![false; points.len()];

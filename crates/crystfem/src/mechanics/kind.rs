@@ -20,7 +20,7 @@ pub enum Element {
     Tetrahedron(Box<Tetrahedron>),
 }
 
-/// Whether stress can be computed in an element of so many nodes.
+/// Returns whether stress can be computed in an element of this number of nodes.
 pub fn is_known(nodes: usize) -> bool {
     matches!(nodes, 4 | 8 | 10)
 }
@@ -58,7 +58,7 @@ pub fn key(places: &[[f64; 3]]) -> Vec<i64> {
 }
 
 impl Element {
-    /// Of 8, 4 or 10 nodes, m; `None` of others, and where it is turned inside out.
+    /// Builds the element of 8, 4 or 10 nodes, m; `None` of others, and where it is turned inside out.
     pub fn new(places: &[[f64; 3]], poisson: f64) -> Option<Self> {
         match places.len() {
             8 => Hexahedron::new(places.first_chunk()?, poisson).map(|own| Self::Hexahedron(Box::new(own))),

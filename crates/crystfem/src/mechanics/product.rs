@@ -19,11 +19,11 @@ pub struct Elements<'a> {
     hexahedra: Vec<Stiff<'a, 8>>,
     first: Vec<Stiff<'a, 4>>,
     second: Vec<Stiff<'a, 10>>,
-    /// Where the places in `forces` of each node begin.
+    /// Start of the places in `forces` of each node.
     starts: Vec<u32>,
     corners: Vec<u32>,
     free: Vec<[bool; 3]>,
-    /// Of all nodes of all elements.
+    /// Forces on all nodes of all elements.
     forces: Vec<f64>,
 }
 

@@ -41,7 +41,7 @@ fn shape(nodes: usize) -> Shape {
 }
 
 impl Tetrahedron {
-    /// Of 4 or 10 nodes, m; `None` where it is turned inside out at a Gauss point.
+    /// Builds the element of 4 or 10 nodes, m; `None` where it is turned inside out at a Gauss point.
     pub fn new(places: &[[f64; 3]], poisson: f64) -> Option<Self> {
         let (nodes, points) = (places.len(), if places.len() == 4 { 1 } else { 4 });
         let elastic = stiffness(poisson);

@@ -16,7 +16,7 @@ use crate::mesh::voxels::{Frame, Voxels};
 const RAYS: usize = 8;
 /// By how much rays miss the middles of their part of a cell, in parts of it: edges lie on middles, seldom here.
 const ASIDE: [f64; 2] = [1.3e-4, 0.7e-4];
-/// Parts of the volume that overlap, or that are inside of shells which face inwards, are told from here on.
+/// Least part of the volume, overlapping or inside shells that face inwards, that is noted.
 const TOLD: f64 = 1e-6;
 
 /// Closed shells of triangles. What any of them surrounds is inside, as slicers take it: overlaps count once. A shell that faces

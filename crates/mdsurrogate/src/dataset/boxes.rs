@@ -64,7 +64,7 @@ impl Boxes {
         .at(table, row)
     }
 
-    /// F of each row of each run, and lines that tell what was done.
+    /// F of each row of each run, and notes on what was done.
     ///
     /// # Errors
     /// A run without an undeformed row, means across a flip, lengths that are none.

@@ -157,7 +157,7 @@ impl Layout {
         }
     }
 
-    /// F of each row of each run, and lines that tell what was done.
+    /// F of each row of each run, and notes on what was done.
     pub fn deformations(
         &self,
         table: &Table,

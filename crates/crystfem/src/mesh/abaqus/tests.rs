@@ -256,7 +256,7 @@ fn orders_do_not_mix() {
     assert!(error.contains("elements 0 and 1 have the corners of one face and different nodes"), "{error}");
 }
 
-/// Keywords with a meaning here are told one by one, with how often and what they say first.
+/// Lists keywords with a meaning here one by one, with their number and first values.
 #[test]
 fn what_is_not_used_says_what_to_give_instead() {
     let more = "*Tie, name=glue\na, b\n*Dflux\nBricks, BF, 1.\n*DFLUX, amplitude=RAMP\nagain, BF, 2.\n*initial conditions, type=temperature\nAll, 20.\n\

@@ -410,7 +410,7 @@ impl<'a> Reader<'a> {
         path.rest = printer.time - path.moves.last().map_or(0.0, |last| last.end);
         (path.features, path.layers) = (remarks.features, remarks.layers);
         path.estimate = remarks.estimate.map(|known| known.1);
-        // of all, unless it leaves out what is before the first layer
+        // of the whole file; some slicers leave out what comes before the first layer
         if remarks.estimate.is_none_or(|known| known.0 > 0) {
             path.first = 0;
         }
