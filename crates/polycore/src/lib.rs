@@ -26,6 +26,7 @@ pub mod constitutive;
 pub mod error;
 pub mod langevin;
 pub mod memory;
+pub mod numerics;
 pub mod output;
 pub mod posterior;
 pub mod random;

@@ -3,6 +3,7 @@
 use super::load::Loads;
 use crate::bonds::Bonds;
 use crate::field::{CHUNK, Field};
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -66,8 +67,7 @@ impl Scale {
             });
             each.sum::<f64>()
         };
-        let parts: Vec<f64> = self.springs.par_chunks(CHUNK).enumerate().map(of).collect();
-        parts.iter().sum::<f64>().sqrt()
+        ordered_sum(self.springs.par_chunks(CHUNK).enumerate().map(of)).sqrt()
     }
 }
 

@@ -1,5 +1,6 @@
 //! The outline of each particle: an upright block, or the deformed cell of a lattice.
 
+use crate::numerics::Groups;
 use rayon::prelude::*;
 
 /// What a particle covers.
@@ -176,8 +177,7 @@ struct Cells {
     low: [f64; 2],
     size: f64,
     count: [usize; 2],
-    starts: Vec<usize>,
-    order: Vec<usize>,
+    particles: Groups<usize>,
 }
 
 impl Cells {
@@ -191,20 +191,9 @@ impl Cells {
         let most = (4.0 * positions.len() as f64).sqrt() + 1.0;
         let size = size.max(extent[0] / most).max(extent[1] / most);
         let count = extent.map(|extent| (extent / size) as usize + 1);
-        let mut cells = Self { low, size, count, starts: vec![0; count[0] * count[1] + 1], order: vec![] };
-        let homes: Vec<usize> = positions.iter().map(|position| cells.index(cells.home(position))).collect();
-        for &home in &homes {
-            cells.starts[home + 1] += 1;
-        }
-        for cell in 1..cells.starts.len() {
-            cells.starts[cell] += cells.starts[cell - 1];
-        }
-        let mut next = cells.starts.clone();
-        cells.order = vec![0; positions.len()];
-        for (particle, &home) in homes.iter().enumerate() {
-            cells.order[next[home]] = particle;
-            next[home] += 1;
-        }
+        let mut cells = Self { low, size, count, particles: Groups::new(0, std::iter::empty()) };
+        let homes = positions.iter().map(|position| cells.index(cells.home(position)));
+        cells.particles = Groups::new(count[0] * count[1], homes.zip(0..));
         cells
     }
 
@@ -222,7 +211,7 @@ impl Cells {
         for row in home[1].saturating_sub(1)..=(home[1] + 1).min(self.count[1] - 1) {
             let first = self.index([home[0].saturating_sub(1), row]);
             let last = self.index([(home[0] + 1).min(self.count[0] - 1), row]);
-            for &particle in &self.order[self.starts[first]..self.starts[last + 1]] {
+            for &particle in self.particles.between(first, last) {
                 each(particle);
             }
         }
