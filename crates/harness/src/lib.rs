@@ -3,6 +3,7 @@
 
 pub mod case;
 pub mod checkpoint;
+pub mod observe;
 pub mod output;
 pub mod report;
 pub mod scene;
