@@ -11,6 +11,7 @@ pub use crate::solver::{Choice, LinearSolver, Method};
 use crate::system::{Behaviour, Exchange, NONE, System};
 pub use crate::system::{Memory, Points};
 use crate::time::{Scheme, Stepper, Steps, Work};
+use polycore::numerics::bounds;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -323,13 +324,8 @@ impl Simulation {
         // A_ii of backward Euler over the capacity
         let capacity = |k: usize| self.system.capacity[k];
         let size = self.system.size();
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for &node in self.system.nodes() {
-            let point = self.problem.mesh.points[node as usize];
-            for d in 0..3 {
-                (low[d], high[d]) = (low[d].min(point[d]), high[d].max(point[d]));
-            }
-        }
+        let [low, high] =
+            bounds(self.system.nodes().iter().map(|&node| self.problem.mesh.points[node as usize]));
         let extent = [0, 1, 2].map(|d| (high[d] - low[d]).max(0.0));
         let longest = extent.into_iter().fold(0.0, f64::max);
         let spacing = (extent.iter().product::<f64>() / size as f64).cbrt().max(1e-6 * longest);

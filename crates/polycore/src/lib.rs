@@ -20,6 +20,7 @@
 
 pub mod constitutive;
 pub mod error;
+#[cfg(feature = "files")]
 pub mod file;
 #[cfg(feature = "hdf5")]
 pub mod hdf5;

@@ -1,6 +1,7 @@
 //! Numerical methods that more than one crate needs. Results have the same bits on any number of threads.
 
 pub mod bisection;
+pub mod bounds;
 #[cfg(feature = "solvers")]
 pub mod cholesky;
 #[cfg(feature = "solvers")]
@@ -8,11 +9,14 @@ pub mod conjugate_gradients;
 pub mod groups;
 pub mod hexahedron;
 pub mod least_squares;
+pub mod sets;
 
 pub use bisection::{bisect, bisected};
+pub use bounds::{bounds, range};
 #[cfg(feature = "solvers")]
 pub use conjugate_gradients::conjugate_gradients;
 pub use groups::Groups;
+pub use sets::Sets;
 
 /// Sum of the values of work items in their order, whatever thread computes them.
 #[cfg(feature = "solvers")]

@@ -14,8 +14,8 @@
 //! integrals are kept, but which share a box has of a cell is as coarse as the points.
 
 use crate::Error;
-use crate::numerics::Groups;
 use crate::numerics::hexahedron::{CORNERS, shapes};
+use crate::numerics::{Groups, bounds};
 
 /// Corners this far from those of a box, over its edges, still make one.
 const ALIGNED: f64 = 1e-9;
@@ -39,15 +39,10 @@ impl Cuboid {
         (0..3).map(|d| self.max[d] - self.min[d]).product()
     }
 
-    fn around(points: &[[f64; 3]]) -> Self {
-        let mut bounds = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
-        for point in points {
-            for d in 0..3 {
-                bounds.min[d] = bounds.min[d].min(point[d]);
-                bounds.max[d] = bounds.max[d].max(point[d]);
-            }
-        }
-        bounds
+    /// The box around points.
+    pub fn around(points: &[[f64; 3]]) -> Self {
+        let [min, max] = bounds(points.iter().copied());
+        Self { min, max }
     }
 }
 

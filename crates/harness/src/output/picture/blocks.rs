@@ -1,6 +1,6 @@
 //! The outline of each particle: an upright block, or the deformed cell of a lattice.
 
-use polycore::numerics::Groups;
+use polycore::numerics::{Groups, bounds};
 use rayon::prelude::*;
 
 /// What a particle covers.
@@ -182,11 +182,8 @@ struct Cells {
 
 impl Cells {
     fn new(positions: &[[f64; 2]], size: f64) -> Self {
-        let fold = |axis: usize, start: f64, pick: fn(f64, f64) -> f64| {
-            positions.iter().fold(start, |bound, position| pick(bound, position[axis]))
-        };
-        let low = [0, 1].map(|axis| fold(axis, f64::INFINITY, f64::min));
-        let extent = [0, 1].map(|axis| fold(axis, f64::NEG_INFINITY, f64::max) - low[axis]);
+        let [low, high] = bounds(positions.iter().copied());
+        let extent = [0, 1].map(|axis| high[axis] - low[axis]);
         // scattered particles must not ask for more cells than there are particles
         let most = (4.0 * positions.len() as f64).sqrt() + 1.0;
         let size = size.max(extent[0] / most).max(extent[1] / most);

@@ -5,7 +5,7 @@
 
 use crate::bonds::Bonds;
 use crate::field::Field;
-use polycore::numerics::Groups;
+use polycore::numerics::{Groups, Sets, bounds};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -51,14 +51,7 @@ struct Grid<const D: usize> {
 impl<const D: usize> Grid<D> {
     /// Cells of about `edge`, which the box holds a whole number of.
     fn new(bonds: &dyn Bonds<D>, edge: f64) -> Self {
-        let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
-        for &site in bonds.particles() {
-            let position = bonds.position(site as usize);
-            for d in 0..D {
-                low[d] = low[d].min(position[d]);
-                high[d] = high[d].max(position[d]);
-            }
-        }
+        let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
         let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / edge).ceil().max(1.0) as usize);
         // a box without extent along an axis still has a cell there
         let edge = std::array::from_fn(|d| {
@@ -296,7 +289,7 @@ fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut
     for (index, &site) in window.iter().enumerate() {
         place[site as usize] = index as u32;
     }
-    let mut parent: Vec<u32> = (0..window.len() as u32).collect();
+    let mut joined = Sets::new(window.len());
     let mut parts = window.len();
     // sites far from each other first: few families hold a window together
     let far = |start: usize| (start..window.len()).step_by(STRIDE);
@@ -306,13 +299,8 @@ fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut
         }
         bonds.neighbours(window[index] as usize, &mut |bond| {
             let other = place[bond.site];
-            if other != NONE {
-                let (a, b) = (root(&mut parent, index as u32), root(&mut parent, other));
-                if a != b {
-                    // the smaller index is the root, whatever the order of bonds
-                    parent[a.max(b) as usize] = a.min(b);
-                    parts -= 1;
-                }
+            if other != NONE && joined.join(index as u32, other) {
+                parts -= 1;
             }
         });
     }
@@ -324,7 +312,7 @@ fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut
     let mut count = 0;
     let mut part_of = Vec::with_capacity(window.len());
     for index in 0..window.len() {
-        let root = root(&mut parent, index as u32) as usize;
+        let root = joined.root(index as u32) as usize;
         if number[root] == NONE {
             number[root] = count;
             count += 1;
@@ -332,15 +320,6 @@ fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut
         part_of.push((window[index], number[root]));
     }
     Some(Split { parts: count, part_of })
-}
-
-fn root(parent: &mut [u32], index: u32) -> u32 {
-    let mut at = index;
-    while parent[at as usize] != at {
-        parent[at as usize] = parent[parent[at as usize] as usize];
-        at = parent[at as usize];
-    }
-    at
 }
 
 /// Nodes of a grid in nested dissection: both halves first, the plane between them last.
