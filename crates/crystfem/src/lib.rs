@@ -31,6 +31,7 @@
 //! and materials of your own.
 
 pub mod boundary;
+pub mod coupling;
 mod element;
 mod elementary;
 pub mod error;

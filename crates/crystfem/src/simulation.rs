@@ -302,6 +302,23 @@ impl Simulation {
         self.advance(until, &mut |_, _| ControlFlow::Continue(())).map(|_| ())
     }
 
+    /// [`Self::advance`] with a look at each accepted step, which ends at its first error.
+    ///
+    /// # Errors
+    /// As [`Self::advance`], and those of `after_step`.
+    pub fn observe(
+        &mut self,
+        until: f64,
+        mut after_step: impl FnMut(&Self) -> Result<(), Error> + Send,
+    ) -> Result<(), Error> {
+        let mut result = Ok(());
+        let _ = self.advance(until, &mut |simulation, _| {
+            result = after_step(simulation);
+            if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        result
+    }
+
     /// How linear systems would be solved from now to a time, and why.
     pub fn choose(&self, until: f64) -> Choice {
         self.task(until).choose()

@@ -1,7 +1,6 @@
 //! From a scene to a problem of heat conduction.
 
 use super::fault::{located, located_in};
-use super::healing::Interfaces;
 use super::mechanics::Mechanics;
 use super::memory;
 use super::mesh::Built;
@@ -10,6 +9,7 @@ use super::places::{elements, millimetres};
 use super::print::Laid;
 use super::voxels::Filling;
 use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
+use crate::coupling::HealingSettings;
 use crate::error::Error;
 use crate::material::{Filled, ThermalMaterial};
 use crate::mesh::surface::Surface;
@@ -60,7 +60,7 @@ pub struct Task {
     /// Stress, where the scene asks for it.
     pub mechanics: Option<Mechanics>,
     /// Interfaces that heal, where the scene asks for it.
-    pub interfaces: Option<Interfaces>,
+    pub interfaces: Option<HealingSettings>,
     /// What should be looked at.
     pub notes: Vec<String>,
 }
