@@ -5,6 +5,43 @@ use crate::error::Error;
 use crate::simulation::Simulation;
 use crate::system::{NONE, Points};
 
+/// Statistics of a field over nodes, weighted by their volumes; all not finite where a value is not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Statistics {
+    /// Mean by volume.
+    pub mean: f64,
+    /// Smallest value.
+    pub least: f64,
+    /// Largest value.
+    pub largest: f64,
+    /// Standard deviation by volume.
+    pub deviation: f64,
+}
+
+impl Statistics {
+    /// Of the nodes that have a value and a volume; `None` without any.
+    pub fn new(values: &[Option<f64>], volumes: &[f64]) -> Option<Self> {
+        let (mut sum, mut volume) = (0.0, 0.0);
+        let (mut least, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
+        let present = || {
+            let with_volume = values.iter().zip(volumes).filter(|(_, volume)| **volume > 0.0);
+            with_volume.filter_map(|(value, volume)| Some(((*value)?, *volume)))
+        };
+        for (value, weight) in present() {
+            sum += value * weight;
+            volume += weight;
+            least = least.min(value);
+            largest = largest.max(value);
+        }
+        let mean = sum / volume;
+        // `min` and `max` pass over NaN
+        let known = |extreme: f64| if mean.is_finite() { extreme } else { mean };
+        let squares = present().map(|(value, weight)| weight * (value - mean).powi(2)).sum::<f64>();
+        let deviation = (squares / volume).sqrt();
+        (volume > 0.0).then(|| Self { mean, least: known(least), largest: known(largest), deviation })
+    }
+}
+
 impl Simulation {
     /// Names of the quantities that materials show, each once, in the order of the materials.
     pub fn field_names(&self) -> Vec<&'static str> {

@@ -48,6 +48,7 @@ pub mod mechanics;
 pub mod melting;
 pub mod mesh;
 pub mod point;
+pub mod print_plan;
 pub mod printed;
 pub mod problem;
 pub mod simulation;

@@ -4,6 +4,7 @@
 mod step;
 
 use crate::error::Error;
+pub use crate::fields::Statistics;
 use crate::ledger::{Ledger, Record};
 use crate::problem::Problem;
 use crate::solver::Task;

@@ -9,7 +9,7 @@ use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
 use crate::quantities as q;
 use crate::scene::{Mechanics, PartScene, Task};
-use crate::simulation::{Simulation, State};
+use crate::simulation::{Simulation, State, Statistics};
 use polycore::case::{Finished, Run, STATISTICS, Step, StepField};
 use polycore::output::vtkhdf::{Cells, Data, MeshSeries};
 use polycore::report::{Phases, Quantity, Report, Value};
@@ -332,8 +332,7 @@ impl Recorder<'_> {
     }
 }
 
-/// Mean by volume, least, largest and standard deviation of a field over the nodes that have it; a value that is not finite
-/// makes all of them so, which fails the report.
+/// Statistics of a field over the nodes that have it; a value that is not finite makes all of them so, which fails the report.
 fn summarise(
     report: &mut Report,
     prefix: &str,
@@ -342,29 +341,12 @@ fn summarise(
     volumes: &[f64],
     unit: &str,
 ) {
-    let (mut sum, mut volume) = (0.0, 0.0);
-    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-    let there = || {
-        let with_volume = values.iter().zip(volumes).filter(|(_, volume)| **volume > 0.0);
-        with_volume.filter_map(|(value, volume)| Some(((*value)?, *volume)))
-    };
-    for (value, weight) in there() {
-        sum += value * weight;
-        volume += weight;
-        least = least.min(value);
-        most = most.max(value);
-    }
-    if volume > 0.0 {
-        let mean = sum / volume;
-        let variance = there().map(|(value, weight)| weight * (value - mean).powi(2)).sum::<f64>() / volume;
+    if let Some(Statistics { mean, least, largest, deviation }) = Statistics::new(values, volumes) {
         let of = |quantity: Quantity| quantity.of(&[prefix, name]).in_unit(unit);
-        // `min` and `max` pass over NaN
-        let known = |extreme: f64| if mean.is_finite() { extreme } else { mean };
         report.value(of(q::MEAN), mean);
-        report.value(of(q::LEAST), known(least));
-        report.value(of(q::LARGEST), known(most));
-        let spread = if unit == "degC" { "K" } else { unit };
-        report.value(of(q::DEVIATION).in_unit(spread), variance.sqrt());
+        report.value(of(q::LEAST), least);
+        report.value(of(q::LARGEST), largest);
+        report.value(of(q::DEVIATION).in_unit(if unit == "degC" { "K" } else { unit }), deviation);
     }
 }
 

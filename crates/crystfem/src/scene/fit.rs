@@ -3,10 +3,9 @@
 use super::fault::{located, located_in};
 use super::fit_part::PartFit;
 use super::fit_spec::{FitLaw, FitSpec, temperature, time};
-use super::heat_flow::Measured;
 use super::material::KINETICS_KEYS;
 use super::{OutputSpec, Program, check_name};
-use crate::fit::{Cooling, DEGREES, Known, Run};
+use crate::fit::{Cooling, DEGREES, Known, MeasuredPeak, Run};
 use crate::kinetics::{Constants, Kinetics};
 use crate::table::{Column, read};
 use polycore::report::Expect;
@@ -51,7 +50,7 @@ impl FitScene {
     ///
     /// # Errors
     /// A [`SceneError`] that names the key, the value found and what is allowed; for data, file, line and column.
-    pub fn jobs(&self, source: &Source) -> Result<Vec<(Job, Vec<Measured>)>, SceneError> {
+    pub fn jobs(&self, source: &Source) -> Result<Vec<(Job, Vec<MeasuredPeak>)>, SceneError> {
         if self.fit.is_empty() {
             return Err(source.error("fit", "nothing", "at least one [[fit]]"));
         }
@@ -81,7 +80,7 @@ impl FitScene {
             let measured = |flow| {
                 (0..fit.data.len()).map(|i| fit.measured(source, &key, flow, i)).collect::<Result<_, _>>()
             };
-            let peaks: Vec<Measured> = fit.heat_flow.as_ref().map_or(Ok(Vec::new()), measured)?;
+            let peaks: Vec<MeasuredPeak> = fit.heat_flow.as_ref().map_or(Ok(Vec::new()), measured)?;
             jobs.push((fit.job(source, &key, &peaks)?, peaks));
         }
         Ok(jobs)
@@ -148,11 +147,11 @@ impl FitSpec {
         &self,
         source: &Source,
         key: &dyn Fn(&str) -> String,
-        peaks: &[Measured],
+        peaks: &[MeasuredPeak],
     ) -> Result<Job, SceneError> {
         match self.law {
             FitLaw::Avrami => {
-                if let [Measured { peak, .. }] = peaks {
+                if let [MeasuredPeak { peak, .. }] = peaks {
                     let times = peak.times.iter().map(|time| time - peak.times[0]).collect();
                     return Ok(Job::Avrami(times, peak.degrees.clone()));
                 }
@@ -190,12 +189,7 @@ impl FitSpec {
                             let run = Run::cooling(rate.si(), temperatures, degrees, &known);
                             run.map_err(|error| source.error(&at, error, "temperatures that fall"))?
                         }
-                        (None, Some(Measured { peak, temperatures, history })) => Run {
-                            times: peak.times.clone(),
-                            temperatures: temperatures.clone(),
-                            degrees: peak.degrees.clone(),
-                            history: history.clone(),
-                        },
+                        (None, Some(found)) => found.run(),
                         (None, None) => {
                             let columns = [time(), temperature(), alpha()];
                             let [times, temperatures, degrees] = table(source, &at, &data.file, columns)?;

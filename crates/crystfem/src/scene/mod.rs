@@ -32,7 +32,6 @@ pub use fit::{FitScene, Job};
 pub use fit_part::PartFit;
 pub use fit_spec::{DataSpec, Direction, FitLaw, FitSpec, HeatFlowSpec, Limit};
 pub use healing::HealingSpec;
-pub use heat_flow::Measured;
 pub use material::{KineticsSpec, Law, MaterialSpec, MeltingSpec, PropertySpec, SignSpec};
 pub use mechanics::{Mechanics, MechanicsLaw, MechanicsSpec};
 pub use mesh::{BarSpec, BrickSpec, Built, MeshSpec, SubstrateSpec, TubeSpec};
