@@ -129,7 +129,7 @@ impl Simulation {
             };
             if nodes.len() > MOST {
                 // all points of a second-order element, by the square of the shape function there
-                let Some(geometry) = element::wide(&problem.mesh, number) else { continue };
+                let Some(geometry) = problem.mesh.geometry(number) else { continue };
                 let shapes = element::shapes::<WIDE, WIDE_POINTS>(nodes.len());
                 for (g, shapes) in shapes.iter().enumerate().take(geometry.points) {
                     for (&node, shape) in nodes.iter().zip(shapes) {
@@ -138,7 +138,7 @@ impl Simulation {
                 }
                 continue;
             }
-            let volumes = element::node_volumes(&problem.mesh, number).unwrap_or([0.0; WIDE]);
+            let volumes = problem.mesh.node_volumes(number).unwrap_or([0.0; WIDE]);
             for (g, &node) in nodes.iter().enumerate() {
                 add(node, density * volumes[g], first + g);
             }
@@ -233,7 +233,7 @@ impl Simulation {
     pub fn volumes(&self, elements: &[u32]) -> Vec<f64> {
         let mut volumes = vec![0.0; self.problem.mesh.points.len()];
         for &number in elements.iter().filter(|&&element| self.is_born(element)) {
-            let own = element::node_volumes(&self.problem.mesh, number).unwrap_or([0.0; WIDE]);
+            let own = self.problem.mesh.node_volumes(number).unwrap_or([0.0; WIDE]);
             for (&node, own) in self.problem.mesh.nodes(number).iter().zip(own) {
                 volumes[node as usize] += own;
             }

@@ -1,7 +1,6 @@
 //! What is solved: a mesh with materials, what acts on it, and when its elements appear.
 
 use crate::boundary::{Condition, Field, Source, Where};
-use crate::element;
 use crate::error::Error;
 use crate::material::ThermalMaterial;
 use crate::mesh::{Face, Mesh};
@@ -120,7 +119,7 @@ impl Problem {
             if let Some(node) = self.mesh.nodes(element).iter().find(|&&n| n as usize >= points) {
                 return mesh_error(format!("element {element}: found node {node}; allowed: below {points}"));
             }
-            if element::node_volumes(&self.mesh, element).is_none() {
+            if self.mesh.node_volumes(element).is_none() {
                 let first =
                     self.mesh.nodes(element).first().map_or([0.0; 3], |&n| self.mesh.points[n as usize]);
                 return mesh_error(format!(

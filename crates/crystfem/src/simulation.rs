@@ -11,7 +11,7 @@ use crate::solver::Task;
 pub use crate::solver::{Choice, LinearSolver, Method};
 use crate::system::{Behaviour, Exchange, NONE, System};
 pub use crate::system::{Memory, Points};
-use crate::time::{Scheme, Stepper, Steps, Work};
+use crate::time::{Scheme, Start, Stepper, Steps, Work};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -101,6 +101,14 @@ pub struct State {
     pub ledger: Ledger,
     /// Work since the start.
     pub work: Work,
+}
+
+impl State {
+    /// What a step begins with.
+    pub(crate) fn start(&self) -> Start<'_> {
+        let Self { time, temperature, slope, rate, exchange, memory, .. } = self;
+        Start { time: *time, temperature, slope, rate, exchange, memory }
+    }
 }
 
 /// A problem being solved.

@@ -270,7 +270,7 @@ impl Recorder<'_> {
         let parts = self.task.filling.as_ref().and_then(|filling| filling.parts.as_ref());
         let of = |element: u32| parts.map_or(1.0, |(values, of)| values[of[element as usize]]);
         let born = (0..mesh.element_count() as u32).filter(|&element| simulation.is_born(element));
-        born.map(|element| of(element) * crate::element::volume(mesh, element)).sum()
+        born.map(|element| of(element) * mesh.volume(element)).sum()
     }
 
     /// The scalars of the end.

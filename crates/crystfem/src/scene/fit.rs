@@ -1,18 +1,15 @@
 //! The scene of a fit.
 
-use super::fault::{located, located_in};
+use super::fault::located_in;
 use super::fit_part::PartFit;
-use super::fit_spec::{FitLaw, FitSpec, temperature, time};
+use super::fit_spec::{FitLaw, FitSpec, alpha, table, temperature, time};
 use super::material::KINETICS_KEYS;
 use super::{OutputSpec, Program, check_name};
-use crate::fit::{Cooling, DEGREES, Known, MeasuredPeak, Run};
+use crate::fit::{Cooling, Known, MeasuredPeak, Run};
 use crate::kinetics::{Constants, Kinetics};
-use crate::table::{Column, read};
 use polycore::report::Expect;
 use polycore::scene::{SceneError, Source};
-use polycore::units::dimension::RatioDimension;
 use serde::Deserialize;
-use std::path::Path;
 
 /// A whole scene.
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
@@ -237,18 +234,4 @@ impl FitSpec {
         Kinetics::new(trial).map_err(|error| located_in(source, block, &KINETICS_KEYS, &error))?;
         Ok(known)
     }
-}
-
-pub(super) fn alpha() -> Column {
-    Column::of::<RatioDimension>("alpha").within(DEGREES[0], DEGREES[1])
-}
-
-/// Reads a table beside the scene.
-pub(super) fn table<const N: usize>(
-    source: &Source,
-    key: &str,
-    file: &Path,
-    columns: [Column; N],
-) -> Result<[Vec<f64>; N], SceneError> {
-    read(&source.file(file), columns).map_err(|error| located(source, key, &error))
 }

@@ -6,7 +6,6 @@ use super::part::PrintSpec;
 use super::places::{elements, millimetres};
 use super::voxels::Filling;
 use crate::boundary::Schedule;
-use crate::element;
 use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::mesh::RATIOS;
@@ -105,7 +104,7 @@ impl PrintSpec {
         }
         let mut activation =
             tool.activation(mesh, &elements, bead).map_err(|error| at("print.path", error))?;
-        let volume = |list: &[u32]| list.iter().map(|&element| element::volume(mesh, element)).sum::<f64>();
+        let volume = |list: &[u32]| list.iter().map(|&element| mesh.volume(element)).sum::<f64>();
         let whole = volume(&elements);
         let share = |list: &[u32]| 100.0 * (1.0 - volume(list) / whole);
         let covered = share(&activation.missed);

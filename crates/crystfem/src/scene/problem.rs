@@ -3,10 +3,9 @@
 use super::fault::{located, located_in};
 use super::mechanics::Mechanics;
 use super::memory;
-use super::mesh::Built;
 use super::part::{BoundarySpec, PartScene};
 use super::places::{elements, millimetres};
-use super::voxels::Filling;
+use super::voxels::{BuiltMesh, Filling};
 use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
 use crate::coupling::HealingSettings;
 use crate::material::{ThermalMaterial, fill_elements};
@@ -70,8 +69,8 @@ impl PartScene {
     /// # Errors
     /// A [`SceneError`] for sets and surfaces that the mesh lacks, elements without a material, and for what
     /// [`Problem::check`] refuses.
-    pub fn task(&self, source: &Source, built: Built) -> Result<Task, SceneError> {
-        let Built { mesh, filling, .. } = built;
+    pub fn task(&self, source: &Source, built: BuiltMesh) -> Result<Task, SceneError> {
+        let BuiltMesh { mesh, filling, .. } = built;
         let mut notes = Vec::new();
         let probes = self.places(source, &mesh, &mut notes)?;
         let (mut materials, mut material_of, temperature_of) = self.regions(source, &mesh)?;

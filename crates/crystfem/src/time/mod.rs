@@ -16,7 +16,7 @@ mod stage;
 mod step;
 
 pub(crate) use stage::{Stage, Stages};
-pub(crate) use step::{Attempt, Stepper};
+pub(crate) use step::{Attempt, Start, Stepper};
 
 /// Time integrators.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
