@@ -1,0 +1,149 @@
+//! What is laid down when: in layers, or along a path.
+
+use super::fault::located;
+use super::file;
+use super::part::PrintSpec;
+use super::places::{elements, millimetres};
+use super::voxels::Filling;
+use crate::boundary::Schedule;
+use crate::error::Error;
+use crate::mesh::Mesh;
+use crate::mesh::RATIOS;
+use crate::mesh::layers::Layers;
+use crate::mesh::path::{Bead, ToolPath, read_csv, read_gcode};
+use crate::print_plan::{NOZZLE, PrintPlan};
+use harness::scene::{SceneError, Source};
+use std::path::Path;
+
+impl PrintSpec {
+    /// `filling`: of a mesh of a path, which is printed along it unless layers are asked for.
+    pub(super) fn plan(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+        filling: Option<&Filling>,
+        notes: &mut Vec<String>,
+    ) -> Result<PrintPlan, SceneError> {
+        if let Some(file) = &self.path {
+            return self.plan_along_file(source, mesh, file, notes);
+        }
+        if let (Some((tool, times)), None) =
+            (filling.and_then(|filling| filling.path.as_ref()), self.layer_time)
+        {
+            return self.plan_along(source, tool, times);
+        }
+        let at = |key: &str, error: Error| located(source, key, &error);
+        let layers = match (&self.elements, self.layer_height) {
+            (Some(set), Some(height)) => {
+                let elements = elements(source, mesh, "print.elements", Some(set))?;
+                Layers::from_height(mesh, &elements, height.si())
+                    .map_err(|error| at("print.layer_height", error))?
+            }
+            _ => Layers::from_sets(mesh, self.layers.as_deref().unwrap_or("layer-"))
+                .map_err(|error| at("print.layers", error))?,
+        };
+        notes.extend(layers.notes);
+        let interval = self.layer_time.map_or(0.0, |time| time.si());
+        let schedule = self.schedule(source)?;
+        let temperature = |time| schedule.as_ref().map_or(f64::NAN, |schedule| schedule.at(time));
+        Ok(PrintPlan::in_layers(layers.elements, self.start(), interval, temperature))
+    }
+
+    fn start(&self) -> f64 {
+        self.start.map_or(0.0, |start| start.si())
+    }
+
+    fn schedule(&self, source: &Source) -> Result<Option<Schedule>, SceneError> {
+        self.temperature.as_ref().map(|given| given.build(source, "print.temperature")).transpose()
+    }
+
+    /// Elements at their times along a path.
+    fn plan_along(&self, source: &Source, path: &ToolPath, times: &[f64]) -> Result<PrintPlan, SceneError> {
+        let (window, schedule) = (self.window.map(|window| window.si()), self.schedule(source)?);
+        PrintPlan::along(path, times, self.start(), window, schedule.as_ref()).map_err(|error| match error {
+            Error::Parameter { name: NOZZLE, found: time, .. } => {
+                let found = format!("nothing, and no M104 or M109 in the file before {time} s");
+                source.error("print.temperature", found, "a temperature")
+            }
+            other => located(source, "print.window", &other),
+        })
+    }
+
+    /// Along a path; what its beads do not cover is never printed.
+    fn plan_along_file(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+        file: &Path,
+        notes: &mut Vec<String>,
+    ) -> Result<PrintPlan, SceneError> {
+        let at = |key: &str, error: Error| located(source, key, &error);
+        let path = source.file(file);
+        let table = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv"));
+        let tool = if table { read_csv(&path) } else { read_gcode(&path) };
+        let mut tool = tool.map_err(|error| at("print.path", error))?;
+        notes.append(&mut tool.notes);
+        let fed = file::filament(source, "print", &tool, self.filament)?;
+        if !table || self.acceleration.is_some() || self.jerk.is_some() {
+            tool = file::timed(source, "print", tool, self.acceleration, self.jerk, notes)?;
+        }
+        if tool.is_fed() {
+            notes.extend(tool.told(fed));
+        }
+        file::leave_out(source, "print", &self.leave_out, &mut tool, notes)?;
+        let elements = elements(source, mesh, "print.elements", self.elements.as_deref())?;
+        let bead = Bead {
+            width: self.bead_width.map_or(0.0, |width| width.si()),
+            height: self.bead_height.map_or(0.0, |height| height.si()),
+        };
+        if self.centre {
+            tool = tool.centred(mesh, &elements, bead);
+        }
+        if let Some(offset) = self.offset {
+            tool = tool.shifted(offset.map(|x| x.si()));
+        }
+        let mut activation =
+            tool.activation(mesh, &elements, bead).map_err(|error| at("print.path", error))?;
+        let volume = |list: &[u32]| list.iter().map(|&element| mesh.volume(element)).sum::<f64>();
+        let whole = volume(&elements);
+        let share = |list: &[u32]| 100.0 * (1.0 - volume(list) / whole);
+        let covered = share(&activation.missed);
+        let outside = 100.0 * tool.outside(mesh, &elements, bead);
+        if covered <= 0.0 || activation.missed.len() == elements.len() {
+            let boxed = |bounds: Option<[[f64; 3]; 2]>| {
+                let [low, high] = bounds.unwrap_or_default().map(millimetres);
+                format!("from {low} to {high}")
+            };
+            let found = format!(
+                "a path {} whose beads cover no centre of an element of the part",
+                boxed(tool.bounds(bead))
+            );
+            let allowed = format!(
+                "one that meets the part, which reaches {}; `centre = true` puts the path over it, `offset` anywhere",
+                boxed(mesh.bounds_of(&elements))
+            );
+            return Err(source.error("print.path", found, allowed));
+        }
+        let mut told = format!(
+            "the beads cover {covered:.1} % of the part; {outside:.1} % of their length lies outside of it"
+        );
+        if self.fill {
+            activation.fill(mesh);
+            told += &format!("; with gaps filled {:.1} % is printed", share(&activation.missed));
+        } else if !activation.missed.is_empty() {
+            told += "; what they do not cover is not printed (`fill = true` fills gaps)";
+        }
+        notes.push(told);
+        let extruded: f64 = tool.printing().map(|one| one.volume(fed)).sum();
+        if extruded > 0.0 {
+            let ratio = (whole - volume(&activation.missed)) / extruded;
+            if !(RATIOS[0]..=RATIOS[1]).contains(&ratio) {
+                notes.push(format!(
+                    "what is printed has {ratio:.3} times the volume that the file extrudes: `[mesh.path]` prints what it extrudes"
+                ));
+            }
+        }
+        let plan = self.plan_along(source, &tool, &activation.times)?;
+        Ok(PrintPlan { absent: activation.missed, ..plan })
+    }
+}
