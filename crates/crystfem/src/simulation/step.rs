@@ -193,7 +193,7 @@ impl Simulation {
             dt,
             stored: sum(size, |k| change[k]),
             moved: sum(size, |k| change[k].abs()),
-            sensitivity: stages.sensitivity,
+            sensitivity: stages.sensitivity(),
             exchange: attempt.exchange,
             reaction: system.fixed.iter().map(|&(equation, _)| residual[equation as usize]).sum(),
             held: system.fixed.iter().map(|&(equation, _)| residual[equation as usize].abs()).sum(),

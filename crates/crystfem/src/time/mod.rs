@@ -12,6 +12,7 @@
 //! The temporal error is the difference to the embedded formula of the other order, filtered by the matrix of the
 //! stage (A e = Δt Σ(b_s − b̂_s) Q_s) so that stiff parts, which are damped at once, do not count.
 
+mod matrix;
 mod stage;
 mod step;
 
