@@ -49,9 +49,9 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
         lines.push(format!(
             "builds     stress of {bearing} elements of {shapes} shapes, {} nodes on the bed{}; about 45 products of its matrix for each element whenever the free strain \
              changes by {:e}",
-            mechanics.bed.len(),
-            if mechanics.release { ", released at the end" } else { "" },
-            mechanics.strain_step
+            mechanics.settings.bed.len(),
+            if mechanics.settings.release { ", released at the end" } else { "" },
+            mechanics.settings.strain_step
         ));
     }
     if task.mechanics.as_ref().is_some_and(|mechanics| mechanics.stiff) {
@@ -64,7 +64,7 @@ pub fn one(source: &Source, scene: &PartScene) -> Result<(Vec<String>, Vec<Named
     if let Some(interfaces) = &task.interfaces {
         lines.push(format!(
             "builds     healing of {} interfaces, {}",
-            interfaces.list.len(),
+            interfaces.interfaces.len(),
             interfaces.law.explain()
         ));
     }

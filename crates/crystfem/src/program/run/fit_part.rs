@@ -9,7 +9,6 @@ use crate::kinetics::Constants;
 use crate::program::scene::PartFit;
 use crate::simulation::Simulation;
 use std::cell::RefCell;
-use std::ops::ControlFlow;
 
 /// Fits the constants; `show` hears of each trial, and may end the fit.
 pub fn solve(
@@ -49,12 +48,7 @@ fn trial(job: &PartFit, constants: &Constants) -> Result<Vec<[f64; 2]>, Failure>
     let mut probes: Vec<Probe> =
         scene.probe.iter().zip(&task.probes).map(|(spec, place)| Probe::new(spec, place, fields)).collect();
     probe::record(&mut probes, &simulation, &names)?;
-    let mut result = Ok(());
-    let _ = simulation.advance(task.end, &mut |simulation, _| {
-        result = probe::record(&mut probes, simulation, &names);
-        if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
-    result?;
+    simulation.observe(task.end, |simulation| probe::record(&mut probes, simulation, &names))?;
     let mut rows = Vec::new();
     for (probe, times, _) in &job.curves {
         let probe = &probes[*probe];

@@ -1,16 +1,15 @@
 //! A body in time: solved, recorded, drawn and judged.
 
 use super::celsius::{CELSIUS, TEMPERATURE};
-use super::healing::{Healed, Healer};
-use super::mechanics::{self, Follower};
 use super::probe::{self, Probe};
-use super::{Failure, animation, line, warped};
+use super::{Failure, animation, healing, line, mechanics, warped};
+use crate::coupling::{HealingCoupling, HealingState, StressCoupling, StressState};
 use crate::error::Error;
 use crate::ledger::{Ledger, Record};
 use crate::mesh::Mesh;
 use crate::program::quantities as q;
-use crate::program::scene::{PartScene, Task};
-use crate::simulation::{Simulation, State};
+use crate::program::scene::{Mechanics, PartScene, Task};
+use crate::simulation::{Simulation, State, Statistics};
 use harness::case::{Finished, Run, STATISTICS, Step, StepField};
 use harness::output::vtkhdf::{Cells, Data, MeshSeries};
 use harness::report::{Phases, Quantity, Report, Value};
@@ -44,14 +43,13 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
         scene.check_expectations(source, &scene.quantities(&task), &[])?;
     }
     phases.start("solve");
-    let (mut simulation, frames, probes, stressed, healed);
+    let (mut simulation, frames, probes, saved);
     if run.options.resume {
         run.begin()?;
     }
-    if let Some((written, state, rows, body, faces)) = run.reached::<Reached>()? {
+    if let Some((written, state, rows, stress, healing)) = run.reached::<Reached>()? {
         simulation = Simulation::resume(Arc::clone(&task.problem), task.settings, state)?;
-        (frames, probes) = (written, rows);
-        (stressed, healed) = (body.unwrap_or_default(), faces.unwrap_or_default());
+        (frames, probes, saved) = (written, rows, (stress, healing));
     } else {
         simulation = Simulation::new(Arc::clone(&task.problem), task.settings)?;
         scene.refuse_too_large(source, &simulation, task.mechanics.as_ref(), task.end)?;
@@ -59,7 +57,7 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
             run.begin()?;
         }
         let fields = simulation.field_names().len();
-        (frames, stressed, healed) = (0, mechanics::Reached::default(), Healed::default());
+        (frames, saved) = (0, (None, None));
         probes = scene
             .probe
             .iter()
@@ -69,10 +67,12 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
     }
     let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
     let names = simulation.field_names();
-    let follow = |spec| Follower::new(spec, &task.problem.mesh, stressed);
-    let follower = task.mechanics.as_ref().map(follow).transpose()?;
-    let healer = task.interfaces.as_ref().map(|spec| Healer::new(spec, healed));
-    let mut recorder = Recorder { scene, task: &task, probes, names, frames, follower, healer };
+    let couple = |part: &Mechanics| StressCoupling::new(&task.problem.mesh, part.settings.clone());
+    let mut stress = task.mechanics.as_ref().map(couple).transpose()?;
+    let mut healing = task.interfaces.clone().map(HealingCoupling::new);
+    stress.as_mut().zip(saved.0).into_iter().for_each(|(stress, saved)| stress.restore(saved));
+    healing.as_mut().zip(saved.1).into_iter().for_each(|(healing, saved)| healing.restore(saved));
+    let mut recorder = Recorder { scene, task: &task, probes, names, frames, stress, healing };
     let series = recorder.solve(&mut simulation, &mut phases, run)?;
     phases.start("write");
     recorder.record(&simulation, &mut report);
@@ -87,11 +87,11 @@ pub fn one(source: &Source, scene: &PartScene, is_study: bool, run: &mut Run) ->
         phases.start("draw");
         probe::draw(&recorder.probes, &recorder.names, scene, output)?;
         animation::draw(scene, &task, &simulation, path.as_deref(), output)?;
-        if let Some(follower) = &recorder.follower {
-            warped::draw(scene, &task, follower, output)?;
+        if let Some(stress) = &recorder.stress {
+            warped::draw(scene, &task, stress, output)?;
         }
-        if let Some(healer) = &recorder.healer {
-            healer.draw(scene, &simulation, output)?;
+        if let Some(healing) = &recorder.healing {
+            healing::draw(healing, scene, &simulation, output)?;
         }
     }
     phases.stop();
@@ -141,7 +141,7 @@ fn seen(simulation: &Simulation, step: &Record, names: &[&'static str]) -> Step 
 }
 
 /// How far a run is, as its checkpoint holds it: frames of the fields that are written, state, rows of the probes, stress, healing.
-type Reached = (usize, State, Vec<Probe>, Option<mechanics::Reached>, Option<Healed>);
+type Reached = (usize, State, Vec<Probe>, Option<StressState>, Option<HealingState>);
 
 /// What is seen of a body on its way.
 struct Recorder<'a> {
@@ -153,9 +153,9 @@ struct Recorder<'a> {
     /// Frames of the fields that are written.
     frames: usize,
     /// Stress, where the scene asks for it.
-    follower: Option<Follower<'a>>,
+    stress: Option<StressCoupling<'a>>,
     /// Healing, where the scene asks for it.
-    healer: Option<Healer<'a>>,
+    healing: Option<HealingCoupling>,
 }
 
 impl Recorder<'_> {
@@ -178,21 +178,21 @@ impl Recorder<'_> {
         if self.frames == 0 {
             simulation.finite()?;
             probe::record(&mut self.probes, simulation, &self.names)?;
-            self.follower.as_mut().map_or(Ok(()), |follower| follower.see(simulation, false))?;
-            self.healer.iter_mut().for_each(|healer| healer.see(simulation));
+            self.stress.as_mut().map_or(Ok(()), |stress| stress.after_step(simulation))?;
+            self.healing.iter_mut().for_each(|healing| healing.after_step(simulation));
         }
         let interrupted = run.options.interrupted;
         while self.frames <= last {
             let until = (self.frames as f64 * every).min(end);
             let (probes, names, frames) = (&mut self.probes, &self.names, self.frames);
-            let (follower, healer) = (&mut self.follower, &mut self.healer);
+            let (stress, healing) = (&mut self.stress, &mut self.healing);
             let mut result = Ok(());
             let mut observe = |simulation: &Simulation, step: &Record| -> ControlFlow<()> {
                 result = simulation.finite().and_then(|()| probe::record(probes, simulation, names));
-                if let (Ok(()), Some(follower)) = (&result, follower.as_mut()) {
-                    result = follower.see(simulation, false);
+                if let (Ok(()), Some(stress)) = (&result, stress.as_mut()) {
+                    result = stress.after_step(simulation);
                 }
-                healer.iter_mut().for_each(|healer| healer.see(simulation));
+                healing.iter_mut().for_each(|healing| healing.after_step(simulation));
                 let state = simulation.state();
                 run.show(state.time / end, &|| {
                     let (time, dt, equations) = (state.time, step.dt, state.temperature.len());
@@ -200,9 +200,9 @@ impl Recorder<'_> {
                 });
                 run.step(|| seen(simulation, step, names));
                 if result.is_ok() {
-                    let stressed = || follower.as_ref().map(Follower::reached);
-                    let healed = || healer.as_ref().map(Healer::reached);
-                    let reached = || Some((frames, state, &*probes, stressed(), healed()));
+                    let stress = || stress.as_ref().map(StressCoupling::save);
+                    let healing = || healing.as_ref().map(HealingCoupling::save);
+                    let reached = || Some((frames, state, &*probes, stress(), healing()));
                     result = run.pause(reached).map_err(Error::from);
                 }
                 if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -215,14 +215,13 @@ impl Recorder<'_> {
                     self.frames,
                     simulation.state(),
                     &self.probes,
-                    self.follower.as_ref().map(Follower::reached),
-                    self.healer.as_ref().map(Healer::reached),
+                    self.stress.as_ref().map(StressCoupling::save),
+                    self.healing.as_ref().map(HealingCoupling::save),
                 );
                 run.pause(|| Some(reached)).map_err(Error::from)?;
             }
-            if let Some(follower) = self.follower.as_mut().filter(|_| self.frames == last) {
-                follower.see(simulation, true)?;
-                follower.release()?;
+            if let Some(stress) = self.stress.as_mut().filter(|_| self.frames == last) {
+                stress.finish(simulation)?;
             }
             phases.start("write");
             if let Some(series) = &mut series {
@@ -245,17 +244,17 @@ impl Recorder<'_> {
         let elements = self.task.problem.mesh.element_count() as u32;
         let exists: Vec<f64> =
             (0..elements).map(|element| f64::from(u8::from(simulation.is_born(element)))).collect();
-        let (displacement, mises, stresses) = match &self.follower {
-            Some(follower) => (follower.displacement(), follower.mises(), follower.stresses()),
+        let (displacement, mises, stresses) = match &self.stress {
+            Some(stress) => (stress.displacement(), stress.mises(), stress.stresses()),
             None => Default::default(),
         };
         let mut of_cells: Vec<Data> = vec![("exists", 1, &exists)];
-        if self.follower.is_some() {
+        if self.stress.is_some() {
             arrays.push(("displacement_m", 3, &displacement));
             of_cells.push(("mises_Pa", 1, &mises));
             of_cells.push(("residual_stress_Pa", 6, &stresses));
         }
-        let healing = self.healer.as_ref().map(|healer| healer.field(simulation));
+        let healing = self.healing.as_ref().map(|healing| healing.element_degrees(simulation));
         of_cells.extend(healing.iter().map(|field| ("healing", 1, field.as_slice())));
         let strength = self.task.interfaces.as_ref().and_then(|interfaces| interfaces.strength);
         let strength = strength.zip(healing.as_ref());
@@ -271,7 +270,7 @@ impl Recorder<'_> {
         let parts = self.task.filling.as_ref().and_then(|filling| filling.parts.as_ref());
         let of = |element: u32| parts.map_or(1.0, |(values, of)| values[of[element as usize]]);
         let born = (0..mesh.element_count() as u32).filter(|&element| simulation.is_born(element));
-        born.map(|element| of(element) * crate::element::volume(mesh, element)).sum()
+        born.map(|element| of(element) * mesh.volume(element)).sum()
     }
 
     /// The scalars of the end.
@@ -293,11 +292,11 @@ impl Recorder<'_> {
                 report.value(q::FILAMENT, path.fed());
             }
         }
-        if let Some(follower) = &self.follower {
-            follower.record(&self.probes, report);
+        if let Some(stress) = &self.stress {
+            mechanics::record(stress, &self.probes, report);
         }
-        if let Some(healer) = &self.healer {
-            healer.record(report);
+        if let Some(healing) = &self.healing {
+            healing::record(healing, report);
         }
         let nodes = 0..self.task.problem.mesh.points.len() as u32;
         let temperature: Vec<Option<f64>> =
@@ -333,8 +332,7 @@ impl Recorder<'_> {
     }
 }
 
-/// Mean by volume, least, largest and standard deviation of a field over the nodes that have it; a value that is not finite
-/// makes all of them so, which fails the report.
+/// Statistics of a field over the nodes that have it; a value that is not finite makes all of them so, which fails the report.
 fn summarise(
     report: &mut Report,
     prefix: &str,
@@ -343,29 +341,12 @@ fn summarise(
     volumes: &[f64],
     unit: &str,
 ) {
-    let (mut sum, mut volume) = (0.0, 0.0);
-    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-    let there = || {
-        let with_volume = values.iter().zip(volumes).filter(|(_, volume)| **volume > 0.0);
-        with_volume.filter_map(|(value, volume)| Some(((*value)?, *volume)))
-    };
-    for (value, weight) in there() {
-        sum += value * weight;
-        volume += weight;
-        least = least.min(value);
-        most = most.max(value);
-    }
-    if volume > 0.0 {
-        let mean = sum / volume;
-        let variance = there().map(|(value, weight)| weight * (value - mean).powi(2)).sum::<f64>() / volume;
+    if let Some(Statistics { mean, least, largest, deviation }) = Statistics::new(values, volumes) {
         let of = |quantity: Quantity| quantity.of(&[prefix, name]).in_unit(unit);
-        // `min` and `max` pass over NaN
-        let known = |extreme: f64| if mean.is_finite() { extreme } else { mean };
         report.value(of(q::MEAN), mean);
-        report.value(of(q::LEAST), known(least));
-        report.value(of(q::LARGEST), known(most));
-        let spread = if unit == "degC" { "K" } else { unit };
-        report.value(of(q::DEVIATION).in_unit(spread), variance.sqrt());
+        report.value(of(q::LEAST), least);
+        report.value(of(q::LARGEST), largest);
+        report.value(of(q::DEVIATION).in_unit(if unit == "degC" { "K" } else { unit }), deviation);
     }
 }
 

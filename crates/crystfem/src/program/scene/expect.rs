@@ -42,7 +42,7 @@ impl PartScene {
                 q::WORST_STRESS_BALANCE,
             ];
             all.extend(stresses.map(Named::from));
-            all.extend(mechanics.law.strength.is_finite().then(|| q::MISES_OVER_STRENGTH.into()));
+            all.extend(mechanics.settings.law.strength.is_finite().then(|| q::MISES_OVER_STRENGTH.into()));
         }
         if let Some(interfaces) = &task.interfaces {
             all.extend([q::LEAST_HEALING, q::MEAN_HEALING].map(Named::from));
