@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 /// Whether bonds differ so much in their tangent that every particle has the mass of its own.
 pub fn has_own_mass<const D: usize>(system: &System<D>, state: &State<D>) -> bool {
-    system.material.has_own_stiffness(state.tangent)
+    system.material.has_own_stiffness(state.stretches.tangent)
 }
 
 /// Σ_J (2 w V_J/|ξ|)(1 + max_{d≠e} |n_d n_e|): the Gershgorin sum of a particle for a unit bond tangent.
@@ -34,7 +34,7 @@ pub fn update_unit_mass<const D: usize>(bonds: &dyn Bonds<D>, sites: &[u32], mas
 
 /// The bounds of all particles with each bond's own tangent, over kθ.
 pub fn own_mass<const D: usize>(system: &mut System<D>, state: &State<D>, mass: &mut Vec<f64>) {
-    let sums = system.material.own_stiffness(&*system.bonds, &state.displacement, state.fitted);
+    let sums = system.material.own_stiffness(&*system.bonds, &state.displacement, state.stretches.fitted);
     mass.resize(system.bonds.sites(), 1.0);
     for (&site, sum) in system.bonds.particles().iter().zip(sums) {
         mass[site as usize] = if sum > 0.0 { sum } else { 1.0 };

@@ -115,7 +115,7 @@ impl VelocityVerlet {
         if !pace.is_due(strain) {
             return false;
         }
-        state.motion.bounds += 1;
+        state.motion.limits.bounds += 1;
         let enough = pace.covered / pace.part;
         let bound = system.material.frequency_bound(&*system.bonds, &state.displacement, enough);
         let [low, high] = stretches(system, state);
@@ -151,7 +151,7 @@ impl VelocityVerlet {
         let enough = pace.covered / pace.part / if waited { BELOW } else { 1.0 };
         let mut bound = known;
         if broken || waited {
-            state.motion.bounds += 1;
+            state.motion.limits.bounds += 1;
             system.prepare(&state.displacement);
             bound = system.material.frequency_bound(&*system.bonds, &state.displacement, enough);
             state.motion.pace.see(bound);
@@ -164,9 +164,9 @@ impl VelocityVerlet {
             return;
         }
         if pace.outgrown || bound > ABOVE * pace.bound || falls && BELOW * bound <= pace.bound {
-            let shortest = state.motion.shortest;
+            let shortest = state.motion.limits.bonds.shortest;
             let frequency = largest_frequency_squared(system, state, volumes, self.density, shortest);
-            state.motion.searches += 1;
+            state.motion.limits.searches += 1;
             self.measure(system, state, frequency);
         } else {
             pace.covered = pace.part * bound;

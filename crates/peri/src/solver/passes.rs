@@ -252,7 +252,7 @@ pub fn move_pass<const D: usize>(
     damping: f64,
 ) {
     let sites = unit_mass.len();
-    let (keep, push) = if state.iteration == 0 {
+    let (keep, push) = if state.counts.iteration == 0 {
         (0.0, 0.5 / mass)
     } else {
         ((2.0 - damping) / (2.0 + damping), 2.0 / (2.0 + damping) / mass)

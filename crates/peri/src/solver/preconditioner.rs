@@ -55,7 +55,7 @@ impl<const D: usize> Preconditioner<D> {
         self.volumes = bonds.particles().iter().map(|&site| bonds.volume(site as usize)).collect();
         update_unit_mass(bonds, bonds.particles(), &mut self.unit_mass);
         let (law, modulus) = system.material.bond_law();
-        let tangent = if own { modulus } else { state.tangent };
+        let tangent = if own { modulus } else { state.stretches.tangent };
         if !own {
             springs.clone_from(&self.unit_mass);
         }
@@ -90,7 +90,7 @@ impl<const D: usize> Preconditioner<D> {
             bonds,
             loads: &system.loads,
             displacement: &state.displacement,
-            law: (law, [modulus, system.material.volumetric()], state.fitted),
+            law: (law, [modulus, system.material.volumetric()], state.stretches.fitted),
             springs: &springs,
             survey: &survey,
             anchors: &anchors,

@@ -116,10 +116,10 @@ impl<'a, const D: usize> System<'a, D> {
         self.set_rates(after, after);
         self.place(before, 0.0);
         self.place(after, 0.0);
-        if let Some(start) = &state.started
+        if let Some(start) = &state.contact.start
             && let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs())
         {
-            contact.hold(start, state.held.clone());
+            contact.hold(start, state.contact.active.clone());
         }
     }
 
@@ -127,27 +127,29 @@ impl<'a, const D: usize> System<'a, D> {
     /// another equilibrium is to be sought.
     pub(super) fn renew_friction(&mut self, state: &mut State<D>, tolerance: f64) -> bool {
         let Some(contact) = self.contact.as_mut().filter(|contact| contact.rubs()) else { return false };
-        let Some(start) = &state.started else { return false };
-        let mut new = contact.grips(&*self.bonds, &state.displacement, start, &state.grips);
+        let Some(start) = &state.contact.start else { return false };
+        let mut new = contact.grips(&*self.bonds, &state.displacement, start, &state.contact.grips);
         let bound = |grips: &[Grip], pair| {
             grips.binary_search_by_key(&pair, |grip: &Grip| grip.pair).map_or(0.0, |at| grips[at].bound)
         };
-        let lost = state.held.iter().filter(|grip| bound(&new, grip.pair) == 0.0).map(|grip| grip.bound);
-        let changed = new.iter().map(|grip| (grip.bound - bound(&state.held, grip.pair)).abs());
+        let lost =
+            state.contact.active.iter().filter(|grip| bound(&new, grip.pair) == 0.0).map(|grip| grip.bound);
+        let changed = new.iter().map(|grip| (grip.bound - bound(&state.contact.active, grip.pair)).abs());
         let change: f64 = lost.chain(changed).sum();
         let total: f64 = new.iter().map(|grip| grip.bound).sum();
         if change <= tolerance * total {
             return false;
         }
-        if state.renewals >= RENEWALS {
-            state.unconverged += 1;
+        if state.contact.renewals >= RENEWALS {
+            state.counts.unconverged += 1;
             return false;
         }
-        if state.renewals >= ALTERNATING {
-            new.iter_mut().for_each(|grip| grip.bound = 0.5 * (grip.bound + bound(&state.held, grip.pair)));
+        if state.contact.renewals >= ALTERNATING {
+            new.iter_mut()
+                .for_each(|grip| grip.bound = 0.5 * (grip.bound + bound(&state.contact.active, grip.pair)));
         }
         contact.hold(start, new.clone());
-        (state.held, state.renewals) = (new, state.renewals + 1);
+        (state.contact.active, state.contact.renewals) = (new, state.contact.renewals + 1);
         true
     }
 
@@ -178,7 +180,7 @@ impl<'a, const D: usize> System<'a, D> {
     pub(super) fn resting(&self, state: &State<D>) -> Vec<Resting> {
         let Some(contact) = self.repulsion() else { return Vec::new() };
         let mut resting = contact.resting(&state.displacement);
-        for (resting, rub) in resting.iter_mut().zip(&state.rubbing) {
+        for (resting, rub) in resting.iter_mut().zip(&state.contact.plane_friction) {
             (0..3).for_each(|d| resting.force[d] += rub[d]);
         }
         resting
@@ -275,8 +277,8 @@ impl<'a, const D: usize> System<'a, D> {
 
     /// Counts one evaluation of all forces.
     pub fn count_evaluation(&self, state: &mut State<D>) {
-        state.evaluations += 1;
-        state.bond_evaluations += self.bonds.directed_bonds();
+        state.counts.evaluations += 1;
+        state.counts.bond_evaluations += self.bonds.directed_bonds();
     }
 
     /// The error that names where a state has ceased to be finite.
@@ -286,7 +288,7 @@ impl<'a, const D: usize> System<'a, D> {
             [("displacement", &state.displacement), ("velocity", &state.velocity), ("force", &state.force)];
         for (quantity, field) in fields {
             if let Some((site, _)) = field.non_finite() {
-                return not_finite(bonds, quantity, site, state.step, state.iteration);
+                return not_finite(bonds, quantity, site, state.step, state.counts.iteration);
             }
         }
         // every entry is finite, their squares are not: the greatest force is to blame
@@ -298,7 +300,7 @@ impl<'a, const D: usize> System<'a, D> {
             particle: greatest.map_or(0, |(particle, _)| particle),
             position: greatest.map_or_else(Vec::new, |(_, &site)| bonds.position(site as usize).to_vec()),
             step: state.step,
-            iteration: state.iteration,
+            iteration: state.counts.iteration,
         }
     }
 }

@@ -5,6 +5,7 @@ use super::state::State;
 use super::system::System;
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Displacement, in shortest bonds, by which the tangent's force differences are taken: truncation and rounding are both
 /// about 1e-10 of the force.
@@ -16,7 +17,7 @@ const ENOUGH: f64 = 1e-2;
 const MOST_STEPS: usize = 200;
 
 /// What bounds the frequencies of a body, and what its bonds can store at most and least.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BondSums {
     /// max_I Σ_J 2 w V_J/|ξ|: the stiffness of a particle's bonds for a unit tangent kθ t′, m.
     pub stiffness: f64,

@@ -169,7 +169,7 @@ pub fn refresh<const D: usize>(
         pieces.dedup();
         pieces
     });
-    let (displacement, friction) = (&state.displacement, state.friction.as_ref());
+    let (displacement, friction) = (&state.displacement, state.contact.friction.as_ref());
     let of = |start: usize, mut f: [&mut [f64]; D]| {
         system.internal_force(displacement, start, &mut f, None);
         load(&system.loads, start, factor, &mut f);
@@ -315,7 +315,7 @@ fn free_kick(v: &mut [f64], f: &[f64], volumes: &[f64], push: f64) -> f64 {
 
 /// The energy of material and contact, J; over all stretches that are fitted, so that the law is sampled once a fit.
 pub fn stored<const D: usize>(system: &mut System<D>, state: &State<D>, observed: StretchRange) -> f64 {
-    let [low, high] = state.fitted.map(|stretch| stretch * stretch - 1.0);
+    let [low, high] = state.stretches.fitted.map(|stretch| stretch * stretch - 1.0);
     let inside = observed.low >= low && observed.high <= high;
     system.stored_energy(state, if inside { StretchRange { low, high } } else { observed })
 }

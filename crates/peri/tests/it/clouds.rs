@@ -436,7 +436,7 @@ fn ring_error(n: usize, relieved: bool) -> f64 {
     let method = Lbfgs { tolerance: 1e-6, max_iterations: 5000, ..Default::default() };
     method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
     drop(system);
-    assert_eq!(state.unconverged, 0);
+    assert_eq!(state.counts.unconverged, 0);
     let mut material = Pointwise::new(solid.clone(), &bonds);
     material.prepare(&bonds, &state.displacement);
     let (mut sum, mut count) = (0.0, 0);

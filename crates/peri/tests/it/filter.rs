@@ -89,7 +89,7 @@ fn roughness(rows: usize, filter: bool) -> f64 {
     let mut state = State::new(loads.constrained.len());
     let method = Lbfgs { tolerance: 1e-6, max_iterations: 20_000, ..Default::default() };
     method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(())).unwrap();
-    assert_eq!(state.unconverged, 0, "{rows} rows");
+    assert_eq!(state.counts.unconverged, 0, "{rows} rows");
     let bonds = &*system.bonds;
     points.prepare(bonds, &state.displacement);
     let pressure = |site: usize| {

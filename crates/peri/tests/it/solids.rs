@@ -517,7 +517,7 @@ fn iterations_at_large_bulk_moduli() {
         let mut simulation = model.build().unwrap();
         let method = peri::solver::Lbfgs { tolerance: 1e-4, ..Default::default() };
         simulation.solve(method).unwrap();
-        simulation.state.total_iterations as f64
+        simulation.state.counts.total_iterations as f64
     };
     let found = [10.0, 100.0, 1000.0].map(iterations);
     // without the volume in the coarse level: 23, 205, 2470

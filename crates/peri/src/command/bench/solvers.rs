@@ -61,8 +61,8 @@ pub fn measure(spacings: &[f64]) -> Result<Vec<Measurement>, Error> {
                     });
                 };
                 row("error", plate.apart(&state, &exact), "");
-                row("force evaluations", state.evaluations as f64, "");
-                row("bond evaluations", state.bond_evaluations as f64, "");
+                row("force evaluations", state.counts.evaluations as f64, "");
+                row("bond evaluations", state.counts.bond_evaluations as f64, "");
                 row("time", seconds, "s");
             }
         }
