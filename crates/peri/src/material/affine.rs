@@ -1,8 +1,9 @@
 //! Rubber as the full network: a Langevin chain along every bond, and a pressure that keeps the volume.
 
-use super::deformation::{GRADIENT, LEAST_SHAPE};
-use super::eight_chain::{LINEAR, cofactor, logarithm, logarithm_slopes};
-use super::tensor::{Tensor, invert};
+use super::crushed::{logarithm, logarithm_slopes};
+use super::eight_chain::LINEAR;
+use super::point::{GRADIENT, LEAST_SHAPE};
+use super::tensor::{Tensor, cofactor, invert};
 use super::{Bond, Family, Material};
 use crate::bonds::Bonds;
 use crate::calibrate::modulus_in;

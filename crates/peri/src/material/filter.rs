@@ -1,7 +1,8 @@
 //! Pressures averaged over nearest neighbours: at a bulk modulus of a thousand shear moduli those of single particles are rough
 //! at corners of grips.
 
-use super::deformation::{Point, PointLaw};
+use super::point::Point;
+use super::point_law::PointLaw;
 use crate::bonds::Bonds;
 use rayon::prelude::*;
 

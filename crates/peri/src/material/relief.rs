@@ -6,12 +6,12 @@
 //! h + Lθ takes the place of h, with L of the stabilisation, f = −Lu where A = 1 and P = 0: symmetric and positive definite as soon as some
 //! particles have θ = 0. Cf. Chen, Hillman & Rüter 2013, doi:10.1002/nme.4512.
 
-use super::deformation::LEAST_SHAPE;
 use super::levels::Levels;
-use super::tensor::invert;
+use super::point::LEAST_SHAPE;
+use super::tensor::{Vector, invert};
 use crate::bonds::{Bonds, CloudBonds, CloudPlaces, Columns, Kind};
 use crate::field::{CHUNK, Field};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 use rayon::prelude::*;
 
 /// The largest |h + Lθ| over the largest |h| inside.
@@ -76,8 +76,6 @@ fn directions<const D: usize>() -> Vec<[f64; D]> {
     };
     (0..count).map(place).collect()
 }
-
-pub(super) type Vector<const D: usize> = SVector<f64, D>;
 
 struct Problem<'a, const D: usize> {
     cloud: &'a CloudBonds<D>,
@@ -187,7 +185,7 @@ impl<'a, const D: usize> Problem<'a, D> {
 }
 
 fn largest<const D: usize>(field: &[Vector<D>]) -> f64 {
-    field.iter().map(SVector::amax).fold(0.0, f64::max)
+    field.iter().map(Vector::amax).fold(0.0, f64::max)
 }
 
 /// In the order of the work items.
