@@ -3,7 +3,7 @@
 use super::faces::Faces;
 use super::grip::{Grip, Pair};
 use super::plane::{Plane, Resting};
-use crate::bonds::{Bonds, Property};
+use crate::bonds::{BodyGeometry, Bonds, Property};
 use crate::error::Error;
 use crate::field::Field;
 use crate::geometry::length;
@@ -159,7 +159,7 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Takes in the particles among `sites` that have lost bonds: they touch planes themselves, and faces above them no longer do.
-    pub fn lose(&mut self, bonds: &dyn Bonds<D>, sites: impl Iterator<Item = usize>) {
+    pub fn lose(&mut self, bonds: &dyn BodyGeometry<D>, sites: impl Iterator<Item = usize>) {
         let before = self.bare.len();
         for site in sites.filter(|&site| bonds.bonded(site) < self.bonded[site]) {
             self.bare.push(site as u32);

@@ -1,14 +1,14 @@
 //! Area of the cracks that a run makes, from the bonds that break.
 
 use super::crossing::{Crossing, SHORT};
-use crate::bonds::Bonds;
+use crate::bonds::{BodyGeometry, Bonds};
 use rayon::prelude::*;
 
 /// The bonds of a body before it is loaded, as far as its crack area needs them.
 pub struct CrackArea {
     /// Σ_J w V_J |ξ_e|/|ξ| over short bonds, m³.
     short: f64,
-    /// Intact bonds of a lattice, see [`Bonds::intact`].
+    /// Intact bonds of a lattice, see [`crate::bonds::BondDamage::intact`].
     words: Vec<u64>,
     /// Short bonds of a cloud.
     pairs: Vec<[u32; 2]>,

@@ -6,7 +6,9 @@ use super::point_law::{NonlocalSolid, PointLaw};
 use super::pointwise::Passes;
 use super::solid_passes::Families;
 use super::tensor::Tensor;
-use crate::bonds::{Bonds, CloudBonds, CloudPlaces, Columns, Kind, Softened, StretchRange, among};
+use crate::bonds::{
+    BodyGeometry, BondDamage, Bonds, CloudBonds, CloudPlaces, Columns, Kind, Softened, StretchRange, among,
+};
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 

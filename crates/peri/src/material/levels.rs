@@ -2,7 +2,7 @@
 //! Pasciak & Xu 1990, doi:10.1090/S0025-5718-1990-1023042-6).
 
 use super::tensor::Vector;
-use crate::bonds::{Bonds, CloudBonds};
+use crate::bonds::{BodyGeometry, CloudBonds};
 use rayon::prelude::*;
 
 /// The finest grid in spacings: 40 % more iterations at twice that.

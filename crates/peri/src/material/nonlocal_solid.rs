@@ -7,7 +7,7 @@ use super::point_law::{Deformation, NonlocalSolid, PointLaw};
 use super::solid_passes::SolidPasses;
 use super::tensor::Tensor;
 use super::{Body, Bond, Family, Material, Passes};
-use crate::bonds::{Bonds, Kind};
+use crate::bonds::{BodyGeometry, Bonds, Kind};
 use crate::calibrate::modulus_in;
 use nalgebra::SVector;
 
@@ -133,12 +133,12 @@ impl<L: PointLaw<D>, const D: usize> Material<D> for NonlocalSolid<L> {
     }
 
     /// Of Young's modulus E ≈ 3μ.
-    fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+    fn micromodulus(&self, bonds: &dyn BodyGeometry<D>) -> f64 {
         modulus_in(bonds, 3.0 * self.0.shear_modulus())
     }
 
     /// ∂P₁₁/∂F₁₁ at rest, by a central difference: truncation and rounding are about 1e-10 of it.
-    fn longitudinal_modulus(&self, _bonds: &dyn Bonds<D>) -> f64 {
+    fn longitudinal_modulus(&self, _bonds: &dyn BodyGeometry<D>) -> f64 {
         let at = |strain: f64| {
             let mut gradient = Tensor::<D>::zeros();
             gradient[(0, 0)] = strain;

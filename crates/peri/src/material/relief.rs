@@ -9,7 +9,7 @@
 use super::levels::Levels;
 use super::point::LEAST_SHAPE;
 use super::tensor::{Vector, invert};
-use crate::bonds::{Bonds, CloudBonds, CloudPlaces, Columns, Kind};
+use crate::bonds::{BodyGeometry, Bonds, CloudBonds, CloudPlaces, Columns, Kind};
 use crate::field::{CHUNK, Field};
 use nalgebra::SMatrix;
 use rayon::prelude::*;
@@ -23,7 +23,7 @@ const OPEN: f64 = 0.5;
 /// Spacings within which such a cone has no neighbour.
 const NEAR: f64 = 2.0;
 
-/// θ with h + Lθ = 0 in all particles whose family no surface cuts, and θ = 0 elsewhere, for [`Bonds::set_relief`]; `None` where there
+/// θ with h + Lθ = 0 in all particles whose family no surface cuts, and θ = 0 elsewhere, for [`crate::bonds::BondForces::set_relief`]; `None` where there
 /// is no such particle, and of lattices, which need none. To be found before any bond breaks: θ stays what it is, and the bonds that
 /// are left keep their part of the correction, so that forces follow from an energy however many break.
 pub fn relief<const D: usize>(bonds: &dyn Bonds<D>) -> Option<Field<D>> {

@@ -67,7 +67,7 @@ pub trait Response<const D: usize>: Send + Sync {
         track: Option<&mut StretchRange>,
     );
 
-    /// Sites that [`Response::force`] may begin with, see [`Bonds::piece`].
+    /// Sites that [`Response::force`] may begin with, see [`crate::bonds::BondForces::piece`].
     fn piece(&self, bonds: &dyn Bonds<D>) -> usize {
         let _ = bonds;
         CHUNK

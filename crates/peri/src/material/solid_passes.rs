@@ -7,7 +7,7 @@ use super::point::Point;
 use super::point_law::{NonlocalSolid, PointLaw};
 use super::pointwise::Passes;
 use super::tensor::Tensor;
-use crate::bonds::{Bonds, LinearRow, Softened, StretchRange, among};
+use crate::bonds::{BodyGeometry, BondDamage, Bonds, LinearRow, Softened, StretchRange, among};
 use crate::field::{CHUNK, Field, chunk_range};
 use rayon::prelude::*;
 

@@ -259,7 +259,7 @@ fn run_variant<const D: usize>(
         }
         outcome.value(q::TIME_STEP, state.motion.steps.time_step);
         outcome.value(q::KINETIC_ENERGY, state.motion.energies.kinetic);
-        body.bonds.round(&state.displacement);
+        body.bonds.prepare(&state.displacement);
         let lattice = body.bonds.as_lattice();
         if let Some(error) = lattice.and_then(|lattice| lattice.mixed_error(&state.displacement)) {
             outcome.value(q::MIXED_ERROR, error);

@@ -9,7 +9,7 @@ use super::load::Loads;
 use super::scale::Scale;
 use super::state::State;
 use super::system::System;
-use crate::bonds::{Bonds, components};
+use crate::bonds::{BodyGeometry, components};
 use crate::error::Error;
 use crate::field::Field;
 use std::collections::BTreeMap;
@@ -77,7 +77,7 @@ struct Piece<const D: usize> {
 
 /// The first part of a body with forces along an axis that add up to more than `tolerance` of their sizes, and that nothing can hold.
 pub fn adrift<const D: usize>(
-    bonds: &dyn Bonds<D>,
+    bonds: &dyn BodyGeometry<D>,
     loads: &Loads<D>,
     displacement: Option<&Field<D>>,
     stops: &Stops<D>,

@@ -20,7 +20,7 @@ pub struct Event {
 /// Damage of a body and its energy.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Fracture {
-    /// Intact bonds, once any has broken, see [`Bonds::intact`].
+    /// Intact bonds, once any has broken, see [`crate::bonds::BondDamage::intact`].
     pub(super) intact: Option<Vec<u64>>,
     /// Damaged bonds (integrity below 1).
     pub softened: Vec<Softened>,

@@ -98,7 +98,7 @@ impl<'a, const D: usize> System<'a, D> {
         if let Some(contact) = self.contact.as_mut().filter(|contact| contact.repels()) {
             contact.update(&*self.bonds, displacement);
         }
-        self.bonds.round(displacement);
+        self.bonds.prepare(displacement);
         self.material.prepare(&*self.bonds, displacement);
     }
 

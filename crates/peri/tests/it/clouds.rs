@@ -5,7 +5,10 @@ use crate::materials::checks;
 use crate::solids::{Plain, displaced, neo_hooke, rubber};
 use crate::spectra::{COLLAR, errors, forces};
 use evidence::{at_most, near, within};
-use peri::bonds::{Bonds, CloudBonds, Overstretched, Softened, StretchRange, VolumeCorrection};
+use peri::bonds::{
+    BodyGeometry, BondDamage, BondForces, Bonds, CloudBonds, Overstretched, Softened, StretchRange,
+    VolumeCorrection,
+};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::material::{Family, Material, NonlocalSolid, PointLaw, Pointwise, Response, Tensor, relief};

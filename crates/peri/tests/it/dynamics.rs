@@ -2,7 +2,7 @@
 
 use crate::bodies::{Body, MODULUS, Random, hold, norm};
 use peri::Error;
-use peri::bonds::{Bonds, force};
+use peri::bonds::{BodyGeometry, BondForces, Bonds, force};
 use peri::field::Field;
 use peri::material::BondMaterial;
 use peri::potential::{BondPotential, Law};

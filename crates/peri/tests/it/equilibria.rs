@@ -2,7 +2,7 @@
 
 use crate::bodies::{Body, MODULUS, hold};
 use peri::Error;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, VolumeCorrection};
 use peri::field::Field;
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;

@@ -4,7 +4,7 @@
 use crate::materials::battery;
 use evidence::{at_most, near};
 use nalgebra::Matrix2;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};

@@ -1,7 +1,7 @@
 //! Homogeneous strains through the whole chain of lattice, law, relaxation and stress.
 
 use crate::bodies::{Body, Built, Random, fit, hold, relax};
-use peri::bonds::{Bonds, Stencil};
+use peri::bonds::{BodyGeometry, Bonds, Stencil};
 use peri::calibrate::{Space, modulus};
 use peri::exact::lattice_uniaxial;
 use peri::potential::{BondPotential, Law};

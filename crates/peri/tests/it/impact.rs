@@ -3,7 +3,7 @@
 use crate::bodies::{Body, MODULUS, Slit, hold};
 use crate::dynamics::DENSITY;
 use peri::Error;
-use peri::bonds::{Bonds, CloudBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, CloudBonds, VolumeCorrection};
 use peri::contact::{Contact, SHORT_RANGE};
 use peri::material::BondMaterial;
 use peri::potential::Law;

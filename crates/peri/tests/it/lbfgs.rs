@@ -3,7 +3,7 @@
 use crate::bodies::{Body, Built, MODULUS, distance, hold, rms};
 use crate::load_steps::dent;
 use peri::Error;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};

@@ -2,7 +2,9 @@
 
 use crate::bodies::{Body, MODULUS, Random, distance, forces, hold, norm, relax, rms};
 use peri::Error;
-use peri::bonds::{Bonds, CloudBonds, Lattice, LatticeBonds, VolumeCorrection};
+use peri::bonds::{
+    BodyGeometry, BondDamage, BondForces, Bonds, CloudBonds, Lattice, LatticeBonds, VolumeCorrection,
+};
 use peri::calibrate::{Space, modulus};
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};

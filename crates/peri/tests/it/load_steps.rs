@@ -1,7 +1,7 @@
 //! Load steps that are cut where bonds break, and loads that follow a response which snaps back.
 
 use crate::bodies::hold;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;

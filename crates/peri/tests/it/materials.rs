@@ -4,7 +4,7 @@
 use crate::bodies::{Body, Built, MODULUS, Random, laws, scatter};
 use crate::linear_solid::{LinearSolid, poisson_ratio};
 use evidence::near;
-use peri::bonds::{Bonds, Overstretched};
+use peri::bonds::{BodyGeometry, Bonds, Overstretched};
 use peri::field::Field;
 use peri::material::{BondMaterial, Cover, Material, Pointwise, Response};
 use peri::solver::{

@@ -2,7 +2,7 @@
 
 use crate::linear_solid::LinearSolid;
 use peri::Error;
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, BondDamage, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;

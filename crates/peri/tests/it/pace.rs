@@ -3,7 +3,7 @@
 
 use crate::bodies::{Random, hold};
 use evidence::{at_most, within};
-use peri::bonds::{Bonds, LatticeBonds, Overstretched, VolumeCorrection};
+use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, Overstretched, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::{Affine, Correspondence, EightChain, Material, NonlocalSolid};

@@ -1,6 +1,8 @@
 //! Bodies of several parts, slots, cracks of several facets, weak layers: who is bonded to whom, and at which load they part.
 
-use peri::bonds::{Bonds, CloudBonds, LatticeBonds, VolumeCorrection, components, fragments};
+use peri::bonds::{
+    BodyGeometry, BondDamage, CloudBonds, LatticeBonds, VolumeCorrection, components, fragments,
+};
 use peri::geometry::{Cut, Gaps, Operation, Shape, lattice};
 use peri::model::Body;
 use peri::run::{Finished, Peri, run};

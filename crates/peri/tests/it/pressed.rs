@@ -1,7 +1,7 @@
 //! Bodies pressed onto each other, in equilibrium: springs in series, flanks of a crack, no list in any bit.
 
 use crate::bodies::{Body, Built, MODULUS, Slit, distance, hold, rms};
-use peri::bonds::Bonds;
+use peri::bonds::{BodyGeometry, Bonds};
 use peri::contact::{Contact, SHORT_RANGE, Touching};
 use peri::material::BondMaterial;
 use peri::potential::Law;

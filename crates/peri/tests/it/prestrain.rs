@@ -3,7 +3,7 @@
 use crate::bodies::{Body, MODULUS, hold, laws, scatter};
 use crate::materials::battery;
 use evidence::near;
-use peri::bonds::{Bonds, Seen};
+use peri::bonds::{BodyGeometry, Bonds, Seen};
 use peri::calibrate::modulus_in;
 use peri::field::Field;
 use peri::material::{BondMaterial, Material, Pointwise, Prestrained, Response};

@@ -1,7 +1,7 @@
 //! Dynamic relaxation: the DENT specimen of `dent.py`, work counts, the same bits for any number of threads.
 
 use crate::bodies::{Body, hold, relax};
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus};
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::potential::{BondPotential, Law};

@@ -1,7 +1,7 @@
 //! Bodies whose reactions vanish: moved by one grip, cut in two, without loads. A residual over reactions alone never converges.
 
 use crate::bodies::{Body, MODULUS, hold};
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::geometry::{Cut, Operation, Shape, lattice};
 use peri::material::BondMaterial;
 use peri::potential::Law;

@@ -3,7 +3,7 @@
 use crate::bodies::{Body, Random, Slit, hold, scatter};
 use crate::solids::{Plain, displaced, neo_hooke, rubber};
 use evidence::{at_most, near};
-use peri::bonds::{Bonds, CloudBonds, Softened, StretchRange};
+use peri::bonds::{BodyGeometry, Bonds, CloudBonds, Softened, StretchRange};
 use peri::calibrate::Space;
 use peri::critical::bilinear;
 use peri::field::Field;

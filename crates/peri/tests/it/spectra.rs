@@ -2,7 +2,7 @@
 //! convergence at finite strains, against an independent program (`docs/reference/correspondence`) and closed forms.
 
 use evidence::{at_most, near};
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, Bonds, LatticeBonds, VolumeCorrection};
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};

@@ -2,7 +2,7 @@
 //! (`s12_mosurf.py`).
 
 use crate::bodies::{fit, relax};
-use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, BondForces, LatticeBonds, VolumeCorrection};
 use peri::calibrate::{Space, modulus, stiffness_1111};
 use peri::correction::surface_factors;
 use peri::geometry::{Operation, Shape, lattice};

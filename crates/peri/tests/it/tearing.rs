@@ -2,7 +2,9 @@
 //! `fit.py`), the critical stretches of both conventions, the area of new cracks, and bonds that soften.
 
 use evidence::near;
-use peri::bonds::{Bonds, CloudBonds, LatticeBonds, Overstretched, VolumeCorrection};
+use peri::bonds::{
+    BodyGeometry, BondDamage, Bonds, CloudBonds, LatticeBonds, Overstretched, VolumeCorrection,
+};
 use peri::calibrate::{Space, modulus, stiffness_1111};
 use peri::correction::surface_factors;
 use peri::critical::{Context, Convention, CrackArea, Critical, Crossing, fracture_energy};
@@ -169,7 +171,7 @@ fn forces_of_soft_bonds_are_slopes() {
         }
         let cover = peri::material::Cover { stretches: [0.9, 1.2], bound: 1e-9, clamped: true, known: None };
         response.cover(&mut *bonds, &displacement, &cover).unwrap();
-        bonds.round(&displacement);
+        bonds.prepare(&displacement);
         response.prepare(&*bonds, &displacement);
         let mut force = Field::<2>::zeros(bonds.sites());
         for (chunk, mut part) in force.chunks_mut().into_iter().enumerate() {

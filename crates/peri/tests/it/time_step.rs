@@ -3,7 +3,7 @@
 use crate::bodies::{Body, hold};
 use crate::dynamics::{DENSITY, once, run};
 use peri::Error;
-use peri::bonds::Bonds;
+use peri::bonds::{BodyGeometry, Bonds};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{Breaking, Loads, Method, Policy, State, StepLimits, System, VelocityVerlet};

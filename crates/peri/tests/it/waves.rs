@@ -2,7 +2,7 @@
 
 use crate::bodies::{Body, MODULUS, Slit, hold, relax};
 use crate::dynamics::{DENSITY, once, run};
-use peri::bonds::Bonds;
+use peri::bonds::{BodyGeometry, Bonds};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{Breaking, DynamicRelaxation, Loads, Method, Policy, State, System, VelocityVerlet};

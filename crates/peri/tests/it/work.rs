@@ -1,7 +1,7 @@
 //! Work and memory: counts that closed forms give, and bytes.
 
 use crate::bodies::{Body, hold, relax};
-use peri::bonds::{Bonds, LatticeBonds, Stencil};
+use peri::bonds::{BodyGeometry, BondDamage, Bonds, LatticeBonds, Stencil};
 use peri::geometry::{Operation, Shape, lattice};
 use peri::potential::Law;
 use peri::solver::{DynamicRelaxation, State};

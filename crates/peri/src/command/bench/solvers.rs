@@ -5,7 +5,7 @@
 
 use super::RATIO;
 use crate::Error;
-use crate::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use crate::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
 use crate::calibrate::{Space, modulus};
 use crate::geometry::{Operation, Shape, lattice};
 use crate::material::BondMaterial;
