@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
-use polycore::output::atomic_write;
+use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
 
 use crate::stamp::{Stamp, sources};

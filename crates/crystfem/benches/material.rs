@@ -4,7 +4,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use crystfem::material::ThermalMaterial;
 use std::hint::black_box;
 
-#[path = "../src/command/bench/material.rs"]
+#[path = "../src/program/command/bench/material.rs"]
 mod material;
 
 fn responses(criterion: &mut Criterion) {

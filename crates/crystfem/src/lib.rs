@@ -52,23 +52,14 @@ pub mod problem;
 pub mod simulation;
 mod solver;
 mod system;
-#[cfg(feature = "case")]
 pub mod table;
-#[cfg(feature = "case")]
-pub mod thermal;
 pub mod time;
 
-// `cargo bench` compiles a file of `command`, in which this crate has its name
+// `cargo bench` compiles a file of `program`, in which this crate has its name
 #[cfg(feature = "case")]
 extern crate self as crystfem;
 
 #[cfg(feature = "case")]
-pub mod command;
-#[cfg(feature = "case")]
-pub mod quantities;
-#[cfg(feature = "case")]
-pub mod run;
-#[cfg(feature = "case")]
-pub mod scene;
+pub mod program;
 
 pub use error::Error;

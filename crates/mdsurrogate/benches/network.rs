@@ -5,7 +5,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mdsurrogate::surrogate::{Prediction, Workspace};
 use std::hint::black_box;
 
-#[path = "../src/bench_points.rs"]
+#[path = "../src/program/command/bench_points.rs"]
 mod points;
 
 fn predictions(criterion: &mut Criterion) {

@@ -4,10 +4,10 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use peri::bonds::{BodyGeometry, BondDamage, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
 use peri::potential::{KernelFit, Law};
-use peri::run::Failure;
+use peri::program::run::Failure;
 use peri::stress::{BallVolume, Loaded, Measure, Missing, piola_in_cloud};
 
-#[path = "../src/command/bench/kernel.rs"]
+#[path = "../src/program/command/bench/kernel.rs"]
 mod kernel;
 
 /// Particles: what the caches hold.

@@ -50,19 +50,11 @@ pub mod solver;
 pub mod stress;
 pub mod surface;
 
-// `cargo bench` compiles a file of `command`, in which this crate has its name
+// `cargo bench` compiles a file of `program`, in which this crate has its name
 #[cfg(feature = "case")]
 extern crate self as peri;
 
 #[cfg(feature = "case")]
-pub mod bridge;
-#[cfg(feature = "case")]
-pub mod command;
-#[cfg(feature = "case")]
-pub mod quantities;
-#[cfg(feature = "case")]
-pub mod run;
-#[cfg(feature = "case")]
-pub mod scene;
+pub mod program;
 
 pub use error::Error;

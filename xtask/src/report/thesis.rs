@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
+use harness::report::{Expect, Kind};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
-use polycore::report::{Expect, Kind};
 use serde::{Deserialize, Serialize};
 
 use super::evidence::{Finding, Measured, Number, verdict};
