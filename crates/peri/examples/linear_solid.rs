@@ -5,7 +5,7 @@
 //! cargo run --release --package peri --example linear_solid
 //! ```
 
-use peri::bonds::{BodyGeometryceBonds, VolumeCorrection};
+use peri::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
 use peri::calibrate::modulus_in;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{Bond, Family, Material, Property};
