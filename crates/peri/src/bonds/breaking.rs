@@ -25,14 +25,14 @@ pub struct Overstretched {
 
 /// Stretches that forces of a displacement have met; empty where none were looked for.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
+pub struct StretchScan {
     /// Sites that were looked at together, a divisor of a work item.
     pub part: usize,
     /// Their extremes, in order.
     pub ranges: Vec<StretchRange>,
 }
 
-impl Seen {
+impl StretchScan {
     /// Those of `sites`, a work item, among which bonds beyond e = `least` may begin.
     fn beyond(&self, sites: Range<usize>, least: f64) -> Vec<Range<usize>> {
         if self.ranges.is_empty() {
@@ -60,7 +60,7 @@ pub fn overstretched<const D: usize, B: BondForces<D> + ?Sized>(
     bonds: &B,
     displacement: &Field<D>,
     critical: &Property,
-    seen: &Seen,
+    seen: &StretchScan,
 ) -> Vec<Overstretched> {
     let sites = bonds.sites();
     // vectorised loops find the bonds to look at; their last bits may differ from those below

@@ -13,7 +13,6 @@ use crate::error::Error;
 use crate::field::{Field, chunk_range};
 use crate::geometry::{Cut, Gaps};
 use crate::potential::{KernelFit, StretchRange};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// The bonds of a cloud.
@@ -36,6 +35,7 @@ pub struct CloudBonds<const D: usize> {
 }
 
 /// The law of the bonds of a cloud.
+#[derive(Default)]
 struct CloudLaw<const D: usize> {
     /// w V_J of each bond, where bonds differ in it.
     weights: Vec<f64>,
@@ -46,12 +46,6 @@ struct CloudLaw<const D: usize> {
     kernel: Option<Box<dyn CloudKernel<D>>>,
     /// A law that only a table represents, and kθ.
     table: Option<(KernelFit, f64)>,
-}
-
-impl<const D: usize> Default for CloudLaw<D> {
-    fn default() -> Self {
-        Self { weights: Vec::new(), stiffness: 0.0, rows: Rows::default(), kernel: None, table: None }
-    }
 }
 
 /// Refuses what is no cloud.

@@ -42,7 +42,7 @@ use crate::surface::Surface;
 pub use friction::Sliding;
 pub use grip::{Drag, Grip, Pair};
 use list::{List, Listed, Near};
-pub use plane::{Plane, Resting};
+pub use plane::{Plane, PlaneReaction};
 use planes::Planes;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -85,7 +85,7 @@ pub struct Contact<const D: usize> {
 
 /// Bodies and planes in touch.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Touching {
+pub struct ContactSummary {
     /// Pairs with r < d, and faces that touch a plane.
     pub pairs: u64,
     /// Greatest overlap: 1 − r/d of a pair, over half a spacing of a face; 0 where nothing touches.
@@ -270,7 +270,7 @@ impl<const D: usize> Contact<D> {
     }
 
     /// Force, area and width of the contact with each plane, without friction.
-    pub fn resting(&self, displacement: &Field<D>) -> Vec<Resting> {
+    pub fn resting(&self, displacement: &Field<D>) -> Vec<PlaneReaction> {
         self.planes.as_ref().map_or_else(Vec::new, |planes| planes.resting(displacement))
     }
 
@@ -393,8 +393,8 @@ impl<const D: usize> Contact<D> {
     }
 
     /// What touches.
-    pub fn touching(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> Touching {
-        let none = Touching { pairs: 0, overlap: 0.0, energy: 0.0 };
+    pub fn touching(&self, bonds: &dyn BodyGeometry<D>, displacement: &Field<D>) -> ContactSummary {
+        let none = ContactSummary { pairs: 0, overlap: 0.0, energy: 0.0 };
         let of = |chunk: usize| {
             let (mut part, sites) = (none, chunk_range(chunk, displacement.sites()));
             for (own, touching) in self.list.pairs(bonds, displacement, sites, 0.0) {
@@ -410,9 +410,9 @@ impl<const D: usize> Contact<D> {
             }
             part
         };
-        let parts: Vec<Touching> =
+        let parts: Vec<ContactSummary> =
             (0..displacement.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
-        let mut all = parts.into_iter().fold(none, |a, b| Touching {
+        let mut all = parts.into_iter().fold(none, |a, b| ContactSummary {
             pairs: a.pairs + b.pairs,
             overlap: a.overlap.max(b.overlap),
             energy: a.energy + b.energy,

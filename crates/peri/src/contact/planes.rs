@@ -2,7 +2,7 @@
 
 use super::faces::Faces;
 use super::grip::{Grip, Pair};
-use super::plane::{Plane, Resting};
+use super::plane::{Plane, PlaneReaction};
 use crate::bonds::{BodyGeometry, Bonds, Property};
 use crate::error::Error;
 use crate::field::Field;
@@ -339,10 +339,10 @@ impl<const D: usize> Planes<D> {
     }
 
     /// Force, area and width of the contact with each plane, without friction.
-    pub fn resting(&self, field: &Field<D>) -> Vec<Resting> {
+    pub fn resting(&self, field: &Field<D>) -> Vec<PlaneReaction> {
         let of = |placed: &Placed<D>| {
             let normal = placed.plane.normal;
-            let mut resting = Resting { gap: f64::INFINITY, ..Resting::default() };
+            let mut resting = PlaneReaction { gap: f64::INFINITY, ..PlaneReaction::default() };
             let (mut push, mut first, mut second) = (0.0, [0.0; D], [0.0; D]);
             let (mut low, mut high, mut count) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D], 0.0);
             for touch in self.touches(placed, field) {

@@ -1,7 +1,7 @@
 //! Area of the cracks that a run makes, from the bonds that break.
 
 use super::crossing::{Crossing, SHORT};
-use crate::bonds::{BodyGeometry, Bonds};
+use crate::bonds::Bonds;
 use rayon::prelude::*;
 
 /// The bonds of a body before it is loaded, as far as its crack area needs them.

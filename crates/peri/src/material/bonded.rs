@@ -1,7 +1,7 @@
 //! Bond laws as materials: no state of a particle, forces by the kernels of [`crate::bonds`].
 
 use super::softened::{Lacking, lacking_energy};
-use super::{Bond, Cover, Family, LawRange, Material, Response};
+use super::{Bond, Family, LawCover, LawRange, Material, Response};
 use crate::bonds::{BodyGeometry, Bonds, Overstretched, Property};
 use crate::error::Error;
 use crate::field::{CHUNK, Field};
@@ -129,7 +129,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
         &mut self,
         bonds: &mut dyn Bonds<D>,
         _displacement: &Field<D>,
-        cover: &Cover,
+        cover: &LawCover,
     ) -> Result<f64, Error> {
         let (law, modulus) = (&*self.material.law, self.material.modulus);
         let mut fit = KernelFit::new(law, cover.stretches, cover.bound)?;

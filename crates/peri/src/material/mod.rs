@@ -42,7 +42,7 @@ pub use point_law::{Deformation, NonlocalSolid, PointLaw, PointStress};
 pub use pointwise::{Passes, Pointwise};
 pub use prestrained::Prestrained;
 pub use relief::relief;
-pub use response::{Cover, LawRange, Response};
+pub use response::{LawCover, LawRange, Response};
 pub use strength::energy_at_strength;
 pub use tensor::Tensor;
 pub use traction::surface_load;

@@ -3,7 +3,7 @@
 use super::point_law::{Deformation, NonlocalSolid, PointLaw, PointStress};
 use super::tensor::Tensor;
 use super::{Pointwise, Response};
-use crate::bonds::{BodyGeometry, Bonds};
+use crate::bonds::Bonds;
 use crate::field::{CHUNK, Field};
 
 /// A uniform stress, whatever the deformation.

@@ -4,11 +4,10 @@
 //! with the quotient taken on increments (the displacement-weighted form has negative stiffness in many iterations).
 
 use super::balance::Goal;
-use super::load_stepping::{Equilibrium, load_stepping};
+use super::load_stepping::{Equilibrium, QuasiStatic};
 use super::mass::{has_own_mass, own_mass, update_unit_mass};
-use super::method::{Finished, Method};
+use super::method::Watch;
 use super::passes::{force_pass, move_pass};
-use super::record::Watch;
 use super::state::State;
 use super::system::System;
 
@@ -44,20 +43,9 @@ impl DynamicRelaxation {
     }
 }
 
-impl<const D: usize> Method<D> for DynamicRelaxation {
-    /// Solves the remaining load steps of `state`. `watch` sees every iteration and may stop the run by an error;
-    /// `finished` sees every finished step.
-    ///
-    /// # Errors
-    /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` and `finished` return.
-    fn solve(
-        &self,
-        system: &mut System<D>,
-        state: &mut State<D>,
-        watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
-    ) -> Result<(), Error> {
-        load_stepping(&mut RelaxationSolver::new(*self), system, state, watch, finished)
+impl<const D: usize> QuasiStatic<D> for DynamicRelaxation {
+    fn solver(&self) -> impl Equilibrium<D> {
+        RelaxationSolver::new(*self)
     }
 }
 

@@ -5,7 +5,7 @@ use super::state::State;
 use super::system::System;
 use crate::bonds::stretch_range;
 use crate::error::Error;
-use crate::material::Cover;
+use crate::material::LawCover;
 use crate::potential::StretchRange;
 
 impl<const D: usize> System<'_, D> {
@@ -64,7 +64,7 @@ impl<const D: usize> System<'_, D> {
 
     pub(super) fn fit(&mut self, state: &mut State<D>, known: Option<f64>) -> Result<(), Error> {
         let (bound, clamped) = (self.fit_bound, self.breaking.is_some());
-        let cover = Cover { stretches: state.stretches.fitted, bound, clamped, known };
+        let cover = LawCover { stretches: state.stretches.fitted, bound, clamped, known };
         state.stretches.tangent = self.material.cover(&mut *self.bonds, &state.displacement, &cover)?;
         Ok(())
     }

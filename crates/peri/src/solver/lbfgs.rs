@@ -3,13 +3,13 @@
 //! condition), found by secants.
 
 use super::balance::Goal;
-use super::load_stepping::{Equilibrium, load_stepping};
+use super::load_stepping::{Equilibrium, QuasiStatic};
 use super::memory::Memory;
-use super::method::{Finished, Method};
+use super::method::Watch;
 use super::passes::{Sums, gradient_pass};
 use super::places::Places;
 use super::preconditioner::Preconditioner;
-use super::record::{Status, Watch};
+use super::record::Status;
 use super::state::State;
 use super::system::System;
 use crate::bonds::{StretchRange, stretch_range};
@@ -82,20 +82,9 @@ impl Lbfgs {
     }
 }
 
-impl<const D: usize> Method<D> for Lbfgs {
-    /// Solves the remaining load steps of `state`. `watch` sees every iteration and may stop the run by an error;
-    /// `finished` sees every finished step.
-    ///
-    /// # Errors
-    /// [`Error::NotConverged`], [`Error::NotFinite`], and whatever `watch` and `finished` return.
-    fn solve(
-        &self,
-        system: &mut System<D>,
-        state: &mut State<D>,
-        watch: &mut Watch<D>,
-        finished: &mut Finished<D>,
-    ) -> Result<(), Error> {
-        load_stepping(&mut LbfgsSolver::new(*self), system, state, watch, finished)
+impl<const D: usize> QuasiStatic<D> for Lbfgs {
+    fn solver(&self) -> impl Equilibrium<D> {
+        LbfgsSolver::new(*self)
     }
 }
 

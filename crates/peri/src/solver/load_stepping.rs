@@ -1,7 +1,7 @@
 //! Load step after load step: a first guess, an equilibrium, the bonds that break in it, the next equilibrium.
 
-use super::method::Finished;
-use super::record::{Record, Watch};
+use super::method::{Finished, Method, Watch};
+use super::record::Record;
 use super::scale::{Balance, Scale};
 use super::state::State;
 use super::system::System;
@@ -29,6 +29,25 @@ pub trait Equilibrium<const D: usize> {
 
     /// Out-of-balance force over its reference that will do.
     fn tolerance(&self) -> f64;
+}
+
+/// Settings of a method that seeks one equilibrium after the other.
+pub trait QuasiStatic<const D: usize> {
+    /// The method at work.
+    fn solver(&self) -> impl Equilibrium<D>;
+}
+
+impl<const D: usize, M: QuasiStatic<D>> Method<D> for M {
+    /// Solves the remaining load steps of `state`, see [`load_stepping`].
+    fn solve(
+        &self,
+        system: &mut System<D>,
+        state: &mut State<D>,
+        watch: &mut Watch<D>,
+        finished: &mut Finished<D>,
+    ) -> Result<(), Error> {
+        load_stepping(&mut self.solver(), system, state, watch, finished)
+    }
 }
 
 /// Solves the remaining load steps of `state`; `finished` sees every finished step and, with [`State::round`] above 0,

@@ -1,7 +1,5 @@
 //! Explicit dynamics of a state: time, steps, energies, and when stretches must be looked at again.
 
-use super::pace::Pace;
-use super::time_step::BondSums;
 use crate::potential::StretchRange;
 use serde::{Deserialize, Serialize};
 
@@ -80,6 +78,37 @@ pub struct Energies {
 pub(super) struct StretchLook {
     pub stretches: [f64; 2],
     pub slack: f64,
+}
+
+/// What bounds the frequencies of a body, and what its bonds can store at most and least.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BondSums {
+    /// max_I Σ_J 2 w V_J/|ξ|: the stiffness of a particle's bonds for a unit tangent kθ t′, m.
+    pub stiffness: f64,
+    /// Shortest bond, m; ∞ without bonds.
+    pub shortest: f64,
+    /// Σ_I V_I Σ_J w V_J |ξ|: the energy of all bonds for kθ φ = 1.
+    pub extent: f64,
+}
+
+/// Greatest frequency, as far as it is known, see [`super::pace`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Pace {
+    /// m when ω² was last measured, N/m⁴, and r.
+    pub(super) bound: f64,
+    pub(super) part: f64,
+    /// ρω² that steps are made for, without the margin.
+    pub(super) covered: f64,
+    /// m at the last look, steps between it and the next, and steps until then; looks since steps were changed.
+    pub(super) last: f64,
+    pub(super) every: u32,
+    pub(super) due: u32,
+    pub(super) looks: u32,
+    /// Strain since the last look, at most.
+    pub(super) strain: f64,
+    /// Least and greatest stretch for which r holds, and whether a look has met others.
+    pub(super) known: [f64; 2],
+    pub(super) outgrown: bool,
 }
 
 impl Motion {

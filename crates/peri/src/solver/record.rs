@@ -1,11 +1,7 @@
 //! Rows of a run's history, and what is shown of an iteration.
 
 use super::scale::Balance;
-use super::state::State;
-use super::system::System;
-use crate::contact::{Resting, Touching};
-use crate::error::Error;
-use crate::potential::StretchRange;
+use crate::contact::{ContactSummary, PlaneReaction};
 use serde::{Deserialize, Serialize};
 
 /// One load step in equilibrium.
@@ -34,7 +30,7 @@ pub struct Record {
     /// Sums of all forces and moments.
     pub balance: Balance,
     /// What touches, where that is looked at.
-    pub contact: Option<Touching>,
+    pub contact: Option<ContactSummary>,
     /// Work of the loads so far, J.
     pub work: f64,
     /// Energy of broken bonds when they broke, J.
@@ -52,7 +48,7 @@ pub struct Record {
     /// Energy that friction has taken so far, J.
     pub rubbed: f64,
     /// How the body rests on each rigid plane.
-    pub resting: Vec<Resting>,
+    pub resting: Vec<PlaneReaction>,
     /// What [`System::observer`](super::System::observer) sees.
     pub seen: Vec<f64>,
 }
@@ -99,45 +95,4 @@ pub struct Status {
     pub broken: u64,
     /// Whether the state may be saved here: a run that begins from it takes the same way.
     pub restartable: bool,
-}
-
-/// Sees every iteration, and may stop the run by an error.
-pub type Watch<'a, const D: usize> = dyn FnMut(&Status, &State<D>) -> Result<(), Error> + 'a;
-
-impl<const D: usize> System<'_, D> {
-    /// Row of history of a state: at a load factor with its conjugate sums, see [`Loads::conjugates`](super::Loads::conjugates), the stretches
-    /// `observed` and the `stored` energy, J. Not of an equilibrium: without residual and balance.
-    pub(super) fn row(
-        &mut self,
-        state: &State<D>,
-        [factor, pull, push]: [f64; 3],
-        observed: StretchRange,
-        stored: f64,
-    ) -> Record {
-        let (load, displacement) = self.response(factor, (pull, push));
-        Record {
-            factor,
-            load,
-            displacement,
-            reactions: self.loads.reactions(&*self.bonds, &state.force),
-            residual: 0.0,
-            iterations: state.counts.step_iterations,
-            rounds: 1,
-            broken: state.fracture.broken,
-            detached: state.fracture.detached,
-            stored,
-            balance: Balance::default(),
-            contact: self.touching(state),
-            work: state.work,
-            released: state.fracture.released,
-            smallest_stretch: (1.0 + observed.low).max(0.0).sqrt(),
-            largest_stretch: (1.0 + observed.high).sqrt(),
-            time: state.motion.time,
-            kinetic: state.motion.energies.kinetic,
-            damped: state.motion.energies.damped,
-            rubbed: state.motion.energies.rubbed,
-            resting: self.resting(state),
-            seen: self.seen(state),
-        }
-    }
 }

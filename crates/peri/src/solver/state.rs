@@ -3,7 +3,7 @@
 use super::fracture::Fracture;
 use super::motion::Motion;
 use super::record::{Record, Status};
-use super::steps::StepControl;
+use super::steps::{Accepted, StepControl};
 use crate::contact::Grip;
 use crate::field::Field;
 use crate::potential::StretchRange;
@@ -131,7 +131,7 @@ pub struct Convergence {
 }
 
 /// Friction and moving planes of a state.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub(super) struct ContactState<const D: usize> {
     /// Force densities of friction in explicit dynamics, a part of [`State::force`], N/m³.
@@ -147,20 +147,6 @@ pub(super) struct ContactState<const D: usize> {
     /// Friction in force towards the current equilibrium, and how often it has been renewed in this step.
     pub active: Vec<Grip>,
     pub renewals: u32,
-}
-
-impl<const D: usize> Default for ContactState<D> {
-    fn default() -> Self {
-        Self {
-            friction: None,
-            plane_friction: Vec::new(),
-            plane_push: Vec::new(),
-            start: None,
-            grips: Vec::new(),
-            active: Vec::new(),
-            renewals: 0,
-        }
-    }
 }
 
 impl<const D: usize> State<D> {
@@ -182,6 +168,37 @@ impl<const D: usize> State<D> {
             work: 0.0,
             history: Vec::new(),
         }
+    }
+
+    /// Keeps a finished step, see [`Self::retreat`].
+    pub(super) fn accept(&mut self) {
+        self.control.accepted = Some(Box::new(Accepted {
+            displacement: self.displacement.clone(),
+            force: self.force.clone(),
+            fracture: self.fracture.clone(),
+            stretches: self.stretches.balanced,
+        }));
+    }
+
+    /// Goes back to the last finished step, or to the undeformed body; counts of work stay. Bonds are another's: see
+    /// [`Fracture::restore`].
+    pub(super) fn retreat(&mut self) {
+        let zero = || Field::zeros(self.velocity.sites());
+        let accepted = self.control.accepted.take().map_or_else(
+            || Accepted {
+                displacement: zero(),
+                force: zero(),
+                fracture: Fracture::default(),
+                stretches: StretchRange::REST,
+            },
+            |accepted| *accepted,
+        );
+        self.velocity = zero();
+        (self.displacement, self.force) = (accepted.displacement, accepted.force);
+        (self.fracture, self.stretches.balanced) = (accepted.fracture, accepted.stretches);
+        self.work = self.history.last().map_or(0.0, |row| row.work);
+        (self.control.predicted, self.control.round) = (false, 0);
+        (self.counts.iteration, self.counts.step_iterations) = (0, 0);
     }
 
     /// Shows an iteration of a run of `steps` steps to who watches it.

@@ -1,13 +1,12 @@
 //! Load steps of a state: how far they are, where they have been cut, and the last one that can be gone back to.
 
 use super::fracture::Fracture;
-use super::state::State;
 use crate::field::Field;
 use crate::potential::StretchRange;
 use serde::{Deserialize, Serialize};
 
 /// Control of load steps.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct StepControl<const D: usize> {
     /// Whether this step's first guess is made.
@@ -26,33 +25,17 @@ pub struct StepControl<const D: usize> {
     /// Factor and largest stretch of the equilibrium from which the load was lowered, see [`System::snap_back`](super::System::snap_back).
     pub(super) lowered: Option<[f64; 2]>,
     /// The last finished step under given forces, which may tear the body apart.
-    accepted: Option<Box<Accepted<D>>>,
+    pub(super) accepted: Option<Box<Accepted<D>>>,
 }
 
 /// A finished step, as far as the history does not have it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
-struct Accepted<const D: usize> {
-    displacement: Field<D>,
-    force: Field<D>,
-    fracture: Fracture,
-    stretches: StretchRange,
-}
-
-impl<const D: usize> Default for StepControl<D> {
-    fn default() -> Self {
-        Self {
-            predicted: false,
-            round: 0,
-            past: Vec::new(),
-            balanced: [0.0; 3],
-            factors: Vec::new(),
-            inserted: Vec::new(),
-            cuts: 0,
-            lowered: None,
-            accepted: None,
-        }
-    }
+pub(super) struct Accepted<const D: usize> {
+    pub displacement: Field<D>,
+    pub force: Field<D>,
+    pub fracture: Fracture,
+    pub stretches: StretchRange,
 }
 
 impl<const D: usize> StepControl<D> {
@@ -71,39 +54,6 @@ impl<const D: usize> StepControl<D> {
         let last = rows.checked_sub(1)?;
         let inserted = self.inserted.partition_point(|&row| row < last);
         (self.inserted.get(inserted) != Some(&last)).then(|| rows - inserted)
-    }
-}
-
-impl<const D: usize> State<D> {
-    /// Keeps a finished step, see [`Self::retreat`].
-    pub(super) fn accept(&mut self) {
-        self.control.accepted = Some(Box::new(Accepted {
-            displacement: self.displacement.clone(),
-            force: self.force.clone(),
-            fracture: self.fracture.clone(),
-            stretches: self.stretches.balanced,
-        }));
-    }
-
-    /// Goes back to the last finished step, or to the undeformed body; counts of work stay. Bonds are another's: see
-    /// [`Fracture::restore`].
-    pub(super) fn retreat(&mut self) {
-        let zero = || Field::zeros(self.velocity.sites());
-        let accepted = self.control.accepted.take().map_or_else(
-            || Accepted {
-                displacement: zero(),
-                force: zero(),
-                fracture: Fracture::default(),
-                stretches: StretchRange::REST,
-            },
-            |accepted| *accepted,
-        );
-        self.velocity = zero();
-        (self.displacement, self.force) = (accepted.displacement, accepted.force);
-        (self.fracture, self.stretches.balanced) = (accepted.fracture, accepted.stretches);
-        self.work = self.history.last().map_or(0.0, |row| row.work);
-        (self.control.predicted, self.control.round) = (false, 0);
-        (self.counts.iteration, self.counts.step_iterations) = (0, 0);
     }
 }
 

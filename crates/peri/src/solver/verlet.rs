@@ -5,12 +5,12 @@
 //! doi:10.1063/1.442716, Hairer, Lubich & Wanner (2003), doi:10.1017/S0962492902000144. Works are sums of
 //! ½(force before + force after)·Δu, which change ½ρ(v² − ¼Δt²a²) exactly: the energies balance to O(Δt²) without drift.
 
-use super::method::{Finished, Method};
-use super::motion::{Energies, Motion, StepLimits, StretchLook};
-use super::record::{Status, Watch};
+use super::method::{Finished, Method, Watch};
+use super::motion::{BondSums, Energies, Motion, StepLimits, StretchLook};
+use super::record::Status;
 use super::state::State;
 use super::system::System;
-use super::time_step::{BondSums, critical, largest_frequency_squared};
+use super::time_step::{critical, largest_frequency_squared};
 use super::verlet_friction::{friction_pass, plane_pass};
 use super::verlet_step::{Sums, VerletStep, force_pass, kick_pass, leap_pass, refresh, stored, volumes};
 use crate::bonds::{StretchRange, stretch_range};

@@ -4,7 +4,7 @@
 use super::load::Loads;
 use super::state::State;
 use super::system::System;
-use crate::bonds::{Seen, StretchRange};
+use crate::bonds::{StretchRange, StretchScan};
 use crate::field::{CHUNK, chunk_range};
 use rayon::prelude::*;
 
@@ -127,7 +127,7 @@ pub fn force_pass<const D: usize>(
     };
     let (sums, seen): (Vec<Sums>, Vec<Vec<StretchRange>>) =
         force.into_par_iter().zip(velocity).enumerate().map(of).unzip();
-    let seen = Seen { part, ranges: seen.concat() };
+    let seen = StretchScan { part, ranges: seen.concat() };
     let observed = seen.ranges.iter().copied().fold(StretchRange::REST, StretchRange::join);
     system.seen_stretches = seen;
     (sums.into_iter().fold(Sums::default(), Sums::add), observed)

@@ -6,7 +6,7 @@ use crate::linear_solid::{LinearSolid, poisson_ratio};
 use evidence::near;
 use peri::bonds::{BodyGeometry, Bonds, Overstretched};
 use peri::field::Field;
-use peri::material::{BondMaterial, Cover, Material, Pointwise, Response};
+use peri::material::{BondMaterial, LawCover, Material, Pointwise, Response};
 use peri::solver::{
     Breaking, DynamicRelaxation, Lbfgs, Method, Policy, State, Status, System, VelocityVerlet,
 };
@@ -25,7 +25,7 @@ struct Case<'a, 'm, const D: usize> {
 impl<'a, 'm, const D: usize> Case<'a, 'm, D> {
     fn new(name: String, bonds: &'a mut dyn Bonds<D>, make: Make<'m, D>, displacement: Field<D>) -> Self {
         let mut material = make(bonds);
-        let cover = Cover { stretches: [0.7, 1.5], bound: 1e-10, clamped: false, known: None };
+        let cover = LawCover { stretches: [0.7, 1.5], bound: 1e-10, clamped: false, known: None };
         material.cover(bonds, &displacement, &cover).unwrap();
         Self { name, bonds, material, displacement }
     }

@@ -2,7 +2,7 @@
 
 use crate::bodies::{Body, Built, MODULUS, Slit, distance, hold, rms};
 use peri::bonds::{BodyGeometry, Bonds};
-use peri::contact::{Contact, SHORT_RANGE, Touching};
+use peri::contact::{Contact, ContactSummary, SHORT_RANGE};
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{
@@ -52,7 +52,7 @@ fn methods<const D: usize>(tolerance: f64) -> [Box<dyn Equilibrium<D>>; 2] {
 }
 
 /// What touches in the last step.
-fn touching<const D: usize>(state: &State<D>) -> Touching {
+fn touching<const D: usize>(state: &State<D>) -> ContactSummary {
     state.history.last().unwrap().contact.unwrap()
 }
 

@@ -169,7 +169,8 @@ fn forces_of_soft_bonds_are_slopes() {
             let [x, y] = bonds.position(site);
             displacement.set(site, [0.01 * (0.7 * x).sin(), 0.03 * y + 0.02 * (0.5 * x + y).cos()]);
         }
-        let cover = peri::material::Cover { stretches: [0.9, 1.2], bound: 1e-9, clamped: true, known: None };
+        let cover =
+            peri::material::LawCover { stretches: [0.9, 1.2], bound: 1e-9, clamped: true, known: None };
         response.cover(&mut *bonds, &displacement, &cover).unwrap();
         bonds.prepare(&displacement);
         response.prepare(&*bonds, &displacement);
