@@ -2,7 +2,7 @@
 
 use super::kernels::{Form, HEAD, leap, pull};
 use super::{Device, Precision};
-use crate::bonds::{Bonds, LatticeBonds, StencilBond, not_finite, scaled_laws};
+use crate::bonds::{BodyGeometry, BondDamage, LatticeBonds, StencilBond, not_finite, scaled_laws};
 use crate::error::Error;
 use crate::field::Field;
 use crate::potential::KernelFit;
