@@ -157,7 +157,7 @@ fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: 
         Ok(())
     };
     solver.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut finished).unwrap();
-    assert_eq!(state.total_iterations, STEPS);
+    assert_eq!(state.counts.total_iterations, STEPS);
 
     let fit = KernelFit::new(&*law, [0.7, 1.25 * critical - 0.25], 1e-9).unwrap().clamped();
     let mut body = DeviceBody::new(device, &whole, &fit, MODULUS, Some(critical)).unwrap();
@@ -176,7 +176,7 @@ fn compare_motion<const D: usize>(device: &Device, cells: [usize; D], critical: 
     // 1e-9 of the true one
     let allowed = 4.0 * (STEPS as f64).sqrt() * device.precision().epsilon().max(1e-9) * reach;
     let name = format!("{D}D motion on {} in {:?}, m", device.name(), device.precision());
-    let broken = state.broken;
+    let broken = state.fracture.broken;
     eprintln!("{name}: {apart:.1e} of {allowed:.1e}; {broken} bonds broke, {margin:.1e} clear of doubt");
     assert!(
         broken > 10 && margin > 2.0 * allowed / whole.spacing(),
