@@ -7,8 +7,8 @@ mod bodies;
 use bodies::{Body, MODULUS, Random, fit, hold, laws, norm};
 use peri::Error;
 use peri::bonds::{
-    BodyGeometry, BondDamage, BondForces, Lattice, LatticeBonds, VolumeCorrection, force, overstretched,
-    stretch_range,
+    BodyGeometry, BondDamage, BondForces, Bonds, Lattice, LatticeBonds, VolumeCorrection, force,
+    overstretched, stretch_range,
 };
 use peri::field::Field;
 use peri::gpu::{Device, DeviceBody, Precision, Start};
