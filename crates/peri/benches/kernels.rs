@@ -1,7 +1,7 @@
 //! `cargo bench -p peri`: force densities of all bonds, as `peri bench` and `cargo xtask bench peri` measure them.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use peri::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
+use peri::bonds::{BodyGeometry, BondDamage, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
 use peri::potential::{KernelFit, Law};
 use peri::program::run::Failure;

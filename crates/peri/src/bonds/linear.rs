@@ -1,8 +1,9 @@
 //! Sums over the bonds of a lattice: energies, and both passes of materials whose forces are linear in a bond.
 
+use super::LatticeBonds;
 use super::kernel::dispatch;
 use super::linear_kernel::{self, LinearPass, LinearRow, MomentPass, Moments};
-use super::{Bonds, LatticeBonds};
+use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::StretchRange;
 use polycore::numerics::ordered_sum;

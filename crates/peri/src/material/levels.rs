@@ -1,8 +1,8 @@
 //! A preconditioner for operators that act on smooth fields like ∫(Δθ)²: splines on grids, each twice as wide as the one before (Bramble,
 //! Pasciak & Xu 1990, doi:10.1090/S0025-5718-1990-1023042-6).
 
-use super::relief::Vector;
-use crate::bonds::{Bonds, CloudBonds};
+use super::tensor::Vector;
+use crate::bonds::{BodyGeometry, CloudBonds};
 use polycore::numerics::bounds;
 use rayon::prelude::*;
 

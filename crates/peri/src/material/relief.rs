@@ -6,12 +6,12 @@
 //! h + Lθ takes the place of h, with L of the stabilisation, f = −Lu where A = 1 and P = 0: symmetric and positive definite as soon as some
 //! particles have θ = 0. Cf. Chen, Hillman & Rüter 2013, doi:10.1002/nme.4512.
 
-use super::deformation::LEAST_SHAPE;
 use super::levels::Levels;
-use super::tensor::invert;
-use crate::bonds::{Bonds, CloudBonds, CloudPlaces, Columns, Kind};
+use super::point::LEAST_SHAPE;
+use super::tensor::{Vector, invert};
+use crate::bonds::{BodyGeometry, Bonds, CloudBonds, CloudPlaces, Columns, Kind};
 use crate::field::{CHUNK, Field};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 use polycore::numerics::{conjugate_gradients, ordered_sum};
 use rayon::prelude::*;
 
@@ -24,7 +24,7 @@ const OPEN: f64 = 0.5;
 /// Spacings within which such a cone has no neighbour.
 const NEAR: f64 = 2.0;
 
-/// θ with h + Lθ = 0 in all particles whose family no surface cuts, and θ = 0 elsewhere, for [`Bonds::set_relief`]; `None` where there
+/// θ with h + Lθ = 0 in all particles whose family no surface cuts, and θ = 0 elsewhere, for [`crate::bonds::BondForces::set_relief`]; `None` where there
 /// is no such particle, and of lattices, which need none. To be found before any bond breaks: θ stays what it is, and the bonds that
 /// are left keep their part of the correction, so that forces follow from an energy however many break.
 pub fn relief<const D: usize>(bonds: &dyn Bonds<D>) -> Option<Field<D>> {
@@ -77,8 +77,6 @@ fn directions<const D: usize>() -> Vec<[f64; D]> {
     };
     (0..count).map(place).collect()
 }
-
-pub(super) type Vector<const D: usize> = SVector<f64, D>;
 
 struct Problem<'a, const D: usize> {
     cloud: &'a CloudBonds<D>,
@@ -182,7 +180,7 @@ impl<'a, const D: usize> Problem<'a, D> {
 }
 
 fn largest<const D: usize>(field: &[Vector<D>]) -> f64 {
-    field.iter().map(SVector::amax).fold(0.0, f64::max)
+    field.iter().map(Vector::amax).fold(0.0, f64::max)
 }
 
 /// In the order of the work items.

@@ -1,6 +1,6 @@
 //! Uniform states at which a solid has its strength.
 
-use super::deformation::{Deformation, PointLaw};
+use super::point_law::{Deformation, PointLaw};
 use super::tensor::Tensor;
 use polycore::numerics::bisect;
 

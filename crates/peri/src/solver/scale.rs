@@ -1,7 +1,7 @@
 //! What forces are measured by, and what sums of them a row of history holds.
 
 use super::load::Loads;
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
 use polycore::numerics::{bounds, ordered_sum};
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ pub struct Scale {
 
 impl Scale {
     /// Of a body with its loads; `stiffness` is kθK.
-    pub fn new<const D: usize>(bonds: &dyn Bonds<D>, loads: &Loads<D>, stiffness: f64) -> Self {
+    pub fn new<const D: usize>(bonds: &dyn BodyGeometry<D>, loads: &Loads<D>, stiffness: f64) -> Self {
         let of = |&site: &u32| {
             let mut sum = 0.0;
             bonds.neighbours(site as usize, &mut |bond| sum += 2.0 * stiffness * bond.weight / bond.length);

@@ -1,6 +1,7 @@
 //! The critical time step Δt_c = 2/ω_max of explicit dynamics: a bound for every deformation within a range of stretches,
 //! and the sharp value of one deformation.
 
+use super::motion::BondSums;
 use super::state::State;
 use super::system::System;
 use crate::field::{CHUNK, Field, chunk_range};
@@ -15,17 +16,6 @@ const PROBE: f64 = 1e-5;
 const ENOUGH: f64 = 1e-2;
 /// Most steps of the Lanczos iteration.
 const MOST_STEPS: usize = 200;
-
-/// What bounds the frequencies of a body, and what its bonds can store at most and least.
-#[derive(Clone, Copy, Debug)]
-pub struct BondSums {
-    /// max_I Σ_J 2 w V_J/|ξ|: the stiffness of a particle's bonds for a unit tangent kθ t′, m.
-    pub stiffness: f64,
-    /// Shortest bond, m; ∞ without bonds.
-    pub shortest: f64,
-    /// Σ_I V_I Σ_J w V_J |ξ|: the energy of all bonds for kθ φ = 1.
-    pub extent: f64,
-}
 
 impl BondSums {
     /// One visit of all bonds.

@@ -1,6 +1,6 @@
 //! `peri bench`: bond evaluations per second, bytes per particle, and the machine's bandwidth beside them.
 
-use crate::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
+use crate::bonds::{BodyGeometry, BondForces, Bonds, CloudBonds, VolumeCorrection, force};
 use crate::field::Field;
 use crate::material::relief;
 use crate::potential::Law;
@@ -205,7 +205,7 @@ fn measure_bonds<const D: usize>(
     let (fit, displacement) = kernel::loaded(bonds, law, range)?;
     let mut out = Field::zeros(bonds.sites());
     let seconds = median(|| {
-        bonds.round(&displacement);
+        bonds.prepare(&displacement);
         force(bonds, &displacement, &mut out);
         black_box(&out);
     });

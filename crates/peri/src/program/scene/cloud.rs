@@ -5,7 +5,7 @@ use super::Scene;
 use super::memory;
 use super::values::{Body, LARGEST_RATIO, needed, ordered, positive, vector};
 use super::variant::Variant;
-use crate::bonds::{Bonds, CloudBonds, LatticeBonds};
+use crate::bonds::{BodyGeometry, BondDamage, CloudBonds, LatticeBonds};
 use crate::geometry::{Cut, Gaps, recognise};
 use harness::scene::{SceneError, Source};
 use polycore::memory::{available, gib};

@@ -3,7 +3,7 @@
 //! The hat of a node is cut into one function for each part of the body that hangs together by intact bonds within the
 //! hat's support, so that no function moves both flanks of a crack, or a fragment with what it has left.
 
-use crate::bonds::Bonds;
+use crate::bonds::BodyGeometry;
 use crate::field::Field;
 use polycore::numerics::{Groups, Sets, bounds};
 use rayon::prelude::*;
@@ -50,7 +50,7 @@ struct Grid<const D: usize> {
 
 impl<const D: usize> Grid<D> {
     /// Cells of about `edge`, which the box holds a whole number of.
-    fn new(bonds: &dyn Bonds<D>, edge: f64) -> Self {
+    fn new(bonds: &dyn BodyGeometry<D>, edge: f64) -> Self {
         let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
         let cells: [usize; D] = std::array::from_fn(|d| ((high[d] - low[d]) / edge).ceil().max(1.0) as usize);
         // a box without extent along an axis still has a cell there
@@ -120,7 +120,7 @@ struct Filled<const D: usize> {
 }
 
 impl<const D: usize> Filled<D> {
-    fn new(grid: &Grid<D>, bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32) -> Self {
+    fn new(grid: &Grid<D>, bonds: &dyn BodyGeometry<D>, bonded: &[u32], whole: u32) -> Self {
         let mut local = Field::zeros(bonds.sites());
         let cells: usize = grid.cells.iter().product();
         let mut members = Vec::with_capacity(bonds.particles().len());
@@ -155,7 +155,13 @@ struct Split {
 impl<const D: usize> Space<D> {
     /// Cells of about `edge`, larger ones if there would be more than `most` functions; `None` where even that does not help.
     /// `bonded` has the number of bonds of each site, `whole` that from which on nothing is missing around a particle.
-    pub fn new(bonds: &dyn Bonds<D>, bonded: &[u32], whole: u32, edge: f64, most: usize) -> Option<Self> {
+    pub fn new(
+        bonds: &dyn BodyGeometry<D>,
+        bonded: &[u32],
+        whole: u32,
+        edge: f64,
+        most: usize,
+    ) -> Option<Self> {
         let mut edge = edge;
         for _ in 0..24 {
             let grid = Grid::new(bonds, edge);
@@ -182,7 +188,7 @@ impl<const D: usize> Space<D> {
         None
     }
 
-    fn on(grid: &Grid<D>, filled: Filled<D>, bonds: &dyn Bonds<D>) -> Self {
+    fn on(grid: &Grid<D>, filled: Filled<D>, bonds: &dyn BodyGeometry<D>) -> Self {
         let (sites, cells) = (bonds.sites(), filled.is_whole.len());
         // what hangs together around each node
         let nodes: usize = grid.node_counts().iter().product();
@@ -284,7 +290,11 @@ impl<const D: usize> Space<D> {
 
 /// The parts of a window that hang together by bonds within it, numbered by their first site; `None` for one part.
 /// `place` holds [`NONE`] for every site, before and after.
-fn split<const D: usize>(bonds: &dyn Bonds<D>, mut window: Vec<u32>, place: &mut [u32]) -> Option<Split> {
+fn split<const D: usize>(
+    bonds: &dyn BodyGeometry<D>,
+    mut window: Vec<u32>,
+    place: &mut [u32],
+) -> Option<Split> {
     window.sort_unstable();
     for (index, &site) in window.iter().enumerate() {
         place[site as usize] = index as u32;

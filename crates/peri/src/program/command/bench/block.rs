@@ -6,7 +6,7 @@
 
 use super::RATIO;
 use crate::Error;
-use crate::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection, force};
+use crate::bonds::{BodyGeometry, BondDamage, BondForces, Lattice, LatticeBonds, VolumeCorrection, force};
 use crate::calibrate::{Space, modulus, poisson_ratio};
 use crate::field::{Field, chunk_range};
 use crate::potential::{KernelFit, Law};
@@ -138,7 +138,7 @@ impl Block {
                 .set(site as usize, initial_displacement(position, options.strain, cells as f64 * SPACING));
         }
         let mut block = Self { bonds, displacement, velocity: zero.clone(), force: zero };
-        block.bonds.round(&block.displacement);
+        block.bonds.prepare(&block.displacement);
         force(&block.bonds, &block.displacement, &mut block.force);
         Ok(block)
     }
@@ -156,7 +156,7 @@ impl Block {
                 }
             }
         });
-        self.bonds.round(&self.displacement);
+        self.bonds.prepare(&self.displacement);
         force(&self.bonds, &self.displacement, &mut self.force);
         let forces = self.force.components();
         self.velocity.chunks_mut().into_par_iter().enumerate().for_each(|(chunk, v)| {

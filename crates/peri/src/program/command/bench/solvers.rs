@@ -5,7 +5,7 @@
 
 use super::RATIO;
 use crate::Error;
-use crate::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use crate::bonds::{BodyGeometry, LatticeBonds, VolumeCorrection};
 use crate::calibrate::{Space, modulus};
 use crate::geometry::{Operation, Shape, lattice};
 use crate::material::BondMaterial;
@@ -61,8 +61,8 @@ pub fn measure(spacings: &[f64]) -> Result<Vec<Measurement>, Error> {
                     });
                 };
                 row("error", plate.apart(&state, &exact), "");
-                row("force evaluations", state.evaluations as f64, "");
-                row("bond evaluations", state.bond_evaluations as f64, "");
+                row("force evaluations", state.counts.evaluations as f64, "");
+                row("bond evaluations", state.counts.bond_evaluations as f64, "");
                 row("time", seconds, "s");
             }
         }
