@@ -111,8 +111,11 @@ impl Shape {
 
     /// The node on the middle of the edge between two corners; `None` of a first-order element or no edge.
     pub fn middle(self, a: usize, b: usize) -> Option<usize> {
+        if !self.is_second_order() {
+            return None;
+        }
         let edge = self.edges().iter().position(|&[p, q]| (p, q) == (a, b) || (q, p) == (a, b))?;
-        self.is_second_order().then_some(self.corners() + edge)
+        Some(self.corners() + edge)
     }
 
     /// Name of its solid element in Abaqus and CalculiX.

@@ -6,6 +6,7 @@ mod step;
 use crate::error::Error;
 pub use crate::fields::Statistics;
 use crate::ledger::{Ledger, Record};
+use crate::mesh::box_around;
 use crate::problem::Problem;
 use crate::solver::Task;
 pub use crate::solver::{Choice, LinearSolver, Method};
@@ -128,10 +129,7 @@ impl Simulation {
     /// # Errors
     /// Those of [`Problem::check`] and of the materials.
     pub fn new(problem: impl Into<Arc<Problem>>, settings: Settings) -> Result<Self, Error> {
-        Self::begin(problem.into(), settings)
-    }
-
-    fn begin(problem: Arc<Problem>, settings: Settings) -> Result<Self, Error> {
+        let problem = problem.into();
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
         let mut state = State { born: vec![0; problem.material_of.len()], jump: true, ..State::default() };
         let later = problem.births.iter().flat_map(|birth| &birth.elements);
@@ -166,10 +164,7 @@ impl Simulation {
     /// # Errors
     /// As [`Self::new`]; [`Error::Mesh`] where the state does not belong to the problem.
     pub fn resume(problem: impl Into<Arc<Problem>>, settings: Settings, state: State) -> Result<Self, Error> {
-        Self::go_on(problem.into(), settings, state)
-    }
-
-    fn go_on(problem: Arc<Problem>, settings: Settings, state: State) -> Result<Self, Error> {
+        let problem = problem.into();
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
         if state.born.len() != problem.material_of.len() {
             return Err(Error::Mesh(format!(
@@ -349,13 +344,8 @@ impl Simulation {
         // A_ii of backward Euler over the capacity
         let capacity = |k: usize| self.system.capacity[k];
         let size = self.system.size();
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for &node in self.system.nodes() {
-            let point = self.problem.mesh.points[node as usize];
-            for d in 0..3 {
-                (low[d], high[d]) = (low[d].min(point[d]), high[d].max(point[d]));
-            }
-        }
+        let places = self.system.nodes().iter().map(|&node| self.problem.mesh.points[node as usize]);
+        let [low, high] = box_around(places).unwrap_or_default();
         let extent = [0, 1, 2].map(|d| (high[d] - low[d]).max(0.0));
         let longest = extent.into_iter().fold(0.0, f64::max);
         let spacing = (extent.iter().product::<f64>() / size as f64).cbrt().max(1e-6 * longest);

@@ -3,6 +3,16 @@
 use super::Mesh;
 use crate::element::{Geometry, MOST, WIDE, WIDE_POINTS};
 
+/// Lower and upper corner of the box around places, m; `None` of none.
+pub fn box_around(places: impl Iterator<Item = [f64; 3]>) -> Option<[[f64; 3]; 2]> {
+    places.map(|place| [place; 2]).reduce(|[mut lower, mut upper], [place, _]| {
+        for d in 0..3 {
+            (lower[d], upper[d]) = (lower[d].min(place[d]), upper[d].max(place[d]));
+        }
+        [lower, upper]
+    })
+}
+
 impl Mesh {
     /// Positions of the nodes of an element, m, and their number; 0 beyond them.
     pub(crate) fn positions<const N: usize>(&self, element: u32) -> ([[f64; 3]; N], usize) {

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::crossing;
 use crate::error::Error;
+use crate::mesh::box_around;
 use nalgebra::Vector3;
 
 /// By how much a point that tells where a shell is lies inside its box, in parts of it: not on another shell's edges.
@@ -276,10 +277,5 @@ fn extremes(shell: &Shell, points: &[[f64; 3]], triangles: &[[u32; 3]]) -> [[f64
 
 /// Box around points.
 pub(super) fn bounds<'a>(points: impl Iterator<Item = &'a [f64; 3]>) -> [[f64; 3]; 2] {
-    points.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[mut low, mut high], point| {
-        for d in 0..3 {
-            (low[d], high[d]) = (low[d].min(point[d]), high[d].max(point[d]));
-        }
-        [low, high]
-    })
+    box_around(points.copied()).unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]])
 }
