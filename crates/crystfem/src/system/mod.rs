@@ -117,7 +117,7 @@ pub struct Memory {
 
 /// Where and when a system is evaluated.
 #[derive(Clone, Copy)]
-pub struct At<'a> {
+pub struct StepInput<'a> {
     /// Temperatures of the nodes that exist, K.
     pub temperature: &'a [f64],
     /// Temperatures at the start of the increment, K.
@@ -232,7 +232,7 @@ impl System {
     pub fn evaluate(
         &mut self,
         problem: &Problem,
-        at: &At,
+        at: &StepInput,
         old: &Memory,
         out: &mut Evaluation,
     ) -> Result<(), Error> {

@@ -7,7 +7,8 @@ use harness::report::Report;
 
 /// The scalars of the end, with the displacements of the probes that are in the part.
 pub fn record(stress: &StressCoupling, probes: &[Probe], report: &mut Report) {
-    let (largest, printed, audit) = (stress.largest_mises(), stress.mises_on_bed(), stress.audit());
+    let (largest, printed, balance) =
+        (stress.largest_mises(), stress.mises_on_bed(), stress.energy_balance());
     let strength = stress.settings().law.strength;
     report.value(q::WARPAGE, stress.warpage());
     report.value(q::MISES_ON_BED, printed);
@@ -16,11 +17,11 @@ pub fn record(stress: &StressCoupling, probes: &[Probe], report: &mut Report) {
         report.value(q::MISES_OVER_STRENGTH, printed.max(largest) / strength);
     }
     report.value(q::LARGEST_ROTATION, stress.largest_rotation());
-    report.value(q::STRESS_WORK, audit.energies.work);
-    report.value(q::STRESS_STORED, audit.energies.stored);
-    report.value(q::STRESS_LOST, audit.energies.lost());
-    report.value(q::STRESS_HARDENING, audit.energies.softening);
-    report.value(q::WORST_STRESS_BALANCE, audit.worst);
+    report.value(q::STRESS_WORK, balance.energies.work);
+    report.value(q::STRESS_STORED, balance.energies.stored);
+    report.value(q::STRESS_LOST, balance.energies.lost());
+    report.value(q::STRESS_HARDENING, balance.energies.softening);
+    report.value(q::WORST_STRESS_BALANCE, balance.worst);
     let moved = stress.displacement();
     for probe in probes {
         for (d, axis) in ["x", "y", "z"].into_iter().enumerate() {
