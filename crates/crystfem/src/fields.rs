@@ -45,15 +45,7 @@ impl Statistics {
 impl Simulation {
     /// Names of the quantities that materials show, each once, in the order of the materials.
     pub fn field_names(&self) -> Vec<&'static str> {
-        let mut names = Vec::new();
-        for material in &self.problem.materials {
-            for name in material.field_names() {
-                if !names.contains(name) {
-                    names.push(*name);
-                }
-            }
-        }
-        names
+        self.problem.field_names()
     }
 
     /// A quantity of a material at one of its points; `None` where the material does not have it.

@@ -55,6 +55,17 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// Names of the quantities that materials show, each once, in the order of the materials.
+    pub fn field_names(&self) -> Vec<&'static str> {
+        let mut names = Vec::new();
+        for name in self.materials.iter().flat_map(|material| material.field_names()) {
+            if !names.contains(name) {
+                names.push(*name);
+            }
+        }
+        names
+    }
+
     /// One material everywhere, one initial temperature, nothing acting on it.
     pub fn new(mesh: Mesh, material: Arc<dyn ThermalMaterial>, temperature: f64) -> Self {
         let elements = mesh.element_count();

@@ -1,10 +1,10 @@
 //! Fits of measurements: constants with their intervals, tables, pictures.
 
 use super::Failure;
-use super::celsius::{CELSIUS, of_kelvin};
 use super::{fit_part, heat_flow};
 use crate::error::Error;
 use crate::fit::{Fit, Known, MeasuredPeak, avrami, nakamura, ozawa};
+use crate::program::observe::celsius::{CELSIUS, of_kelvin};
 use crate::program::quantities as q;
 use crate::program::scene::{FitLaw, FitScene, FitSpec, Job};
 use harness::case::Finished;

@@ -1,7 +1,7 @@
 //! Peaks of heat flows: enthalpies, tables, pictures.
 
-use super::celsius::of_kelvin;
 use crate::fit::MeasuredPeak;
+use crate::program::observe::celsius::of_kelvin;
 use crate::program::quantities as q;
 use crate::program::scene::FitSpec;
 use harness::output::csv;

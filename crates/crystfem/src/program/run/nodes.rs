@@ -1,9 +1,9 @@
 //! Crystallinity at the nodes of a thermal analysis that another program made.
 
-use super::celsius::CELSIUS;
 use crate::error::Error;
 use crate::material::ThermalMaterial;
 use crate::point::MaterialPoint;
+use crate::program::observe::celsius::CELSIUS;
 use crate::program::quantities as q;
 use crate::program::scene::NodesSpec;
 use crate::program::thermal;
