@@ -23,7 +23,7 @@ struct Part {
     material: u16,
     /// ρV, kg.
     mass: f64,
-    /// What it has, K.
+    /// Temperature, K.
     temperature: f64,
     /// U there, J/kg.
     energy: f64,
@@ -243,11 +243,11 @@ impl Simulation {
     }
 }
 
-/// What meets at a node.
+/// Materials that meet at a node.
 struct Mixture<'a> {
     /// ΣρcV of old linear material, J/K.
     capacity: f64,
-    /// Its temperature, K.
+    /// Temperature, K.
     temperature: f64,
     existed: bool,
     sum: &'a Sum,

@@ -78,7 +78,7 @@ pub struct State {
     pub time: f64,
     /// Temperature of each equation, K.
     pub temperature: Vec<f64>,
-    /// Its rate of change over the last step, K/s; empty after a jump.
+    /// Rate of change over the last step, K/s; empty after a jump.
     pub slope: Vec<f64>,
     /// Q of each equation, W; empty if not known.
     pub rate: Vec<f64>,
@@ -209,12 +209,12 @@ impl Simulation {
         Ok((behaviours, problem.breaks()))
     }
 
-    /// What is solved.
+    /// Returns the problem.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
 
-    /// Where it stands: serialise it to continue later with the same bits.
+    /// Returns the state; serialise it to continue later with the same bits.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -224,12 +224,12 @@ impl Simulation {
         self.state.time
     }
 
-    /// Whether a node of the mesh exists.
+    /// Returns whether a node of the mesh exists.
     pub fn exists(&self, node: u32) -> bool {
         self.system.equation.get(node as usize).is_some_and(|&equation| equation != NONE)
     }
 
-    /// Whether an element exists.
+    /// Returns whether an element exists.
     pub fn is_born(&self, element: u32) -> bool {
         self.state.born.get(element as usize).is_some_and(|&birth| birth != NONE)
     }

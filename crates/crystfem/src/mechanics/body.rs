@@ -23,11 +23,11 @@ pub struct Body<'a> {
     shape: Vec<u32>,
     /// Residual over the load at which a solution ends.
     pub tolerance: f64,
-    /// What changes.
+    /// State.
     pub state: BodyState,
 }
 
-/// What a body needs to continue, bit by bit.
+/// State of a body, to continue bit by bit.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct BodyState {
     /// Elastic strains of the branches at each Gauss point (0 beyond those of the element), element by element; empty before birth.
@@ -49,7 +49,7 @@ pub struct BodyState {
 pub struct EnergyBalance {
     /// Of all branches of all elements.
     pub energies: Energies,
-    /// What the melt's floor took, which forgets it.
+    /// Energy dissipated by the minimum stiffness of the melt.
     pub floor: f64,
     /// Largest |[`Energies::closure`]| of a step over the energies that it moved and those stored.
     pub worst: f64,

@@ -77,13 +77,13 @@ pub struct FaceNodes {
 }
 
 impl FaceNodes {
-    /// Its corners.
+    /// Corners.
     pub fn corners(&self) -> &[u32] {
         let count = if self.count > 4 { self.count / 2 } else { self.count };
         &self.nodes[..usize::from(count)]
     }
 
-    /// Its corners, sorted, the rest [`u32::MAX`]: the same from either side.
+    /// Sorted corners, the rest [`u32::MAX`]: the same from either side.
     pub(crate) fn key(&self) -> [u32; 4] {
         let corners = self.corners();
         let mut key = [u32::MAX; 4];
@@ -130,7 +130,7 @@ impl Mesh {
         }
     }
 
-    /// Whether some element is of second order.
+    /// Returns whether some element is of second order.
     pub fn is_second_order(&self) -> bool {
         self.others.iter().any(|cell| cell.shape.is_second_order())
     }

@@ -48,7 +48,7 @@ pub struct Behaviour {
 }
 
 impl Behaviour {
-    /// Whether it has points at nodes.
+    /// Returns whether it has points at nodes.
     pub fn nodal(&self) -> bool {
         self.conductivity.is_some() && (self.capacity.is_none() || self.states > 0)
     }
@@ -203,12 +203,12 @@ impl System {
         &self.plan.numbering.nodes[..self.size()]
     }
 
-    /// Whether no Newton iteration is needed.
+    /// Returns whether no Newton iteration is needed.
     pub fn is_linear(&self) -> bool {
         !self.nodal.coupled && self.general.is_empty() && !self.surfaces.radiates()
     }
 
-    /// Whether the tangent is symmetric.
+    /// Returns whether the tangent is symmetric.
     pub fn is_symmetric(&self) -> bool {
         !self.general.potential
     }

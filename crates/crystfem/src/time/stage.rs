@@ -22,7 +22,7 @@ const MOST_SHIFTS: usize = 3;
 /// Share of the heat moved that the sum of all residuals may be; the audit promises 1e-10.
 const BALANCED: f64 = 2e-11;
 
-/// What a stage solves.
+/// Equation of a stage.
 #[derive(Clone, Copy)]
 pub struct Stage<'a> {
     /// Factor of Q, s.
@@ -362,7 +362,7 @@ impl Stages {
         Ok(())
     }
 
-    /// Whether the free nodes' residuals add up to nothing.
+    /// Returns whether the free nodes' residuals add up to nothing.
     fn balanced(&self, system: &System, weight: f64) -> bool {
         let size = system.size();
         let total = dot(&system.free, &self.residual);

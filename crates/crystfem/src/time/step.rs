@@ -28,7 +28,7 @@ pub struct Start<'a> {
     pub memory: &'a Memory,
 }
 
-/// What a step came to.
+/// Result of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Attempt {
     /// Largest temporal error of a node, K; `None` if not requested.
