@@ -11,6 +11,8 @@ use crate::shape::Shape;
 pub use face::FaceGeometry;
 use nalgebra::Matrix3;
 use natural::Rule;
+use polycore::numerics::hexahedron;
+pub use polycore::numerics::hexahedron::CORNERS;
 
 /// Nodes of a first-order element at most, and its integration points.
 pub const MOST: usize = 8;
@@ -18,18 +20,6 @@ pub const MOST: usize = 8;
 pub const WIDE: usize = 20;
 /// Integration points of any element at most.
 pub const WIDE_POINTS: usize = 27;
-
-/// Corners of a hexahedron in natural coordinates, in the order of Abaqus and VTK.
-pub const CORNERS: [[f64; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-];
 
 /// 1/√3: the abscissa of the two-point Gauss rule.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
@@ -75,14 +65,11 @@ pub fn shapes<const N: usize, const P: usize>(nodes: usize) -> [[f64; N]; P] {
         return shapes;
     }
     for point in 0..nodes {
-        for node in 0..nodes {
-            shapes[point][node] = if nodes == 8 {
-                (0..3).map(|d| 0.5 * (1.0 + GAUSS * CORNERS[point][d] * CORNERS[node][d])).product()
-            } else if point == node {
-                NEAR
-            } else {
-                FAR
-            };
+        if nodes == 8 {
+            shapes[point][..8].copy_from_slice(&hexahedron::shapes(gauss(point)));
+        } else {
+            shapes[point][..nodes].fill(FAR);
+            shapes[point][point] = NEAR;
         }
     }
     shapes
@@ -207,17 +194,14 @@ impl<const N: usize, const P: usize> Geometry<N, P> {
     }
 }
 
+fn gauss(point: usize) -> [f64; 3] {
+    CORNERS[point].map(|sign| GAUSS * sign)
+}
+
 /// ∂N/∂ξ of each node of an 8-node hexahedron or a 4-node tetrahedron at an integration point.
 fn natural_gradients(nodes: usize, point: usize, gradients: &mut [[f64; 3]]) {
     if nodes == 8 {
-        for (gradient, corner) in gradients.iter_mut().zip(&CORNERS) {
-            let factor = |d: usize| 0.5 * (1.0 + GAUSS * CORNERS[point][d] * corner[d]);
-            *gradient = [
-                0.5 * corner[0] * factor(1) * factor(2),
-                0.5 * corner[1] * factor(0) * factor(2),
-                0.5 * corner[2] * factor(0) * factor(1),
-            ];
-        }
+        gradients[..8].copy_from_slice(&hexahedron::slopes(gauss(point)));
     } else {
         gradients[..4].copy_from_slice(&[[-1.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
     }

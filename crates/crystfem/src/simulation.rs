@@ -6,13 +6,13 @@ mod step;
 use crate::error::Error;
 pub use crate::fields::Statistics;
 use crate::ledger::{Ledger, Record};
-use crate::mesh::box_around;
 use crate::problem::Problem;
 use crate::solver::Task;
 pub use crate::solver::{Choice, LinearSolver, Method};
 use crate::system::{Behaviour, Exchange, NONE, System};
 pub use crate::system::{Memory, Points};
 use crate::time::{Scheme, Start, Stepper, Steps, Work};
+use polycore::numerics::bounds;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -344,8 +344,8 @@ impl Simulation {
         // A_ii of backward Euler over the capacity
         let capacity = |k: usize| self.system.capacity[k];
         let size = self.system.size();
-        let places = self.system.nodes().iter().map(|&node| self.problem.mesh.points[node as usize]);
-        let [low, high] = box_around(places).unwrap_or_default();
+        let [low, high] =
+            bounds(self.system.nodes().iter().map(|&node| self.problem.mesh.points[node as usize]));
         let extent = [0, 1, 2].map(|d| (high[d] - low[d]).max(0.0));
         let longest = extent.into_iter().fold(0.0, f64::max);
         let spacing = (extent.iter().product::<f64>() / size as f64).cbrt().max(1e-6 * longest);

@@ -11,6 +11,7 @@ use crate::calibrate::Space;
 use crate::error::Error;
 use crate::potential::{BondPotential, NetworkStretch, softened_energy};
 use crate::solver::Bilinear;
+use polycore::numerics::{bisect, bisected};
 use polycore::units::{EnergyPerArea, Stress};
 use serde::Deserialize;
 use std::f64::consts::PI;
@@ -148,11 +149,8 @@ pub fn bilinear<const D: usize>(
     if wanted.is_nan() || wanted < brittle {
         return Err(fracture_energy / (brittle * reach));
     }
-    let (mut low, mut high) = (1.0, wanted / calibration(8.0));
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if middle * calibration(middle) < wanted { low = middle } else { high = middle }
-    }
+    let most = wanted / calibration(8.0);
+    let [_, high] = bisect(1.0, most, 100, |ductility| ductility * calibration(ductility) < wanted);
     Ok(Bilinear { onset, limit: high * onset })
 }
 
@@ -279,11 +277,7 @@ fn stretch_of_energy(context: &Context, convention: Convention, energy: f64) -> 
             return fault("smaller: no bond stretch stores it");
         }
     }
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if of(middle) < energy { low = middle } else { high = middle }
-    }
-    Ok(0.5 * (low + high))
+    Ok(bisected(low, high, 200, |stretch| of(stretch) < energy))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 use super::element::Wide;
 use crate::system::vector::sum;
 use nalgebra::{Matrix3, Vector3};
+use polycore::numerics::Groups;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -27,9 +28,8 @@ pub struct Elements<'a> {
     hexahedra: Vec<Stiff<'a, 8>>,
     first: Vec<Stiff<'a, 4>>,
     second: Vec<Stiff<'a, 10>>,
-    /// Start of the places in `forces` of each node.
-    starts: Vec<u32>,
-    corners: Vec<u32>,
+    /// Places in `forces` of each node.
+    corners: Groups<u32>,
     free: Vec<[bool; 3]>,
     /// Forces on all nodes of all elements.
     forces: Vec<f64>,
@@ -52,19 +52,10 @@ impl<'a> Elements<'a> {
                 first.push((nodes.map(|node| number[node as usize]), stiffness, modulus));
             }
         }
-        let starts = vec![0_u32; free.len() + 1];
-        let mut own =
-            Self { hexahedra, first, second, starts, corners: Vec::new(), free, forces: Vec::new() };
+        let corners = Groups::new(0, std::iter::empty());
+        let mut own = Self { hexahedra, first, second, corners, free, forces: Vec::new() };
         let nodes: Vec<u32> = own.each().flat_map(|element| element.0).copied().collect();
-        nodes.iter().for_each(|&node| own.starts[node as usize + 1] += 1);
-        (0..own.free.len()).for_each(|k| own.starts[k + 1] += own.starts[k]);
-        let mut next = own.starts.clone();
-        own.corners = vec![0; nodes.len()];
-        for (corner, node) in (0..).zip(&nodes) {
-            let next = &mut next[*node as usize];
-            own.corners[*next as usize] = corner;
-            *next += 1;
-        }
+        own.corners = Groups::new(own.free.len(), nodes.iter().map(|&node| node as usize).zip(0..));
         own.forces = vec![0.0; 3 * nodes.len()];
         own
     }
@@ -85,7 +76,7 @@ impl<'a> Elements<'a> {
 
     /// image = Σ E K̂ u on free components.
     pub fn product(&mut self, u: &[Vector3<f64>], image: &mut [Vector3<f64>]) {
-        let Self { hexahedra, first, second, starts, corners, free, forces } = self;
+        let Self { hexahedra, first, second, corners, free, forces } = self;
         let arch = Arch::new();
         let (of_hexahedra, rest) = forces.split_at_mut(COMPONENTS * hexahedra.len());
         let (of_first, of_second) = rest.split_at_mut(12 * first.len());
@@ -99,7 +90,7 @@ impl<'a> Elements<'a> {
         image.par_chunks_mut(ITEM).enumerate().for_each(|(item, image)| {
             for (k, image) in (item * ITEM..).zip(image) {
                 let mut sum = [0.0; 3];
-                for &corner in &corners[starts[k] as usize..starts[k + 1] as usize] {
+                for &corner in corners.of(k) {
                     let force = &forces[3 * corner as usize..][..3];
                     (0..3).for_each(|d| sum[d] += force[d]);
                 }

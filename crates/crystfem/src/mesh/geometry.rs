@@ -2,15 +2,12 @@
 
 use super::Mesh;
 use crate::element::{Geometry, MOST, WIDE, WIDE_POINTS};
+use polycore::numerics::bounds;
 
 /// Lower and upper corner of the box around places, m; `None` of none.
 pub fn box_around(places: impl Iterator<Item = [f64; 3]>) -> Option<[[f64; 3]; 2]> {
-    places.map(|place| [place; 2]).reduce(|[mut lower, mut upper], [place, _]| {
-        for d in 0..3 {
-            (lower[d], upper[d]) = (lower[d].min(place[d]), upper[d].max(place[d]));
-        }
-        [lower, upper]
-    })
+    let [lower, upper] = bounds(places);
+    (lower[0] <= upper[0]).then_some([lower, upper])
 }
 
 impl Mesh {

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::mesh::Mesh;
+use polycore::numerics::range;
 
 /// Elements by layers, in the order of printing.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,8 +130,7 @@ impl Layers {
     pub fn from_height(mesh: &Mesh, elements: &[u32], height: f64) -> Result<Self, Error> {
         let nodes = elements.iter().flat_map(|element| mesh.nodes(*element));
         let heights = nodes.map(|node| mesh.points[*node as usize][2]);
-        let (low, high) =
-            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
+        let [low, high] = range(heights);
         // a last layer of less than a millionth is rounding
         let count = ((high - low) / height - 1e-6).ceil();
         if !(height > 0.0 && count >= 1.0 && count <= elements.len() as f64) {

@@ -1,10 +1,11 @@
 //! Location of places in a mesh, for values between nodes.
 
 use super::Mesh;
+use crate::element::WIDE;
 use crate::element::natural::{self, Natural};
-use crate::element::{CORNERS, WIDE};
 use crate::mesh::Shape;
 use nalgebra::{Matrix3, Vector3};
+use polycore::numerics::hexahedron;
 
 /// Natural coordinates, and distances over an element's diagonal, that count as none: a place on a node has its value.
 const NEAR: f64 = 1e-9;
@@ -160,9 +161,7 @@ fn of_hexahedron(natural: Vector3<f64>) -> [f64; WIDE] {
     // exact at the ends: a node has the weight 1, and those across a face have 0
     let natural = natural.map(|x| if x.abs() > 1.0 - NEAR { x.signum() } else { x });
     let mut weights = [0.0; WIDE];
-    for (weight, corner) in weights.iter_mut().zip(CORNERS) {
-        *weight = (0..3).map(|d| 0.5 * (1.0 + natural[d] * corner[d])).product();
-    }
+    weights[..8].copy_from_slice(&hexahedron::shapes(natural.into()));
     weights
 }
 
@@ -214,15 +213,10 @@ fn in_hexahedron(corners: &[[f64; 3]], at: [f64; 3]) -> [f64; WIDE] {
     let mut natural = Vector3::<f64>::zeros();
     for _ in 0..MOST_ITERATIONS {
         let (mut left, mut jacobian) = (offset(at), Matrix3::<f64>::zeros());
-        for (corner, signs) in corners.iter().zip(&CORNERS) {
-            let factor = [0, 1, 2].map(|d| 0.5 * (1.0 + natural[d] * signs[d]));
-            left -= factor.iter().product::<f64>() * offset(*corner);
-            let gradient = Vector3::new(
-                0.5 * signs[0] * factor[1] * factor[2],
-                0.5 * signs[1] * factor[0] * factor[2],
-                0.5 * signs[2] * factor[0] * factor[1],
-            );
-            jacobian += offset(*corner) * gradient.transpose();
+        let (shapes, slopes) = (hexahedron::shapes(natural.into()), hexahedron::slopes(natural.into()));
+        for ((corner, shape), slope) in corners.iter().zip(shapes).zip(slopes) {
+            left -= shape * offset(*corner);
+            jacobian += offset(*corner) * Vector3::from(slope).transpose();
         }
         let Some(step) = jacobian.try_inverse().map(|inverse| inverse * left) else { break };
         // far outside of a distorted element the map folds: no further than a neighbour's far side

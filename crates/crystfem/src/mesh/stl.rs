@@ -97,7 +97,7 @@ pub fn parse(path: &Path, bytes: &[u8], scale: f64) -> Result<Stl, Error> {
 impl Stl {
     /// Box around it, m.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
-        shells::bounds(self.triangles.iter().flatten().map(|n| &self.points[*n as usize]))
+        polycore::numerics::bounds(self.triangles.iter().flatten().map(|n| self.points[*n as usize]))
     }
 
     /// Cells along each axis of the grid around it, before any of them is made.

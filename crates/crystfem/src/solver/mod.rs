@@ -89,10 +89,10 @@ impl Iterative {
         goal: &Goal,
     ) -> Ended {
         let Self { conjugate, biconjugate, multigrid } = self;
-        match &mut multigrid.value {
-            _ if !symmetric => biconjugate.solve(operator, inverse, residual, solution, goal),
-            Some(levels) => conjugate.solve_with(levels, operator, inverse, residual, solution, goal),
-            None => conjugate.solve(operator, inverse, residual, solution, goal),
+        if symmetric {
+            conjugate.solve(multigrid.value.as_mut(), operator, inverse, residual, solution, goal)
+        } else {
+            biconjugate.solve(operator, inverse, residual, solution, goal)
         }
     }
 }

@@ -10,6 +10,7 @@ mod product;
 mod stencils;
 
 use super::vector::{CHUNK, items};
+use polycore::numerics::ordered_sum;
 use product::{Both, Product};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -442,8 +443,7 @@ impl Rows {
         y: &mut [f64],
     ) -> f64 {
         let part = |(item, y): (usize, &mut [f64])| self.part::<FLOW>(item, diagonal, weights, x, y);
-        let parts: Vec<f64> = y.par_chunks_mut(CHUNK).enumerate().map(part).collect();
-        parts.iter().sum()
+        ordered_sum(y.par_chunks_mut(CHUNK).enumerate().map(part))
     }
 
     /// [`Self::product`], or the flow, of the rows of one work item, `y`.

@@ -1,5 +1,6 @@
 //! Particles as cells: deformed cells of a lattice that come apart at cracks, or a block for each particle of a cloud.
 
+use polycore::numerics::Sets;
 use rayon::prelude::*;
 
 use super::solid::{HEXAHEDRON, QUADRILATERAL, Solid};
@@ -31,10 +32,7 @@ pub struct Choice {
 impl Choice {
     /// The particles that are drawn: all, or every k-th along each axis of a large body; `coarser` drops more.
     pub fn of(reference: &[[f64; 3]], coarser: usize) -> Self {
-        let extent: [[f64; 2]; 3] = [0, 1, 2].map(|d| {
-            let low = reference.iter().fold(f64::INFINITY, |low, x| low.min(x[d]));
-            [low, reference.iter().fold(f64::NEG_INFINITY, |high, x| high.max(x[d]))]
-        });
+        let extent = [0, 1, 2].map(|d| polycore::numerics::range(reference.iter().map(|x| x[d])));
         let longest = extent.iter().map(|[low, high]| high - low).fold(f64::MIN_POSITIVE, f64::max);
         let flat = extent.map(|[low, high]| high - low <= 1e-9 * longest);
         let plane = flat[2];
@@ -138,7 +136,7 @@ impl Choice {
     /// in VTK's order.
     fn corners(&self, joined: &[Sides]) -> (Vec<(u32, u8)>, Vec<u32>) {
         let count = if self.plane { 4 } else { 8 };
-        let mut parent: Vec<u32> = (0..(joined.len() * count) as u32).collect();
+        let mut sets = Sets::new(joined.len() * count);
         for (particle, beside) in joined.iter().enumerate() {
             for axis in 0..3 {
                 let other = beside[2 * axis + 1];
@@ -146,18 +144,17 @@ impl Choice {
                     continue;
                 }
                 for corner in (0..count).filter(|corner| corner >> axis & 1 == 1) {
-                    let a = root(&mut parent, (particle * count + corner) as u32);
-                    let b = root(&mut parent, (other as usize * count + (corner ^ (1 << axis))) as u32);
-                    parent[a.max(b) as usize] = a.min(b);
+                    let there = other as usize * count + (corner ^ (1 << axis));
+                    sets.join((particle * count + corner) as u32, there as u32);
                 }
             }
         }
         let order: &[usize] = if self.plane { &[0, 1, 3, 2] } else { &[0, 1, 3, 2, 4, 5, 7, 6] };
-        let mut number = vec![u32::MAX; parent.len()];
-        let (mut owners, mut corners) = (Vec::new(), Vec::with_capacity(parent.len()));
+        let mut number = vec![u32::MAX; joined.len() * count];
+        let (mut owners, mut corners) = (Vec::new(), Vec::with_capacity(number.len()));
         for particle in 0..joined.len() {
             for corner in order {
-                let root = root(&mut parent, (particle * count + corner) as u32) as usize;
+                let root = sets.root((particle * count + corner) as u32) as usize;
                 if number[root] == u32::MAX {
                     number[root] = owners.len() as u32;
                     owners.push(((root / count) as u32, (root % count) as u8));
@@ -167,14 +164,6 @@ impl Choice {
         }
         (owners, corners)
     }
-}
-
-fn root(parent: &mut [u32], mut node: u32) -> u32 {
-    while parent[node as usize] != node {
-        parent[node as usize] = parent[parent[node as usize] as usize];
-        node = parent[node as usize];
-    }
-    node
 }
 
 /// The smallest distance of planes of points along an axis; closer ones than `same` are one.

@@ -8,6 +8,7 @@ use crate::field::{CHUNK, Field};
 use crate::potential::{
     BondPotential, EnergyTable, KernelFit, StretchRange, TangentTable, integrity, softened_energy,
 };
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -209,8 +210,7 @@ impl<const D: usize> Response<D> for Kernels<'_> {
             }
             sum
         };
-        let parts: Vec<f64> = bonds.particles().par_chunks(CHUNK).map(of).collect();
-        modulus * parts.iter().sum::<f64>() + lacking.unwrap_or(0.0)
+        modulus * ordered_sum(bonds.particles().par_chunks(CHUNK).map(of)) + lacking.unwrap_or(0.0)
     }
 
     /// Half of a bond's energy 2kθ|ξ|φ w V_I V_J from either end. Beyond what is fitted q is constant: the energy grows with half

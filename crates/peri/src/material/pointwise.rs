@@ -5,6 +5,7 @@ use crate::bonds::{Bonds, Overstretched, Property, Seen, overstretched};
 use crate::error::Error;
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::{BondPotential, LinearBond, StretchRange};
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
 /// Both passes of a material over a whole body, for one that has something faster than plain loops over bonds. The states and
@@ -188,8 +189,7 @@ impl<M: Material<D>, const D: usize> Response<D> for Pointwise<M, D> {
             });
             each.sum::<f64>()
         };
-        let parts: Vec<f64> = bonds.particles().par_chunks(CHUNK).map(of).collect();
-        parts.iter().sum()
+        ordered_sum(bonds.particles().par_chunks(CHUNK).map(of))
     }
 
     fn released(&self, _bonds: &dyn Bonds<D>, _list: &[Overstretched], _most: f64) -> Option<f64> {

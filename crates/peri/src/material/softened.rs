@@ -4,6 +4,7 @@ use super::{Bond, BondMaterial};
 use crate::bonds::{Bonds, Property};
 use crate::field::{CHUNK, Field, chunk_range};
 use crate::potential::{EnergyTable, KernelFit, integrity, onset, softened_energy};
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
 /// The soft bonds of a displacement, by work items: site, and force density that its bonds lack, N/m³ (to be added).
@@ -91,6 +92,5 @@ pub(super) fn lacking_energy<const D: usize>(
         });
         sum
     };
-    let parts: Vec<f64> = (0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(of).collect();
-    parts.iter().sum()
+    ordered_sum((0..bonds.sites().div_ceil(CHUNK)).into_par_iter().map(of))
 }

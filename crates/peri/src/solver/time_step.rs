@@ -4,6 +4,7 @@
 use super::state::State;
 use super::system::System;
 use crate::field::{CHUNK, Field, chunk_range};
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
 /// Displacement, in shortest bonds, by which the tangent's force differences are taken: truncation and rounding are both
@@ -189,8 +190,7 @@ fn product_of<const D: usize>(a: &Field<D>, b: &Field<D>, volumes: &[f64]) -> f6
         };
         (0..D).map(of_axis).sum()
     };
-    let parts: Vec<f64> = (0..sites.div_ceil(CHUNK)).into_par_iter().map(of).collect();
-    parts.iter().sum()
+    ordered_sum((0..sites.div_ceil(CHUNK)).into_par_iter().map(of))
 }
 
 fn scale<const D: usize>(field: &mut Field<D>, factor: f64) {

@@ -8,6 +8,7 @@ use super::state::State;
 use super::system::System;
 use super::verlet_step::{Two, VerletStep};
 use crate::field::{Field, chunk_range};
+use polycore::numerics::ordered_sum;
 use rayon::prelude::*;
 
 /// Computes friction for the half-step velocities, and adds it to the force; `old` are the forces of friction of the step before. Adds to
@@ -49,9 +50,8 @@ pub fn friction_pass<const D: usize>(
         }
         0.5 * (before + work(chunk, &own))
     };
-    let parts: Vec<f64> =
-        friction.chunks_mut().into_par_iter().zip(state.force.chunks_mut()).enumerate().map(of).collect();
-    let mut taken = -parts.iter().sum::<f64>();
+    let items = friction.chunks_mut().into_par_iter().zip(state.force.chunks_mut()).enumerate();
+    let mut taken = -ordered_sum(items.map(of));
     // what planes drag is work of theirs, not heat
     taken += work_of_planes(contact.moved(), &state.rubbing, &sliding.planes);
     if leap.step > 0.0 {

@@ -1,7 +1,7 @@
 //! What a file prints, in lines for who wrote it.
 
 use super::ToolPath;
-use crate::mesh::box_around;
+use polycore::numerics::bounds;
 
 /// A printing move that falls by more than this, and more steeply, lays nothing on anything, m.
 const FALL: f64 = 1e-3;
@@ -39,8 +39,8 @@ impl ToolPath {
     /// Layers, box, filament, volume and time of what is printed, and the share of each feature in its
     /// volume. `filament`: its diameter, m.
     pub fn summary(&self, filament: f64) -> Vec<String> {
-        let ends = self.printing().flat_map(|one| [one.from, one.to]);
-        let [low, high] = box_around(ends).unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]);
+        let ends = || self.printing().flat_map(|one| [one.from, one.to]);
+        let [low, high] = bounds(ends());
         let place = |at: [f64; 3]| {
             let [x, y, z] = at.map(|x| (1e6 * x).round() / 1e3);
             format!("({x}, {y}, {z}) mm")

@@ -9,6 +9,7 @@ use crate::program::scene::NodesSpec;
 use crate::program::thermal;
 use harness::output::vtkhdf::MeshSeries;
 use harness::report::{Quantity, Report};
+use polycore::numerics::range;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -27,8 +28,7 @@ pub fn explain(spec: &NodesSpec, path: &Path) -> Result<String, Error> {
         return Err(none(path));
     };
     kelvin(spec, path, &first)?;
-    let span = |pick: fn(f64, f64) -> f64, start| first.temperature.iter().copied().fold(start, pick);
-    let [low, high] = [span(f64::min, f64::INFINITY), span(f64::max, f64::NEG_INFINITY)];
+    let [low, high] = range(first.temperature.iter().copied());
     let unit = if spec.zero() == 0.0 { "K" } else { "°C" };
     let (nodes, cells, time) = (analysis.points.len(), analysis.cells.len(), first.time);
     let file = spec.file.display();

@@ -1,5 +1,6 @@
 //! The outline of each particle: an upright block, or the deformed cell of a lattice.
 
+use polycore::numerics::{Groups, bounds};
 use rayon::prelude::*;
 
 use crate::output::lattice::{self, NONE, joined, neighbours};
@@ -67,35 +68,20 @@ struct Cells {
     low: [f64; 2],
     size: f64,
     count: [usize; 2],
-    starts: Vec<usize>,
-    order: Vec<usize>,
+    particles: Groups<usize>,
 }
 
 impl Cells {
     fn new(positions: &[[f64; 2]], size: f64) -> Self {
-        let fold = |axis: usize, start: f64, pick: fn(f64, f64) -> f64| {
-            positions.iter().fold(start, |bound, position| pick(bound, position[axis]))
-        };
-        let low = [0, 1].map(|axis| fold(axis, f64::INFINITY, f64::min));
-        let extent = [0, 1].map(|axis| fold(axis, f64::NEG_INFINITY, f64::max) - low[axis]);
+        let [low, high] = bounds(positions.iter().copied());
+        let extent = [0, 1].map(|axis| high[axis] - low[axis]);
         // scattered particles must not ask for more cells than there are particles
         let most = (4.0 * positions.len() as f64).sqrt() + 1.0;
         let size = size.max(extent[0] / most).max(extent[1] / most);
         let count = extent.map(|extent| (extent / size) as usize + 1);
-        let mut cells = Self { low, size, count, starts: vec![0; count[0] * count[1] + 1], order: vec![] };
-        let homes: Vec<usize> = positions.iter().map(|position| cells.index(cells.home(position))).collect();
-        for &home in &homes {
-            cells.starts[home + 1] += 1;
-        }
-        for cell in 1..cells.starts.len() {
-            cells.starts[cell] += cells.starts[cell - 1];
-        }
-        let mut next = cells.starts.clone();
-        cells.order = vec![0; positions.len()];
-        for (particle, &home) in homes.iter().enumerate() {
-            cells.order[next[home]] = particle;
-            next[home] += 1;
-        }
+        let mut cells = Self { low, size, count, particles: Groups::new(0, std::iter::empty()) };
+        let homes = positions.iter().map(|position| cells.index(cells.home(position)));
+        cells.particles = Groups::new(count[0] * count[1], homes.zip(0..));
         cells
     }
 
@@ -113,7 +99,7 @@ impl Cells {
         for row in home[1].saturating_sub(1)..=(home[1] + 1).min(self.count[1] - 1) {
             let first = self.index([home[0].saturating_sub(1), row]);
             let last = self.index([(home[0] + 1).min(self.count[0] - 1), row]);
-            for &particle in &self.order[self.starts[first]..self.starts[last + 1]] {
+            for &particle in self.particles.between(first, last) {
                 each(particle);
             }
         }

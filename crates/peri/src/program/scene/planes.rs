@@ -4,6 +4,7 @@ use super::values::Body;
 use super::{Method, Scene};
 use crate::contact::Plane;
 use harness::scene::{SceneError, Source};
+use polycore::numerics::range;
 
 /// n₁·n₂ of planes that face each other.
 const FACING: f64 = -0.99;
@@ -43,8 +44,7 @@ fn seen<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Resul
         plane.normal = plane.normal.map(|n| n / size);
         let heights =
             body.bonds.particles().iter().map(|&site| plane.height(body.bonds.position(site as usize)));
-        let (low, high) =
-            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
+        let [low, high] = range(heights);
         let faces = surface.faces().iter().map(|face| plane.height(face.place));
         let lowest = faces.fold(f64::INFINITY, f64::min);
         let of_particles = low - 0.5 * body.bonds.spacing();

@@ -14,6 +14,7 @@ use crate::potential::BondPotential;
 use crate::solver::load::Loads;
 use crate::solver::places::in_order;
 use factor::{Factor, Pattern};
+use polycore::numerics::bounds;
 use pulp::Arch;
 use rayon::prelude::*;
 use space::{CORNERS, NONE, Space};
@@ -193,12 +194,8 @@ fn hold<const D: usize>(
 
 /// Diagonal of the bounding box, m.
 fn extent<const D: usize>(bonds: &dyn Bonds<D>) -> f64 {
-    let span = |d: usize| {
-        let places = bonds.particles().iter().map(|&site| bonds.position(site as usize)[d]);
-        let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-        high - low + bonds.spacing()
-    };
-    (0..D).map(|d| span(d).powi(2)).sum::<f64>().sqrt()
+    let [low, high] = bounds(bonds.particles().iter().map(|&site| bonds.position(site as usize)));
+    (0..D).map(|d| (high[d] - low[d] + bonds.spacing()).powi(2)).sum::<f64>().sqrt()
 }
 
 /// Functions that share an element with each function, up to itself.
