@@ -17,7 +17,8 @@ pub fn healed(interval: f64) -> Result<Option<[f64; 2]>, crystfem::Error> {
 
     // chains relax in 2 s at 180 °C, activation energy 60 kJ/mol (assumed)
     let law = Healing::new(2.0, 453.15, 60e3)?;
-    let mut healing = HealingCoupling::new(HealingSettings::new(&problem, 0, law)?);
+    let settings = HealingSettings::new(&problem.mesh, &problem.material_of, &problem.births, 0, law)?;
+    let mut healing = HealingCoupling::new(settings);
     healing.after_step(&simulation);
     simulation.observe(4.0 * interval + 60.0, |simulation| {
         healing.after_step(simulation);

@@ -23,7 +23,7 @@ struct Part {
     material: u16,
     /// ρV, kg.
     mass: f64,
-    /// What it has, K.
+    /// Temperature, K.
     temperature: f64,
     /// U there, J/kg.
     energy: f64,
@@ -156,11 +156,11 @@ impl Simulation {
         let (problem, system) = (&self.problem, &self.system);
         let Memory { nodal, general } = &mut state.memory;
         let birth_of = |birth: u32| problem.births[birth as usize - 1].temperature;
-        nodal.go(&added.nodal, system.nodal.stride, system.nodal.energies, |nodal, point| {
+        nodal.rearrange(&added.nodal, system.nodal.stride, system.nodal.energies, |nodal, point| {
             let (birth, material) = (system.nodal.birth[point], system.nodal.material[point]);
             nodal.fresh(problem, usize::from(material), system.nodal.stride, point, birth_of(birth));
         });
-        general.go(&added.general, system.general.stride, true, |general, point| {
+        general.rearrange(&added.general, system.general.stride, true, |general, point| {
             let index = system.general.starts.partition_point(|&first| first as usize <= point) - 1;
             let number = system.general.elements[index] as usize;
             let material = usize::from(problem.material_of[number]);
@@ -243,11 +243,11 @@ impl Simulation {
     }
 }
 
-/// What meets at a node.
+/// Materials that meet at a node.
 struct Mixture<'a> {
     /// ΣρcV of old linear material, J/K.
     capacity: f64,
-    /// Its temperature, K.
+    /// Temperature, K.
     temperature: f64,
     existed: bool,
     sum: &'a Sum,
@@ -351,7 +351,7 @@ impl Points {
     }
 
     /// Moves points, with their energies or without; `fresh` makes the new ones.
-    fn go(&mut self, moves: &Moves, stride: usize, energies: bool, fresh: impl Fn(&mut Self, usize)) {
+    fn rearrange(&mut self, moves: &Moves, stride: usize, energies: bool, fresh: impl Fn(&mut Self, usize)) {
         let state = self.state.split_off(moves.first * stride);
         let energy = if energies { self.energy.split_off(moves.first) } else { Vec::new() };
         for (point, &from) in (moves.first..).zip(&moves.from) {

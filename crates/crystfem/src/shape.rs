@@ -67,7 +67,7 @@ impl Shape {
         }
     }
 
-    /// Whether shape functions are of second order.
+    /// Returns whether shape functions are of second order.
     pub const fn is_second_order(self) -> bool {
         self.nodes() > 8
     }
@@ -111,8 +111,11 @@ impl Shape {
 
     /// The node on the middle of the edge between two corners; `None` of a first-order element or no edge.
     pub fn middle(self, a: usize, b: usize) -> Option<usize> {
+        if !self.is_second_order() {
+            return None;
+        }
         let edge = self.edges().iter().position(|&[p, q]| (p, q) == (a, b) || (q, p) == (a, b))?;
-        self.is_second_order().then_some(self.corners() + edge)
+        Some(self.corners() + edge)
     }
 
     /// Name of its solid element in Abaqus and CalculiX.
@@ -127,7 +130,7 @@ impl Shape {
         }
     }
 
-    /// Its name in messages.
+    /// Name in messages.
     pub const fn name(self) -> &'static str {
         match self.corners() {
             8 => "hexahedron",
@@ -136,7 +139,7 @@ impl Shape {
         }
     }
 
-    /// Its number in VTK, and the position here of each node in VTK's order: VTK counts the first triangle of a 6-node wedge
+    /// Number in VTK, and the position here of each node in VTK's order: VTK counts the first triangle of a 6-node wedge
     /// the other way round (vtkWedge: its normal points away from the second), and all others as Abaqus.
     pub const fn vtk(self) -> (u8, Option<[usize; 6]>) {
         match self {
@@ -168,7 +171,7 @@ impl Shape {
 /// An element that is neither an 8-node hexahedron nor a 4-node tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cell {
-    /// Its type.
+    /// Type.
     pub shape: Shape,
     nodes: [u32; 20],
 }
@@ -181,12 +184,12 @@ impl Cell {
         Some(cell)
     }
 
-    /// Its nodes.
+    /// Nodes.
     pub fn nodes(&self) -> &[u32] {
         &self.nodes[..self.shape.nodes()]
     }
 
-    /// Its nodes.
+    /// Nodes.
     pub fn nodes_mut(&mut self) -> &mut [u32] {
         &mut self.nodes[..self.shape.nodes()]
     }

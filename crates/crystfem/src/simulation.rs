@@ -78,7 +78,7 @@ pub struct State {
     pub time: f64,
     /// Temperature of each equation, K.
     pub temperature: Vec<f64>,
-    /// Its rate of change over the last step, K/s; empty after a jump.
+    /// Rate of change over the last step, K/s; empty after a jump.
     pub slope: Vec<f64>,
     /// Q of each equation, W; empty if not known.
     pub rate: Vec<f64>,
@@ -129,10 +129,7 @@ impl Simulation {
     /// # Errors
     /// Those of [`Problem::check`] and of the materials.
     pub fn new(problem: impl Into<Arc<Problem>>, settings: Settings) -> Result<Self, Error> {
-        Self::begin(problem.into(), settings)
-    }
-
-    fn begin(problem: Arc<Problem>, settings: Settings) -> Result<Self, Error> {
+        let problem = problem.into();
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
         let mut state = State { born: vec![0; problem.material_of.len()], jump: true, ..State::default() };
         let later = problem.births.iter().flat_map(|birth| &birth.elements);
@@ -167,10 +164,7 @@ impl Simulation {
     /// # Errors
     /// As [`Self::new`]; [`Error::Mesh`] where the state does not belong to the problem.
     pub fn resume(problem: impl Into<Arc<Problem>>, settings: Settings, state: State) -> Result<Self, Error> {
-        Self::go_on(problem.into(), settings, state)
-    }
-
-    fn go_on(problem: Arc<Problem>, settings: Settings, state: State) -> Result<Self, Error> {
+        let problem = problem.into();
         let (behaviours, breaks) = Self::prepare(&problem, &settings)?;
         if state.born.len() != problem.material_of.len() {
             return Err(Error::Mesh(format!(
@@ -215,12 +209,12 @@ impl Simulation {
         Ok((behaviours, problem.breaks()))
     }
 
-    /// What is solved.
+    /// Returns the problem.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
 
-    /// Where it stands: serialise it to continue later with the same bits.
+    /// Returns the state; serialise it to continue later with the same bits.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -230,12 +224,12 @@ impl Simulation {
         self.state.time
     }
 
-    /// Whether a node of the mesh exists.
+    /// Returns whether a node of the mesh exists.
     pub fn exists(&self, node: u32) -> bool {
         self.system.equation.get(node as usize).is_some_and(|&equation| equation != NONE)
     }
 
-    /// Whether an element exists.
+    /// Returns whether an element exists.
     pub fn is_born(&self, element: u32) -> bool {
         self.state.born.get(element as usize).is_some_and(|&birth| birth != NONE)
     }

@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::healing::Healing;
 use crate::mesh::Mesh;
 use crate::mesh::surface::{Surface, area};
+use crate::problem::Birth;
 use crate::simulation::Simulation;
 
 /// An interface between two elements.
@@ -52,18 +53,24 @@ pub struct HealingSettings {
 }
 
 impl HealingSettings {
-    /// All that is printed of one material, by its number in the problem, heals between births.
+    /// All that is printed of one material, by its number among those of the elements, heals between births.
     ///
     /// # Errors
     /// Those of [`Interface::between_births`].
-    pub fn new(problem: &crate::problem::Problem, material: u16, law: Healing) -> Result<Self, Error> {
-        let mut birth_of = vec![u32::MAX; problem.mesh.element_count()];
-        for (number, birth) in (0..).zip(&problem.births) {
+    pub fn new(
+        mesh: &Mesh,
+        material_of: &[u16],
+        births: &[Birth],
+        material: u16,
+        law: Healing,
+    ) -> Result<Self, Error> {
+        let mut birth_of = vec![u32::MAX; mesh.element_count()];
+        for (number, birth) in (0..).zip(births) {
             birth.elements.iter().for_each(|&element| birth_of[element as usize] = number);
         }
-        let births = birth_of.iter().zip(&problem.material_of);
+        let births = birth_of.iter().zip(material_of);
         let printed: Vec<bool> = births.map(|(&birth, &of)| of == material && birth != u32::MAX).collect();
-        let interfaces = Interface::between_births(&problem.mesh, &printed, &birth_of)?;
+        let interfaces = Interface::between_births(mesh, &printed, &birth_of)?;
         Ok(Self { law, strength: None, interfaces, printed })
     }
 }

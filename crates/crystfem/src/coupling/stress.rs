@@ -2,7 +2,7 @@
 
 use super::bed::{bed_nodes, loose_elements, out_of_flatness, remove_rigid_motion, statically_determinate};
 use crate::error::Error;
-use crate::mechanics::{Audit, Body, BodyState, MOST, SolidifyingMaxwell, Support, points, shares};
+use crate::mechanics::{Body, BodyState, EnergyBalance, MOST, SolidifyingMaxwell, Support, points, shares};
 use crate::mesh::Mesh;
 use crate::simulation::Simulation;
 use polycore::tensor::von_mises;
@@ -289,8 +289,8 @@ impl<'a> StressCoupling<'a> {
     }
 
     /// Energies of all solutions.
-    pub fn audit(&self) -> &Audit {
-        &self.body.state.audit
+    pub fn energy_balance(&self) -> &EnergyBalance {
+        &self.body.state.balance
     }
 
     /// Numbers of solutions and of iterations of conjugate gradients.

@@ -18,9 +18,9 @@ pub struct ReadMesh {
     pub node_labels: Vec<u64>,
     /// The file's number of each element.
     pub element_labels: Vec<u64>,
-    /// What [`quality::check`] found.
+    /// Result of [`quality::check`].
     pub quality: Quality,
-    /// What was left out or should be looked at, for the user.
+    /// Notes for the user: what was left out or should be looked at.
     pub notes: Vec<String>,
 }
 
@@ -84,7 +84,7 @@ pub(super) struct Node {
     pub point: [f64; 3],
 }
 
-/// What a file says. Names and members of sets: positions in `nodes` and `elements`.
+/// Content of a file. Names and members of sets: positions in `nodes` and `elements`.
 #[derive(Debug, Default)]
 pub(super) struct Content {
     pub nodes: Vec<Node>,

@@ -2,6 +2,13 @@
 
 use super::Mesh;
 use crate::element::{Geometry, MOST, WIDE, WIDE_POINTS};
+use polycore::numerics::bounds;
+
+/// Lower and upper corner of the box around places, m; `None` of none.
+pub fn box_around(places: impl Iterator<Item = [f64; 3]>) -> Option<[[f64; 3]; 2]> {
+    let [lower, upper] = bounds(places);
+    (lower[0] <= upper[0]).then_some([lower, upper])
+}
 
 impl Mesh {
     /// Positions of the nodes of an element, m, and their number; 0 beyond them.

@@ -1,4 +1,4 @@
-//! Which layer an element belongs to, and when it appears.
+//! Layers of elements, and groups that appear together.
 
 use crate::error::Error;
 use crate::mesh::Mesh;

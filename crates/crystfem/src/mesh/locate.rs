@@ -1,4 +1,4 @@
-//! Where a place lies in a mesh, for values between nodes.
+//! Location of places in a mesh, for values between nodes.
 
 use super::Mesh;
 use crate::element::WIDE;
@@ -23,7 +23,7 @@ pub struct Place {
     weights: Vec<(u32, f64)>,
     /// Elements that hold it: one, or those that meet there.
     elements: Vec<u32>,
-    /// How far it is from the place that was requested, m; 0 inside the mesh.
+    /// Distance from the requested place, m; 0 inside the mesh.
     distance: f64,
 }
 
@@ -33,7 +33,7 @@ impl Place {
         &self.elements
     }
 
-    /// How far it is from the place that was requested, m; 0 inside the mesh.
+    /// Distance from the requested place, m; 0 inside the mesh.
     pub fn distance(&self) -> f64 {
         self.distance
     }
@@ -50,7 +50,7 @@ impl Place {
 }
 
 impl Mesh {
-    /// Whether a place, m, lies in an element or on its faces.
+    /// Returns whether a place, m, lies in an element or on its faces.
     pub fn holds(&self, element: u32, at: [f64; 3]) -> bool {
         self.shapes_at(element, at).is_some()
     }

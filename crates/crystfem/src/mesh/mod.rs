@@ -27,6 +27,7 @@ use crate::error::Error;
 pub use crate::shape::{Cell, HEXAHEDRON_SIDES, Shape, TETRAHEDRON_SIDES};
 pub use bar::{Bar, Substrate};
 pub use file_mesh::ReadMesh;
+pub(crate) use geometry::box_around;
 pub use locate::Place;
 pub use read::read;
 pub use split::Split;
@@ -76,13 +77,13 @@ pub struct FaceNodes {
 }
 
 impl FaceNodes {
-    /// Its corners.
+    /// Corners.
     pub fn corners(&self) -> &[u32] {
         let count = if self.count > 4 { self.count / 2 } else { self.count };
         &self.nodes[..usize::from(count)]
     }
 
-    /// Its corners, sorted, the rest [`u32::MAX`]: the same from either side.
+    /// Sorted corners, the rest [`u32::MAX`]: the same from either side.
     pub(crate) fn key(&self) -> [u32; 4] {
         let corners = self.corners();
         let mut key = [u32::MAX; 4];
@@ -129,7 +130,7 @@ impl Mesh {
         }
     }
 
-    /// Whether some element is of second order.
+    /// Returns whether some element is of second order.
     pub fn is_second_order(&self) -> bool {
         self.others.iter().any(|cell| cell.shape.is_second_order())
     }
@@ -164,31 +165,14 @@ impl Mesh {
 
     /// Nodes of a face, anticlockwise seen from outside; empty where there is no such face.
     pub fn face_nodes(&self, face: Face) -> FaceNodes {
-        let (element, side) = (face.element as usize, usize::from(face.side));
-        let mut nodes = [0; 8];
-        let mut count = 0;
-        if let Some(all) = self.hexahedra.get(element) {
-            if let Some(side) = HEXAHEDRON_SIDES.get(side) {
-                for (node, local) in nodes.iter_mut().zip(side) {
-                    *node = all[*local];
-                }
-                count = 4;
-            }
-        } else if let Some(all) = self.tetrahedra.get(element - self.hexahedra.len()) {
-            if let Some(side) = TETRAHEDRON_SIDES.get(side) {
-                for (node, local) in nodes.iter_mut().zip(side) {
-                    *node = all[*local];
-                }
-                count = 3;
-            }
-        } else if let Some(cell) = self.other(element) {
-            let (all, ring) = (cell.nodes(), cell.shape.side(face.side));
-            let next = (0..ring.len()).map(|k| (ring[k], ring[(k + 1) % ring.len()]));
-            let middles = next.filter_map(|(a, b)| cell.shape.middle(a, b));
-            for (node, local) in nodes.iter_mut().zip(ring.iter().copied().chain(middles)) {
-                *node = all[local];
-                count += 1;
-            }
+        let (all, shape) = (self.nodes(face.element), self.shape(face.element));
+        let ring = if all.is_empty() { &[] } else { shape.side(face.side) };
+        let next = (0..ring.len()).map(|k| (ring[k], ring[(k + 1) % ring.len()]));
+        let middles = next.filter_map(|(a, b)| shape.middle(a, b));
+        let (mut nodes, mut count) = ([0; 8], 0);
+        for (node, local) in nodes.iter_mut().zip(ring.iter().copied().chain(middles)) {
+            *node = all[local];
+            count += 1;
         }
         FaceNodes { nodes, count }
     }
@@ -202,26 +186,13 @@ impl Mesh {
 
     /// Corners of the smallest box around all nodes, m; `None` without nodes.
     pub fn bounds(&self) -> Option<[[f64; 3]; 2]> {
-        let first = *self.points.first()?;
-        Some(self.points.iter().fold([first, first], |[mut lower, mut upper], point| {
-            for d in 0..3 {
-                lower[d] = lower[d].min(point[d]);
-                upper[d] = upper[d].max(point[d]);
-            }
-            [lower, upper]
-        }))
+        box_around(self.points.iter().copied())
     }
 
     /// Lower and upper corner of the box around some elements, m; `None` of none.
     pub fn bounds_of(&self, elements: &[u32]) -> Option<[[f64; 3]; 2]> {
-        let places =
-            elements.iter().flat_map(|&element| self.nodes(element)).map(|&n| self.points[n as usize]);
-        places.map(|place| [place; 2]).reduce(|[mut lower, mut upper], [place, _]| {
-            for d in 0..3 {
-                (lower[d], upper[d]) = (lower[d].min(place[d]), upper[d].max(place[d]));
-            }
-            [lower, upper]
-        })
+        let nodes = elements.iter().flat_map(|&element| self.nodes(element));
+        box_around(nodes.map(|&node| self.points[node as usize]))
     }
 
     /// Nodes on faces, sorted, each once.

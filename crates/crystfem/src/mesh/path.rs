@@ -77,7 +77,7 @@ impl Motion {
 }
 
 impl Move {
-    /// Its length, m.
+    /// Length, m.
     pub fn length(&self) -> f64 {
         (0..3).map(|d| (self.to[d] - self.from[d]).powi(2)).sum::<f64>().sqrt()
     }

@@ -1,4 +1,4 @@
-//! What a mesh must be before anything is computed on it.
+//! Checks of a mesh before anything is computed on it.
 
 use nalgebra::Vector3;
 use polycore::numerics::Sets;
@@ -35,7 +35,7 @@ pub struct Quality {
     pub aspect: (f64, u32),
     /// Parts that share no node.
     pub parts: usize,
-    /// What is allowed but should be looked at.
+    /// Findings that are allowed but should be looked at.
     pub notes: Vec<String>,
 }
 

@@ -4,7 +4,7 @@ use super::{LinearSolver, Method, Points, Simulation, State};
 use crate::error::Error;
 use crate::ledger::Record;
 use crate::solver::LEVELS;
-use crate::system::At;
+use crate::system::StepInput;
 use crate::system::vector::{set, sum};
 use crate::time::{Attempt, Scheme, Stepper, Steps, Work};
 
@@ -156,7 +156,7 @@ impl Simulation {
         let in_place = self.in_place();
         let State { temperature: start, memory, work, time, .. } = &mut self.state;
         let Stepper { temperature, stages, .. } = &mut self.stepper;
-        let at = At { temperature, start, dt, time: *time, tangent: false };
+        let at = StepInput { temperature, start, dt, time: *time, tangent: false };
         let nodal = &self.system.nodal;
         let new = &mut stages.evaluation.memory.nodal;
         let points = if in_place {

@@ -9,12 +9,12 @@ pub struct Cached<T> {
 }
 
 impl<T> Cached<T> {
-    /// Whether the value was made for this key.
+    /// Returns whether the value was made for this key.
     pub fn is_for(&self, key: (u64, u64)) -> bool {
         self.key == Some(key)
     }
 
-    /// Whether the value was made for the same build of the equations, whose number is the upper half of the generation.
+    /// Returns whether the value was made for the same build of the equations, whose number is the upper half of the generation.
     pub fn is_for_build(&self, build: u64) -> bool {
         self.key.is_some_and(|(generation, _)| generation >> 32 == build)
     }

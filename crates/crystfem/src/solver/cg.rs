@@ -111,7 +111,7 @@ pub struct ConjugateGradients {
 
 impl ConjugateGradients {
     /// See [`super::Iterative::lend`].
-    pub fn lend(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
+    pub fn swap_vectors(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
         std::mem::swap(&mut self.direction, direction);
         std::mem::swap(&mut self.image, image);
     }

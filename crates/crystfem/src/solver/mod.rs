@@ -73,8 +73,8 @@ pub struct Iterative {
 
 impl Iterative {
     /// Swaps the work vectors of conjugate gradients, the direction and A times it, with two vectors that are free until the next call.
-    pub fn lend(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
-        self.conjugate.lend(direction, image);
+    pub fn swap_vectors(&mut self, direction: &mut Vec<f64>, image: &mut Vec<f64>) {
+        self.conjugate.swap_vectors(direction, image);
     }
 
     /// Solves A x = r from x = 0 by the method that suits the matrix. `inverse` is one over A's diagonal, 0 where x stays 0;

@@ -11,7 +11,7 @@
 //! nodes of a line at rest; its tangent ∇N_a·D∇N_b k(T_b) is complete, and not symmetric.
 
 use super::rows::Rows;
-use super::{At, Evaluation, Moves, NONE, Points};
+use super::{Evaluation, Moves, NONE, Points, StepInput};
 use crate::element::{self, Geometry, MOST, WIDE, WIDE_POINTS};
 use crate::error::Error;
 use crate::material::Point;
@@ -109,7 +109,7 @@ impl General {
         &self,
         problem: &Problem,
         consistent: bool,
-        at: &At,
+        at: &StepInput,
         old: &Points,
         rows: &mut Rows,
         out: &mut Evaluation,
@@ -124,7 +124,7 @@ impl General {
         &self,
         problem: &Problem,
         consistent: bool,
-        at: &At,
+        at: &StepInput,
         old: &Points,
         rows: &mut Rows,
         out: &mut Evaluation,
@@ -188,7 +188,7 @@ impl General {
         &self,
         problem: &Problem,
         consistent: bool,
-        at: &At,
+        at: &StepInput,
         old: &Points,
         index: usize,
         state: &mut [f64],

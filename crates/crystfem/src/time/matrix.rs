@@ -9,7 +9,7 @@ pub fn key(system: &System, weight: f64) -> (u64, u64) {
     (system.generation, weight.to_bits())
 }
 
-/// What follows from the diagonal and the row sums of A.
+/// Diagonal and row sums of A, and what follows from them.
 #[derive(Default)]
 pub struct Matrix {
     /// Diagonal of C and of the surfaces, with lumped capacity.

@@ -9,20 +9,20 @@ use crate::solver::{
     Cached, Direct, Ended, Goal, Iterative, Method, Multigrid, Operator, Packed, norm_squared,
 };
 use crate::system::vector::{combine, dot, largest, set, sum};
-use crate::system::{At, Evaluation, Memory, System};
+use crate::system::{Evaluation, Memory, StepInput, System};
 
 /// Newton iterations at most.
 const MOST_ITERATIONS: usize = 60;
 /// Halvings of a Newton step at most.
 const MOST_HALVINGS: usize = 7;
 /// Newton steps in a row, where k jumps, that are taken whole though the residual does not fall.
-const MOST_WHOLE: usize = 8;
+const MOST_FULL_STEPS: usize = 8;
 /// Corrections of the balance of a linear stage at most.
 const MOST_SHIFTS: usize = 3;
 /// Share of the heat moved that the sum of all residuals may be; the audit promises 1e-10.
 const BALANCED: f64 = 2e-11;
 
-/// What a stage solves.
+/// Equation of a stage.
 #[derive(Clone, Copy)]
 pub struct Stage<'a> {
     /// Factor of Q, s.
@@ -143,7 +143,7 @@ impl Stages {
             if square < best.0 {
                 best = (square, iteration);
             }
-            let whole = !system.is_symmetric() && iteration - best.1 < MOST_WHOLE;
+            let whole = !system.is_symmetric() && iteration - best.1 < MOST_FULL_STEPS;
             for halving in 0..=MOST_HALVINGS {
                 let correction = &self.correction;
                 set(&mut trial, |k| temperature[k] + part * correction[k]);
@@ -225,7 +225,7 @@ impl Stages {
         temperature: &[f64],
         work: &mut Work,
     ) -> Result<(), Error> {
-        let at = At { temperature, start: stage.start, dt: stage.dt, time: stage.time, tangent: true };
+        let at = StepInput { temperature, start: stage.start, dt: stage.dt, time: stage.time, tangent: true };
         self.evaluation.responses = 0;
         system.evaluate(problem, &at, stage.old, &mut self.evaluation)?;
         work.evaluations += 1;
@@ -280,7 +280,7 @@ impl Stages {
     ) -> Result<(), Error> {
         let size = system.size();
         // both are in the residual, and evaluated anew after the correction
-        self.iterative.lend(&mut self.evaluation.change, &mut self.evaluation.rate);
+        self.iterative.swap_vectors(&mut self.evaluation.change, &mut self.evaluation.rate);
         self.raise(problem, system, stage.weight, work);
         self.correction.resize(size, 0.0);
         combine(&mut self.residual, |k, residual| -system.free[k] * residual);
@@ -358,11 +358,11 @@ impl Stages {
                 *correction += shift * free;
             }
         }
-        self.iterative.lend(&mut self.evaluation.change, &mut self.evaluation.rate);
+        self.iterative.swap_vectors(&mut self.evaluation.change, &mut self.evaluation.rate);
         Ok(())
     }
 
-    /// Whether the free nodes' residuals add up to nothing.
+    /// Returns whether the free nodes' residuals add up to nothing.
     fn balanced(&self, system: &System, weight: f64) -> bool {
         let size = system.size();
         let total = dot(&system.free, &self.residual);

@@ -4,7 +4,7 @@ use super::{Scheme, Stage, Stages, Work};
 use crate::error::Error;
 use crate::problem::Problem;
 use crate::system::vector::set;
-use crate::system::{At, Evaluation, Exchange, Memory, System};
+use crate::system::{Evaluation, Exchange, Memory, StepInput, System};
 
 /// γ, and the weights w, w, d of TR-BDF2: 2 − √2, √2/4, √2/4, γ/2.
 const GAMMA: f64 = 2.0 - std::f64::consts::SQRT_2;
@@ -28,7 +28,7 @@ pub struct Start<'a> {
     pub memory: &'a Memory,
 }
 
-/// What a step came to.
+/// Result of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Attempt {
     /// Largest temporal error of a node, K; `None` if not requested.
@@ -70,7 +70,7 @@ impl Stepper {
     ) -> Result<(Vec<f64>, Exchange), Error> {
         let mut evaluation = Evaluation::default();
         let temperature = state.temperature;
-        let at = At { temperature, start: temperature, dt: 0.0, time: state.time, tangent: false };
+        let at = StepInput { temperature, start: temperature, dt: 0.0, time: state.time, tangent: false };
         system.evaluate(problem, &at, state.memory, &mut evaluation)?;
         Ok((evaluation.rate, evaluation.exchange))
     }

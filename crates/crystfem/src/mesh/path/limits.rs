@@ -90,7 +90,7 @@ impl Limits {
             // mm/min always
             _ => set(&mut self.jerk, of_axes.map(|v| v / 60.0)),
         }
-        self.look();
+        self.update();
     }
 
     /// Takes in Klipper's SET_VELOCITY_LIMIT.
@@ -110,7 +110,7 @@ impl Limits {
             }
         }
         self.stated = true;
-        self.look();
+        self.update();
     }
 
     /// Takes in a setting that a slicer writes in a comment, `machine_max_jerk_x`.
@@ -132,15 +132,15 @@ impl Limits {
             _ => return,
         }
         self.stated = true;
-        self.look();
+        self.update();
     }
 
-    fn look(&mut self) {
+    fn update(&mut self) {
         self.accelerates = self.acceleration[..2].iter().chain(&self.by_kind).any(|a| a.is_finite());
     }
 
     /// One line of what they are.
-    pub fn told(&self) -> String {
+    pub fn describe(&self) -> String {
         let list = |all: &[f64]| {
             let values =
                 all.iter().map(|v| if v.is_finite() { format!("{:.6}", 1e3 * v) } else { "–".into() });

@@ -88,10 +88,10 @@ impl ToolPath {
     }
 
     /// The limits that the file states, in a line; `None` where it states none of motion.
-    pub fn limits_told(&self) -> Option<String> {
+    pub fn describe_limits(&self) -> Option<String> {
         let acts = |motion: &Motion| self.limits[motion.limits as usize].stated;
         let last = self.motions.iter().rfind(|motion| acts(motion))?;
-        Some(self.limits[last.limits as usize].told())
+        Some(self.limits[last.limits as usize].describe())
     }
 
     /// Gives motions, with start and end of each, s, new durations; all else keeps its own.

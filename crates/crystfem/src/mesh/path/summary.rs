@@ -38,7 +38,7 @@ impl ToolPath {
 
     /// Layers, box, filament, volume and time of what is printed, and the share of each feature in its
     /// volume. `filament`: its diameter, m.
-    pub fn told(&self, filament: f64) -> Vec<String> {
+    pub fn summary(&self, filament: f64) -> Vec<String> {
         let ends = || self.printing().flat_map(|one| [one.from, one.to]);
         let [low, high] = bounds(ends());
         let place = |at: [f64; 3]| {

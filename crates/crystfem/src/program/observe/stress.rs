@@ -47,11 +47,11 @@ impl<'a> Observer<Simulation, Error> for Stress<'a> {
             to.add(q::MISES_OVER_STRENGTH, |_| self.of(most) / strength);
         }
         to.add(q::LARGEST_ROTATION, |_| self.of(StressCoupling::largest_rotation));
-        to.add(q::STRESS_WORK, |_| self.of(|stress| stress.audit().energies.work));
-        to.add(q::STRESS_STORED, |_| self.of(|stress| stress.audit().energies.stored));
-        to.add(q::STRESS_LOST, |_| self.of(|stress| stress.audit().energies.lost()));
-        to.add(q::STRESS_HARDENING, |_| self.of(|stress| stress.audit().energies.softening));
-        to.add(q::WORST_STRESS_BALANCE, |_| self.of(|stress| stress.audit().worst));
+        to.add(q::STRESS_WORK, |_| self.of(|stress| stress.energy_balance().energies.work));
+        to.add(q::STRESS_STORED, |_| self.of(|stress| stress.energy_balance().energies.stored));
+        to.add(q::STRESS_LOST, |_| self.of(|stress| stress.energy_balance().energies.lost()));
+        to.add(q::STRESS_HARDENING, |_| self.of(|stress| stress.energy_balance().energies.softening));
+        to.add(q::WORST_STRESS_BALANCE, |_| self.of(|stress| stress.energy_balance().worst));
         to.add(q::LARGEST_DISPLACEMENT, |_| self.of(StressCoupling::largest_displacement));
         let moved = self.coupling.as_ref().map(StressCoupling::displacement);
         for (probe, place) in self.scene.probe.iter().zip(&self.task.probes) {

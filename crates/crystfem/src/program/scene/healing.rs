@@ -2,10 +2,11 @@
 
 use super::PartScene;
 use super::fault::located_in;
-use crate::coupling::{HealingSettings, Interface};
+use crate::coupling::HealingSettings;
 use crate::error::Error;
 use crate::healing::{Glass, Healing};
 use crate::mesh::Mesh;
+use crate::problem::Birth;
 use harness::scene::{SceneError, Source};
 use polycore::units::{MolarEnergy, Stress, Temperature, TemperatureDifference, Time};
 use serde::Deserialize;
@@ -72,16 +73,16 @@ impl HealingSpec {
 }
 
 impl PartScene {
-    /// The interfaces of a scene, where it asks for their healing; `births` are the elements of each birth.
+    /// The interfaces of a scene, where it asks for their healing; `births` are those of its print.
     ///
     /// # Errors
     /// A [`SceneError`] for another material, constants out of their domain, and a part without interfaces.
-    pub(super) fn interfaces<'a>(
+    pub(super) fn interfaces(
         &self,
         source: &Source,
         mesh: &Mesh,
         material_of: &[u16],
-        births: impl Iterator<Item = &'a [u32]>,
+        births: &[Birth],
     ) -> Result<Option<HealingSettings>, SceneError> {
         let Some(spec) = &self.healing else { return Ok(None) };
         let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
@@ -101,16 +102,9 @@ impl PartScene {
         if let Some(found) = strength.filter(|strength| !(*strength > 0.0 && strength.is_finite())) {
             return Err(source.error("healing.strength", format!("{found} Pa"), "above 0"));
         }
-        let mut birth_of = vec![u32::MAX; mesh.element_count()];
-        for (number, elements) in (0..).zip(births) {
-            elements.iter().for_each(|&element| birth_of[element as usize] = number);
-        }
-        let births = birth_of.iter().zip(material_of);
-        let printed: Vec<bool> =
-            births.map(|(&birth, &of)| usize::from(of) == index && birth != u32::MAX).collect();
-        let interfaces = Interface::between_births(mesh, &printed, &birth_of)
+        let settings = HealingSettings::new(mesh, material_of, births, index as u16, law)
             .map_err(|error| source.refused("mesh", error.to_string()))?;
-        if interfaces.is_empty() {
+        if settings.interfaces.is_empty() {
             let found = format!("no two births of `{}` that touch", spec.material);
             return Err(source.error(
                 "healing.material",
@@ -118,6 +112,6 @@ impl PartScene {
                 "the material of a [print] with several births",
             ));
         }
-        Ok(Some(HealingSettings { law, strength, interfaces, printed }))
+        Ok(Some(HealingSettings { strength, ..settings }))
     }
 }

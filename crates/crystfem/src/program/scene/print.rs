@@ -88,7 +88,7 @@ impl PrintSpec {
             tool = file::timed(source, "print", tool, self.acceleration, self.jerk, notes)?;
         }
         if tool.is_fed() {
-            notes.extend(tool.told(fed));
+            notes.extend(tool.summary(fed));
         }
         file::leave_out(source, "print", &self.leave_out, &mut tool, notes)?;
         let elements = elements(source, mesh, "print.elements", self.elements.as_deref())?;

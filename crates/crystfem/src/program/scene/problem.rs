@@ -97,8 +97,7 @@ impl PartScene {
             let path = filling.as_ref().and_then(|filling| filling.path.as_ref()).map(|(path, _)| path);
             self.mechanics(source, &mesh, &material_of, &absent, path)?
         };
-        let appearing = births.iter().map(|birth| birth.elements.as_slice());
-        let interfaces = self.interfaces(source, &mesh, &material_of, appearing)?;
+        let interfaces = self.interfaces(source, &mesh, &material_of, &births)?;
         let end = self.time.end.map_or(by_itself, |end| end.si());
         memory::refuse_times(source, self, end)?;
         self.note_hot_bed(source, end, &mut notes)?;

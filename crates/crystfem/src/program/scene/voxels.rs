@@ -116,7 +116,7 @@ impl PathSpec {
         let mut notes = std::mem::take(&mut path.notes);
         let filament = file::filament(source, block, &path, self.filament)?;
         path = file::timed(source, block, path, self.acceleration, self.jerk, &mut notes)?;
-        notes.extend(path.told(filament));
+        notes.extend(path.summary(filament));
         path = file::purged(source, "mesh.path.file", path, &mut notes)?;
         let height = self.bead_height.map(|x| x.si());
         if height.is_none_or(|height| height > 0.0) && filament > 0.0 {
