@@ -3,13 +3,13 @@
 //! 20 mm cube of PA12 at 220 °C; the bottom held at 80 °C, on the five other sides h = 15 W/m²K and ε = 0.9 against
 //! 80 °C; backward Euler.
 
-use crate::boundary::{Condition, Field, Schedule, Where};
-use crate::material::{Conductor, Property};
-use crate::mesh::{Grid, abaqus};
-use crate::problem::{Capacity, Problem};
-use crate::run::Failure;
-use crate::simulation::{LinearSolver, Settings, Simulation};
-use polycore::case::terminal::Measurement;
+use crate::Failure;
+use crystfem::boundary::{Condition, Field, Schedule, Where};
+use crystfem::material::{Conductor, Property};
+use crystfem::mesh::{Grid, abaqus};
+use crystfem::problem::{Capacity, Problem};
+use crystfem::simulation::{LinearSolver, Settings, Simulation};
+use evidence::measurement::Measurement;
 use polycore::output::{atomic_write, csv};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ const HOT: f64 = 493.15;
 #[derive(clap::Args)]
 pub struct Options {
     /// Elements along an edge.
-    #[arg(long, default_value_t = 26, value_parser = super::elements)]
+    #[arg(long, default_value_t = 26, value_parser = crate::elements)]
     elements: usize,
     /// Steps.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
@@ -80,9 +80,9 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     let (work, steps) = (simulation.state().work, f64::from(options.steps));
     let size = temperatures.len();
     let mut rows = Vec::new();
-    let mut push = |what: &str, value: f64, unit| {
+    let mut push = |what: &str, value: f64, unit: &str| {
         let threads = rayon::current_num_threads();
-        rows.push(Measurement { what: what.to_owned(), size: size as u64, threads, value, unit });
+        rows.push(Measurement::new(what, size, threads, value, unit));
     };
     push("mesh", meshed, "s");
     push("build", built, "s");
@@ -106,7 +106,7 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     Ok(rows)
 }
 
-fn problem(options: &Options) -> Result<Problem, crate::Error> {
+fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
     let mesh = Grid::uniform([0.0; 3], [EDGE; 3], [options.elements; 3])?.mesh("brick")?;
     let mesh = if options.distorted > 0.0 { mesh.distorted(options.distorted)? } else { mesh };
     let property = Property::constant;
@@ -123,7 +123,7 @@ fn problem(options: &Options) -> Result<Problem, crate::Error> {
 }
 
 /// The most memory that this process has had, bytes; `None` where the system does not tell.
-pub(super) fn peak_memory() -> Option<f64> {
+pub fn peak_memory() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kibibytes: f64 = line.split_whitespace().next()?.parse().ok()?;

@@ -1,11 +1,11 @@
 //! Error against run time of the time integrators.
 
-use super::cube::{Cube, END, Start};
-use super::median;
-use crate::run::Failure;
-use crate::simulation::{LinearSolver, Settings, Simulation};
-use crate::time::{Scheme, Steps};
-use polycore::case::terminal::Measurement;
+use crate::Failure;
+use crate::median;
+use crystfem::exact::cube::{Cube, END, Start};
+use crystfem::simulation::{LinearSolver, Settings, Simulation};
+use crystfem::time::{Scheme, Steps};
+use evidence::measurement::Measurement;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -65,14 +65,9 @@ fn run(
         ControlFlow::Continue(())
     })?;
     let threads = rayon::current_num_threads();
-    let mut push = |quantity: &str, value: f64, unit| {
-        rows.push(Measurement {
-            what: format!("{name}: {quantity}, {problem}"),
-            size: cube.size(),
-            threads,
-            value,
-            unit,
-        });
+    let mut push = |quantity: &str, value: f64, unit: &str| {
+        let what = format!("{name}: {quantity}, {problem}");
+        rows.push(Measurement::new(what, cube.size(), threads, value, unit));
     };
     push("error", (squares / END).sqrt(), "K");
     push("time", median(seconds), "s");

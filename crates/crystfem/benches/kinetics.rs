@@ -2,11 +2,11 @@
 //!
 //! Rows `SCHEME KELVIN: QUANTITY`: the largest error in α over the curve, the time for all of it, and for a step of KELVIN.
 
-use super::{REPEATS, material, median};
-use crate::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
-use crate::material::ThermalMaterial;
-use crate::run::Failure;
-use polycore::case::terminal::Measurement;
+use crate::Failure;
+use crate::{REPEATS, median, point};
+use crystfem::kinetics::{Constants, Kinetics, Scheme, cooling_curve};
+use crystfem::material::ThermalMaterial;
+use evidence::measurement::Measurement;
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -16,8 +16,7 @@ const STEPS: usize = 200_000;
 /// Column 1 of Table 4.1, 200 → 120 °C from a seed of 1e-3 (from which Euler's method can start at all).
 pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
     if !(rate > 0.0 && rate.is_finite()) {
-        let allowed = "above 0".to_owned();
-        return Err(crate::Error::Parameter { name: "--rate, K/min", found: rate, allowed }.into());
+        return Err(format!("--rate: found {rate} K/min; allowed: above 0").into());
     }
     let kinetics = Kinetics::new(Constants::TABLE_4_1_COLUMN_1)?;
     let rate = rate / 60.0;
@@ -26,9 +25,9 @@ pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
     for scheme in Scheme::ALL {
         for kelvin in [0.001, 0.01, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0] {
             let steps = (80.0_f64 / kelvin).round() as usize;
-            let mut push = |what: &str, value: f64, unit| {
+            let mut push = |what: &str, value: f64, unit: &str| {
                 let what = format!("{} {kelvin}: {what}", scheme.name());
-                rows.push(Measurement { what, size: steps as u64, threads: 1, value, unit });
+                rows.push(Measurement::new(what, steps, 1, value, unit));
             };
             let error = error(&kinetics, scheme, rate, kelvin, steps, &exact);
             // JSON knows no NaN: a scheme that leaves [0, 1] for good has no row of errors
@@ -40,12 +39,12 @@ pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
             push("step", step, "ns/step");
         }
     }
-    for (name, start, increment) in material::STEPS {
+    for (name, start, increment) in point::STEPS {
         for latent in [None, Some(209e3)] {
             let coupled = if latent.is_some() { "with" } else { "without" };
             let what = format!("response, {name} by 0.5 K, {coupled} latent heat");
             let value = response(latent, start, increment)?;
-            rows.push(Measurement { what, size: STEPS as u64, threads: 1, value, unit: "ns" });
+            rows.push(Measurement::new(what, STEPS, 1, value, "ns"));
         }
     }
     Ok(rows)
@@ -53,10 +52,10 @@ pub fn measure(rate: f64) -> Result<Vec<Measurement>, Failure> {
 
 /// Nanoseconds of a material's response, tangent and all.
 fn response(latent_heat: Option<f64>, start: f64, increment: f64) -> Result<f64, Failure> {
-    let polymer = material::polymer(latent_heat)?;
+    let polymer = point::polymer(latent_heat)?;
     let mut old = [0.0];
     polymer.initial_state(start, &mut old);
-    let at = material::point(start, increment);
+    let at = point::point(start, increment);
     let mut times = Vec::new();
     for _ in 0..REPEATS {
         let since = Instant::now();
@@ -74,7 +73,7 @@ fn error(
     rate: f64,
     kelvin: f64,
     steps: usize,
-    exact: &crate::kinetics::CoolingCurve,
+    exact: &crystfem::kinetics::CoolingCurve,
 ) -> f64 {
     let mut state = scheme.state(kinetics, 1e-3);
     let mut worst = 0.0_f64;

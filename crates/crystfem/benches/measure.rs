@@ -1,28 +1,34 @@
-//! `crystfem bench`: error against run time, seconds per step, memory.
+//! `cargo xtask bench crystfem`: error against run time, seconds per step, memory.
 
-use crate::run::Failure;
-use clap::Subcommand;
-use polycore::case::terminal::print_measurements;
+use clap::{Parser, Subcommand};
+use evidence::measurement::print as print_rows;
+use polycore::case::terminal::Threads;
 
 mod brick;
-mod cube;
 mod integrators;
 mod kinetics;
-mod material;
+mod point;
 mod print;
 mod solvers;
 
 /// Timings, of which the median counts.
 const REPEATS: usize = 7;
 
+type Failure = Box<dyn std::error::Error>;
+
 /// What to measure.
-#[derive(clap::Args)]
-pub struct Bench {
+#[derive(Parser)]
+struct Bench {
     #[command(subcommand)]
     what: What,
     /// Print JSON rows {what, size, threads, value, unit}.
     #[arg(long, global = true)]
     json: bool,
+    #[command(flatten)]
+    threads: Threads,
+    /// What `cargo bench` adds.
+    #[arg(long, global = true, hide = true)]
+    bench: bool,
 }
 
 #[derive(Subcommand)]
@@ -58,22 +64,18 @@ fn elements(text: &str) -> Result<usize, String> {
     if (1..=400).contains(&value) { Ok(value) } else { Err(format!("{value} is not within 1 to 400")) }
 }
 
-impl Bench {
-    /// Measures and prints.
-    ///
-    /// # Errors
-    /// A rate that is not above 0; those of the runs and of files that cannot be written.
-    pub fn print(self) -> Result<bool, Failure> {
-        let rows = match self.what {
-            What::Kinetics { rate } => kinetics::measure(rate)?,
-            What::Integrators { elements } => integrators::measure(elements)?,
-            What::Solvers { elements } => solvers::measure(elements)?,
-            What::Brick(options) => brick::measure(&options)?,
-            What::Print(options) => print::measure(&options)?,
-        };
-        print_measurements(&rows, self.json);
-        Ok(true)
-    }
+fn main() -> Result<(), Failure> {
+    let bench = Bench::parse();
+    bench.threads.apply()?;
+    let rows = match bench.what {
+        What::Kinetics { rate } => kinetics::measure(rate)?,
+        What::Integrators { elements } => integrators::measure(elements)?,
+        What::Solvers { elements } => solvers::measure(elements)?,
+        What::Brick(options) => brick::measure(&options)?,
+        What::Print(options) => print::measure(&options)?,
+    };
+    print_rows(&rows, bench.json);
+    Ok(())
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

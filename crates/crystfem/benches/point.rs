@@ -3,15 +3,14 @@
 use crystfem::kinetics::{Constants, Kinetics};
 use crystfem::material::{Point, Polymer, Property, Semicrystalline};
 use crystfem::melting::Melting;
-use crystfem::run::Failure;
 
 /// What is asked of it: a name, the temperature before in K, and its increment.
 pub const STEPS: [(&str, f64, f64); 3] =
     [("cooling", 425.0, -0.5), ("heating", 425.0, 0.5), ("heating above melting", 500.0, 0.5)];
 
 /// PA12 after column 1 of Table 4.1, with latent heat in J/kg or without.
-pub fn polymer(latent_heat: Option<f64>) -> Result<Semicrystalline, Failure> {
-    Ok(Semicrystalline::new(Polymer {
+pub fn polymer(latent_heat: Option<f64>) -> Result<Semicrystalline, crystfem::Error> {
+    Semicrystalline::new(Polymer {
         density: 1010.0,
         conductivity: Property::Constant(0.25),
         specific_heat: Property::Constant(2200.0),
@@ -20,7 +19,7 @@ pub fn polymer(latent_heat: Option<f64>) -> Result<Semicrystalline, Failure> {
         ultimate_crystallinity: 0.25,
         latent_heat,
         seed: 0.3,
-    })?)
+    })
 }
 
 /// A step of 0.5 s.

@@ -3,16 +3,16 @@
 //! Layers of one element's height, lines of alternating direction, cut into pieces; each piece is a birth. All but the last are there at
 //! the start, as warm as their age lets them be; each of the last ones is followed by a step.
 
-use super::brick::peak_memory;
-use crate::boundary::{Condition, Schedule, Where};
-use crate::kinetics::{Constants, Kinetics};
-use crate::material::{Filled, Polymer, Property, Semicrystalline, ThermalMaterial};
-use crate::melting::Melting;
-use crate::mesh::Grid;
-use crate::problem::{Birth, Problem};
-use crate::run::Failure;
-use crate::simulation::{Settings, Simulation};
-use polycore::case::terminal::Measurement;
+use crate::Failure;
+use crate::brick::peak_memory;
+use crystfem::boundary::{Condition, Schedule, Where};
+use crystfem::kinetics::{Constants, Kinetics};
+use crystfem::material::{Filled, Polymer, Property, Semicrystalline, ThermalMaterial};
+use crystfem::melting::Melting;
+use crystfem::mesh::Grid;
+use crystfem::problem::{Birth, Problem};
+use crystfem::simulation::{Settings, Simulation};
+use evidence::measurement::Measurement;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -23,16 +23,16 @@ const HOT: f64 = 493.15;
 #[derive(clap::Args)]
 pub struct Options {
     /// Elements along x and y.
-    #[arg(long, default_value_t = 68, value_parser = super::elements)]
+    #[arg(long, default_value_t = 68, value_parser = crate::elements)]
     elements: usize,
     /// Layers, each an element high.
-    #[arg(long, default_value_t = 22, value_parser = super::elements)]
+    #[arg(long, default_value_t = 22, value_parser = crate::elements)]
     layers: usize,
     /// Elements across a line.
-    #[arg(long, default_value_t = 2, value_parser = super::elements)]
+    #[arg(long, default_value_t = 2, value_parser = crate::elements)]
     width: usize,
     /// Elements along a piece.
-    #[arg(long, default_value_t = 40, value_parser = super::elements)]
+    #[arg(long, default_value_t = 40, value_parser = crate::elements)]
     piece: usize,
     /// Births that are followed by a step.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
@@ -61,7 +61,7 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     let settings = match options.tolerance {
         Some(tolerance) => {
             let mut settings = Settings::adaptive(0.02 * options.step);
-            if let crate::time::Steps::Adaptive { tolerance: own, .. } = &mut settings.steps {
+            if let crystfem::time::Steps::Adaptive { tolerance: own, .. } = &mut settings.steps {
                 *own = tolerance;
             }
             settings
@@ -82,18 +82,18 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     let (work, births) = (simulation.state().work, f64::from(options.births));
     let size = simulation.state().temperature.len();
     let mut rows = Vec::new();
-    let mut push = |what: &str, value: f64, unit| {
+    let mut push = |what: &str, value: f64, unit: &str| {
         let threads = rayon::current_num_threads();
-        rows.push(Measurement { what: what.to_owned(), size: size as u64, threads, value, unit });
+        rows.push(Measurement::new(what, size, threads, value, unit));
     };
     push("build", built, "s");
     push("birth and steps", solved / births, "s/birth");
     push("steps", (work.steps + work.rejected - start.steps) as f64 / births, "/birth");
     push("CG iterations", (work.cg_iterations - start.cg_iterations) as f64 / births, "/birth");
-    push("material points", simulation.system.nodal.material.len() as f64 / size as f64, "/dof");
-    let matrix = &simulation.system.rows;
-    push("distinct rows", matrix.stored()[0] as f64 / size as f64, "/dof");
-    push("stored rows", matrix.bytes() as f64 / size as f64, "bytes/dof");
+    let [points, distinct, bytes] = simulation.storage().map(|count| count as f64 / size as f64);
+    push("material points", points, "/dof");
+    push("distinct rows", distinct, "/dof");
+    push("stored rows", bytes, "bytes/dof");
     for (what, memory) in [("memory at the start", at_start), ("memory", memory)] {
         if let Some(memory) = memory {
             push(what, memory / size as f64, "bytes/dof");
@@ -107,7 +107,7 @@ pub fn measure(options: &Options) -> Result<Vec<Measurement>, Failure> {
     Ok(rows)
 }
 
-fn problem(options: &Options) -> Result<Problem, crate::Error> {
+fn problem(options: &Options) -> Result<Problem, crystfem::Error> {
     let (count, layers) = (options.elements, options.layers);
     let cold = options.chamber + 273.15;
     let side = EDGE * count as f64;
@@ -123,7 +123,7 @@ fn problem(options: &Options) -> Result<Problem, crate::Error> {
         latent_heat: options.latent.then_some(209e3),
         seed: 0.0,
     })?);
-    let filled = |part: f64| -> Result<Arc<dyn ThermalMaterial>, crate::Error> {
+    let filled = |part: f64| -> Result<Arc<dyn ThermalMaterial>, crystfem::Error> {
         Ok(Arc::new(Filled::new(whole.clone(), part)?))
     };
     // from half to whole
@@ -161,43 +161,4 @@ fn problem(options: &Options) -> Result<Problem, crate::Error> {
     let conditions = vec![film(Where::Faces(bottom), 300.0), film(outer, 15.0)];
     let material_of = (0..mesh.element_count()).map(of).collect();
     Ok(Problem { conditions, births, materials, material_of, ..Problem::new(mesh, whole, cold) })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Cells filled in eight ways need the points of full ones and, of a million equations as of these, less than a packed copy for their
-    /// rows: after births as when all is built at once, but for lists that wait to be dropped.
-    #[test]
-    fn unequal_cells_need_little_more_than_equal_ones() {
-        let run = |fills| {
-            let options = Options {
-                elements: 24,
-                layers: 12,
-                width: 2,
-                piece: 12,
-                births: 100,
-                step: 0.5,
-                chamber: 80.0,
-                tolerance: None,
-                latent: false,
-                fills,
-            };
-            let mut simulation =
-                Simulation::new(problem(&options).unwrap(), Settings::backward_euler(0.5)).unwrap();
-            simulation.run_until(50.0).unwrap();
-            let state = simulation.state().clone();
-            let whole = Simulation::resume(simulation.problem.clone(), simulation.settings, state).unwrap();
-            [simulation, whole].map(|simulation| {
-                let size = simulation.system.size();
-                let points = simulation.system.nodal.material.len();
-                assert_eq!(simulation.state().memory.nodal.state.len(), points);
-                [simulation.system.rows.bytes() as f64 / size as f64, points as f64 / size as f64]
-            })
-        };
-        let ([equal, _], [unequal, whole]) = (run(1), run(8));
-        assert_eq!(equal[1], unequal[1]);
-        assert!(whole[0] <= 60.0 && unequal[0] <= 60.0 + 12.0, "{unequal:?} {whole:?}");
-    }
 }

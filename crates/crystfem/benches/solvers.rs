@@ -1,9 +1,9 @@
 //! Error against run time of the linear solvers, in short and long steps.
 
-use super::cube::{Cube, Start};
-use crate::run::Failure;
-use crate::simulation::{LinearSolver, Settings, Simulation};
-use polycore::case::terminal::Measurement;
+use crate::Failure;
+use crystfem::exact::cube::{Cube, Start};
+use crystfem::simulation::{LinearSolver, Settings, Simulation};
+use evidence::measurement::Measurement;
 use std::time::Instant;
 
 /// Lengths of steps, s; steps taken.
@@ -47,14 +47,9 @@ fn run(
     let error = cube.mean_square(&simulation, |lambda| (1.0 + dt * lambda).powi(-STEPS)).sqrt();
     let iterations = simulation.state().work.cg_iterations as f64 / f64::from(STEPS);
     let threads = rayon::current_num_threads();
-    let mut push = |quantity: &str, value: f64, unit| {
-        rows.push(Measurement {
-            what: format!("{name}: {quantity}, {dt} s a step"),
-            size: cube.size(),
-            threads,
-            value,
-            unit,
-        });
+    let mut push = |quantity: &str, value: f64, unit: &str| {
+        let what = format!("{name}: {quantity}, {dt} s a step");
+        rows.push(Measurement::new(what, cube.size(), threads, value, unit));
     };
     push("error", error, "K");
     push("time", step, "s/step");

@@ -58,10 +58,6 @@ pub mod table;
 pub mod thermal;
 pub mod time;
 
-// `cargo bench` compiles a file of `command`, in which this crate has its name
-#[cfg(feature = "case")]
-extern crate self as crystfem;
-
 #[cfg(feature = "case")]
 pub mod command;
 #[cfg(feature = "case")]

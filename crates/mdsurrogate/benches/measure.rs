@@ -1,20 +1,24 @@
-//! `mdsurrogate bench`: nanoseconds a point of stress, of tangent and of batches, of the thesis' network and of energies.
+//! `cargo xtask bench mdsurrogate`: nanoseconds a point of stress, of tangent and of batches, of the thesis' network and of energies.
 
-use crate::bench_points::{self, POINTS};
+use clap::Parser;
+use evidence::measurement::{Measurement, print};
 use mdsurrogate::Error;
 use mdsurrogate::network::Real;
 use mdsurrogate::surrogate::{Prediction, Surrogate, Workspace};
 use nalgebra::Scalar;
-use polycore::case::terminal::{Measurement, print_measurements};
+use points::POINTS;
 use std::hint::black_box;
 use std::time::Instant;
+
+mod points;
+mod training;
 
 /// Repetitions, of which the median counts.
 const REPEATS: usize = 15;
 
 /// What to measure.
-#[derive(clap::Args)]
-pub struct Bench {
+#[derive(Parser)]
+struct Bench {
     /// Print JSON rows {what, size, threads, value, unit}.
     #[arg(long)]
     json: bool,
@@ -23,30 +27,28 @@ pub struct Bench {
     training: bool,
     /// A law to measure instead of the built-in ones with random weights.
     law: Option<std::path::PathBuf>,
+    /// What `cargo bench` adds.
+    #[arg(long, hide = true)]
+    bench: bool,
 }
 
-impl Bench {
-    /// Measures and prints.
-    pub fn print(self) -> Result<bool, Error> {
-        if self.training {
-            print_measurements(&crate::bench_training::measure()?, self.json);
-            return Ok(true);
-        }
-        let mut rows = Vec::new();
-        for (name, law) in self.laws()? {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let bench = Bench::parse();
+    let mut rows = Vec::new();
+    if bench.training {
+        rows = training::measure()?;
+    } else {
+        let laws = match &bench.law {
+            Some(path) => vec![("law".into(), Surrogate::read(path)?)],
+            None => points::laws()?,
+        };
+        for (name, law) in laws {
             measure(&name, "f64", &law, &mut rows)?;
             measure(&name, "f32", &law.convert::<f32>()?, &mut rows)?;
         }
-        print_measurements(&rows, self.json);
-        Ok(true)
     }
-
-    fn laws(&self) -> Result<Vec<(String, Surrogate<f64>)>, Error> {
-        if let Some(path) = &self.law {
-            return Ok(vec![("law".into(), Surrogate::read(path)?)]);
-        }
-        bench_points::laws()
-    }
+    print(&rows, bench.json);
+    Ok(())
 }
 
 fn measure<T: Real + Scalar>(
@@ -55,13 +57,13 @@ fn measure<T: Real + Scalar>(
     law: &Surrogate<T>,
     rows: &mut Vec<Measurement>,
 ) -> Result<(), Error> {
-    let points = bench_points::points::<T>();
+    let points = points::points::<T>();
     let mut memory = Workspace::default();
     let mut predictions = vec![Prediction::default(); POINTS];
-    let size = law.header().architecture.parameters() as u64;
+    let size = law.header().architecture.parameters();
     let mut row = |what: &str, value: f64| {
         let what = format!("{name}, {precision}, {what}");
-        rows.push(Measurement { what, size, threads: 1, value, unit: "ns/point" });
+        rows.push(Measurement::new(what, size, 1, value, "ns/point"));
     };
     let single = median_time(|| {
         for (c, prediction) in points.iter().zip(&mut predictions) {

@@ -1,5 +1,6 @@
-//! `mdsurrogate bench --training`: seconds of an epoch of the thesis' network.
+//! `cargo xtask bench mdsurrogate -- --training`: seconds of an epoch of the thesis' network.
 
+use evidence::measurement::Measurement;
 use mdsurrogate::Error;
 use mdsurrogate::dataset::Row;
 use mdsurrogate::kinematics::cauchy_of_material;
@@ -7,7 +8,6 @@ use mdsurrogate::network::Architecture;
 use mdsurrogate::random::SplitMix64;
 use mdsurrogate::surrogate::Kind;
 use mdsurrogate::train::{Settings, Training};
-use polycore::case::terminal::Measurement;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 
 /// Training rows of the thesis: 80 % of 72,720.
@@ -38,13 +38,8 @@ pub fn measure() -> Result<Vec<Measurement>, Error> {
             times.push(training.epoch()?.seconds);
         }
         times.sort_by(f64::total_cmp);
-        measured.push(Measurement {
-            what: format!("mdsurrogate, epoch of ANN-4, batch {batch}"),
-            size: ROWS as u64,
-            threads: 1,
-            value: times[times.len() / 2],
-            unit: "s",
-        });
+        let what = format!("mdsurrogate, epoch of ANN-4, batch {batch}");
+        measured.push(Measurement::new(what, ROWS, 1, times[times.len() / 2], "s"));
     }
     Ok(measured)
 }

@@ -7,7 +7,6 @@ use peri::field::{CHUNK, Field};
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{Correspondence, EightChain, Material, NonlocalSolid, Response};
 use peri::potential::{KernelFit, Law};
-use peri::run::Failure;
 use polycore::constitutive::hyperelastic::{Compressible, NeoHookean, Volumetric};
 use polycore::constitutive::network::Activation::Softplus;
 use polycore::constitutive::surrogate::{Header, Kind, Surrogate, Symmetry};
@@ -17,15 +16,15 @@ use rayon::prelude::*;
 pub const RATIO: f64 = 3.015;
 
 /// A square or cube of about so many particles.
-pub fn block<const D: usize>(particles: f64) -> Result<Lattice<D>, Failure> {
+pub fn block<const D: usize>(particles: f64) -> Result<Lattice<D>, Error> {
     let side = particles.powf(1.0 / D as f64).round();
     let body = [Operation::Add(Shape::Box { min: [0.0; D], max: [side; D] })];
-    Ok(lattice(&body, 1.0, 1.0)?)
+    lattice(&body, 1.0, 1.0)
 }
 
 /// Its bonds.
-pub fn bonds<const D: usize>(lattice: Lattice<D>) -> Result<LatticeBonds<D>, Failure> {
-    Ok(LatticeBonds::new(lattice, RATIO, VolumeCorrection::None, &[])?)
+pub fn bonds<const D: usize>(lattice: Lattice<D>) -> Result<LatticeBonds<D>, Error> {
+    LatticeBonds::new(lattice, RATIO, VolumeCorrection::None, &[])
 }
 
 /// Gives bonds a law, fitted for these stretches, and a displacement for them to act on.
@@ -33,7 +32,7 @@ pub fn loaded<const D: usize>(
     bonds: &mut dyn Bonds<D>,
     law: Law,
     range: [f64; 2],
-) -> Result<(KernelFit, Field<D>), Failure> {
+) -> Result<(KernelFit, Field<D>), Error> {
     let space = if D == 2 { Space::PlaneStress } else { Space::Solid };
     let built = law.build(720.0, 1200.0, false)?;
     let fit = KernelFit::new(&*built, range, 1e-9)?;
@@ -51,7 +50,7 @@ pub type Named<const D: usize> = (&'static str, Box<dyn Response<D>>);
 
 /// Solids with two passes, by name: chains of 25 links, and by correspondence neo-Hookean rubber, K/μ = 100, and a learnt law, a
 /// network of 209 weights that are random: its speed does not depend on them.
-pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Failure> {
+pub fn solids<const D: usize>(bonds: &dyn Bonds<D>) -> Result<[Named<D>; 3], Error> {
     let space = if D == 2 { Space::PlaneStrain } else { Space::Solid };
     let law =
         NeoHookean::new(1.0).and_then(|law| Compressible::new(law, Volumetric::Ciarlet { lame: 100.0 }));

@@ -4,9 +4,9 @@
 //! specimen. As in the kernels, what comes in is e = l² − 1 and what goes out q = t/l: tables need a square root. Error:
 //! the largest of q over its root mean square, against the law itself.
 
-use crate::Error;
-use crate::potential::{BondPotential, KernelFit, Law};
-use polycore::case::terminal::Measurement;
+use evidence::measurement::Measurement;
+use peri::Error;
+use peri::potential::{BondPotential, KernelFit, Law};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -33,7 +33,7 @@ pub fn measure() -> Result<Vec<Measurement>, Error> {
         let error = found.iter().zip(&exact).map(|(f, e)| (f - e).abs()).fold(0.0, f64::max) / rms;
         let mut row = |what: &str, value, unit| {
             let what = format!("{name}: {what}");
-            rows.push(Measurement { what, size: ROW as u64, threads: 1, value, unit });
+            rows.push(Measurement::new(what, ROW, 1, value, unit));
         };
         row("largest error", error, "");
         row("time", nanoseconds(&strains, &mut found, way), "ns/bond");
@@ -91,7 +91,7 @@ fn evaluate(fit: &KernelFit, strains: &[f64], found: &mut [f64]) {
 }
 
 fn nanoseconds(strains: &[f64], found: &mut [f64], way: &dyn Fn(&[f64], &mut [f64])) -> f64 {
-    let mut times: Vec<f64> = (0..super::REPEATS)
+    let mut times: Vec<f64> = (0..crate::REPEATS)
         .map(|_| {
             let since = Instant::now();
             for _ in 0..ROWS {
@@ -101,7 +101,7 @@ fn nanoseconds(strains: &[f64], found: &mut [f64], way: &dyn Fn(&[f64], &mut [f6
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    times[super::REPEATS / 2]
+    times[crate::REPEATS / 2]
 }
 
 /// Tension and its derivative at equally spaced stretches.

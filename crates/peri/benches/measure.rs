@@ -1,12 +1,13 @@
-//! `peri bench`: bond evaluations per second, bytes per particle, and the machine's bandwidth beside them.
+//! `cargo xtask bench peri`: bond evaluations per second, bytes per particle, and the machine's bandwidth beside them.
 
-use crate::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
-use crate::field::Field;
-use crate::material::relief;
-use crate::potential::Law;
-use crate::run::Failure;
+use clap::Parser;
+use evidence::measurement::{Measurement, print};
 use kernel::RATIO;
-use polycore::case::terminal::{Measurement, print_measurements};
+use peri::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
+use peri::field::Field;
+use peri::material::relief;
+use peri::potential::Law;
+use polycore::case::terminal::Threads;
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -21,9 +22,11 @@ const WIDE: [f64; 2] = [0.5, 3.0];
 /// Repetitions, of which the median counts.
 const REPEATS: usize = 7;
 
+type Failure = Box<dyn std::error::Error>;
+
 /// What to measure.
-#[derive(clap::Args)]
-pub struct Bench {
+#[derive(Parser)]
+struct Bench {
     /// Print JSON rows {what, size, threads, value, unit}.
     #[arg(long)]
     json: bool,
@@ -40,44 +43,38 @@ pub struct Bench {
     /// Time this instead: ways to evaluate the bond law, each with its error.
     #[arg(long, conflicts_with_all = ["block", "solvers"])]
     laws: bool,
+    #[command(flatten)]
+    threads: Threads,
+    /// What `cargo bench` adds.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+fn main() -> Result<(), Failure> {
+    let bench = Bench::parse();
+    bench.threads.apply()?;
+    let rows = match bench.block.block {
+        Some(cells) => block::measure(cells, &bench.block)?,
+        None if !bench.solvers.solvers.is_empty() => solvers::measure(&bench.solvers.solvers)?,
+        None if bench.laws => laws::measure()?,
+        None => bench.rates()?,
+    };
+    print(&rows, bench.json);
+    Ok(())
 }
 
 impl Bench {
-    /// Measures and prints.
-    pub fn print(self) -> Result<bool, Failure> {
-        let rows = match self.block.block {
-            Some(cells) => block::measure(cells, &self.block)?,
-            None if !self.solvers.solvers.is_empty() => solvers::measure(&self.solvers.solvers)?,
-            None if self.laws => laws::measure()?,
-            None => self.rates()?,
-        };
-        print_measurements(&rows, self.json);
-        Ok(true)
-    }
-
     fn rates(&self) -> Result<Vec<Measurement>, Failure> {
         let mut rows = Vec::new();
         for &threads in &self.bench_threads {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| {
-                crate::Error::Parameter {
-                    name: "--bench-threads",
-                    found: threads as f64,
-                    allowed: error.to_string(),
-                }
-            })?;
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
             pool.install(|| self.measure(threads, &mut rows))?;
         }
         Ok(rows)
     }
 
     fn measure(&self, threads: usize, rows: &mut Vec<Measurement>) -> Result<(), Failure> {
-        rows.push(Measurement {
-            what: "STREAM triad".into(),
-            size: 1 << 25,
-            threads,
-            value: triad(),
-            unit: "B/s",
-        });
+        rows.push(Measurement::new("STREAM triad", 1 << 25, threads, triad(), "B/s"));
         for size in [1e4, 1e5, 1e6, 1e7_f64] {
             if size > self.largest {
                 break;
@@ -146,7 +143,7 @@ fn measure_dimension<const D: usize>(
         cloud.set_relief(theta);
         let what = format!("{D}D list, its relief");
         let value = start.elapsed().as_secs_f64();
-        rows.push(Measurement { what, size: total as u64, threads, value, unit: "s" });
+        rows.push(Measurement::new(what, total, threads, value, "s"));
         measure_solids(&mut cloud, "relieved list", seconds, threads, rows)?;
     }
     Ok(())
@@ -167,11 +164,11 @@ fn measure_solids<const D: usize>(
             kernel::both_passes(&mut *solid, bonds, &displacement, &mut out);
             black_box(&out);
         });
-        let (size, rate) = (bonds.particles().len() as u64, bonds.directed_bonds() as f64 / seconds);
+        let (size, rate) = (bonds.particles().len(), bonds.directed_bonds() as f64 / seconds);
         let what = format!("{D}D {path} {name}, both passes");
-        rows.push(Measurement { what: what.clone(), size, threads, value: rate, unit: "directed bonds/s" });
+        rows.push(Measurement::new(&what, size, threads, rate, "directed bonds/s"));
         let what = format!("{what}, over {} {}–{}", Law::ChainOffset.name(), WIDE[0], WIDE[1]);
-        rows.push(Measurement { what, size, threads, value: seconds / bond_law, unit: "" });
+        rows.push(Measurement::new(what, size, threads, seconds / bond_law, ""));
     }
     Ok(())
 }
@@ -209,21 +206,15 @@ fn measure_bonds<const D: usize>(
         force(bonds, &displacement, &mut out);
         black_box(&out);
     });
-    let size = bonds.particles().len() as u64;
+    let size = bonds.particles().len();
     let what = format!("{D}D {path} {} {}–{} ({})", law.name(), range[0], range[1], fit.kind());
     let rate = bonds.directed_bonds() as f64 / seconds;
-    rows.push(Measurement { what: what.clone(), size, threads, value: rate, unit: "directed bonds/s" });
+    rows.push(Measurement::new(&what, size, threads, rate, "directed bonds/s"));
     if law == Law::Linear || path == "list" && range != WIDE {
         // bonds and particles; displacement, velocity, force and mass of the solver
         let solver = bonds.sites() * 8 * (3 * D + 1);
         let bytes = (bonds.bytes() + solver) as f64 / size as f64;
-        rows.push(Measurement {
-            what: format!("{D}D {path} memory"),
-            size,
-            threads,
-            value: bytes,
-            unit: "B/particle",
-        });
+        rows.push(Measurement::new(format!("{D}D {path} memory"), size, threads, bytes, "B/particle"));
     }
     Ok(seconds)
 }

@@ -3,18 +3,18 @@
 //! The plate with a hole of `cases/ch2/plate-with-hole`, from rest to equilibrium in one load step. Error: the largest
 //! difference of displacements from the same lattice's equilibrium at a residual of 1e-11, over the root mean square.
 
-use super::RATIO;
-use crate::Error;
-use crate::bonds::{Bonds, LatticeBonds, VolumeCorrection};
-use crate::calibrate::{Space, modulus};
-use crate::geometry::{Operation, Shape, lattice};
-use crate::material::BondMaterial;
-use crate::potential::{BondPotential, Law};
-use crate::solver::{
+use crate::RATIO;
+use evidence::measurement::Measurement;
+use peri::Error;
+use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
+use peri::calibrate::{Space, modulus};
+use peri::geometry::{Operation, Shape, lattice};
+use peri::material::BondMaterial;
+use peri::potential::{BondPotential, Law};
+use peri::solver::{
     DynamicRelaxation, Equilibrium, Lbfgs, LbfgsSolver, Loads, RelaxationSolver, State, Support, System,
     load_stepping,
 };
-use polycore::case::terminal::Measurement;
 use std::time::Instant;
 
 /// Half a side of the plate, its thickness, and the hole's radius, m.
@@ -37,7 +37,7 @@ pub struct Options {
 }
 
 fn spacing(text: &str) -> Result<f64, String> {
-    super::block::within(text, 0.5, 20.0)
+    crate::block::within(text, 0.5, 20.0)
 }
 
 /// Every method at every tolerance.
@@ -52,13 +52,9 @@ pub fn measure(spacings: &[f64]) -> Result<Vec<Measurement>, Error> {
                 let state = plate.solve(method, tolerance)?;
                 let seconds = start.elapsed().as_secs_f64();
                 let mut row = |what: &str, value: f64, unit: &'static str| {
-                    rows.push(Measurement {
-                        what: format!("{method} {tolerance:e}: {what}"),
-                        size: plate.bonds.particles().len() as u64,
-                        threads: rayon::current_num_threads(),
-                        value,
-                        unit,
-                    });
+                    let (what, size) =
+                        (format!("{method} {tolerance:e}: {what}"), plate.bonds.particles().len());
+                    rows.push(Measurement::new(what, size, rayon::current_num_threads(), value, unit));
                 };
                 row("error", plate.apart(&state, &exact), "");
                 row("force evaluations", state.evaluations as f64, "");

@@ -47,8 +47,8 @@ impl Cube {
     }
 
     /// Equations.
-    pub fn size(&self) -> u64 {
-        (self.elements as u64 + 1).pow(3)
+    pub fn size(&self) -> usize {
+        (self.elements + 1).pow(3)
     }
 
     /// As finite elements.
