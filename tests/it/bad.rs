@@ -48,7 +48,8 @@ pub fn write_bad_scenes(program: &str, folder: &Path) -> Vec<BadScene> {
         };
         let (expected, patch): (Vec<&str>, Vec<&str>) = lines.partition(|line| line.starts_with("? "));
         let expected = expected.into_iter().map(|line| line[2..].to_owned()).collect();
-        let text = patched(&base, &patch).unwrap_or_else(|line| panic!("{name}: `{line}` is not in its base"));
+        let text =
+            patched(&base, &patch).unwrap_or_else(|line| panic!("{name}: `{line}` is not in its base"));
         let text = text.replace("../../", &format!("{}/", workspace().display()));
         fs::write(folder.join(format!("{name}.toml")), &text).unwrap();
         BadScene { name: name.to_owned(), text, expected }

@@ -4,8 +4,8 @@
 //! 2000 mutations of each kind, the same ones every time; `FRONT_DOOR=100000 cargo test --release -p tests front_door`
 //! takes that many, new ones every time. What it finds is kept in tests/proptest-regressions and tried first.
 
-use crate::bad::write_bad_scenes;
 use crate::allocations;
+use crate::bad::write_bad_scenes;
 use crate::program::workspace;
 use polycore::scene::Source;
 use proptest::prelude::*;

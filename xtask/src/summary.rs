@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use polycore::report::Kind;
 
-use super::outcome::Outcome;
+use crate::outcome::Outcome;
 use crate::table::Table;
 
 /// Every expectation of every case, seconds by case, and a last line of sums.
@@ -67,8 +67,8 @@ pub fn kinds(outcomes: &[Outcome]) -> Vec<(Kind, usize)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::outcome::tests::{outcome, report};
     use super::*;
+    use crate::outcome::tests::{outcome, report};
 
     #[test]
     fn tables() {

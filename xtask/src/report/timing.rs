@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 use super::pictures;
 use super::points::{of_curves, of_table, pairs};
 use crate::bench;
+use crate::outcome::Outcome;
 use crate::stamp::Stamp;
-use crate::validate::outcome::Outcome;
 use crate::workspace::Workspace;
 
 /// The alternatives, cases/timing.toml.

@@ -1,7 +1,7 @@
 //! Several runs side by side: a row for each, with what is left at its end.
 
 use crate::output::atomic_write;
-use crate::report::{Report, Value};
+use crate::report::{Report, Value, aligned};
 use std::path::Path;
 
 /// Statistics of a field: its mean by volume, its extremes, and its standard deviation, which measures uniformity.
@@ -128,18 +128,7 @@ impl Rows {
             }
             table.push(line);
         }
-        // what is long and stands alone may stick out
-        let mut widths = vec![0; table[0].len()];
-        for line in table.iter().filter(|line| line.len() == table[0].len()) {
-            for (width, cell) in widths.iter_mut().zip(line) {
-                *width = (*width).max(cell.chars().count());
-            }
-        }
-        let line = |line: &Vec<String>| {
-            let cells = line.iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}"));
-            cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
-        };
-        table.iter().map(line).collect()
+        aligned(&table)
     }
 
     /// The table as CSV, with all digits; what a run does not tell is empty.
