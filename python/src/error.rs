@@ -1,7 +1,7 @@
 //! Errors as exceptions.
 
-use polycore::case::Fault;
-use polycore::scene::Failure;
+use harness::case::Fault;
+use harness::scene::Failure;
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::path::Path;

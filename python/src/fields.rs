@@ -1,8 +1,8 @@
 //! Fields over time, read from VTKHDF files.
 
 use crate::error::file;
+use harness::output::vtkhdf;
 use numpy::{IntoPyArray, PyArray1, PyArrayDyn, PyArrayMethods};
-use polycore::output::vtkhdf;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;

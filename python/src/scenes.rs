@@ -2,12 +2,12 @@
 
 use crate::error::failure;
 use crate::watch::{Line, Watchers, left_alone, watched};
-use crystfem::run::Crystfem;
-use peri::run::Peri;
-use polycore::case::{self, Case, Fault, Finished, Options, Part, Step, SweepOptions, Vary};
-use polycore::checkpoint::Header;
-use polycore::report::Report;
-use polycore::scene::{Failure, Source};
+use crystfem::program::run::Crystfem;
+use harness::case::{self, Case, Fault, Finished, Options, Part, Step, SweepOptions, Vary};
+use harness::checkpoint::Header;
+use harness::report::Report;
+use harness::scene::{Failure, Source};
+use peri::program::run::Peri;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
@@ -70,9 +70,9 @@ pub fn resume(py: Python<'_>, program: &str, how: Behaviour) -> PyResult<(String
 fn resume_of<C: Case>(py: Python<'_>, how: Behaviour) -> PyResult<(String, String)> {
     let output = &how.output;
     let there = |name: &str| output.join(name).is_file();
-    if !there(polycore::checkpoint::FILE_NAME) && there(polycore::report::FILE_NAME) {
+    if !there(harness::checkpoint::FILE_NAME) && there(harness::report::FILE_NAME) {
         let report =
-            Report::read(output.join(polycore::report::FILE_NAME)).map_err(|e| crate::error::file(&e))?;
+            Report::read(output.join(harness::report::FILE_NAME)).map_err(|e| crate::error::file(&e))?;
         return told(&report.clone().into());
     }
     let header = Header::read(output, C::PROGRAM.magic)
@@ -213,5 +213,5 @@ pub fn schema(program: &str) -> PyResult<String> {
 /// The page of a run in a folder, as HTML.
 #[pyfunction]
 pub fn view(py: Python<'_>, folder: PathBuf) -> PyResult<String> {
-    py.detach(|| polycore::view::view(folder)).map_err(|error| crate::error::file(&error))
+    py.detach(|| harness::view::view(folder)).map_err(|error| crate::error::file(&error))
 }

@@ -1,7 +1,7 @@
 //! Long work on a thread of its own, while the caller's thread hears signals and calls Python's functions.
 
+use harness::case::{Step, StepField};
 use numpy::{IntoPyArray, PyArrayMethods};
-use polycore::case::{Step, StepField};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

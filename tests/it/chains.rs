@@ -3,7 +3,7 @@
 use crate::program::{Ended, command, finish, peri};
 use crate::results::{assert_same, report, scalar};
 use evidence::near;
-use polycore::output::vtkhdf::{Cells, MeshSeries, ParticleSeries, read};
+use harness::output::vtkhdf::{Cells, MeshSeries, ParticleSeries, read};
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};

@@ -3,7 +3,7 @@
 use crate::program::{command, finish, peri, workspace};
 use crate::results::{report, scalar};
 use crate::scenes;
-use polycore::output::vtkhdf;
+use harness::output::vtkhdf;
 use std::fs;
 use std::path::Path;
 
@@ -111,7 +111,7 @@ fn inputs_of_mdsurrogate_that_cannot_be_used() {
     run(ask).with_code(2).tells("point 1 of the list");
     fs::write(here.join("strains.csv"), "C11,C22,C33,C12\n1,1,1,0\n1,1,1,0.3\n").unwrap();
     run(ask).with_code(0).shows("2 predictions, 2 of them flagged");
-    let answers = polycore::output::csv::read(here.join("answers.csv")).unwrap();
+    let answers = harness::output::csv::read(here.join("answers.csv")).unwrap();
     let column = |name: &str| &answers.iter().find(|(heading, _)| heading == name).unwrap().1;
     // an energy has no stress at rest; C11 = 1 was no training row; shear was never seen
     assert_eq!(column("S11 [MPa]")[0], 0.0);

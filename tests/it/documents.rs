@@ -111,6 +111,7 @@ fn ours(words: &[String]) -> Option<(&str, Vec<&str>)> {
                 words[..end].iter().position(|&w| w == flag).and_then(|at| words.get(at + 1)).copied()
             };
             let package = package.or(after("-p")).or(after("--package")).or(after("--bin"))?;
+            let package = package.strip_suffix("-cli").unwrap_or(package);
             Some((package, words.get(end + 1..).unwrap_or_default().to_vec()))
         }
         [program, ..] => {

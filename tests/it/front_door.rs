@@ -7,7 +7,7 @@
 use crate::allocations;
 use crate::bad::write_bad_scenes;
 use crate::program::workspace;
-use polycore::scene::Source;
+use harness::scene::Source;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
 use std::fs;
@@ -215,7 +215,7 @@ fn cases(program: &str) -> Vec<PathBuf> {
 }
 
 /// Opens scenes given as a text by `open`.
-fn attack_scenes(files: &[PathBuf], open: impl Fn(&Source) -> Result<(), polycore::scene::SceneError>) {
+fn attack_scenes(files: &[PathBuf], open: impl Fn(&Source) -> Result<(), harness::scene::SceneError>) {
     attack("scene", files, "scene.toml", |bytes| {
         let source = Source::new("scene.toml", String::from_utf8_lossy(bytes).into_owned());
         open(&source).map_err(|error| error.render())
@@ -241,14 +241,14 @@ fn scenes_of_peri() {
     let bad = write_bad_scenes("peri", folder.path());
     files.extend(bad.iter().map(|scene| folder.path().join(format!("{}.toml", scene.name))));
     attack_scenes(&files, |source| {
-        let scene = source.parse::<peri::scene::Scene>()?;
-        peri::scene::check(source, &scene, false).map(|_| ())
+        let scene = source.parse::<peri::program::scene::Scene>()?;
+        peri::program::scene::check(source, &scene, false).map(|_| ())
     });
 }
 
 #[test]
 fn scenes_of_crystfem() {
-    use crystfem::scene::{FitScene, Kind, PartScene, PointScene, kind};
+    use crystfem::program::scene::{FitScene, Kind, PartScene, PointScene, kind};
     attack_scenes(&cases("crystfem"), |source| match kind(source)? {
         Kind::Part => source.parse::<PartScene>()?.check(source),
         Kind::Point => source.parse::<PointScene>().map(|_| ()),
@@ -260,7 +260,7 @@ fn scenes_of_crystfem() {
 fn scenes_of_mdsurrogate() {
     let mut files = cases("mdsurrogate");
     files.extend(below("crates/mdsurrogate/tests/bad", ".toml"));
-    attack_scenes(&files, |source| source.parse::<mdsurrogate::scene::Scene>()?.check(source));
+    attack_scenes(&files, |source| source.parse::<mdsurrogate::program::scene::Scene>()?.check(source));
 }
 
 #[test]
@@ -308,7 +308,7 @@ fn tables() {
     let mut files = below("cases", ".csv");
     files.extend(below("tests/bad/clouds", ".csv"));
     attack_files("CSV", &files, "table.csv", |path| {
-        polycore::output::csv::read(path).map(|_| ()).map_err(|error| error.to_string())
+        harness::output::csv::read(path).map(|_| ()).map_err(|error| error.to_string())
     });
     attack_files("history", &below("cases/ch4", ".csv"), "history.csv", |path| {
         crystfem::history::History::read(path).map(|_| ()).map_err(|error| error.to_string())
@@ -377,13 +377,13 @@ fn laws_of_a_surrogate() {
 
 #[test]
 fn checkpoints() {
-    const MAGIC: &polycore::checkpoint::Magic = b"fronting";
+    const MAGIC: &harness::checkpoint::Magic = b"fronting";
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a");
     let value: Vec<(String, Vec<f64>)> = (0..9).map(|k| (format!("field {k}"), vec![0.5; 20 * k])).collect();
-    polycore::checkpoint::write(&path, MAGIC, &value).unwrap();
+    harness::checkpoint::write(&path, MAGIC, &value).unwrap();
     attack_files("checkpoint", &[path], "checkpoint.bin", |path| {
-        match polycore::checkpoint::read::<Vec<(String, Vec<f64>)>>(path, MAGIC) {
+        match harness::checkpoint::read::<Vec<(String, Vec<f64>)>>(path, MAGIC) {
             // its checksum lets nothing through
             Ok(read) if read != value => Err("a damaged checkpoint was read".to_owned()),
             Ok(_) => Ok(()),

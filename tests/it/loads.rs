@@ -4,9 +4,9 @@
 use crate::program::peri;
 use crate::results::{report, scalar};
 use crate::scenes;
-use peri::scene::{Scene, quantities_of};
-use polycore::output::vtkhdf;
-use polycore::scene::Source;
+use harness::output::vtkhdf;
+use harness::scene::Source;
+use peri::program::scene::{Scene, quantities_of};
 use serde_json::Value;
 use std::fs;
 

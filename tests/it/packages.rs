@@ -28,19 +28,21 @@ fn no_crate_is_built_with_what_it_does_not_need() {
         let has = |name: &str| tree.iter().any(|other| other == name);
         assert_eq!(has("safetensors"), package != "crystfem", "{package}");
         assert_eq!(has("ndarray"), package == "polycore", "{package}");
+        assert_eq!(has("harness"), package != "polycore", "{package}");
         for other in ["peri", "crystfem", "mdsurrogate", "evidence"] {
             assert!(package == other || !tree.iter().any(|name| name == other), "{package}: {other}");
         }
     }
 }
 
-/// A library without scenes brings no scene format, no errors with carets, no pictures, no command line. Data sets of
-/// `mdsurrogate` are tables: it reads CSV, too.
+/// A library without scenes brings no harness, scene format, errors with carets, pictures or command line. Data sets of
+/// `mdsurrogate` and tool paths of `crystfem` are tables: they read CSV, too.
 #[test]
 fn libraries_bring_no_shell() {
     for package in ["polycore", "peri", "crystfem", "mdsurrogate"] {
         let tree = tree(package, &["--no-default-features"]);
         for name in [
+            "harness",
             "miette",
             "toml",
             "schemars",
@@ -53,7 +55,7 @@ fn libraries_bring_no_shell() {
             "plotly",
             "burn",
         ] {
-            let reads_tables = package == "mdsurrogate" && name == "csv";
+            let reads_tables = package != "polycore" && package != "peri" && name == "csv";
             assert!(reads_tables || !tree.iter().any(|other| other == name), "{package}: {name}");
         }
         // a library takes the laws that its user passes

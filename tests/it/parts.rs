@@ -2,7 +2,7 @@
 
 use crate::program::{command, finish};
 use crate::results::{assert_same, report, scalar, timeless};
-use polycore::output::vtkhdf;
+use harness::output::vtkhdf;
 use std::fs;
 use std::path::Path;
 
@@ -105,7 +105,7 @@ fn a_printed_bar() {
     let temperature = series.data(0, "temperature_degC").unwrap();
     assert!(temperature.iter().any(|t| t.is_nan()) && temperature.iter().all(|t| t.is_nan() || *t >= 99.9));
     // the probe lies between nodes of the second layer: it begins with that, and its values are between theirs
-    let rows = polycore::output::csv::read(out.join("probe_middle.csv")).unwrap();
+    let rows = harness::output::csv::read(out.join("probe_middle.csv")).unwrap();
     let of = |name: &str| &rows.iter().find(|(heading, _)| heading.starts_with(name)).unwrap().1;
     assert!((10.0..10.1).contains(&of("time")[0]), "{}", of("time")[0]);
     let last = series.data(12, "temperature_degC").unwrap();

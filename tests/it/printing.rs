@@ -3,7 +3,7 @@
 use crate::parts::BAR;
 use crate::program::{Ended, command, finish};
 use crate::results::{report, scalar};
-use polycore::output::vtkhdf;
+use harness::output::vtkhdf;
 use std::fs;
 use std::path::Path;
 

@@ -8,7 +8,8 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 /// Packages whose command lines, and the module of Python, are tested.
-pub const PACKAGES: [&str; 6] = ["crystfem", "mdsurrogate", "peri", "polycore", "polymech", "xtask"];
+pub const PACKAGES: [&str; 7] =
+    ["crystfem", "mdsurrogate", "peri", "polycore", "polycore-cli", "polymech", "xtask"];
 
 /// Longer than any of these tests takes on a busy machine: a program that hangs ends here.
 const PATIENCE: Duration = Duration::from_secs(240);

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 
 pub use evidence::measurement::Measurement as Row;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
-use polycore::output::atomic_write;
+use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
 
 use crate::stamp::{Stamp, sources};

@@ -61,7 +61,8 @@ pub fn text(workspace: &Workspace, programs: &[String]) -> Result<String> {
 /// Name and version of all crates that the programs are linked with on this machine.
 fn linked(workspace: &Workspace, programs: &[String]) -> Result<BTreeSet<String>> {
     let mut arguments = vec!["tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}"];
-    programs.iter().for_each(|program| arguments.extend(["--package", program]));
+    let packages: Vec<String> = programs.iter().filter_map(|program| workspace.package(program)).collect();
+    packages.iter().for_each(|package| arguments.extend(["--package", package]));
     let tree = cargo(workspace, &arguments)?;
     let of = |line: &str| {
         let (name, rest) = line.split_once(" v")?;

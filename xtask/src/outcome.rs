@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use polycore::report::{Judgement, Report, Value};
+use harness::report::{Judgement, Report, Value};
 
 /// What became of a case.
 #[derive(Default)]
@@ -125,7 +125,7 @@ fn shown(value: f64) -> String {
 
 /// How far a value lies outside what was requested.
 fn beyond(judgement: &Judgement) -> Option<String> {
-    use polycore::report::Bound;
+    use harness::report::Bound;
     let value = judgement.value.filter(|value| value.is_finite())?;
     let distance = match judgement.expect.bound {
         Bound::Near { reference, tolerance } => (value - reference).abs() - tolerance.distance(reference),
@@ -140,7 +140,7 @@ fn beyond(judgement: &Judgement) -> Option<String> {
 #[cfg(test)]
 pub mod tests {
     use super::*;
-    use polycore::report::Named;
+    use harness::report::Named;
 
     /// The text of a report with one expectation: kt = 3 ± 1 %.
     pub fn report(value: f64) -> String {

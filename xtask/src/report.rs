@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use harness::report::{Judgement, Provenance};
 use miette::{IntoDiagnostic, Result, miette};
-use polycore::output::atomic_write;
-use polycore::report::{Judgement, Provenance};
+use polycore::file::atomic_write;
 use serde::Serialize;
 
 use crate::outcome::Outcome;

@@ -4,8 +4,8 @@ use std::fmt;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use harness::report::Report;
 use miette::{IntoDiagnostic, Result, WrapErr};
-use polycore::report::Report;
 use serde::{Deserialize, Serialize};
 
 /// Of a bench's rows, or of a number that a test measured.

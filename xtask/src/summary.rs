@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use polycore::report::Kind;
+use harness::report::Kind;
 
 use crate::outcome::Outcome;
 use crate::table::Table;

@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use polycore::report::aligned;
+use harness::report::aligned;
 
 /// To standard output; a closed pipe is no reason to fail.
 pub fn print(text: &str) {

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use harness::report::Judgement;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
-use polycore::output::atomic_write;
-use polycore::report::Judgement;
+use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 

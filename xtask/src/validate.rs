@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use harness::case::Shard;
+use harness::scene::Source;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
-use polycore::case::Shard;
-use polycore::scene::Source;
 
 use crate::outcome::Outcome;
 use crate::report;

@@ -62,12 +62,13 @@ impl Workspace {
     /// Builds one of our programs and gives the path of its executable.
     pub fn release(&self, program: &str) -> Result<PathBuf> {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        if program.is_empty() || !program.chars().all(plain) || !self.has_program(program) {
+        let package = self.package(program).filter(|_| !program.is_empty() && program.chars().all(plain));
+        let Some(package) = package else {
             let known = self.programs().join(", ");
             return Err(miette!("there is no program `{program}` in crates/ (there are: {known})"));
-        }
-        if !self.cargo(&["build", "--release", "--quiet", "--package", program], &[], &[])? {
-            return Err(miette!("`cargo build --release --package {program}` failed"));
+        };
+        if !self.cargo(&["build", "--release", "--quiet", "--package", &package], &[], &[])? {
+            return Err(miette!("`cargo build --release --package {package}` failed"));
         }
         Ok(self.target.join("release").join(program).with_extension(std::env::consts::EXE_EXTENSION))
     }
@@ -100,15 +101,17 @@ impl Workspace {
         self.root.join("crates").join(name).join("benches/measure.rs").is_file()
     }
 
-    fn has_program(&self, name: &str) -> bool {
-        self.root.join("crates").join(name).join("src/main.rs").is_file()
+    /// The package of a program: its own name, or `NAME-cli` where that is the name of a library alone.
+    pub fn package(&self, program: &str) -> Option<String> {
+        let has_main = |name: &String| self.root.join("crates").join(name).join("src/main.rs").is_file();
+        [program.to_owned(), format!("{program}-cli")].into_iter().find(has_main)
     }
 
-    /// The crates with a command line.
+    /// The programs, by name.
     pub fn programs(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.root.join("crates")).into_iter().flatten().flatten();
         let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        let mut names: Vec<String> = names.filter(|name| self.has_program(name)).collect();
+        let mut names: Vec<String> = names.filter(|name| self.package(name).is_some()).collect();
         names.sort();
         names
     }

@@ -2,7 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use evidence::measurement::print as print_rows;
-use polycore::case::terminal::Threads;
+use harness::case::terminal::Threads;
 
 mod brick;
 mod integrators;

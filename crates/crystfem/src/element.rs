@@ -79,7 +79,6 @@ pub fn node_volumes(mesh: &Mesh, element: u32) -> Option<[f64; WIDE]> {
 }
 
 /// Volume, m³; 0 of an element that is not valid.
-#[cfg(feature = "case")]
 pub fn volume(mesh: &Mesh, element: u32) -> f64 {
     node_volumes(mesh, element).map_or(0.0, |volumes| volumes.iter().sum())
 }

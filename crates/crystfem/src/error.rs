@@ -100,10 +100,3 @@ pub enum Error {
     #[error(transparent)]
     Shared(#[from] polycore::Error),
 }
-
-#[cfg(feature = "case")]
-impl From<Error> for polycore::scene::Failure<Error> {
-    fn from(error: Error) -> Self {
-        Self::Run(error)
-    }
-}

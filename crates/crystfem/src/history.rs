@@ -114,7 +114,6 @@ impl History {
     ///
     /// # Errors
     /// [`Error::File`] as `table::read`, and where times decrease.
-    #[cfg(feature = "case")]
     pub fn read(path: &std::path::Path) -> Result<Self, Error> {
         use crate::table::{Column, read_with_lines};
         use polycore::units::dimension::{TemperatureDimension, TimeDimension};

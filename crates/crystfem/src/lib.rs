@@ -52,19 +52,10 @@ pub mod problem;
 pub mod simulation;
 mod solver;
 mod system;
-#[cfg(feature = "case")]
 pub mod table;
-#[cfg(feature = "case")]
-pub mod thermal;
 pub mod time;
 
 #[cfg(feature = "case")]
-pub mod command;
-#[cfg(feature = "case")]
-pub mod quantities;
-#[cfg(feature = "case")]
-pub mod run;
-#[cfg(feature = "case")]
-pub mod scene;
+pub mod program;
 
 pub use error::Error;

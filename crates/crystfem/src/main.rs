@@ -1,5 +1,5 @@
 //! The `crystfem` command line.
 
 fn main() -> std::process::ExitCode {
-    crystfem::command::main()
+    crystfem::program::command::main()
 }

@@ -146,10 +146,3 @@ pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> O
 fn hint(similar: &Option<String>) -> String {
     similar.as_ref().map_or(String::new(), |name| format!("; did you mean `{name}`?"))
 }
-
-#[cfg(feature = "case")]
-impl From<Error> for polycore::scene::Failure<Error> {
-    fn from(error: Error) -> Self {
-        Self::Run(error)
-    }
-}

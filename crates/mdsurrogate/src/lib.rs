@@ -70,12 +70,12 @@ pub mod search;
 #[cfg(feature = "train")]
 pub mod train;
 
+// `cargo bench` compiles a file of `program`, in which this crate has its name
 #[cfg(feature = "case")]
-pub mod quantities;
+extern crate self as mdsurrogate;
+
 #[cfg(feature = "case")]
-pub mod run;
-#[cfg(feature = "case")]
-pub mod scene;
+pub mod program;
 
 pub use error::Error;
 pub use polycore::constitutive::{network, surrogate};

@@ -7,12 +7,12 @@
 use crate::Failure;
 use crate::kernel::RATIO;
 use evidence::measurement::Measurement;
+use harness::output::csv::{self, Column};
 use peri::Error;
 use peri::bonds::{Bonds, Lattice, LatticeBonds, VolumeCorrection, force};
 use peri::calibrate::{Space, modulus, poisson_ratio};
 use peri::field::{Field, chunk_range};
 use peri::potential::{KernelFit, Law};
-use polycore::output::csv::{self, Column};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};

@@ -2,12 +2,12 @@
 
 use clap::Parser;
 use evidence::measurement::{Measurement, print};
+use harness::case::terminal::Threads;
 use kernel::RATIO;
 use peri::bonds::{Bonds, CloudBonds, VolumeCorrection, force};
 use peri::field::Field;
 use peri::material::relief;
 use peri::potential::Law;
-use polycore::case::terminal::Threads;
 use std::hint::black_box;
 use std::time::Instant;
 

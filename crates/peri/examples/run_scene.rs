@@ -1,8 +1,8 @@
 //! A scene from a program: run as the command line does, values by their names.
 
-use peri::run::Peri;
-use polycore::case::{self, Options};
-use polycore::scene::Source;
+use harness::case::{self, Options};
+use harness::scene::Source;
+use peri::program::run::Peri;
 
 const SCENE: &str = r#"
 version = 1

@@ -133,10 +133,3 @@ impl Error {
         Self::Geometry(what)
     }
 }
-
-#[cfg(feature = "case")]
-impl From<Error> for polycore::scene::Failure<Error> {
-    fn from(error: Error) -> Self {
-        Self::Run(error)
-    }
-}

@@ -51,14 +51,6 @@ pub mod stress;
 pub mod surface;
 
 #[cfg(feature = "case")]
-pub mod bridge;
-#[cfg(feature = "case")]
-pub mod command;
-#[cfg(feature = "case")]
-pub mod quantities;
-#[cfg(feature = "case")]
-pub mod run;
-#[cfg(feature = "case")]
-pub mod scene;
+pub mod program;
 
 pub use error::Error;

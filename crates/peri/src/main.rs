@@ -1,5 +1,5 @@
 //! The `peri` command line.
 
 fn main() -> std::process::ExitCode {
-    peri::command::main()
+    peri::program::command::main()
 }

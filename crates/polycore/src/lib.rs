@@ -1,5 +1,5 @@
-//! Shared ground of the polymer-mechanics toolkit: tensors, Langevin statistics, constitutive laws, units, scenes, reports
-//! and output.
+//! Mathematics of the polymer-mechanics toolkit: tensors, Langevin statistics, constitutive laws and their fits, units,
+//! transfer of fields.
 //!
 //! ```
 //! use polycore::constitutive::hyperelastic::{EightChain, homogeneous::uniaxial};
@@ -18,27 +18,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-#[cfg(feature = "case")]
-pub mod case;
-#[cfg(feature = "case")]
-pub mod checkpoint;
 pub mod constitutive;
 pub mod error;
+pub mod file;
+#[cfg(feature = "hdf5")]
+pub mod hdf5;
 pub mod langevin;
 pub mod memory;
-pub mod output;
 pub mod posterior;
 pub mod random;
-#[cfg(feature = "case")]
-pub mod report;
-#[cfg(feature = "case")]
-pub mod scene;
 #[cfg(feature = "tables")]
 pub mod table;
 pub mod tensor;
 pub mod transfer;
 pub mod units;
-#[cfg(feature = "view")]
-pub mod view;
 
 pub use error::Error;

@@ -166,7 +166,7 @@ impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
 }
 
 /// A text `NUMBER UNIT`; a bare number too where there is no unit.
-#[cfg(feature = "case")]
+#[cfg(feature = "schemars")]
 impl<D: Dimension> schemars::JsonSchema for Quantity<D> {
     fn schema_name() -> std::borrow::Cow<'static, str> {
         let noun = D::NAME.trim_start_matches("an ").trim_start_matches("a ");

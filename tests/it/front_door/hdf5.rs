@@ -1,8 +1,8 @@
 //! HDF5: data sets of molecular dynamics, ours and others', and fields over time.
 
 use super::{attack_files, fs};
+use harness::output::vtkhdf::{self, Cells, MeshSeries, ParticleSeries};
 use mdsurrogate::dataset::{Fractions, Method, ReadOptions, Standardisation, hdf5, read, split};
-use polycore::output::vtkhdf::{self, Cells, MeshSeries, ParticleSeries};
 use rust_hdf5::{H5File, LibverBound};
 use std::path::{Path, PathBuf};
 

@@ -2,8 +2,8 @@
 
 use super::{attack, below, fs};
 use crate::scenes;
-use peri::scene::{Scene, body_of, check};
-use polycore::scene::Source;
+use harness::scene::Source;
+use peri::program::scene::{Scene, body_of, check};
 
 /// Every fortieth of the points of the strip, and a lattice of 12 × 4: their scenes build in no time.
 #[test]

@@ -2,7 +2,7 @@
 
 use super::{attack_some, cases, fs};
 use crate::{parts, scenes};
-use polycore::scene::{Failure, Source};
+use harness::scene::{Failure, Source};
 use std::path::{Path, PathBuf};
 
 /// Larger bodies and meshes are judged, not built.
@@ -43,7 +43,7 @@ fn bodies_of_peri() {
     let files = written(folder.path(), &texts);
     attack("body", folder.path(), &files, |source| {
         use peri::calibrate::Space;
-        use peri::scene::{Scene, check, least_memory};
+        use peri::program::scene::{Scene, check, least_memory};
         let scene = source.parse::<Scene>().map_err(|error| error.render())?;
         for variant in check(source, &scene, false).map_err(|error| error.render())? {
             let (source, scene) = variant.resolve(source, &scene).map_err(|error| error.render())?;
@@ -55,7 +55,7 @@ fn bodies_of_peri() {
                 return Ok(());
             }
         }
-        peri::run::explanation(source, &scene, false).map(|_| ()).map_err(told)
+        peri::program::run::explanation(source, &scene, false).map(|_| ()).map_err(told)
     });
 }
 
@@ -73,19 +73,19 @@ fn parts_of_crystfem() {
         .replace("emissivity = 0.9", "");
     let files = written(folder.path(), &[along, table, layers, parts::BAR.to_owned()]);
     attack("part", folder.path(), &files, |source| {
-        let scene = source.parse::<crystfem::scene::PartScene>().map_err(|error| error.render())?;
+        let scene = source.parse::<crystfem::program::scene::PartScene>().map_err(|error| error.render())?;
         let elements = scene.mesh.elements(source).map_err(|error| error.render())?;
         if elements.iter().product::<f64>() > MOST_ELEMENTS || scene.mesh.file.is_some() {
             return Ok(());
         }
-        crystfem::run::explain(source, false).map(|_| ()).map_err(told)
+        crystfem::program::run::explain(source, false).map(|_| ()).map_err(told)
     });
 }
 
 /// Kinetics and fits, with the tables beside them.
 #[test]
 fn points_and_fits_of_crystfem() {
-    use crystfem::scene::{Kind, kind};
+    use crystfem::program::scene::{Kind, kind};
     for file in cases("crystfem") {
         let source = Source::read(&file).unwrap();
         if kind(&source).unwrap() == Kind::Part {
@@ -94,7 +94,7 @@ fn points_and_fits_of_crystfem() {
         let folder = file.parent().unwrap().to_owned();
         attack("points", &folder, &[file], |source| match kind(source).map_err(|error| error.render())? {
             Kind::Part => Ok(()),
-            _ => crystfem::run::explain(source, false).map(|_| ()).map_err(told),
+            _ => crystfem::program::run::explain(source, false).map(|_| ()).map_err(told),
         });
     }
 }

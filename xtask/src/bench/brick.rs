@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use harness::output::csv;
+use harness::output::picture::{LinePlot, Series};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
-use polycore::output::csv;
-use polycore::output::picture::{LinePlot, Series};
 
 use super::calculix::{self, Calculix};
 use super::scikit_fem::ScikitFem;

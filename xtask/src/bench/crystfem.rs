@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use harness::output::picture::{LinePlot, Series};
 use miette::{IntoDiagnostic, Result, miette};
-use polycore::output::picture::{LinePlot, Series};
 
 use super::{Row, brick, external, write};
 use crate::table::Table;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use harness::output::csv;
 use miette::{IntoDiagnostic, Result, miette};
-use polycore::output::csv;
 
 /// Particles as `--block --state` of `crates/peri/benches/measure.rs` writes them.
 pub struct Snapshot {

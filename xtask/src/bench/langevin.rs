@@ -8,9 +8,9 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
+use harness::output::picture::{LinePlot, Series};
 use miette::{IntoDiagnostic, Result, miette};
 use polycore::langevin::{Inverse, inverse_from_complement};
-use polycore::output::picture::{LinePlot, Series};
 
 use super::Row;
 use crate::table::Table;

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use harness::output::picture::{LinePlot, Series};
 use miette::{IntoDiagnostic, Result, miette};
-use polycore::output::picture::{LinePlot, Series};
 
 use super::{Row, external};
 use crate::table::Table;

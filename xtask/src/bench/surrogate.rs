@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
-use polycore::output::atomic_write;
+use polycore::file::atomic_write;
 
 use super::{Row, external};
 use crate::workspace::Workspace;

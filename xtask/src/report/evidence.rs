@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use harness::report::{Expect, Kind};
 use miette::{Result, miette};
-use polycore::report::{Expect, Kind};
 use serde::{Deserialize, Serialize};
 
 use crate::outcome::Outcome;

@@ -1,6 +1,6 @@
 //! docs/validation.md: what stays the same from day to day, without seconds; dates and machines are those of benches.
 
-use polycore::report::Kind;
+use harness::report::Kind;
 
 use super::Page;
 use crate::outcome::Outcome;

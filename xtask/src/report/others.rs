@@ -1,6 +1,6 @@
 //! Figures that no one here wrote, and ours beside them: the cases below cases/external.
 
-use polycore::report::Kind;
+use harness::report::Kind;
 use serde::Serialize;
 
 use crate::outcome::Outcome;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use polycore::view;
+use harness::view;
 
 use crate::outcome::Outcome;
 
@@ -23,7 +23,7 @@ pub fn page(outcome: &Outcome) -> Option<PathBuf> {
     let path = outcome.output.join(view::FILE_NAME);
     let age =
         |path: &Path| path.metadata().and_then(|file| file.modified()).unwrap_or(SystemTime::UNIX_EPOCH);
-    if age(&path) < age(&outcome.output.join(polycore::report::FILE_NAME)) {
+    if age(&path) < age(&outcome.output.join(harness::report::FILE_NAME)) {
         view::write(&outcome.output, None).ok()?;
     }
     Some(path)
@@ -32,8 +32,8 @@ pub fn page(outcome: &Outcome) -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use polycore::output::vtkhdf::ParticleSeries;
-    use polycore::report::{Named, Report};
+    use harness::output::vtkhdf::ParticleSeries;
+    use harness::report::{Named, Report};
 
     #[test]
     fn only_what_tears_or_is_printed_has_a_page() {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use polycore::report::Value;
+use harness::report::Value;
 
 use crate::bench::Row;
 use crate::outcome::Outcome;

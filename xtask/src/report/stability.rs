@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use polycore::report::Judgement;
+use harness::report::Judgement;
 use serde::{Deserialize, Serialize};
 
 use crate::outcome::Outcome;

@@ -1,17 +1,13 @@
 //! The thesis map: every numbered figure and table that holds a result, and what became of it here (cases/thesis.toml).
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs;
-use std::path::Path;
 
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
-use polycore::report::{Expect, Kind};
 use serde::{Deserialize, Serialize};
 
 use super::evidence::{Finding, Found, Measured, Number, check, verdict};
 use super::pictures::{Gallery, Picture};
-use crate::outcome::Outcome;
-use crate::test::Records;
 use crate::workspace::Workspace;
 
 /// What must have a row (issue 6): figures and tables with a result, and the appendices.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use harness::output::picture::{LinePlot, Series};
 use miette::{IntoDiagnostic, Result, WrapErr};
-use polycore::output::picture::{LinePlot, Series};
 use serde::{Deserialize, Serialize};
 
 use super::pictures;

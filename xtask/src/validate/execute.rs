@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use harness::report::{FILE_NAME, Report};
+use harness::scene::Stamp;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
-use polycore::output::atomic_write;
-use polycore::report::{FILE_NAME, Report};
-use polycore::scene::Stamp;
+use polycore::file::atomic_write;
 use serde::{Deserialize, Serialize};
 
 use super::Case;

@@ -1,6 +1,6 @@
 use super::*;
 use crate::kinetics::{Constants, Kinetics, cooling_curve};
-use polycore::case::Fault;
+use harness::case::Fault;
 
 /// Normal numbers (splitmix64 and Box–Muller).
 struct Noise(u64);

@@ -11,7 +11,6 @@ use crate::mesh::Mesh;
 pub const FILAMENT: f64 = 1.75e-3;
 
 mod cover;
-#[cfg(feature = "case")]
 mod csv;
 mod deposit;
 mod feature;
@@ -27,7 +26,6 @@ mod remark;
 mod summary;
 
 pub use cover::{Activation, Bead};
-#[cfg(feature = "case")]
 pub use csv::read_csv;
 pub use deposit::{Cells, Deposit};
 pub use feature::FAMILIES;

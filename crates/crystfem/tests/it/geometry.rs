@@ -1,9 +1,9 @@
 //! Parts of files of other programs, from the scene to the report: right, or refused with the key that is wrong.
 
-use crystfem::run::{Crystfem, explain};
-use polycore::case::{Options, run};
-use polycore::report::Report;
-use polycore::scene::Source;
+use crystfem::program::run::{Crystfem, explain};
+use harness::case::{Options, run};
+use harness::report::Report;
+use harness::scene::Source;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;

@@ -1,15 +1,15 @@
 //! Scenes of the material alone, and fits, from their text to their report.
 
 use crystfem::kinetics::{Constants, Kinetics, cooling_curve};
-use crystfem::run::{Crystfem, Failure};
-use polycore::case::Options;
-use polycore::report::Report;
-use polycore::scene::Source;
+use crystfem::program::run::{Crystfem, Failure};
+use harness::case::Options;
+use harness::report::Report;
+use harness::scene::Source;
 use std::path::Path;
 
 fn run_quietly(source: &Source, output: &Path, quick: bool) -> Result<Report, Failure> {
     let options = Options { quick, ..Options::new(output) };
-    polycore::case::run::<Crystfem>(source, options).map(|finished| finished.report)
+    harness::case::run::<Crystfem>(source, options).map(|finished| finished.report)
 }
 
 const SCENE: &str = r#"

@@ -5,9 +5,9 @@ use crystfem::material::{Conductor, Property, Semicrystalline};
 use crystfem::mesh::layers::Layers;
 use crystfem::mesh::{Bar, Grid, Substrate};
 use crystfem::printed::PrintedPart;
-use crystfem::scene::PartScene;
+use crystfem::program::scene::PartScene;
 use crystfem::simulation::{Settings, Simulation};
-use polycore::scene::Source;
+use harness::scene::Source;
 use std::sync::Arc;
 
 const SCENE: &str = include_str!("../../../../cases/ch4/printed-bar/case.toml");

@@ -11,7 +11,7 @@ use super::stress::{Symmetry, cauchy_of_first};
 use super::{Dataset, Path, Row, Split, Standardisation};
 use crate::Error;
 use crate::kinematics::{cauchy_of_material, material_pair, stretch_of};
-use polycore::output::hdf5::{Created, dataset};
+use polycore::hdf5::{Created, dataset};
 use polycore::tensor::{DeformationGradient, Tensor, Voigt};
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
 
@@ -44,7 +44,7 @@ pub fn write(
         .tempdir_in(folder.unwrap_or(".".as_ref()))
         .map_err(Error::io("create a folder beside", path))?;
     let inside = temporary.path().join("data.h5");
-    fill(&inside, set, split).map_err(|error| polycore::output::hdf5::write_error(path, error))?;
+    fill(&inside, set, split).map_err(|error| polycore::hdf5::write_error(path, error))?;
     std::fs::File::open(&inside).and_then(|file| file.sync_all()).map_err(Error::io("synchronise", path))?;
     std::fs::rename(&inside, path).map_err(Error::io("write", path))
 }

@@ -17,7 +17,7 @@ fn csv(text: &str) -> Result<Dataset, Error> {
 /// What an error says; the set read otherwise.
 pub(super) fn refused(found: Result<Dataset, Error>) -> String {
     let error = found.expect_err("refused");
-    assert_eq!(polycore::case::Fault::exit_code(&error), 2);
+    assert_eq!(harness::case::Fault::exit_code(&error), 2);
     error.to_string()
 }
 

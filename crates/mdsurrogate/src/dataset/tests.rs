@@ -1,6 +1,6 @@
 use super::*;
 use crate::random::SplitMix64;
-use polycore::case::Fault;
+use harness::case::Fault;
 use polycore::tensor::Tensor;
 
 /// Paths of sheared rows with σ = 100 MPa on 11 plus noise of a stated deviation, uniform in ±√3 of it.

@@ -3,7 +3,7 @@
 use super::{Engine, Plan, Run, input, results};
 use crate::Error;
 use crate::cell::{Crystal, LATTICE, Packing};
-use polycore::output::atomic_write;
+use polycore::file::atomic_write;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
 use super::*;
-use polycore::case::Fault;
+use harness::case::Fault;
 
 /// Table 3.2 and formulation.md, chapter 3: 720 runs; [3.3, 50], [4, 60], [1, 15]e-6 per step of 0.5 fs.
 #[test]

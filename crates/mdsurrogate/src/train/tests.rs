@@ -4,7 +4,7 @@ use crate::kinematics::cauchy_of_material;
 use crate::network::Activation::{Elu, Linear, Relu, Sigmoid, Silu, Softplus, Tanh};
 use crate::network::{Activation, Architecture};
 use crate::surrogate::{Kind, Symmetry, Workspace};
-use polycore::case::Fault;
+use harness::case::Fault;
 use polycore::constitutive::verify;
 use polycore::tensor::{DeformationGradient, Tensor, Voigt, voigt};
 

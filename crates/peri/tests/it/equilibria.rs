@@ -1,6 +1,7 @@
 //! Loads without an equilibrium: bodies torn by a force, free bodies, and prescribed displacements that press a body through itself.
 
 use crate::bodies::{Body, MODULUS, hold};
+use harness::case::Fault;
 use peri::Error;
 use peri::bonds::{Bonds, LatticeBonds, VolumeCorrection};
 use peri::field::Field;
@@ -11,7 +12,6 @@ use peri::solver::{
     Adrift, Breaking, DynamicRelaxation, Lbfgs, Loads, Method, Policy, State, Stops, System, VelocityVerlet,
     adrift, inverted,
 };
-use polycore::case::Fault;
 
 /// A force on some particles, N, spread evenly.
 fn push<const D: usize>(

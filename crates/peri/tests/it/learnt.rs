@@ -3,20 +3,20 @@
 use crate::bodies::{Body, scatter};
 use crate::materials::battery;
 use evidence::at_most;
+use harness::case::{Case, Options, Run};
+use harness::output::vtkhdf;
+use harness::scene::Source;
 use peri::bonds::Bonds;
 use peri::calibrate::Space;
 use peri::field::Field;
 use peri::material::{
     Correspondence, Deformation, Material, NonlocalSolid, PointLaw, Pointwise, Response, Tensor,
 };
-use peri::run::{Finished, Peri, run};
-use peri::scene::{self, Scene};
-use polycore::case::{Case, Options, Run};
+use peri::program::run::{Finished, Peri, run};
+use peri::program::scene::{self, Scene};
 use polycore::constitutive::network::Activation::Softplus;
 use polycore::constitutive::surrogate::{Header, Kind, Softening, Surrogate, Symmetry};
 use polycore::constitutive::{Error, Law, Prediction, Workspace};
-use polycore::output::vtkhdf;
-use polycore::scene::Source;
 use polycore::tensor::voigt::{self, Voigt, Voigt6x6};
 use std::path::Path;
 

@@ -1,9 +1,9 @@
 //! Probes, formulas of boundaries and loads, grids, and field files of whole scenes.
 
-use peri::run::{Finished, Peri, run};
-use peri::scene::Scene;
-use polycore::case::{Case, Options, Run};
-use polycore::scene::Source;
+use harness::case::{Case, Options, Run};
+use harness::scene::Source;
+use peri::program::run::{Finished, Peri, run};
+use peri::program::scene::Scene;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -300,7 +300,7 @@ fn examples_of_the_guide_read_the_last_step() {
     );
     let finished = solve(&scene, &output);
     let file = output.join("dx-5mm_m-3.015.vtkhdf");
-    let series = polycore::output::vtkhdf::read(&file).unwrap();
+    let series = harness::output::vtkhdf::read(&file).unwrap();
     let last = series.len() - 1;
     assert_eq!(series.len(), 3);
     let history = &finished.outcomes[0].history;

@@ -1,13 +1,13 @@
 //! Bodies of several parts, slots, cracks of several facets, weak layers: who is bonded to whom, and at which load they part.
 
+use harness::case::{Case, Options, Run};
+use harness::output::vtkhdf;
+use harness::scene::Source;
 use peri::bonds::{Bonds, CloudBonds, LatticeBonds, VolumeCorrection, components, fragments};
 use peri::geometry::{Cut, Gaps, Operation, Shape, lattice};
 use peri::model::Body;
-use peri::run::{Finished, Peri, run};
-use peri::scene::Scene;
-use polycore::case::{Case, Options, Run};
-use polycore::output::vtkhdf;
-use polycore::scene::Source;
+use peri::program::run::{Finished, Peri, run};
+use peri::program::scene::Scene;
 
 fn solve(text: &str) -> Finished {
     let directory = tempfile::tempdir().unwrap();
@@ -25,7 +25,9 @@ fn value(finished: &Finished, name: &str) -> f64 {
 fn check(text: &str) -> String {
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
-    peri::run::explanation(&source, &scene, false).unwrap_or_else(|error| panic!("{error}")).join("\n")
+    peri::program::run::explanation(&source, &scene, false)
+        .unwrap_or_else(|error| panic!("{error}"))
+        .join("\n")
 }
 
 fn boxed<const D: usize>(min: [f64; D], max: [f64; D]) -> Operation<D> {

@@ -1,14 +1,14 @@
 //! Boundaries that turn along the arc: a twisted bar against the torsion of a neo-Hookean cylinder, bodies that turn as a whole.
 
+use harness::case::{Case, Options, Run};
+use harness::scene::Source;
 use peri::bonds::stretch_range;
 use peri::geometry::Shape;
 use peri::model::{Body, Model, Rubber};
 use peri::potential::Law;
-use peri::run::{Finished, Peri, run};
-use peri::scene::Scene;
+use peri::program::run::{Finished, Peri, run};
+use peri::program::scene::Scene;
 use peri::solver::{DynamicRelaxation, Lbfgs, Rotation, VelocityVerlet};
-use polycore::case::{Case, Options, Run};
-use polycore::scene::Source;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI, TAU};
 
 fn solve(text: &str) -> Finished {
@@ -207,7 +207,9 @@ fn chords_are_told() {
     let told = |turn: &str| {
         let source = Source::new("scene.toml", bar(turn, 4));
         let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
-        peri::run::explanation(&source, &scene, false).unwrap_or_else(|error| panic!("{error}")).join("\n")
+        peri::program::run::explanation(&source, &scene, false)
+            .unwrap_or_else(|error| panic!("{error}"))
+            .join("\n")
     };
     let warned = told(chord);
     assert!(warned.contains("boundary[1].displacement_field turns its region by 60°"), "{warned}");

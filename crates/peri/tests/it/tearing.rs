@@ -2,6 +2,7 @@
 //! `fit.py`), the critical stretches of both conventions, the area of new cracks, and bonds that soften.
 
 use evidence::near;
+use harness::scene::Source;
 use peri::bonds::{Bonds, CloudBonds, LatticeBonds, Overstretched, VolumeCorrection};
 use peri::calibrate::{Space, modulus, stiffness_1111};
 use peri::correction::surface_factors;
@@ -10,9 +11,8 @@ use peri::field::Field;
 use peri::geometry::{Operation, Shape, lattice};
 use peri::material::{BondMaterial, Material};
 use peri::potential::{BondPotential, DUCTILITY, Law, StretchRange, integrity, onset, softened_energy};
-use peri::run::explanation;
-use peri::scene::Scene;
-use polycore::scene::Source;
+use peri::program::run::explanation;
+use peri::program::scene::Scene;
 use polycore::units::EnergyPerArea;
 use std::f64::consts::PI;
 use std::path::Path;

@@ -2,12 +2,12 @@
 
 use crate::bodies::{Body, hold};
 use crate::dynamics::{DENSITY, once, run};
+use harness::case::Fault;
 use peri::Error;
 use peri::bonds::Bonds;
 use peri::material::BondMaterial;
 use peri::potential::Law;
 use peri::solver::{Breaking, Loads, Method, Motion, Policy, State, System, VelocityVerlet};
-use polycore::case::Fault;
 
 /// Steps beyond the critical one are refused by name, with the exit code of bad input.
 #[test]

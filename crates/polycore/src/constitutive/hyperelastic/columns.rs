@@ -7,7 +7,7 @@ use crate::units::dimension::{RatioDimension, StressDimension};
 
 /// Measures of the extension of a test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
-#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum StrainMeasure {
     /// λ = l/L, 1 at rest.
@@ -20,7 +20,7 @@ pub enum StrainMeasure {
 
 /// Measures of the stress of a test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
-#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum StressMeasure {
     /// Force over undeformed area, P (PK1, "engineering").

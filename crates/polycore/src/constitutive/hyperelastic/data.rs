@@ -14,7 +14,7 @@ pub struct Table {
 
 /// The test that a state is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
-#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
     /// A bar: λ₂ = λ₃ = λ₁^{−1/2}.

@@ -25,7 +25,7 @@ impl Surrogate<f64> {
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), crate::Error> {
         let path = path.as_ref();
         let bytes = self.to_bytes().map_err(|error| Error::file(path, error, "a law that can be written"))?;
-        crate::output::atomic_write(path, |file| file.write_all(&bytes))
+        crate::file::atomic_write(path, |file| file.write_all(&bytes))
     }
 
     /// Reads a law; numbers come back to the bit.

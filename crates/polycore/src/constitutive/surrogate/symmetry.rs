@@ -13,7 +13,7 @@ pub type Monomial<'a> = (f64, &'a [usize]);
 
 /// A symmetry of the crystal, the third of the material axes being the special one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[cfg_attr(feature = "case", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Symmetry {
     /// No symmetry: the six components of C.

@@ -1,0 +1,263 @@
+//! `crystfem card`: the thermal materials of a scene as cards of other programs.
+
+use crate::material::{CONSTANT_NAMES, Polymer, Property};
+use crate::program::run::Failure;
+use crate::program::scene::{Kind, Law, MaterialSpec, PartScene, PointScene, kind};
+use harness::scene::{SceneError, Source};
+use polycore::file::atomic_write;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::PathBuf;
+
+/// Options of `crystfem card`.
+#[derive(clap::Args)]
+pub struct Options {
+    /// The scene whose materials are written.
+    scene: PathBuf,
+    /// The program that reads them.
+    #[arg(long, value_enum, default_value_t = Host::Abaqus)]
+    host: Host,
+    /// Units of that program.
+    #[arg(long, value_enum, default_value_t = Units::Si)]
+    units: Units,
+    /// Write temperatures in °C instead of K.
+    #[arg(long)]
+    celsius: bool,
+    /// Folder of the cards, NAME.inp, one for each material.
+    #[arg(long, short, default_value = "cards")]
+    output: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Host {
+    Abaqus,
+    Calculix,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Units {
+    /// m, kg, s.
+    Si,
+    /// mm, t, s: N, MPa, mJ.
+    Mm,
+}
+
+impl Units {
+    /// The host's numbers of 1 J/kg and of 1 kg/m³; 1 W/(m K) is 1 in both.
+    fn factors(self) -> [f64; 2] {
+        match self {
+            Self::Si => [1.0, 1.0],
+            Self::Mm => [1e6, 1e-12],
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Si => "m, kg, s",
+            Self::Mm => "mm, t, s (N, MPa, mJ)",
+        }
+    }
+}
+
+/// Writes the cards and says where.
+///
+/// # Errors
+/// A scene without materials, materials that have no card, and files that cannot be written.
+pub fn write(options: &Options) -> Result<bool, Failure> {
+    let source = Source::read(&options.scene)?;
+    let mut written = Vec::new();
+    for (name, spec, key) in materials(&source)? {
+        let name = if name.is_empty() { "material".to_owned() } else { name };
+        let (deck, rest) = card(options, &source, &name, &spec, &key)?;
+        written.push((format!("{name}.inp"), deck));
+        written.extend(rest.map(|rest| (format!("{}.umatht", host_name(&name).to_lowercase()), rest)));
+    }
+    std::fs::create_dir_all(&options.output).map_err(polycore::Error::io("create", &options.output))?;
+    for (file, text) in written {
+        let path = options.output.join(file);
+        atomic_write(&path, |out| out.write_all(text.as_bytes()))?;
+        harness::say!("{}", path.display());
+    }
+    Ok(true)
+}
+
+/// Names, blocks, and where they stand.
+fn materials(source: &Source) -> Result<Vec<(String, MaterialSpec, String)>, Failure> {
+    match kind(source)? {
+        Kind::Part => {
+            let scene: PartScene = source.parse()?;
+            let of = |(name, spec): (String, MaterialSpec)| {
+                let key = format!("materials.{name}");
+                (name, spec, key)
+            };
+            Ok(scene.materials.into_iter().map(of).collect())
+        }
+        Kind::Point => {
+            let scene: PointScene = source.parse()?;
+            let all = scene.materials(source)?;
+            Ok(all.into_iter().map(|(name, spec, key)| (name, spec.clone(), key)).collect())
+        }
+        Kind::Fit => {
+            let allowed = "a scene with `[material]` or `[materials]`: enter the fitted constants, which the run writes as a block";
+            Err(source.error("fit", "a scene of fits, which has no material", allowed).into())
+        }
+    }
+}
+
+/// Returns a name as hosts have it: capitals, no blanks.
+fn host_name(name: &str) -> String {
+    name.to_uppercase().chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
+}
+
+/// The cards of a material, and the file of constants that CalculiX has no room for.
+fn card(
+    options: &Options,
+    source: &Source,
+    name: &str,
+    spec: &MaterialSpec,
+    key: &str,
+) -> Result<(String, Option<String>), SceneError> {
+    let [heat, density] = options.units.factors();
+    let degrees = if options.celsius { "°C" } else { "K" };
+    let mut text = format!(
+        "** {name} of {}, units {}, {degrees}\n*MATERIAL, NAME={}\n",
+        source.path.display(),
+        options.units.name(),
+        host_name(name)
+    );
+    let density = format!("*DENSITY\n{}\n", digits(density * spec.density.si()));
+    if spec.conductivity_factors.is_some() || spec.powder.is_some() || spec.law == Law::AsPublished {
+        let found = "a material with directions, of powder, or `as-published`";
+        return Err(source.error(key, found, "an isotropic conductor or polymer: others have no card"));
+    }
+    if spec.law == Law::Conductor {
+        let [conductivity, capacity] = spec.properties(source, key)?;
+        let zero = if options.celsius { 273.15 } else { 0.0 };
+        text += &format!("*CONDUCTIVITY\n{}", lines(&conductivity, 1.0, zero));
+        text += &format!("*SPECIFIC HEAT\n{}", lines(&capacity, heat, zero));
+        return Ok((text + &density, None));
+    }
+    let polymer = spec.polymer(source, key)?;
+    let constants = constants(&polymer, options).ok_or_else(|| {
+        let allowed = "constants: the subroutine has no tables over temperature";
+        source.error(key, "`conductivity` or `specific_heat` over temperature", allowed)
+    })?;
+    let capacity = constants[1];
+    let (listed, rest) = match options.host {
+        Host::Abaqus => (constants, None),
+        Host::Calculix => {
+            let rest = CONSTANT_NAMES
+                .iter()
+                .zip(&constants[6..])
+                .map(|(name, value)| format!("{name} = {}\n", digits(*value)));
+            let head = [&constants[..3], &[3.0], &constants[4..6]].concat();
+            (head, Some(format!("# constants 7 to 15 of {name}, SI\n{}", rest.collect::<String>())))
+        }
+    };
+    let _ = writeln!(text, "*USER MATERIAL, TYPE=THERMAL, CONSTANTS={}", listed.len());
+    for row in listed.chunks(8) {
+        let row: Vec<String> = row.iter().map(|number| digits(*number)).collect();
+        let _ = writeln!(text, "{}", row.join(", "));
+    }
+    text += &density;
+    if options.host == Host::Calculix {
+        let _ = writeln!(text, "*SPECIFIC HEAT\n{}", digits(capacity));
+    }
+    // CalculiX takes latent heat as a load, from a fourth state variable
+    let states = if options.host == Host::Calculix && polymer.latent_heat.is_some() { 4 } else { 3 };
+    let _ = writeln!(text, "*DEPVAR\n{states}");
+    Ok((text, rest))
+}
+
+/// The fifteen constants of UMATHT in the host's units; none with properties over temperature.
+fn constants(polymer: &Polymer, options: &Options) -> Option<Vec<f64>> {
+    let (Property::Constant(conductivity), Property::Constant(capacity)) =
+        (&polymer.conductivity, &polymer.specific_heat)
+    else {
+        return None;
+    };
+    let heat = options.units.factors()[0];
+    let latent = polymer.latent_heat.unwrap_or(0.0) * polymer.ultimate_crystallinity;
+    let zero = if options.celsius { 273.15 } else { 0.0 };
+    let host = if options.host == Host::Calculix { 1.0 } else { 0.0 };
+    let mut all = vec![*conductivity, heat * capacity, heat * latent, 0.0, zero, host];
+    all.extend(polymer.growth_and_melting());
+    Some(all)
+}
+
+/// A number without the noise of its last digits.
+fn digits(number: f64) -> String {
+    let short: f64 = format!("{number:.11e}").parse().unwrap_or(number);
+    format!("{short:?}")
+}
+
+/// A value, or rows of a value and its temperature.
+fn lines(property: &Property, factor: f64, zero: f64) -> String {
+    match property {
+        Property::Constant(value) => digits(factor * value) + "\n",
+        Property::Table(table) => table
+            .rows()
+            .map(|[temperature, value]| {
+                format!("{}, {}\n", digits(factor * value), digits(temperature - zero))
+            })
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = r#"
+version = 1
+program = "crystfem"
+[materials.own-pp]
+law = "semicrystalline"
+density = "905 kg/m^3"
+conductivity = "0.2 W/(m K)"
+specific_heat = "1900 J/(kg K)"
+kinetics = { growth_rate = "5.3e6 1/s", nucleation = "3.3e5 K^2", equilibrium_melting = "458.2 K", frozen = "231.2 K", avrami_exponent = 3.0 }
+melting = { sharpness = "0.965 1/K", shape = 8.584, peak = "438 K" }
+crystallinity = 0.5
+latent_heat = "200 J/g"
+[materials.glass]
+law = "conductor"
+density = "2500 kg/m^3"
+conductivity = { temperature = ["0 degC", "100 degC"], value = ["1 W/(m K)", "1.2 W/(m K)"] }
+specific_heat = "800 J/(kg K)"
+[[point]]
+name = "p"
+start = "180 degC"
+legs = [{ hold = "1 s" }]
+"#;
+
+    fn cards(host: Host, units: Units, celsius: bool) -> Vec<(String, Option<String>)> {
+        let options = Options { scene: "s.toml".into(), host, units, celsius, output: "cards".into() };
+        let source = Source::new("s.toml", SCENE);
+        let all = materials(&source).unwrap();
+        all.iter().map(|(name, spec, key)| card(&options, &source, name, spec, key).unwrap()).collect()
+    }
+
+    #[test]
+    fn units_are_those_of_the_host() {
+        let [(glass, none), (pp, nothing)] = &cards(Host::Abaqus, Units::Mm, true)[..] else { panic!("two") };
+        assert!(none.is_none() && nothing.is_none());
+        let expected = "*CONDUCTIVITY\n1.0, 0.0\n1.2, 100.0\n*SPECIFIC HEAT\n800000000.0\n*DENSITY\n2.5e-9\n";
+        assert!(glass.ends_with(expected), "{glass}");
+        let expected = "*MATERIAL, NAME=OWN_PP\n*USER MATERIAL, TYPE=THERMAL, CONSTANTS=15\n\
+                        0.2, 1900000000.0, 100000000000.0, 0.0, 273.15, 0.0, 5300000.0, 330000.0\n\
+                        6270.0, 458.2, 231.2, 3.0, 0.965, 8.584, 438.0\n*DENSITY\n9.05e-10\n*DEPVAR\n3\n";
+        assert!(pp.ends_with(expected), "{pp}");
+    }
+
+    /// Six constants, the other nine in a file, c by its own card, a fourth state for the latent heat.
+    #[test]
+    fn calculix_takes_six_constants() {
+        let all = cards(Host::Calculix, Units::Si, false);
+        let (deck, Some(file)) = &all[1] else { panic!("a file") };
+        let expected = "CONSTANTS=6\n0.2, 1900.0, 100000.0, 3.0, 0.0, 1.0\n*DENSITY\n905.0\n*SPECIFIC HEAT\n1900.0\n*DEPVAR\n4\n";
+        assert!(deck.ends_with(expected), "{deck}");
+        assert_eq!(file.lines().filter(|line| line.contains(" = ")).count(), 9);
+        assert!(file.contains("melting_peak = 438.0\n"), "{file}");
+    }
+}

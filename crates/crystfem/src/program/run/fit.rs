@@ -1,0 +1,266 @@
+//! Fits of measurements: constants with their intervals, tables, pictures.
+
+use super::Failure;
+use super::celsius::{CELSIUS, of_kelvin};
+use super::{fit_part, heat_flow};
+use crate::error::Error;
+use crate::fit::{Fit, Known, avrami, nakamura, ozawa};
+use crate::program::quantities as q;
+use crate::program::scene::{FitLaw, FitScene, FitSpec, Job, Measured};
+use harness::case::Finished;
+use harness::output::csv;
+use harness::output::picture::{LinePlot, Series};
+use harness::report::{Phases, Quantity, Report};
+use harness::scene::{SceneError, Source};
+use polycore::file::atomic_write;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+
+/// A finished fit and the abscissae of its measurements, series by series.
+struct Done {
+    name: String,
+    fit: Fit,
+    abscissa: (&'static str, &'static str),
+    series: Vec<(String, Vec<f64>, Vec<f64>)>,
+    /// What was known of the kinetics, of `nakamura`.
+    known: Option<Known>,
+}
+
+impl Done {
+    /// The fitted kinetics as a key of a material of a scene.
+    fn block(&self) -> Option<String> {
+        let Known { equilibrium_melting, frozen, activation_energy } = self.known?;
+        let of = |name: &str| self.fit.estimates.iter().find(|one| one.name == name).map(|one| one.value);
+        let [rate, nucleation, n] = ["growth_rate", "nucleation", "avrami_exponent"].map(of);
+        Some(format!(
+            "kinetics = {{ growth_rate = \"{:.6e} 1/s\", nucleation = \"{:.6e} K^2\", activation_energy = \"{activation_energy} J/mol\", \
+             equilibrium_melting = \"{equilibrium_melting} K\", frozen = \"{frozen} K\", avrami_exponent = {:.5} }}\n",
+            rate?, nucleation?, n?
+        ))
+    }
+}
+
+/// Runs every fit.
+pub fn run(source: &Source, scene: &FitScene, run: &mut harness::case::Run) -> Result<Finished, Failure> {
+    let (output, quick) = (run.options.output, run.options.quick);
+    let jobs = scene.jobs(source)?;
+    run.begin()?;
+    let mut report = Report::new("crystfem", env!("CARGO_PKG_VERSION"), &source.text);
+    let mut phases = Phases::new();
+    let mut done = Vec::new();
+    for (index, (spec, (job, peaks))) in scene.fit.iter().zip(jobs).enumerate() {
+        phases.start("fit");
+        let fits = solve(spec, job, run);
+        // data that say nothing are a fault of the scene, which names them
+        let fits = fits.map_err(|failure| match failure {
+            Failure::Run(Error::Data { what, reason }) => {
+                let single = spec.law == FitLaw::Nakamura && spec.data.len() == 1;
+                let hint = if single {
+                    "; one cooling rate gives K0 and K_G together only: add runs at others"
+                } else {
+                    ""
+                };
+                source.refused(&format!("fit[{index}].data"), format!("{what}: {reason}{hint}")).into()
+            }
+            other => other,
+        })?;
+        done.extend(fits);
+        heat_flow::record(&mut report, spec, &peaks);
+        heat_flow::write(output, &spec.name, &peaks, scene.output.pictures)?;
+    }
+    phases.start("write");
+    for one in &done {
+        record(&mut report, one);
+        write(output, one)?;
+        write_draws(output, one)?;
+        if scene.output.pictures {
+            draw(output, one)?;
+        }
+    }
+    write_estimates(output, &done)?;
+    phases.stop();
+    report.phases(&phases).threads(1).judge(&scene.expect, quick);
+    let mut text = report.table();
+    for (one, block) in done.iter().filter_map(|one| Some((one, one.block()?))) {
+        let path = output.join(format!("{}_kinetics.toml", one.name));
+        atomic_write(&path, |file| file.write_all(block.as_bytes()))?;
+        text += &format!("for a material of a scene, {}:\n  {block}", path.display());
+    }
+    Ok(Finished { report, text })
+}
+
+/// What a scene will fit.
+///
+/// # Errors
+/// A fault of the scene or of its data.
+pub fn explain(source: &Source, scene: &FitScene) -> Result<Vec<String>, SceneError> {
+    let jobs = scene.jobs(source)?;
+    let line = |(spec, (job, peaks)): (&FitSpec, &(Job, Vec<Measured>))| {
+        let what = match job {
+            Job::Avrami(times, _) => format!("k and n from {} measurements", times.len()),
+            Job::Ozawa(coolings, temperatures) => {
+                format!(
+                    "m and χ at {} temperatures from {} cooling rates",
+                    temperatures.len(),
+                    coolings.len()
+                )
+            }
+            Job::Nakamura(runs, _) => {
+                let rows: usize = runs.iter().map(|run| run.degrees.len()).sum();
+                format!("K0, K_G and n from {rows} measurements in {} runs", runs.len())
+            }
+            Job::Part(part) => {
+                let (rows, file) = (part.degrees().len(), part.source.path.display());
+                format!("K0 and K_G from {rows} measurements in {file}, which runs for each trial")
+            }
+        };
+        let heat = |found: &Measured| format!("{:.4} J/g", found.peak.enthalpy / 1e3);
+        let heats: Vec<String> = peaks.iter().map(heat).collect();
+        let of = if heats.is_empty() { String::new() } else { format!("; peaks of {}", heats.join(", ")) };
+        format!("fit {}: {:?}, {what}{of}", spec.name, spec.law)
+    };
+    Ok(read(source, scene).chain(scene.fit.iter().zip(&jobs).map(line)).collect())
+}
+
+/// How the tables of a scene are understood, a line each.
+pub fn read<'a>(source: &'a Source, scene: &'a FitScene) -> impl Iterator<Item = String> + 'a {
+    let tables = scene.fit.iter().flat_map(|spec| &spec.data);
+    tables.filter_map(|data| crate::table::understood(&source.file(&data.file)))
+}
+
+fn solve(spec: &FitSpec, job: Job, run: &mut harness::case::Run) -> Result<Vec<Done>, Failure> {
+    let name = &spec.name;
+    match job {
+        Job::Avrami(times, degrees) => {
+            let fit = avrami(&times, &degrees)?;
+            let series = vec![("measured".to_owned(), times, degrees)];
+            Ok(vec![Done { name: name.clone(), fit, abscissa: ("time", "s"), series, known: None }])
+        }
+        Job::Nakamura(runs, known) => {
+            let fit = nakamura(&runs, &known)?;
+            let series = runs
+                .into_iter()
+                .zip(&spec.data)
+                .map(|(run, data)| (stem(&data.file), of_kelvin(&run.temperatures), run.degrees))
+                .collect();
+            Ok(vec![Done {
+                name: name.clone(),
+                fit,
+                abscissa: ("temperature", "degC"),
+                series,
+                known: Some(known),
+            }])
+        }
+        Job::Part(part) => {
+            let mut show = |trial: usize| {
+                run.show(0.0, &|| format!("fit {name}  trial {trial}"));
+                if (run.options.interrupted)() { Err(run.interruption()) } else { Ok(()) }
+            };
+            let fit = fit_part::solve(&part, &mut show)?;
+            let curves = part.curves.into_iter().zip(&spec.data);
+            let series =
+                curves.map(|((_, times, degrees), data)| (stem(&data.file), times, degrees)).collect();
+            Ok(vec![Done { name: name.clone(), fit, abscissa: ("time", "s"), series, known: None }])
+        }
+        Job::Ozawa(coolings, temperatures) => {
+            let mut all = Vec::new();
+            for temperature in temperatures {
+                let fit = ozawa(&coolings, temperature)?;
+                let (rates, degrees) = crate::fit::rates_at(&coolings, temperature);
+                let rates: Vec<f64> = rates.iter().map(|q| q * 60.0).collect();
+                let name = format!("{name}.{}_degC", ((temperature - CELSIUS) * 100.0).round() / 100.0);
+                let series = vec![("measured".to_owned(), rates, degrees)];
+                all.push(Done { name, fit, abscissa: ("cooling_rate", "K/min"), series, known: None });
+            }
+            Ok(all)
+        }
+    }
+}
+
+/// A file's name without folder and extension.
+fn stem(file: &Path) -> String {
+    file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn record(report: &mut Report, done: &Done) {
+    let Done { name, fit, .. } = done;
+    for estimate in &fit.estimates {
+        let of = |quantity: Quantity| quantity.of(&[name, estimate.name]).in_unit(&estimate.unit);
+        report.value(of(q::CONSTANT), estimate.value);
+        report.value(of(q::STANDARD_ERROR), estimate.standard_error);
+        report.value(of(q::LOWER), estimate.interval[0]);
+        report.value(of(q::UPPER), estimate.interval[1]);
+    }
+    report.value(q::FIT_RMS.of(&[name]), fit.rms);
+    report.work(&format!("{name}.measurements"), fit.measurements as u64);
+    report.work(&format!("{name}.evaluations"), fit.evaluations as u64);
+}
+
+/// estimates.csv: a line for each constant.
+fn write_estimates(output: &Path, all: &[Done]) -> Result<(), polycore::Error> {
+    let mut text = String::from("fit,constant,value,standard_error,lower_95,upper_95,unit\n");
+    for Done { name, fit, .. } in all {
+        for e in &fit.estimates {
+            let [lower, upper] = e.interval;
+            let numbers = format!("{:?},{:?},{lower:?},{upper:?}", e.value, e.standard_error);
+            let _ = writeln!(text, "{name},{},{numbers},{}", e.name, e.unit);
+        }
+    }
+    atomic_write(output.join("estimates.csv"), |file| file.write_all(text.as_bytes()))
+}
+
+/// NAME.csv: measurements beside the model.
+fn write(output: &Path, done: &Done) -> Result<(), polycore::Error> {
+    let mut columns = [Vec::new(), Vec::new(), Vec::new()];
+    for (index, (_, x, data)) in done.series.iter().enumerate() {
+        columns[0].extend(std::iter::repeat_n((index + 1) as f64, x.len()));
+        columns[1].extend(x);
+        columns[2].extend(data);
+    }
+    let [run, x, data] = &columns;
+    let (name, unit) = done.abscissa;
+    let columns: [csv::Column; 4] =
+        [("run", "", run), (name, unit, x), ("alpha", "", data), ("alpha_model", "", &done.fit.model)];
+    csv::write(output.join(format!("{}.csv", done.name)), &columns)
+}
+
+/// NAME_posterior.csv: draws of the constants, for `sweep --sample`.
+fn write_draws(output: &Path, done: &Done) -> Result<(), polycore::Error> {
+    let fit = &done.fit;
+    if fit.draws.is_empty() {
+        return Ok(());
+    }
+    let lists: Vec<Vec<f64>> =
+        (0..fit.estimates.len()).map(|i| fit.draws.iter().map(|draw| draw[i]).collect()).collect();
+    let columns: Vec<csv::Column> = fit
+        .estimates
+        .iter()
+        .zip(&lists)
+        .map(|(one, list)| (one.name, one.unit.as_str(), &list[..]))
+        .collect();
+    csv::write(output.join(format!("{}_posterior.csv", done.name)), &columns)
+}
+
+/// NAME.png: measurements as markers, the model dashed.
+fn draw(output: &Path, done: &Done) -> Result<(), polycore::Error> {
+    let unit = done.abscissa.1.replace("degC", "°C");
+    let axis = format!("{} ({unit})", done.abscissa.0.replace('_', " "));
+    let mut plot = LinePlot::new(&done.name).axes(&axis, "relative crystallinity α").size(800.0, 460.0);
+    let (mut row, mut curve) = (0, [Vec::new(), Vec::new()]);
+    for (name, x, data) in &done.series {
+        let model = &done.fit.model[row..row + x.len()];
+        row += x.len();
+        let mut order: Vec<usize> = (0..x.len()).collect();
+        order.sort_by(|&a, &b| x[a].total_cmp(&x[b]));
+        for index in order {
+            curve[0].push(x[index]);
+            curve[1].push(model[index]);
+        }
+        // a NaN ends the line of one run
+        curve.iter_mut().for_each(|values| values.push(f64::NAN));
+        plot = plot.series(Series::markers(name, x, data));
+    }
+    plot = plot.series(Series::reference("model", &curve[0], &curve[1]));
+    plot.write(output.join(format!("{}.png", done.name)))
+}

@@ -1,0 +1,74 @@
+//! The model of a fit of a part: one simulation for each trial of its constants.
+
+use super::Failure;
+use super::celsius::CELSIUS;
+use super::probe::{self, Probe};
+use crate::error::Error;
+use crate::fit::{self, Fit};
+use crate::kinetics::Constants;
+use crate::program::scene::PartFit;
+use crate::simulation::Simulation;
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+
+/// Fits the constants; `show` hears of each trial, and may end the fit.
+pub fn solve(
+    job: &PartFit,
+    show: &mut dyn FnMut(usize) -> Result<(), polycore::Error>,
+) -> Result<Fit, Failure> {
+    // a first trial whose failure is the scene's has its own error
+    trial(job, &job.constants)?;
+    let (state, stopped) = (RefCell::new((0, show)), RefCell::new(None));
+    let model = |constants: &Constants| -> Option<Vec<[f64; 2]>> {
+        let (count, show) = &mut *state.borrow_mut();
+        *count += 1;
+        if stopped.borrow().is_some() {
+            return None;
+        }
+        if let Err(error) = show(*count) {
+            *stopped.borrow_mut() = Some(error);
+            return None;
+        }
+        trial(job, constants).ok()
+    };
+    let found = fit::part(&model, &job.degrees(), &job.constants);
+    match stopped.into_inner() {
+        Some(error) => Err(Error::from(error).into()),
+        None => Ok(found?),
+    }
+}
+
+/// Temperature, K, and α at each measurement of a part with such constants.
+fn trial(job: &PartFit, constants: &Constants) -> Result<Vec<[f64; 2]>, Failure> {
+    let scene = job.with(constants);
+    let task = scene.task(&job.source, scene.mesh.build(&job.source)?)?;
+    let mut simulation = Simulation::new(std::sync::Arc::clone(&task.problem), task.settings)?;
+    let names = simulation.field_names();
+    let fields = names.len();
+    let field = names.iter().position(|name| *name == "alpha").unwrap_or(0);
+    let mut probes: Vec<Probe> =
+        scene.probe.iter().zip(&task.probes).map(|(spec, place)| Probe::new(spec, place, fields)).collect();
+    probe::record(&mut probes, &simulation, &names)?;
+    let mut result = Ok(());
+    let _ = simulation.advance(task.end, &mut |simulation, _| {
+        result = probe::record(&mut probes, simulation, &names);
+        if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    result?;
+    let mut rows = Vec::new();
+    for (probe, times, _) in &job.curves {
+        let probe = &probes[*probe];
+        for &time in times {
+            let Some([temperature, degree]) = probe.at(time, field) else {
+                let reason = format!(
+                    "probe `{}` is not there at {time} s; the part ends at {} s",
+                    probe.name(),
+                    task.end
+                );
+                return Err(Error::Data { what: "measurements of a part".to_owned(), reason }.into());
+            };
+            rows.push([temperature + CELSIUS, degree]);
+        }
+    }
+    Ok(rows)
+}

@@ -1,0 +1,62 @@
+//! Peaks of heat flows: enthalpies, tables, pictures.
+
+use super::celsius::of_kelvin;
+use crate::program::quantities as q;
+use crate::program::scene::{FitSpec, Measured};
+use harness::output::csv;
+use harness::output::picture::{LinePlot, Series};
+use harness::report::Report;
+use std::path::Path;
+
+/// Enthalpies and degrees of crystallinity of a fit's files.
+pub fn record(report: &mut Report, spec: &FitSpec, peaks: &[Measured]) {
+    let perfect = spec.heat_flow.as_ref().and_then(|flow| flow.latent_heat);
+    for (index, Measured { peak, .. }) in peaks.iter().enumerate() {
+        let run = (index + 1).to_string();
+        report.value(q::ENTHALPY.of(&[&spec.name, &run]), peak.enthalpy / 1e3);
+        if let Some(perfect) = perfect {
+            report.value(q::CRYSTALLINITY.of(&[&spec.name, &run]), peak.enthalpy / perfect.si());
+        }
+    }
+}
+
+/// NAME-heat-flow.csv and .png: heat given off, its baseline and α; nothing without peaks.
+pub fn write(output: &Path, name: &str, peaks: &[Measured], picture: bool) -> Result<(), polycore::Error> {
+    let Some(first) = peaks.first() else { return Ok(()) };
+    let mut columns: Vec<(&str, &str, Vec<f64>)> = vec![
+        ("run", "", Vec::new()),
+        ("time", "s", Vec::new()),
+        ("heat_flow", "W/g", Vec::new()),
+        ("baseline", "W/g", Vec::new()),
+        ("alpha", "", Vec::new()),
+    ];
+    let cooling = !first.temperatures.is_empty();
+    if cooling {
+        columns.push(("temperature", "degC", Vec::new()));
+    }
+    let axis = if cooling { "temperature (°C)" } else { "time (s)" };
+    let mut plot = LinePlot::new(name).axes(axis, "heat given off (W/g)").size(800.0, 460.0);
+    let mut under = [Vec::new(), Vec::new()];
+    for (index, Measured { peak, temperatures, .. }) in peaks.iter().enumerate() {
+        let per_gram = |flows: &[f64]| flows.iter().map(|q| q / 1e3).collect::<Vec<f64>>();
+        let [flows, baseline] = [per_gram(&peak.flows), per_gram(&peak.baseline)];
+        let celsius = of_kelvin(temperatures);
+        let x = if cooling { &celsius } else { &peak.times };
+        plot = plot.series(Series::line(&format!("run {}", index + 1), x, &flows));
+        under[0].extend(x);
+        under[1].extend(&baseline);
+        // a NaN ends the line of one run
+        under.iter_mut().for_each(|values| values.push(f64::NAN));
+        let run = vec![(index + 1) as f64; x.len()];
+        let all = [run, peak.times.clone(), flows, baseline, peak.degrees.clone(), celsius];
+        columns.iter_mut().zip(all).for_each(|(column, values)| column.2.extend(values));
+    }
+    let columns: Vec<csv::Column> =
+        columns.iter().map(|(name, unit, values)| (*name, *unit, &values[..])).collect();
+    csv::write(output.join(format!("{name}-heat-flow.csv")), &columns)?;
+    if !picture {
+        return Ok(());
+    }
+    let plot = plot.series(Series::reference("baseline", &under[0], &under[1]));
+    plot.write(output.join(format!("{name}-heat-flow.png")))
+}

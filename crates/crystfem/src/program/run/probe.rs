@@ -1,0 +1,194 @@
+//! Places whose temperature and state are recorded in every step of a part's run.
+
+use super::celsius::CELSIUS;
+use crate::error::Error;
+use crate::mesh::Place;
+use crate::program::quantities as q;
+use crate::program::scene::{PartScene, ProbeSpec};
+use crate::simulation::Simulation;
+use harness::output::csv;
+use harness::output::picture::{LinePlot, Series};
+use harness::report::Report;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Rows of a probe that are drawn at most.
+const ROWS: usize = 4000;
+
+/// A place and what was recorded there since it exists.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Probe {
+    name: String,
+    place: Place,
+    time: Vec<f64>,
+    /// °C.
+    temperature: Vec<f64>,
+    /// Of each quantity of the materials.
+    fields: Vec<Vec<f64>>,
+}
+
+impl Probe {
+    /// At a place, of which nothing is recorded yet.
+    pub fn new(spec: &ProbeSpec, place: &Place, fields: usize) -> Self {
+        Self {
+            name: spec.name.clone(),
+            place: place.clone(),
+            time: Vec::new(),
+            temperature: Vec::new(),
+            fields: vec![Vec::new(); fields],
+        }
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn place(&self) -> &Place {
+        &self.place
+    }
+
+    /// Temperature, °C, and a field at a time, linear between rows; `None` where it was not there.
+    pub(super) fn at(&self, time: f64, field: usize) -> Option<[f64; 2]> {
+        let after = self.time.partition_point(|&row| row < time).max(1);
+        let (from, to) = (*self.time.get(after - 1)?, *self.time.get(after)?);
+        let share = (time - from) / (to - from);
+        if !(0.0..=1.0).contains(&share) {
+            return None;
+        }
+        let between = |values: &[f64]| values[after - 1] + share * (values[after] - values[after - 1]);
+        Some([between(&self.temperature), between(&self.fields[field])])
+    }
+
+    fn last(&self) -> Option<f64> {
+        self.time.last().copied()
+    }
+
+    /// Whether an element that holds the place is there.
+    fn exists(&self, simulation: &Simulation) -> bool {
+        self.place.elements().iter().any(|&element| simulation.is_born(element))
+    }
+}
+
+/// Adds a row to every probe whose place exists; NaN stands for a quantity that no material there has.
+///
+/// # Errors
+/// [`Error::NotFinite`] of a value at a probe.
+pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static str]) -> Result<(), Error> {
+    if !probes.iter().any(|probe| probe.exists(simulation)) {
+        return Ok(());
+    }
+    let time = simulation.time();
+    let mut nodes: Vec<u32> = probes.iter().flat_map(|probe| probe.place.nodes()).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    let fields: Vec<_> = names.iter().map(|name| simulation.field_of(name, &nodes)).collect();
+    for probe in probes.iter_mut().filter(|probe| probe.exists(simulation)) {
+        let Some(temperature) = probe.place.value(|node| simulation.temperature(node)) else { continue };
+        if probe.last() == Some(time) {
+            continue;
+        }
+        let of =
+            |field: &Vec<Option<f64>>| probe.place.value(|node| field[nodes.binary_search(&node).ok()?]);
+        let values: Vec<Option<f64>> = fields.iter().map(of).collect();
+        let all = std::iter::once(("temperature", Some(temperature)))
+            .chain(names.iter().copied().zip(values.iter().copied()));
+        for (quantity, value) in all {
+            if value.is_some_and(|value| !value.is_finite()) {
+                let place = format!("probe `{}`", probe.name);
+                return Err(Error::NotFinite { quantity, place, time });
+            }
+        }
+        probe.time.push(time);
+        probe.temperature.push(temperature - CELSIUS);
+        for (list, value) in probe.fields.iter_mut().zip(values) {
+            list.push(value.unwrap_or(f64::NAN));
+        }
+    }
+    Ok(())
+}
+
+/// probe_NAME.csv, the values at the end, and the extremes of temperature.
+pub fn write(
+    probes: &[Probe],
+    names: &[&'static str],
+    output: &Path,
+    report: &mut Report,
+) -> Result<(), Error> {
+    for probe in probes {
+        let name = &probe.name;
+        report.value(q::DISTANCE.of(&[name]), probe.place.distance());
+        let mut columns: Vec<csv::Column> =
+            vec![("time", "s", &probe.time), ("temperature", "degC", &probe.temperature)];
+        columns.extend(names.iter().zip(&probe.fields).map(|(name, values)| (*name, "", values.as_slice())));
+        csv::write(output.join(format!("probe_{name}.csv")), &columns)?;
+        let mut last = |quantity: &str, values: &[f64], unit: &str| {
+            // `record` has refused all others: no material there has it
+            if let Some(last) = values.last().filter(|last| !last.is_nan()) {
+                report.value(q::AT_PROBE.of(&[name, quantity]).in_unit(unit), *last);
+            }
+        };
+        last("temperature", &probe.temperature, "degC");
+        for (quantity, values) in names.iter().zip(&probe.fields) {
+            last(quantity, values, "");
+        }
+        if !probe.temperature.is_empty() {
+            let extreme = |pick: fn(f64, f64) -> f64| probe.temperature.iter().copied().reduce(pick);
+            let [lowest, highest] = [extreme(f64::min), extreme(f64::max)].map(Option::unwrap_or_default);
+            report.value(q::LOWEST_TEMPERATURE.of(&[name]), lowest);
+            report.value(q::HIGHEST_TEMPERATURE.of(&[name]), highest);
+        }
+    }
+    Ok(())
+}
+
+/// What births do to the probes that are there: NAME.jump_at_birth_N, by how much the temperature rises after the N-th birth
+/// before the next one, K, and of each field FIELD_at_birth_N, its value just before, and FIELD_lost_at_birth_N, by how
+/// much it falls below that.
+pub fn births(probes: &[Probe], names: &[&'static str], times: &[f64], report: &mut Report) {
+    for probe in probes {
+        for (number, &birth) in (1..).zip(times) {
+            // a row at the time of a birth shows what was before it
+            let first = probe.time.partition_point(|&time| time <= birth);
+            let next = times.get(number).copied().unwrap_or(f64::INFINITY);
+            let last = probe.time.partition_point(|&time| time <= next);
+            let (Some(before), true) = (first.checked_sub(1), last > first) else { continue };
+            // the row at which the probe itself was born says nothing
+            if probe.time[0] >= birth {
+                continue;
+            }
+            let after = |values: &[f64], pick: fn(f64, f64) -> f64| {
+                values[first..last].iter().copied().fold(values[before], pick) - values[before]
+            };
+            let (name, number) = (probe.name.as_str(), number.to_string());
+            report.value(q::JUMP.of(&[name, &number]), after(&probe.temperature, f64::max));
+            for (field, values) in names.iter().zip(&probe.fields).filter(|(_, v)| !v[before].is_nan()) {
+                report.value(q::AT_BIRTH.of(&[name, field, &number]), values[before]);
+                let lost = after(values, f64::min).abs();
+                report.value(q::LOST_AT_BIRTH.of(&[name, field, &number]), lost);
+            }
+        }
+    }
+}
+
+/// Temperatures and fields of all probes over time.
+pub fn draw(probes: &[Probe], names: &[&'static str], scene: &PartScene, output: &Path) -> Result<(), Error> {
+    let quantities =
+        std::iter::once(("temperature", "T [°C]")).chain(names.iter().map(|name| (*name, *name)));
+    for (index, (name, label)) in quantities.enumerate() {
+        let mut plot = LinePlot::new(&scene.title).axes("t [s]", label);
+        let mut drawn = false;
+        for probe in probes.iter().filter(|probe| probe.time.len() > 1) {
+            let values = if index == 0 { &probe.temperature } else { &probe.fields[index - 1] };
+            if values.iter().any(|x| x.is_finite()) {
+                let every = values.len().div_ceil(ROWS);
+                let thinned = |list: &[f64]| -> Vec<f64> { list.iter().copied().step_by(every).collect() };
+                plot = plot.series(Series::line(&probe.name, &thinned(&probe.time), &thinned(values)));
+                drawn = true;
+            }
+        }
+        if drawn {
+            plot.write(output.join(format!("probes_{name}.png")))?;
+        }
+    }
+    Ok(())
+}

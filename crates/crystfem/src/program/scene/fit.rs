@@ -1,0 +1,260 @@
+//! The scene of a fit.
+
+use super::fault::{located, located_in};
+use super::fit_part::PartFit;
+use super::fit_spec::{FitLaw, FitSpec, temperature, time};
+use super::heat_flow::Measured;
+use super::material::KINETICS_KEYS;
+use super::{OutputSpec, Program, check_name};
+use crate::fit::{Cooling, DEGREES, Known, Run};
+use crate::kinetics::{Constants, Kinetics};
+use crate::table::{Column, read};
+use harness::report::Expect;
+use harness::scene::{SceneError, Source};
+use polycore::units::dimension::RatioDimension;
+use serde::Deserialize;
+use std::path::Path;
+
+/// A whole scene.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FitScene {
+    /// The program that runs it: `crystfem`.
+    pub program: Program,
+    /// One line for tables and pictures.
+    #[serde(default)]
+    pub title: String,
+    /// The fits.
+    pub fit: Vec<FitSpec>,
+    /// Files to write.
+    #[serde(default)]
+    pub output: OutputSpec,
+    /// Expected results.
+    #[serde(default)]
+    pub expect: Vec<Expect>,
+}
+
+/// A fit with its data, checked.
+pub enum Job {
+    /// Times, s, and α.
+    Avrami(Vec<f64>, Vec<f64>),
+    /// Cooling curves, and where to compare them, K.
+    Ozawa(Vec<Cooling>, Vec<f64>),
+    /// Runs, and what is known.
+    Nakamura(Vec<Run>, Known),
+    /// A part, and what was measured in it.
+    Part(Box<PartFit>),
+}
+
+impl FitScene {
+    /// All fits with their data, and the peaks of those that come from heat flows.
+    ///
+    /// # Errors
+    /// A [`SceneError`] that names the key, the value found and what is allowed; for data, file, line and column.
+    pub fn jobs(&self, source: &Source) -> Result<Vec<(Job, Vec<Measured>)>, SceneError> {
+        if self.fit.is_empty() {
+            return Err(source.error("fit", "nothing", "at least one [[fit]]"));
+        }
+        let mut jobs = Vec::new();
+        for (index, fit) in self.fit.iter().enumerate() {
+            let key = |field: &str| format!("fit[{index}].{field}");
+            check_name(source, &key("name"), &fit.name)?;
+            if self.fit[..index].iter().any(|other| other.name == fit.name) {
+                return Err(source.error(
+                    &key("name"),
+                    format!("`{}` a second time", fit.name),
+                    "another name",
+                ));
+            }
+            let tables = |other: &&FitSpec| {
+                other.heat_flow.is_some() && fit.name.strip_prefix(&other.name) == Some("-heat-flow")
+            };
+            let taken =
+                self.fit.iter().find(tables).map(|other| format!("the heat flow of `{}`", other.name));
+            let taken = taken.or_else(|| (fit.name == "estimates").then(|| "all estimates".to_owned()));
+            if let Some(taken) = taken {
+                let found = format!("`{0}`, but {0}.csv has {taken}", fit.name);
+                return Err(source.error(&key("name"), found, "another name"));
+            }
+            fit.check_keys(source, &key)?;
+            fit.check_heat_flow(source, &key)?;
+            let measured = |flow| {
+                (0..fit.data.len()).map(|i| fit.measured(source, &key, flow, i)).collect::<Result<_, _>>()
+            };
+            let peaks: Vec<Measured> = fit.heat_flow.as_ref().map_or(Ok(Vec::new()), measured)?;
+            jobs.push((fit.job(source, &key, &peaks)?, peaks));
+        }
+        Ok(jobs)
+    }
+}
+
+impl FitSpec {
+    fn check_keys(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<(), SceneError> {
+        use FitLaw::{Nakamura, Ozawa, Part};
+        let foreign = [
+            ("temperatures", !self.temperatures.is_empty(), Ozawa),
+            ("equilibrium_melting", self.equilibrium_melting.is_some(), Nakamura),
+            ("frozen", self.frozen.is_some(), Nakamura),
+            ("glass_transition", self.glass_transition.is_some(), Nakamura),
+            ("activation_energy", self.activation_energy.is_some(), Nakamura),
+            ("part", self.part.is_some(), Part),
+            ("material", self.material.is_some(), Part),
+        ];
+        for (name, given, law) in foreign {
+            if given && law != self.law {
+                let law = format!("{law:?}").to_lowercase();
+                let found = format!("`{name}` of another law");
+                return Err(source.error(&key(name), found, format!("nothing, or `law = \"{law}\"`")));
+            }
+        }
+        let rows = self.data.len();
+        let needed = if self.law == Ozawa { 3 } else { 1 };
+        if rows < needed {
+            return Err(source.error(&key("data"), format!("{rows} files"), format!("at least {needed}")));
+        }
+        if self.law == FitLaw::Avrami && rows > 1 {
+            return Err(source.error(
+                &key("data[1]"),
+                "a second file",
+                "one: another temperature is another [[fit]]",
+            ));
+        }
+        if self.law == Part && self.heat_flow.is_some() {
+            return Err(source.error(&key("heat_flow"), "`heat_flow` of a part", "nothing"));
+        }
+        for (i, data) in self.data.iter().enumerate() {
+            if self.law != Part && data.probe.is_some() {
+                let at = key(&format!("data[{i}].probe"));
+                return Err(source.error(&at, "`probe` of another law", "nothing, or `law = \"part\"`"));
+            }
+            let at = key(&format!("data[{i}].rate"));
+            match (self.law, data.rate.map(|rate| rate.si())) {
+                (Part, Some(_)) => return Err(source.error(&at, "`rate` of a part", "nothing")),
+                (FitLaw::Avrami, Some(_)) => {
+                    return Err(source.error(&at, "`rate` of an isothermal run", "nothing"));
+                }
+                (Ozawa, None) => return Err(source.error(&at, "nothing", "`rate`: a cooling rate")),
+                (_, Some(rate)) if !(rate > 0.0 && rate.is_finite()) => {
+                    return Err(source.error(&at, format!("{rate} K/s"), "above 0: a cooling rate"));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The job, of the peaks where there are any and else of tables of α.
+    fn job(
+        &self,
+        source: &Source,
+        key: &dyn Fn(&str) -> String,
+        peaks: &[Measured],
+    ) -> Result<Job, SceneError> {
+        match self.law {
+            FitLaw::Avrami => {
+                if let [Measured { peak, .. }] = peaks {
+                    let times = peak.times.iter().map(|time| time - peak.times[0]).collect();
+                    return Ok(Job::Avrami(times, peak.degrees.clone()));
+                }
+                let columns = [time().within(0.0, f64::INFINITY), alpha()];
+                let [times, degrees] = table(source, &key("data[0].file"), &self.data[0].file, columns)?;
+                Ok(Job::Avrami(times, degrees))
+            }
+            FitLaw::Ozawa => {
+                if self.temperatures.is_empty() {
+                    let allowed = "at least one temperature at which the rates are compared";
+                    return Err(source.error(&key("temperatures"), "nothing", allowed));
+                }
+                let mut coolings = Vec::new();
+                for (i, data) in self.data.iter().enumerate() {
+                    let at = key(&format!("data[{i}].file"));
+                    let [temperatures, degrees] = match peaks.get(i) {
+                        Some(found) => [found.temperatures.clone(), found.peak.degrees.clone()],
+                        None => table(source, &at, &data.file, [temperature(), alpha()])?,
+                    };
+                    coolings.push(Cooling { rate: data.rate.map_or(0.0, |r| r.si()), temperatures, degrees });
+                }
+                Ok(Job::Ozawa(coolings, self.temperatures.iter().map(|t| t.si()).collect()))
+            }
+            FitLaw::Nakamura => {
+                let known = self.known(source, key)?;
+                let mut runs = Vec::new();
+                for (i, data) in self.data.iter().enumerate() {
+                    let at = key(&format!("data[{i}].file"));
+                    runs.push(match (data.rate, peaks.get(i)) {
+                        (Some(rate), found) => {
+                            let [temperatures, degrees] = match found {
+                                Some(found) => [found.temperatures.clone(), found.peak.degrees.clone()],
+                                None => table(source, &at, &data.file, [temperature(), alpha()])?,
+                            };
+                            let run = Run::cooling(rate.si(), temperatures, degrees, &known);
+                            run.map_err(|error| source.error(&at, error, "temperatures that fall"))?
+                        }
+                        (None, Some(Measured { peak, temperatures, history })) => Run {
+                            times: peak.times.clone(),
+                            temperatures: temperatures.clone(),
+                            degrees: peak.degrees.clone(),
+                            history: history.clone(),
+                        },
+                        (None, None) => {
+                            let columns = [time(), temperature(), alpha()];
+                            let [times, temperatures, degrees] = table(source, &at, &data.file, columns)?;
+                            Run { times, temperatures, degrees, history: Vec::new() }
+                        }
+                    });
+                }
+                Ok(Job::Nakamura(runs, known))
+            }
+            FitLaw::Part => Ok(Job::Part(Box::new(self.part(source, key)?))),
+        }
+    }
+
+    fn known(&self, source: &Source, key: &dyn Fn(&str) -> String) -> Result<Known, SceneError> {
+        let Some(melting) = self.equilibrium_melting else {
+            let allowed = "`equilibrium_melting`: the temperature T₀, e.g. by a Hoffman–Weeks plot";
+            return Err(source.error(&key("equilibrium_melting"), "nothing", allowed));
+        };
+        let frozen = match (self.frozen, self.glass_transition) {
+            (Some(frozen), None) => frozen.si(),
+            (None, Some(glass)) => glass.si() - 30.0,
+            (None, None) => {
+                let allowed = "`frozen`, or `glass_transition` for T∞ = T_g − 30 K";
+                return Err(source.error(&key("frozen"), "nothing", allowed));
+            }
+            (Some(_), Some(_)) => {
+                let found = "`glass_transition` together with `frozen`";
+                return Err(source.error(&key("glass_transition"), found, "one of them"));
+            }
+        };
+        let example = Constants::TABLE_4_1_COLUMN_1;
+        let known = Known {
+            equilibrium_melting: melting.si(),
+            frozen,
+            activation_energy: self.activation_energy.map_or(example.activation_energy, |u| u.si()),
+        };
+        let trial = Constants {
+            equilibrium_melting: known.equilibrium_melting,
+            frozen: known.frozen,
+            activation_energy: known.activation_energy,
+            ..example
+        };
+        let block = key("");
+        let block = block.trim_end_matches('.');
+        Kinetics::new(trial).map_err(|error| located_in(source, block, &KINETICS_KEYS, &error))?;
+        Ok(known)
+    }
+}
+
+pub(super) fn alpha() -> Column {
+    Column::of::<RatioDimension>("alpha").within(DEGREES[0], DEGREES[1])
+}
+
+/// Reads a table beside the scene.
+pub(super) fn table<const N: usize>(
+    source: &Source,
+    key: &str,
+    file: &Path,
+    columns: [Column; N],
+) -> Result<[Vec<f64>; N], SceneError> {
+    read(&source.file(file), columns).map_err(|error| located(source, key, &error))
+}

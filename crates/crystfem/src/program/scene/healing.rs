@@ -1,0 +1,157 @@
+//! Healing of interfaces: of which material, how fast.
+
+use super::PartScene;
+use super::fault::located_in;
+use crate::error::Error;
+use crate::healing::{Glass, Healing};
+use crate::mesh::Mesh;
+use crate::mesh::surface::{Surface, area};
+use harness::scene::{SceneError, Source};
+use polycore::units::{MolarEnergy, Stress, Temperature, TemperatureDifference, Time};
+use serde::Deserialize;
+
+/// Where its constants stand.
+const KEYS: [(&str, &str); 6] = [
+    ("relaxation time of healing, s", "time"),
+    ("temperature of healing, K", "temperature"),
+    ("activation energy of healing, J/mol", "energy"),
+    ("glass transition, K", "glass_transition"),
+    ("C1 of WLF", "wlf"),
+    ("C2 of WLF, K", "wlf"),
+];
+/// T∞ of the kinetics is that much below T_g, K (Hoffman).
+const FROZEN: f64 = 30.0;
+
+/// How interfaces between what was printed at different times heal.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HealingSpec {
+    /// The printed material; it must be semicrystalline.
+    pub material: String,
+    /// Relaxation time of chains at `temperature`; nobody has published it of PA12.
+    pub time: Time,
+    /// See `time`.
+    pub temperature: Temperature,
+    /// Activation energy of this time in the melt.
+    pub energy: MolarEnergy,
+    /// How `time` grows towards the glass: `wlf`, the default, or `arrhenius`, as in the melt.
+    #[serde(default)]
+    pub shift: Shift,
+    /// Glass transition, at and below which nothing heals; default T∞ + 30 K of the material's kinetics.
+    pub glass_transition: Option<Temperature>,
+    /// C₁ and C₂ of Williams, Landel and Ferry about it; default 17.44 and 51.6 K.
+    pub wlf: Option<(f64, TemperatureDifference)>,
+    /// Tensile strength of the material: the strength of interfaces is D_h times it.
+    pub strength: Option<Stress>,
+}
+
+/// How the relaxation time grows towards the glass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shift {
+    /// As Williams, Landel and Ferry have it.
+    #[default]
+    Wlf,
+    /// As in the melt, at any temperature.
+    Arrhenius,
+}
+
+/// An interface between two elements.
+pub struct Interface {
+    /// The elements.
+    pub sides: [u32; 2],
+    /// The corners that they share.
+    pub nodes: Vec<u32>,
+    /// m².
+    pub area: f64,
+}
+
+/// What heals.
+pub struct Interfaces {
+    /// How fast.
+    pub law: Healing,
+    /// Strength of the material, Pa.
+    pub strength: Option<f64>,
+    /// Between elements that appear at different times.
+    pub list: Vec<Interface>,
+    /// Elements that are printed of this material.
+    pub printed: Vec<bool>,
+}
+
+impl HealingSpec {
+    /// The law, of a material whose glass transition is about `transition`, K.
+    fn law(&self, transition: f64) -> Result<Healing, Error> {
+        let law = Healing::new(self.time.si(), self.temperature.si(), self.energy.si())?;
+        if self.shift == Shift::Arrhenius {
+            return Ok(law);
+        }
+        let mut glass = Glass::universal(self.glass_transition.map_or(transition, |given| given.si()));
+        if let Some((steepness, width)) = &self.wlf {
+            (glass.steepness, glass.width) = (*steepness, width.si());
+        }
+        law.with_glass(glass)
+    }
+}
+
+impl PartScene {
+    /// The interfaces of a scene, where it asks for their healing; `births` are the elements of each birth.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for another material, constants out of their domain, and a part without interfaces.
+    pub(super) fn interfaces<'a>(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+        material_of: &[u16],
+        births: impl Iterator<Item = &'a [u32]>,
+    ) -> Result<Option<Interfaces>, SceneError> {
+        let Some(spec) = &self.healing else { return Ok(None) };
+        let known: Vec<&str> = self.materials.keys().map(String::as_str).collect();
+        let Some(index) = known.iter().position(|name| *name == spec.material) else {
+            return Err(source.unknown("healing.material", &spec.material, &known));
+        };
+        let material = &self.materials[&spec.material];
+        if material.kinetics.is_none() {
+            let found = format!("`{}`, which does not crystallize", spec.material);
+            return Err(source.error("healing.material", found, "a semicrystalline material"));
+        }
+        let kinetics = material.constants(source, &format!("materials.{}", spec.material))?;
+        let law = spec
+            .law(kinetics.frozen + FROZEN)
+            .map_err(|error| located_in(source, "healing", &KEYS, &error))?;
+        let strength = spec.strength.map(|strength| strength.si());
+        if let Some(found) = strength.filter(|strength| !(*strength > 0.0 && strength.is_finite())) {
+            return Err(source.error("healing.strength", format!("{found} Pa"), "above 0"));
+        }
+        let mut birth_of = vec![u32::MAX; mesh.element_count()];
+        for (number, elements) in (0..).zip(births) {
+            elements.iter().for_each(|&element| birth_of[element as usize] = number);
+        }
+        let births = birth_of.iter().zip(material_of);
+        let printed: Vec<bool> =
+            births.map(|(&birth, &of)| usize::from(of) == index && birth != u32::MAX).collect();
+        let surface = Surface::of_all(mesh).map_err(|error| source.refused("mesh", error.to_string()))?;
+        let mut list = Vec::new();
+        for element in 0..mesh.element_count() as u32 {
+            if !printed[element as usize] {
+                continue;
+            }
+            for face in mesh.faces_of(element) {
+                let Some(other) = surface.opposite(face).map(|face| face.element) else { continue };
+                if printed[other as usize] && birth_of[other as usize] < birth_of[element as usize] {
+                    let nodes = mesh.face_nodes(face).to_vec();
+                    list.push(Interface { sides: [element, other], nodes, area: area(mesh, face) });
+                }
+            }
+        }
+        if list.is_empty() {
+            let found = format!("no two births of `{}` that touch", spec.material);
+            return Err(source.error(
+                "healing.material",
+                found,
+                "the material of a [print] with several births",
+            ));
+        }
+        Ok(Some(Interfaces { law, strength, list, printed }))
+    }
+}

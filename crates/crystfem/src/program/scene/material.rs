@@ -1,0 +1,494 @@
+//! The material block of a scene.
+
+use super::either::{self, TextOrTable};
+use super::fault::{located, located_in};
+use super::powder::PowderSpec;
+use crate::error::Error;
+use crate::kinetics::{Constants, Kinetics};
+use crate::material::{AsPublished, Conductor, Polymer, Property, Semicrystalline, Sign, ThermalMaterial};
+use crate::melting::Melting;
+use harness::scene::{SceneError, Source};
+use polycore::units::dimension::{ConductivityDimension, SpecificHeatDimension};
+use polycore::units::{
+    Density, Dimension, MolarEnergy, PerTemperature, Quantity, Rate, Ratio, SpecificEnergy,
+    SquaredTemperature, Temperature,
+};
+use serde::{Deserialize, Deserializer};
+
+/// Laws of heat and crystallization.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Law {
+    /// [`Conductor`].
+    Conductor,
+    /// [`Semicrystalline`].
+    Semicrystalline,
+    /// [`AsPublished`]: Appendix B as coded.
+    AsPublished,
+}
+
+/// A material.
+///
+/// ```toml
+/// [material]
+/// law = "semicrystalline"
+/// density = "1010 kg/m^3"
+/// conductivity = "0.25 W/(m K)"
+/// specific_heat = { temperature = ["20 degC", "200 degC"], value = ["1500 J/(kg K)", "2600 J/(kg K)"] }
+/// kinetics = "table-4.1-column-1"
+/// melting = "pa12"          # without it crystals never melt
+/// crystallinity = 0.25
+/// latent_heat = "209 J/g"   # without it heat and crystallinity are uncoupled
+/// ```
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialSpec {
+    /// Law.
+    pub law: Law,
+    /// Density ρ.
+    pub density: Density,
+    /// Conductivity k.
+    pub conductivity: PropertySpec<ConductivityDimension>,
+    /// Factors on the conductivity along x, y and z; default 1.
+    pub conductivity_factors: Option<[f64; 3]>,
+    /// Specific heat c.
+    pub specific_heat: PropertySpec<SpecificHeatDimension>,
+    /// Fresh material is powder, of `conductor` and `semicrystalline`.
+    pub powder: Option<PowderSpec>,
+    /// Kinetics, of `semicrystalline`.
+    pub kinetics: Option<KineticsSpec>,
+    /// Melting, of `semicrystalline`.
+    pub melting: Option<MeltingSpec>,
+    /// Ultimate crystallinity X∞, of `semicrystalline`.
+    pub crystallinity: Option<Ratio>,
+    /// Heat of fusion of crystal ΔH, of `semicrystalline`.
+    pub latent_heat: Option<SpecificEnergy>,
+    /// Relative crystallinity α of fresh material, of `semicrystalline`; default 0.
+    pub initial_alpha: Option<Ratio>,
+    /// Which sign of the increment crystallizes, of `as-published`; default as published.
+    pub sign: Option<SignSpec>,
+    /// Whether K = 0 outside (T∞, T₀), of `as-published`; default no, as published.
+    pub guarded: Option<bool>,
+}
+
+/// See [`Sign`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SignSpec {
+    /// Heating crystallizes.
+    AsPublished,
+    /// Cooling crystallizes.
+    Mended,
+}
+
+/// A constant (`"0.25 W/(m K)"`) or a table (`{ temperature = […], value = […] }`).
+#[derive(Clone, Debug)]
+pub enum PropertySpec<D> {
+    /// The same at every temperature.
+    Constant(Quantity<D>),
+    /// Linear between these, constant beyond.
+    Table(TableSpec<D>),
+}
+
+/// A table of a property.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, bound = "D: Dimension")]
+pub struct TableSpec<D> {
+    /// Increasing temperatures.
+    pub temperature: Vec<Temperature>,
+    /// A value for each.
+    pub value: Vec<Quantity<D>>,
+}
+
+/// Constants by name (`"table-4.1-column-1"`) or one by one.
+#[derive(Clone, Debug)]
+pub enum KineticsSpec {
+    /// Of the thesis.
+    Named(Constants),
+    /// One by one.
+    Given(GivenKinetics),
+}
+
+/// The constants of Eq. (4.7).
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GivenKinetics {
+    /// Growth rate constant K₀.
+    pub growth_rate: Rate,
+    /// Nucleation constant K_G.
+    pub nucleation: SquaredTemperature,
+    /// Activation energy U; default 6270 J/mol.
+    pub activation_energy: Option<MolarEnergy>,
+    /// Equilibrium melting temperature T₀.
+    pub equilibrium_melting: Temperature,
+    /// Temperature T∞ of frozen chains; or `glass_transition`.
+    pub frozen: Option<Temperature>,
+    /// Glass transition T_g: T∞ = T_g − 30 K.
+    pub glass_transition: Option<Temperature>,
+    /// Avrami exponent n.
+    pub avrami_exponent: f64,
+}
+
+/// Constants by name (`"pa12"`) or one by one.
+#[derive(Clone, Debug)]
+pub enum MeltingSpec {
+    /// Of the thesis.
+    Named(Melting),
+    /// One by one.
+    Given(GivenMelting),
+}
+
+/// The constants of Eq. (4.8).
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GivenMelting {
+    /// Sharpness k_m.
+    pub sharpness: PerTemperature,
+    /// Shape d.
+    pub shape: f64,
+    /// Most probable melting temperature T_p.
+    pub peak: Temperature,
+}
+
+const KINETICS_NAMES: [&str; 3] = ["table-4.1-column-1", "table-4.1-column-2", "appendix-b"];
+const KINETICS: [(&str, Constants); 3] = [
+    (KINETICS_NAMES[0], Constants::TABLE_4_1_COLUMN_1),
+    (KINETICS_NAMES[1], Constants::TABLE_4_1_COLUMN_2),
+    (KINETICS_NAMES[2], Constants::APPENDIX_B),
+];
+
+/// Where parameters of the kinetics stand in their block.
+pub(super) const KINETICS_KEYS: [(&str, &str); 6] = [
+    ("growth rate constant K0, 1/s", "growth_rate"),
+    ("nucleation constant K_G, K²", "nucleation"),
+    ("activation energy U, J/mol", "activation_energy"),
+    ("temperature of frozen chains, K", "frozen"),
+    ("equilibrium melting temperature, K", "equilibrium_melting"),
+    ("Avrami exponent n", "avrami_exponent"),
+];
+/// Where parameters of melting stand in their block.
+const MELTING_KEYS: [(&str, &str); 3] = [
+    ("sharpness of melting k_m, 1/K", "sharpness"),
+    ("shape of melting d", "shape"),
+    ("peak of melting, K", "peak"),
+];
+
+impl MaterialSpec {
+    /// The material; `key` is where the block stands, e.g. `material`.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for keys that the law does not have or lacks, and for constants out of their domain.
+    pub fn build(&self, source: &Source, key: &str) -> Result<Box<dyn ThermalMaterial>, SceneError> {
+        self.check_keys(source, key)?;
+        Ok(match self.law {
+            Law::Conductor => PowderSpec::wrap(self.powder, source, key, self.conductor(source, key)?)?,
+            Law::Semicrystalline => {
+                PowderSpec::wrap(self.powder, source, key, self.semicrystalline(source, key)?)?
+            }
+            Law::AsPublished => {
+                let sign = match self.sign {
+                    Some(SignSpec::Mended) => Sign::Mended,
+                    _ => Sign::AsPublished,
+                };
+                Box::new(AsPublished::new(self.conductor(source, key)?, sign, self.guarded.unwrap_or(false)))
+            }
+        })
+    }
+
+    fn check_keys(&self, source: &Source, key: &str) -> Result<(), SceneError> {
+        let crystalline = [
+            ("kinetics", self.kinetics.is_some(), true),
+            ("crystallinity", self.crystallinity.is_some(), true),
+            ("melting", self.melting.is_some(), false),
+            ("latent_heat", self.latent_heat.is_some(), false),
+            ("initial_alpha", self.initial_alpha.is_some(), false),
+        ];
+        for (name, given, needed) in crystalline {
+            let at = format!("{key}.{name}");
+            match self.law {
+                Law::Semicrystalline if needed && !given => {
+                    return Err(source.error(
+                        &at,
+                        "nothing",
+                        format!("`{name}`: a semicrystalline material needs it"),
+                    ));
+                }
+                Law::Conductor | Law::AsPublished if given => {
+                    let found = format!("`{name}` of a material that has none");
+                    return Err(source.error(&at, found, "nothing, or `law = \"semicrystalline\"`"));
+                }
+                _ => {}
+            }
+        }
+        if self.powder.is_some() && self.law == Law::AsPublished {
+            let allowed = "nothing: the published subroutine has one conductivity";
+            return Err(source.error(&format!("{key}.powder"), "`powder` of `as-published`", allowed));
+        }
+        for (name, given) in [("sign", self.sign.is_some()), ("guarded", self.guarded.is_some())] {
+            if given && self.law != Law::AsPublished {
+                let found = format!("`{name}` of another law");
+                return Err(source.error(
+                    &format!("{key}.{name}"),
+                    found,
+                    "nothing, or `law = \"as-published\"`",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn conductor(&self, source: &Source, key: &str) -> Result<Conductor, SceneError> {
+        let [conductivity, heat] = self.properties(source, key)?;
+        let conductor = Conductor::new(self.density.si(), conductivity, heat);
+        let conductor = at(source, &format!("{key}.density"), conductor)?;
+        let factors = format!("{key}.conductivity_factors");
+        at(source, &factors, conductor.with_directions(self.conductivity_factors.unwrap_or([1.0; 3])))
+    }
+
+    /// Conductivity and specific heat.
+    pub(crate) fn properties(&self, source: &Source, key: &str) -> Result<[Property; 2], SceneError> {
+        let of = |name: &str| format!("{key}.{name}");
+        Ok([
+            self.conductivity.build(source, &of("conductivity"), "conductivity, W/(m K)")?,
+            self.specific_heat.build(source, &of("specific_heat"), "specific heat, J/(kg K)")?,
+        ])
+    }
+
+    /// The constants of the kinetics of a `semicrystalline` block.
+    ///
+    /// # Errors
+    /// A [`SceneError`] where some are missing or given twice.
+    pub(super) fn constants(&self, source: &Source, key: &str) -> Result<Constants, SceneError> {
+        match &self.kinetics {
+            Some(KineticsSpec::Named(constants)) => Ok(*constants),
+            Some(KineticsSpec::Given(given)) => given.constants(source, key),
+            None => Err(source.error(&format!("{key}.kinetics"), "nothing", "kinetics")),
+        }
+    }
+
+    /// The constants of a `semicrystalline` block.
+    ///
+    /// # Errors
+    /// As [`MaterialSpec::build`].
+    pub fn polymer(&self, source: &Source, key: &str) -> Result<Polymer, SceneError> {
+        self.check_keys(source, key)?;
+        let constants = self.constants(source, key)?;
+        let melting = match &self.melting {
+            Some(MeltingSpec::Named(melting)) => Some(*melting),
+            Some(MeltingSpec::Given(given)) => {
+                let built = Melting::new(given.sharpness.si(), given.shape, given.peak.si());
+                let block = format!("{key}.melting");
+                Some(built.map_err(|error| located_in(source, &block, &MELTING_KEYS, &error))?)
+            }
+            None => None,
+        };
+        let property = |name: &str| format!("{key}.{name}");
+        // density and factors are checked here with the properties, so that the rest speaks of crystals
+        self.conductor(source, key)?;
+        let [conductivity, specific_heat] = self.properties(source, key)?;
+        let kinetics = Kinetics::new(constants)
+            .map_err(|error| located_in(source, &property("kinetics"), &KINETICS_KEYS, &error))?;
+        Ok(Polymer {
+            density: self.density.si(),
+            conductivity,
+            specific_heat,
+            kinetics,
+            melting,
+            ultimate_crystallinity: self.crystallinity.map_or(0.0, Quantity::si),
+            latent_heat: self.latent_heat.map(Quantity::si),
+            seed: self.initial_alpha.map_or(0.0, Quantity::si),
+        })
+    }
+
+    /// The material of a `semicrystalline` block.
+    ///
+    /// # Errors
+    /// As [`MaterialSpec::build`].
+    pub fn semicrystalline(&self, source: &Source, key: &str) -> Result<Semicrystalline, SceneError> {
+        let built = Semicrystalline::new(self.polymer(source, key)?);
+        let factors = self.conductivity_factors.unwrap_or([1.0; 3]);
+        built.and_then(|built| built.with_directions(factors)).map_err(|error| {
+            let name = match &error {
+                Error::Parameter { name: "latent heat, J/kg", .. } => "latent_heat",
+                Error::Parameter { name: "initial relative crystallinity", .. } => "initial_alpha",
+                _ => "crystallinity",
+            };
+            located(source, &format!("{key}.{name}"), &error)
+        })
+    }
+}
+
+impl GivenKinetics {
+    fn constants(&self, source: &Source, key: &str) -> Result<Constants, SceneError> {
+        let frozen = match (self.frozen, self.glass_transition) {
+            (Some(frozen), None) => frozen.si(),
+            (None, Some(glass)) => glass.si() - 30.0,
+            (None, None) => {
+                let at = format!("{key}.kinetics.frozen");
+                return Err(source.error(
+                    &at,
+                    "nothing",
+                    "`frozen`, or `glass_transition` for T∞ = T_g − 30 K",
+                ));
+            }
+            (Some(_), Some(_)) => {
+                let at = format!("{key}.kinetics.glass_transition");
+                return Err(source.error(&at, "`glass_transition` together with `frozen`", "one of them"));
+            }
+        };
+        let energy = Constants::TABLE_4_1_COLUMN_1.activation_energy;
+        Ok(Constants {
+            growth_rate: self.growth_rate.si(),
+            nucleation: self.nucleation.si(),
+            activation_energy: self.activation_energy.map_or(energy, Quantity::si),
+            equilibrium_melting: self.equilibrium_melting.si(),
+            frozen,
+            avrami_exponent: self.avrami_exponent,
+        })
+    }
+}
+
+impl<D: Dimension + Copy> PropertySpec<D> {
+    fn build(&self, source: &Source, key: &str, name: &'static str) -> Result<Property, SceneError> {
+        match self {
+            Self::Constant(value) => at(source, key, Property::constant(name, value.si())),
+            Self::Table(table) => {
+                let temperatures = table.temperature.iter().map(|t| t.si()).collect();
+                let values = table.value.iter().map(|v| v.si()).collect();
+                let keys =
+                    [(name, "value"), ("number of values", "value"), ("temperature, K", "temperature")];
+                Property::table(name, temperatures, values)
+                    .map_err(|error| located_in(source, key, &keys, &error))
+            }
+        }
+    }
+}
+
+/// Puts a parameter's error at its place in the scene.
+fn at<T>(source: &Source, key: &str, result: Result<T, Error>) -> Result<T, SceneError> {
+    result.map_err(|error| located(source, key, &error))
+}
+
+impl<D: Dimension> TextOrTable for PropertySpec<D> {
+    type Table = TableSpec<D>;
+
+    fn expected() -> String {
+        format!("{}, e.g. \"{}\", or {{ temperature = […], value = […] }}", D::NAME, D::EXAMPLE)
+    }
+
+    fn from_text<E: serde::de::Error>(text: &str) -> Result<Self, E> {
+        text.parse().map(Self::Constant).map_err(E::custom)
+    }
+
+    fn from_table(table: TableSpec<D>) -> Self {
+        Self::Table(table)
+    }
+}
+
+impl TextOrTable for KineticsSpec {
+    type Table = GivenKinetics;
+
+    fn expected() -> String {
+        let names = KINETICS_NAMES.map(|name| format!("\"{name}\"")).join(", ");
+        format!("{names}, or {{ growth_rate = …, nucleation = …, … }}")
+    }
+
+    fn from_text<E: serde::de::Error>(text: &str) -> Result<Self, E> {
+        let known = KINETICS.iter().find(|(name, _)| *name == text);
+        known
+            .map(|(_, constants)| Self::Named(*constants))
+            .ok_or_else(|| E::unknown_variant(text, &KINETICS_NAMES))
+    }
+
+    fn from_table(table: GivenKinetics) -> Self {
+        Self::Given(table)
+    }
+}
+
+impl TextOrTable for MeltingSpec {
+    type Table = GivenMelting;
+
+    fn expected() -> String {
+        "\"pa12\", or { sharpness = …, shape = …, peak = … }".to_owned()
+    }
+
+    fn from_text<E: serde::de::Error>(text: &str) -> Result<Self, E> {
+        match text {
+            "pa12" => Ok(Self::Named(Melting::PA12)),
+            _ => Err(E::unknown_variant(text, &["pa12"])),
+        }
+    }
+
+    fn from_table(table: GivenMelting) -> Self {
+        Self::Given(table)
+    }
+}
+
+impl<D: Dimension> schemars::JsonSchema for PropertySpec<D> {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        format!("{}_or_table", Quantity::<D>::schema_name()).into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let constant = generator.subschema_for::<Quantity<D>>();
+        let temperature = generator.subschema_for::<Temperature>();
+        schemars::json_schema!({
+            "description": "a constant, or a table: linear between its temperatures, constant beyond",
+            "anyOf": [constant, {
+                "type": "object",
+                "properties": {
+                    "temperature": { "type": "array", "items": temperature, "description": "Increasing temperatures." },
+                    "value": { "type": "array", "items": constant, "description": "A value for each." },
+                },
+                "required": ["temperature", "value"],
+                "additionalProperties": false,
+            }],
+        })
+    }
+}
+
+impl schemars::JsonSchema for KineticsSpec {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Kinetics".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let given = generator.subschema_for::<GivenKinetics>();
+        schemars::json_schema!({
+            "description": "constants by name, or one by one",
+            "anyOf": [{ "enum": KINETICS_NAMES }, given],
+        })
+    }
+}
+
+impl schemars::JsonSchema for MeltingSpec {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Melting".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let given = generator.subschema_for::<GivenMelting>();
+        schemars::json_schema!({
+            "description": "constants by name, or one by one",
+            "anyOf": [{ "const": "pa12" }, given],
+        })
+    }
+}
+
+impl<'de, D: Dimension> Deserialize<'de> for PropertySpec<D> {
+    fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
+        either::deserialize(deserializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for KineticsSpec {
+    fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
+        either::deserialize(deserializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for MeltingSpec {
+    fn deserialize<De: Deserializer<'de>>(deserializer: De) -> Result<Self, De::Error> {
+        either::deserialize(deserializer)
+    }
+}

@@ -1,0 +1,274 @@
+//! The mesh block of a scene.
+
+use super::fault::{located, located_in};
+use super::memory;
+use super::voxels::{Filling, PRINTED, PathSpec, StlSpec, box_of};
+use crate::error::Error;
+use crate::mesh::{Bar, Block, Grid, Mesh, Split, Substrate, Tube, quality, read};
+use harness::scene::{SceneError, Source};
+use polycore::units::{Angle, Length};
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// Where parameters of a bar stand in its block.
+const BAR_KEYS: [(&str, &str); 9] = [
+    ("extent of the bar", "size"),
+    ("layers", "layers"),
+    ("height of a layer", "layer_height"),
+    ("elements per layer", "elements_per_layer"),
+    ("element size", "element_size"),
+    ("elements along an axis", "element_size"),
+    ("extent of the substrate", "substrate.size"),
+    ("thickness of the substrate", "substrate.thickness"),
+    ("growth of elements", "substrate.growth"),
+];
+
+/// A part larger than this is none that is printed, m: the unit of its file is missing.
+const LARGE: f64 = 2.0;
+
+/// Where parameters of a tube stand in its block.
+const TUBE_KEYS: [(&str, &str); 6] = [
+    ("radius of the bore", "radii"),
+    ("outer radius", "radii"),
+    ("angle of the sector", "angle"),
+    ("angle of an element", "elements"),
+    ("length of the tube", "length"),
+    ("elements along an axis", "elements"),
+];
+
+/// One of a printed bar, a brick, a sector of a tube, what a G-code file prints, the inside of an STL surface, and a file.
+///
+/// ```toml
+/// [mesh.bar]
+/// size = ["80 mm", "10 mm"]
+/// layers = 8
+/// layer_height = "0.5 mm"
+/// elements_per_layer = 2
+/// element_size = "1 mm"
+/// substrate = { size = ["120 mm", "40 mm"], thickness = "4 mm", growth = 1.4 }
+/// ```
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshSpec {
+    /// A bar in layers, with or without a substrate.
+    pub bar: Option<BarSpec>,
+    /// A box of equal elements.
+    pub brick: Option<BrickSpec>,
+    /// A sector of a hollow cylinder.
+    pub tube: Option<TubeSpec>,
+    /// The cells that a G-code file fills, printed along it.
+    pub path: Option<PathSpec>,
+    /// The cells inside an STL surface.
+    pub stl: Option<StlSpec>,
+    /// A Gmsh `.msh` (2 or 4) or an Abaqus or CalculiX `.inp`.
+    pub file: Option<PathBuf>,
+    /// Length of one unit of the file; default 1 m.
+    pub unit: Option<Length>,
+    /// Order of the shape functions: 2 puts a node on the middle of each edge; default: as the mesh is.
+    pub order: Option<u8>,
+}
+
+/// See [`Bar`].
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BarSpec {
+    /// Extents along x and y.
+    pub size: [Length; 2],
+    /// Number of layers.
+    pub layers: usize,
+    /// Height of a layer.
+    pub layer_height: Length,
+    /// Elements through a layer; default 1.
+    pub elements_per_layer: Option<usize>,
+    /// Greatest element along x and y.
+    pub element_size: Length,
+    /// The substrate.
+    pub substrate: Option<SubstrateSpec>,
+    /// Element type of the grid's cells; default hexahedra.
+    #[serde(default)]
+    pub cells: Split,
+}
+
+/// See [`Substrate`].
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SubstrateSpec {
+    /// Extents along x and y.
+    pub size: [Length; 2],
+    /// Thickness.
+    pub thickness: Length,
+    /// Growth of elements away from the bar; default 1.5.
+    pub growth: Option<f64>,
+}
+
+/// A box with its lower corner at the origin.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BrickSpec {
+    /// Extents.
+    pub size: [Length; 3],
+    /// Elements along each axis; tetrahedra or wedges fill each of these cells.
+    pub elements: [usize; 3],
+    /// Element type; default hexahedra.
+    #[serde(default)]
+    pub cells: Split,
+}
+
+/// See [`Tube`].
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TubeSpec {
+    /// Radii of the bore and of the outside.
+    pub radii: [Length; 2],
+    /// Angle of the sector, from y = 0 on.
+    pub angle: Angle,
+    /// Length along z.
+    pub length: Length,
+    /// Elements along the radius, around, and along z.
+    pub elements: [usize; 3],
+}
+
+/// A mesh, and what should be looked at.
+pub struct Built {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// Notes for the user.
+    pub notes: Vec<String>,
+    /// Volume of all elements, m³.
+    pub volume: f64,
+    /// How full the elements of a path or an STL surface are.
+    pub filling: Option<Filling>,
+}
+
+impl MeshSpec {
+    /// The mesh, checked.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for none or several of the alternatives, and for what the mesh refuses.
+    pub fn build(&self, source: &Source) -> Result<Built, SceneError> {
+        let mut built = self.first_order(source)?;
+        match self.order {
+            None | Some(1) => {}
+            Some(2) if built.filling.is_none() => built.mesh = built.mesh.second_order(),
+            Some(order) => {
+                return Err(source.error("mesh.order", order, "1, or 2 of a bar, brick, tube or file"));
+            }
+        }
+        Ok(built)
+    }
+
+    fn first_order(&self, source: &Source) -> Result<Built, SceneError> {
+        let structured = [self.bar.is_some(), self.brick.is_some(), self.tube.is_some()];
+        let from_files = [self.file.is_some(), self.path.is_some(), self.stl.is_some()];
+        let kinds = structured.into_iter().chain(from_files);
+        let given = kinds.filter(|&x| x).count();
+        if given != 1 {
+            let found = if given == 0 { "nothing".to_owned() } else { format!("{given} meshes") };
+            return Err(source.error("mesh", found, "one of `bar`, `brick`, `tube`, `path`, `stl`, `file`"));
+        }
+        if self.unit.is_some() && self.file.is_none() {
+            return Err(source.error("mesh.unit", "a unit without a file", "nothing"));
+        }
+        if let Some(path) = &self.path {
+            return path.build(source);
+        }
+        if let Some(stl) = &self.stl {
+            return stl.build(source);
+        }
+        let at = |key: &str, error: Error| located(source, key, &error);
+        let mut notes = Vec::new();
+        let mesh = if let Some(bar) = &self.bar {
+            memory::refuse_mesh(source, "mesh.bar", self.elements(source)?, bar.cells.count())?;
+            bar.build().mesh().map_err(|error| located_in(source, "mesh.bar", &BAR_KEYS, &error))?
+        } else if let Some(brick) = &self.brick {
+            let size = brick.size.map(|x| x.si());
+            memory::refuse_mesh(source, "mesh.brick.elements", self.elements(source)?, brick.cells.count())?;
+            let grid = Grid::uniform([0.0; 3], size, brick.elements);
+            let blocks = [Block { name: "brick".into(), lower: [0.0; 3], upper: size }];
+            grid.and_then(|grid| grid.blocks(&blocks, brick.cells)).map_err(|error| match error {
+                Error::Mesh(_) => at("mesh.brick.size", error),
+                _ => at("mesh.brick.elements", error),
+            })?
+        } else if let Some(tube) = &self.tube {
+            memory::refuse_mesh(source, "mesh.tube.elements", self.elements(source)?, 1)?;
+            tube.build().mesh().map_err(|error| located_in(source, "mesh.tube", &TUBE_KEYS, &error))?
+        } else {
+            let file = self.file.clone().unwrap_or_default();
+            let path = source.file(&file);
+            let unit = self.unit.map_or(1.0, |unit| unit.si());
+            let found = read(&path, unit).map_err(|error| at("mesh.file", error))?;
+            notes = found.notes;
+            if let Some(suspicion) = self.without_unit(source, &found.mesh) {
+                let [low, high] = found.mesh.bounds().unwrap_or_default();
+                if (0..3).any(|d| high[d] - low[d] > PRINTED[1]) {
+                    return Err(suspicion);
+                }
+                notes.push(suspicion.message().to_owned());
+            }
+            notes.extend(found.mesh.bounds().map(|bounds| format!("the part is {}", box_of(bounds))));
+            notes.extend(found.quality.notes.clone());
+            return Ok(Built { volume: found.quality.volume, mesh: found.mesh, notes, filling: None });
+        };
+        let found = quality::check(&mesh, None).map_err(|error| at("mesh", error))?;
+        notes.extend(found.notes);
+        Ok(Built { mesh, notes, volume: found.volume, filling: None })
+    }
+}
+
+impl MeshSpec {
+    /// Of a mesh of a file without `unit` that is metres large: that the unit may be missing.
+    pub(super) fn without_unit(&self, source: &Source, mesh: &Mesh) -> Option<SceneError> {
+        let [low, high] = mesh.bounds().filter(|_| self.file.is_some() && self.unit.is_none())?;
+        let [x, y, z] = [0, 1, 2].map(|d| ((high[d] - low[d]) * 1e6).round() / 1e6);
+        let found = format!("nothing, and with the file's unit as 1 m the part is {x} × {y} × {z} m");
+        let allowed = "`unit`, e.g. \"1 mm\"; or `unit = \"1 m\"` where it is so large";
+        (x.max(y).max(z) > LARGE).then(|| source.error("mesh.unit", found, allowed))
+    }
+
+    /// Cells along each axis of a bar, brick or tube, before anything of it is allocated: they may be too many. None of
+    /// a file.
+    ///
+    /// # Errors
+    /// As [`MeshSpec::build`].
+    pub fn elements(&self, source: &Source) -> Result<[f64; 3], SceneError> {
+        match (&self.bar, &self.brick, &self.tube) {
+            (Some(bar), ..) => {
+                bar.build().elements().map_err(|error| located_in(source, "mesh.bar", &BAR_KEYS, &error))
+            }
+            (None, Some(BrickSpec { elements, .. }), _) | (None, None, Some(TubeSpec { elements, .. })) => {
+                Ok(elements.map(|count| count as f64))
+            }
+            (None, None, None) => Ok([0.0; 3]),
+        }
+    }
+}
+
+impl BarSpec {
+    fn build(&self) -> Bar {
+        Bar {
+            size: self.size.map(|x| x.si()),
+            layers: self.layers,
+            layer_height: self.layer_height.si(),
+            elements_per_layer: self.elements_per_layer.unwrap_or(1),
+            element_size: self.element_size.si(),
+            substrate: self.substrate.as_ref().map(|substrate| Substrate {
+                size: substrate.size.map(|x| x.si()),
+                thickness: substrate.thickness.si(),
+                growth: substrate.growth.unwrap_or(1.5),
+            }),
+            cells: self.cells,
+        }
+    }
+}
+
+impl TubeSpec {
+    fn build(&self) -> Tube {
+        let [inner, outer] = &self.radii;
+        Tube {
+            radii: [inner.si(), outer.si()],
+            angle: self.angle.si(),
+            length: self.length.si(),
+            elements: self.elements,
+        }
+    }
+}

@@ -1,0 +1,454 @@
+//! From a scene to a problem of heat conduction.
+
+use super::fault::{located, located_in};
+use super::healing::Interfaces;
+use super::mechanics::Mechanics;
+use super::memory;
+use super::mesh::Built;
+use super::part::{BoundarySpec, PartScene};
+use super::places::{elements, millimetres};
+use super::print::Laid;
+use super::voxels::Filling;
+use crate::boundary::{Condition, Field, Schedule, Source as Heat, Where};
+use crate::error::Error;
+use crate::material::{Filled, ThermalMaterial};
+use crate::mesh::surface::Surface;
+use crate::mesh::{Face, Mesh, Place};
+use crate::problem::Problem;
+use crate::simulation::Settings;
+use crate::time::Steps;
+use harness::scene::{LineSpec, SceneError, Source};
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+
+/// Temporal error in a step, K, and rms error of solves, K, unless a scene says otherwise.
+const TOLERANCE: f64 = 0.1;
+const SOLVES: f64 = 1e-7;
+/// A temperature below which a scene is asked whether it means °C, K.
+const COLD: f64 = 200.0;
+/// First step over the end, and smallest over the first.
+const FIRST: f64 = 1e-6;
+const SMALLEST: f64 = 1e-3;
+
+/// Where parameters of conditions stand in their block.
+const CONDITION_KEYS: [(&str, &str); 5] = [
+    ("prescribed temperature", "temperature"),
+    ("flux", "flux"),
+    ("film coefficient", "film"),
+    ("emissivity", "emissivity"),
+    ("ambient temperature", "ambient"),
+];
+
+/// What a scene asks to solve.
+pub struct Task {
+    /// The problem.
+    pub problem: Arc<Problem>,
+    /// How.
+    pub settings: Settings,
+    /// When to end, s.
+    pub end: f64,
+    /// Elements that are printed, ascending; all where nothing is.
+    pub printed: Vec<u32>,
+    /// Elements of each layer, where there are layers.
+    pub layers: Vec<Vec<u32>>,
+    /// Where each probe is.
+    pub probes: Vec<Place>,
+    /// Where the points of each line are; none outside of the mesh.
+    pub lines: Vec<Vec<Option<Place>>>,
+    /// How full elements are, of a mesh of a path or an STL surface.
+    pub filling: Option<Filling>,
+    /// Stress, where the scene asks for it.
+    pub mechanics: Option<Mechanics>,
+    /// Interfaces that heal, where the scene asks for it.
+    pub interfaces: Option<Interfaces>,
+    /// What should be looked at.
+    pub notes: Vec<String>,
+}
+
+/// Materials by material and filled part, as far as elements have them.
+fn fill(
+    materials: &mut Vec<Arc<dyn ThermalMaterial>>,
+    material_of: &mut [u16],
+    parts: &[f64],
+    part_of: &[usize],
+) -> Result<(), Error> {
+    let mut all: Vec<Arc<dyn ThermalMaterial>> = Vec::new();
+    let mut known: HashMap<(u16, usize), u16> = HashMap::new();
+    for (material, &part) in material_of.iter_mut().zip(part_of) {
+        let key = (*material, part);
+        *material = match known.get(&key) {
+            Some(&found) => found,
+            None => {
+                let number = u16::try_from(all.len()).map_err(|_| Error::Parameter {
+                    name: "filled parts of all materials",
+                    found: all.len() as f64,
+                    allowed: "at most 65536".into(),
+                })?;
+                all.push(Arc::new(Filled::new(materials[usize::from(key.0)].clone(), parts[part])?));
+                known.insert(key, number);
+                number
+            }
+        };
+    }
+    *materials = all;
+    Ok(())
+}
+
+impl PartScene {
+    /// The problem on a mesh.
+    ///
+    /// # Errors
+    /// A [`SceneError`] for sets and surfaces that the mesh lacks, elements without a material, and for what
+    /// [`Problem::check`] refuses.
+    pub fn task(&self, source: &Source, built: Built) -> Result<Task, SceneError> {
+        let Built { mesh, filling, .. } = built;
+        let mut notes = Vec::new();
+        let probes = self.places(source, &mesh, &mut notes)?;
+        let (mut materials, mut material_of, temperature_of) = self.regions(source, &mesh)?;
+        let shown = materials.iter().flat_map(|material| material.field_names().iter().copied());
+        let shown: Vec<String> = ["temperature"].into_iter().chain(shown).map(str::to_owned).collect();
+        let lines = self.lines(source, &mesh, &shown)?;
+        let conditions = self.conditions(source, &mesh)?;
+        self.note_cold(source, &mut notes)?;
+        let mut heats = Vec::new();
+        for (index, spec) in self.source.iter().enumerate() {
+            let elements =
+                elements(source, &mesh, &format!("source[{index}].elements"), spec.elements.as_deref())?;
+            let power = Field::Uniform(spec.power.build(source, &format!("source[{index}].power"))?);
+            heats.push(Heat { elements, power });
+        }
+        let Laid { births, absent, layers, end: by_itself } = match &self.print {
+            Some(print) => print.laid(source, &mesh, filling.as_ref(), &mut notes).map_err(|fault| {
+                // a file in millimetres that is read in metres has few layers, or lies far away
+                self.mesh.without_unit(source, &mesh).unwrap_or(fault)
+            })?,
+            None => Laid::default(),
+        };
+        let mechanics = {
+            let path = filling.as_ref().and_then(|filling| filling.path.as_ref()).map(|(path, _)| path);
+            self.mechanics(source, &mesh, &material_of, &absent, path)?
+        };
+        let appearing = births.iter().map(|birth| birth.elements.as_slice());
+        let interfaces = self.interfaces(source, &mesh, &material_of, appearing)?;
+        let end = self.time.end.map_or(by_itself, |end| end.si());
+        memory::refuse_times(source, self, end)?;
+        self.note_hot_bed(source, end, &mut notes)?;
+        if let Some(last) = births.iter().map(|birth| birth.time).reduce(f64::max).filter(|last| *last >= end)
+        {
+            let allowed = format!("after the last birth, at {last} s");
+            return Err(source.error("time.end", format!("{end} s"), allowed));
+        }
+        for (spec, place) in self.probe.iter().zip(&probes) {
+            if place.elements().iter().all(|element| absent.binary_search(element).is_ok()) {
+                notes.push(format!("probe `{}` is where nothing is printed: it records nothing", spec.name));
+            }
+        }
+        let mut printed: Vec<u32> = births.iter().flat_map(|birth| birth.elements.iter().copied()).collect();
+        printed.sort_unstable();
+        if printed.is_empty() {
+            printed = (0..mesh.element_count() as u32).collect();
+        }
+        let later = births.iter().flat_map(|birth| &birth.elements).chain(&absent).copied();
+        let later: HashSet<u32> = later.collect();
+        let initial = initial(&mesh, &temperature_of, &later);
+        let capacity = self.time.capacity;
+        if let Some((parts, part_of)) = filling.as_ref().and_then(|filling| filling.parts.as_ref()) {
+            fill(&mut materials, &mut material_of, parts, part_of)
+                .map_err(|error| located(source, "mesh", &error))?;
+        }
+        let problem = Problem {
+            mesh,
+            materials,
+            material_of,
+            initial,
+            conditions,
+            sources: heats,
+            births,
+            absent,
+            capacity,
+        };
+        problem.check().map_err(|error| located(source, "mesh", &error))?;
+        let settings = self.settings(end, problem.shortest_period());
+        Ok(Task {
+            problem: Arc::new(problem),
+            settings,
+            end,
+            printed,
+            layers,
+            probes,
+            lines,
+            filling,
+            mechanics,
+            interfaces,
+            notes,
+        })
+    }
+
+    /// Notes temperatures at which no part is made: numbers in °C that were written as K.
+    fn note_cold(&self, source: &Source, notes: &mut Vec<String>) -> Result<(), SceneError> {
+        let mut written = Vec::new();
+        for (index, region) in self.region.iter().enumerate() {
+            written.push((format!("region[{index}].temperature"), region.temperature.si()));
+        }
+        for (index, boundary) in self.boundary.iter().enumerate() {
+            for (name, given) in [("temperature", &boundary.temperature), ("ambient", &boundary.ambient)] {
+                let key = format!("boundary[{index}].{name}");
+                if let Some(given) = given {
+                    written.push((key.clone(), given.build(source, &key)?.lowest()));
+                }
+            }
+        }
+        if let Some(temperature) = self.print.as_ref().and_then(|print| print.temperature.as_ref()) {
+            let key = "print.temperature".to_owned();
+            let lowest = temperature.build(source, &key)?.lowest();
+            written.push((key, lowest));
+        }
+        for (key, kelvin) in written.into_iter().filter(|(_, kelvin)| *kelvin < COLD) {
+            notes
+                .push(format!("`{key}` is {kelvin} K, which is {:.2} °C: is `degC` meant?", kelvin - 273.15));
+        }
+        Ok(())
+    }
+
+    /// Notes a bed that its G-code switches off and that is still hot at the end, s.
+    fn note_hot_bed(&self, source: &Source, end: f64, notes: &mut Vec<String>) -> Result<(), SceneError> {
+        for (index, boundary) in self.boundary.iter().enumerate() {
+            for (name, given) in [("temperature", &boundary.temperature), ("ambient", &boundary.ambient)] {
+                let key = format!("boundary[{index}].{name}");
+                let Some(given) = given else { continue };
+                if let Some((off, then)) = given.still_hot(source, &key, end)? {
+                    let celsius = then - 273.15;
+                    notes.push(format!(
+                        "`{key}`: the file switches the bed off at {off:.1} s, at the end of the run, {end:.1} s, it has {celsius:.1} °C: a later `time.end` lets the part cool"
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Where each probe lies in the mesh.
+    fn places(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Place>, SceneError> {
+        let mut places = Vec::new();
+        for (index, probe) in self.probe.iter().enumerate() {
+            let at = probe.at.map(|x| x.si());
+            let Some(place) = mesh.locate(at) else {
+                let [low, high] = mesh.bounds().unwrap_or_default().map(millimetres);
+                let found = format!("{}, outside of the mesh", millimetres(at));
+                let allowed = format!("a place in the mesh, which reaches from {low} to {high}");
+                return Err(source.error(&format!("probe[{index}].at"), found, allowed));
+            };
+            if place.distance() > 0.0 {
+                let (name, distance) = (&probe.name, 1e3 * place.distance());
+                notes.push(format!(
+                    "probe `{name}` lies outside of the mesh: recorded {distance:.4} mm away, in the nearest element"
+                ));
+            }
+            places.push(place);
+        }
+        Ok(places)
+    }
+
+    /// Where the points of each line lie in the mesh.
+    fn lines(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+        columns: &[String],
+    ) -> Result<Vec<Vec<Option<Place>>>, SceneError> {
+        LineSpec::check(&self.output.line, source, 3, columns)?;
+        let mut lines = Vec::new();
+        for (index, line) in self.output.line.iter().enumerate() {
+            let places = line.places::<3>();
+            let places = mesh.locate_along(places[0], places[places.len() - 1], &places);
+            line.refuse_outside(source, index, places.iter().any(Option::is_some))?;
+            lines.push(places);
+        }
+        Ok(lines)
+    }
+
+    #[allow(clippy::type_complexity)]
+    fn regions(
+        &self,
+        source: &Source,
+        mesh: &Mesh,
+    ) -> Result<(Vec<Arc<dyn ThermalMaterial>>, Vec<u16>, Vec<f64>), SceneError> {
+        let mut materials: Vec<Arc<dyn ThermalMaterial>> = Vec::new();
+        for (name, spec) in &self.materials {
+            materials.push(spec.build(source, &format!("materials.{name}"))?.into());
+        }
+        let mut material_of = vec![u16::MAX; mesh.element_count()];
+        let mut temperature_of = vec![f64::NAN; mesh.element_count()];
+        for (index, region) in self.region.iter().enumerate() {
+            let key = format!("region[{index}].elements");
+            let material = self.materials.keys().position(|name| *name == region.material).unwrap_or(0);
+            for element in elements(source, mesh, &key, region.elements.as_deref())? {
+                material_of[element as usize] = material as u16;
+                temperature_of[element as usize] = region.temperature.si();
+            }
+        }
+        if let Some(bare) = material_of.iter().position(|&material| material == u16::MAX) {
+            let [x, y, z] = mesh.centre(bare as u32);
+            let found = format!("element {bare} at ({x:.4e}, {y:.4e}, {z:.4e}) m without a material");
+            return Err(source.error("region", found, "regions that cover all elements"));
+        }
+        Ok((materials, material_of, temperature_of))
+    }
+
+    fn conditions(&self, source: &Source, mesh: &Mesh) -> Result<Vec<Condition>, SceneError> {
+        let surface = Surface::of_all(mesh).map_err(|error| located(source, "mesh", &error))?;
+        let faces = |key: &str, name: &str| -> Result<Vec<Face>, SceneError> {
+            let region = surface.region(mesh, name);
+            region.map(|region| surface.all_in(&region)).map_err(|error| located(source, key, &error))
+        };
+        let middle = |face: &Face| {
+            let nodes = mesh.face_nodes(*face);
+            let sum = |d: usize| nodes.iter().map(|node| mesh.points[*node as usize][d]).sum::<f64>();
+            [0, 1, 2].map(|d| sum(d) / nodes.len() as f64)
+        };
+        let mut conditions = Vec::new();
+        for (index, spec) in self.boundary.iter().enumerate() {
+            let key = format!("boundary[{index}]");
+            let mut except = Vec::new();
+            for name in &spec.except {
+                except.extend(faces(&format!("{key}.except"), name)?);
+            }
+            // nodes without faces
+            if let (Some(temperature), Some(nodes)) = (&spec.temperature, spec.node_set(mesh)) {
+                let value = Field::Uniform(temperature.build(source, &format!("{key}.temperature"))?);
+                let condition = Condition::Temperature { nodes, value };
+                condition.check().map_err(|error| located_in(source, &key, &CONDITION_KEYS, &error))?;
+                conditions.push(condition);
+                continue;
+            }
+            let place = if let Some([min, max]) = spec.corners() {
+                let mut inside = faces(&format!("{key}.surface"), &spec.surface)?;
+                inside.retain(|face| {
+                    let at = middle(face);
+                    (0..3).all(|d| (min[d]..=max[d]).contains(&at[d])) && !except.contains(face)
+                });
+                if inside.is_empty() {
+                    let found = format!(
+                        "no face of `{}` from {} to {}",
+                        spec.surface,
+                        millimetres(min),
+                        millimetres(max)
+                    );
+                    return Err(source.error(
+                        &format!("{key}.min"),
+                        found,
+                        "a box that contains the centre of a face",
+                    ));
+                }
+                Where::Faces(inside)
+            } else if spec.surface == "outer" {
+                Where::Outer { except }
+            } else {
+                Where::Faces(faces(&format!("{key}.surface"), &spec.surface)?)
+            };
+            for condition in spec.conditions(source, &key, mesh, place)? {
+                condition.check().map_err(|error| located_in(source, &key, &CONDITION_KEYS, &error))?;
+                conditions.push(condition);
+            }
+        }
+        Ok(conditions)
+    }
+
+    /// Adaptive steps are an eighth of the shortest period of what swings at most: longer ones would leap over it.
+    fn settings(&self, end: f64, period: Option<f64>) -> Settings {
+        let time = &self.time;
+        let most = period.map_or(f64::INFINITY, |period| period / 8.0);
+        let steps = match time.step {
+            Some(step) => Steps::Fixed { dt: step.si() },
+            None => {
+                let first = time.first_step.map_or(FIRST * end, |first| first.si()).min(most);
+                Steps::Adaptive {
+                    tolerance: time.tolerance.map_or(TOLERANCE, |tolerance| tolerance.si()),
+                    first,
+                    smallest: SMALLEST * first,
+                    largest: time
+                        .longest_step
+                        .map_or(f64::INFINITY, |longest| longest.si())
+                        .min(most)
+                        .max(first),
+                }
+            }
+        };
+        let tolerance = time.solver_tolerance.map_or(SOLVES, |tolerance| tolerance.si());
+        Settings { scheme: time.scheme, steps, tolerance, solver: time.solver }
+    }
+}
+
+impl BoundarySpec {
+    /// Nodes of a set of the mesh, where no surface has its name; in the box where there is one.
+    fn node_set(&self, mesh: &Mesh) -> Option<Vec<u32>> {
+        let set = mesh.node_sets.get(&self.surface).filter(|_| !mesh.surfaces.contains_key(&self.surface))?;
+        let Some([min, max]) = self.corners() else { return Some(set.clone()) };
+        let inside = |node: &&u32| {
+            let at = mesh.points[**node as usize];
+            (0..3).all(|d| (min[d]..=max[d]).contains(&at[d]))
+        };
+        Some(set.iter().filter(inside).copied().collect()).filter(|nodes: &Vec<u32>| !nodes.is_empty())
+    }
+
+    fn conditions(
+        &self,
+        source: &Source,
+        key: &str,
+        mesh: &Mesh,
+        place: Where,
+    ) -> Result<Vec<Condition>, SceneError> {
+        let of = |name: &str| format!("{key}.{name}");
+        let mut conditions = Vec::new();
+        if let Some(temperature) = &self.temperature {
+            let nodes = match &place {
+                Where::Faces(faces) => mesh.nodes_of(faces),
+                Where::Outer { .. } => Vec::new(),
+            };
+            let value = Field::Uniform(temperature.build(source, &of("temperature"))?);
+            conditions.push(Condition::Temperature { nodes, value });
+        }
+        if let Some(flux) = &self.flux {
+            let inward = Field::Uniform(flux.build(source, &of("flux"))?);
+            conditions.push(Condition::Flux { surface: place.clone(), inward });
+        }
+        let ambient = match &self.ambient {
+            Some(ambient) => ambient.build(source, &of("ambient"))?,
+            None => Schedule::constant(0.0),
+        };
+        if let Some(film) = &self.film {
+            let coefficient = film.build(source, &of("film"))?;
+            let (surface, ambient) = (place.clone(), ambient.clone());
+            conditions.push(Condition::Film { surface, coefficient, ambient });
+        }
+        if let Some(emissivity) = self.emissivity {
+            conditions.push(Condition::Radiation { surface: place, emissivity, ambient });
+        }
+        Ok(conditions)
+    }
+}
+
+/// Temperatures at nodes: that of the last element there that is not laid down later; a node that two regions share takes
+/// that of the later one.
+fn initial(mesh: &Mesh, temperature_of: &[f64], later: &HashSet<u32>) -> Field {
+    let first = temperature_of.first().copied().unwrap_or(0.0);
+    if temperature_of.iter().all(|&temperature| temperature == first) {
+        return Field::constant(first);
+    }
+    // by place, as the problem asks; places of nodes are exact
+    let mut at = HashMap::new();
+    for (element, &temperature) in temperature_of.iter().enumerate() {
+        if later.contains(&(element as u32)) {
+            continue;
+        }
+        for &node in mesh.nodes(element as u32) {
+            at.insert(mesh.points[node as usize].map(f64::to_bits), temperature);
+        }
+    }
+    Field::function(move |place, _| at.get(&place.map(f64::to_bits)).copied().unwrap_or(first))
+}

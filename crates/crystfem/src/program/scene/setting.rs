@@ -1,0 +1,218 @@
+//! Values over time that a G-code file sets: its nozzle, its bed, its fan.
+
+use super::fault::located;
+use super::schedule::{FileSetting, ScheduleSpec, TimesSpec};
+use crate::boundary::Schedule;
+use crate::mesh::path::{Setting, ToolPath, read_gcode};
+use harness::scene::{SceneError, Source};
+use polycore::units::dimension::TemperatureDimension;
+use polycore::units::{Acceleration, Dimension, Speed};
+use serde::Deserialize;
+use std::path::PathBuf;
+
+/// How long a setting of a file takes to be reached, s.
+const CHANGE: f64 = 1.0;
+/// What a bed cools towards, K, and its time constant, s: 3 mm of aluminium (7.3 kJ/(m² K)) lose 12 W/(m² K).
+const ROOM: f64 = 298.15;
+const CONSTANT: f64 = 600.0;
+/// Times of a cooling that are given, over its time constant: between them it is off by 0.2 % of the whole at
+/// most.
+const TIMES: [f64; 20] =
+    [0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.75, 0.9, 1.1, 1.3, 1.5, 1.8, 2.1, 2.5, 3.0, 3.6, 4.4, 5.5, 7.0];
+/// A bed is as cold as it gets, K.
+const COLD: f64 = 1.0;
+
+/// What of a scene changes the times of a path.
+#[derive(Deserialize)]
+struct Outline {
+    mesh: Option<MeshOutline>,
+    print: Option<PrintOutline>,
+}
+
+#[derive(Deserialize)]
+struct MeshOutline {
+    path: Option<Timed>,
+}
+
+#[derive(Deserialize)]
+struct Timed {
+    file: PathBuf,
+    acceleration: Option<Acceleration>,
+    jerk: Option<Speed>,
+}
+
+#[derive(Deserialize)]
+struct PrintOutline {
+    path: Option<PathBuf>,
+    acceleration: Option<Acceleration>,
+    jerk: Option<Speed>,
+}
+
+impl<D: Dimension + Copy> TimesSpec<D> {
+    /// The path of the file, with the times that the scene prints it with.
+    fn path(&self, source: &Source, key: &str) -> Result<ToolPath, SceneError> {
+        let Some(name) = &self.file else {
+            return Err(source.error(&format!("{key}.file"), "nothing", "a G-code file"));
+        };
+        let file = source.file(name);
+        let path = read_gcode(&file).map_err(|error| located(source, &format!("{key}.file"), &error))?;
+        let outline: Outline = source.parse()?;
+        let own = outline.mesh.and_then(|mesh| mesh.path).map(|own| (own.file, own.acceleration, own.jerk));
+        let along = outline.print.and_then(|own| own.path.map(|file| (file, own.acceleration, own.jerk)));
+        for (other, acceleration, jerk) in own.into_iter().chain(along) {
+            if let (Some(acceleration), Some(jerk), true) = (acceleration, jerk, source.file(other) == file) {
+                let fault = |error| located(source, &format!("{key}.file"), &error);
+                return path.accelerated(acceleration.si(), jerk.si()).map_err(fault);
+            }
+        }
+        Ok(path.as_stated())
+    }
+
+    /// What a bed cools towards, K, and the time constant, s.
+    fn cooling(&self) -> (f64, f64) {
+        (self.cools_to.map_or(ROOM, |room| room.si()), self.cooling_time.map_or(CONSTANT, |time| time.si()))
+    }
+
+    /// A setting of a G-code file over its time; each command changes it within a second, but a bed that is
+    /// switched off or set lower cools exponentially. Before the first one it has that one's value, and the
+    /// fan is off.
+    pub(super) fn of_file(
+        &self,
+        source: &Source,
+        key: &str,
+        of: FileSetting,
+        table: bool,
+    ) -> Result<Schedule, SceneError> {
+        let fault =
+            |name: &str, found: &str, allowed: &str| source.error(&format!("{key}.{name}"), found, allowed);
+        if self.file.is_some() && (table || self.period.is_some()) {
+            return Err(source.error(key, "a table or a sine beside `of`", "`file` and `of`"));
+        }
+        let path = self.path(source, key)?;
+        let setting = match of {
+            FileSetting::Nozzle => Setting::Nozzle,
+            FileSetting::Bed => Setting::Bed,
+            FileSetting::Fan => Setting::Fan,
+        };
+        let mut pairs = path.setting(setting);
+        match (setting, self.low, self.high) {
+            (Setting::Fan, Some(low), Some(high)) => {
+                for (_, value) in &mut pairs {
+                    *value = low.si() + (high.si() - low.si()) * *value;
+                }
+                pairs.insert(0, (f64::NEG_INFINITY, low.si()));
+            }
+            (Setting::Fan, ..) => {
+                return Err(fault("low", "nothing", "`low` and `high`: values with the fan off and on"));
+            }
+            (_, None, None) if D::NAME == TemperatureDimension::NAME => {}
+            (_, None, None) => return Err(fault("of", "a temperature", "`fan` with `low` and `high`")),
+            _ => return Err(fault("low", "`low` or `high` of a temperature", "nothing")),
+        }
+        let cooling = [("cools_to", self.cools_to.is_some()), ("cooling_time", self.cooling_time.is_some())];
+        if let Some((name, _)) = cooling.iter().find(|(_, given)| *given && setting != Setting::Bed) {
+            return Err(fault(name, "cooling of no bed", "`of = \"bed\"`"));
+        }
+        let (room, constant) = self.cooling();
+        if !(constant > 0.0 && constant.is_finite()) {
+            return Err(fault("cooling_time", &constant.to_string(), "above 0, finite"));
+        }
+        let points = if setting == Setting::Bed { bed(&pairs, room, constant) } else { steps(&pairs) };
+        Schedule::linear(&points).map_err(|error| located(source, &format!("{key}.file"), &error))
+    }
+}
+
+/// Values that are reached within a second of their commands.
+fn steps(pairs: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for &(time, value) in pairs {
+        match points.last().copied() {
+            None => points.push((time.max(-CHANGE), value)),
+            // commands within a second of one another: the last holds
+            Some((last, before)) => {
+                let from = time.max(last + 1e-6 * CHANGE);
+                points.extend([(from, before), (from + CHANGE, value)]);
+            }
+        }
+    }
+    points
+}
+
+/// Temperatures of a bed, K: it is heated within a second, and cools towards a room with a time constant, s,
+/// down to what it is set to; NaN is off. A file that switches it off at first has it on before.
+fn bed(pairs: &[(f64, f64)], room: f64, constant: f64) -> Vec<(f64, f64)> {
+    let on = pairs.iter().position(|pair| !pair.1.is_nan());
+    let Some(on) = on else { return pairs.first().map_or_else(Vec::new, |_| vec![(0.0, room)]) };
+    let mut points = vec![(pairs[on].0.max(-CHANGE), pairs[on].1)];
+    for (k, &(time, set)) in pairs.iter().enumerate().skip(on + 1) {
+        let (last, now) = points[points.len() - 1];
+        let from = time.max(last + 1e-6 * CHANGE);
+        points.push((from, now));
+        if set >= now {
+            points.push((from + CHANGE, set));
+            continue;
+        }
+        let next = pairs.get(k + 1).map_or(f64::INFINITY, |pair| pair.0);
+        let at = |after: f64| room + (now - room) * (-after / constant).exp();
+        // when it is as cold as it is set; never below the room
+        let reached = if set > room { constant * ((now - room) / (set - room)).ln() } else { f64::INFINITY };
+        let end = reached.min(next - from);
+        let inside = TIMES.iter().map(|share| share * constant).filter(|after| *after < end - 1e-6 * CHANGE);
+        points.extend(inside.map(|after| (from + after, at(after))));
+        if end.is_finite() && end > 2e-6 * CHANGE {
+            points.push((from + end, if reached <= next - from { set } else { at(end) }));
+        }
+    }
+    points
+}
+
+impl ScheduleSpec<TemperatureDimension> {
+    /// Of a bed that its file switches off at last: when, s, unless it is cold at `end`, s, and how hot it is
+    /// then, K.
+    pub(super) fn still_hot(
+        &self,
+        source: &Source,
+        key: &str,
+        end: f64,
+    ) -> Result<Option<(f64, f64)>, SceneError> {
+        let Self::Over(over) = self else { return Ok(None) };
+        if over.of != Some(FileSetting::Bed) {
+            return Ok(None);
+        }
+        let pairs = over.path(source, key)?.setting(Setting::Bed);
+        let Some(&(time, _)) = pairs.last().filter(|pair| pair.1.is_nan()) else { return Ok(None) };
+        let (room, constant) = over.cooling();
+        let schedule = Schedule::linear(&bed(&pairs, room, constant));
+        let then = schedule.map_err(|error| located(source, key, &error))?.at(end);
+        Ok((then > room + COLD).then_some((time, then)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Off at 10 s from 60 °C in a room of 20 °C, time constant 100 s: (60 − 20)/e after 100 s; set lower it
+    /// stops there.
+    #[test]
+    fn beds_cool() {
+        let at =
+            |pairs: &[(f64, f64)], time: f64| Schedule::linear(&bed(pairs, 20.0, 100.0)).unwrap().at(time);
+        let off = [(0.0, 60.0), (10.0, f64::NAN)];
+        for (time, exact) in
+            [(5.0, 60.0), (110.0, 20.0 + 40.0 / 1f64.exp()), (210.0, 20.0 + 40.0 / 2f64.exp())]
+        {
+            let found = at(&off, time);
+            assert!((found - exact).abs() < 0.1, "{time}: {found} {exact}");
+        }
+        let lower = [(0.0, 60.0), (10.0, 40.0)];
+        let reached = 10.0 + 100.0 * 2f64.ln();
+        assert!((at(&lower, reached) - 40.0).abs() < 1e-9 && at(&lower, reached + 50.0) == 40.0);
+        assert!(at(&lower, reached - 20.0) > 44.0);
+        // on again before it is cold
+        let again = [(0.0, 60.0), (10.0, f64::NAN), (110.0, 60.0)];
+        assert!((at(&again, 110.0) - 34.7).abs() < 0.1 && at(&again, 112.0) == 60.0);
+        assert_eq!(bed(&[(0.0, f64::NAN), (0.5, 60.0)], 20.0, 100.0), [(0.5, 60.0)]);
+        assert_eq!(bed(&[(0.0, f64::NAN)], 20.0, 100.0), [(0.0, 20.0)]);
+    }
+}

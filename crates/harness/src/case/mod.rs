@@ -1,0 +1,349 @@
+//! The harness of the command lines: what a program is, and how one run, a resumed run and a sweep of it are driven.
+//!
+//! A program implements [`Case`]: it reads a scene, says what it builds, and solves it. Everything around that is here,
+//! once: command line, lock and checkpoint of the output directory, progress, interruption, sweeps, the report.
+
+mod cli;
+mod folder;
+mod inputs;
+mod rows;
+mod sweep;
+pub mod terminal;
+
+pub use cli::{RunArguments, main, solve};
+pub use folder::{RunLock, lock_run, prepare_run, remove_unfinished, resume_run, share_run};
+pub use inputs::{Input, InputState, attached, input_state, inputs};
+use rows::fits;
+pub use rows::{Row, Rows, STATISTICS};
+pub use sweep::{
+    OF_SAMPLES, OF_SWEEPS, Part, Sample, Search, Shard, SweepOptions, Vary, drawn, job, search, sweep,
+};
+
+use crate::checkpoint::{self, Header, Magic};
+use crate::report::{Expect, Quantity, Report};
+use crate::scene::{Failure, SceneError, Source};
+use polycore::Error;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// How long a run that is asked to stop looks for a moment from which it can continue.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// What a command line says of itself.
+#[derive(Debug)]
+pub struct Program {
+    /// Its name, as it is called.
+    pub name: &'static str,
+    /// Its version.
+    pub version: &'static str,
+    /// One line.
+    pub about: &'static str,
+    /// Lines of examples.
+    pub examples: &'static str,
+    /// First bytes of its checkpoints: program and version of what they hold.
+    pub magic: &'static Magic,
+    /// Values that a sweep shows of each run, before the columns that the user names; `*` stands for any text.
+    pub columns: &'static [&'static str],
+}
+
+/// A program of scenes.
+pub trait Case {
+    /// What it is called and says.
+    const PROGRAM: Program;
+    /// What can go wrong in it.
+    type Error: Fault;
+
+    /// What a scene builds and leaves out, in lines; `quick`: without what is marked `quick = false`.
+    ///
+    /// # Errors
+    /// A fault of the scene.
+    fn explain(source: &Source, quick: bool) -> Result<Vec<String>, Failure<Self::Error>>;
+
+    /// Runs a scene. It calls [`Run::begin`] when the scene is known to be right, and [`Run::pause`] between its steps.
+    ///
+    /// # Errors
+    /// [`Failure`].
+    fn solve(source: &Source, run: &mut Run) -> Result<Finished, Failure<Self::Error>>;
+
+    /// Keys of a scene that a sweep sets to `false`: what they name is large, and nobody looks at it run by run.
+    fn bulky(_source: &Source) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// The JSON Schema of its scenes.
+    fn schema() -> serde_json::Value;
+}
+
+/// Refuses an expectation of a scalar that a program does not declare, where it cannot say which of them a scene has.
+///
+/// # Errors
+/// The name, and those that are most like it.
+pub fn check_expectations(
+    source: &Source,
+    expectations: &[Expect],
+    declared: &[&[Quantity]],
+) -> Result<(), SceneError> {
+    for (index, expect) in expectations.iter().enumerate() {
+        let is_declared =
+            |name: &str| declared.iter().flat_map(|list| *list).any(|q| fits(&q.pattern(), name));
+        if let Some(name) = expect.names().find(|name| !is_declared(name)) {
+            let known: Vec<&str> = declared.iter().flat_map(|list| *list).map(|q| q.name).collect();
+            return Err(source.unknown(&format!("expect[{index}].quantity"), name, &known));
+        }
+    }
+    Ok(())
+}
+
+/// An error that ends a program.
+pub trait Fault: std::error::Error + From<Error> + Send + 'static {
+    /// 1 for a failed run, 2 for bad input, 130 for an interrupted run.
+    fn exit_code(&self) -> u8;
+
+    /// Whether the user requested this end.
+    fn is_interruption(&self) -> bool {
+        self.exit_code() == polycore::error::EXIT_INTERRUPTED
+    }
+}
+
+impl Fault for Error {
+    fn exit_code(&self) -> u8 {
+        Error::exit_code(self)
+    }
+}
+
+/// Sees the part done, from 0 to 1, and a line about it.
+pub type Watcher<'a> = &'a mut (dyn FnMut(f64, &dyn Fn() -> String) + Send);
+
+/// A finished step of a run, for whoever watches it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Step {
+    /// Numbers of the step: name, unit, value.
+    pub values: Vec<(&'static str, &'static str, f64)>,
+    /// Fields at particles or nodes, which do not change their order.
+    pub fields: Vec<StepField>,
+}
+
+/// A field at a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepField {
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Components at each place.
+    pub components: usize,
+    /// Values, the components of a place together.
+    pub data: Vec<f64>,
+}
+
+/// Sees each finished step; the run stops where it gives `false`, as on a signal.
+pub type StepWatcher<'a> = &'a mut (dyn FnMut(Step) -> bool + Send);
+
+/// How a run behaves towards its user.
+pub struct Options<'a> {
+    /// Where results go.
+    pub output: &'a Path,
+    /// Leave out what is marked `quick = false`.
+    pub quick: bool,
+    /// Continue from the checkpoint in `output`.
+    pub resume: bool,
+    /// Time between checkpoints.
+    pub checkpoint_every: Duration,
+    /// Whether the user asked to stop.
+    pub interrupted: &'a (dyn Fn() -> bool + Sync),
+    /// Sees progress.
+    pub progress: Option<Watcher<'a>>,
+    /// Sees finished steps.
+    pub on_step: Option<StepWatcher<'a>>,
+}
+
+impl<'a> Options<'a> {
+    /// A new, whole run into a directory, which nobody watches.
+    pub fn new(output: &'a Path) -> Self {
+        Self {
+            output,
+            quick: false,
+            resume: false,
+            checkpoint_every: Duration::from_secs(30),
+            interrupted: &|| false,
+            progress: None,
+            on_step: None,
+        }
+    }
+}
+
+/// A run that came to its end.
+#[derive(Debug)]
+pub struct Finished {
+    /// What is in `report.json`.
+    pub report: Report,
+    /// What the user is shown of it.
+    pub text: String,
+}
+
+impl From<Report> for Finished {
+    fn from(report: Report) -> Self {
+        Self { text: report.table(), report }
+    }
+}
+
+/// A run under way, and its output directory.
+pub struct Run<'a> {
+    /// How it behaves.
+    pub options: Options<'a>,
+    program: &'static Program,
+    source: Source,
+    header: Header,
+    lock: Option<RunLock>,
+    saved: Instant,
+    asked: Option<Instant>,
+    stopped: bool,
+}
+
+impl<'a> Run<'a> {
+    /// A run of a scene, or of one of its studies in a directory of its own.
+    pub fn new(
+        program: &'static Program,
+        source: &Source,
+        study: Option<&str>,
+        options: Options<'a>,
+    ) -> Self {
+        let header = Header::new(source, options.quick, study);
+        Self {
+            options,
+            program,
+            source: source.clone(),
+            header,
+            lock: None,
+            saved: Instant::now(),
+            asked: None,
+            stopped: false,
+        }
+    }
+
+    /// Takes the output directory. From here on a new run can be resumed.
+    ///
+    /// # Errors
+    /// The directory cannot be written to, or another run holds it.
+    pub fn begin(&mut self) -> Result<(), Error> {
+        let directory = self.options.output;
+        if self.options.resume {
+            self.lock = Some(resume_run(directory)?);
+            return Header::read(directory, self.program.magic)?.check(directory);
+        }
+        self.refuse_another()?;
+        self.lock = Some(prepare_run(directory)?);
+        self.header.stamp = self.source.stamp(self.options.quick);
+        checkpoint::save(directory, self.program.magic, &self.header, None::<&()>)
+    }
+
+    /// Refuses a directory with results of another scene, whose file is still there.
+    fn refuse_another(&self) -> Result<(), Error> {
+        let directory = self.options.output;
+        let finished = || Report::read(directory.join(crate::report::FILE_NAME)).ok()?.provenance.path;
+        let begun = || Header::read(directory, self.program.magic).ok().map(|header| header.scene_path);
+        let file = |path: &Path| std::fs::canonicalize(path).ok();
+        match finished().or_else(begun).and_then(|path| file(&path)) {
+            Some(other) if file(&self.source.path).is_some_and(|own| own != other) => {
+                let reason = format!(
+                    "it has the results of another scene, {}; choose another folder with --output, or remove this one",
+                    other.display()
+                );
+                Err(Error::OutputDirectory { path: directory.to_path_buf(), reason })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What the last [`Run::save`] wrote, where the run is resumed and one did.
+    ///
+    /// # Errors
+    /// The checkpoint cannot be read.
+    pub fn reached<T: DeserializeOwned>(&self) -> Result<Option<T>, Error> {
+        match self.options.resume {
+            true => checkpoint::resume(self.options.output, self.program.magic),
+            false => Ok(None),
+        }
+    }
+
+    /// Writes the checkpoint.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn save<T: Serialize>(&mut self, state: &T) -> Result<(), Error> {
+        self.saved = Instant::now();
+        self.header.stamp = self.source.stamp(self.options.quick);
+        checkpoint::save(self.options.output, self.program.magic, &self.header, Some(state))
+    }
+
+    /// Between steps: writes the checkpoint where one is due, and ends the run where the user requested it. `state` gives
+    /// nothing at a moment from which the run cannot continue.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`]; the checkpoint cannot be written.
+    pub fn pause<T: Serialize>(&mut self, state: impl FnOnce() -> Option<T>) -> Result<(), Error> {
+        let stop = self.stopped || (self.options.interrupted)();
+        if !stop && self.saved.elapsed() < self.options.checkpoint_every {
+            return Ok(());
+        }
+        let state = state();
+        if let Some(state) = &state {
+            self.save(state)?;
+        }
+        if !stop {
+            return Ok(());
+        }
+        // the last checkpoint will do where the next moment to continue from is far
+        let since = *self.asked.get_or_insert_with(Instant::now);
+        if state.is_some() || since.elapsed() > PATIENCE { Err(self.interruption()) } else { Ok(()) }
+    }
+
+    /// The error of a run that the user stopped.
+    pub fn interruption(&self) -> Error {
+        Error::Interrupted { program: self.program.name, output: self.options.output.to_path_buf() }
+    }
+
+    /// Shows the part done, from 0 to 1, and a line about it.
+    pub fn show(&mut self, part: f64, line: &dyn Fn() -> String) {
+        if let Some(progress) = &mut self.options.progress {
+            progress(part, line);
+        }
+    }
+
+    /// Shows a finished step where somebody watches; one who wants no more of them stops the run at the next [`Run::pause`].
+    pub fn step(&mut self, step: impl FnOnce() -> Step) {
+        if let Some(watcher) = &mut self.options.on_step
+            && !self.stopped
+        {
+            self.stopped = !watcher(step());
+        }
+    }
+
+    /// Writes the report, the last file of a run, with the stamp of what it was computed from: a directory with a checkpoint
+    /// holds an unfinished one.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(&mut self, report: &Report) -> Result<(), Error> {
+        let mut report = report.clone();
+        report.provenance.path = std::path::absolute(&self.source.path).ok();
+        report.provenance.stamp = Some(self.source.stamp(self.options.quick));
+        report.write(self.options.output)?;
+        let _ = std::fs::remove_file(self.options.output.join(checkpoint::FILE_NAME));
+        self.lock = None;
+        Ok(())
+    }
+}
+
+/// Runs a scene to its report.
+///
+/// # Errors
+/// [`Failure`]; nothing half-written remains, and an interrupted run can be resumed.
+pub fn run<C: Case>(source: &Source, options: Options) -> Result<Finished, Failure<C::Error>> {
+    let mut run = Run::new(const { &C::PROGRAM }, source, None, options);
+    let finished = C::solve(source, &mut run)?;
+    run.finish(&finished.report)?;
+    Ok(finished)
+}

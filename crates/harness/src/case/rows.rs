@@ -1,0 +1,218 @@
+//! Several runs side by side: a row for each, with what is left at its end.
+
+use crate::report::{Report, Value, aligned};
+use polycore::file::atomic_write;
+use std::path::Path;
+
+/// Statistics of a field: its mean by volume, its extremes, and its standard deviation, which measures uniformity.
+pub const STATISTICS: [&str; 4] = ["mean_", "least_", "largest_", "deviation_of_"];
+
+/// Heading of the column that says whether a run meets the scene's expectations.
+const ENDS: &str = "passed";
+
+/// A run among others.
+pub struct Row {
+    /// Its name.
+    pub name: String,
+    /// What was set, one text for each heading.
+    pub settings: Vec<String>,
+    /// Its report, or why there is none.
+    pub outcome: Result<Report, String>,
+}
+
+/// Runs and the headings of their settings.
+pub struct Rows {
+    /// Headings.
+    pub settings: Vec<String>,
+    /// Further values that are requested, by name; `*` stands for any text.
+    pub columns: Vec<String>,
+    /// Rows.
+    pub rows: Vec<Row>,
+}
+
+impl Rows {
+    /// Whether every run came to its end.
+    pub fn passed(&self) -> bool {
+        self.rows.iter().all(|row| row.outcome.is_ok())
+    }
+
+    /// Whether some run has a value.
+    pub fn has(&self, name: &str) -> bool {
+        self.rows
+            .iter()
+            .filter_map(|row| row.outcome.as_ref().ok())
+            .any(|report| report.scalar(name).is_some())
+    }
+
+    /// Fields whose statistics some run tells, the temperature first.
+    pub fn fields(&self) -> Vec<String> {
+        let mut fields: Vec<String> = self
+            .rows
+            .iter()
+            .filter_map(|row| row.outcome.as_ref().ok())
+            .flat_map(|report| report.values.keys())
+            .filter_map(|name| Some(name.strip_prefix(STATISTICS[0])?.to_owned()))
+            .collect();
+        fields.sort_by_key(|name| (name != "temperature", name.clone()));
+        fields.dedup();
+        fields
+    }
+
+    /// Names of values that the further columns ask for, in the order of the columns, numbers by their size.
+    pub fn asked(&self) -> Vec<String> {
+        let mut names: Vec<String> = Vec::new();
+        for pattern in &self.columns {
+            let fit = |name: &&String| fits(pattern, name);
+            let mut found: Vec<&String> =
+                self.reports().flat_map(|report| report.values.keys()).filter(fit).collect();
+            found.sort_by_key(|name| natural(name));
+            found.dedup();
+            names.extend(found.into_iter().filter(|name| !names.contains(name)).cloned().collect::<Vec<_>>());
+        }
+        names
+    }
+
+    /// Whether some run has expectations.
+    fn judged(&self) -> bool {
+        self.reports().any(|report| !report.expect.is_empty())
+    }
+
+    fn reports(&self) -> impl Iterator<Item = &Report> {
+        self.rows.iter().filter_map(|row| row.outcome.as_ref().ok())
+    }
+
+    /// `name [unit]`, with the unit that the reports give.
+    fn heading(&self, name: &str) -> String {
+        let unit =
+            self.reports().filter_map(|report| report.values.get(name)).find_map(|value| match value {
+                Value::Scalar { unit, .. } if !unit.is_empty() => Some(unit),
+                _ => None,
+            });
+        unit.map_or_else(|| name.to_owned(), |unit| format!("{name} [{unit}]"))
+    }
+
+    /// The table to be read: a column for each field, with its mean, extremes and deviation.
+    pub fn text(&self) -> String {
+        let fields = self.fields();
+        let mut head = vec!["run".to_owned()];
+        head.extend(self.settings.iter().cloned());
+        head.extend(fields.iter().map(|name| format!("{name}: mean (least to largest) ± deviation")));
+        let asked = self.asked();
+        head.extend(asked.iter().map(|name| self.heading(name)));
+        if self.judged() {
+            head.push(ENDS.into());
+        }
+        head.push("steps".into());
+        let mut table = vec![head];
+        for row in &self.rows {
+            let mut line = vec![row.name.clone()];
+            line.extend(row.settings.iter().cloned());
+            match &row.outcome {
+                Ok(report) => {
+                    line.extend(fields.iter().map(|field| {
+                        let [mean, least, largest, deviation] = STATISTICS.map(|statistic| {
+                            let value = report.scalar(&format!("{statistic}{field}"));
+                            value.map_or_else(|| "–".to_owned(), |value| format!("{value:.4}"))
+                        });
+                        format!("{mean} ({least} to {largest}) ± {deviation}")
+                    }));
+                    line.extend(asked.iter().map(|name| {
+                        report.scalar(name).map_or_else(|| "–".to_owned(), |value| format!("{value:.4}"))
+                    }));
+                    if self.judged() {
+                        line.push(verdict(report));
+                    }
+                    line.push(report.work.get("steps").map(u64::to_string).unwrap_or_default());
+                }
+                Err(failure) => line.push(failure.lines().next().unwrap_or_default().to_owned()),
+            }
+            table.push(line);
+        }
+        aligned(&table)
+    }
+
+    /// The table as CSV, with all digits; what a run does not tell is empty.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), polycore::Error> {
+        let fields = self.fields();
+        let mut values: Vec<String> = fields
+            .iter()
+            .flat_map(|field| STATISTICS.map(|statistic| format!("{statistic}{field}")))
+            .collect();
+        values.extend(self.asked());
+        let mut head = vec!["run".to_owned()];
+        head.extend(self.settings.iter().cloned());
+        head.extend(values.iter().map(|name| self.heading(name)));
+        if self.judged() {
+            head.push(ENDS.to_owned());
+        }
+        head.extend(["steps", "failure"].map(str::to_owned));
+        atomic_write(path, |file| {
+            let mut writer = csv::Writer::from_writer(file);
+            writer.write_record(&head)?;
+            for row in &self.rows {
+                let report = row.outcome.as_ref().ok();
+                let mut line = vec![row.name.clone()];
+                line.extend(row.settings.iter().cloned());
+                line.extend(values.iter().map(|name| {
+                    let value = report.and_then(|report| report.scalar(name));
+                    value.map(|value| format!("{value:?}")).unwrap_or_default()
+                }));
+                if self.judged() {
+                    line.push(report.map(verdict).unwrap_or_default());
+                }
+                let steps = report.and_then(|report| report.work.get("steps"));
+                line.push(steps.map(u64::to_string).unwrap_or_default());
+                line.push(row.outcome.as_ref().err().cloned().unwrap_or_default());
+                writer.write_record(line)?;
+            }
+            writer.flush()
+        })
+    }
+}
+
+/// `yes`, or the quantities that miss what the scene expects of them.
+fn verdict(report: &Report) -> String {
+    let missed: Vec<&str> =
+        report.expect.iter().filter(|one| !one.pass).map(|one| one.expect.quantity.as_str()).collect();
+    if missed.is_empty() { "yes".to_owned() } else { format!("no: {}", missed.join(" ")) }
+}
+
+/// Whether a name fits a pattern in which `*` stands for any text.
+pub(super) fn fits(pattern: &str, name: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == name,
+        Some((before, after)) => name.strip_prefix(before).is_some_and(|rest| {
+            (0..=rest.len()).filter(|&at| rest.is_char_boundary(at)).any(|at| fits(after, &rest[at..]))
+        }),
+    }
+}
+
+/// A name's pieces of text and numbers, so that `layer-10` comes after `layer-9`.
+fn natural(name: &str) -> Vec<(String, u64)> {
+    let mut pieces = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let digits = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
+        let end = rest[digits..].find(|c: char| !c.is_ascii_digit()).map_or(rest.len(), |end| digits + end);
+        pieces.push((rest[..digits].to_owned(), rest[digits..end].parse().unwrap_or(0)));
+        rest = &rest[end..];
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns_and_their_order() {
+        assert!(fits("layer-*.mean_alpha", "layer-12.mean_alpha") && fits("a", "a") && fits("*", ""));
+        assert!(!fits("layer-*.mean_alpha", "layer-1.least_alpha") && !fits("a", "ab") && !fits("a*b", "a"));
+        let mut names = ["layer-10.x", "layer-9.x", "layer-9.a"];
+        names.sort_by_key(|name| natural(name));
+        assert_eq!(names, ["layer-9.a", "layer-9.x", "layer-10.x"]);
+    }
+}

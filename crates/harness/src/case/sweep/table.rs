@@ -1,0 +1,119 @@
+//! What a sweep found: its report, and its pictures against the first key.
+
+use super::{FAILED_RUNS, Vary};
+use crate::case::Program;
+use crate::case::rows::{Rows, STATISTICS};
+use crate::output::picture::{LinePlot, Series};
+use crate::report::Report;
+use crate::scene::Source;
+use std::path::Path;
+
+/// Every statistic of every run, and as curves against the number of the run.
+pub(super) fn together(program: &Program, source: &Source, vary: &[Vary], rows: &Rows) -> Report {
+    let mut report = Report::new(program.name, program.version, &source.text);
+    let finished = || rows.rows.iter().filter_map(|row| Some((row, row.outcome.as_ref().ok()?)));
+    let numbers: Vec<f64> =
+        rows.rows.iter().zip(1..).filter(|(row, _)| row.outcome.is_ok()).map(|(_, k)| f64::from(k)).collect();
+    let mut columns = vec![("run".to_owned(), String::new(), numbers)];
+    for (index, vary) in vary.iter().enumerate() {
+        if let Some((values, unit)) = numeric(&vary.values) {
+            let of = |text: &String| values[vary.values.iter().position(|v| v == text).unwrap_or(0)];
+            let list = finished().map(|(row, _)| of(&row.settings[index])).collect();
+            columns.push((vary.key.clone(), unit, list));
+        }
+    }
+    let mut names = Vec::new();
+    for field in rows.fields() {
+        for statistic in STATISTICS {
+            names.push(format!("{statistic}{field}"));
+        }
+    }
+    for name in names.into_iter().chain(rows.asked()) {
+        let list = finished().map(|(_, report)| report.scalar(&name).unwrap_or(f64::NAN)).collect::<Vec<_>>();
+        // a curve has no gaps
+        if list.iter().all(|value| value.is_finite()) {
+            columns.push((name, String::new(), list));
+        }
+    }
+    let views: Vec<(&str, &str, Vec<f64>)> =
+        columns.iter().map(|(name, unit, list)| (name.as_str(), unit.as_str(), list.clone())).collect();
+    report.curve("sweep", &views);
+    report.value(FAILED_RUNS, (rows.rows.len() - finished().count()) as f64);
+    report.work("runs", rows.rows.len() as u64);
+    report.work("steps", finished().filter_map(|(_, own)| own.work.get("steps")).sum());
+    report
+}
+
+/// The numbers of values that have one unit, and the unit.
+pub(super) fn numeric(values: &[String]) -> Option<(Vec<f64>, String)> {
+    let split = |text: &String| -> Option<(f64, String)> {
+        // of keys that change together the first
+        let text = text.split(';').next().unwrap_or_default();
+        let end = text.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(text.len());
+        Some((text[..end].parse().ok()?, text[end..].trim().to_owned()))
+    };
+    let all: Vec<(f64, String)> = values.iter().map(split).collect::<Option<_>>()?;
+    let unit = all.first()?.1.clone();
+    all.iter().all(|(_, other)| *other == unit).then(|| (all.iter().map(|(x, _)| *x).collect(), unit))
+}
+
+/// sweep_FIELD.png: mean, least and largest at the end (the mean only where several keys vary), and
+/// sweep_deviation_of_FIELD.png, against the first key, with a line for each combination of the others.
+pub(super) fn draw(vary: &[Vary], rows: &Rows, output: &Path) -> Result<(), polycore::Error> {
+    let Some(first) = vary.first().filter(|vary| vary.values.len() > 1) else { return Ok(()) };
+    let (places, label) = match numeric(&first.values) {
+        Some((places, unit)) if unit.is_empty() => (places, first.key.clone()),
+        Some((places, unit)) => (places, format!("{} [{}]", first.key, unit.replace("degC", "°C"))),
+        None => {
+            let names = first.values.join(", ");
+            ((1..=first.values.len()).map(|k| k as f64).collect(), format!("{}: {names}", first.key))
+        }
+    };
+    let mut others: Vec<String> = rows.rows.iter().map(|row| row.settings[1..].join(", ")).collect();
+    others.dedup();
+    others.sort();
+    others.dedup();
+    for field in rows.fields() {
+        let line = |other: &String, statistic: &str| {
+            let mut points: Vec<(f64, f64)> = rows
+                .rows
+                .iter()
+                .filter(|row| row.settings[1..].join(", ") == *other)
+                .filter_map(|row| {
+                    let value = row.outcome.as_ref().ok()?.scalar(&format!("{statistic}{field}"))?;
+                    Some((places[first.values.iter().position(|v| *v == row.settings[0])?], value))
+                })
+                .collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let name = [statistic.trim_end_matches("_of_").trim_end_matches('_'), other];
+            let name: Vec<&str> = name.into_iter().filter(|part| !part.is_empty()).collect();
+            let name = name.join(", ").replace("degC", " °C");
+            let (x, y): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+            Series::marked_line(&name, &x, &y)
+        };
+        let plot = |statistics: &[&str], what: &str| {
+            let mut plot = LinePlot::new("At the end").axes(&label, what).size(800.0, 480.0);
+            for other in &others {
+                // not every field has all of them: healing has no largest
+                for statistic in statistics.iter().filter(|name| rows.has(&format!("{name}{field}"))) {
+                    plot = plot.series(line(other, statistic));
+                }
+            }
+            plot
+        };
+        let unit = if field == "temperature" {
+            ["temperature [°C]", "deviation of temperature [K]"]
+        } else {
+            ["", ""]
+        };
+        let what = if unit[0].is_empty() { field.as_str() } else { unit[0] };
+        let shown = if others.len() > 1 { &STATISTICS[..1] } else { &STATISTICS[..3] };
+        plot(shown, what).write(output.join(format!("sweep_{field}.png")))?;
+        let deviation = format!("deviation of {field}");
+        let what = if unit[1].is_empty() { deviation.as_str() } else { unit[1] };
+        if rows.has(&format!("{}{field}", STATISTICS[3])) {
+            plot(&STATISTICS[3..], what).write(output.join(format!("sweep_deviation_of_{field}.png")))?;
+        }
+    }
+    Ok(())
+}

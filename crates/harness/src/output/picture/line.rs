@@ -1,0 +1,226 @@
+//! Curves over two axes.
+
+use std::io::Write;
+use std::path::Path;
+
+use kuva::backend::raster::RasterBackend;
+use kuva::backend::svg::SvgBackend;
+
+use super::canvas::{Anchor, Canvas, Text};
+use super::{picture_error, plot};
+use polycore::Error;
+use polycore::file::atomic_write;
+
+/// Pixels of a PNG for each unit of the layout.
+const PIXELS: f64 = 2.0;
+
+/// A plot of several curves.
+///
+/// ```
+/// # use harness::output::picture::{LinePlot, Series};
+/// let x = [0.0, 1.0, 2.0];
+/// let plot = LinePlot::new("Stress along the ligament")
+///     .axes("x / a", "stress / applied stress")
+///     .series(Series::line("Hardy, m = 3", &x, &[3.0, 1.3, 1.1]))
+///     .series(Series::reference("Kirsch", &x, &[3.0, 1.2, 1.1]));
+/// # let directory = tempfile::tempdir().unwrap();
+/// plot.write(directory.path().join("profile.svg"))?;
+/// # Ok::<(), polycore::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct LinePlot {
+    pub(super) title: String,
+    pub(super) x_label: String,
+    pub(super) y_label: String,
+    pub(super) log: [bool; 2],
+    pub(super) x_range: Option<(f64, f64)>,
+    pub(super) y_range: Option<(f64, f64)>,
+    pub(super) legend: LegendPlace,
+    pub(super) size: (f64, f64),
+    pub(super) series: Vec<Series>,
+}
+
+/// Where the names of the series stand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum LegendPlace {
+    /// Right of the axes, never over the data.
+    #[default]
+    Outside,
+    TopRight,
+    TopLeft,
+    BottomRight,
+    BottomLeft,
+}
+
+/// A named curve.
+#[derive(Clone, Debug)]
+pub struct Series {
+    pub(super) name: String,
+    points: Vec<(f64, f64)>,
+    pub(super) style: Style,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Style {
+    Line,
+    Markers,
+    Both,
+    Reference,
+}
+
+impl Series {
+    /// Joined by a line. A NaN interrupts it.
+    pub fn line(name: &str, x: &[f64], y: &[f64]) -> Self {
+        Self::new(name, x, y, Style::Line)
+    }
+
+    /// Single points: measurements.
+    pub fn markers(name: &str, x: &[f64], y: &[f64]) -> Self {
+        Self::new(name, x, y, Style::Markers)
+    }
+
+    /// Points joined by a line: convergence studies.
+    pub fn marked_line(name: &str, x: &[f64], y: &[f64]) -> Self {
+        Self::new(name, x, y, Style::Both)
+    }
+
+    /// A dashed black line: what the others are compared with.
+    pub fn reference(name: &str, x: &[f64], y: &[f64]) -> Self {
+        Self::new(name, x, y, Style::Reference)
+    }
+
+    fn new(name: &str, x: &[f64], y: &[f64], style: Style) -> Self {
+        // a missing partner is as undefined as a NaN
+        let count = x.len().max(y.len());
+        let at = |values: &[f64], index: usize| values.get(index).copied().unwrap_or(f64::NAN);
+        let points = (0..count).map(|index| (at(x, index), at(y, index))).collect();
+        Self { name: name.to_owned(), points, style }
+    }
+
+    /// The runs between undefined points.
+    pub(super) fn runs(&self) -> impl Iterator<Item = &[(f64, f64)]> {
+        self.points.split(|(x, y)| x.is_nan() || y.is_nan()).filter(|run| !run.is_empty())
+    }
+}
+
+impl LinePlot {
+    /// A plot with linear axes and no series yet.
+    pub fn new(title: &str) -> Self {
+        Self {
+            title: title.to_owned(),
+            x_label: String::new(),
+            y_label: String::new(),
+            log: [false; 2],
+            x_range: None,
+            y_range: None,
+            legend: LegendPlace::Outside,
+            size: (640.0, 420.0),
+            series: Vec::new(),
+        }
+    }
+
+    /// Labels of the axes, with their units.
+    pub fn axes(mut self, x: &str, y: &str) -> Self {
+        (self.x_label, self.y_label) = (x.to_owned(), y.to_owned());
+        self
+    }
+
+    /// A logarithmic x axis.
+    pub fn log_x(mut self) -> Self {
+        self.log[0] = true;
+        self
+    }
+
+    /// A logarithmic y axis.
+    pub fn log_y(mut self) -> Self {
+        self.log[1] = true;
+        self
+    }
+
+    /// Shows this part of the x axis instead of all data.
+    pub fn x_range(mut self, low: f64, high: f64) -> Self {
+        self.x_range = Some((low, high));
+        self
+    }
+
+    /// Shows this part of the y axis instead of all data.
+    pub fn y_range(mut self, low: f64, high: f64) -> Self {
+        self.y_range = Some((low, high));
+        self
+    }
+
+    /// Moves the legend into a free corner.
+    pub fn legend(mut self, place: LegendPlace) -> Self {
+        self.legend = place;
+        self
+    }
+
+    /// Width and height of an SVG in pixels; a PNG has twice as many.
+    pub fn size(mut self, width: f64, height: f64) -> Self {
+        self.size = (width, height);
+        self
+    }
+
+    /// Adds a curve.
+    pub fn series(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// Writes a `.png` or `.svg`, whole or not at all.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for another extension, for nothing to draw, for infinite numbers and for numbers ≤ 0 on a
+    /// logarithmic axis; [`Error::Io`].
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let path = path.as_ref();
+        self.check().map_err(|reason| picture_error(path, reason))?;
+        let bytes = match path.extension().and_then(|extension| extension.to_str()) {
+            Some("svg") => self.svg().map_err(|reason| picture_error(path, reason))?,
+            Some("png") => self.png().map_err(|reason| picture_error(path, reason))?,
+            _ => return Err(picture_error(path, "the file name must end in .png or .svg")),
+        };
+        atomic_write(path, |file| file.write_all(&bytes))
+    }
+
+    fn svg(&self) -> Result<Vec<u8>, String> {
+        let (mut scene, label) = plot::scene(self)?;
+        scene.add(label.primitive());
+        Ok(SvgBackend::new().render_scene(&scene).into_bytes())
+    }
+
+    fn png(&self) -> Result<Vec<u8>, String> {
+        let (scene, label) = plot::scene(self)?;
+        let mut canvas =
+            Canvas::decode(&RasterBackend::new().with_scale(PIXELS as f32).render_scene(&scene)?)?;
+        // the raster back end turns letters pixel by pixel; a quarter turn of ours loses nothing
+        let text = Text::new(&label.text, (f64::from(label.size) * PIXELS) as u32)?;
+        let [x, y] = [label.x, label.y].map(|at| (at * PIXELS).round() as isize);
+        canvas.text(x, y, &text, Anchor::Upwards);
+        canvas.encode()
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let mut any = false;
+        for series in &self.series {
+            for &(x, y) in series.runs().flatten() {
+                any = true;
+                let undrawable = |value: f64, log: bool| {
+                    value.is_infinite() || value.abs() > 1e300 || (log && value <= 0.0)
+                };
+                if undrawable(x, self.log[0]) || undrawable(y, self.log[1]) {
+                    return Err(format!("({x}, {y}) of `{}` cannot be drawn on these axes", series.name));
+                }
+            }
+        }
+        for (range, log) in [(self.x_range, self.log[0]), (self.y_range, self.log[1])] {
+            if let Some((low, high)) = range
+                && !(low < high && low.is_finite() && high.is_finite() && !(log && low <= 0.0))
+            {
+                return Err(format!("the axis range {low} … {high} is not valid"));
+            }
+        }
+        if any { Ok(()) } else { Err("there is nothing to draw".to_owned()) }
+    }
+}

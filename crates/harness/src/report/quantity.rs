@@ -1,0 +1,97 @@
+//! Scalars that reports can have: declared once, with unit and description, by the program that computes them.
+
+/// A scalar that a report can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Quantity {
+    /// Its name; `{axis}`, `{probe}` and the like stand for what is filled in.
+    pub name: &'static str,
+    /// Its unit, empty if dimensionless; `*` where it depends on what is filled in.
+    pub unit: &'static str,
+    /// What it is.
+    pub about: &'static str,
+}
+
+/// A scalar of a report: name and unit.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Named {
+    /// Name, with everything filled in.
+    pub name: String,
+    /// Unit, empty if dimensionless.
+    pub unit: String,
+}
+
+impl Quantity {
+    /// The name with `parts` in place of its words in braces, in this order.
+    pub fn of(&self, parts: &[&str]) -> Named {
+        debug_assert_eq!(parts.len(), self.name.matches('{').count(), "`{}`", self.name);
+        let mut parts = parts.iter();
+        let mut name = String::new();
+        let mut rest = self.name;
+        while let Some((before, (_, after))) =
+            rest.split_once('{').and_then(|(before, braced)| Some((before, braced.split_once('}')?)))
+        {
+            name += before;
+            name += parts.next().copied().unwrap_or_default();
+            rest = after;
+        }
+        Named { name: name + rest, unit: self.unit.to_owned() }
+    }
+
+    /// The name with `*` for what is filled in.
+    pub fn pattern(&self) -> String {
+        self.of(&vec!["*"; self.name.matches('{').count()]).name
+    }
+}
+
+impl Named {
+    /// One that no program declares: of another report, say.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { name: name.into(), unit: unit.into() }
+    }
+
+    /// Names with their units, in a line.
+    pub fn list<'a>(all: impl IntoIterator<Item = &'a Self>) -> String {
+        let one = |Self { name, unit }: &Self| match unit.as_str() {
+            "" => name.clone(),
+            unit => format!("{name} ({unit})"),
+        };
+        all.into_iter().map(one).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The same in a unit that only the result knows.
+    pub fn in_unit(self, unit: &str) -> Self {
+        Self { unit: unit.to_owned(), ..self }
+    }
+}
+
+impl From<Quantity> for Named {
+    fn from(quantity: Quantity) -> Self {
+        quantity.of(&[])
+    }
+}
+
+/// Declares the quantities of a program or of a part of it, and a list of them:
+///
+/// ```
+/// harness::quantities! {
+///     /// What a pulled bar reports.
+///     pub ALL:
+///     PEAK_LOAD = "peak_load", "N", "greatest load of all steps";
+///     REACTION = "reaction_{axis}", "N", "force on what is held";
+/// }
+/// assert_eq!(REACTION.of(&["x"]).name, "reaction_x");
+/// assert_eq!(ALL.len(), 2);
+/// ```
+#[macro_export]
+macro_rules! quantities {
+    ($(#[$documented:meta])* $visibility:vis $list:ident:
+     $($constant:ident = $name:literal, $unit:literal, $about:literal;)*) => {
+        $(
+            #[doc = concat!("`", $name, "`: ", $about, ".")]
+            $visibility const $constant: $crate::report::Quantity =
+                $crate::report::Quantity { name: $name, unit: $unit, about: $about };
+        )*
+        $(#[$documented])*
+        $visibility const $list: &[$crate::report::Quantity] = &[$($constant),*];
+    };
+}

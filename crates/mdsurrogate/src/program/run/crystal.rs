@@ -1,0 +1,137 @@
+//! What the crystal of Table 3.1, the grid of Table 3.2 and the networks of Table 3.4 are, in numbers and pictures.
+
+use crate::cell::{Crystal, Element, LATTICE, Packing, amide_torsions};
+use crate::error::Error;
+use crate::md::{AXES, Grid, Protocol};
+use crate::network::Architecture;
+use crate::program::quantities as q;
+use crate::program::scene::CrystalSpec;
+use harness::output::picture::{LinePlot, Series};
+use harness::report::{Named, Report};
+use std::path::Path;
+
+/// Builds the crystal and measures it; writes `cell-xy.png`, `cell-yz.png` and the same of the supercell.
+///
+/// # Errors
+/// A supercell of too many atoms; I/O errors.
+pub fn measure(spec: &CrystalSpec, output: &Path, report: &mut Report) -> Result<(), Error> {
+    let cell = Crystal::unit_cell(&LATTICE, Packing::default())?;
+    let supercell = cell.replicate(spec.cells)?;
+    let mut value = |quantity: Named, value: f64| {
+        report.value(quantity, value);
+    };
+    value(q::DENSITY.into(), cell.density());
+    value(q::DENSITY_OF_FOUR.into(), 2.0 * cell.density());
+    for (name, crystal) in [("cell", &cell), ("supercell", &supercell)] {
+        value(q::ATOMS.of(&[name]), crystal.atoms.len() as f64);
+        for (axis, length) in ["x", "y", "z"].iter().zip(crystal.lengths) {
+            value(q::EDGE.of(&[name, axis]), length);
+        }
+    }
+    let nitrogens = cell.atoms.iter().filter(|(element, _)| *element == Element::N).count();
+    value(q::MONOMERS.into(), nitrogens as f64);
+    let bonds = cell.bonds();
+    value(q::BONDS.into(), bonds.len() as f64);
+    value(q::CHAINS.into(), chains(&cell) as f64);
+    let mut of_atom = vec![Vec::new(); cell.atoms.len()];
+    for (i, j, d) in &bonds {
+        of_atom[*i].push(*d);
+        of_atom[*j].push(-d);
+    }
+    for element in Element::ALL {
+        for count in 1..=4 {
+            let with =
+                |(atom, own): &(&(Element, [f64; 3]), &Vec<_>)| atom.0 == element && own.len() == count;
+            let found = cell.atoms.iter().zip(&of_atom).filter(with).count();
+            if found > 0 {
+                value(q::ATOMS_WITH_BONDS.of(&[&format!("{element:?}"), &count.to_string()]), found as f64);
+            }
+        }
+    }
+    let mut carbon = [f64::INFINITY, f64::NEG_INFINITY];
+    for (_, own) in cell.atoms.iter().zip(&of_atom).filter(|((e, _), own)| *e == Element::C && own.len() == 4)
+    {
+        for (index, a) in own.iter().enumerate() {
+            for b in &own[..index] {
+                let angle = a.angle(b).to_degrees();
+                carbon = [carbon[0].min(angle), carbon[1].max(angle)];
+            }
+        }
+    }
+    value(q::LEAST_ANGLE.into(), carbon[0]);
+    value(q::GREATEST_ANGLE.into(), carbon[1]);
+    let atoms = &cell.atoms;
+    let lengths = |first: Element, second: Element| {
+        let own = bonds.iter().filter(move |(i, j, _)| {
+            let pair = [atoms[*i].0, atoms[*j].0];
+            pair == [first, second] || pair == [second, first]
+        });
+        own.map(|(_, _, d)| d.norm()).collect::<Vec<f64>>()
+    };
+    for (first, second) in [
+        (Element::C, Element::C),
+        (Element::C, Element::H),
+        (Element::C, Element::O),
+        (Element::C, Element::N),
+        (Element::N, Element::H),
+    ] {
+        let all = lengths(first, second);
+        let pair = format!("{first:?}{second:?}");
+        value(q::SHORTEST_BOND.of(&[&pair]), all.iter().copied().fold(f64::INFINITY, f64::min));
+        value(q::LONGEST_BOND.of(&[&pair]), all.iter().copied().fold(0.0, f64::max));
+    }
+    for (index, torsion) in amide_torsions(LATTICE.b / 2.0)?.into_iter().enumerate() {
+        value(q::TORSION.of(&[&(index + 1).to_string()]), torsion.abs());
+    }
+    let (protocol, grid) = (Protocol::default(), Grid { levels: spec.levels, ..Grid::default() });
+    let runs = grid.runs(&protocol)?;
+    value(q::GRID_RUNS.into(), runs.len() as f64);
+    let samples = (protocol.steps / protocol.every + 1) as f64 * runs.len() as f64;
+    value(q::GRID_SAMPLES.into(), samples);
+    let steps = protocol.steps as f64;
+    for (axis, rates) in AXES.iter().zip(grid.rates(&protocol)) {
+        let (Some(least), Some(greatest)) = (rates.first(), rates.last()) else { continue };
+        // Table 3.2 prints them in 1e-6 a step of 0.5 fs, and calls them 1e-6/fs
+        let printed = |rate: f64| rate * protocol.time_step * 1e6;
+        value(q::LEAST_RATE.of(&[axis]), printed(*least));
+        value(q::GREATEST_RATE.of(&[axis]), printed(*greatest));
+        let ends = greatest * steps * protocol.time_step;
+        value(q::GREATEST_STRAIN.of(&[axis]), ends);
+        let per_fs = printed(*greatest) * 1e-6 * steps * protocol.time_step;
+        value(q::STRAIN_IF_PER_FS.of(&[axis]), per_fs);
+    }
+    for number in 1..=4 {
+        let network = Architecture::thesis(number)?;
+        let name = format!("ANN-{number}");
+        value(q::PARAMETERS.of(&[&name]), network.parameters() as f64);
+        value(q::HIDDEN_LAYERS.of(&[&name]), (network.widths.len() - 2) as f64);
+    }
+    for (name, crystal) in [("cell", &cell), ("supercell", &supercell)] {
+        for (view, [across, up]) in [("xy", [0, 1]), ("yz", [1, 2])] {
+            let axes = ["x (Å)", "y (Å)", "z (Å)"];
+            let [wide, high] = [crystal.lengths[across], crystal.lengths[up]];
+            let mut plot = LinePlot::new(&format!("γ-PA12, {name}"))
+                .axes(axes[across], axes[up])
+                .size(460.0, (340.0 * high / wide).clamp(340.0, 1000.0) + 80.0);
+            for element in Element::ALL {
+                let own = || crystal.atoms.iter().filter(|(other, _)| *other == element);
+                let along = |axis: usize| own().map(|(_, p)| p[axis]).collect::<Vec<f64>>();
+                plot = plot.series(Series::markers(&format!("{element:?}"), &along(across), &along(up)));
+            }
+            plot.write(output.join(format!("{name}-{view}.png")))?;
+        }
+    }
+    Ok(())
+}
+
+/// Molecules of a periodic cell, by its bonds.
+fn chains(cell: &Crystal) -> usize {
+    let mut of: Vec<usize> = (0..cell.atoms.len()).collect();
+    for (i, j, _) in cell.bonds() {
+        let (from, to) = (of[i], of[j]);
+        of.iter_mut().filter(|own| **own == from).for_each(|own| *own = to);
+    }
+    of.sort_unstable();
+    of.dedup();
+    of.len()
+}

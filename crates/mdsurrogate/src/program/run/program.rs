@@ -1,0 +1,51 @@
+//! `mdsurrogate` as a program of the harness.
+
+use super::{explain, run};
+use crate::error::Error;
+use crate::program::scene;
+use harness::case::{Case, Fault, Finished, Program, Run};
+use harness::scene::{Failure, Source};
+
+/// From molecular dynamics to a constitutive law.
+pub struct Mdsurrogate;
+
+impl Case for Mdsurrogate {
+    const PROGRAM: Program = Program {
+        name: "mdsurrogate",
+        version: env!("CARGO_PKG_VERSION"),
+        about: "From molecular dynamics to a constitutive law",
+        examples: "  mdsurrogate check cases/ch3/train-default/case.toml   the scene and its data
+  mdsurrogate run cases/ch3/train-default/case.toml     train, judge, draw; results in out/train-default
+  mdsurrogate resume out/train-default                  continue an interrupted run
+  mdsurrogate sweep cases/ch3/train-default/case.toml --vary training.batch=32,256
+  mdsurrogate predict law.safetensors strains.csv -o stresses.csv
+                                                        stress and uncertainty at the strains of a table
+  mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      describe a table
+  mdsurrogate schema > mdsurrogate.schema.json          for editors",
+        magic: b"mdsg-ck3",
+        columns: &["*.error_over_noise", "*.best_validation_loss"],
+    };
+    type Error = Error;
+
+    fn explain(source: &Source, _quick: bool) -> Result<Vec<String>, Failure<Error>> {
+        explain(source)
+    }
+
+    fn solve(source: &Source, own: &mut Run) -> Result<Finished, Failure<Error>> {
+        run(source, own)
+    }
+
+    fn schema() -> serde_json::Value {
+        scene::schema()
+    }
+}
+
+impl Fault for Error {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Diverged { .. } | Self::NotFinite { .. } => 1,
+            Self::Shared(error) => error.exit_code(),
+            _ => harness::scene::EXIT_BAD_INPUT,
+        }
+    }
+}

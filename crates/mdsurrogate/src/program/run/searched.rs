@@ -1,0 +1,115 @@
+//! What searches have found at what cost: the best loss against epochs and seconds, by method.
+
+use crate::program::quantities as q;
+use crate::program::scene::SearchSpec;
+use crate::search::{Journal, Method};
+use harness::report::Report;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// Points of a curve.
+const POINTS: usize = 8;
+
+/// A search with one seed.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub(super) struct Searched {
+    pub journal: Journal,
+    /// Of each trial: seconds of training of its candidate up to then.
+    pub seconds: Vec<f64>,
+}
+
+/// After each trial of a method: epochs and seconds trained in all, the best loss so far.
+fn course(one: &Searched, method: Method) -> Vec<[f64; 3]> {
+    let mut before: HashMap<usize, [f64; 2]> = HashMap::new();
+    let (mut epochs, mut seconds, mut best) = (0.0, 0.0, f64::INFINITY);
+    let mut points = Vec::new();
+    for (trial, total) in one.journal.trials.iter().zip(&one.seconds).filter(|(t, _)| t.method == method) {
+        // a candidate is trained on, not anew
+        let now = [f64::from(trial.epochs), *total];
+        let [was, took] = before.insert(trial.number, now).unwrap_or_default();
+        epochs += now[0] - was;
+        seconds += (now[1] - took).max(0.0);
+        best = best.min(trial.loss.unwrap_or(f64::INFINITY));
+        points.push([epochs, seconds, best]);
+    }
+    points
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => values[middle],
+        _ => 0.5 * (values[middle - 1] + values[middle]),
+    }
+}
+
+/// Curves `error_against_time_METHOD` with medians over the seeds, and what was found in the end.
+pub(super) fn against_time(spec: &SearchSpec, done: &[Searched], report: &mut Report) {
+    for method in &spec.methods {
+        let courses: Vec<_> = done.iter().map(|one| course(one, *method)).collect();
+        let ends: Vec<[f64; 3]> = courses.iter().filter_map(|course| course.last().copied()).collect();
+        let finite = |k: usize| ends.iter().map(|end| end[k]).filter(|v| v.is_finite()).collect::<Vec<f64>>();
+        if finite(2).is_empty() {
+            continue;
+        }
+        let name = method.name();
+        report.work(&format!("epochs of {name}"), ends.iter().map(|end| end[0] as u64).sum());
+        report.value(q::MEDIAN_EPOCHS.of(&[name]), median(finite(0)));
+        report.value(q::MEDIAN_LOSS.of(&[name]), median(finite(2)));
+        let worst = finite(2).into_iter().fold(f64::NEG_INFINITY, f64::max);
+        report.value(q::WORST_LOSS.of(&[name]), worst);
+        let most = ends.iter().map(|end| end[0]).fold(0.0, f64::max);
+        let mut columns = [Vec::new(), Vec::new(), Vec::new()];
+        for point in 1..=POINTS {
+            let budget = most * point as f64 / POINTS as f64;
+            let within = courses.iter().filter_map(|course| course.iter().rfind(|at| at[0] <= budget));
+            let found: Vec<[f64; 3]> = within.copied().filter(|at| at[2].is_finite()).collect();
+            // a median over fewer seeds is no point of the curve
+            if found.len() == done.len() {
+                for (k, column) in columns.iter_mut().enumerate() {
+                    column.push(median(found.iter().map(|at| at[k]).collect()));
+                }
+            }
+        }
+        let [epochs, seconds, losses] = columns;
+        report.curve(
+            &format!("error_against_time_{name}"),
+            &[("epochs", "", epochs), ("seconds", "s", seconds), ("loss", "MPa²", losses)],
+        );
+    }
+    let value = |method: &str, report: &Report| report.scalar(&q::MEDIAN_LOSS.of(&[method]).name);
+    if let Some(random) = value("random", report) {
+        for name in ["hyperband", "bayesian"] {
+            if let Some(own) = value(name, report) {
+                report.value(q::LOSS_OVER_RANDOM.of(&[name]), own / random);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::Activation::Relu;
+    use crate::search::{Candidate, Journal, Trial};
+
+    #[test]
+    fn costs_by_hand() {
+        let trial = |number, epochs, loss| Trial {
+            method: Method::Hyperband,
+            number,
+            candidate: Candidate { hidden: vec![(8, Relu)], learning_rate: 0.1 },
+            epochs,
+            loss,
+        };
+        let journal =
+            Journal { trials: vec![trial(0, 1, Some(9.0)), trial(1, 1, None), trial(0, 3, Some(4.0))] };
+        let one = Searched { journal, seconds: vec![0.5, 0.25, 1.5] };
+        // candidate 0 is trained on for two epochs and a second
+        assert_eq!(course(&one, Method::Hyperband), [[1.0, 0.5, 9.0], [2.0, 0.75, 9.0], [4.0, 1.75, 4.0]]);
+        assert_eq!(course(&one, Method::Random), [[0.0; 3]; 0]);
+        assert_eq!((median(vec![3.0, 1.0, 2.0]), median(vec![4.0, 1.0])), (2.0, 2.5));
+    }
+}

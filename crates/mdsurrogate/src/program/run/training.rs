@@ -1,0 +1,293 @@
+//! The models of a scene, trained one after the other.
+
+use super::judge::Named;
+use super::{Failure, Prepared, short};
+use crate::dataset::Method;
+use crate::error::Error;
+use crate::program::quantities as q;
+use crate::program::scene::{ModelSpec, Scene};
+use crate::surrogate::{Header, Surrogate};
+use crate::train::{Settings, State, Training, ensemble, loading, soften};
+use harness::case::Run;
+use harness::output::csv;
+use harness::report::Report;
+use polycore::tensor::Voigt;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A best epoch within this part of all is among the first …
+const EARLY: f64 = 0.1;
+/// … of a training with at least so many epochs.
+const LONG: usize = 20;
+
+/// Where the trainings of a scene stand: member by member of model by model; the last may be unfinished.
+#[derive(Debug, Default, Serialize, Deserialize)]
+struct Progress {
+    states: Vec<State>,
+}
+
+/// A law and how it came to be.
+pub struct Trained {
+    name: String,
+    runs: Vec<String>,
+    law: Surrogate,
+    states: Vec<State>,
+    split: Option<Method>,
+}
+
+impl Trained {
+    /// The law with its training time.
+    pub fn named(&self) -> Named<'_> {
+        let seconds = self.states.iter().map(State::seconds).sum();
+        Named {
+            name: &self.name,
+            law: &self.law,
+            runs: &self.runs,
+            seconds: Some(seconds),
+            split: self.split,
+        }
+    }
+}
+
+/// Trains the models, or resumes it; writes each law when its members are done.
+///
+/// # Errors
+/// Those of [`Training`], with what is finished kept in the checkpoint; [`Error::Interrupted`].
+pub fn train(
+    scene: &Scene,
+    models: &[&ModelSpec],
+    data: &Prepared,
+    run: &mut Run,
+) -> Result<Vec<Trained>, Failure> {
+    let (output, quick) = (run.options.output, run.options.quick);
+    let mut queue = Queue {
+        progress: run.reached()?.unwrap_or_default(),
+        total: models.iter().map(|model| model.members).sum(),
+        done: 0,
+    };
+    let mut trained = Vec::new();
+    for model in models {
+        let split = data.split_of(model.split);
+        let loading: Vec<bool> = data.set.paths.iter().flat_map(loading).collect();
+        let learnt = |numbers: &[usize]| {
+            let is_learnt = |row: &&usize| model.softening.is_none() || loading[**row];
+            data.rows_of(&numbers.iter().filter(is_learnt).copied().collect::<Vec<_>>(), &model.runs)
+        };
+        let (rows, validation) = (learnt(&split.train), learnt(&split.validation));
+        let strains: Vec<Voigt> = rows.iter().map(|row| row.c).collect();
+        let mut header = crate::fitted::header(
+            model.law(),
+            model.architecture(),
+            model.members,
+            &rows,
+            model.standardised(),
+        )?;
+        let settings = model.training.over(&scene.training, quick);
+        header.provenance.clone_from(&data.set.provenance);
+        header.provenance.push(format!(
+            "{} {}: {} training rows of a split by {:?} with seed {}; {settings:?}",
+            env!("CARGO_PKG_NAME"),
+            env!("CARGO_PKG_VERSION"),
+            rows.len(),
+            split.method,
+            split.seed,
+        ));
+        let first = queue.done;
+        for member in 0..model.members {
+            let settings = Settings { seed: settings.seed.wrapping_add(member as u64), ..settings };
+            let training = match queue.progress.states.get(queue.done) {
+                Some(state) => Training::resume(&header, &rows, &validation, settings, state.clone()),
+                None => Training::new(&header, &rows, &validation, settings),
+            };
+            let title = match model.members {
+                1 => model.title(),
+                members => format!("{} ({} of {members})", model.title(), member + 1),
+            };
+            let result = queue.finish(training?, &title, settings, run);
+            // also of a diverged training: its best epoch is a law
+            if let Err(failure) = result {
+                let begun = &queue.progress.states[first.min(queue.progress.states.len())..];
+                write(&model.title(), &header, begun, &strains, output)?;
+                return Err(failure);
+            }
+        }
+        let states = queue.progress.states[first..queue.done].to_vec();
+        let mut law = write(&model.title(), &header, &states, &strains, output)?;
+        if let Some(units) = model.softening {
+            law = soften(law, &data.paths_of(&split.train, &model.runs), units)?;
+            law.write(output.join(format!("{}.safetensors", model.title())))?;
+        }
+        let (name, runs, split) = (model.title(), model.runs.clone(), model.split);
+        trained.push(Trained { name, runs, law, states, split });
+    }
+    Ok(trained)
+}
+
+/// The trainings of a scene, in their order.
+struct Queue {
+    progress: Progress,
+    total: usize,
+    done: usize,
+}
+
+impl Queue {
+    /// Trains to the end, with checkpoints.
+    fn finish(
+        &mut self,
+        mut training: Training,
+        title: &str,
+        settings: Settings,
+        run: &mut Run,
+    ) -> Result<(), Failure> {
+        while training.ending().is_none() {
+            let result = training.epoch().copied();
+            let epochs = training.state().history().len();
+            if result.is_err() {
+                self.store(&training);
+                run.save(&self.progress)?;
+            }
+            let epoch = result?;
+            run.pause(|| {
+                self.store(&training);
+                Some(&self.progress)
+            })?;
+            let part = (self.done as f64 + epochs as f64 / f64::from(settings.epochs)) / self.total as f64;
+            run.show(part, &|| {
+                let validation =
+                    epoch.validation.map_or(String::new(), |loss| format!(", validation {}", short(loss)));
+                format!(
+                    "{title}: epoch {epochs} of {}, loss {}{validation} MPa², best in epoch {}",
+                    settings.epochs,
+                    short(epoch.train),
+                    training.state().best_epoch()
+                )
+            });
+        }
+        self.store(&training);
+        self.done += 1;
+        Ok(run.save(&self.progress)?)
+    }
+
+    fn store(&mut self, training: &Training) {
+        self.progress.states.truncate(self.done);
+        self.progress.states.push(training.state().clone());
+    }
+}
+
+/// Writes a law of the best epochs with the limit of its spread, and its learning curves.
+fn write(
+    name: &str,
+    header: &Header,
+    states: &[State],
+    strains: &[Voigt],
+    output: &Path,
+) -> Result<Surrogate, Error> {
+    let learnt: Vec<Vec<f32>> =
+        states.iter().filter(|state| state.best_epoch() > 0).map(|state| state.best().to_vec()).collect();
+    if learnt.is_empty() {
+        return Ok(Surrogate::random(header.clone(), 0)?);
+    }
+    for (member, state) in states.iter().enumerate() {
+        let end = if states.len() == 1 { String::new() } else { format!("-{}", member + 1) };
+        learning_curve(state, &output.join(format!("learning-{name}{end}.csv")))?;
+    }
+    let law = ensemble(header.clone(), &learnt)?.with_spread_limit(strains)?;
+    law.write(output.join(format!("{name}.safetensors")))?;
+    Ok(law)
+}
+
+/// Loss by epoch: (3.12), and the mean over the components that Keras reports.
+fn learning_curve(state: &State, path: &Path) -> Result<(), Error> {
+    let history = state.history();
+    let column = |value: &dyn Fn(usize) -> f64| (0..history.len()).map(value).collect::<Vec<f64>>();
+    let validation = |k: usize| history[k].validation.unwrap_or(f64::NAN);
+    Ok(csv::write(
+        path,
+        &[
+            ("epoch", "", &column(&|k| (k + 1) as f64)),
+            ("learning rate", "", &column(&|k| history[k].learning_rate)),
+            ("training loss (3.12)", "MPa²", &column(&|k| history[k].train)),
+            ("training loss per component", "MPa²", &column(&|k| history[k].train / 6.0)),
+            ("validation loss (3.12)", "MPa²", &column(&validation)),
+            ("validation loss per component", "MPa²", &column(&|k| validation(k) / 6.0)),
+        ],
+    )?)
+}
+
+/// What no number says about the trainings: invariants that the data do not vary.
+pub fn remarks(trained: &[Trained], data: &Prepared) -> Vec<String> {
+    let remark = |model: &Trained| {
+        let names = crate::fitted::constrained(
+            &model.law,
+            &data.rows_of(&data.split_of(model.split).train, &model.runs),
+        );
+        let text = format!(
+            "{}: {} does not vary independently in these data: the dependence of the energy on it is not known",
+            model.name,
+            names.join(", ")
+        );
+        (!names.is_empty()).then_some(text)
+    };
+    trained.iter().filter_map(remark).chain(trained.iter().flat_map(early)).collect()
+}
+
+/// Whether an epoch is among the first of a training that is long enough to tell.
+fn is_early(best: usize, epochs: usize) -> bool {
+    epochs >= LONG && best as f64 <= EARLY * epochs as f64
+}
+
+/// Members whose best epoch is among the first: they have not learnt from the rest of their training.
+fn early(model: &Trained) -> Vec<String> {
+    let members = model.states.len();
+    let line = |(member, state): (usize, &State)| {
+        let (best, epochs) = (state.best_epoch() as usize, state.history().len());
+        let of = if members > 1 { format!(" (member {} of {members})", member + 1) } else { String::new() };
+        is_early(best, epochs).then(|| {
+            format!(
+                "{}{of}: its best epoch is {best} of {epochs}: the loss on the validation rows only grew afterwards, so the law is \
+                 that of the first steps. Look at its learning curve; a smaller learning rate, or validation rows more like the \
+                 training rows, may help",
+                model.name
+            )
+        })
+    };
+    model.states.iter().enumerate().filter_map(line).collect()
+}
+
+/// Numbers of the trainings, and Fig. 3.7.
+///
+/// # Errors
+/// I/O errors.
+pub fn record(trained: &[Trained], output: &Path, report: &mut Report) -> Result<(), Error> {
+    for model in trained {
+        let name = &model.name;
+        let epochs: usize = model.states.iter().map(|state| state.history().len()).sum();
+        report.work(&format!("epochs of {name}"), epochs as u64);
+        report.value(q::PARAMETERS.of(&[name]), model.law.header().architecture.parameters() as f64);
+        report.seconds(&format!("training of {name}"), model.states.iter().map(State::seconds).sum());
+        if let Some(limit) = model.law.header().spread_limit {
+            report.value(q::SPREAD_LIMIT.of(&[name]), limit / 1e6);
+        }
+        for (member, state) in model.states.iter().enumerate() {
+            let quantity = match model.states.len() {
+                1 => q::BEST_EPOCH.of(&[name]),
+                _ => q::MEMBER_BEST_EPOCH.of(&[name, &(member + 1).to_string()]),
+            };
+            report.value(quantity, f64::from(state.best_epoch()));
+        }
+    }
+    let curves: Vec<_> = trained.iter().map(|model| (model.name.as_str(), &model.states[0])).collect();
+    super::draw::learning(&curves, output)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn epochs_among_the_first() {
+        for (best, epochs, early) in
+            [(1, 20, true), (3, 20, false), (100, 1000, true), (101, 1000, false), (1, 5, false)]
+        {
+            assert_eq!(super::is_early(best, epochs), early, "{best} of {epochs}");
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! The program `peri`: scenes in TOML, their runs, the command line. The only room of this crate that knows of them.
+
+pub mod bridge;
+pub mod command;
+pub mod quantities;
+pub mod run;
+pub mod scene;
+
+impl From<crate::Error> for harness::scene::Failure<crate::Error> {
+    fn from(error: crate::Error) -> Self {
+        Self::Run(error)
+    }
+}

@@ -1,0 +1,247 @@
+//! A bond law on a lattice as LAMMPS sees it: there are few reference lengths, and the force depends on the current length only, so
+//! that one `bond_style table` for each length is the model itself.
+
+mod compare;
+mod files;
+mod import;
+mod refuse;
+#[cfg(test)]
+mod tests;
+
+pub use compare::{BOUND, Comparison, compare};
+pub use import::import;
+
+use crate::bonds::Bonds;
+use crate::calibrate::Space;
+use crate::potential::BondPotential;
+use crate::program::run::{Acting, Bonded, Failure};
+use crate::program::scene::{self, Scene, Variant, body_of, loads_of};
+use crate::solver::{Criterion, Loads};
+use harness::scene::Source;
+use std::path::Path;
+
+/// Writes a variant of a scene for LAMMPS into `output`: body, tables, input, driver, self-check state, README.
+/// A scene of one variant needs no name of it.
+///
+/// # Errors
+/// A [`harness::scene::SceneError`] for what tables cannot represent; files that cannot be written.
+pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<Summary, Failure> {
+    let scene: Scene = source.parse()?;
+    let variants = scene::check(source, &scene, false)?;
+    let names: Vec<String> = variants.iter().map(Variant::name).collect();
+    let index = match variant {
+        None if variants.len() == 1 => 0,
+        None => {
+            let found = format!("{} variants", variants.len());
+            let allowed = format!("one of them by `--variant`: `{}`", names.join("`, `"));
+            return Err(source.error("study", found, allowed).into());
+        }
+        Some(name) => match names.iter().position(|own| own == name) {
+            Some(index) => index,
+            None => {
+                let found = format!("no variant `{name}`");
+                return Err(source.error("study", found, format!("`{}`", names.join("`, `"))).into());
+            }
+        },
+    };
+    let variant = &variants[index];
+    // values of one variant have its name behind theirs only where there are others
+    let texts = [&*source.text, if names.len() > 1 { &*names[index] } else { "" }];
+    let (source, scene) = variant.resolve(source, &scene)?;
+    scene::check_variant(&source, &scene)?;
+    refuse::refuse(&source, &scene, variant)?;
+    match scene.body.space {
+        Space::Solid => write::<3>(&source, &scene, variant, texts, output),
+        _ => write::<2>(&source, &scene, variant, texts, output),
+    }
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Summary {
+    /// Particles.
+    pub particles: usize,
+    /// Bonds, each once.
+    pub bonds: usize,
+    /// Tables.
+    pub types: usize,
+}
+
+/// LAMMPS has 32 groups, of which four are used elsewhere.
+const MOST_CLAMPS: usize = 28;
+
+fn write<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    variant: &Variant,
+    texts: [&str; 2],
+    output: &Path,
+) -> Result<Summary, Failure> {
+    let body = body_of::<D>(source, scene, variant)?;
+    let (loads, _) = loads_of(source, scene, &body)?;
+    let bonded = Bonded::new(source, scene, variant, body)?;
+    let Acting::Bonds(material) = &bonded.material else {
+        // nothing else is left after `refuse`
+        return Err(source.error("material", "another material", "a bond law").into());
+    };
+    let critical = match &bonded.criterion {
+        Some(Criterion::Stretch(stretch)) => Some(stretch.least()),
+        _ => None,
+    };
+    let model = Model::new(&*bonded.body.bonds, material.law(), material.modulus(), critical, &loads);
+    if model.clamps.len() > MOST_CLAMPS {
+        let found = format!("{} kinds of clamps, overlaps counted", model.clamps.len());
+        return Err(source
+            .error("boundary", found, format!("at most {MOST_CLAMPS}: the groups of LAMMPS"))
+            .into());
+    }
+    if model.reach == 0.0 {
+        let allowed = "clamps that move against each other: the load is the force that does work on them";
+        return Err(source.error("boundary", "no displacement", allowed).into());
+    }
+    files::write(&model, scene, &loads, texts, output)?;
+    Ok(Summary { particles: model.labels.len(), bonds: model.bonds.len(), types: model.types.len() })
+}
+
+/// Bonds of one reference length.
+pub(crate) struct BondType {
+    /// Reference length, m.
+    length: f64,
+    /// 2 kθ w_J V_I, N: force of a bond over t/kθ.
+    scale: f64,
+}
+
+/// Particles that are held in the same way and belong to the same regions.
+pub(crate) struct Clamp<const D: usize> {
+    /// Bit d: component d is held.
+    mask: u8,
+    /// At load factor 1, m.
+    displacement: [f64; D],
+    regions: Vec<usize>,
+}
+
+/// A body as LAMMPS sees it.
+pub(crate) struct Model<'a, const D: usize> {
+    law: &'a dyn BondPotential,
+    critical: Option<f64>,
+    positions: Vec<[f64; D]>,
+    /// 0, or the number of the clamp from 1 on.
+    labels: Vec<usize>,
+    clamps: Vec<Clamp<D>>,
+    types: Vec<BondType>,
+    /// Type and both ends, from 0.
+    bonds: Vec<(usize, usize, usize)>,
+    horizon: f64,
+    spacing: f64,
+    /// How far apart the clamps are at load factor 1, m.
+    reach: f64,
+    /// Largest prescribed displacement at any factor 0 to 1, m.
+    farthest: f64,
+    predictor: [[f64; 4]; D],
+}
+
+impl<'a, const D: usize> Model<'a, D> {
+    pub(crate) fn new(
+        bonds: &dyn Bonds<D>,
+        law: &'a dyn BondPotential,
+        modulus: f64,
+        critical: Option<f64>,
+        loads: &Loads<D>,
+    ) -> Self {
+        let particles = bonds.particles();
+        let mut number = vec![usize::MAX; bonds.sites()];
+        for (index, &site) in particles.iter().enumerate() {
+            number[site as usize] = index;
+        }
+        let (mut types, mut of_square): (Vec<BondType>, Vec<(i64, usize)>) = Default::default();
+        let mut list = Vec::with_capacity(bonds.directed_bonds() as usize / 2);
+        for &site in particles {
+            let (own, volume) = (number[site as usize], bonds.volume(site as usize));
+            bonds.neighbours(site as usize, &mut |bond| {
+                let other = number[bond.site];
+                if own < other {
+                    // squares of lengths on a lattice are integers, in spacings
+                    let square = (bond.length / bonds.spacing()).powi(2).round() as i64;
+                    let known = of_square.iter().find(|known| known.0 == square).map(|known| known.1);
+                    let kind = known.unwrap_or_else(|| {
+                        types.push(BondType {
+                            length: (square as f64).sqrt() * bonds.spacing(),
+                            scale: 2.0 * modulus * bond.weight * volume,
+                        });
+                        of_square.push((square, types.len() - 1));
+                        types.len() - 1
+                    });
+                    list.push((kind, own, other));
+                }
+            });
+        }
+        let mut member = vec![Vec::new(); bonds.sites()];
+        for (region, sites) in loads.held_regions.iter().enumerate() {
+            sites.iter().for_each(|&site| member[site as usize].push(region));
+        }
+        let mut clamps: Vec<Clamp<D>> = Vec::new();
+        let label = |&site: &u32| {
+            let site = site as usize;
+            let (mask, regions) = (loads.constrained(site), &member[site]);
+            if mask == 0 {
+                return 0;
+            }
+            let displacement = loads.displacement.as_ref().map_or([0.0; D], |field| field.get(site));
+            let same =
+                |c: &Clamp<D>| c.mask == mask && c.regions == *regions && c.displacement == displacement;
+            clamps.iter().position(same).unwrap_or_else(|| {
+                clamps.push(Clamp { mask, displacement, regions: regions.clone() });
+                clamps.len() - 1
+            }) + 1
+        };
+        let labels = particles.iter().map(label).collect();
+        let farthest =
+            clamps.iter().flat_map(|clamp| clamp.displacement).fold(0.0, |most: f64, u| most.max(u.abs()));
+        Self {
+            law,
+            critical,
+            positions: particles.iter().map(|&site| bonds.position(site as usize)).collect(),
+            labels,
+            clamps,
+            types,
+            bonds: list,
+            horizon: bonds.horizon(),
+            spacing: bonds.spacing(),
+            reach: loads.reach(bonds, &[]),
+            farthest,
+            predictor: loads.affine_predictor(bonds, modulus * law.tangent()),
+        }
+    }
+
+    /// Forces, N, of positions, by the plain loop over the law itself.
+    pub(crate) fn forces(&self, positions: &[[f64; D]]) -> Vec<[f64; D]> {
+        let mut forces = vec![[0.0; D]; positions.len()];
+        for &(kind, a, b) in &self.bonds {
+            let BondType { length, scale } = self.types[kind];
+            let bond: [f64; D] = std::array::from_fn(|d| positions[b][d] - positions[a][d]);
+            let now = bond.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let pull = scale * self.law.tension(now / length) / now;
+            for d in 0..D {
+                forces[a][d] += pull * bond[d];
+                forces[b][d] -= pull * bond[d];
+            }
+        }
+        forces
+    }
+
+    /// The self-check state: a pseudo-random displacement below a tenth of the spacing, m, that breaks nothing.
+    pub(crate) fn check_state(&self) -> Vec<[f64; D]> {
+        let room = self.critical.map_or(1.0, |critical| critical - 1.0);
+        let amplitude = self.spacing * (0.2 * room).min(0.1);
+        let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut random = || {
+            // splitmix64, Steele, Lea & Flood, OOPSLA 2014
+            seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = seed;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            2.0 * ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64 - 1.0
+        };
+        self.positions.iter().map(|x| x.map(|x| x + amplitude * random())).collect()
+    }
+}

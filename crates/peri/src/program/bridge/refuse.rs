@@ -1,0 +1,88 @@
+//! What tables of bond forces cannot represent: refused by key, value and reason.
+
+use crate::program::scene::{Method, Scene, SurfaceCorrection, Variant};
+use crate::solver::Policy;
+use harness::scene::{SceneError, Source};
+
+/// Refuses a scene that is not a lattice with one bond law under prescribed displacements.
+///
+/// # Errors
+/// A [`SceneError`] that names the key, the value found and what is allowed.
+pub(super) fn refuse(source: &Source, scene: &Scene, variant: &Variant) -> Result<(), SceneError> {
+    let material = &scene.material;
+    let energy = variant.surface == SurfaceCorrection::Energy;
+    let reasons = [
+        (
+            scene.body.has_points(),
+            if scene.body.points.is_some() { "body.points" } else { "body.grid" },
+            "a cloud, whose bonds have as many lengths as pairs",
+            "`shapes` on a lattice: LAMMPS has a table for each bond length",
+        ),
+        (
+            material.solid.is_some(),
+            "material.solid",
+            "a solid whose bond forces depend on whole families",
+            "a bond law: a table knows the length of its bond only",
+        ),
+        (
+            energy,
+            "material.surface_correction",
+            "`energy`, a weight of its own for each pair",
+            "`none`: LAMMPS has a table for each bond length",
+        ),
+        (
+            scene.softens(),
+            "material.critical.convention",
+            "`softening`, bonds that soften before they break",
+            "`tearing` or `bonds`: the tables end where bonds break at once",
+        ),
+        (
+            !material.inclusions.is_empty(),
+            "material.inclusions",
+            "inclusions, which give pairs weights of their own",
+            "none: LAMMPS has a table for each bond length",
+        ),
+        (
+            !material.fields.is_empty(),
+            "material.fields",
+            "parameters that follow fields, different for each pair",
+            "none: LAMMPS has a table for each bond length",
+        ),
+        (scene.contact.is_some(), "contact", "contact", "none: the tables act between bonded particles only"),
+        (
+            scene.dynamics.is_some() || scene.method() == Method::Verlet,
+            if scene.dynamics.is_some() { "dynamics" } else { "solver.method" },
+            "explicit dynamics",
+            "a quasi-static scene: the driver minimises the energy",
+        ),
+        (
+            scene.solver.breaking == Policy::EachIteration,
+            "solver.breaking",
+            "`each-iteration`",
+            "`at-equilibrium`: the iterations of LAMMPS are not ours",
+        ),
+        (
+            scene.solver.refine > 1,
+            "solver.refine",
+            "load steps that are cut where bonds break",
+            "1: the driver takes the steps that are prescribed",
+        ),
+    ];
+    if let Some((_, key, found, allowed)) = reasons.into_iter().find(|(refused, ..)| *refused) {
+        return Err(source.error(key, found, allowed));
+    }
+    for (index, boundary) in scene.boundary.iter().enumerate() {
+        let loads = [
+            ("traction", boundary.traction.is_some(), "a traction"),
+            ("force", boundary.force.is_some(), "a force"),
+            ("rotation", boundary.rotation.is_some(), "a rotation"),
+            ("displacement_field", boundary.displacement_field.is_some(), "a field of displacements"),
+        ];
+        if let Some((name, _, found)) = loads.into_iter().find(|(_, given, _)| *given) {
+            let key = format!("boundary[{index}].{name}");
+            let allowed = "`displacement`: the driver moves clamps, each as a whole";
+            return Err(source.error(&key, found, allowed));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,36 @@
+//! The `peri` command line. It is a part of the library, so that the solvers are compiled once for all commands.
+
+// harness::say! prints without a panic where nobody reads any more
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
+use crate::program::run::Peri;
+use std::process::ExitCode;
+
+mod bridge;
+mod exact;
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Print closed-form solutions and the constants of a bond law.
+    #[command(subcommand)]
+    Exact(exact::Exact),
+    /// Write a scene for another engine.
+    #[command(subcommand)]
+    Export(bridge::Export),
+    /// Read the results of another engine.
+    #[command(subcommand)]
+    Import(bridge::Import),
+    /// Compare an export with the engine that it is for.
+    #[command(subcommand)]
+    Compare(bridge::Compare),
+}
+
+/// Runs the command line of this process.
+pub fn main() -> ExitCode {
+    harness::case::main::<Peri, _>(|command| match command {
+        Command::Exact(exact) => exact.print(),
+        Command::Export(export) => export.print(),
+        Command::Import(import) => import.print(),
+        Command::Compare(compare) => compare.print(),
+    })
+}

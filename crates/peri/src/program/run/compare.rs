@@ -1,0 +1,383 @@
+//! Comparison with closed forms, convergence, and the report.
+
+use super::outcome::{Outcome, Profile, families};
+use crate::bonds::Bonds;
+use crate::exact;
+use crate::program::quantities as q;
+use crate::program::scene::{ExactSpec, Scene};
+use crate::stress::{Measure, Tensor};
+use harness::report::{Bound, Expect, Kind, Named, Report};
+use harness::scene::Source;
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Stress around a hole against Kirsch's solution or, given, that of this plate: peak and profile at θ = π/2, RMSE (2.84)
+/// over all particles and without the loading layers; of a plate also within 2δ of the hole, and beyond up to five radii.
+pub fn hole<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    spec: &ExactSpec,
+    plate: Option<&exact::Plate>,
+    fields: &[(Measure, Vec<Tensor<D>>)],
+    loaded: &[bool],
+    outcome: &mut Outcome,
+) {
+    let (radius, remote) = spec.hole();
+    let positions: Vec<[f64; D]> = bonds.particles().iter().map(|&s| bonds.position(s as usize)).collect();
+    let kirsch: Vec<f64> = positions.iter().map(|p| exact::kirsch(p[0], p[1], radius, 1.0)[0]).collect();
+    let truth =
+        plate.map(|plate| positions.par_iter().map(|p| plate.stress(p[0], p[1])[0]).collect::<Vec<f64>>());
+    let exact = truth.as_ref().unwrap_or(&kirsch);
+    let near = radius + 2.0 * bonds.horizon();
+    let inner: Vec<bool> = bonds.particles().iter().map(|&site| !loaded[site as usize]).collect();
+    let distance: Vec<f64> = positions.iter().map(|p| p[0].hypot(p[1])).collect();
+    let column = column(&positions, bonds.spacing());
+    if !column.is_empty() {
+        outcome.value(q::KIRSCH_FIRST, mean(&column[0].1, &kirsch));
+        outcome.profiles.push(profile("kirsch", &column, &kirsch));
+        if let (Some(plate), Some(truth)) = (plate, &truth) {
+            outcome.value(q::EXACT_FIRST, mean(&column[0].1, truth));
+            outcome.value(q::EXACT_PEAK, plate.stress(0.0, radius)[0]);
+            outcome.profiles.push(profile("exact", &column, truth));
+        }
+    }
+    for (measure, field) in fields {
+        let name = measure.name();
+        let normal: Vec<f64> = field.iter().map(|s| s[0][0] / remote).collect();
+        let rms = |exact: &[f64], wanted: &dyn Fn(usize) -> bool| {
+            let squares = (0..normal.len()).filter(|&i| wanted(i)).map(|i| (normal[i] - exact[i]).powi(2));
+            let (sum, count) = squares.fold((0.0, 0_usize), |(sum, count), square| (sum + square, count + 1));
+            (sum / count.max(1) as f64).sqrt()
+        };
+        let most =
+            (0..normal.len()).filter(|&i| inner[i]).map(|i| normal[i]).fold(f64::NEG_INFINITY, f64::max);
+        outcome.value(q::MEASURE_MAX.of(&[name]), most);
+        for kind in spec.errors() {
+            let of = if kind.ends_with("kirsch") { &kirsch } else { exact };
+            let error = match *kind {
+                "rmse_inner" | "rmse_inner_kirsch" => rms(of, &|i| inner[i]),
+                "rmse_bulk" => rms(of, &|i| distance[i] > near && distance[i] < 5.0 * radius),
+                "rmse_ring" => rms(of, &|i| distance[i] <= near),
+                _ => rms(of, &|_| true),
+            };
+            outcome.value(q::MEASURE_ERROR.of(&[name, kind]), error);
+        }
+        if !column.is_empty() {
+            let profile = profile(name, &column, &normal);
+            let peak = profile.value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            outcome.value(q::MEASURE_PEAK.of(&[name]), peak);
+            outcome.value(q::MEASURE_PEAK_ERROR.of(&[name]), peak / mean(&column[0].1, exact) - 1.0);
+            outcome.value(q::MEASURE_FIRST.of(&[name]), profile.value[0]);
+            outcome.profiles.push(profile);
+        }
+    }
+}
+
+/// Heights above the hole and the particles there: the column(s) of particles nearest the line x = 0, y > 0.
+fn column<const D: usize>(positions: &[[f64; D]], spacing: f64) -> Vec<(f64, Vec<usize>)> {
+    let mut near: Vec<usize> = (0..positions.len())
+        .filter(|&i| positions[i][0].abs() < 0.6 * spacing && positions[i][1] > 0.0)
+        .collect();
+    near.sort_by(|&a, &b| positions[a][1].total_cmp(&positions[b][1]));
+    let mut rows: Vec<(f64, Vec<usize>)> = Vec::new();
+    for particle in near {
+        let height = positions[particle][1];
+        match rows.last_mut() {
+            Some((last, members)) if height - *last < 0.1 * spacing => members.push(particle),
+            _ => rows.push((height, vec![particle])),
+        }
+    }
+    rows
+}
+
+fn mean(members: &[usize], values: &[f64]) -> f64 {
+    members.iter().map(|&i| values[i]).sum::<f64>() / members.len() as f64
+}
+
+fn profile(name: &str, column: &[(f64, Vec<usize>)], values: &[f64]) -> Profile {
+    Profile {
+        name: name.to_owned(),
+        at: column.iter().map(|row| row.0).collect(),
+        value: column.iter().map(|row| mean(&row.1, values)).collect(),
+    }
+}
+
+/// Seconds that a stress field of one measure takes from the scene on, as if it were the only one.
+pub fn run_time(outcome: &Outcome, measure: &str) -> f64 {
+    ["build", "solve", "deformation gradient", &format!("stress {measure}")]
+        .map(|phase| outcome.seconds_of(phase))
+        .iter()
+        .sum()
+}
+
+/// Observed order: slope of ln(error) over ln(spacing) by least squares.
+pub fn observed_order(spacing: &[f64], error: &[f64]) -> f64 {
+    let points: Vec<(f64, f64)> = spacing.iter().zip(error).map(|(h, e)| (h.ln(), e.ln())).collect();
+    let n = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let (top, bottom) =
+        points.iter().fold((0.0, 0.0), |(t, b), p| (t + (p.0 - x) * (p.1 - y), b + (p.0 - x) * (p.0 - x)));
+    top / bottom
+}
+
+/// The report of all variants; with one variant its values keep their plain names.
+pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -> Report {
+    let mut report =
+        Report::new("peri", env!("CARGO_PKG_VERSION"), &resolved(source, scene, outcomes, quick));
+    report.threads(rayon::current_num_threads());
+    // names must not depend on how many of the variants run
+    let several =
+        crate::program::scene::check(source, scene, false).map_or(outcomes.len(), |all| all.len()) > 1;
+    let full = |name: &str, outcome: &Outcome| {
+        if several { format!("{name}[{}]", outcome.name) } else { name.to_owned() }
+    };
+    for outcome in outcomes {
+        for (name, value, unit) in &outcome.values {
+            report.value(Named { name: full(name, outcome), unit: unit.clone() }, *value);
+        }
+        for profile in &outcome.profiles {
+            let columns = [("y", "m", profile.at.clone()), ("stress", "", profile.value.clone())];
+            report.curve(&full(&format!("profile_{}", profile.name), outcome), &columns);
+        }
+        for (name, count) in &outcome.work {
+            report.work(&full(name, outcome), *count);
+        }
+        for (phase, seconds) in &outcome.seconds {
+            report.seconds(&full(phase, outcome), *seconds);
+        }
+    }
+    if let (Some(problem), Some(stress)) = (&scene.exact, &scene.stress) {
+        if let Some(width) = plate_width(scene) {
+            report.value(q::KT_FINITE_WIDTH, exact::heywood_gross(2.0 * problem.hole().0 / width));
+        }
+        for (family, members) in families(outcomes) {
+            let spacing: Vec<f64> = members.iter().map(|o| o.spacing).collect();
+            for measure in &stress.measures {
+                let name = measure.name();
+                let errors_of = |kind: &str| -> Vec<f64> {
+                    members.iter().filter_map(|o| o.get(&format!("{name}_{kind}"))).collect()
+                };
+                for kind in problem.errors() {
+                    let errors = errors_of(kind);
+                    if errors.len() == spacing.len() {
+                        let order = observed_order(&spacing, &errors);
+                        report.value(q::MEASURE_ORDER.of(&[name, kind, &family]), order);
+                    }
+                }
+                let seconds: Vec<f64> = members.iter().map(|o| run_time(o, name)).collect();
+                let columns = [
+                    ("spacing", "m", spacing.clone()),
+                    ("seconds", "s", seconds),
+                    ("rmse", "", errors_of("rmse")),
+                    ("rmse_inner", "", errors_of("rmse_inner")),
+                ];
+                report.curve(&format!("error_against_time_{name}[{family}]"), &columns);
+            }
+        }
+    }
+    if scene.output.integrals {
+        for (quantity, value) in q::INTEGRALS.into_iter().zip(crate::integrals::all()) {
+            report.value(quantity, value);
+        }
+    }
+    if several {
+        for quantity in q::BALANCES {
+            let most = outcomes.iter().filter_map(|o| o.get(quantity.name)).reduce(f64::max);
+            if let Some(most) = most {
+                report.value(quantity, most);
+            }
+        }
+    }
+    if let Some(compare) = &scene.output.compare {
+        super::against::add(&mut report, compare, outcomes);
+    }
+    for (family, change) in super::history::peak_changes(outcomes) {
+        report.value(q::PEAK_LOAD_CHANGE.of(&[&family]), change);
+    }
+    let mut expectations = scene.expect.clone();
+    expectations.extend(outcomes.iter().filter_map(|outcome| stiff_contact(scene, outcome, several)));
+    report.judge(&expectations, quick);
+    report
+}
+
+/// Part of the stored energy that contact may hold in equilibrium.
+const SOFTEST: f64 = 0.1;
+
+/// The expectation that contact is stiff enough for its load to be right, of a variant in equilibrium.
+fn stiff_contact(scene: &Scene, outcome: &Outcome, several: bool) -> Option<Expect> {
+    let judged = scene.contact.as_ref().is_some_and(|contact| contact.short_range.is_none());
+    outcome.get(q::CONTACT_SHARE.name).filter(|_| judged && scene.dynamics.is_none())?;
+    let name = q::CONTACT_SHARE.name;
+    Some(Expect {
+        quantity: if several { format!("{name}[{}]", outcome.name) } else { name.to_owned() },
+        bound: Bound::Range { at_least: None, at_most: Some(SOFTEST) },
+        kind: Kind::Bound,
+        source: "of every scene with contact: the load is about this part too low".to_owned(),
+        quick: true,
+    })
+}
+
+/// The scene with everything that it left to defaults, as comments behind its text.
+fn resolved(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -> String {
+    let Scene { material, solver, stress, output, .. } = scene;
+    let mut text = format!("{}\n# as run, with defaults (quick = {quick}):\n", source.text.trim_end());
+    for line in [format!("{material:?}"), format!("{solver:?}"), format!("{stress:?}"), format!("{output:?}")]
+    {
+        text += &format!("# {line}\n");
+    }
+    for outcome in outcomes {
+        text += &format!("# variant {}\n", outcome.name);
+    }
+    text
+}
+
+/// Names and units of the values of all variants, in the order in which they come.
+fn columns(outcomes: &[Outcome]) -> Vec<(&str, &str)> {
+    let mut columns: Vec<(&str, &str)> = Vec::new();
+    for (name, _, unit) in outcomes.iter().flat_map(|o| &o.values) {
+        if !columns.iter().any(|(known, _)| known == name) {
+            columns.push((name, unit));
+        }
+    }
+    columns
+}
+
+/// Variants as lines of a table: size, work, time, then their main results; `study.csv` has all of them.
+pub fn table(outcomes: &[Outcome]) -> String {
+    use std::fmt::Write;
+    // once a body is torn, reactions are those of its pieces
+    let torn = outcomes.iter().any(|o| o.history.iter().any(|r| r.broken > 0));
+    let main = ["_peak", "_rmse", "_rmse_inner", "_rmse_ring", "largest_displacement"];
+    let of_loading = ["peak_load", "displacement_at_peak", "first_break", "broken_bonds"];
+    let shown: Vec<(&str, String)> = columns(outcomes)
+        .into_iter()
+        .filter(|(name, _)| {
+            main.iter().any(|end| name.ends_with(end))
+                || of_loading.contains(name)
+                || (!torn && name.starts_with("reaction_"))
+        })
+        .filter(|(name, _)| !name.starts_with("as-published"))
+        .map(|(name, unit)| {
+            (name, if unit.is_empty() { name.to_owned() } else { format!("{name} ({unit})") })
+        })
+        .collect();
+    let width = outcomes.iter().map(|o| o.name.len()).max().unwrap_or(0);
+    let mut text = String::new();
+    let _ = write!(text, "{:<width$} {:>10} {:>10} {:>9}", "variant", "particles", "iterations", "solve (s)");
+    for (_, heading) in &shown {
+        let _ = write!(text, "  {heading:>10}");
+    }
+    text.push('\n');
+    for outcome in outcomes {
+        let work = |name: &str| outcome.work.iter().find(|w| w.0 == name).map_or(0, |w| w.1);
+        let (particles, iterations) = (work("particles"), work("iterations"));
+        let _ = write!(
+            text,
+            "{:<width$} {particles:>10} {iterations:>10} {:>9.2}",
+            outcome.name,
+            outcome.seconds_of("solve")
+        );
+        for (name, heading) in &shown {
+            let column = heading.chars().count().max(10);
+            let _ = write!(text, "  {:>column$}", outcome.get(name).map_or("-".to_owned(), digits));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Six digits.
+fn digits(value: f64) -> String {
+    let size = value.abs();
+    if value != 0.0 && !(1e-4..1e7).contains(&size) {
+        return format!("{value:.5e}");
+    }
+    let after = if value == 0.0 { 0 } else { (5 - size.log10().floor() as i32).clamp(0, 9) };
+    let text = format!("{value:.*}", after as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// What the results do not say by themselves: warnings, runs in which nothing broke, how far a peak is known.
+pub fn notes(outcomes: &[Outcome]) -> String {
+    let mut lines = Vec::new();
+    let several = outcomes.len() > 1;
+    let of = |outcome: &Outcome| if several { format!("{}: ", outcome.name) } else { String::new() };
+    for outcome in outcomes {
+        lines.extend(outcome.warnings.iter().map(|text| format!("warning: {}{text}", of(outcome))));
+        let unbroken = outcome.history.last().is_some_and(|last| last.broken == 0);
+        if let (Some(critical), true) = (outcome.get("critical_stretch"), unbroken) {
+            let largest = outcome.history.iter().map(|r| r.largest_stretch).fold(1.0, f64::max);
+            lines
+                .push(format!("{}largest stretch {largest:.4} of {critical:.4}: nothing broke", of(outcome)));
+        }
+    }
+    for (family, change) in super::history::peak_changes(outcomes) {
+        let members: Vec<&Outcome> = outcomes.iter().filter(|o| o.family == family).collect();
+        let step = members.iter().filter_map(|o| o.step_at_peak()).fold(0.0, f64::max);
+        let known = if step >= change { ": smaller steps first" } else { "" };
+        lines.push(format!(
+            "{family}: the peak load changes by {:.2} % between the two finest spacings; a load step changes it by up to {:.2} %{known}",
+            100.0 * change,
+            100.0 * step
+        ));
+    }
+    lines.iter().map(|line| format!("{line}\n")).collect()
+}
+
+/// All values of all variants, a row for each.
+pub fn study(outcomes: &[Outcome], output: &Path) -> Result<(), polycore::Error> {
+    if outcomes.len() < 2 {
+        return Ok(());
+    }
+    let columns = columns(outcomes);
+    let quoted = |text: &str| format!("\"{}\"", text.replace('"', "\"\""));
+    let mut text = String::from("variant,spacing [m],horizon_ratio");
+    for (name, unit) in &columns {
+        let heading = if unit.is_empty() { (*name).to_owned() } else { format!("{name} [{unit}]") };
+        text += &format!(",{}", quoted(&heading));
+    }
+    text.push('\n');
+    for outcome in outcomes {
+        text += &format!("{},{:?},{:?}", quoted(&outcome.name), outcome.spacing, outcome.horizon_ratio);
+        for (name, _) in &columns {
+            // empty: this variant has no such value
+            text += &outcome.get(name).map_or(",".to_owned(), |value| format!(",{value:?}"));
+        }
+        text.push('\n');
+    }
+    polycore::file::atomic_write(output.join("study.csv"), |file| {
+        std::io::Write::write_all(file, text.as_bytes())
+    })
+}
+
+/// Width of the plate across the load, from the added boxes.
+pub fn plate_width(scene: &Scene) -> Option<f64> {
+    let edges = |get: fn(&crate::program::scene::ShapeSpec) -> &Option<Vec<polycore::units::Length>>| {
+        scene
+            .body
+            .shapes()
+            .iter()
+            .filter(|s| s.add.is_some())
+            .filter_map(move |s| Some(get(s).as_ref()?.get(1)?.si()))
+    };
+    let low = edges(|s| &s.min).reduce(f64::min)?;
+    let high = edges(|s| &s.max).reduce(f64::max)?;
+    Some(high - low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn six_digits() {
+        let texts = [0.0, 1234567.8, 0.001234567, 8.9e-5, -15.25, 2e9].map(digits);
+        assert_eq!(texts, ["0", "1234568", "0.00123457", "8.90000e-5", "-15.25", "2.00000e9"]);
+    }
+
+    #[test]
+    fn order_of_a_power_law() {
+        let h = [4.0, 2.0, 1.0];
+        let error = h.map(|h: f64| 0.3 * h.powf(0.45));
+        assert!((observed_order(&h, &error) - 0.45).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,180 @@
+//! Pictures and field files of a run.
+
+use super::compare::{plate_width, run_time};
+use super::outcome::Outcome;
+use super::outcome::families;
+use super::scale::{bridge, short, stress_unit};
+use crate::bonds::Bonds;
+use crate::exact;
+use crate::program::scene::{ExactSpec, Scene};
+use crate::solver::State;
+use crate::stress::{Measure, Tensor};
+use harness::output::csv;
+use harness::output::picture::{FieldMap, LegendPlace, LinePlot, Panel, Series};
+use polycore::Error;
+use std::path::Path;
+
+/// Maps of the stress components of the first measure (Fig. 2.6); plane bodies only.
+pub fn maps<const D: usize>(
+    scene: &Scene,
+    bonds: &dyn Bonds<D>,
+    state: &State<D>,
+    fields: &[(Measure, Vec<Tensor<D>>)],
+    outcome: &Outcome,
+    output: &Path,
+) -> Result<(), Error> {
+    let Some((measure, field)) = fields.first().filter(|_| D == 2) else { return Ok(()) };
+    let [rest, places] = in_plane(bonds, state);
+    let largest = field.iter().flatten().flatten().fold(0.0_f64, |most, s| most.max(s.abs()));
+    let (scale, unit) = match &scene.exact {
+        Some(exact) => (1.0 / exact.hole().1, "/σ∞".to_owned()),
+        None => {
+            let (scale, unit) = stress_unit(largest);
+            (scale, format!(" ({unit})"))
+        }
+    };
+    let components: Vec<(&str, Vec<f64>)> = [("σ₁₁", 0, 0), ("σ₂₂", 1, 1), ("σ₁₂", 0, 1)]
+        .map(|(name, a, b)| (name, field.iter().map(|t| t[a][b] * scale).collect()))
+        .into();
+    let mut map = FieldMap::new().lengths("mm", 1e-3);
+    let [wide, high] = [0, 1].map(|d| {
+        let (low, high) =
+            places.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x[d]), high.max(x[d])));
+        high - low
+    });
+    if wide > 1.8 * high {
+        map = map.columns(1).size(1200);
+    }
+    for (name, values) in &components {
+        let label = format!("{name}{unit}");
+        // of a body that is torn this is what is left in its pieces
+        let last = outcome.history.last().filter(|last| last.broken > 0);
+        let at = last.map_or(String::new(), |r| {
+            format!(", U = {} mm, F = {} N", short(r.displacement * 1e3), short(r.load))
+        });
+        let title = format!("{label}, {}{at}", measure.name());
+        let panel = Panel::new(&title, &label, &places, values, bonds.spacing()).reference(&rest);
+        map = map.panel(panel.bridge(bridge(outcome)));
+    }
+    map.write(output.join(format!("stress_{}.png", outcome.file_name())))
+}
+
+/// Map of the particles of a plane body at which a learnt law is uncertain.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn flagged<const D: usize>(
+    bonds: &dyn Bonds<D>,
+    state: &State<D>,
+    values: &[f64],
+    outcome: &Outcome,
+    output: &Path,
+) -> Result<(), Error> {
+    let [rest, places] = in_plane(bonds, state);
+    let panel = Panel::new("where the learnt law is uncertain", "flagged", &places, values, bonds.spacing());
+    let map = FieldMap::new()
+        .lengths("mm", 1e-3)
+        .panel(panel.range(0.0, 1.0).reference(&rest).bridge(bridge(outcome)));
+    map.write(output.join(format!("flags_{}.png", outcome.file_name())))
+}
+
+/// Where the particles of a plane body were and are.
+fn in_plane<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> [Vec<[f64; 2]>; 2] {
+    let sites = bonds.particles().iter().map(|&site| site as usize);
+    let rest: Vec<[f64; 2]> =
+        sites.clone().map(|site| [bonds.position(site)[0], bonds.position(site)[1]]).collect();
+    let moved = sites.map(|site| state.displacement.get(site));
+    let places = rest.iter().zip(moved).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect();
+    [rest, places]
+}
+
+/// Profiles (Fig. 2.7), convergence (Fig. 2.8), error against run time.
+pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+    let (Some(exact), Some(stress)) = (&scene.exact, &scene.stress) else { return Ok(()) };
+    let (radius, is_plate) = (exact.hole().0, matches!(exact, ExactSpec::PlateWithHole { .. }));
+    let kind = if is_plate { "rmse_inner" } else { "rmse" };
+    let error_axis = if is_plate {
+        "RMSE of σ₁₁/σ∞, loaded layers left out"
+    } else {
+        "RMSE of σ₁₁/σ∞ (2.84)"
+    };
+    profiles(scene, outcomes, stress.measures[0].name(), radius, output)?;
+    let families = families(outcomes);
+    if families.is_empty() {
+        return Ok(());
+    }
+    let mut cost = LinePlot::new("Error against run time").log_x().log_y().size(1000.0, 560.0);
+    cost = cost.axes("build + solve + stress (s)", error_axis);
+    let mut rows: Vec<Vec<f64>> = vec![Vec::new(); 5];
+    for (index, measure) in stress.measures.iter().enumerate().filter(|(_, m)| **m != Measure::AsPublished) {
+        let name = measure.name();
+        let mut convergence = LinePlot::new(&format!("Stress error of the plate with a hole, {name}"));
+        convergence = convergence.log_x().log_y().size(900.0, 500.0);
+        convergence = convergence.axes("spacing Δx (mm)", error_axis);
+        for (family, members) in &families {
+            let error: Vec<f64> = members.iter().filter_map(|o| o.get(&format!("{name}_{kind}"))).collect();
+            let spacing: Vec<f64> = members.iter().map(|o| o.spacing * 1e3).collect();
+            let seconds: Vec<f64> = members.iter().map(|o| run_time(o, name)).collect();
+            for (row, outcome) in members.iter().enumerate() {
+                let values = [spacing[row], outcome.horizon_ratio, index as f64, seconds[row], error[row]];
+                for (column, value) in rows.iter_mut().zip(values) {
+                    column.push(value);
+                }
+            }
+            convergence = convergence.series(Series::marked_line(family, &spacing, &error));
+            cost = cost.series(Series::marked_line(&format!("{name} {family}"), &seconds, &error));
+        }
+        convergence.write(output.join(format!("convergence_{name}.png")))?;
+    }
+    cost.write(output.join("error_against_time.png"))?;
+    let names = [("spacing", "mm"), ("horizon_ratio", ""), ("measure", ""), ("run_time", "s"), (kind, "")];
+    let columns: Vec<_> =
+        names.iter().zip(&rows).map(|((name, unit), data)| (*name, *unit, data.as_slice())).collect();
+    csv::write(output.join("convergence.csv"), &columns)
+}
+
+fn profiles(
+    scene: &Scene,
+    outcomes: &[Outcome],
+    measure: &str,
+    radius: f64,
+    output: &Path,
+) -> Result<(), Error> {
+    let far = 5.0 * radius;
+    let line: Vec<f64> = (0..=400).map(|k| radius + (far - radius) * f64::from(k) / 400.0).collect();
+    let exact: Vec<f64> = line.iter().map(|&y| exact::kirsch(0.0, y, radius, 1.0)[0]).collect();
+    let over_radius = |at: &[f64]| -> Vec<f64> { at.iter().map(|y| y / radius).collect() };
+    let mut plot = LinePlot::new("Stress above the hole, θ = π/2")
+        .axes("y/a", "σ₁₁/σ∞")
+        .x_range(1.0, 5.0)
+        .legend(LegendPlace::TopRight);
+    if let Some(width) = plate_width(scene) {
+        let peak = exact::heywood_gross(2.0 * radius / width);
+        plot = plot.series(Series::markers(&format!("long strip, Heywood: {peak:.3}"), &[1.0], &[peak]));
+    }
+    let first = outcomes.first().map(|o| o.family.clone());
+    for outcome in outcomes.iter().filter(|o| Some(&o.family) == first.as_ref()) {
+        if let Some(profile) = outcome.profiles.iter().find(|p| p.name == measure) {
+            let keep = profile.at.iter().filter(|&&y| y <= far).count();
+            let label = format!("{measure}, {}", outcome.name);
+            plot =
+                plot.series(Series::line(&label, &over_radius(&profile.at[..keep]), &profile.value[..keep]));
+        }
+        for profile in &outcome.profiles {
+            let path = output.join(format!("profile_{}_{}.csv", profile.name, outcome.file_name()));
+            csv::write(path, &[("y", "m", &profile.at), ("stress_ratio", "", &profile.value)])?;
+        }
+    }
+    let kirsch = ("Kirsch, infinite plate", over_radius(&line), exact);
+    let finest = outcomes.iter().rfind(|o| Some(&o.family) == first.as_ref());
+    plot = match finest.and_then(|o| o.profiles.iter().find(|p| p.name == "exact")) {
+        Some(profile) => {
+            let keep = profile.at.iter().filter(|&&y| y <= far).count();
+            let (at, value) = (over_radius(&profile.at[..keep]), &profile.value[..keep]);
+            let plot = plot.series(Series::line(kirsch.0, &kirsch.1, &kirsch.2));
+            plot.series(Series::reference("this plate, series", &at, value))
+        }
+        None => plot.series(Series::reference(kirsch.0, &kirsch.1, &kirsch.2)),
+    };
+    plot.write(output.join("profile.png"))
+}

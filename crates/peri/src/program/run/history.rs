@@ -1,0 +1,425 @@
+//! The history of loading: values, tables and curves of load against displacement and of energies.
+
+use super::envelope::envelope;
+use super::outcome::Outcome;
+use crate::program::quantities as q;
+use crate::program::scene::{ContactSpec, Scene, of_plane};
+use crate::solver::{Balance, Event, Record};
+use harness::output::csv;
+use harness::output::picture::{LegendPlace, LinePlot, Series};
+use harness::report::{Report, Trial};
+use polycore::Error;
+use std::path::Path;
+
+/// More curves have their legend beside the picture.
+const LEGEND: usize = 8;
+
+/// A column: name, unit, values.
+type Column = (String, String, Vec<f64>);
+
+/// Part of the stored energy that contact may hold before a run warns, and the part that its advice is for.
+const SOFT: f64 = 0.02;
+const WANTED: f64 = 0.01;
+/// Stored energy over the work below which a body is at rest.
+const AT_REST: f64 = 1e-12;
+
+impl Outcome {
+    pub(super) fn is_dynamic(&self) -> bool {
+        self.history.iter().any(|r| r.time > 0.0)
+    }
+
+    /// Energy that damping has taken, J: in quasi-static runs all that is neither stored nor released.
+    fn damped(&self, record: &Record) -> f64 {
+        if self.is_dynamic() {
+            record.damped
+        } else {
+            record.work - record.stored - record.released - record.rubbed
+        }
+    }
+
+    /// The steps as columns.
+    pub fn columns(&self) -> Vec<Column> {
+        let each = |get: &dyn Fn(&Record) -> f64| self.history.iter().map(get).collect();
+        let mut columns: Vec<Column> = Vec::new();
+        columns.extend([
+            ("displacement".to_owned(), "m".to_owned(), each(&|r| r.displacement)),
+            ("load".to_owned(), "N".to_owned(), each(&|r| r.load)),
+        ]);
+        if self.is_dynamic() {
+            columns.push(("time".to_owned(), "s".to_owned(), each(&|r| r.time)));
+            columns.push(("kinetic".to_owned(), "J".to_owned(), each(&|r| r.kinetic)));
+        }
+        for (index, region) in self.regions.iter().enumerate() {
+            for (d, axis) in ["x", "y", "z"].iter().enumerate() {
+                let values: Vec<f64> =
+                    self.history.iter().filter_map(|r| Some(r.reactions.get(index)?[d])).collect();
+                if values.len() == self.history.len() && values.iter().any(|&v| v != 0.0) {
+                    columns.push((format!("reaction_{axis} {region}"), "N".to_owned(), values));
+                }
+            }
+        }
+        columns.extend([
+            ("out_of_balance".to_owned(), "".to_owned(), each(&|r| r.residual)),
+            ("iterations".to_owned(), "".to_owned(), each(&|r| r.iterations as f64)),
+            ("equilibria".to_owned(), "".to_owned(), each(&|r| r.rounds as f64)),
+            ("broken_bonds".to_owned(), "".to_owned(), each(&|r| r.broken as f64)),
+            ("detached_particles".to_owned(), "".to_owned(), each(&|r| r.detached as f64)),
+            ("largest_stretch".to_owned(), "".to_owned(), each(&|r| r.largest_stretch)),
+            ("work".to_owned(), "J".to_owned(), each(&|r| r.work)),
+            ("stored".to_owned(), "J".to_owned(), each(&|r| r.stored)),
+            ("released".to_owned(), "J".to_owned(), each(&|r| r.released)),
+            ("damped".to_owned(), "J".to_owned(), each(&|r| self.damped(r))),
+        ]);
+        if self.history.iter().any(|r| r.rubbed != 0.0) {
+            columns.push(("friction_work".to_owned(), "J".to_owned(), each(&|r| r.rubbed)));
+        }
+        for (index, plane) in self.planes.iter().enumerate() {
+            let resting = |r: &Record| r.resting.get(index).copied().unwrap_or_default();
+            for (d, axis) in ["x", "y", "z"].iter().enumerate() {
+                let values = each(&|r| resting(r).force[d]);
+                if values.iter().any(|&v| v != 0.0) {
+                    columns.push((format!("force_{axis} {plane}"), "N".to_owned(), values));
+                }
+            }
+            columns.push((format!("area {plane}"), "m²".to_owned(), each(&|r| resting(r).area)));
+            columns.push((format!("spread {plane}"), "m".to_owned(), each(&|r| resting(r).spread)));
+            columns.push((format!("width {plane}"), "m".to_owned(), each(&|r| resting(r).width)));
+        }
+        let touching: Vec<_> = self.history.iter().filter_map(|r| r.contact).collect();
+        if !touching.is_empty() {
+            columns.extend([
+                ("contact_energy".to_owned(), "J".to_owned(), touching.iter().map(|t| t.energy).collect()),
+                ("contacts".to_owned(), "".to_owned(), touching.iter().map(|t| t.pairs as f64).collect()),
+                ("overlap".to_owned(), "".to_owned(), touching.iter().map(|t| t.overlap).collect()),
+            ]);
+        }
+        for (index, (name, unit)) in self.probes.iter().enumerate() {
+            columns.push((
+                name.clone(),
+                unit.clone(),
+                each(&|r| r.seen.get(index).copied().unwrap_or(f64::NAN)),
+            ));
+        }
+        columns
+    }
+
+    /// Peak, first break, energies at the end.
+    pub fn values_of_history(&mut self, scene: &Scene) {
+        let Some(last) = self.history.last().cloned() else { return };
+        let peak = self.history.iter().max_by(|a, b| a.load.total_cmp(&b.load)).cloned();
+        if let Some(peak) = peak.filter(|_| self.history.len() > 1) {
+            self.value(q::PEAK_LOAD, peak.load);
+            self.value(q::DISPLACEMENT_AT_PEAK, peak.displacement);
+        }
+        for at in &scene.output.load_at {
+            if let Some(load) = self.load_at(at.si()) {
+                self.value(q::load_at(at.si()), load);
+            }
+        }
+        if scene.material.critical.is_some() {
+            if let Some(first) = self.history.iter().position(|r| r.broken > 0) {
+                self.value(q::FIRST_BREAK, self.history[first].displacement);
+                // that at the end of the step may be past the collapse
+                let before = first.checked_sub(1).map_or(0.0, |s| self.history[s].load);
+                self.value(q::LOAD_AT_FIRST_BREAK, before);
+                if let Some(event) = self.events.first().filter(|_| !self.is_dynamic()) {
+                    self.value(q::LOAD_OF_FIRST_EVENT, event.load);
+                }
+            }
+            self.value(q::BROKEN_BONDS, last.broken as f64);
+            if !self.is_dynamic() {
+                self.value(q::BREAKING_EVENTS, self.events.len() as f64);
+            }
+            self.value(q::DETACHED_PARTICLES, last.detached as f64);
+            self.value(q::LAST_LOAD, last.load);
+            self.value(q::LAST_DISPLACEMENT, last.displacement);
+        }
+        self.value(q::WORK_OF_LOADS, last.work);
+        self.value(q::STORED_ENERGY, last.stored);
+        if scene.material.critical.is_some() {
+            self.value(q::RELEASED_ENERGY, last.released);
+        }
+        self.value(q::DAMPED_ENERGY, self.damped(&last));
+        if self.is_dynamic() {
+            // largest difference of what came in and what is there, over what was turned over
+            let off = |r: &Record| (r.work - r.stored - r.released - r.damped - r.rubbed - r.kinetic).abs();
+            let most =
+                self.history.iter().map(|r| r.work.abs().max(r.kinetic)).fold(f64::MIN_POSITIVE, f64::max);
+            let error = self.history.iter().map(off).fold(0.0, f64::max) / most;
+            self.value(q::ENERGY_ERROR, error);
+        }
+        if !self.is_dynamic() {
+            let most =
+                |get: fn(&Balance) -> f64| self.history.iter().map(|r| get(&r.balance)).fold(0.0, f64::max);
+            let size = most(|b| b.size).max(f64::MIN_POSITIVE);
+            let (force, external) = (most(|b| b.force) / size, most(|b| b.external) / size);
+            let moment = most(|b| b.moment / b.arm.max(f64::MIN_POSITIVE)) / size;
+            for (quantity, value) in q::BALANCES.into_iter().zip([force, moment, external]) {
+                self.value(quantity, value);
+            }
+        }
+        let residual = self.history.iter().map(|r| r.residual).fold(0.0, f64::max);
+        self.value(q::LARGEST_RESIDUAL, residual);
+    }
+
+    /// Contact and friction at the end, the planes that the body rests on, and warnings where contact is soft or never begins.
+    pub fn values_of_contact<const D: usize>(&mut self, scene: &Scene) {
+        let Some(last) = self.history.last().cloned() else { return };
+        let Some(contact) = &scene.contact else { return };
+        let explicit = self.is_dynamic();
+        let of_plane_or_pairs = contact.plane.first().map(|plane| contact.stiffness_of(plane, explicit));
+        let stiffness = of_plane_or_pairs.or(contact.short_range).unwrap_or(contact.pair_stiffness());
+        self.value(q::CONTACT_STIFFNESS, stiffness);
+        if let Some(touching) = last.contact {
+            self.value(q::CONTACT_ENERGY, touching.energy);
+            self.value(q::CONTACTS, touching.pairs as f64);
+            let deepest = self.history.iter().filter_map(|r| Some(r.contact?.overlap)).fold(0.0, f64::max);
+            self.value(q::DEEPEST_OVERLAP, deepest);
+            let at_rest = last.stored <= AT_REST * last.work.abs();
+            let share = if at_rest || last.stored <= 0.0 { 0.0 } else { touching.energy / last.stored };
+            self.value(q::CONTACT_SHARE, share);
+            if share > SOFT && !explicit && contact.short_range.is_none() {
+                self.warnings.push(format!(
+                    "contact holds {:.1} % of the stored energy, and the load is about as much too low: raise `stiffness` from {stiffness} to {:.0}",
+                    100.0 * share,
+                    stiffness * share / WANTED
+                ));
+            }
+            if deepest > 0.5 && contact.short_range.is_none() {
+                self.warnings.push(format!(
+                    "a contact overlaps by {deepest:.2} of half a spacing: raise `contact.stiffness`, or take a finer spacing"
+                ));
+            }
+        }
+        for (plane, name) in contact.plane.iter().zip(self.planes.clone()).filter(|(plane, _)| !plane.bonded)
+        {
+            let index = self.planes.iter().position(|other| *other == name).unwrap_or(0);
+            let gaps =
+                self.history.iter().filter_map(|row| row.resting.get(index)).map(|resting| resting.gap);
+            let least = gaps.fold(f64::INFINITY, f64::min);
+            let wanted = plane.displacement.is_some() || plane.friction.is_some_and(|mu| mu > 0.0);
+            if least > 0.0 && wanted {
+                self.warnings
+                    .push(format!("nothing has touched plane `{name}`: the least gap was {least:.3e} m"));
+            }
+        }
+        if scene.contact.as_ref().is_some_and(ContactSpec::rubs) {
+            self.value(q::FRICTION_WORK, last.rubbed);
+        }
+        for (name, resting) in self.planes.clone().iter().zip(&last.resting) {
+            let values =
+                resting.force[..D].iter().copied().chain([resting.area, resting.spread, resting.width]);
+            of_plane(name, D).into_iter().zip(values).for_each(|(named, value)| self.value(named, value));
+        }
+    }
+
+    /// By how much of it the load rises to its peak, or falls from it, in one step.
+    pub(super) fn step_at_peak(&self) -> Option<f64> {
+        let loads: Vec<f64> = std::iter::once(0.0).chain(self.history.iter().map(|r| r.load)).collect();
+        let (at, &peak) = loads.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+        (at > 0 && peak > 0.0).then(|| (peak - loads[at - 1]).abs() / peak)
+    }
+
+    /// See [`envelope`], from the undeformed body on.
+    fn envelope(&self) -> [Vec<f64>; 2] {
+        let rows = self.history.iter().map(|r| [r.displacement, r.load]);
+        envelope(&std::iter::once([0.0; 2]).chain(rows).collect::<Vec<_>>())
+    }
+
+    /// Load at a displacement between two steps, linearly; from the undeformed body on.
+    fn load_at(&self, displacement: f64) -> Option<f64> {
+        let mut before = (0.0, 0.0);
+        for record in &self.history {
+            let here = (record.displacement, record.load);
+            if here.0 >= displacement * (1.0 - 1e-12) {
+                let part = (displacement - before.0) / (here.0 - before.0);
+                return Some(before.1 + part.min(1.0) * (here.1 - before.1));
+            }
+            before = here;
+        }
+        None
+    }
+}
+
+/// Peaks as far as load steps resolve them, a line for each variant with several steps.
+pub fn peak_lines(outcomes: &[Outcome]) -> String {
+    let line = |outcome: &Outcome| {
+        let peak = (0..outcome.history.len())
+            .max_by(|&a, &b| outcome.history[a].load.total_cmp(&outcome.history[b].load))?;
+        let (at, name) = (outcome.history[peak].displacement, &outcome.name);
+        let load = outcome.history[peak].load;
+        let near = [peak.checked_sub(1), Some(peak + 1)];
+        let near: Vec<&Record> = near.into_iter().filter_map(|row| outcome.history.get(row?)).collect();
+        let gap = |r: &&Record| [(r.displacement - at).abs(), (r.load - load).abs()];
+        let gaps: Vec<[f64; 2]> = near.iter().map(gap).collect();
+        let broken = outcome.history[peak].broken;
+        let [apart, least] = match (&near[..], &gaps[..]) {
+            // nothing breaks before the peak and something after: it lies between the two
+            ([before, after], [[back, rise], [ahead, _]])
+                if before.broken == broken && after.broken > broken =>
+            {
+                [*ahead, rise * ahead / back]
+            }
+            _ => gaps.iter().fold([0.0_f64, f64::INFINITY], |[a, l], gap| [a.max(gap[0]), l.min(gap[1])]),
+        };
+        (apart > 0.0 && load > 0.0 && !outcome.is_dynamic()).then(|| {
+            let (at, apart) = (at * 1e3, apart * 1e3);
+            // where the load was lowered behind the peak, the step in which bonds broke is no row
+            let lowered =
+                outcome.history.get(peak + 1).is_some_and(|r| r.factor < outcome.history[peak].factor);
+            let within = match lowered {
+                true => String::new(),
+                false => format!(", ± one load step: {apart:.3} mm, {least:.3} N"),
+            };
+            format!("{name}: peak {load:.5} N at {at:.5} mm{within}\n")
+        })
+    };
+    outcomes.iter().filter_map(line).collect()
+}
+
+/// How much the peak load still changes between the two finest spacings of each family, over the finest.
+pub fn peak_changes(outcomes: &[Outcome]) -> Vec<(String, f64)> {
+    let change = |(family, members): (String, Vec<&Outcome>)| {
+        let mut finest = members.iter().rev().map(|o| o.get("peak_load"));
+        let (last, before) = (finest.next()??, finest.next()??);
+        (last != 0.0).then(|| (family, ((last - before) / last).abs()))
+    };
+    super::outcome::families(outcomes).into_iter().filter_map(change).collect()
+}
+
+/// Peak load over spacing, where variants differ in it.
+fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+    let mut plot = LinePlot::new("Peak load").size(900.0, 560.0).axes("spacing Δx (mm)", "peak load (N)");
+    let mut any = false;
+    for (family, members) in super::outcome::families(outcomes) {
+        let peaks: Vec<f64> = members.iter().filter_map(|o| o.get("peak_load")).collect();
+        if peaks.len() == members.len() {
+            let spacing: Vec<f64> = members.iter().map(|o| o.spacing * 1e3).collect();
+            plot = plot.series(Series::marked_line(&family, &spacing, &peaks));
+            any = true;
+        }
+    }
+    if any { plot.write(output.join("peak_load.png")) } else { Ok(()) }
+}
+
+/// The table of a suite, also as trials of the report: each variant, its expected and observed behaviour, and its cost.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn suite(report: &mut Report, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+    use std::fmt::Write;
+    if outcomes.iter().all(|o| o.description.is_none()) {
+        return Ok(());
+    }
+    let mut text =
+        String::from("| case | expected | observed | iterations | seconds |\n|---|---|---|---|---|\n");
+    for outcome in outcomes {
+        let work = |name: &str| outcome.work.iter().find(|w| w.0 == name).map_or(0, |w| w.1);
+        let (held, failed) = report.verdict_on(|name| name.ends_with(&format!("[{}]", outcome.name)));
+        let observed = match (&outcome.error, failed.is_empty()) {
+            (Some(error), _) => format!("refused: {}", error.lines().next().unwrap_or_default()),
+            (None, true) => format!(
+                "stretches {:.3} to {:.3}, residual {:.1e}, {} bonds broken; {held} expectations satisfied",
+                outcome.get("smallest_stretch").unwrap_or(f64::NAN),
+                outcome.get("largest_stretch").unwrap_or(f64::NAN),
+                outcome.get("largest_residual").unwrap_or(f64::NAN),
+                outcome.history.last().map_or(0, |r| r.broken),
+            ),
+            (None, false) => format!("missed: {}", failed.join(", ")),
+        };
+        let description = outcome.description.clone().unwrap_or_default();
+        let _ = writeln!(
+            text,
+            "| {} | {description} | {observed} | {} | {:.2} |",
+            outcome.name,
+            work("iterations"),
+            outcome.seconds_of("solve")
+        );
+        if outcome.description.is_some() {
+            let (what, iterations) = (outcome.name.clone(), Some(work("iterations")));
+            report.trials.push(Trial { what, description, observed, iterations, passed: failed.is_empty() });
+        }
+    }
+    polycore::file::atomic_write(output.join("suite.md"), |file| {
+        std::io::Write::write_all(file, text.as_bytes())
+    })
+}
+
+/// Tables of every variant, one plot of all loads, and a plot of energies for each variant whose bonds break.
+pub fn write(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
+    let several: Vec<&Outcome> = outcomes.iter().filter(|o| o.history.len() > 1).collect();
+    for outcome in &several {
+        let columns = outcome.columns();
+        let views: Vec<_> = columns.iter().map(|(n, u, v)| (n.as_str(), u.as_str(), v.as_slice())).collect();
+        csv::write(output.join(format!("history_{}.csv", outcome.file_name())), &views)?;
+    }
+    for outcome in several.iter().filter(|outcome| outcome.snaps_back) {
+        let [at, load] = outcome.envelope();
+        let columns = [("displacement", "m", &at[..]), ("load", "N", &load)];
+        csv::write(output.join(format!("envelope_{}.csv", outcome.file_name())), &columns)?;
+    }
+    for outcome in outcomes.iter().filter(|outcome| !outcome.events.is_empty()) {
+        let each = |get: &dyn Fn(&Event) -> f64| outcome.events.iter().map(get).collect::<Vec<f64>>();
+        let (step, load) = (each(&|e| e.step as f64 + 1.0), each(&|e| e.load));
+        let bonds = each(&|e| e.bonds as f64);
+        let columns = [("step", "", &step[..]), ("load_before", "N", &load), ("bonds", "", &bonds)];
+        csv::write(output.join(format!("events_{}.csv", outcome.file_name())), &columns)?;
+    }
+    for outcome in outcomes.iter().filter(|outcome| outcome.fragments.len() > 1) {
+        let particles: Vec<f64> = outcome.fragments.iter().map(|own| own.particles as f64).collect();
+        let volume: Vec<f64> = outcome.fragments.iter().map(|own| own.volume).collect();
+        let density = scene.dynamics.as_ref().map(|dynamics| dynamics.density.si());
+        let mass: Option<Vec<f64>> = density.map(|density| volume.iter().map(|v| density * v).collect());
+        let mut columns = vec![("particles", "", &particles[..]), ("volume", "m^3", &volume)];
+        columns.extend(mass.iter().map(|mass| ("mass", "kg", &mass[..])));
+        csv::write(output.join(format!("fragments_{}.csv", outcome.file_name())), &columns)?;
+    }
+    if several.is_empty() || !scene.output.pictures {
+        return Ok(());
+    }
+    let mut plot = LinePlot::new(if scene.title.is_empty() { "Load" } else { &scene.title })
+        .size(900.0, 560.0)
+        .axes("displacement (mm)", "load (N)")
+        .legend(if several.len() > LEGEND { LegendPlace::Outside } else { LegendPlace::TopLeft });
+    let from_rest = |values: &[f64], scale: f64| -> Vec<f64> {
+        std::iter::once(0.0).chain(values.iter().map(|v| v * scale)).collect()
+    };
+    // a body in free flight has neither
+    let loaded: Vec<&&Outcome> =
+        several.iter().filter(|o| o.history.iter().any(|r| r.load != 0.0 || r.displacement != 0.0)).collect();
+    for outcome in &loaded {
+        let columns = outcome.columns();
+        let (x, y) = (from_rest(&columns[0].2, 1e3), from_rest(&columns[1].2, 1.0));
+        plot = plot.series(Series::line(&outcome.name, &x, &y));
+        if outcome.snaps_back {
+            let [at, load] = outcome.envelope();
+            let at: Vec<f64> = at.iter().map(|u| u * 1e3).collect();
+            plot = plot.series(Series::reference(&format!("{}, envelope", outcome.name), &at, &load));
+        }
+    }
+    if !loaded.is_empty() {
+        plot.write(output.join("load_displacement.png"))?;
+    }
+    peaks(outcomes, output)?;
+    for outcome in several.iter().filter(|o| o.history.iter().any(|r| r.broken > 0)) {
+        let columns = outcome.columns();
+        // a body in motion does not stop where its loads do
+        let time = columns.iter().find(|c| c.0 == "time");
+        let (label, x) = match time {
+            Some(time) => ("time (ms)", from_rest(&time.2, 1e3)),
+            None => ("displacement (mm)", from_rest(&columns[0].2, 1e3)),
+        };
+        let mut plot = LinePlot::new(&format!("Energies, {}", outcome.name))
+            .size(900.0, 560.0)
+            .axes(label, "energy (J)")
+            .legend(LegendPlace::TopLeft);
+        // stored is with that of contact
+        for name in ["work", "stored", "contact_energy", "kinetic", "released", "damped", "friction_work"] {
+            if let Some(column) = columns.iter().find(|c| c.0 == name) {
+                plot = plot.series(Series::line(name, &x, &from_rest(&column.2, 1.0)));
+            }
+        }
+        plot.write(output.join(format!("energy_{}.png", outcome.file_name())))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,174 @@
+//! Results of one variant.
+
+use crate::bonds::{Bonds, Fragment};
+use crate::program::quantities as q;
+use crate::program::scene::Variant;
+use crate::solver::{Event, Loads, Record, State};
+use harness::report::{Named, Phases};
+use serde::{Deserialize, Serialize};
+
+/// Everything of a variant that outlives its fields.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Outcome {
+    /// The variant's name.
+    pub name: String,
+    /// Spacing, m.
+    pub spacing: f64,
+    /// Horizon over spacing.
+    pub horizon_ratio: f64,
+    /// Name of the variant without its spacing: variants that differ in nothing else converge together.
+    pub family: String,
+    /// Named scalars with units.
+    pub values: Vec<(String, f64, String)>,
+    /// Named profiles.
+    pub profiles: Vec<Profile>,
+    /// The load steps.
+    pub history: Vec<Record>,
+    /// Bonds that broke together, in their order.
+    pub events: Vec<Event>,
+    /// The fragments, the largest first.
+    pub fragments: Vec<Fragment>,
+    /// Whether the load was lowered where bonds broke, see `solver.snap_back`.
+    pub snaps_back: bool,
+    /// Names of the regions of prescribed displacement.
+    pub regions: Vec<String>,
+    /// Names of rigid planes.
+    pub planes: Vec<String>,
+    /// Columns of what the probes saw, with their units.
+    pub probes: Vec<(String, String)>,
+    /// What is allowed and most likely not meant.
+    pub warnings: Vec<String>,
+    /// Expected behaviour, where the scene says so.
+    pub description: Option<String>,
+    /// The error with which it ended, where the scene expects one.
+    pub error: Option<String>,
+    /// Work done.
+    pub work: Vec<(String, u64)>,
+    /// Seconds by phase.
+    pub seconds: Vec<(String, f64)>,
+}
+
+/// A curve along a line: abscissa in m, value relative to its reference.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Profile {
+    /// What.
+    pub name: String,
+    /// Where, m.
+    pub at: Vec<f64>,
+    /// How much.
+    pub value: Vec<f64>,
+}
+
+impl Outcome {
+    /// Nothing yet.
+    pub fn new(name: String, variant: &Variant) -> Self {
+        Self {
+            name,
+            spacing: variant.spacing,
+            horizon_ratio: variant.horizon_ratio,
+            family: variant.family(),
+            values: Vec::new(),
+            profiles: Vec::new(),
+            history: Vec::new(),
+            events: Vec::new(),
+            fragments: Vec::new(),
+            snaps_back: false,
+            regions: Vec::new(),
+            planes: Vec::new(),
+            probes: Vec::new(),
+            warnings: Vec::new(),
+            description: None,
+            error: None,
+            work: Vec::new(),
+            seconds: Vec::new(),
+        }
+    }
+
+    /// Name for files: no spaces, no signs that shells know.
+    pub fn file_name(&self) -> String {
+        self.name.replace(' ', "_").replace('=', "-")
+    }
+
+    /// Adds a scalar.
+    pub fn value(&mut self, quantity: impl Into<Named>, value: f64) {
+        let Named { name, unit } = quantity.into();
+        self.values.push((name, value, unit));
+    }
+
+    /// A scalar by name.
+    pub fn get(&self, name: &str) -> Option<f64> {
+        self.values.iter().find(|(n, _, _)| n == name).map(|v| v.1)
+    }
+
+    /// Counts of the solution.
+    pub fn work_of<const D: usize>(&mut self, bonds: &dyn Bonds<D>, state: &State<D>) {
+        let directed = bonds.directed_bonds();
+        for (name, count) in [
+            ("particles", bonds.particles().len() as u64),
+            ("directed_bonds", directed),
+            ("steps", state.step as u64),
+            ("iterations", state.total_iterations),
+            ("unconverged_searches", state.unconverged),
+            ("force_evaluations", state.evaluations),
+            ("bond_evaluations", state.bond_evaluations),
+            ("bytes_bonds", bonds.bytes() as u64),
+        ] {
+            self.work.push((name.to_owned(), count));
+        }
+        if state.motion.bounds > 0 {
+            self.work.push(("frequency_bounds".to_owned(), state.motion.bounds));
+            self.work.push(("frequency_searches".to_owned(), state.motion.searches));
+        }
+        let rows = || state.history.iter();
+        self.value(q::SMALLEST_STRETCH, rows().map(|row| row.smallest_stretch).fold(1.0, f64::min));
+        self.value(q::LARGEST_STRETCH, rows().map(|row| row.largest_stretch).fold(1.0, f64::max));
+        self.value(q::SMALLEST_STRETCH_MET, (1.0 + state.observed.low).max(0.0).sqrt());
+        self.value(q::LARGEST_STRETCH_MET, (1.0 + state.observed.high).sqrt());
+    }
+
+    /// Largest displacement, force of the held regions, applied force.
+    pub fn responses<const D: usize>(&mut self, bonds: &dyn Bonds<D>, loads: &Loads<D>, state: &State<D>) {
+        let mut largest = 0.0_f64;
+        for &site in bonds.particles() {
+            let displacement = state.displacement.get(site as usize);
+            largest = largest.max(displacement.iter().map(|x| x * x).sum::<f64>().sqrt());
+        }
+        let (reaction, applied) = (loads.reaction(bonds, &state.force), loads.applied(bonds));
+        self.value(q::LARGEST_DISPLACEMENT, largest);
+        for d in 0..D {
+            let axis = ["x", "y", "z"][d];
+            if !loads.constrained.is_empty() {
+                self.value(q::REACTION.of(&[axis]), reaction[d]);
+            }
+            if loads.body_force.is_some() {
+                self.value(q::APPLIED.of(&[axis]), applied[d]);
+            }
+        }
+    }
+
+    /// Seconds of all phases.
+    pub fn seconds(&mut self, phases: &Phases) {
+        self.seconds = phases.seconds().map(|(name, seconds)| (name.to_owned(), seconds)).collect();
+    }
+
+    /// Seconds of a phase.
+    pub fn seconds_of(&self, phase: &str) -> f64 {
+        self.seconds.iter().filter(|(name, _)| name == phase).map(|s| s.1).fold(0.0, |sum, s| sum + s)
+    }
+}
+
+/// Families of variants that differ in spacing only, coarse to fine, at least two in each.
+pub fn families(outcomes: &[Outcome]) -> Vec<(String, Vec<&Outcome>)> {
+    let mut families: Vec<(String, Vec<&Outcome>)> = Vec::new();
+    for outcome in outcomes {
+        match families.iter_mut().find(|(name, _)| *name == outcome.family) {
+            Some((_, members)) => members.push(outcome),
+            None => families.push((outcome.family.clone(), vec![outcome])),
+        }
+    }
+    for (_, members) in &mut families {
+        members.sort_by(|a, b| b.spacing.total_cmp(&a.spacing));
+    }
+    families.retain(|(_, members)| members.len() > 1);
+    families
+}

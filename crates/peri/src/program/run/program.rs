@@ -1,0 +1,65 @@
+//! `peri` as a program of the harness.
+
+use super::{explanation, run};
+use crate::error::Error;
+use crate::program::scene::{self, Scene};
+use harness::case::{Case, Fault, Finished, Program, Run};
+use harness::scene::{Failure, Source};
+
+/// Bond-based peridynamics of elastomers.
+pub struct Peri;
+
+impl Case for Peri {
+    const PROGRAM: Program = Program {
+        name: "peri",
+        version: env!("CARGO_PKG_VERSION"),
+        about: "Bond-based peridynamics of elastomers",
+        examples: "  peri check cases/ch2/dent/case.toml               what it builds and leaves out
+  peri run cases/ch2/dent/case.toml --quick         solve, draw, judge; results in out/dent
+  peri resume out/dent                              continue an interrupted run
+  peri sweep SCENE --vary material.fracture_energy=50J/m^2,100J/m^2
+  peri exact law --law chain-affine --links 720 --dissociation 1200
+  peri schema > peri.schema.json                    for editors",
+        magic: b"peri-c11",
+        columns: &[
+            "peak_load*",
+            "displacement_at_peak*",
+            "first_break*",
+            "stored_energy*",
+            "largest_displacement*",
+        ],
+    };
+    type Error = Error;
+
+    fn explain(source: &Source, quick: bool) -> Result<Vec<String>, Failure<Error>> {
+        explanation(source, &source.parse::<Scene>()?, quick)
+    }
+
+    fn solve(source: &Source, own: &mut Run) -> Result<Finished, Failure<Error>> {
+        let finished = run(source, &source.parse::<Scene>()?, own)?;
+        Ok(Finished { text: finished.summary(), report: finished.report })
+    }
+
+    fn bulky(_: &Source) -> &'static [&'static str] {
+        &["output.pictures", "output.fields"]
+    }
+
+    fn schema() -> serde_json::Value {
+        scene::schema()
+    }
+}
+
+impl Fault for Error {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Geometry(_) | Self::Parameter { .. } | Self::TimeStep { .. } => 2,
+            Self::NoEquilibrium { torn, .. } => 2 - u8::from(*torn),
+            Self::NotFinite { .. }
+            | Self::NotConverged { .. }
+            | Self::Unstable { .. }
+            | Self::Penetration { .. } => 1,
+            Self::Within { error, .. } => error.exit_code(),
+            Self::Shared(error) => error.exit_code(),
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! Pictures of solids as they look from outside.
+
+use super::frames::{Stresses, in_space, tensor_in_space};
+use super::outcome::Outcome;
+use super::scale::{self, bridge, stress_unit};
+
+use crate::bonds::Bonds;
+use crate::error::Error;
+use crate::program::scene::{Scene, StressSpec};
+use crate::solver::State;
+use harness::output::picture::{ColorMap, Particles, Skin, Solids, Strip};
+use nalgebra::Matrix3;
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Pictures of a full turn, and how long each is shown, s.
+const TURN: usize = 36;
+const SHOWN: f64 = 0.12;
+/// A box that holds nothing yet.
+pub const NOWHERE: [[f64; 3]; 2] = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+
+/// A body at a moment: where its particles are, where they were at rest, and the values of one or two fields.
+#[derive(Clone)]
+pub struct Look {
+    pub title: String,
+    pub places: Vec<[f64; 3]>,
+    pub rest: Vec<[f64; 3]>,
+    pub values: [Vec<f64>; 2],
+}
+
+/// A field in a picture: what its values are multiplied with, and its colours.
+pub struct Field {
+    pub scale: f64,
+    pub strip: Strip,
+}
+
+/// A variant in pictures.
+pub struct Picture<'a> {
+    pub scene: &'a Scene,
+    pub outcome: &'a Outcome,
+    pub spacing: f64,
+    /// Around all places.
+    pub bounds: [[f64; 3]; 2],
+}
+
+/// Takes places into a box.
+pub fn widen(bounds: &mut [[f64; 3]; 2], places: &[[f64; 3]]) {
+    for place in places {
+        for d in 0..3 {
+            bounds[0][d] = bounds[0][d].min(place[d]);
+            bounds[1][d] = bounds[1][d].max(place[d]);
+        }
+    }
+}
+
+/// The component of a row-major 3 × 3 that the scene names, or the largest principal stress, of a plane tensor in its plane.
+pub fn shown(spec: &StressSpec, flat: bool, t: &[f64]) -> f64 {
+    if let Some([a, b]) = spec.component() {
+        return t[3 * a + b];
+    }
+    if flat {
+        let (mean, half) = (0.5 * (t[0] + t[4]), 0.5 * (t[0] - t[4]));
+        return mean + half.hypot(0.5 * (t[1] + t[3]));
+    }
+    // its iteration would not end
+    if t.iter().any(|x| !x.is_finite()) {
+        return f64::NAN;
+    }
+    let tensor = Matrix3::from_row_slice(t);
+    (0.5 * (tensor + tensor.transpose())).symmetric_eigenvalues().max()
+}
+
+/// Stresses that the scene names, with a range that holds these values but the very extremes: a crushed particle's Cauchy
+/// stress would take all the colours.
+pub fn stress_field(spec: &StressSpec, mut values: Vec<f64>) -> Field {
+    values.retain(|value| !value.is_nan());
+    values.sort_by(f64::total_cmp);
+    let part =
+        |share: f64| values.get((share * (values.len().max(1) - 1) as f64) as usize).copied().unwrap_or(0.0);
+    let (low, high) = (part(0.002).min(0.0), part(0.998).max(0.0));
+    let (scale, unit) = stress_unit(high.max(-low));
+    let index: String = match (&spec.component, spec.component()) {
+        (Some(name), Some(_)) => {
+            name.chars().filter_map(|c| "₀₁₂₃".chars().nth(c.to_digit(10)? as usize)).collect()
+        }
+        _ => "₁".to_owned(),
+    };
+    field(format!("σ{index} ({unit})"), scale, (low, high))
+}
+
+/// Broken bonds over those there were.
+pub fn damage_field() -> Field {
+    field("damage".to_owned(), 1.0, (0.0, 0.6))
+}
+
+/// Where a learnt law is uncertain: 1, elsewhere 0.
+pub fn flagged_field() -> Field {
+    field("flagged".to_owned(), 1.0, (0.0, 1.0))
+}
+
+fn field(label: String, scale: f64, (low, high): (f64, f64)) -> Field {
+    let range = (low * scale, high * scale);
+    let range = if range.0 < range.1 && (range.1 - range.0).is_finite() { range } else { (0.0, 1.0) };
+    Field { scale, strip: Strip { label, range, colors: ColorMap::Viridis } }
+}
+
+/// The end of a run without stages: stress, or the length of the displacement, and a second field.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn end<const D: usize>(
+    scene: &Scene,
+    bonds: &dyn Bonds<D>,
+    state: &State<D>,
+    stresses: &Stresses<D>,
+    second: Option<(Field, Vec<f64>)>,
+    outcome: &Outcome,
+    output: &Path,
+) -> Result<(), Error> {
+    let sites = || bonds.particles().iter().map(|&site| site as usize);
+    let rest: Vec<[f64; 3]> = sites().map(|site| in_space(bonds.position(site))).collect();
+    let moved = || sites().map(|site| in_space(state.displacement.get(site)));
+    let places: Vec<[f64; 3]> =
+        rest.iter().zip(moved()).map(|(x, u)| [0, 1, 2].map(|d| x[d] + u[d])).collect();
+    let (first, values) = match (&scene.stress, stresses.cauchy.first()) {
+        (Some(spec), Some((_, tensors))) => {
+            let values: Vec<f64> = tensors.iter().map(|t| shown(spec, false, &tensor_in_space(t))).collect();
+            (stress_field(spec, values.clone()), values)
+        }
+        _ => {
+            let values: Vec<f64> = moved().map(|u| u.iter().map(|u| u * u).sum::<f64>().sqrt()).collect();
+            let largest = values.iter().fold(0.0_f64, |most, u| most.max(*u));
+            (field("|u| (mm)".to_owned(), 1e3, (0.0, largest)), values)
+        }
+    };
+    let (second, others) = second.filter(|(_, values)| values.iter().any(|&value| value > 0.0)).unzip();
+    let fields = std::iter::once(first).chain(second).collect();
+    let mut bounds = NOWHERE;
+    let title = scale::title(outcome, outcome.history.len() as f64);
+    widen(&mut bounds, &places);
+    let look = Look { title, places, rest, values: [values, others.unwrap_or_default()] };
+    let picture = Picture { scene, outcome, spacing: bonds.spacing(), bounds };
+    picture.draw(output, fields, 1, |_| Ok(Cow::Borrowed(&look)))
+}
+
+impl Picture<'_> {
+    /// Writes the stages beside one another, and the last in a full turn where the scene wants one.
+    ///
+    /// # Errors
+    /// A file that cannot be written; those of `look`.
+    pub fn draw<'l>(
+        &self,
+        output: &Path,
+        fields: Vec<Field>,
+        stages: usize,
+        mut look: impl FnMut(usize) -> Result<Cow<'l, Look>, polycore::Error>,
+    ) -> Result<(), Error> {
+        let spec = self.scene.output.solid.unwrap_or_default();
+        let mut last = None;
+        let scales: Vec<f64> = fields.iter().map(|field| field.scale).collect();
+        let mut bounds = self.bounds;
+        for d in 0..3 {
+            bounds[0][d] -= 0.5 * self.spacing;
+            bounds[1][d] += 0.5 * self.spacing;
+        }
+        let solids = Solids {
+            title: self.scene.title.clone(),
+            bounds,
+            unit: ("mm".into(), 1e-3),
+            view: spec.view(),
+            fields: fields.into_iter().map(|field| field.strip).collect(),
+        };
+        let mut stage = |index: usize| -> Result<(String, Skin), polycore::Error> {
+            let look = look(index)?;
+            let Look { title, places, rest, values } = &*look;
+            let mut at_rest = NOWHERE;
+            widen(&mut at_rest, rest);
+            let bridge = bridge(self.outcome);
+            let particles = Particles { reference: rest, positions: places, spacing: self.spacing, bridge };
+            let value = |field: usize, k: usize| {
+                let scale = scales.get(field).copied().unwrap_or(1.0);
+                values[field].get(k).map_or(f64::NAN, |value| value * scale)
+            };
+            Ok((title.clone(), particles.skin(spec.plane(at_rest), |k| [value(0, k), value(1, k)])))
+        };
+        let name = self.outcome.file_name();
+        solids.write(output.join(format!("solid_{name}.png")), stages, |index| {
+            let drawn = stage(index)?;
+            last = spec.turntable.then(|| drawn.clone());
+            Ok(drawn)
+        })?;
+        if let Some(last) = last {
+            solids.turn(output.join(format!("turntable_{name}.png")), TURN, SHOWN, &last)?;
+        }
+        Ok(())
+    }
+}

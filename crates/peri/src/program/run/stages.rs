@@ -1,0 +1,170 @@
+//! Pictures of the stages of a run: the body as its fields show it.
+
+use super::outcome::Outcome;
+use super::scale::{self, bridge};
+use super::solid::{self, Look, shown};
+use crate::error::Error;
+use crate::program::scene::Scene;
+use harness::output::picture::{FieldMap, Panel};
+use harness::output::vtkhdf;
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Largest principal stress and damage at some stages from the last whole state on, of a plane body or of the middle
+/// plane y = const of a solid; of a solid also as it looks from outside.
+///
+/// # Errors
+/// Files that cannot be read or written.
+pub fn stages(
+    scene: &Scene,
+    outcome: &Outcome,
+    (spacing, cracks): (f64, f64),
+    series: &Path,
+    output: &Path,
+) -> Result<(), Error> {
+    let frames = vtkhdf::read(series)?;
+    let damages: Vec<f64> = (0..frames.len())
+        .map(|k| Ok(since(frames.data(k, "damage")?.iter().sum(), cracks)))
+        .collect::<Result<_, Error>>()?;
+    // the step of the peak load, which the damage does not determine
+    let peak = outcome.history.iter().enumerate().max_by(|a, b| a.1.load.total_cmp(&b.1.load));
+    let peak = peak.and_then(|(k, _)| frames.times().iter().position(|&time| time == (k + 1) as f64));
+    let chosen = choose(&damages, peak, scene.output.stages);
+    let Some(spec) = &scene.stress else { return Ok(()) };
+    let measure = format!("cauchy_{}", spec.measures[0].name());
+    let flat = scene.body.space != crate::calibrate::Space::Solid;
+    let look = |frame: usize| -> Result<Look, polycore::Error> {
+        let (places, moved) = (frames.points(frame)?, frames.data(frame, "displacement")?);
+        let tensors = frames.data(frame, &measure)?;
+        let at_rest = |(k, x): (usize, &[f64; 3])| [0, 1, 2].map(|d| x[d] - moved[3 * k + d]);
+        Ok(Look {
+            title: scale::title(outcome, frames.times()[frame]),
+            rest: places.iter().enumerate().map(at_rest).collect(),
+            places,
+            values: [
+                tensors.chunks(9).map(|t| shown(spec, flat, t)).collect(),
+                frames.data(frame, "damage")?,
+            ],
+        })
+    };
+    struct Stage {
+        places: Vec<[f64; 2]>,
+        rest: Vec<[f64; 2]>,
+        stress: Vec<f64>,
+        damage: Vec<f64>,
+        title: String,
+    }
+    let (mut stages, mut all, mut bounds) = (Vec::new(), Vec::new(), solid::NOWHERE);
+    for &frame in &chosen {
+        let Look { title, places, rest, values: [stress, damage] } = look(frame)?;
+        solid::widen(&mut bounds, &places);
+        let (low, high) = rest.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x[1]), h.max(x[1])));
+        let middle = 0.5 * (low + high);
+        let keep: Vec<usize> = (0..places.len())
+            .filter(|&k| flat || (0.0..spacing).contains(&(rest[k][1] - middle + 0.01 * spacing)))
+            .collect();
+        let in_plane = |x: [f64; 3]| if flat { [x[0], x[1]] } else { [x[0], x[2]] };
+        stages.push(Stage {
+            places: keep.iter().map(|&k| in_plane(places[k])).collect(),
+            rest: keep.iter().map(|&k| in_plane(rest[k])).collect(),
+            stress: keep.iter().map(|&k| stress[k]).collect(),
+            damage: keep.iter().map(|&k| damage[k]).collect(),
+            title,
+        });
+        all.extend(stress);
+    }
+    let (field, damage) = (solid::stress_field(spec, all), solid::damage_field());
+    let (scale, strips) = (field.scale, [field.strip.clone(), damage.strip.clone()]);
+    if !flat {
+        let picture = solid::Picture { scene, outcome, spacing, bounds };
+        let fields = vec![field, damage];
+        picture.draw(output, fields, chosen.len(), |k| Ok(Cow::Owned(look(chosen[k])?)))?;
+    }
+    let bridge = bridge(outcome);
+    let [wide, tall] = [0, 1].map(|d| {
+        let ends = |(low, high): (f64, f64), x: &[f64; 2]| (low.min(x[d]), high.max(x[d]));
+        let extent = |stage: &Stage| stage.places.iter().fold((f64::MAX, f64::MIN), ends);
+        stages.iter().map(extent).map(|(low, high)| high - low).fold(0.0, f64::max)
+    });
+    let layout = Layout::of(wide / tall, stages.len());
+    let mut map = FieldMap::new().lengths("mm", 1e-3).columns(layout.columns).size(layout.size);
+    if !flat {
+        map = map.axes(["x", "z"]);
+    }
+    for stage in &mut stages {
+        stage.stress.iter_mut().for_each(|stress| *stress *= scale);
+    }
+    let kinds = [false, true];
+    let order: Vec<(&Stage, bool)> = if layout.pairs {
+        stages.iter().flat_map(|stage| kinds.map(|damage| (stage, damage))).collect()
+    } else {
+        kinds.iter().flat_map(|&damage| stages.iter().map(move |stage| (stage, damage))).collect()
+    };
+    for (stage, damage) in order {
+        let (title, values) = if damage { ("", &stage.damage) } else { (&*stage.title, &stage.stress) };
+        let strip = &strips[usize::from(damage)];
+        let panel = Panel::new(title, &strip.label, &stage.places, values, spacing);
+        let panel = panel.range(strip.range.0, strip.range.1).reference(&stage.rest).bridge(bridge);
+        map = map.panel(panel);
+    }
+    map.write(output.join(format!("stages_{}.png", outcome.file_name())))?;
+    Ok(())
+}
+
+/// Damage beside that of the scene's cracks; a sum of both has rounding.
+fn since(damage: f64, cracks: f64) -> f64 {
+    let since = damage - cracks;
+    if since > 3e-7 * cracks { since } else { 0.0 }
+}
+
+/// How stages are laid out: side by side, damage under stress; wide bodies one under another, damage beside stress.
+struct Layout {
+    pairs: bool,
+    columns: usize,
+    /// Pixels of a body's longer side.
+    size: usize,
+}
+
+impl Layout {
+    /// For bodies `aspect` times as wide as high.
+    fn of(aspect: f64, stages: usize) -> Self {
+        match aspect {
+            wide if wide > 1.8 => Self { pairs: true, columns: 2, size: 720 },
+            narrow if narrow < 0.5 => Self { pairs: false, columns: stages, size: 720 },
+            _ => Self { pairs: false, columns: stages, size: 420 },
+        }
+    }
+}
+
+/// The last frame before the first break, the peak where it is later, then frames at even parts of all damage, then the
+/// last.
+fn choose(damage: &[f64], peak: Option<usize>, count: usize) -> Vec<usize> {
+    let last = damage.len() - 1;
+    let whole = damage.iter().rposition(|&d| d == 0.0).unwrap_or(0);
+    let mut chosen = vec![whole];
+    let peak = peak.filter(|peak| (whole + 1..last).contains(peak) && count > 2);
+    chosen.extend(peak);
+    for part in 1 + chosen.len() - 1..count.saturating_sub(1) {
+        let target = damage[last] * part as f64 / (count - 1) as f64;
+        let off = |k: usize| (damage[k] - target).abs();
+        chosen.extend((whole..=last).min_by(|&a, &b| off(a).total_cmp(&off(b))));
+    }
+    chosen.push(last);
+    chosen.sort_unstable();
+    chosen.dedup();
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_are_chosen_by_damage() {
+        assert_eq!(choose(&[0.0, 0.0, 1.0, 5.0, 6.0, 9.0], None, 4), [1, 2, 4, 5]);
+        // the peak takes the place of the first of them
+        assert_eq!(choose(&[0.0, 0.0, 0.1, 1.0, 5.0, 6.0, 9.0], Some(2), 4), [1, 2, 5, 6]);
+        assert_eq!(choose(&[0.0, 0.0], Some(0), 4), [1]);
+        assert_eq!(choose(&[3.0], None, 4), [0]);
+    }
+}

@@ -1,0 +1,268 @@
+//! From a scene to a body. Every rule that spans several keys is checked here, once.
+
+use super::cloud::cloud;
+use super::crack::{cracks, severed};
+use super::memory;
+use super::values::{Body, needed, ordered, vector};
+use super::variant::Variant;
+use super::{Axis, Scene, ShapeKind, ShapeSpec};
+use crate::bonds::{Bonds, LatticeBonds};
+use crate::calibrate::Space;
+use crate::geometry::{Cut, Gaps, MOST_CELLS, Operation, Shape, bounds, cell_counts, lattice};
+use harness::scene::{SceneError, Source};
+use polycore::memory::{available, gib};
+use polycore::units::Length;
+
+/// Sites a body may have at most, whatever memory there is: they are counted in 32 bits.
+const MOST_SITES: f64 = u32::MAX as f64;
+
+/// Builds the body of a variant.
+///
+/// # Errors
+/// A [`SceneError`] that names the key, the value found and what is allowed.
+pub fn body_of<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    variant: &Variant,
+) -> Result<Body<D>, SceneError> {
+    let thickness = thickness(source, scene)?;
+    let cuts = cracks(source, scene)?;
+    let mut body = match scene.body.has_points() {
+        true => cloud(source, scene, variant, thickness, &cuts)?,
+        false => filled(source, scene, variant, thickness, &cuts)?,
+    };
+    body.severed = severed(source, &*body.bonds, &cuts)?;
+    body.cuts = cuts;
+    Ok(body)
+}
+
+/// The lattice in the shapes.
+fn filled<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    variant: &Variant,
+    thickness: f64,
+    cuts: &[Cut<D>],
+) -> Result<Body<D>, SceneError> {
+    let (operations, low, high) = outline(source, scene)?;
+    let counts = cell_counts(low, high, variant.spacing);
+    refuse_too_large(source, scene, counts, variant.horizon_ratio)?;
+    check_shapes(source, &operations, low, high)?;
+    let lattice = lattice(&operations, variant.spacing, thickness).map_err(|error| {
+        source.error("body.shapes", error, "a body that contains at least one particle of the lattice")
+    })?;
+    let volume = variant.spacing.powi(D as i32) * thickness;
+    if !(volume.is_normal()) {
+        let found = format!("{} m, with which the volume of a particle is {volume} m³", variant.spacing);
+        return Err(source.error(spacing_key(scene), found, "a spacing whose cells have a volume"));
+    }
+    let gaps = Gaps::of_shapes(&operations, &lattice, variant.horizon_ratio * variant.spacing);
+    let severing = gaps.as_ref().filter(|_| scene.body.bond_gaps != Some(true));
+    let mut bonds = LatticeBonds::with_gaps(lattice, variant.horizon_ratio, variant.volume, cuts, severing)
+        .map_err(|error| {
+        source.error("body.horizon_ratio", error, "a horizon that reaches a neighbour")
+    })?;
+    if bonds.directed_bonds() == 0 {
+        let found = format!(
+            "{} m, which leaves {} particles without any bond",
+            variant.spacing,
+            bonds.particles().len()
+        );
+        return Err(source.error(
+            spacing_key(scene),
+            found,
+            "smaller: a body of at least two bonded particles",
+        ));
+    }
+    if scene.is_mixed() {
+        bonds.set_mixed();
+    }
+    memory::refuse_too_large(source, scene, spacing_key(scene), &bonds)?;
+    let (severed, cuts) = (Vec::new(), Vec::new());
+    let bonds = Box::new(bonds);
+    Ok(Body { bonds, bounds: (low, high), thickness, severed, cuts, gaps, operations })
+}
+
+/// Bytes that a variant needs at least, as far as its lattice determines it, before anything of it is built; 0 for a cloud.
+///
+/// # Errors
+/// As [`body_of`].
+pub fn least_memory<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    variant: &Variant,
+) -> Result<f64, SceneError> {
+    if scene.body.has_points() {
+        return Ok(0.0);
+    }
+    let (_, low, high) = outline::<D>(source, scene)?;
+    Ok(memory::of_lattice(scene, cell_counts(low, high, variant.spacing), variant.horizon_ratio).1)
+}
+
+/// Operations on shapes, and the box around what they add.
+type Outline<const D: usize> = (Vec<Operation<D>>, [f64; D], [f64; D]);
+
+pub(super) fn outline<const D: usize>(source: &Source, scene: &Scene) -> Result<Outline<D>, SceneError> {
+    let operations = operations(source, "body.shapes", scene.body.shapes())?;
+    let (low, high) = bounds(&operations)
+        .ok_or_else(|| source.error("body.shapes", "no shape is added", "at least one shape with `add`"))?;
+    Ok((operations, low, high))
+}
+
+fn thickness(source: &Source, scene: &Scene) -> Result<f64, SceneError> {
+    match (scene.body.space, scene.body.thickness) {
+        (Space::Solid, None) => Ok(1.0),
+        (Space::Solid, Some(_)) => Err(source.error(
+            "body.thickness",
+            "a thickness",
+            "none: the body is `solid`, its size is in its shapes",
+        )),
+        (_, Some(t)) if t.si() > 0.0 => Ok(t.si()),
+        (_, Some(t)) => Err(source.error("body.thickness", format!("{} m", t.si()), "above 0")),
+        (_, None) => {
+            Err(source.error("body.thickness", "nothing", "a length; a plane body needs its thickness"))
+        }
+    }
+}
+
+/// Refuses a lattice before anything of it is allocated.
+fn refuse_too_large<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    counts: [f64; D],
+    ratio: f64,
+) -> Result<(), SceneError> {
+    let cells: f64 = counts.iter().product();
+    let (sites, needed) = memory::of_lattice(scene, counts, ratio);
+    let available = available();
+    if !(cells <= MOST_CELLS && sites <= MOST_SITES && needed <= available) {
+        let found = format!("{cells:.3e} lattice cells, which need about {}", gib(needed));
+        let allowed = format!(
+            "at most {MOST_CELLS:.0e} cells and {} (the available memory); take a larger spacing",
+            gib(available)
+        );
+        return Err(source.error(spacing_key(scene), found, allowed));
+    }
+    Ok(())
+}
+
+/// Where the spacings stand.
+fn spacing_key(scene: &Scene) -> &'static str {
+    if scene.study.iter().any(|study| !study.spacing.is_empty()) { "study" } else { "body.spacing" }
+}
+
+/// The list of shapes that stands at `list`.
+pub(super) fn operations<const D: usize>(
+    source: &Source,
+    list: &str,
+    shapes: &[ShapeSpec],
+) -> Result<Vec<Operation<D>>, SceneError> {
+    let each = shapes.iter().enumerate().map(|(index, spec)| {
+        let key = format!("{list}[{index}]");
+        match (spec.add, spec.cut) {
+            (Some(kind), None) => Ok(Operation::Add(shape(source, &key, kind, spec)?)),
+            (None, Some(kind)) => Ok(Operation::Cut(shape(source, &key, kind, spec)?)),
+            (Some(_), Some(_)) => Err(source.error(&key, "both `add` and `cut`", "one of them")),
+            (None, None) => {
+                Err(source.error(&key, "neither `add` nor `cut`", "one of them, with the kind of shape"))
+            }
+        }
+    });
+    each.collect()
+}
+
+pub(super) fn shape<const D: usize>(
+    source: &Source,
+    key: &str,
+    kind: ShapeKind,
+    spec: &ShapeSpec,
+) -> Result<Shape<D>, SceneError> {
+    let given = [
+        ("min", spec.min.is_some(), matches!(kind, ShapeKind::Box)),
+        ("max", spec.max.is_some(), matches!(kind, ShapeKind::Box)),
+        ("centre", spec.centre.is_some(), !matches!(kind, ShapeKind::Box)),
+        ("radius", spec.radius.is_some(), !matches!(kind, ShapeKind::Box)),
+        ("length", spec.length.is_some(), matches!(kind, ShapeKind::Cylinder)),
+        ("axis", spec.axis.is_some(), matches!(kind, ShapeKind::Cylinder)),
+    ];
+    for (name, is_given, belongs) in given {
+        let path = format!("{key}.{name}");
+        if is_given && !belongs {
+            return Err(source.error(
+                &path,
+                format!("`{name}`"),
+                format!("nothing: a {kind:?} has no {name}"),
+            ));
+        }
+        if belongs && !is_given {
+            return Err(source.error(&path, "nothing", format!("a {kind:?} needs its `{name}`")));
+        }
+    }
+    let positive = |name: &str, value: Option<Length>| {
+        let path = format!("{key}.{name}");
+        let value = needed(source, &path, value, "a length")?.si();
+        if value > 0.0 { Ok(value) } else { Err(source.error(&path, format!("{value} m"), "above 0")) }
+    };
+    let point = |name: &str, value: &Option<Vec<Length>>| {
+        let path = format!("{key}.{name}");
+        vector::<D>(source, &path, value.as_deref().unwrap_or_default())
+    };
+    match kind {
+        ShapeKind::Box => {
+            let (min, max) = (point("min", &spec.min)?, point("max", &spec.max)?);
+            ordered(source, key, min, max)?;
+            Ok(Shape::Box { min, max })
+        }
+        ShapeKind::Disk | ShapeKind::Ball => {
+            if (kind == ShapeKind::Disk) != (D == 2) {
+                let allowed = if D == 2 {
+                    "`disk` or `box` in a plane body"
+                } else {
+                    "`ball`, `cylinder` or `box` in a solid"
+                };
+                return Err(source.error(key, format!("a {kind:?}"), allowed));
+            }
+            Ok(Shape::Ball {
+                centre: point("centre", &spec.centre)?,
+                radius: positive("radius", spec.radius)?,
+            })
+        }
+        ShapeKind::Cylinder => {
+            if D != 3 {
+                return Err(source.error(key, "a Cylinder", "`disk` or `box` in a plane body"));
+            }
+            let axis = match needed(source, &format!("{key}.axis"), spec.axis, "an axis")? {
+                Axis::X => 0,
+                Axis::Y => 1,
+                Axis::Z => 2,
+            };
+            Ok(Shape::Cylinder {
+                centre: point("centre", &spec.centre)?,
+                radius: positive("radius", spec.radius)?,
+                length: positive("length", spec.length)?,
+                axis,
+            })
+        }
+    }
+}
+
+/// A cut that reaches past the body on all sides leaves nothing to solve: name it rather than the empty lattice.
+fn check_shapes<const D: usize>(
+    source: &Source,
+    operations: &[Operation<D>],
+    low: [f64; D],
+    high: [f64; D],
+) -> Result<(), SceneError> {
+    for (index, operation) in operations.iter().enumerate() {
+        if let Operation::Cut(shape) = operation {
+            let (from, to) = shape.bounds();
+            if (0..D).all(|d| from[d] <= low[d] && to[d] >= high[d]) {
+                let found = format!(
+                    "a cut from {from:?} m to {to:?} m around the whole body ({low:?} m to {high:?} m)"
+                );
+                return Err(source.error(&format!("body.shapes[{index}]"), found, "smaller than the body"));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,423 @@
+//! Values that can be judged without building anything, and the list of variants to run.
+
+use super::values::{plain, positive};
+use super::variant::{Variant, variants};
+use super::{Method, Parameter, Probe, Scene, Track};
+use crate::calibrate::{Calibration, Space};
+use crate::solver::Policy;
+use crate::stress::Measure;
+use harness::scene::{SceneError, Source};
+
+/// Rows of history of a run in time.
+const MOST_RECORDS: usize = 1_000_000;
+
+/// Checks a scene and lists its variants; `quick` leaves out those that a `--quick` run leaves out.
+///
+/// # Errors
+/// A [`SceneError`] that names the key, the value found and what is allowed.
+pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+    let variants = variants(source, scene, quick)?;
+    for variant in &variants {
+        // what must fail does so when its turn comes
+        if variant.study.is_none_or(|index| scene.study[index].expect_error.is_none()) {
+            let (source, scene) = variant.resolve(source, scene)?;
+            check_variant(&source, &scene)?;
+        }
+    }
+    super::expect::check(source, scene)?;
+    if let Some(name) = scene.output.compare.as_ref().and_then(|compare| compare.variant.as_ref()) {
+        let names: Vec<String> =
+            super::variant::variants(source, scene, false)?.iter().map(Variant::name).collect();
+        if !names.contains(name) {
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            return Err(source.unknown("output.compare.variant", name, &names));
+        }
+    }
+    if variants.is_empty() {
+        return Err(source.error(
+            "study",
+            "no variant left in a --quick run",
+            "at least one without `quick = false`",
+        ));
+    }
+    Ok(variants)
+}
+
+/// Checks the scene of one variant, see [`Variant::resolve`].
+///
+/// # Errors
+/// As [`check`].
+pub fn check_variant(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    body(source, scene)?;
+    material(source, scene)?;
+    solver(source, scene)?;
+    if scene.boundary.is_empty() {
+        return Err(source.error("boundary", "nothing", "at least one [[boundary]]"));
+    }
+    if let Some(stress) = &scene.stress
+        && stress.measures.is_empty()
+    {
+        return Err(source.error("stress.measures", "an empty list", "at least one measure, or no [stress]"));
+    }
+    if let Some(stress) = &scene.stress
+        && let Some(found) = &stress.component
+    {
+        let most = if scene.body.space == Space::Solid { 2 } else { 1 };
+        if stress.component().is_none_or(|[a, b]| a.max(b) > most) {
+            let allowed = if most == 1 { "`11`, `22` or `12`" } else { "two digits of 1 to 3, e.g. `33`" };
+            return Err(source.error("stress.component", format!("`{found}`"), allowed));
+        }
+    }
+    let lattices = scene.stress.iter().flat_map(|stress| &stress.measures).position(|m| m.needs_lattice());
+    if let Some(index) = lattices.filter(|_| scene.body.points.is_some()) {
+        let found = "a measure of lattices in a cloud";
+        let allowed = "`hardy`, `gaussian`, `spline`, `ball-share`, `one-point` or `as-published`";
+        return Err(source.error(&format!("stress.measures[{index}]"), found, allowed));
+    }
+    if let Some(exact) = &scene.exact {
+        let ((radius, remote), name) = (exact.hole(), exact.name());
+        positive(source, "exact.radius", radius, "m")?;
+        positive(source, "exact.remote_stress", remote, "Pa")?;
+        if scene.body.space == Space::Solid {
+            let (found, allowed) = (format!("{name} in a solid"), format!("{name} in a plane body"));
+            return Err(source.error("exact.problem", found, allowed));
+        }
+        if scene.stress.is_none() {
+            let allowed = "a [stress] block with the measures to compare";
+            return Err(source.error("exact", format!("{name} without [stress]"), allowed));
+        }
+    }
+    dynamics(source, scene)?;
+    super::contact::check(source, scene)?;
+    super::probe::check(source, scene)?;
+    super::line::check(source, scene)?;
+    output(source, scene)
+}
+
+fn dynamics(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let explicit = scene.method() == Method::Verlet;
+    match &scene.dynamics {
+        None if explicit => {
+            let allowed = "a [dynamics] block with `density` and `end_time`: `verlet` needs it";
+            return Err(source.error("dynamics", "nothing", allowed));
+        }
+        Some(_) if !explicit => {
+            let allowed = "nothing, or `solver.method = \"verlet\"`";
+            return Err(source.error("dynamics", "a [dynamics] block of a quasi-static method", allowed));
+        }
+        Some(dynamics) => {
+            let method = dynamics.method();
+            positive(source, "dynamics.density", method.density, "kg/m³")?;
+            positive(source, "dynamics.end_time", method.end_time, "s")?;
+            positive(source, "dynamics.time_step", method.time_step.unwrap_or(1.0), "s")?;
+            if !(1..=MOST_RECORDS).contains(&method.records) {
+                return Err(source.error("dynamics.records", method.records, format!("1 to {MOST_RECORDS}")));
+            }
+            for (key, value, most) in [
+                ("safety", method.safety, 1.0),
+                ("damping", method.damping, 1e12),
+                ("ramp", method.ramp, 1e12),
+            ] {
+                if !(0.0..=most).contains(&value) || (key == "safety" && value == 0.0) {
+                    let allowed = format!("0 to {most:e}");
+                    return Err(source.error(&format!("dynamics.{key}"), plain(value), allowed));
+                }
+            }
+            let elsewhere = [
+                (scene.body.has_points(), "a body of points"),
+                (scene.material.solid.is_some(), "a `solid`"),
+                (scene.material.is_prestrained(), "prestrained bonds"),
+            ];
+            if let Some((_, what)) = elsewhere.iter().find(|(has, _)| scene.is_mixed() && *has) {
+                let allowed = "\"double\"; \"mixed\" is for bond laws in bodies of shapes";
+                return Err(source.error("dynamics.precision", format!("\"mixed\" of {what}"), allowed));
+            }
+            if let Some(factor) = &dynamics.factor {
+                if dynamics.ramp.is_some() {
+                    return Err(source.error(
+                        "dynamics.factor",
+                        "`factor` together with `ramp`",
+                        "one of them",
+                    ));
+                }
+                if let Some(found) = factor.other_than("t") {
+                    let found = format!("`{found}` in `{}`", factor.text());
+                    return Err(source.error("dynamics.factor", found, "a formula of `t`, the time in s"));
+                }
+                for part in 0..=16 {
+                    let time = method.end_time * f64::from(part) / 16.0;
+                    let (value, rate) = factor.in_time(time);
+                    if !(value.is_finite() && rate.is_finite()) {
+                        let found = format!("{value}, rising at {rate} 1/s, at {time} s");
+                        return Err(source.error("dynamics.factor", found, "finite values and rates"));
+                    }
+                }
+            }
+        }
+        None => {}
+    }
+    let moving = scene.boundary.iter().position(super::Boundary::moves);
+    match moving.filter(|_| !explicit) {
+        Some(index) => {
+            let key = format!("boundary[{index}].velocity");
+            Err(source.error(
+                &key,
+                "`velocity` of a quasi-static method",
+                "nothing, or `solver.method = \"verlet\"`",
+            ))
+        }
+        None => Ok(()),
+    }
+}
+
+fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    for (index, at) in scene.output.load_at.iter().enumerate() {
+        positive(source, &format!("output.load_at[{index}]"), at.si(), "m")?;
+    }
+    if let Some(compare) = &scene.output.compare {
+        let found = match (&compare.variant, compare.value) {
+            (Some(_), Some(_)) => "both `variant` and `value`",
+            (None, None) => "neither `variant` nor `value`",
+            (None, Some(value)) if !(value.is_finite() && value != 0.0) => {
+                "a value with which nothing compares"
+            }
+            _ => "",
+        };
+        if !found.is_empty() {
+            let allowed = "`variant`, the name of one, or `value`, a number in SI units other than 0";
+            return Err(source.error("output.compare", found, allowed));
+        }
+    }
+    if scene.output.every == Some(0) {
+        return Err(source.error("output.every", 0, "at least 1 step"));
+    }
+    if scene.output.flags && !scene.is_learnt() && scene.study.is_empty() {
+        let allowed = "only with `material.solid.constitutive.learnt`: other laws have none";
+        return Err(source.error("output.flags", "flags of a law in closed form", allowed));
+    }
+    if !(1..=12).contains(&scene.output.stages) {
+        return Err(source.error("output.stages", scene.output.stages, "1 to 12"));
+    }
+    match &scene.output.solid {
+        Some(_) if scene.body.space != Space::Solid => {
+            Err(source.error("output.solid", "a view of a solid", "only with `space = \"solid\"`"))
+        }
+        Some(solid) => solid.check(source, "output.solid"),
+        None => Ok(()),
+    }
+}
+
+fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let body = &scene.body;
+    if body.points.is_some() && body.grid.is_some() {
+        return Err(source.error("body.grid", "`grid` together with `points`", "one of them"));
+    }
+    let name = if body.grid.is_some() { "grid" } else { "points" };
+    match (body.shapes().is_empty(), body.has_points()) {
+        (true, false) => {
+            return Err(source.error("body.shapes", "nothing", "at least one shape, `points` or a `grid`"));
+        }
+        (_, true) if body.shapes.is_some() => {
+            return Err(source.error(
+                &format!("body.{name}"),
+                format!("`{name}` together with `shapes`"),
+                "one of them",
+            ));
+        }
+        (false, false) => {
+            let spacing = body
+                .spacing
+                .map(|s| s.si())
+                .or(scene.study.iter().find_map(|s| Some(s.spacing.first()?.si())));
+            let spacing = spacing.ok_or_else(|| {
+                source.error("body.spacing", "nothing", "a length; a lattice needs its `spacing`")
+            })?;
+            positive(source, "body.spacing", spacing, "m")?;
+            if body.horizon.is_some() {
+                return Err(source.error("body.horizon", "`horizon` of a lattice", "`horizon_ratio`"));
+            }
+        }
+        (_, true) => {
+            for (key, given) in [
+                ("body.spacing", body.spacing.is_some()),
+                ("body.horizon_ratio", body.horizon_ratio.is_some()),
+            ] {
+                if given {
+                    return Err(source.error(
+                        key,
+                        "a lattice's key",
+                        "nothing: `points` bring their own spacing; set `horizon`",
+                    ));
+                }
+            }
+            if scene.material.calibration == Calibration::Lattice {
+                return Err(source.error(
+                    "material.calibration",
+                    "lattice",
+                    "`continuum`: a cloud has no lattice sums",
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn material(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let material = &scene.material;
+    if let Some(solid) = &material.solid {
+        return super::solid::check(source, scene, solid);
+    }
+    let Some(youngs_modulus) = material.youngs_modulus else {
+        let allowed = "a stress, or a `solid` in place of a bond law";
+        return Err(source.error("material.youngs_modulus", "nothing", allowed));
+    };
+    positive(source, "material.youngs_modulus", youngs_modulus.si(), "Pa")?;
+    if let Some(index) =
+        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m == Measure::Constitutive)
+    {
+        let key = format!("stress.measures[{index}]");
+        return Err(source.error(
+            &key,
+            "`constitutive` of a bond law",
+            "a measure of bond forces, such as `hardy`",
+        ));
+    }
+    let law = material.law.unwrap_or_default();
+    let chain = law.is_chain();
+    // far beyond any polymer, and far from where the chain's force overflows
+    let most = 1e9;
+    for (key, value, least) in [("links", material.links, 2.0), ("dissociation", material.dissociation, 1.0)]
+    {
+        let key = format!("material.{key}");
+        match value {
+            None if chain => {
+                return Err(source.error(
+                    &key,
+                    "nothing",
+                    format!("a number of at least {least}: `{}` needs it", law.name()),
+                ));
+            }
+            Some(value) if !(least..=most).contains(&value) => {
+                return Err(source.error(&key, plain(value), format!("{least} to {most:e}")));
+            }
+            Some(_) if !chain => {
+                return Err(source.error(
+                    &key,
+                    "a chain's parameter",
+                    format!("nothing: `{}` has no chains", law.name()),
+                ));
+            }
+            _ => {}
+        }
+    }
+    if let Some(critical) = &material.critical {
+        let given = critical.given();
+        if given.len() != 1 {
+            let found = given.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
+            let found = if found.is_empty() { "none of them".to_owned() } else { found };
+            return Err(source.error("material.critical", found, crate::critical::ONE_OF));
+        }
+    }
+    super::tearing::check(source, scene)?;
+    for (index, field) in material.fields.iter().enumerate() {
+        let key = format!("material.fields[{index}].of");
+        if material.fields[..index].iter().any(|other| other.of == field.of) {
+            return Err(source.error(&key, format!("`{}` a second time", field.of.name()), "each once"));
+        }
+        let energy = material.critical.is_some_and(|critical| critical.fracture_energy.is_some());
+        if field.of == Parameter::FractureEnergy && !energy {
+            let allowed = "`material.critical.fracture_energy` beside it";
+            return Err(source.error(&key, "a fracture energy of a material without one", allowed));
+        }
+    }
+    if material.is_prestrained() || scene.softens() {
+        // forces of these bonds are not those of the fitted law, from which stresses are taken
+        let what = if scene.softens() { "bonds that soften" } else { "a prestrain in `material`" };
+        if material.is_prestrained() && scene.softens() {
+            let found = "`softening` of prestrained bonds";
+            return Err(source.error("material.critical.convention", found, "`tearing` or `bonds`"));
+        }
+        let j_integral = |probe: &Probe| probe.track == Track::JIntegral;
+        for (key, given) in [
+            ("stress", scene.stress.is_some()),
+            ("output.section", !scene.output.section.is_empty()),
+            ("probe", scene.probe.iter().any(j_integral)),
+        ] {
+            if given {
+                let found = format!("together with {what}");
+                return Err(source.error(key, found, "displacements of such bodies only, so far"));
+            }
+        }
+    }
+    for (index, inclusion) in material.inclusions.iter().enumerate() {
+        let key = format!("material.inclusions[{index}].stiffness");
+        positive(source, &key, inclusion.stiffness, "")?;
+        if inclusion.critical.is_some() && material.critical.is_none() {
+            let key = format!("material.inclusions[{index}].critical");
+            return Err(source.error(
+                &key,
+                "a critical stretch of a part",
+                "`material.critical` beside it, of the rest",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn solver(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let solver = &scene.solver;
+    let within = |key: &str, value: f64, low: f64, high: f64| {
+        if (low..=high).contains(&value) {
+            Ok(())
+        } else {
+            let allowed = format!("{} to {}", plain(low), plain(high));
+            Err(source.error(&format!("solver.{key}"), plain(value), allowed))
+        }
+    };
+    within("tolerance", scene.tolerance(), 1e-12, 0.1)?;
+    within("fit_bound", scene.fit_bound(), 1e-12, 1e-2)?;
+    within("steps", solver.steps as f64, 1.0, 1e6)?;
+    if let Some(path) = &solver.path {
+        if path.is_empty() || !solver.steps.is_multiple_of(path.len()) {
+            let found = format!("{} load factors in {} steps", path.len(), solver.steps);
+            return Err(source.error("solver.path", found, "at least one, and as many steps to each"));
+        }
+        for (index, &factor) in path.iter().enumerate() {
+            within(&format!("path[{index}]"), factor, -1e3, 1e3)?;
+        }
+    }
+    within("max_iterations", solver.max_iterations as f64, 1.0, 1e9)?;
+    within("mass_safety", solver.mass_safety.unwrap_or(1.1), 1.0, 100.0)?;
+    if solver.mass_safety.is_some() && scene.method() != Method::Adr {
+        let found = format!("`mass_safety` of `{}`", scene.method().name());
+        return Err(source.error(
+            "solver.mass_safety",
+            found,
+            "nothing, or `method = \"adr\"`: only it has a fictitious mass",
+        ));
+    }
+    within("refine", solver.refine as f64, 1.0, 1e6)?;
+    let refuses = [
+        (scene.material.critical.is_none(), "bonds that never break"),
+        (scene.method() == Method::Verlet, "explicit dynamics"),
+        (solver.breaking == Policy::EachIteration, "`breaking = \"each-iteration\"`"),
+        (scene.material.critical.is_some_and(|critical| critical.strength.is_some()), "bonds that soften"),
+        (scene.contact.as_ref().is_some_and(super::ContactSpec::rubs), "friction"),
+    ];
+    if let Some((_, what)) = refuses.into_iter().find(|(refused, _)| *refused && solver.refine > 1) {
+        let allowed =
+            "1, or a quasi-static scene whose bonds break at once and in equilibrium, without friction";
+        return Err(source.error("solver.refine", format!("{} with {what}", solver.refine), allowed));
+    }
+    let found = match (solver.refine, &solver.path) {
+        (1, _) => Some("`snap_back` without `refine`"),
+        (_, Some(_)) => Some("`snap_back` along a `path`"),
+        _ => None,
+    };
+    if let Some(found) = found.filter(|_| solver.snap_back) {
+        let allowed = "`refine` above 1 and a load that grows in proportion";
+        return Err(source.error("solver.snap_back", found, allowed));
+    }
+    within("accept", solver.accept.unwrap_or(0.0), 0.0, 1.0)?;
+    within("stop_below", solver.stop_below.unwrap_or(0.0), 0.0, 1.0)
+}

@@ -1,0 +1,296 @@
+//! Where a body is stiffer or softer, or breaks earlier or later: its inclusions, and fields of other scenes.
+
+use super::build::shape;
+use super::values::Body;
+use super::{Followed, Material, Parameter, Scene, ShapeSpec, plain};
+use crate::bonds::{Bonds, Property};
+use crate::calibrate::{Space, poisson_ratio};
+use crate::critical::Critical;
+use crate::error::Error;
+use crate::geometry::Shape;
+use harness::scene::{SceneError, Source};
+use polycore::units::{EnergyPerArea, Ratio};
+use serde::Deserialize;
+use std::array;
+use std::collections::HashMap;
+
+/// A part of the body whose bonds are stiffer or softer; a bond across its border has the mean of both.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Inclusion {
+    /// Where: a shape to `add`.
+    pub shape: ShapeSpec,
+    /// Its stiffness over that of the rest; default: 1.
+    #[serde(default = "whole")]
+    pub stiffness: f64,
+    /// When its bonds break, instead of `material.critical`; a bond that ends in it or passes through it breaks as the weakest
+    /// part on its way does, so that a layer may be thinner than the spacing.
+    pub critical: Option<Critical>,
+    /// ε*: the strain that it would have if it were free, the same in all directions; those of several parts add up.
+    pub prestrain: Option<Ratio>,
+}
+
+fn whole() -> f64 {
+    1.0
+}
+
+/// ε* = −S:σ of a body of bonds, with its Poisson ratio: held in its shape it has the stress σ.
+fn relaxed<const D: usize>(space: Space, youngs_modulus: f64, stress: &[[f64; 3]; 3]) -> [[f64; D]; D] {
+    let nu = poisson_ratio(space);
+    let trace: f64 = (0..D).map(|d| stress[d][d]).sum();
+    // a strain across the plane that is zero takes ν(1 + ν) of the sum, in its plane
+    let across = if space == Space::PlaneStrain { nu * (1.0 + nu) } else { nu };
+    let of = |a: usize, b: usize| across * if a == b { trace } else { 0.0 } - (1.0 + nu) * stress[a][b];
+    array::from_fn(|a| array::from_fn(|b| of(a, b) / youngs_modulus))
+}
+
+/// The inclusions of a scene, and the parameters that follow fields, as fields.
+pub struct Inclusions<'a, const D: usize> {
+    /// Micromodulus over that of the scene's Young's modulus: the product of all that hold for a particle.
+    pub micromodulus: Property,
+    /// Fracture energy, J/m², where it follows a field.
+    fracture_energy: Option<Property>,
+    /// ε* site by site, where there is any.
+    pub prestrain: Option<Vec<[[f64; D]; D]>>,
+    /// The inclusions, and their particles' sites.
+    each: Vec<(&'a Inclusion, Shape<D>, Vec<u32>)>,
+}
+
+impl<'a, const D: usize> Inclusions<'a, D> {
+    /// Finds the particles of all inclusions; `followed` are the parameters that follow fields.
+    ///
+    /// # Errors
+    /// A fault of an inclusion's shape, or one that contains no particle.
+    pub fn new(
+        source: &Source,
+        scene: &'a Scene,
+        body: &Body<D>,
+        followed: &[Followed],
+    ) -> Result<Self, SceneError> {
+        let bonds = &*body.bonds;
+        let mut each = Vec::new();
+        let following =
+            |parameter| followed.iter().find(|one| one.parameter == parameter).map(|one| &one.values);
+        let stressed = followed.iter().find(|one| !one.stress.is_empty());
+        let modulus = following(Parameter::YoungsModulus).zip(scene.material.youngs_modulus);
+        let varies = modulus.is_some() || stressed.is_some() || !scene.material.inclusions.is_empty();
+        let mut stiffness = vec![1.0; if varies { bonds.sites() } else { 0 }];
+        if let Some((values, whole)) = modulus {
+            bonds.particles().iter().for_each(|&site| {
+                stiffness[site as usize] = values.at(site as usize) / whole.si();
+            });
+        }
+        let shrinks = scene.material.is_prestrained();
+        let mut prestrain = vec![0.0; if shrinks { bonds.sites() } else { 0 }];
+        if let Some(values) = following(Parameter::Prestrain).filter(|_| stressed.is_none()) {
+            bonds.particles().iter().for_each(|&site| prestrain[site as usize] = values.at(site as usize));
+        }
+        for (index, inclusion) in scene.material.inclusions.iter().enumerate() {
+            let key = format!("material.inclusions[{index}].shape");
+            let Some(kind) = inclusion.shape.add.filter(|_| inclusion.shape.cut.is_none()) else {
+                return Err(source.error(&key, "no `add`", "`add` with the kind of shape"));
+            };
+            let shape = shape::<D>(source, &key, kind, &inclusion.shape)?;
+            let inside = |&site: &u32| shape.contains(bonds.position(site as usize));
+            let members: Vec<u32> = bonds.particles().iter().copied().filter(inside).collect();
+            // a layer between particles may still be a weak one
+            let acts =
+                inclusion.stiffness != 1.0 || inclusion.prestrain.is_some() || inclusion.critical.is_none();
+            if members.is_empty() && acts {
+                return Err(source.error(&key, "a shape without particles", "a shape with at least one"));
+            }
+            members.iter().for_each(|&site| stiffness[site as usize] *= inclusion.stiffness);
+            if let Some(strain) = inclusion.prestrain {
+                members.iter().for_each(|&site| prestrain[site as usize] += strain.si());
+            }
+            each.push((inclusion, shape, members));
+        }
+        let at = |site: usize, _| stiffness.get(site).copied().unwrap_or(1.0);
+        let fracture_energy = following(Parameter::FractureEnergy).cloned();
+        let strain = |site: usize| {
+            let own: [[f64; D]; D] =
+                array::from_fn(|a| array::from_fn(|b| if a == b { prestrain[site] } else { 0.0 }));
+            let (Some(one), Some(whole)) = (stressed, scene.material.youngs_modulus) else { return own };
+            let held: [[f64; D]; D] =
+                relaxed(scene.body.space, stiffness[site] * whole.si(), &one.stress[site]);
+            array::from_fn(|a| array::from_fn(|b| own[a][b] + held[a][b]))
+        };
+        let prestrain: Option<Vec<[[f64; D]; D]>> = shrinks.then(|| (0..bonds.sites()).map(strain).collect());
+        let along = prestrain.iter().flatten().flat_map(|tensor| (0..D).map(|d| tensor[d][d]));
+        if let Some(found) = along.reduce(f64::min).filter(|&least| least <= -1.0) {
+            return Err(source.error("material", format!("a prestrain of {}", plain(found)), "above -1"));
+        }
+        Ok(Self { micromodulus: Property::new(bonds, at), fracture_energy, prestrain, each })
+    }
+
+    /// The critical stretch: `rest`, or that of the fracture energy that follows a field, and of inclusions with a critical stretch of their own what `resolve` makes of it with
+    /// their micromodulus over that of the rest; of several the last.
+    ///
+    /// # Errors
+    /// A critical stretch out of its domain.
+    pub fn critical_stretch(
+        &self,
+        source: &Source,
+        bonds: &dyn Bonds<D>,
+        rest: f64,
+        resolve: &dyn Fn(Critical, f64) -> Result<f64, Error>,
+    ) -> Result<Property, SceneError> {
+        let varies = self.fracture_energy.is_some() || !self.each.is_empty();
+        let mut stretch = vec![rest; if varies { bonds.sites() } else { 0 }];
+        if let Some(energies) = &self.fracture_energy {
+            for site in bonds.particles().iter().map(|&site| site as usize) {
+                let energy = Some(EnergyPerArea::from_si(energies.at(site)));
+                let critical = Critical { fracture_energy: energy, ..Critical::default() };
+                stretch[site] = resolve(critical, self.micromodulus.at(site)).map_err(|error| {
+                    source.error("material.fields", error, "a fracture energy that bonds can have")
+                })?;
+            }
+        }
+        for (index, (inclusion, _, members)) in self.each.iter().enumerate() {
+            let Some(critical) = inclusion.critical else { continue };
+            let key = format!("material.inclusions[{index}].critical");
+            let fault = |error| match error {
+                Error::Parameter { found, allowed, .. } => source.error(&key, plain(found), allowed),
+                other => source.error(&key, other, "a critical stretch"),
+            };
+            // one bisection for neighbours of one stiffness
+            let mut last = None;
+            for &site in members {
+                let stiffness = self.micromodulus.at(site as usize);
+                let own = match last {
+                    Some((before, own)) if before == stiffness => own,
+                    _ => resolve(critical, stiffness).map_err(fault)?,
+                };
+                stretch[site as usize] = own;
+                last = Some((stiffness, own));
+            }
+        }
+        let property = Property::new(bonds, |site, _| stretch.get(site).copied().unwrap_or(rest));
+        if self.each.iter().all(|(inclusion, ..)| inclusion.critical.is_none()) {
+            return Ok(property);
+        }
+        let weak = self.passing(source, bonds, resolve)?;
+        for (index, (_, _, members)) in self.each.iter().enumerate() {
+            if members.is_empty() && !weak.iter().any(|one| one.0.contains(&index)) {
+                let key = format!("material.inclusions[{index}].shape");
+                let found = "a shape without particles, and without bonds that pass through it";
+                return Err(source.error(&key, found, "a shape with at least one"));
+            }
+        }
+        Ok(property.weakened(weak.into_iter().map(|(_, bond, value)| (bond, value)).collect()))
+    }
+
+    /// Bonds that pass through inclusions with a critical stretch: these, the bond's sites and the least critical stretch on its way between
+    /// the ends.
+    fn passing(
+        &self,
+        source: &Source,
+        bonds: &dyn Bonds<D>,
+        resolve: &dyn Fn(Critical, f64) -> Result<f64, Error>,
+    ) -> Result<Vec<Passing>, SceneError> {
+        let reach = bonds.horizon() * (1.0 + 1e-9);
+        let mut known: HashMap<(usize, u64), f64> = HashMap::new();
+        let mut found = Vec::new();
+        for &site in bonds.particles() {
+            let here = bonds.position(site as usize);
+            let near = |shape: &Shape<D>| {
+                let (low, high) = shape.bounds();
+                (0..D).all(|d| low[d] - reach <= here[d] && here[d] <= high[d] + reach)
+            };
+            let near: Vec<usize> = (0..self.each.len()).filter(|&index| near(&self.each[index].1)).collect();
+            if near.iter().all(|&index| self.each[index].0.critical.is_none()) {
+                continue;
+            }
+            // of the rest of the body at this end
+            let inside = |place| near.iter().filter(move |&&index| self.each[index].1.contains(place));
+            let stiffness = |place| inside(place).map(|&index| self.each[index].0.stiffness).product::<f64>();
+            let rest = self.micromodulus.at(site as usize) / stiffness(here);
+            let mut others = Vec::new();
+            bonds.neighbours(site as usize, &mut |bond| {
+                if site < bond.site as u32 {
+                    others.push(bond.site as u32);
+                }
+            });
+            for other in others {
+                let there = bonds.position(other as usize);
+                let mut ends: Vec<f64> =
+                    near.iter().filter_map(|&index| self.each[index].1.span(here, there)).flatten().collect();
+                ends.sort_by(f64::total_cmp);
+                let mut passing = (Vec::new(), [site, other], f64::INFINITY);
+                for pair in ends.windows(2).filter(|pair| pair[1] - pair[0] > THIN) {
+                    let part = 0.5 * (pair[0] + pair[1]);
+                    let place: [f64; D] = array::from_fn(|d| here[d] + part * (there[d] - here[d]));
+                    let last =
+                        inside(place).rev().find_map(|&index| Some((index, self.each[index].0.critical?)));
+                    let Some((index, critical)) = last else { continue };
+                    let stiffness = rest * stiffness(place);
+                    let value = match known.get(&(index, stiffness.to_bits())) {
+                        Some(&value) => value,
+                        None => resolve(critical, stiffness).map_err(|error| {
+                            source.error(
+                                &format!("material.inclusions[{index}].critical"),
+                                error,
+                                "a critical stretch",
+                            )
+                        })?,
+                    };
+                    known.insert((index, stiffness.to_bits()), value);
+                    passing.0.push(index);
+                    passing.2 = passing.2.min(value);
+                }
+                if !passing.0.is_empty() {
+                    found.push(passing);
+                }
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// Part of a bond's length that is none: where faces meet.
+const THIN: f64 = 1e-6;
+
+/// Inclusions that a bond passes through, its sites, and the least critical stretch in them.
+type Passing = (Vec<usize>, [u32; 2], f64);
+
+impl Material {
+    /// Whether some bonds are at rest at another stretch than 1.
+    pub fn is_prestrained(&self) -> bool {
+        let follows = self.fields.iter().any(|field| field.of == Parameter::Prestrain);
+        follows || self.inclusions.iter().any(|inclusion| inclusion.prestrain.is_some())
+    }
+
+    /// The bond law of this material.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] where a chain parameter is out of its domain.
+    pub fn bond_law(&self) -> Result<Box<dyn crate::potential::BondPotential>, crate::Error> {
+        let law = self.law.unwrap_or_default();
+        let rescale = self.rescale.unwrap_or(law.rescales());
+        law.build(self.links.unwrap_or(1.0), self.dissociation.unwrap_or(1.0), rescale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ε of Hooke's law: ε_xx = σ/E and ε_yy = −νσ/E of a bar, with 1 − ν² and −ν(1 + ν) in plane strain; shear σ_xy(1 + ν)/E.
+    #[test]
+    fn strains_of_stresses() {
+        let bar = [[2.0, 0.0, 0.0], [0.0; 3], [0.0; 3]];
+        let close =
+            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-15, "{found} {expected}");
+        let sheet: [[f64; 2]; 2] = relaxed(Space::PlaneStress, 4.0, &bar);
+        close(sheet[0][0], -0.5);
+        close(sheet[1][1], 0.5 / 3.0);
+        let slab: [[f64; 2]; 2] = relaxed(Space::PlaneStrain, 4.0, &bar);
+        close(slab[0][0], -0.5 * (1.0 - 0.0625));
+        close(slab[1][1], 0.5 * 0.25 * 1.25);
+        let block: [[f64; 3]; 3] = relaxed(Space::Solid, 4.0, &bar);
+        close(block[2][2], 0.125);
+        let shear: [[f64; 3]; 3] = relaxed(Space::Solid, 4.0, &[[0.0, 2.0, 0.0], [2.0, 0.0, 0.0], [0.0; 3]]);
+        close(shear[1][0], -0.625);
+        close(shear[0][0] + shear[2][2], 0.0);
+    }
+}

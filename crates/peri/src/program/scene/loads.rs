@@ -1,0 +1,474 @@
+//! From a scene's boundaries to the loads and supports of a body.
+
+use super::build::operations;
+use super::formula::Formula;
+use super::values::{Body, ordered, vector};
+use super::{Boundary, ContactSpec, Method, Prescribed, PrescribedField, Scene, Side};
+use crate::field::Field;
+use crate::geometry::inside;
+use crate::material::{Tensor, surface_load};
+use crate::solver::{Adrift, INVERTS, Loads, Stops, Support, adrift, inverted};
+use harness::scene::{SceneError, Source};
+
+/// Loads and supports of a body, and the sites where forces act on it, of loads or of holding.
+///
+/// # Errors
+/// As [`super::body_of`].
+pub fn loads_of<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<(Loads<D>, Vec<bool>), SceneError> {
+    let (mut regions, mut tractions) = (Vec::new(), Vec::new());
+    let mut loaded = vec![false; body.bonds.sites()];
+    for (index, boundary) in scene.boundary.iter().enumerate() {
+        let key = format!("boundary[{index}]");
+        let (members, depth) = region(source, &key, boundary, body)?;
+        if members.is_empty() {
+            return Err(source.error(&key, "a region without particles", "a region with at least one"));
+        }
+        let forced =
+            boundary.traction.is_some() || boundary.force.is_some() || boundary.displacement.is_some();
+        let forced = forced || boundary.rotation.is_some();
+        for &site in members.iter().filter(|_| forced) {
+            loaded[site as usize] = true;
+        }
+        let by_area = scene.material.solid.is_some() && boundary.layers.is_none() && boundary.depth.is_none();
+        let support = support(source, &key, boundary, body, &members, depth.filter(|_| !by_area))?;
+        if let (Some(side), Some(traction), true) = (boundary.side, &boundary.traction, by_area) {
+            tractions.push((side, std::array::from_fn(|d| traction[d].si())));
+        }
+        regions.push((members, support));
+    }
+    let mut loads = Loads::new(body.bonds.sites(), &regions);
+    for (side, traction) in tractions {
+        add_traction(body, side, traction, &mut loads, &mut loaded);
+    }
+    follow_formulas(source, scene, body, &regions, &mut loads)?;
+    super::rotation::turn(source, scene, body, &regions, &mut loads)?;
+    upright(source, scene, body, &loads)?;
+    if scene.method() == Method::Verlet {
+        // a body in motion needs neither balance nor hold
+        return Ok((loads, loaded));
+    }
+    balanced(source, scene, body, &loads)?;
+    let all = (1_u8 << D) - 1;
+    if body.bonds.particles().iter().all(|&site| loads.constrained(site as usize) == all) {
+        return Err(source.error(
+            "boundary",
+            "every component of every particle is prescribed",
+            "at least one free",
+        ));
+    }
+    Ok((loads, loaded))
+}
+
+/// Adds a traction on a side of a solid: t (n·h_I)/V_I of the area vectors h, which balances a uniform stress in every particle
+/// ([`surface_load`]). It acts in two horizons below the side, in a thin body in the half next to it.
+fn add_traction<const D: usize>(
+    body: &Body<D>,
+    side: Side,
+    traction: [f64; D],
+    loads: &mut Loads<D>,
+    loaded: &mut [bool],
+) {
+    let (axis, upper) = side.axis();
+    let bounds = [body.bounds.0[axis], body.bounds.1[axis]];
+    let reach = (2.0 * body.bonds.horizon()).min(0.5 * (bounds[1] - bounds[0]));
+    let sign = if upper { 1.0 } else { -1.0 };
+    let stress = Tensor::from_fn(|a, b| if b == axis { sign * traction[a] } else { 0.0 });
+    let surface = surface_load(&*body.bonds, stress);
+    let field = loads.body_force.get_or_insert_with(|| Field::zeros(body.bonds.sites()));
+    for &site in body.bonds.particles() {
+        let site = site as usize;
+        let below = sign * (bounds[usize::from(upper)] - body.bonds.position(site)[axis]);
+        let (old, new) = (field.get(site), surface.get(site));
+        if below <= reach && new != [0.0; D] {
+            field.set(site, std::array::from_fn(|d| old[d] + new[d]));
+            loaded[site] = true;
+        }
+    }
+}
+
+/// Velocities at the start, m/s; the last region applies.
+///
+/// # Errors
+/// As [`super::body_of`].
+pub fn velocities_of<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<Field<D>, SceneError> {
+    let mut field = Field::zeros(body.bonds.sites());
+    for (index, boundary) in scene.boundary.iter().enumerate() {
+        if !boundary.moves() {
+            continue;
+        }
+        let (members, _) = region(source, &format!("boundary[{index}]"), boundary, body)?;
+        for site in members {
+            let place = body.bonds.position(site as usize);
+            let mut value = [0.0; D];
+            for (d, value) in value.iter_mut().enumerate() {
+                if let Some(velocity) = boundary.velocity.as_ref().and_then(|v| v.get(d)) {
+                    *value = velocity.si();
+                } else if let Some(formula) = boundary.velocity_field.as_ref().and_then(|v| v.get(d)) {
+                    *value = at(source, &format!("boundary[{index}].velocity_field[{d}]"), formula, place)?;
+                }
+            }
+            field.set(site as usize, value);
+        }
+    }
+    Ok(field)
+}
+
+/// The value of a formula at a particle.
+fn at<const D: usize>(
+    source: &Source,
+    key: &str,
+    formula: &Formula,
+    place: [f64; D],
+) -> Result<f64, SceneError> {
+    let value = formula.at(place);
+    if value.is_finite() {
+        return Ok(value);
+    }
+    let found = format!("{value} of `{}` at {place:?} m", formula.text());
+    Err(source.error(key, found, "a finite value at every particle of the region"))
+}
+
+/// Prescribed displacements that differ from particle to particle; of two regions the last one holds.
+fn follow_formulas<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+    regions: &[(Vec<u32>, Support<D>)],
+    loads: &mut Loads<D>,
+) -> Result<(), SceneError> {
+    if scene.boundary.iter().all(|boundary| boundary.displacement_field.is_none()) {
+        return Ok(());
+    }
+    let Some(field) = &mut loads.displacement else { return Ok(()) };
+    for ((index, boundary), (members, support)) in scene.boundary.iter().enumerate().zip(regions) {
+        for &site in members {
+            let mut value = field.get(site as usize);
+            for (d, value) in value.iter_mut().enumerate() {
+                match boundary.displacement_field.as_ref().and_then(|field| field.get(d)) {
+                    Some(PrescribedField::By(formula)) => {
+                        let key = format!("boundary[{index}].displacement_field[{d}]");
+                        *value = at(source, &key, formula, body.bonds.position(site as usize))?;
+                    }
+                    _ => *value = support.displacement[d].unwrap_or(*value),
+                }
+            }
+            field.set(site as usize, value);
+        }
+    }
+    Ok(())
+}
+
+/// A part of a body that nothing holds is never at rest under forces that do not balance.
+fn balanced<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+    loads: &Loads<D>,
+) -> Result<(), SceneError> {
+    let planes =
+        scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes::<D>(source, false))?;
+    let normals = planes.iter().map(|plane| plane.normal).collect();
+    let stops = Stops {
+        normals,
+        pairs: scene.contact.is_some(),
+        rubs: scene.contact.as_ref().is_some_and(ContactSpec::rubs)
+            || planes.iter().any(|plane| plane.bonded),
+    };
+    let Some(part) = adrift(&*body.bonds, loads, None, &stops, scene.tolerance()) else { return Ok(()) };
+    let Adrift { particles, of, force, axis, .. } = &part;
+    let found = if particles == of {
+        format!("a total force of {force:.3e} N along {axis}, along which no displacement is prescribed")
+    } else {
+        part.to_string()
+    };
+    let allowed = format!("balanced forces, or a `displacement` along {axis} of some region of it");
+    Err(source.error("boundary", found, allowed))
+}
+
+/// Displacements that a body can follow.
+fn upright<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+    loads: &Loads<D>,
+) -> Result<(), SceneError> {
+    let factors = match &scene.dynamics {
+        // a course of its own may stay far below 1
+        Some(dynamics) if dynamics.factor.is_some() => return Ok(()),
+        Some(_) => vec![1.0],
+        None => scene.solver.factors(),
+    };
+    match inverted(&*body.bonds, loads, &factors) {
+        Some(found) => Err(source.error("boundary", found, INVERTS)),
+        None => Ok(()),
+    }
+}
+
+/// What the regions of prescribed displacement are called, in their order.
+pub fn region_names(scene: &Scene) -> Vec<String> {
+    let constrained = scene.boundary.iter().enumerate().filter(|(_, b)| b.holds());
+    constrained.map(|(index, boundary)| name_of(index, boundary)).collect()
+}
+
+/// Lines for `peri check`: which particles a boundary takes, and what is free between two grips.
+pub(super) fn explain<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<Vec<String>, SceneError> {
+    let mut lines = Vec::new();
+    let mut grips = [[None; 2]; 3];
+    for (index, boundary) in scene.boundary.iter().enumerate() {
+        let (members, depth) = region(source, &format!("boundary[{index}]"), boundary, body)?;
+        let layers = match (boundary.side, depth) {
+            (Some(side), Some(depth)) => {
+                let (axis, upper) = side.axis();
+                if boundary.holds() {
+                    grips[axis][usize::from(upper)] = Some(depth);
+                }
+                let layers = (depth / body.bonds.spacing()).round();
+                format!(
+                    "{layers} layer{}, {:.4} mm deep, ",
+                    if layers == 1.0 { "" } else { "s" },
+                    depth * 1e3
+                )
+            }
+            _ => String::new(),
+        };
+        let what = [
+            ("constrained", boundary.holds()),
+            ("pulled", boundary.traction.is_some() || boundary.force.is_some()),
+            ("moving at the start", boundary.moves()),
+        ];
+        let what: Vec<&str> = what.iter().filter(|(_, given)| *given).map(|(what, _)| *what).collect();
+        let name = name_of(index, boundary);
+        lines.push(format!("  boundary   {name}: {layers}{} particles {}", members.len(), what.join(", ")));
+    }
+    for (axis, depths) in grips.iter().enumerate() {
+        if let [Some(low), Some(high)] = depths
+            && axis < D
+        {
+            let free = body.bounds.1[axis] - body.bounds.0[axis] - low - high;
+            lines.push(format!(
+                "  boundary   {} mm free between {}- and {}+",
+                mm(free),
+                AXES[axis],
+                AXES[axis]
+            ));
+        }
+    }
+    Ok(lines)
+}
+
+/// In mm, without the digits that a change of units leaves behind.
+fn mm(length: f64) -> f64 {
+    (length * 1e9).round() / 1e6
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Its own name, its side, or its number.
+fn name_of(index: usize, boundary: &Boundary) -> String {
+    match (&boundary.name, boundary.side) {
+        (Some(name), _) => name.clone(),
+        (None, Some(side)) => side.to_string(),
+        (None, None) if boundary.shapes.is_empty() => format!("box{}", index + 1),
+        (None, None) => format!("shapes{}", index + 1),
+    }
+}
+
+/// Layers of particles at a side that a boundary acts on.
+pub(super) fn layers<const D: usize>(boundary: &Boundary, bonds: &dyn crate::bonds::Bonds<D>) -> usize {
+    boundary.layers_of(bonds.spacing(), bonds.horizon() / bonds.spacing())
+}
+
+pub(super) fn region<const D: usize>(
+    source: &Source,
+    key: &str,
+    boundary: &Boundary,
+    body: &Body<D>,
+) -> Result<(Vec<u32>, Option<f64>), SceneError> {
+    let spacing = body.bonds.spacing();
+    let (low, high, depth) = match (boundary.side, &boundary.min, &boundary.max) {
+        (Some(side), None, None) if boundary.shapes.is_empty() => {
+            let (axis, upper) = side.axis();
+            if axis >= D {
+                return Err(source.error(
+                    &format!("{key}.side"),
+                    side,
+                    "a side along x or y of a plane body",
+                ));
+            }
+            let name = boundary.depth_key().unwrap_or("layers");
+            if boundary.depth.is_some() && boundary.layers.is_some() {
+                return Err(source.error(
+                    &format!("{key}.depth"),
+                    "`depth` together with `layers`",
+                    "one of them",
+                ));
+            }
+            if boundary.layers == Some(0) {
+                return Err(source.error(&format!("{key}.layers"), 0, "at least 1"));
+            }
+            let layers = layers(boundary, &*body.bonds);
+            // particles of a lattice fill whole layers
+            let depth = match boundary.depth {
+                Some(depth) if body.bonds.as_lattice().is_none() => depth.si(),
+                _ => layers as f64 * spacing,
+            };
+            if depth <= 0.0 || boundary.depth.is_some_and(|depth| depth.si() <= 0.0) {
+                let found = format!("{} m", boundary.depth.map_or(0.0, |depth| depth.si()));
+                let allowed = format!("at least half a spacing, {} m: it holds no particle", 0.5 * spacing);
+                return Err(source.error(&format!("{key}.depth"), found, allowed));
+            }
+            let extent = body.bounds.1[axis] - body.bounds.0[axis];
+            if depth > extent * (1.0 + 1e-9) {
+                let found = format!("{layers} layers, {depth} m deep");
+                return Err(source.error(
+                    &format!("{key}.{name}"),
+                    found,
+                    format!("at most the body, {extent} m"),
+                ));
+            }
+            let (mut low, mut high) = ([f64::NEG_INFINITY; D], [f64::INFINITY; D]);
+            if upper {
+                low[axis] = body.bounds.1[axis] - depth;
+            } else {
+                high[axis] = body.bounds.0[axis] + depth;
+            }
+            (low, high, Some(depth))
+        }
+        (None, Some(min), Some(max)) if boundary.shapes.is_empty() => {
+            if let Some(name) = boundary.depth_key() {
+                return Err(source.error(
+                    &format!("{key}.{name}"),
+                    format!("`{name}`"),
+                    "nothing: the box has its own depth",
+                ));
+            }
+            let (min, max) =
+                (vector(source, &format!("{key}.min"), min)?, vector(source, &format!("{key}.max"), max)?);
+            ordered(source, key, min, max)?;
+            (min, max, None)
+        }
+        (None, None, None) if !boundary.shapes.is_empty() && boundary.depth_key().is_none() => {
+            ([f64::NEG_INFINITY; D], [f64::INFINITY; D], None)
+        }
+        (side, min, max) => {
+            let given = [side.is_some(), min.is_some() || max.is_some(), !boundary.shapes.is_empty()];
+            let several = given.iter().filter(|given| **given).count() > 1;
+            let found = if several { "several kinds of region" } else { "no region" };
+            return Err(source.error(key, found, "one of `side`, `shapes`, or `min` and `max`"));
+        }
+    };
+    let shapes = operations(source, &format!("{key}.shapes"), &boundary.shapes)?;
+    let inside = |&site: &u32| {
+        let position = body.bonds.position(site as usize);
+        let boxed = (0..D).all(|d| low[d] <= position[d] && position[d] <= high[d]);
+        boxed && (shapes.is_empty() || inside(&shapes, position))
+    };
+    Ok((body.bonds.particles().iter().copied().filter(inside).collect(), depth))
+}
+
+fn support<const D: usize>(
+    source: &Source,
+    key: &str,
+    boundary: &Boundary,
+    body: &Body<D>,
+    members: &[u32],
+    depth: Option<f64>,
+) -> Result<Support<D>, SceneError> {
+    let count = |name: &str, found: usize| {
+        if found == D {
+            Ok(())
+        } else {
+            Err(source.error(
+                &format!("{key}.{name}"),
+                format!("{found} components"),
+                format!("{D} components"),
+            ))
+        }
+    };
+    let either = |name: &str, both: bool, other: &str| match both {
+        true => Err(source.error(
+            &format!("{key}.{name}"),
+            format!("`{name}` together with `{other}`"),
+            "one of them",
+        )),
+        false => Ok(()),
+    };
+    let of_place = |name: &str, formula: &Formula| match formula.other_than(&"xyz"[..D]) {
+        Some(found) => {
+            let allowed = if D == 2 { "`x` and `y`" } else { "`x`, `y` and `z`" };
+            Err(source.error(&format!("{key}.{name}"), format!("`{found}` in `{}`", formula.text()), allowed))
+        }
+        None => Ok(()),
+    };
+    let mut support = Support { displacement: [None; D], body_force: [0.0; D] };
+    if let Some(traction) = &boundary.traction {
+        count("traction", traction.len())?;
+        if boundary.side.is_none() {
+            let allowed = "`side`, or `force` on the box";
+            return Err(source.error(&format!("{key}.traction"), "a traction on a box", allowed));
+        }
+        if let Some(depth) = depth {
+            support.body_force = std::array::from_fn(|d| traction[d].si() / depth);
+        }
+    }
+    if let Some(force) = &boundary.force {
+        count("force", force.len())?;
+        let volume: f64 = members.iter().map(|&site| body.bonds.volume(site as usize)).sum();
+        for d in 0..D {
+            support.body_force[d] += force[d].si() / volume;
+        }
+    }
+    if let Some(displacement) = &boundary.displacement {
+        count("displacement", displacement.len())?;
+        support.displacement = std::array::from_fn(|d| match displacement[d] {
+            Prescribed::Free => None,
+            Prescribed::At(value) => Some(value),
+        });
+    }
+    if super::rotation::rotation_of::<D>(source, key, boundary)?.is_some() {
+        for (d, component) in support.displacement.iter_mut().enumerate() {
+            let free = boundary.displacement.as_ref().is_some_and(|given| given[d] == Prescribed::Free);
+            *component = if free { None } else { Some(component.unwrap_or(0.0)) };
+        }
+    }
+    if let Some(field) = &boundary.displacement_field {
+        count("displacement_field", field.len())?;
+        either("displacement_field", boundary.displacement.is_some(), "displacement")?;
+        for (d, constrained) in field.iter().enumerate() {
+            if let PrescribedField::By(formula) = constrained {
+                of_place(&format!("displacement_field[{d}]"), formula)?;
+                support.displacement[d] = Some(0.0);
+            }
+        }
+    }
+    if let Some(velocity) = &boundary.velocity {
+        count("velocity", velocity.len())?;
+    }
+    if let Some(field) = &boundary.velocity_field {
+        count("velocity_field", field.len())?;
+        either("velocity_field", boundary.velocity.is_some(), "velocity")?;
+        for (d, formula) in field.iter().enumerate() {
+            of_place(&format!("velocity_field[{d}]"), formula)?;
+        }
+    }
+    if boundary.traction.is_none() && boundary.force.is_none() && !boundary.holds() && !boundary.moves() {
+        return Err(source.error(
+            key,
+            "a region without a condition",
+            "`traction`, `force`, `displacement`, `rotation` or, in explicit dynamics, `velocity`",
+        ));
+    }
+    Ok(support)
+}

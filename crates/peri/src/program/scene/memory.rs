@@ -1,0 +1,178 @@
+//! Memory that a variant needs, stated before it is solved and, as far as its lattice determines it, before it is built.
+//!
+//! Counted are the arrays that live at once, in bytes a site or a particle; the test `memory` of the workspace compares
+//! the sum with what whole runs take.
+
+use super::{Method, Scene};
+use crate::bonds::{Bonds, Stencil, storage};
+use crate::material::Point;
+use crate::solver::{Lbfgs, Record};
+use harness::scene::{SceneError, Source};
+use polycore::constitutive::Flags;
+use polycore::memory::{available, gib};
+
+/// Threads, the fitted law, tables.
+const ALWAYS: f64 = 20e6;
+/// Vector fields of any method: displacement, velocity, force and loads, what a pass sums, and a checkpoint, which is a
+/// copy of the first three in a list that grows.
+const FIELDS: f64 = 10.0;
+/// Equilibria before the last, from which the next is guessed, and their copies in a checkpoint; springs, in a component.
+const PAST: f64 = 6.0;
+/// Fields of L-BFGS beside its pairs, and bytes of its coarse level a particle: factors in both precisions while they are made.
+const FIELDS_OF_LBFGS: f64 = 8.0;
+const COARSE: f64 = 300.0;
+/// A face of a plane body with its entries, there and back; there are about four times as many in space.
+const FACE: f64 = 700.0;
+/// Sites and particles of contact: cells, their order, the list of near pairs.
+const CONTACT: f64 = 190.0;
+/// Damage: bonds at the start, what breaks.
+const BREAKING: f64 = 24.0;
+/// A particle in a field file: place, displacement, damage, line; two tensors of nine for each measure; what is packed.
+const WRITTEN: f64 = 64.0;
+const WRITTEN_TENSORS: f64 = 2.0 * 72.0;
+const PACKED: f64 = 160.0;
+/// Canvases and letters of pictures, and a particle in one: its place, its components, its reach, its cell.
+const PICTURES: f64 = 60e6;
+const DRAWN: f64 = 150.0;
+/// The same of a solid: two places, two values, its place in the lattice, its neighbours, the faces of its surface.
+const DRAWN_IN_SPACE: f64 = 350.0;
+/// A particle near a line: its site, its place, its cell, as they are sorted.
+const NEAR_LINE: f64 = 100.0;
+/// A bond of a cloud beside what it keeps: the lists while they are built.
+const BOND_LISTS: f64 = 12.0;
+
+/// Bytes of a lattice's bonds and of the solver's fields: what is known from its box of cells.
+fn of_sites<const D: usize>(scene: &Scene, sites: f64, stencil: usize) -> f64 {
+    let masks = 8.0 * stencil.div_ceil(64) as f64;
+    let vector = 8.0 * D as f64;
+    // a bit for what is occupied, its number, a surface factor twice while it is found
+    let mut each = masks + 8.0 + 2.0 * vector;
+    each += FIELDS * vector + if scene.material.critical.is_some() { PAST * vector } else { 8.0 };
+    if scene.method() == Method::Lbfgs {
+        // both fields of a pair are in single precision
+        each += (FIELDS_OF_LBFGS + Lbfgs::default().memory as f64) * vector + COARSE;
+    }
+    if let Some(contact) = &scene.contact {
+        each += CONTACT;
+        if !contact.plane.is_empty() {
+            // radii, volumes, bonds; faces of the sides of a cube, each over a column of two horizons
+            let side = 2.0 * D as f64 * sites.powf(-1.0 / D as f64);
+            each += 20.0 + side.min(1.0) * FACE * if D == 2 { 1.0 } else { 4.0 };
+        }
+        each += if contact.rubs() { 3.0 * vector } else { 0.0 };
+    }
+    if scene.material.solid.is_some() {
+        // states of particles, while they are made, and another set for outputs
+        let (state, passes) = (size_of::<Point<D>>() as f64, 8.0 * (1 + D * D) as f64 + 5.0);
+        each += if scene.observes_forces() { 3.0 * state + 2.0 * passes } else { 2.0 * state + passes };
+    }
+    if scene.material.critical.is_some() {
+        // the bonds at the start and at the end, a sum of each particle, for the area of cracks
+        each += BREAKING + 2.0 * masks + 8.0;
+    }
+    if scene.is_mixed() {
+        // displacement and surface factors in single precision
+        each += vector;
+    }
+    sites * each
+}
+
+/// Bytes of results, of `particles`.
+fn of_results<const D: usize>(scene: &Scene, particles: f64) -> f64 {
+    let tensor = 8.0 * (D * D) as f64;
+    let measures = scene.stress.as_ref().map_or(0, |stress| stress.measures.len()) as f64;
+    let kept = if scene.output.fields || !scene.output.line.is_empty() { 2.0 } else { 1.0 };
+    let mut each = if measures > 0.0 { (3.0 + kept * measures) * tensor } else { 0.0 };
+    if scene.output.fields {
+        each += WRITTEN + PACKED + WRITTEN_TENSORS * measures;
+    }
+    if scene.is_learnt() {
+        // flags, and as numbers
+        each += size_of::<Flags>() as f64 + 16.0;
+    }
+    if scene.output.pictures {
+        each += if D == 2 { DRAWN } else { DRAWN_IN_SPACE };
+    }
+    let rows = match &scene.dynamics {
+        Some(dynamics) => dynamics.method().records,
+        None => scene.solver.steps,
+    };
+    // a row of history and its copy in a checkpoint
+    let row = size_of::<Record>() + 24 * scene.boundary.len() + 48 * scene.output.section.len();
+    // a table: arc length, position twice, every column; near particles and their cells
+    let points = scene.output.line.iter().map(|line| line.points).max().unwrap_or(0) as f64;
+    let line = points * 8.0 * (2.0 + 4.0 * D as f64 + 2.0 * measures * (D * D) as f64);
+    if points > 0.0 {
+        each += NEAR_LINE;
+    }
+    let canvas = if scene.output.pictures { PICTURES } else { 0.0 };
+    canvas + line + particles * each + 2.0 * rows as f64 * row as f64
+}
+
+/// Bytes that the run of a variant needs at most, of a body that is built.
+pub fn needed<const D: usize>(scene: &Scene, bonds: &dyn Bonds<D>) -> f64 {
+    let (sites, particles) = (bonds.sites() as f64, bonds.particles().len() as f64);
+    let body = match bonds.as_lattice() {
+        Some(lattice) => of_sites::<D>(scene, sites, lattice.stencil().offsets.len()),
+        None => {
+            let directed = bonds.directed_bonds() as f64;
+            // the weights by which bonds are shared out, in lists that grow
+            let shared = if scene.stress.is_some() { 16.0 * directed + 24.0 * particles } else { 0.0 };
+            of_sites::<D>(scene, sites, 0)
+                + of_cloud::<D>(particles, directed)
+                + of_relief::<D>(scene, particles)
+                + of_pairs::<D>(scene, particles)
+                + shared
+        }
+    };
+    ALWAYS + body + of_results::<D>(scene, particles)
+}
+
+/// Bytes of a cloud: points as they are read, sorted and kept; bonds, where they differ in weight, and their lists.
+pub(super) fn of_cloud<const D: usize>(particles: f64, bonds: f64) -> f64 {
+    let padded = bonds + 8.0 * particles;
+    // and the rows that the kernel reads
+    particles * (6.0 * 8.0 * D as f64 + 96.0 + 32.0 * (D as f64 - 1.0))
+        + padded * (4.0 + 8.0 + 8.0 + BOND_LISTS)
+}
+
+/// Bytes of the short bonds of a cloud whose cracks have an area, in a list that grows, and of their sums.
+fn of_pairs<const D: usize>(scene: &Scene, particles: f64) -> f64 {
+    let pairs = if D == 2 { 4.0 } else { 13.0 };
+    if scene.material.critical.is_some() { particles * pairs * (16.0 + 8.0) } else { 0.0 }
+}
+
+/// Bytes of a solid in a cloud beside those of one on a lattice: θ, what it adds to states, and what the kernels read of a particle.
+fn of_relief<const D: usize>(scene: &Scene, particles: f64) -> f64 {
+    if scene.material.solid.is_none() {
+        return 0.0;
+    }
+    let (vector, tensor) = (8.0 * D as f64, 8.0 * (D * D) as f64);
+    let (state, passes) = (3.0 * tensor + 24.0, 96.0 + 64.0 * D as f64 - tensor);
+    let each = if scene.observes_forces() { 3.0 * state + 2.0 * passes } else { 2.0 * state + passes };
+    particles * (vector + each)
+}
+
+/// What a run takes at least, whose lattice has these cells: before any of it is allocated.
+pub(super) fn of_lattice<const D: usize>(scene: &Scene, cells: [f64; D], ratio: f64) -> (f64, f64) {
+    let sites = storage(cells, ratio);
+    (sites, of_sites::<D>(scene, sites, Stencil::<D>::new(ratio).offsets.len()))
+}
+
+/// Refuses a body that is built where its run would not fit.
+///
+/// # Errors
+/// What is needed and what there is, at `key`.
+pub(super) fn refuse_too_large<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    key: &str,
+    bonds: &dyn Bonds<D>,
+) -> Result<(), SceneError> {
+    let (needed, available) = (needed(scene, bonds), available());
+    if needed <= available {
+        return Ok(());
+    }
+    let found = format!("{} particles, whose run needs about {}", bonds.particles().len(), gib(needed));
+    Err(source.error(key, found, format!("at most {} (the available memory)", gib(available))))
+}

@@ -1,0 +1,487 @@
+//! The scene of a peridynamic problem, as written in TOML. Only what a scene names is built.
+
+mod boundary;
+mod bridges;
+mod build;
+mod cells;
+mod check;
+mod cloud;
+mod contact;
+mod crack;
+mod expect;
+mod explain;
+mod field;
+mod followed;
+mod formula;
+mod grips;
+mod inclusion;
+mod line;
+mod loads;
+mod memory;
+mod method;
+mod parts;
+mod placement;
+mod planes;
+mod probe;
+mod rotation;
+mod solid;
+mod tearing;
+mod values;
+mod variant;
+mod warn;
+
+pub use boundary::{Boundary, Prescribed, PrescribedField, RotationSpec, Side};
+pub use build::{body_of, least_memory};
+pub use check::{check, check_variant};
+pub use contact::{ContactSpec, PlaneSpec, of_plane, tied_grips};
+pub use crack::{cuts_of, severed_of_each};
+pub use expect::{quantities, quantities_of};
+pub use explain::explain;
+pub use field::{FieldSpec, Parameter};
+pub use followed::{Followed, followed};
+pub use formula::Formula;
+pub use grips::free_lengths;
+pub use inclusion::{Inclusion, Inclusions};
+pub use line::{LineField, SectionSpec, line_fields};
+pub use loads::{loads_of, region_names, velocities_of};
+pub use memory::needed as memory_needed;
+pub use method::{Dynamics, Method, Precision, Solver};
+pub use placement::{check_placement, exact_plate};
+pub use probe::{Probe, Track};
+pub use solid::{SolidKind, SolidLaw};
+pub use tearing::{explain_tearing, tearing_warnings};
+pub use values::{Body, plain};
+pub use variant::Variant;
+pub use warn::warnings;
+
+use crate::bonds::VolumeCorrection;
+use crate::calibrate::{Calibration, Space};
+use crate::critical::{Convention, Critical};
+use crate::potential::Law;
+use crate::stress::{BallVolume, Measure};
+use harness::report::Expect;
+use harness::scene::{LineSpec, SolidSpec};
+use polycore::units::{Length, Stress};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A whole scene.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// The program that runs it: `peri`.
+    pub program: Program,
+    /// One line for tables and pictures.
+    #[serde(default)]
+    pub title: String,
+    /// Geometry and discretisation.
+    pub body: BodySpec,
+    /// Bond law.
+    pub material: Material,
+    /// Loads and supports.
+    #[serde(default)]
+    pub boundary: Vec<Boundary>,
+    /// Solver settings.
+    #[serde(default)]
+    pub solver: Solver,
+    /// Density and times of explicit dynamics.
+    pub dynamics: Option<Dynamics>,
+    /// Repulsion of particles without a bond, friction, rigid planes; default: none.
+    pub contact: Option<ContactSpec>,
+    /// Quantities recorded in every row of the history.
+    #[serde(default)]
+    pub probe: Vec<Probe>,
+    /// Stress output; without it no stress is computed.
+    pub stress: Option<StressSpec>,
+    /// A closed-form solution to compare with.
+    pub exact: Option<ExactSpec>,
+    /// Files to write.
+    #[serde(default)]
+    pub output: OutputSpec,
+    /// Variants to run instead of the scene's own discretisation.
+    #[serde(default)]
+    pub study: Vec<Study>,
+    /// Expected results.
+    #[serde(default)]
+    pub expect: Vec<Expect>,
+}
+
+/// The only program that runs these scenes.
+#[derive(Clone, Copy, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Program {
+    /// This crate.
+    Peri,
+}
+
+/// Geometry: shapes on a regular lattice, or points from a file.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BodySpec {
+    /// `plane-stress`, `plane-strain` or `solid`.
+    pub space: Space,
+    /// Thickness of a plane body.
+    pub thickness: Option<Length>,
+    /// Distance of neighbouring particles, with `shapes`.
+    pub spacing: Option<Length>,
+    /// Horizon over spacing, m = δ/Δx, with `shapes`.
+    pub horizon_ratio: Option<f64>,
+    /// Horizon, with `points` or `grid`.
+    pub horizon: Option<Length>,
+    /// Shapes added and cut in order.
+    pub shapes: Option<Vec<ShapeSpec>>,
+    /// CSV file with the columns x, y(, z) in m and volume in m³.
+    pub points: Option<PathBuf>,
+    /// A box of cells that may have unequal sides, with `horizon`.
+    pub grid: Option<GridSpec>,
+    /// Bonds across gaps: between parts that do not touch and across cuts narrower than the horizon. Default: false; of points
+    /// that form no lattice: true.
+    pub bond_gaps: Option<bool>,
+    /// Cracks of zero width.
+    #[serde(default)]
+    pub cracks: Vec<CrackSpec>,
+}
+
+/// A box of equal cells, a particle in the middle of each.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GridSpec {
+    /// Lower corner.
+    pub min: Vec<Length>,
+    /// Upper corner.
+    pub max: Vec<Length>,
+    /// Cells along each axis.
+    pub cells: Vec<usize>,
+}
+
+impl BodySpec {
+    /// Whether it has points instead of shapes.
+    pub fn has_points(&self) -> bool {
+        self.points.is_some() || self.grid.is_some()
+    }
+
+    /// The shapes, none where there are points.
+    pub fn shapes(&self) -> &[ShapeSpec] {
+        self.shapes.as_deref().unwrap_or_default()
+    }
+}
+
+/// Default horizon over spacing, as in the thesis.
+pub const HORIZON_RATIO: f64 = 3.015;
+
+/// One shape; which lengths it needs depends on its kind.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ShapeSpec {
+    /// Kind of an added shape.
+    pub add: Option<ShapeKind>,
+    /// Kind of a shape that is cut out.
+    pub cut: Option<ShapeKind>,
+    /// Lower corner of a box.
+    pub min: Option<Vec<Length>>,
+    /// Upper corner of a box.
+    pub max: Option<Vec<Length>>,
+    /// Centre of a disk, ball or cylinder.
+    pub centre: Option<Vec<Length>>,
+    /// Radius of a disk, ball or cylinder.
+    pub radius: Option<Length>,
+    /// Length of a cylinder.
+    pub length: Option<Length>,
+    /// Axis of a cylinder.
+    pub axis: Option<Axis>,
+}
+
+/// Kinds of shapes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ShapeKind {
+    /// Axis-parallel box (2D: rectangle).
+    Box,
+    /// Disk, in 2D.
+    Disk,
+    /// Ball, in 3D.
+    Ball,
+    /// Cylinder along an axis, in 3D.
+    Cylinder,
+}
+
+/// A coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// First.
+    X,
+    /// Second.
+    Y,
+    /// Third.
+    Z,
+}
+
+/// A crack of zero width: the segment `from`–`to` in 2D, the parallelogram `from`, `to`, `and` (two neighbouring
+/// corners of `from`) in 3D.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CrackSpec {
+    /// First corner.
+    pub from: Vec<Length>,
+    /// A neighbouring corner.
+    pub to: Vec<Length>,
+    /// The other neighbouring corner, in 3D.
+    pub and: Option<Vec<Length>>,
+}
+
+/// The bond law and its constants, or a solid.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// Young's modulus E of the continuum, of bond laws; ν follows from the space.
+    pub youngs_modulus: Option<Stress>,
+    /// Bond law; default: `chain-offset`.
+    pub law: Option<Law>,
+    /// A solid with any Poisson ratio in place of a bond law.
+    pub solid: Option<SolidLaw>,
+    /// Links per bond n̄, for the chain laws.
+    pub links: Option<f64>,
+    /// Dissociation energy over kθ, D̂, for the chain laws.
+    pub dissociation: Option<f64>,
+    /// Scale kθ so that the small-strain modulus is exact; default by law.
+    pub rescale: Option<bool>,
+    /// kθ from the continuum's integrals or from the lattice's sums.
+    #[serde(default)]
+    pub calibration: Calibration,
+    /// Volumes near the horizon.
+    #[serde(default)]
+    pub volume_correction: VolumeCorrection,
+    /// Bonds near free surfaces.
+    #[serde(default)]
+    pub surface_correction: SurfaceCorrection,
+    /// Critical stretch, beyond which bonds break; default: no bond breaks.
+    pub critical: Option<Critical>,
+    /// Parts of the body that are stiffer or softer.
+    #[serde(default)]
+    pub inclusions: Vec<Inclusion>,
+    /// Parameters that follow fields of other scenes.
+    #[serde(default)]
+    pub fields: Vec<FieldSpec>,
+}
+
+/// Whether bonds near a free surface are stiffened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfaceCorrection {
+    /// As printed.
+    #[default]
+    None,
+    /// Until a homogeneous strain stores the continuum's energy (Madenci & Oterkus).
+    Energy,
+}
+
+/// Stress output.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StressSpec {
+    /// Measures to compute; the first is drawn.
+    pub measures: Vec<Measure>,
+    /// Volume of the averaging ball of `ball-share`.
+    #[serde(default)]
+    pub ball: BallVolume,
+    /// The component that pictures of stages show, e.g. `22`; default: the largest principal stress, of a plane body that in the plane.
+    pub component: Option<String>,
+}
+
+impl StressSpec {
+    /// Row and column of the component, from 0.
+    pub fn component(&self) -> Option<[usize; 2]> {
+        let digits: Vec<usize> =
+            self.component.as_ref()?.chars().map(|c| c.to_digit(10).map_or(9, |d| d as usize)).collect();
+        match digits[..] {
+            [a @ 1..=3, b @ 1..=3] => Some([a - 1, b - 1]),
+            _ => None,
+        }
+    }
+}
+
+/// Closed-form solutions.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(tag = "problem", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum ExactSpec {
+    /// Circular hole at the origin in a plate under remote tension along x, Eqs (2.81)–(2.83).
+    Kirsch {
+        /// Radius of the hole.
+        radius: Length,
+        /// Remote stress.
+        remote_stress: Stress,
+    },
+    /// The same in the body's own rectangle, by [`crate::exact::Plate`]: free hole, tractions `remote_stress` on the sides x+
+    /// and x−, acting in their layers.
+    PlateWithHole {
+        /// Radius of the hole.
+        radius: Length,
+        /// Traction on the sides.
+        remote_stress: Stress,
+    },
+}
+
+impl ExactSpec {
+    /// Radius of the hole, m, and the stress far from it, Pa.
+    pub fn hole(&self) -> (f64, f64) {
+        let (Self::Kirsch { radius, remote_stress } | Self::PlateWithHole { radius, remote_stress }) = self;
+        (radius.si(), remote_stress.si())
+    }
+
+    /// Name in scenes.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Kirsch { .. } => "kirsch",
+            Self::PlateWithHole { .. } => "plate-with-hole",
+        }
+    }
+
+    /// What errors of a measure are called, `MEASURE_…`.
+    pub fn errors(&self) -> &'static [&'static str] {
+        match self {
+            Self::Kirsch { .. } => &["rmse", "rmse_inner"],
+            Self::PlateWithHole { .. } => {
+                &["rmse", "rmse_inner", "rmse_bulk", "rmse_ring", "rmse_kirsch", "rmse_inner_kirsch"]
+            }
+        }
+    }
+}
+
+/// Files to write beside the report.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct OutputSpec {
+    /// Pictures (PNG).
+    pub pictures: bool,
+    /// Fields as VTKHDF.
+    pub fields: bool,
+    /// Write the fields every so many steps, and in every step in which bonds break; default: at the end only.
+    pub every: Option<usize>,
+    /// Pictures of so many stages from the last whole state to the end, of what is written with `every`.
+    pub stages: usize,
+    /// How pictures show a solid.
+    pub solid: Option<SolidSpec>,
+    /// Where a learnt law is uncertain, as a field and in pictures.
+    pub flags: bool,
+    /// Displacements at which the load becomes a value of the report: `load_at_20mm`.
+    pub load_at: Vec<Length>,
+    /// The integrals over the horizon of Appendix A, by quadrature, among the values of the report.
+    pub integrals: bool,
+    /// Reference for the variants.
+    pub compare: Option<CompareSpec>,
+    /// Lines along which fields are written at the end.
+    pub line: Vec<LineSpec>,
+    /// Planes across which the transmitted force is written in every row of the history.
+    pub section: Vec<SectionSpec>,
+}
+
+/// A reference for one result: that of a variant, or a number.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CompareSpec {
+    /// The result, such as `peak_load`.
+    pub quantity: String,
+    /// Name of the reference variant.
+    pub variant: Option<String>,
+    /// The reference value, in SI units.
+    pub value: Option<f64>,
+}
+
+impl Default for OutputSpec {
+    fn default() -> Self {
+        Self {
+            pictures: true,
+            fields: true,
+            every: None,
+            stages: 5,
+            solid: None,
+            flags: false,
+            load_at: Vec::new(),
+            integrals: false,
+            compare: None,
+            line: Vec::new(),
+            section: Vec::new(),
+        }
+    }
+}
+
+/// A set of variants: every combination of the listed values; other keys keep the scene's value. A replaced part of the
+/// scene is replaced as a whole.
+#[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Study {
+    /// Suffix of the variants' names.
+    pub name: Option<String>,
+    /// Expected behaviour, for the table of a suite.
+    pub description: Option<String>,
+    /// The run must end with an error that contains this.
+    pub expect_error: Option<String>,
+    /// Values by their paths (`"solver.tolerance"`, `"boundary[1].displacement"`), merged into the scene.
+    #[schemars(with = "Option<BTreeMap<String, serde_json::Value>>")]
+    pub set: Option<BTreeMap<String, IgnoredAny>>,
+    /// Instead of `body.shapes`.
+    pub shapes: Option<Vec<ShapeSpec>>,
+    /// Instead of `body.cracks`.
+    pub cracks: Option<Vec<CrackSpec>>,
+    /// Instead of `material`.
+    pub material: Option<Material>,
+    /// Instead of `material.critical`.
+    pub critical: Option<Critical>,
+    /// Instead of `boundary`.
+    pub boundary: Option<Vec<Boundary>>,
+    /// Instead of `solver`.
+    pub solver: Option<Solver>,
+    /// Instead of `dynamics`.
+    pub dynamics: Option<Dynamics>,
+    /// Instead of `contact`.
+    pub contact: Option<ContactSpec>,
+    /// Spacings.
+    pub spacing: Vec<Length>,
+    /// Horizon ratios.
+    pub horizon_ratio: Vec<f64>,
+    /// Surface corrections.
+    pub surface_correction: Vec<SurfaceCorrection>,
+    /// Volume corrections.
+    pub volume_correction: Vec<VolumeCorrection>,
+    /// Part of `--quick` runs.
+    pub quick: Option<bool>,
+}
+
+/// The JSON Schema of scenes.
+pub fn schema() -> serde_json::Value {
+    harness::scene::schema("peri", crate::program::quantities::ALL, |generator| {
+        vec![generator.subschema_for::<Scene>()]
+    })
+}
+
+impl Scene {
+    /// Whether outputs ask for forces, stresses or flags.
+    pub fn observes_forces(&self) -> bool {
+        let j_integral = self.probe.iter().any(|probe| probe.track == Track::JIntegral);
+        self.stress.is_some() || !self.output.section.is_empty() || j_integral || self.is_learnt()
+    }
+
+    /// Whether its law is learnt from data.
+    pub fn is_learnt(&self) -> bool {
+        self.material.solid.as_ref().is_some_and(SolidLaw::is_learnt)
+    }
+
+    /// Whether the bonds of its law soften before they break.
+    pub fn softens(&self) -> bool {
+        self.material.critical.and_then(|own| own.convention) == Some(Convention::Softening)
+    }
+
+    /// Largest relative error of the fitted bond law.
+    pub fn fit_bound(&self) -> f64 {
+        let rough = self.material.critical.is_some() || self.is_mixed();
+        self.solver.fit_bound.unwrap_or(if rough { 1e-6 } else { 1e-9 })
+    }
+
+    /// Whether forces of bonds are evaluated in mixed precision.
+    pub fn is_mixed(&self) -> bool {
+        self.dynamics.as_ref().is_some_and(|dynamics| dynamics.precision == Precision::Mixed)
+    }
+}

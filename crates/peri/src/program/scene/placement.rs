@@ -1,0 +1,110 @@
+//! What a scene names beside its body must lie where the body is: a closed form's hole, displacements of the loads.
+
+use super::loads::layers;
+use super::values::Body;
+use super::{ExactSpec, Scene, Side};
+use crate::exact::Plate;
+use crate::solver::Loads;
+use harness::scene::{SceneError, Source};
+
+/// Checks what only the body and its loads can tell.
+///
+/// # Errors
+/// A hole of `[exact]` that the body does not have; a load requested at a displacement that is never reached.
+pub fn check_placement<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+    loads: &Loads<D>,
+) -> Result<(), SceneError> {
+    if let Some(exact) = &scene.exact {
+        hole(source, body, exact.hole().0)?;
+    }
+    plate_frame(source, scene, body)?;
+    super::planes::check(source, scene, body)?;
+    let planes = scene.contact.as_ref().map_or(Ok(Vec::new()), |contact| contact.planes(source, false))?;
+    let rigid: Vec<[f64; D]> = planes.iter().map(|plane| plane.displacement).collect();
+    let reach = loads.reach(&*body.bonds, &rigid);
+    // under forces alone nobody knows before the run how far they get
+    let beyond = |at: f64| reach > 0.0 && at > reach * (1.0 + 1e-9);
+    match scene.output.load_at.iter().position(|at| beyond(at.si())) {
+        Some(index) => {
+            let found = format!("{} m, beyond the last displacement", scene.output.load_at[index].si());
+            Err(source.error(&format!("output.load_at[{index}]"), found, format!("up to {reach} m")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Half the edges of the plate that `[exact]` names, and the width of its loaded layers, m; none for other problems.
+fn plate_frame<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<Option<([f64; 2], f64)>, SceneError> {
+    let Some(exact @ ExactSpec::PlateWithHole { .. }) = &scene.exact else { return Ok(None) };
+    let (low, high) = &body.bounds;
+    let half = [0.5 * (high[0] - low[0]), 0.5 * (high[1] - low[1])];
+    if (0..2).any(|d| (low[d] + high[d]).abs() > 1e-6 * half[d]) {
+        let found = format!("a body from {low:?} to {high:?} m");
+        return Err(source.error("exact.problem", found, "a rectangle about the origin"));
+    }
+    let mut widths = [0.0; 2];
+    for (index, boundary) in scene.boundary.iter().enumerate() {
+        let sign = match boundary.side {
+            Some(Side::XHigh) => 1.0,
+            Some(Side::XLow) => -1.0,
+            _ => f64::NAN,
+        };
+        let traction = boundary.traction.iter().flatten().map(|t| t.si());
+        let wanted = [sign * exact.hole().1, 0.0];
+        if !traction.eq(wanted) || boundary.force.is_some() || boundary.displacement.is_some() {
+            let allowed =
+                "the sides x+ and x- with tractions ± `exact.remote_stress` along x, and no other condition";
+            return Err(source.error(
+                &format!("boundary[{index}]"),
+                "a condition that `plate-with-hole` does not have",
+                allowed,
+            ));
+        }
+        widths[usize::from(sign < 0.0)] = layers(boundary, &*body.bonds) as f64 * body.bonds.spacing();
+    }
+    if widths[0] != widths[1] {
+        let found = format!("layers of {} and {} m at x+ and x-", widths[0], widths[1]);
+        return Err(source.error("boundary", found, "tractions on both, in layers of one width"));
+    }
+    Ok(Some((half, widths[0])))
+}
+
+/// The exact stresses of the plate that `[exact]` names, judged with the width of the scene's own loaded layers.
+///
+/// # Errors
+/// Loads or a body that the problem does not have; see [`check_placement`].
+pub fn exact_plate<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<Option<Plate>, SceneError> {
+    let Some((half, layer)) = plate_frame(source, scene, body)? else { return Ok(None) };
+    let radius = scene.exact.as_ref().map_or(0.0, |exact| exact.hole().0);
+    let plate = Plate::new(radius, half, layer).ok_or_else(|| {
+        let found =
+            format!("a radius of {radius} m in a plate of half edges {half:?} m, loaded layers of {layer} m");
+        source.error("exact.radius", found, "a hole that neither an edge nor a loaded layer touches")
+    })?;
+    Ok(Some(plate))
+}
+
+/// No particle inside the radius, and some at the rim.
+fn hole<const D: usize>(source: &Source, body: &Body<D>, radius: f64) -> Result<(), SceneError> {
+    let places = body.bonds.particles().iter().map(|&site| body.bonds.position(site as usize));
+    let distance = |place: &[f64; D]| place[0].hypot(place[1]);
+    let Some(nearest) = places.min_by(|a, b| distance(a).total_cmp(&distance(b))) else { return Ok(()) };
+    let rim = radius + 1.5 * body.bonds.spacing();
+    if (radius * (1.0 - 1e-9)..=rim).contains(&distance(&nearest)) {
+        return Ok(());
+    }
+    let [x, y] = [nearest[0], nearest[1]].map(|x| (x * 1e9).round() / 1e9);
+    let found = format!("{radius} m, but the particle nearest the origin is at ({x}, {y}) m");
+    Err(source.error("exact.radius", found, "the radius of a hole that the body has at the origin"))
+}

@@ -1,0 +1,214 @@
+//! Rigid planes beside a body: what they leave no room for, and what they will not reach.
+
+use super::values::Body;
+use super::{Method, Scene};
+use crate::contact::Plane;
+use harness::scene::{SceneError, Source};
+
+/// n₁·n₂ of planes that face each other.
+const FACING: f64 = -0.99;
+/// Part of the body between two planes that must be left.
+const LEFT: f64 = 0.2;
+/// Distance of the surface from a bonded plane, in spacings.
+const TIED: f64 = 0.5;
+/// Overlap of faces, in spacings, up to which particles are still in front of a plane.
+const PRESTRESSED: f64 = 0.01;
+/// Load factors at which planes are looked at.
+const LOOKS: u32 = 100;
+
+/// A plane of a scene with a unit normal, and the range of the body's particles along it, m.
+struct Seen<const D: usize> {
+    name: String,
+    plane: Plane<D>,
+    low: f64,
+    high: f64,
+    /// Height of the lowest point of the surface, m.
+    surface: f64,
+}
+
+impl<const D: usize> Seen<D> {
+    /// Height of the plane over its place at rest along its normal, m, at a load factor and a time, s.
+    fn raised(&self, factor: f64, time: f64) -> f64 {
+        let Plane { normal, displacement, velocity, .. } = self.plane;
+        (0..D).map(|d| normal[d] * (factor * displacement[d] + time * velocity[d])).sum()
+    }
+}
+
+fn seen<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Result<Vec<Seen<D>>, SceneError> {
+    let Some(contact) = &scene.contact else { return Ok(Vec::new()) };
+    let planes = contact.planes::<D>(source, scene.method() == Method::Verlet)?;
+    let surface = body.surface();
+    let each = planes.into_iter().enumerate().map(|(index, mut plane)| {
+        let size = crate::geometry::length(plane.normal);
+        plane.normal = plane.normal.map(|n| n / size);
+        let heights =
+            body.bonds.particles().iter().map(|&site| plane.height(body.bonds.position(site as usize)));
+        let (low, high) =
+            heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)));
+        let faces = surface.faces().iter().map(|face| plane.height(face.place));
+        let lowest = faces.fold(f64::INFINITY, f64::min);
+        let of_particles = low - 0.5 * body.bonds.spacing();
+        let lowest = if lowest.is_finite() { lowest } else { of_particles };
+        Seen { name: contact.plane[index].name(index), plane, low, high, surface: lowest }
+    });
+    Ok(each.collect())
+}
+
+/// Load factors and times, s, at which planes are looked at: all that are prescribed, and more between them.
+fn moments(scene: &Scene) -> Vec<(f64, f64)> {
+    let end = scene.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.method().end_time);
+    let even = (0..=LOOKS).map(|k| f64::from(k) / f64::from(LOOKS));
+    if scene.dynamics.is_some() {
+        let ramp = scene.dynamics.as_ref().map_or(0.0, |dynamics| dynamics.method().ramp);
+        let factor = |time: f64| if time < ramp { time / ramp } else { 1.0 };
+        return even.map(|part| (factor(part * end), part * end)).collect();
+    }
+    let factors = scene.solver.factors();
+    std::iter::once(0.0).chain(factors).map(|factor| (factor, 0.0)).collect()
+}
+
+/// Checks that planes are in front of the body at the start, and leave it room all along.
+///
+/// # Errors
+/// The plane, what was found and what is allowed.
+pub(super) fn check<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<(), SceneError> {
+    let (planes, spacing) = (seen(source, scene, body)?, body.bonds.spacing());
+    let particles = body.bonds.particles();
+    for (index, own) in planes.iter().enumerate() {
+        let key = format!("contact.plane[{index}]");
+        // the surface of a particle lies half a spacing from its centre
+        let allowed = 1e-6 * spacing;
+        if own.low < -allowed {
+            let behind = particles
+                .iter()
+                .filter(|&&site| own.plane.height(body.bonds.position(site as usize)) < -allowed)
+                .count();
+            let found = format!("{behind} of {} particles behind plane `{}`", particles.len(), own.name);
+            let advice = if own.high < allowed {
+                let opposite =
+                    own.plane.normal.map(|n| super::plain(if n == 0.0 { 0.0 } else { -n })).join(", ");
+                format!("a normal towards the body: [{opposite}]")
+            } else {
+                "a plane with the whole body in front of it; `normal` points towards the body".to_owned()
+            };
+            return Err(source.error(&format!("{key}.normal"), found, advice));
+        }
+        if own.plane.bonded && own.surface.abs() >= TIED * spacing {
+            let found = format!("plane `{}` {:.3e} m from the surface of the body", own.name, own.surface);
+            let allowed =
+                format!("up to half a spacing, {:.3e} m: a bonded plane touches the body", TIED * spacing);
+            return Err(source.error(&format!("{key}.point"), found, allowed));
+        }
+        if own.plane.bonded && body.surface().faces().is_empty() {
+            let allowed = "false: a cloud of points has no faces to tie";
+            return Err(source.error(&format!("{key}.bonded"), "true", allowed));
+        }
+        for (other_index, other) in planes.iter().enumerate().skip(index + 1) {
+            let turn: f64 = (0..D).map(|d| own.plane.normal[d] * other.plane.normal[d]).sum();
+            if turn > FACING {
+                continue;
+            }
+            let apart = own.plane.height(other.plane.point);
+            let body_between = own.high - own.low + spacing;
+            for (factor, time) in moments(scene) {
+                let gap = apart - own.raised(factor, time) - other.raised(factor, time);
+                if gap < LEFT * body_between {
+                    let when = if time > 0.0 {
+                        format!("time {time:.3e} s")
+                    } else {
+                        format!("load factor {factor:.3}")
+                    };
+                    let found = format!(
+                        "planes `{}` and `{}` {:.3e} m apart at {when}, with {body_between:.3e} m of the body between them",
+                        own.name, other.name, gap
+                    );
+                    let allowed = format!("at least {:.3e} m, a fifth of the body", LEFT * body_between);
+                    let key = format!("contact.plane[{other_index}].displacement");
+                    return Err(source.error(&key, found, allowed));
+                }
+            }
+        }
+    }
+    if let Some((factor, time)) = moments(scene).into_iter().find(|&(f, t)| !has_room(&planes, body, f, t)) {
+        let when = if time > 0.0 { format!("time {time:.3e} s") } else { format!("load factor {factor:.3}") };
+        let names: Vec<String> = planes.iter().map(|seen| format!("`{}`", seen.name)).collect();
+        let found = format!("planes {} that leave no room between them at {when}", names.join(", "));
+        return Err(source.error(
+            "contact.plane",
+            found,
+            "planes with room for the body in front of all of them",
+        ));
+    }
+    Ok(())
+}
+
+/// Whether some point near the body is in front of all planes: the largest t with n_i·x − h_i ≥ t is positive. It is at a corner, where
+/// D + 1 of the constraints hold with equality.
+fn has_room<const D: usize>(planes: &[Seen<D>], body: &Body<D>, factor: f64, time: f64) -> bool {
+    let (low, high) = body.bounds;
+    let size = (0..D).map(|d| high[d] - low[d]).fold(0.0, f64::max);
+    // n·x − t ≥ h of planes and of a box ten times the body
+    let mut rows: Vec<([f64; D], f64)> = Vec::new();
+    for seen in planes {
+        let at: f64 = (0..D).map(|d| seen.plane.normal[d] * seen.plane.point[d]).sum();
+        rows.push((seen.plane.normal, at + seen.raised(factor, time)));
+    }
+    if rows.len() < 2 {
+        return true;
+    }
+    for d in 0..D {
+        let middle = 0.5 * (low[d] + high[d]);
+        for sign in [1.0, -1.0] {
+            let normal = std::array::from_fn(|e| if e == d { sign } else { 0.0 });
+            rows.push((normal, sign * middle - 10.0 * size));
+        }
+    }
+    let least = |x: &[f64]| {
+        let slack = |(n, h): &([f64; D], f64)| (0..D).map(|d| n[d] * x[d]).sum::<f64>() - h;
+        rows.iter().map(slack).fold(f64::INFINITY, f64::min)
+    };
+    let count = rows.len();
+    let mut chosen: Vec<usize> = (0..=D).collect();
+    loop {
+        let matrix =
+            nalgebra::DMatrix::from_fn(D + 1, D + 1, |i, j| if j < D { rows[chosen[i]].0[j] } else { -1.0 });
+        let right = nalgebra::DVector::from_fn(D + 1, |i, _| rows[chosen[i]].1);
+        if let Some(corner) = matrix.lu().solve(&right)
+            && corner.iter().all(|x| x.is_finite())
+            && least(corner.as_slice()) > 1e-9 * size
+        {
+            return true;
+        }
+        // the next choice of D + 1 of them
+        let Some(at) = (0..=D).rev().find(|&k| chosen[k] < count - 1 - (D - k)) else { return false };
+        chosen[at] += 1;
+        for k in at + 1..=D {
+            chosen[k] = chosen[k - 1] + 1;
+        }
+    }
+}
+
+/// One sentence for each plane that presses at the start, or that will not reach the body.
+pub(super) fn warnings<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Vec<String> {
+    let (planes, spacing) = (seen(source, scene, body).unwrap_or_default(), body.bonds.spacing());
+    let of = |seen: &Seen<D>| {
+        let gap = seen.surface;
+        if gap < -PRESTRESSED * spacing {
+            return Some(format!(
+                "plane `{}` stands {:.3e} m inside the surface of the body at the start: it presses before it moves",
+                seen.name, -gap
+            ));
+        }
+        let moves = seen.plane.displacement != [0.0; D] || seen.plane.velocity != [0.0; D];
+        let reach = moments(scene).into_iter().map(|(f, t)| seen.raised(f, t)).fold(0.0, f64::max);
+        let far = reach < gap - PRESTRESSED * spacing && !seen.plane.bonded;
+        (moves && far && scene.dynamics.is_none()).then(|| {
+            format!("plane `{}` comes {reach:.3e} m nearer to the body, whose gap is {gap:.3e} m: it does not reach it", seen.name)
+        })
+    };
+    planes.iter().filter_map(of).collect()
+}

@@ -1,0 +1,313 @@
+//! Quantities that a scene records in every row of the history: displacements, strains between marks, rotations, crack tips, wave
+//! fronts, J-integrals.
+
+use super::loads::region;
+use super::values::{Body, vector};
+use super::{Axis, Boundary, Method, Scene, Side};
+use crate::calibrate::Space;
+use crate::program::quantities as q;
+use harness::report::{Named, Quantity};
+use harness::scene::{SceneError, Source};
+use polycore::units::Length;
+use serde::{Deserialize, Serialize};
+
+/// A quantity recorded in every row of the history.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    /// Its column in the history, and the prefix of its values.
+    pub name: String,
+    /// Its quantity.
+    pub track: Track,
+    /// Direction, or axis of rotation.
+    pub axis: Option<Axis>,
+    /// A side of the bounding box; default: the whole body.
+    pub side: Option<Side>,
+    /// Its depth in particles.
+    pub layers: Option<usize>,
+    /// Or a box: lower corner …
+    pub min: Option<Vec<Length>>,
+    /// … and upper corner.
+    pub max: Option<Vec<Length>>,
+    /// Marks of a strain.
+    pub from: Option<Vec<Length>>,
+    /// The other mark.
+    pub to: Option<Vec<Length>>,
+    /// Damage, from and to, of the particles at a crack's tip.
+    pub damage: Option<[f64; 2]>,
+    /// Axis along which the distance of a crack's tip from 0 is recorded.
+    pub across: Option<Axis>,
+    /// Two places between which a crack's or a front's speed is measured.
+    pub gauges: Option<[Length; 2]>,
+    /// Velocity of a front, as a fraction of the largest.
+    pub threshold: Option<f64>,
+    /// Crack tip of a J-integral.
+    pub tip: Option<Vec<Length>>,
+    /// Radii about the tip between which it is taken.
+    pub radii: Option<[Length; 2]>,
+}
+
+/// Quantities of a probe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Track {
+    /// Mean displacement of the region along the axis, m.
+    Displacement,
+    /// Distance of two marks over that at rest, less 1.
+    Strain,
+    /// Rotation of the region about the axis through the origin, rad.
+    Rotation,
+    /// Farthest place along the axis with damage in a range, m.
+    Crack,
+    /// Farthest place along the axis at which the velocity along it is a part of the largest, m.
+    Front,
+    /// J-integral of a crack that grows along the axis, J/m².
+    JIntegral,
+}
+
+impl Track {
+    /// Unit of its column.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Displacement | Self::Crack | Self::Front => "m",
+            Self::Rotation => "rad",
+            Self::Strain => "",
+            Self::JIntegral => "J/m²",
+        }
+    }
+}
+
+impl Axis {
+    /// 0, 1 or 2.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+impl Probe {
+    /// Names of its values.
+    pub fn values(&self) -> Vec<Named> {
+        let front = [q::PROBE_SPEED, q::PROBE_BETWEEN_GAUGES, q::PROBE_BACKSTEP];
+        let more = match self.track {
+            Track::Displacement | Track::Strain | Track::JIntegral => Vec::new(),
+            Track::Rotation => vec![q::PROBE_FREQUENCY, q::PROBE_RATE],
+            Track::Crack => [&front[..], &[q::PROBE_ACROSS]].concat(),
+            Track::Front => front.to_vec(),
+        };
+        let all = [q::PROBE, q::PROBE_PEAK].into_iter().chain(more);
+        all.map(|quantity| self.named(quantity)).collect()
+    }
+
+    /// A quantity of this probe, in its unit where it has none of its own.
+    pub fn named(&self, quantity: Quantity) -> Named {
+        let named = quantity.of(&[&self.name]);
+        if named.unit == "*" { named.in_unit(self.track.unit()) } else { named }
+    }
+
+    /// Sites of its region, of the whole body where it names none.
+    ///
+    /// # Errors
+    /// As [`super::body_of`].
+    pub fn members<const D: usize>(
+        &self,
+        source: &Source,
+        key: &str,
+        body: &Body<D>,
+    ) -> Result<Vec<u32>, SceneError> {
+        if self.side.is_none() && self.min.is_none() && self.max.is_none() {
+            return Ok(body.bonds.particles().to_vec());
+        }
+        let place = Boundary {
+            side: self.side,
+            layers: self.layers,
+            min: self.min.clone(),
+            max: self.max.clone(),
+            ..Boundary::default()
+        };
+        let (members, _) = region(source, key, &place, body)?;
+        if members.is_empty() {
+            return Err(source.error(key, "a region without particles", "a region with at least one"));
+        }
+        Ok(members)
+    }
+
+    /// The particles at the two marks of a strain: the nearest, and all that are as near.
+    ///
+    /// # Errors
+    /// Marks that are one.
+    pub fn marks<const D: usize>(
+        &self,
+        source: &Source,
+        key: &str,
+        body: &Body<D>,
+    ) -> Result<[Vec<u32>; 2], SceneError> {
+        let near = |name: &str, mark: &Option<Vec<Length>>| {
+            let mark = vector::<D>(source, &format!("{key}.{name}"), mark.as_deref().unwrap_or_default())?;
+            let distance = |site: u32| {
+                let place = body.bonds.position(site as usize);
+                (0..D).map(|d| (place[d] - mark[d]).powi(2)).sum::<f64>().sqrt()
+            };
+            let particles = body.bonds.particles();
+            let least = particles.iter().map(|&site| distance(site)).fold(f64::INFINITY, f64::min);
+            if least > 1.5 * body.bonds.spacing() {
+                let found = format!("{mark:?} m, {least:.3e} m from the nearest particle");
+                return Err(source.error(&format!("{key}.{name}"), found, "a place in the body"));
+            }
+            let most = least + 1e-6 * body.bonds.spacing();
+            Ok(particles.iter().copied().filter(|&site| distance(site) <= most).collect::<Vec<u32>>())
+        };
+        let marks = [near("from", &self.from)?, near("to", &self.to)?];
+        if marks[0] == marks[1] {
+            let found = "the same particles as `from`";
+            return Err(source.error(&format!("{key}.to"), found, "marks at least one spacing apart"));
+        }
+        Ok(marks)
+    }
+
+    /// The particles between the radii of a J-integral, each with its area times ∇q, m: q falls linearly from 1 at the inner radius
+    /// to 0 at the outer.
+    ///
+    /// # Errors
+    /// A ring without particles.
+    pub fn ring<const D: usize>(
+        &self,
+        source: &Source,
+        key: &str,
+        body: &Body<D>,
+    ) -> Result<(Vec<u32>, Vec<[f64; 2]>), SceneError> {
+        let tip = vector::<D>(source, &format!("{key}.tip"), self.tip.as_deref().unwrap_or_default())?;
+        let [inner, outer] = self.radii.map_or([0.0; 2], |radii| radii.map(|r| r.si()));
+        let (mut sites, mut weights) = (Vec::new(), Vec::new());
+        for &site in body.bonds.particles() {
+            let place = body.bonds.position(site as usize);
+            let arm = [place[0] - tip[0], place[1] - tip[1]];
+            let radius = arm[0].hypot(arm[1]);
+            if radius > inner && radius < outer {
+                let area = body.bonds.volume(site as usize) / body.thickness;
+                sites.push(site);
+                weights.push(arm.map(|x| -area * x / (radius * (outer - inner))));
+            }
+        }
+        if sites.is_empty() {
+            let found = format!("{inner} m to {outer} m about {tip:?} m, where no particle is");
+            return Err(source.error(&format!("{key}.radii"), found, "a ring with particles"));
+        }
+        Ok((sites, weights))
+    }
+}
+
+/// Checks what can be judged without a body.
+///
+/// # Errors
+/// The key, what was found and what is allowed.
+pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    let dimension = if scene.body.space == Space::Solid { 3 } else { 2 };
+    let taken = super::quantities(&Scene { probe: Vec::new(), ..scene.clone() });
+    let mut names: Vec<String> = taken.into_iter().map(|quantity| quantity.name).collect();
+    for (index, probe) in scene.probe.iter().enumerate() {
+        let key = |name: &str| format!("probe[{index}].{name}");
+        let letters = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
+        if probe.name.is_empty() || !probe.name.chars().all(letters) {
+            let found = format!("`{}`", probe.name);
+            return Err(source.error(&key("name"), found, "letters, digits, `_` and `-`"));
+        }
+        for Named { name: value, .. } in probe.values() {
+            if names.contains(&value) {
+                let found = format!("`{}`, of which `{value}` is taken", probe.name);
+                return Err(source.error(&key("name"), found, "a unique name"));
+            }
+            names.push(value);
+        }
+        let track = probe.track;
+        // name, given, belongs, needed
+        let of_crack = track == Track::Crack;
+        let moving = of_crack || track == Track::Front;
+        let of_j = track == Track::JIntegral;
+        let in_region = track != Track::Strain && !of_j;
+        for (name, given, belongs, needed) in [
+            ("axis", probe.axis.is_some(), track != Track::Strain, track != Track::Strain),
+            ("from", probe.from.is_some(), track == Track::Strain, track == Track::Strain),
+            ("to", probe.to.is_some(), track == Track::Strain, track == Track::Strain),
+            ("side", probe.side.is_some(), in_region, false),
+            ("min", probe.min.is_some(), in_region, false),
+            ("max", probe.max.is_some(), in_region, false),
+            ("tip", probe.tip.is_some(), of_j, of_j),
+            ("radii", probe.radii.is_some(), of_j, of_j),
+            ("damage", probe.damage.is_some(), of_crack, false),
+            ("across", probe.across.is_some(), of_crack, false),
+            ("gauges", probe.gauges.is_some(), moving, false),
+            ("threshold", probe.threshold.is_some(), track == Track::Front, false),
+        ] {
+            if given && !belongs {
+                let found = format!("`{name}` of a probe of `{}`", name_of(track));
+                return Err(source.error(&key(name), found, "nothing"));
+            }
+            if needed && !given {
+                let allowed = format!("a probe of `{}` needs `{name}`", name_of(track));
+                return Err(source.error(&key(name), "nothing", allowed));
+            }
+        }
+        for (name, axis) in [("axis", probe.axis), ("across", probe.across)] {
+            let plane_rotation = track == Track::Rotation && axis == Some(Axis::Z);
+            if axis.is_some_and(|axis| axis.index() >= dimension) && !plane_rotation {
+                return Err(source.error(&key(name), "`z` in a plane body", "`x` or `y`"));
+            }
+        }
+        if track == Track::Rotation && dimension == 2 && probe.axis != Some(Axis::Z) {
+            return Err(source.error(&key("axis"), "an axis in the plane", "`z` in a plane body"));
+        }
+        if of_crack && scene.material.critical.is_none() {
+            let allowed = "nothing, or `material.critical`: without it nothing breaks";
+            return Err(source.error(&key("track"), "`crack`", allowed));
+        }
+        if of_j && (dimension == 3 || scene.material.solid.is_none()) {
+            let found = if dimension == 3 {
+                "`j-integral` in three dimensions"
+            } else {
+                "`j-integral` of a bond law"
+            };
+            return Err(source.error(&key("track"), found, "a plane body with `material.solid`"));
+        }
+        if let Some([inner, outer]) = probe.radii
+            && !(inner.si() >= 0.0 && inner.si() < outer.si() && outer.si().is_finite())
+        {
+            let found = format!("{} m to {} m", inner.si(), outer.si());
+            return Err(source.error(&key("radii"), found, "0 ≤ inner < outer"));
+        }
+        if track == Track::Front && scene.method() != Method::Verlet {
+            return Err(source.error(
+                &key("track"),
+                "`front` without motion",
+                "`solver.method = \"verlet\"`",
+            ));
+        }
+        if let Some([low, high]) = probe.damage
+            && !(low > 0.0 && low <= high && high <= 1.0)
+        {
+            return Err(source.error(&key("damage"), format!("{low} to {high}"), "0 < from ≤ to ≤ 1"));
+        }
+        if let Some(threshold) = probe.threshold
+            && !(threshold > 0.0 && threshold < 1.0)
+        {
+            return Err(source.error(&key("threshold"), threshold, "between 0 and 1"));
+        }
+        if let Some([from, to]) = probe.gauges
+            && from.si() >= to.si()
+        {
+            let found = format!("{} m to {} m", from.si(), to.si());
+            return Err(source.error(&key("gauges"), found, "the nearer one first"));
+        }
+    }
+    Ok(())
+}
+
+fn name_of(track: Track) -> &'static str {
+    match track {
+        Track::Displacement => "displacement",
+        Track::Strain => "strain",
+        Track::Rotation => "rotation",
+        Track::Crack => "crack",
+        Track::Front => "front",
+        Track::JIntegral => "j-integral",
+    }
+}

@@ -1,0 +1,158 @@
+//! Boundaries that turn about an axis, and fields of displacements that would cut across the arc.
+
+use super::boundary::RotationSpec;
+use super::loads::region;
+use super::values::{Body, plain, vector};
+use super::{Boundary, Prescribed, PrescribedField, Scene};
+use crate::bonds::Bonds;
+use crate::solver::{Loads, Rotation, Support, Turned};
+use harness::scene::{SceneError, Source};
+use nalgebra::{DMatrix, SMatrix};
+
+/// Turn of a `displacement_field`, °, from which `check` points to `rotation`: at half of it, chords are shorter than the arc by 0.4 %.
+const LARGE: f64 = 10.0;
+/// Strain up to which a field turns the region as a whole.
+const RIGID: f64 = 0.02;
+
+/// The rotation of a boundary.
+///
+/// # Errors
+/// A point, an axis or an angle that is none, a free component that the rotation needs, a `displacement_field` beside it.
+pub(super) fn rotation_of<const D: usize>(
+    source: &Source,
+    key: &str,
+    boundary: &Boundary,
+) -> Result<Option<Rotation<D>>, SceneError> {
+    let Some(RotationSpec { point, axis, angle }) = &boundary.rotation else { return Ok(None) };
+    let key = format!("{key}.rotation");
+    let centre = vector::<D>(source, &format!("{key}.point"), point)?;
+    let axis: [f64; 3] = match (axis, D) {
+        (None, 2) => [0.0, 0.0, 1.0],
+        (Some(axis), 3) => {
+            let size = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let three = <[f64; 3]>::try_from(axis.as_slice()).ok().filter(|_| size > 0.0 && size.is_finite());
+            let three = three.ok_or_else(|| {
+                source.error(&format!("{key}.axis"), format!("{axis:?}"), "three numbers, not all of them 0")
+            })?;
+            three.map(|x| x / size)
+        }
+        (None, _) => {
+            return Err(source.error(
+                &format!("{key}.axis"),
+                "nothing",
+                "the direction of the axis, e.g. [0, 0, 1]",
+            ));
+        }
+        (Some(_), _) => {
+            return Err(source.error(
+                &format!("{key}.axis"),
+                "an axis",
+                "none: a plane body turns in its plane",
+            ));
+        }
+    };
+    if angle.si() == 0.0 {
+        return Err(source.error(&format!("{key}.angle"), "0", "an angle other than 0"));
+    }
+    if boundary.displacement_field.is_some() {
+        return Err(source.error(&key, "`rotation` together with `displacement_field`", "one of them"));
+    }
+    let moved = boundary.displacement.iter().flatten().enumerate();
+    for (d, _) in moved.filter(|(_, component)| **component == Prescribed::Free) {
+        if (0..3).any(|other| other != d && axis[other].abs() > 1e-9) || d >= D {
+            let allowed = "a length: a rotation prescribes all components but that along its axis";
+            return Err(source.error(
+                &key.replace("rotation", &format!("displacement[{d}]")),
+                "`free`",
+                allowed,
+            ));
+        }
+    }
+    Ok(Some(Rotation { centre, axis, angle: angle.si() }))
+}
+
+/// Turns regions; of two regions of prescribed displacement the last one holds.
+///
+/// # Errors
+/// As [`rotation_of`].
+pub(super) fn turn<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+    regions: &[(Vec<u32>, Support<D>)],
+    loads: &mut Loads<D>,
+) -> Result<(), SceneError> {
+    let mut number = 0;
+    for (index, (boundary, (members, support))) in scene.boundary.iter().zip(regions).enumerate() {
+        let held = support.displacement.iter().any(Option::is_some);
+        if let Some(rotation) = rotation_of::<D>(source, &format!("boundary[{index}]"), boundary)? {
+            let mut later = vec![false; body.bonds.sites()];
+            for (others, support) in &regions[index + 1..] {
+                if support.displacement.iter().any(Option::is_some) {
+                    others.iter().for_each(|&site| later[site as usize] = true);
+                }
+            }
+            let bit = |d: usize| u8::from(support.displacement[d].is_some()) << d;
+            let turned = Turned {
+                rotation,
+                shift: support.displacement.map(|component| component.unwrap_or(0.0)),
+                components: (0..D).map(bit).sum(),
+                region: number,
+                sites: members.iter().copied().filter(|&site| !later[site as usize]).collect(),
+            };
+            loads.turn(&*body.bonds, turned);
+        }
+        number += usize::from(held);
+    }
+    Ok(())
+}
+
+/// Warnings of fields of displacements that turn a region: they grow along the chord.
+pub(super) fn chords<const D: usize>(source: &Source, scene: &Scene, body: &Body<D>) -> Vec<String> {
+    let of = |(index, boundary): (usize, &Boundary)| {
+        let field = boundary.displacement_field.as_ref()?;
+        let key = format!("boundary[{index}]");
+        let (members, _) = region(source, &key, boundary, body).ok()?;
+        let angle = angle_of(&*body.bonds, &members, field)?.to_degrees();
+        (angle > LARGE).then(|| {
+            format!(
+                "{key}.displacement_field turns its region by {}°, along the chord: at half the load it is narrower by a factor of \
+                 {:.4}; `rotation` turns it along the arc",
+                plain((angle * 10.0).round() / 10.0),
+                (0.5 * angle.to_radians()).cos()
+            )
+        })
+    };
+    scene.boundary.iter().enumerate().filter_map(of).collect()
+}
+
+/// Angle of a field that turns its region nearly as a whole, rad: of the affine field closest to it.
+fn angle_of<const D: usize>(bonds: &dyn Bonds<D>, members: &[u32], field: &[PrescribedField]) -> Option<f64> {
+    let places: Vec<[f64; D]> = members.iter().map(|&site| bonds.position(site as usize)).collect();
+    let formulas: Vec<_> = field
+        .iter()
+        .take(D)
+        .map(|component| match component {
+            PrescribedField::By(formula) => Some(formula),
+            PrescribedField::Free => None,
+        })
+        .collect();
+    let mean: [f64; D] =
+        std::array::from_fn(|d| places.iter().map(|x| x[d]).sum::<f64>() / places.len().max(1) as f64);
+    let rows =
+        DMatrix::from_fn(places.len(), D + 1, |i, j| if j == D { 1.0 } else { places[i][j] - mean[j] });
+    let values = DMatrix::from_fn(places.len(), D, |i, d| {
+        // a free component may turn along: as it is, it does not
+        formulas.get(d).copied().flatten().map_or(0.0, |formula| formula.at(places[i]))
+    });
+    let size = rows.columns(0, D).norm();
+    let solution =
+        (&rows.transpose() * &rows).pseudo_inverse(1e-12 * size * size).ok()? * rows.transpose() * values;
+    let gradient = SMatrix::<f64, D, D>::from_fn(|a, b| f64::from(u8::from(a == b)) + solution[(b, a)]);
+    if !gradient.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let strain = (gradient.transpose() * gradient - SMatrix::<f64, D, D>::identity()) * 0.5;
+    let cosine = if D == 2 { 0.5 * gradient.trace() } else { 0.5 * (gradient.trace() - 1.0) };
+    (strain.norm() < RIGID).then(|| cosine.clamp(-1.0, 1.0).acos())
+}

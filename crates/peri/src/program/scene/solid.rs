@@ -1,0 +1,220 @@
+//! Solids with any Poisson ratio in place of a bond law.
+
+use super::Scene;
+use super::SurfaceCorrection;
+use super::values::{plain, positive};
+use crate::bonds::VolumeCorrection;
+use crate::calibrate::{Calibration, Space};
+use crate::error::Error;
+use crate::material::{Correspondence, EightChain, PointLaw};
+use crate::stress::Measure;
+use harness::scene::{ConstitutiveSpec, SceneError, Source};
+use polycore::constitutive::surrogate::Kind;
+use polycore::units::Stress;
+use serde::Deserialize;
+use std::sync::Arc;
+
+/// A solid whose energy follows from the mean deformation of a family.
+#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SolidLaw {
+    /// Its law.
+    pub law: SolidKind,
+    /// Shear modulus at rest, of `eight-chain`.
+    pub shear_modulus: Option<Stress>,
+    /// Bulk modulus at rest, of `eight-chain`; default in plane stress: incompressible.
+    pub bulk_modulus: Option<Stress>,
+    /// Links of a chain, of `eight-chain`.
+    pub links: Option<f64>,
+    /// Whether the volumetric energy depends on J averaged over nearest neighbours, of `eight-chain` on a lattice, solid or plane strain;
+    /// default: beside rigid planes true from a bulk modulus of 50 times the shear modulus on.
+    pub pressure_filter: Option<bool>,
+    /// The constitutive law of `correspondence`.
+    pub constitutive: Option<ConstitutiveSpec>,
+    /// Factor on the stabilisation of `correspondence`; default 1.
+    pub stabilisation: Option<f64>,
+}
+
+/// Laws of such solids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolidKind {
+    /// Arruda and Boyce's network over the directions of a family.
+    EightChain,
+    /// Any constitutive law at the mean deformation of a family.
+    Correspondence,
+}
+
+impl SolidKind {
+    /// Name in scenes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::EightChain => "eight-chain",
+            Self::Correspondence => "correspondence",
+        }
+    }
+}
+
+/// Bulk modulus over shear modulus from which on the pressure is filtered beside planes: without it coarse lattices are too stiff there
+/// (docs/guide/src/how-to/contact.md). Grips that hold by bonds give way, which makes up for that.
+const FILTERED: f64 = 50.0;
+
+/// Where the block stands.
+const KEY: &str = "material.solid";
+
+impl SolidLaw {
+    /// Whether its law is learnt from data.
+    pub fn is_learnt(&self) -> bool {
+        self.constitutive.as_ref().is_some_and(|spec| spec.learnt.is_some())
+    }
+
+    /// The law in a space; `planes`: on a lattice beside rigid planes.
+    ///
+    /// # Errors
+    /// A key that the law lacks or does not know, or a value out of its domain.
+    pub fn build<const D: usize>(
+        &self,
+        source: &Source,
+        space: Space,
+        planes: bool,
+    ) -> Result<Arc<dyn PointLaw<D>>, SceneError> {
+        let chains = self.law == SolidKind::EightChain;
+        let other = if chains { SolidKind::Correspondence } else { SolidKind::EightChain }.name();
+        for (key, given, of_chains) in [
+            ("shear_modulus", self.shear_modulus.is_some(), true),
+            ("bulk_modulus", self.bulk_modulus.is_some(), true),
+            ("links", self.links.is_some(), true),
+            ("pressure_filter", self.pressure_filter == Some(true), true),
+            ("constitutive", self.constitutive.is_some(), false),
+            ("stabilisation", self.stabilisation.is_some(), false),
+        ] {
+            if given && of_chains != chains {
+                let allowed = format!("nothing: it belongs to `{other}`");
+                return Err(source.error(
+                    &format!("{KEY}.{key}"),
+                    format!("`{key}` of `{}`", self.law.name()),
+                    allowed,
+                ));
+            }
+        }
+        let missing = |key: &str, what: &str| source.error(&format!("{KEY}.{key}"), "nothing", what);
+        let wrong = |error: Error| match error {
+            Error::Parameter { name, found, allowed } if chains || name == "stabilisation" => {
+                source.error(&format!("{KEY}.{}", name.replace(' ', "_")), plain(found), allowed)
+            }
+            Error::Parameter { name, found, allowed } => {
+                source.error(&format!("{KEY}.constitutive"), format!("{name}: {}", plain(found)), allowed)
+            }
+            other => source.error(KEY, other, "a law with an energy, and without stress at rest"),
+        };
+        if chains {
+            let shear = self.shear_modulus.ok_or_else(|| missing("shear_modulus", "a stress"))?;
+            let links = self.links.ok_or_else(|| missing("links", "a number above 1"))?;
+            let bulk = match self.bulk_modulus {
+                Some(bulk) => bulk.si(),
+                None if space == Space::PlaneStress => f64::INFINITY,
+                None => {
+                    return Err(missing(
+                        "bulk_modulus",
+                        "a stress; only plane stress is incompressible without it",
+                    ));
+                }
+            };
+            let network = EightChain::new(space, shear.si(), links, bulk).map_err(wrong)?;
+            let volumetric = space != Space::PlaneStress && planes;
+            let stiff = volumetric && bulk >= FILTERED * shear.si();
+            if !self.pressure_filter.unwrap_or(stiff) {
+                return Ok(Arc::new(network));
+            }
+            if space == Space::PlaneStress {
+                let allowed = "false: the thickness of plane stress gives way";
+                return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
+            }
+            return Ok(Arc::new(network.filtered().map_err(wrong)?));
+        }
+        let spec = self.constitutive.as_ref().ok_or_else(|| {
+            missing("constitutive", "a block with `model`, `parameters`, `bulk_modulus`, or `learnt`")
+        })?;
+        let (key, stabilisation) = (format!("{KEY}.constitutive"), self.stabilisation.unwrap_or(1.0));
+        let Some(learnt) = spec.learnt(source, &key)? else {
+            let law = spec.law(source, &key)?;
+            return Ok(Arc::new(Correspondence::stabilised(law, space, stabilisation).map_err(wrong)?));
+        };
+        if learnt.header().kind == Kind::Ann {
+            let allowed = "a law of the kind `energy`: forces follow from one, and it has no stress at rest";
+            return Err(source.error(&format!("{key}.learnt"), "a law of the kind `ann`", allowed));
+        }
+        if learnt.header().softening.is_some() {
+            let allowed = "a law without: particles keep no history of it";
+            return Err(source.error(&format!("{key}.learnt"), "a law with `softening`", allowed));
+        }
+        Ok(Arc::new(Correspondence::stabilised(learnt, space, stabilisation).map_err(wrong)?))
+    }
+}
+
+/// Checks what a scene with such a solid may and may not have.
+///
+/// # Errors
+/// A key of bond laws, or a block that the law does not take.
+pub(super) fn check(source: &Source, scene: &Scene, solid: &SolidLaw) -> Result<(), SceneError> {
+    let material = &scene.material;
+    for (key, given) in [
+        ("youngs_modulus", material.youngs_modulus.is_some()),
+        ("law", material.law.is_some()),
+        ("links", material.links.is_some()),
+        ("dissociation", material.dissociation.is_some()),
+        ("rescale", material.rescale.is_some()),
+        ("calibration", material.calibration != Calibration::default()),
+        ("volume_correction", material.volume_correction != VolumeCorrection::default()),
+        ("surface_correction", material.surface_correction != SurfaceCorrection::default()),
+        ("inclusions", !material.inclusions.is_empty()),
+        ("fields", !material.fields.is_empty()),
+    ] {
+        if given {
+            let found = format!("`{key}` of bond laws together with `solid`");
+            return Err(source.error(&format!("material.{key}"), found, "one of them"));
+        }
+    }
+    if let Some(critical) = &material.critical {
+        if critical.convention.is_some() {
+            let allowed = "nothing: the fracture energy of a `solid` is always that of tearing";
+            return Err(source.error("material.critical.convention", "a convention of bond laws", allowed));
+        }
+        if let Some(strength) = critical.strength {
+            let key = "material.critical.strength";
+            positive(source, key, strength.si(), "Pa")?;
+            if critical.fracture_energy.is_none() {
+                return Err(source.error(key, "a strength without `fracture_energy`", "both of them"));
+            }
+        }
+        let allowed = "either `stretch`, above 1, or `fracture_energy`, above 0";
+        let found = match (critical.given().len(), critical.stretch, critical.fracture_energy) {
+            (1, Some(stretch), _) if stretch > 1.0 && stretch.is_finite() => None,
+            (1, _, Some(energy)) if energy.si() > 0.0 && energy.si().is_finite() => None,
+            (1, Some(stretch), _) => Some(format!("a stretch of {}", plain(stretch))),
+            (1, _, Some(energy)) => Some(format!("{} J/m²", plain(energy.si()))),
+            _ => Some(format!("`{}` of a solid", critical.given().join("` and `"))),
+        };
+        if let Some(found) = found {
+            return Err(source.error("material.critical", found, allowed));
+        }
+    }
+    let planes = scene.is_beside_planes();
+    if solid.pressure_filter == Some(true) && scene.body.points.is_some() {
+        let allowed = "false: points of a cloud have no nearest neighbours";
+        return Err(source.error(&format!("{KEY}.pressure_filter"), "true", allowed));
+    }
+    let other =
+        scene.stress.iter().flat_map(|stress| &stress.measures).position(|&m| m != Measure::Constitutive);
+    if let Some(index) = other {
+        let allowed = "`constitutive`, the stress of the law itself";
+        return Err(source.error(&format!("stress.measures[{index}]"), "a measure of bond forces", allowed));
+    }
+    match scene.body.space {
+        Space::Solid => solid.build::<3>(source, Space::Solid, planes).map(|_| ()),
+        plane => {
+            positive(source, "body.thickness", scene.body.thickness.map_or(1.0, |t| t.si()), "m")?;
+            solid.build::<2>(source, plane, planes).map(|_| ())
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Fitted laws as materials of Abaqus and CalculiX.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use polycore::Error;
+use polycore::file::atomic_write;
+
+use super::fits::Set;
+use super::material::{BULK_RATIO, unusable};
+
+/// Files by units: their name, what they say of it, and the host's unit of stress, Pa.
+const FILES: [(&str, &str, f64); 2] =
+    [("materials_mm.inp", "mm, N, MPa", 1e6), ("materials_si.inp", "m, N, Pa", 1.0)];
+
+/// `materials_mm.inp` and `materials_si.inp`: a card of every fit.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
+    for (name, units, pascals) in FILES {
+        atomic_write(directory.join(name), |file| {
+            writeln!(
+                file,
+                "** units {units}; K is {BULK_RATIO} times the shear modulus: tests at constant volume do not determine it"
+            )?;
+            for set in all {
+                for fit in set.fits.iter().filter(|fit| unusable(fit).is_none()) {
+                    let parameters = fit.parameters.iter();
+                    let scale = |unit: &str| if unit == "Pa" { pascals } else { 1.0 };
+                    let scaled: Vec<f64> = parameters.map(|of| of.value / scale(of.unit)).collect();
+                    let bulk = BULK_RATIO * fit.law.shear_modulus() / pascals;
+                    write!(
+                        file,
+                        "**\n** {} fitted to {}\n{}",
+                        fit.model.key,
+                        set.name,
+                        card(fit.model.key, &scaled, bulk)
+                    )?;
+                }
+            }
+            Ok(())
+        })?;
+    }
+    Ok(())
+}
+
+/// The card of a law with its parameters and bulk modulus, stresses in the host's unit: *HYPERELASTIC where hosts have the law, with
+/// D₁ = 2/K, or the user material of crate `umat`.
+fn card(key: &str, parameters: &[f64], bulk: f64) -> String {
+    let name = key.to_uppercase().replace('-', "_");
+    let compliance = 2.0 / bulk;
+    let (kind, numbers) = match (key, parameters) {
+        ("neo-hookean", &[modulus]) => ("NEO HOOKE".to_owned(), vec![0.5 * modulus, compliance]),
+        ("mooney-rivlin", &[first, second]) => ("MOONEY-RIVLIN".to_owned(), vec![first, second, compliance]),
+        ("yeoh", &[first, second, third]) => {
+            ("YEOH".to_owned(), vec![first, second, third, compliance, 0.0, 0.0])
+        }
+        // five terms of the series of the inverse Langevin function: too soft near locking
+        ("eight-chain", &[modulus, links]) => {
+            ("ARRUDA-BOYCE".to_owned(), vec![modulus, links.sqrt(), compliance])
+        }
+        (_, terms) if key.starts_with("ogden-") => {
+            let count = terms.len() / 2;
+            let mut numbers = terms.to_vec();
+            numbers.push(compliance);
+            numbers.extend(std::iter::repeat_n(0.0, count - 1));
+            (format!("OGDEN, N={count}"), numbers)
+        }
+        _ => {
+            let numbers = std::iter::once(bulk).chain(parameters.iter().copied()).collect::<Vec<_>>();
+            let constants = numbers.len();
+            return format!(
+                "** of crate umat; in CalculiX NAME=USER_{name}\n*MATERIAL, NAME={name}\n*USER MATERIAL, CONSTANTS={constants}\n{}",
+                lines(&numbers)
+            );
+        }
+    };
+    format!("*MATERIAL, NAME={name}\n*HYPERELASTIC, {kind}\n{}", lines(&numbers))
+}
+
+/// Eight numbers a line.
+fn lines(numbers: &[f64]) -> String {
+    let row = |row: &[f64]| row.iter().map(|x| format!("{x:.6e}")).collect::<Vec<_>>().join(", ") + "\n";
+    numbers.chunks(8).map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::card;
+    use polycore::constitutive::hyperelastic::MODELS;
+
+    #[test]
+    fn hosts_have_their_own_forms() {
+        for (key, parameters, expected) in [
+            ("neo-hookean", &[0.4][..], "*HYPERELASTIC, NEO HOOKE\n2.000000e-1, 5.000000e-2\n"),
+            (
+                "mooney-rivlin",
+                &[0.15, 0.02],
+                "*HYPERELASTIC, MOONEY-RIVLIN\n1.500000e-1, 2.000000e-2, 5.000000e-2\n",
+            ),
+            (
+                "eight-chain",
+                &[0.27, 25.0],
+                "*HYPERELASTIC, ARRUDA-BOYCE\n2.700000e-1, 5.000000e0, 5.000000e-2\n",
+            ),
+            (
+                "ogden-2",
+                &[0.4, 2.0, 0.1, -1.5],
+                "*HYPERELASTIC, OGDEN, N=2\n4.000000e-1, 2.000000e0, 1.000000e-1, -1.500000e0, 5.000000e-2, 0.000000e0\n",
+            ),
+            (
+                "yeoh",
+                &[0.2, 0.002, 5e-5],
+                "*HYPERELASTIC, YEOH\n2.000000e-1, 2.000000e-3, 5.000000e-5, 5.000000e-2, 0.000000e0, 0.000000e0\n",
+            ),
+            ("gent", &[0.3, 75.0], "*USER MATERIAL, CONSTANTS=3\n4.000000e1, 3.000000e-1, 7.500000e1\n"),
+        ] {
+            let found = card(key, parameters, 40.0);
+            assert!(found.ends_with(expected), "{found}");
+        }
+        // a name of twelve numbers still has eight a line
+        assert!(
+            MODELS
+                .iter()
+                .all(|model| card(model.key, model.example, 1.0).lines().all(|line| line.len() < 256))
+        );
+    }
+}

@@ -1,0 +1,129 @@
+//! Pictures of fits: curves over the data for each kind of test in a table, and model against measurement.
+
+use std::path::Path;
+
+use harness::output::picture::{LinePlot, Series};
+use polycore::Error;
+use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::fit::{self, Fit};
+use polycore::constitutive::hyperelastic::{Hyperelastic, Kind, homogeneous};
+
+use super::MPA;
+
+/// A kind of homogeneous test that may be found among general biaxial states.
+struct Test {
+    key: &'static str,
+    title: &'static str,
+    holds: fn(&State) -> bool,
+    nominal: fn(&dyn Hyperelastic, f64) -> Result<f64, polycore::constitutive::Error>,
+}
+
+const TESTS: [Test; 3] = [
+    Test {
+        key: "uniaxial",
+        title: "uniaxial tension",
+        holds: |state| match state.mode {
+            Mode::Biaxial => state.nominal[1] == 0.0,
+            mode => mode == Mode::Uniaxial,
+        },
+        nominal: |law, stretch| homogeneous::uniaxial(law, stretch),
+    },
+    Test {
+        key: "pure-shear",
+        title: "pure shear",
+        holds: |state| match state.mode {
+            Mode::Biaxial => state.stretches[1] == 1.0 && state.nominal[1] != 0.0,
+            mode => mode == Mode::PureShear,
+        },
+        nominal: |law, stretch| Ok(homogeneous::pure_shear(law, stretch)?[0]),
+    },
+    Test {
+        key: "equibiaxial",
+        title: "equibiaxial tension",
+        holds: |state| match state.mode {
+            Mode::Biaxial => state.stretches[0] == state.stretches[1] && state.nominal[1] != 0.0,
+            mode => mode == Mode::Equibiaxial,
+        },
+        nominal: |law, stretch| homogeneous::equibiaxial(law, stretch),
+    },
+];
+
+/// Points of a drawn curve.
+const POINTS: usize = 200;
+
+/// The thesis' two categories have pictures of their own: together they would be more curves than colours.
+const KINDS: [(Kind, &str); 2] =
+    [(Kind::Phenomenological, "phenomenological"), (Kind::Micromechanical, "chains")];
+
+/// `<data>_<test>_<kind>.png` for every kind of test with at least three states, and `<data>_parity_<kind>.png` for
+/// biaxial tables.
+pub fn pictures(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Result<(), Error> {
+    for (kind, suffix) in KINDS {
+        let fits: Vec<&Fit> = fits.iter().filter(|fit| fit.model.kind == kind).collect();
+        if fits.is_empty() {
+            continue;
+        }
+        for test in &TESTS {
+            let states: Vec<&State> = table.states.iter().filter(|state| (test.holds)(state)).collect();
+            if states.len() >= 3 {
+                let path = directory.join(format!("{name}_{}_{suffix}.png", test.key));
+                curves(name, test, &states, &fits).write(path)?;
+            }
+        }
+        if table.states.iter().any(|state| state.mode != table.states[0].mode || state.nominal[1] != 0.0) {
+            parity(name, table, &fits)?.write(directory.join(format!("{name}_parity_{suffix}.png")))?;
+        }
+    }
+    Ok(())
+}
+
+/// Nominal stress over stretch.
+fn curves(name: &str, test: &Test, states: &[&State], fits: &[&Fit]) -> LinePlot {
+    let x: Vec<f64> = states.iter().map(|state| state.stretches[0]).collect();
+    let y: Vec<f64> = states.iter().map(|state| state.nominal[0] / MPA).collect();
+    let [low, high] = span(&x, 1.0).map(|l| 1.0 + 1.03 * (l - 1.0)).map(|l| l.max(0.01));
+    let [least, most] = span(&y, 0.0).map(|nominal| 1.1 * nominal);
+    let stretches: Vec<f64> = (0..=POINTS).map(|i| low + (high - low) * i as f64 / POINTS as f64).collect();
+    let mut plot = LinePlot::new(&format!("{name}: {}", test.title))
+        .axes("stretch", "nominal stress, MPa")
+        .x_range(low, high)
+        .y_range(least, most)
+        .series(Series::markers("measured", &x, &y));
+    for fit in fits {
+        // beyond locking a curve just ends
+        let nominal: Vec<f64> = stretches
+            .iter()
+            .map(|l| (test.nominal)(&fit.law, *l).map_or(f64::NAN, |nominal| nominal / MPA))
+            .collect();
+        plot = plot.series(Series::line(fit.model.key, &stretches, &nominal));
+    }
+    plot
+}
+
+/// Every stress of the table, model over measurement.
+fn parity(name: &str, table: &Table, fits: &[&Fit]) -> Result<LinePlot, Error> {
+    let measured: Vec<f64> = table
+        .states
+        .iter()
+        .flat_map(|state| state.nominal)
+        .filter(|nominal| *nominal != 0.0)
+        .map(|nominal| nominal / MPA)
+        .collect();
+    let [lowest, highest] = span(&measured, 0.0).map(|nominal| 1.1 * nominal);
+    let mut plot = LinePlot::new(&format!("{name}: all measured stresses"))
+        .axes("measured nominal stress, MPa", "nominal stress of the law, MPa")
+        .x_range(lowest, highest)
+        .y_range(lowest, highest)
+        .series(Series::reference("equal", &[lowest, highest], &[lowest, highest]));
+    for fit in fits {
+        let residuals = fit::residuals(&fit.law, table)?;
+        let model: Vec<f64> = residuals.iter().zip(&measured).map(|(r, data)| r / MPA + data).collect();
+        plot = plot.series(Series::markers(fit.model.key, &measured, &model));
+    }
+    Ok(plot)
+}
+
+/// Least and largest of some values and of that at rest.
+fn span(values: &[f64], rest: f64) -> [f64; 2] {
+    values.iter().fold([rest, rest], |[low, high], value| [value.min(low), value.max(high)])
+}

@@ -1,0 +1,368 @@
+//! Runs the fits and trials of a case and writes what they give.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use harness::case::{Finished, Run};
+use harness::output;
+use harness::report::{Phases, Report};
+use polycore::Error;
+use polycore::constitutive;
+use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::fit::{Agreement, Fit, Fitted, Standing, fit_until};
+use polycore::constitutive::hyperelastic::{Hyperelastic, homogeneous, stability};
+
+use super::MPA;
+use super::material::{DIGITS, digits, unit_of};
+use super::quantities as q;
+use super::scene::{Case, DataSet};
+use super::{card, draw, material, trials};
+
+/// What was fitted to one table.
+pub struct Set<'a> {
+    pub name: &'a str,
+    pub table: &'a Table,
+    /// How the file was understood.
+    read: &'a [String],
+    pub fits: Vec<Fit>,
+    /// Laws that could not be fitted, and why.
+    failed: Vec<(&'static str, String)>,
+    /// Law, other table, agreement there: none where the law locks.
+    crossed: Vec<(&'static str, &'a str, Option<Agreement>)>,
+}
+
+impl Set<'_> {
+    /// The unit of its stresses, and its Pa: by the largest modulus.
+    fn unit(&self) -> (&'static str, f64) {
+        unit_of(self.fits.iter().map(|fit| fit.law.shear_modulus()).fold(0.0, f64::max))
+    }
+}
+
+/// Fits every law to every table, writes tables and pictures. A law that cannot be fitted is named; the others are kept. Where it is
+/// stopped, what is done is written.
+pub fn run(case: &Case, run: &mut Run) -> Result<Finished, Error> {
+    let (directory, quick) = (run.options.output, run.options.quick);
+    run.begin()?;
+    let mut report = Report::new("polycore", env!("CARGO_PKG_VERSION"), &case.source.text);
+    let mut phases = Phases::new();
+    let mut all: Vec<Set> = Vec::new();
+    let total = (case.data.len() * case.laws.len()).max(1) as f64;
+    let mut done = 0.0;
+    let mut stopped = false;
+    for DataSet { name, table, read } in &case.data {
+        phases.start("fit");
+        let mut set = Set { name, table, read, fits: Vec::new(), failed: Vec::new(), crossed: Vec::new() };
+        for model in &case.laws {
+            run.show(done / total, &|| format!("fit {name}  {}", model.key));
+            match fit_until(model, table, run.options.interrupted) {
+                Ok(fit) => set.fits.push(fit),
+                Err(constitutive::Error::Stopped) => stopped = true,
+                Err(error) => set.failed.push((model.key, error.to_string())),
+            }
+            if stopped {
+                break;
+            }
+            done += 1.0;
+        }
+        phases.start("output");
+        for fit in &set.fits {
+            record(&mut report, name, table, fit)?;
+            for other in case.data.iter().filter(|other| case.cross && other.name != *name) {
+                let key = format!("{name}.{}.{}", fit.model.key, other.name);
+                let found = judge_on(&mut report, &key, &fit.law, &other.table)?;
+                set.crossed.push((fit.model.key, &other.name, found));
+            }
+        }
+        for (law, _) in &set.failed {
+            report.value(q::FAILED.of(&[&format!("{name}.{law}")]), 1.0);
+        }
+        if let (true, false, Some((law, why))) = (set.fits.is_empty(), stopped, set.failed.first()) {
+            let reason = format!("no law can be fitted; {law}: {why}");
+            return Err(constitutive::Error::Data { what: (*name).clone(), reason }.into());
+        }
+        write_states(directory, name, table, &set.fits)?;
+        set.fits.iter().try_for_each(|fit| write_draws(directory, name, fit))?;
+        all.push(set);
+        if stopped {
+            break;
+        }
+    }
+    if !all.is_empty() {
+        write_fits(directory, &all)?;
+        material::write(directory, &all)?;
+        card::write(directory, &all)?;
+    }
+    if stopped {
+        return Err(run.interruption());
+    }
+    phases.start("trials");
+    for trial in &case.trials {
+        trials::run(trial, &mut report)?;
+    }
+    if !quick {
+        phases.start("pictures");
+        for set in &all {
+            draw::pictures(directory, set.name, set.table, &set.fits)?;
+        }
+    }
+    phases.stop();
+    report.phases(&phases).threads(1).judge(&case.expect, quick);
+    trials::judge(&case.trials, &mut report);
+    let mut text = summary(case, &all, &report);
+    for name in &report.non_finite {
+        let _ = writeln!(text, "FAIL  {name} is not finite");
+    }
+    Ok(Finished { report, text })
+}
+
+/// In the unit of the tables: a stress in MPa, numbers as they are.
+fn scaled(value: f64, unit: &str) -> (f64, &'static str) {
+    if unit == "Pa" { (value / MPA, "MPa") } else { (value, "") }
+}
+
+/// rms, mean absolute error and R² of a law on another table than that of its fit; where it locks, how often.
+fn judge_on(
+    report: &mut Report,
+    key: &str,
+    law: &dyn Hyperelastic,
+    table: &Table,
+) -> Result<Option<Agreement>, Error> {
+    let locks = |state: &&State| {
+        let [a, b] = state.stretches;
+        matches!(homogeneous::biaxial(law, a, b), Err(constitutive::Error::Locked { .. }))
+    };
+    let locked = table.states.iter().filter(locks).count();
+    report.value(q::LOCKED.of(&[key]), locked as f64);
+    if locked > 0 {
+        return Ok(None);
+    }
+    let found = Agreement::of(law, table)?;
+    agree(report, key, &found);
+    Ok(Some(found))
+}
+
+fn agree(report: &mut Report, key: &str, found: &Agreement) {
+    report.value(q::RMS.of(&[key]), found.rms / MPA);
+    report.value(q::MAE.of(&[key]), found.mae / MPA);
+    if let Some(r2) = found.r2 {
+        report.value(q::R2.of(&[key]), r2);
+    }
+}
+
+fn record(report: &mut Report, data: &str, table: &Table, fit: &Fit) -> Result<(), Error> {
+    let key = format!("{data}.{}", fit.model.key);
+    report.value(q::SHEAR_MODULUS.of(&[&key]), fit.law.shear_modulus() / MPA);
+    for parameter in &fit.parameters {
+        let (value, unit) = scaled(parameter.value, parameter.unit);
+        report.value(q::PARAMETER.of(&[&key, parameter.name]).in_unit(unit), value);
+        if let Some(error) = parameter.standard_error {
+            let quantity = q::STANDARD_ERROR.of(&[&key, parameter.name]).in_unit(unit);
+            report.value(quantity, scaled(error, parameter.unit).0);
+        }
+    }
+    agree(report, &key, &Agreement::of(&fit.law, table)?);
+    report.value(q::STABLE.of(&[&key]), f64::from(u8::from(unstable(fit, table).is_none())));
+    report.work(&format!("{key}.evaluations"), fit.iterations as u64);
+    report.work(&format!("{key}.starts"), fit.starts.0 as u64);
+    report.work(&format!("{key}.starts_that_agree"), fit.starts.1 as u64);
+    Ok(())
+}
+
+/// Where a law first is unstable over the stretches of a table: the test and its stretch.
+fn unstable(fit: &Fit, table: &Table) -> Option<(Mode, f64)> {
+    let ends = stability::range(table);
+    let all = Mode::TESTS.into_iter().flat_map(|mode| ends.map(|end| (mode, end)));
+    all.filter(|(_, end)| *end != 1.0)
+        .find_map(|(mode, end)| stability::unstable_from(&fit.law, mode, end).map(|stretch| (mode, stretch)))
+}
+
+/// `fits.csv`: one line for each number, with its standard error where the data determine it; stresses of a table in one unit.
+fn write_fits(directory: &Path, all: &[Set]) -> Result<(), Error> {
+    let mut text = String::from("data,law,quantity,value,standard_error,unit\n");
+    for set in all {
+        let (in_unit, pascals) = set.unit();
+        for fit in &set.fits {
+            let mut line = |quantity: &str, value: f64, error: Option<f64>, unit: &str| {
+                let (shown, scale) = if unit == "Pa" { (in_unit, pascals) } else { ("", 1.0) };
+                let error = error.map_or_else(String::new, |error| digits(error / scale, DIGITS));
+                let (data, law, value) = (set.name, fit.model.key, digits(value / scale, DIGITS));
+                let _ = writeln!(text, "{data},{law},{quantity},{value},{error},{shown}");
+            };
+            line("rms", fit.rms, None, "Pa");
+            if let Some(r2) = Agreement::of(&fit.law, set.table)?.r2 {
+                line("r2", r2, None, "");
+            }
+            for (_, other, found) in set.crossed.iter().filter(|crossed| crossed.0 == fit.model.key) {
+                if let Some(r2) = found.and_then(|found| found.r2) {
+                    line(&format!("r2.{other}"), r2, None, "");
+                }
+            }
+            for parameter in fit.parameters.iter().filter(|parameter| parameter.standing != Standing::Absent)
+            {
+                line(parameter.name, parameter.value, parameter.standard_error, parameter.unit);
+            }
+            if fit.parameters.iter().all(|parameter| parameter.name != "shear_modulus") {
+                line("shear_modulus", fit.law.shear_modulus(), None, "Pa");
+            }
+        }
+    }
+    polycore::file::atomic_write(directory.join("fits.csv"), |file| {
+        std::io::Write::write_all(file, text.as_bytes())
+    })
+}
+
+/// `<data>_<law>_posterior.csv`: draws of the parameters, for `sweep --sample`.
+fn write_draws(directory: &Path, name: &str, fit: &Fit) -> Result<(), Error> {
+    if fit.draws.is_empty() {
+        return Ok(());
+    }
+    let unit = |parameter: &Fitted| scaled(0.0, parameter.unit).1;
+    let column = |(i, parameter): (usize, &Fitted)| {
+        fit.draws.iter().map(|draw| scaled(draw[i], parameter.unit).0).collect()
+    };
+    let lists: Vec<Vec<f64>> = fit.parameters.iter().enumerate().map(column).collect();
+    let columns: Vec<output::csv::Column> =
+        fit.parameters.iter().zip(&lists).map(|(one, list)| (one.name, unit(one), &list[..])).collect();
+    output::csv::write(directory.join(format!("{name}_{}_posterior.csv", fit.model.key)), &columns)
+}
+
+/// `<data>_states.csv`: the measured states, and beside them what every law makes of them.
+fn write_states(directory: &Path, name: &str, table: &Table, fits: &[Fit]) -> Result<(), Error> {
+    let mut columns: Vec<(String, &str, Vec<f64>)> = Vec::new();
+    for i in [0, 1] {
+        let stretches = table.states.iter().map(|state| state.stretches[i]).collect();
+        columns.push((format!("stretch_{}", i + 1), "", stretches));
+    }
+    for i in [0, 1] {
+        let nominal = table.states.iter().map(|state| state.nominal[i] / MPA).collect();
+        columns.push((format!("nominal_{}", i + 1), "MPa", nominal));
+    }
+    for fit in fits {
+        let mut found = Vec::new();
+        for state in &table.states {
+            found.push(homogeneous::biaxial(&fit.law, state.stretches[0], state.stretches[1])?);
+        }
+        for i in [0, 1] {
+            let nominal = found.iter().map(|nominal| nominal[i] / MPA).collect();
+            columns.push((format!("{}_{}", fit.model.key, i + 1), "MPa", nominal));
+        }
+    }
+    let columns: Vec<output::csv::Column<'_>> =
+        columns.iter().map(|(name, unit, data)| (name.as_str(), *unit, data.as_slice())).collect();
+    output::csv::write(directory.join(format!("{name}_states.csv")), &columns)
+}
+
+/// How tables were read, rms by law and table, verdicts, the parameters, a block for `peri`, trials, then the expectations.
+fn summary(case: &Case, all: &[Set], report: &Report) -> String {
+    let mut text = format!("{}\n", case.title);
+    for set in all {
+        set.read.iter().for_each(|line| text += &format!("{}: {line}\n", set.name));
+    }
+    if !all.is_empty() {
+        text += "rms of the nominal stress, over the measured stresses (their number in brackets); k: parameters\n";
+        let _ = write!(text, "{:<22}{:>4}", "law", "k");
+        for set in all {
+            let head = format!("{} ({}), {}", set.name, set.table.measurements(), set.unit().0);
+            let _ = write!(text, "{head:>24}");
+        }
+        text.push('\n');
+        for model in &case.laws {
+            let _ = write!(text, "{:<22}{:>4}", model.key, model.parameters.len());
+            for set in all {
+                let fit = set.fits.iter().find(|fit| fit.model.key == model.key);
+                let rms = fit.map(|fit| digits(fit.rms / set.unit().1, 5));
+                let _ = write!(text, "{:>24}", rms.unwrap_or_else(|| "failed".to_owned()));
+            }
+            text.push('\n');
+        }
+    }
+    for set in all {
+        for (law, why) in &set.failed {
+            let _ = writeln!(text, "failed  {law} on {}: {why}", set.name);
+        }
+    }
+    for set in all {
+        text += &verdicts(set);
+        let _ = writeln!(
+            text,
+            "parameters on {} (± standard error, - where the data do not determine it)",
+            set.name
+        );
+        for fit in &set.fits {
+            let list: Vec<String> = fit.parameters.iter().map(shown).collect();
+            let _ = writeln!(text, "  {:<22}{}", fit.model.key, list.join(", "));
+        }
+        text += &material::best(set.name, &set.fits);
+    }
+    for trial in &report.trials {
+        let verdict = if trial.passed { "pass" } else { "FAIL" };
+        let _ = writeln!(
+            text,
+            "{verdict}  {}: expected: {}; observed: {}",
+            trial.what, trial.description, trial.observed
+        );
+    }
+    for judgement in &report.expect {
+        let _ = writeln!(text, "{}", judgement.row().join("  "));
+    }
+    text
+}
+
+/// R² in the own and in other tables below which a law is not to be used there.
+const SAFE: f64 = 0.9;
+
+/// R² of each law in its table and in the others, whether it may be used there, and where it is unstable.
+fn verdicts(set: &Set) -> String {
+    let [low, high] = stability::range(set.table);
+    let mut text = format!(
+        "R² of laws fitted to {}; stability (Drucker) in uniaxial, equibiaxial and pure shear tests at stretches {low:.3} to \
+         {high:.3}\n",
+        set.name
+    );
+    for fit in &set.fits {
+        let key = fit.model.key;
+        let shown = |r2: Option<f64>| match r2 {
+            Some(r2) if r2 > -100.0 => format!("{r2:.4}"),
+            Some(r2) => format!("{r2:.0e}"),
+            None => "-".to_owned(),
+        };
+        let own = Agreement::of(&fit.law, set.table).ok().and_then(|found| found.r2);
+        let _ = write!(text, "  {key:<22}{}", shown(own));
+        let crossed: Vec<_> = set.crossed.iter().filter(|crossed| crossed.0 == key).collect();
+        for (_, other, found) in &crossed {
+            let r2 = found.map_or_else(|| "locked".to_owned(), |found| shown(found.r2));
+            let _ = write!(text, ", {other} {r2}");
+        }
+        let bad =
+            |found: &Option<Agreement>| !found.is_some_and(|found| found.r2.is_none_or(|r2| r2 >= SAFE));
+        if !crossed.is_empty() {
+            let unsafe_there = crossed.iter().any(|(_, _, found)| bad(found));
+            let verdict = if unsafe_there { "unsafe outside" } else { "safe outside" };
+            let _ = write!(text, "; {verdict} {}", set.name);
+        }
+        match unstable(fit, set.table) {
+            Some((mode, stretch)) => {
+                let _ =
+                    writeln!(text, "; unstable in {} tests from the stretch {stretch:.3} on", mode.name());
+            }
+            None => text += "; stable\n",
+        }
+    }
+    text
+}
+
+/// `links 25.46 ± 0.13`.
+fn shown(parameter: &Fitted) -> String {
+    let name = parameter.name;
+    let (unit, scale) = if parameter.unit == "Pa" { unit_of(parameter.value) } else { ("", 1.0) };
+    let number = |value: f64| digits(value / scale, 6);
+    match parameter.standing {
+        Standing::Absent => format!("{name} absent"),
+        Standing::Undetermined => format!("{name} not determined"),
+        Standing::Determined => {
+            let error = parameter.standard_error.map(|error| digits(error / scale, 2));
+            let error = error.unwrap_or_else(|| "-".to_owned());
+            format!("{name} {} ± {error} {unit}", number(parameter.value)).trim_end().to_owned()
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! What a scene of `peri` takes of a fitted law.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+
+use polycore::Error;
+use polycore::constitutive::hyperelastic::fit::{Fit, Fitted, Standing};
+use polycore::file::atomic_write;
+
+use super::fits::Set;
+
+/// Laws of which the printed block is taken before others.
+const EIGHT_CHAINS: &str = "eight-chain";
+
+/// Bulk over shear modulus: nearly incompressible. Tests at constant volume do not determine it.
+pub const BULK_RATIO: f64 = 100.0;
+
+/// Standard errors to either side of a value that hold 95 % of a normal distribution.
+const HALF_WIDTH: f64 = 1.96;
+
+/// `[material.solid]` of `peri` for a fitted law: the law itself, with its intervals of confidence. Of a law that the data do not
+/// determine, in comments, what to take.
+fn block(fit: &Fit) -> String {
+    let rms = stress(fit.rms, 5);
+    if let Some(why) = unusable(fit) {
+        return format!("# {}, rms {rms}: no block, {why}\n", fit.model.key);
+    }
+    let shear = fit.law.shear_modulus();
+    let mut text = format!("[material.solid] # {}, rms {rms}\n", fit.model.key);
+    let _ = writeln!(text, "law = \"correspondence\"");
+    let _ = writeln!(text, "[material.solid.constitutive]\nmodel = \"{}\"", fit.model.key);
+    let _ = writeln!(
+        text,
+        "bulk_modulus = \"{}\" # {BULK_RATIO} times the shear modulus of {}: these tests do not determine it",
+        stress(BULK_RATIO * shear, DIGITS),
+        stress(shear, DIGITS)
+    );
+    text += "[material.solid.constitutive.parameters]\n";
+    for parameter in &fit.parameters {
+        let is_stress = parameter.unit == "Pa";
+        let value = if is_stress {
+            format!("\"{}\"", stress(parameter.value, DIGITS))
+        } else {
+            digits(parameter.value, DIGITS)
+        };
+        let _ = write!(text, "{} = {value}", parameter.name);
+        let _ = match parameter.standard_error.map(|error| HALF_WIDTH * error) {
+            Some(error) if is_stress => {
+                let (unit, scale) = unit_of(parameter.value);
+                writeln!(text, " # ± {:.2e} {unit}, 95 %", error / scale)
+            }
+            Some(error) => writeln!(text, " # ± {error:.2e}, 95 %"),
+            None => writeln!(text, " # its error is not determined by the data"),
+        };
+    }
+    text
+}
+
+/// Why a fitted law is no material to use, and what to take.
+pub fn unusable(fit: &Fit) -> Option<String> {
+    let names = |standing| -> Vec<&str> {
+        let those = fit.parameters.iter().filter(|parameter| parameter.standing == standing);
+        those.map(|parameter| parameter.name).collect()
+    };
+    let (absent, open) = (names(Standing::Absent), names(Standing::Undetermined));
+    if !absent.is_empty() {
+        return Some(format!("without {} it is a law of fewer parameters: take that", absent.join(", ")));
+    }
+    (!open.is_empty()).then(|| {
+        format!(
+            "the data do not determine {}, its values are as good as infinite: take `neo-hookean`",
+            open.join(", ")
+        )
+    })
+}
+
+/// The block of the eight-chain law with the least rms; without such a one, of the best law. Laws of which every parameter is known to
+/// half of its size come first.
+pub fn best(data: &str, fits: &[Fit]) -> String {
+    let known = |fit: &Fit| {
+        let sure = |parameter: &Fitted| {
+            parameter.standard_error.is_some_and(|error| HALF_WIDTH * error < parameter.value.abs())
+        };
+        fit.parameters.iter().all(sure)
+    };
+    let usable = || fits.iter().filter(|fit| unusable(fit).is_none());
+    let least = |a: &&Fit, b: &&Fit| a.rms.total_cmp(&b.rms);
+    let chains = |fit: &&Fit| fit.model.key.starts_with(EIGHT_CHAINS) && known(fit);
+    let best = usable().filter(chains).min_by(least);
+    let best =
+        best.or_else(|| usable().filter(|fit| known(fit)).min_by(least)).or_else(|| usable().min_by(least));
+    best.map_or_else(String::new, |fit| format!("for a scene of peri, from {data}:\n{}", block(fit)))
+}
+
+/// `materials.toml`: the block of every fit, under comments.
+pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
+    atomic_write(directory.join("materials.toml"), |file| {
+        writeln!(file, "# Take one block: docs/guide/src/how-to/fit.md says what it can and cannot do.")?;
+        for set in all {
+            for fit in &set.fits {
+                write!(file, "\n# fitted to {}\n{}", set.name, block(fit))?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Significant digits of parameters.
+pub const DIGITS: usize = 7;
+
+/// Unit in which a stress has a readable number, and its Pa.
+pub fn unit_of(stress: f64) -> (&'static str, f64) {
+    match stress.abs() {
+        size if size >= 1e9 => ("GPa", 1e9),
+        size if size >= 1e4 => ("MPa", 1e6),
+        size if size >= 1e2 => ("kPa", 1e3),
+        _ => ("Pa", 1.0),
+    }
+}
+
+/// With its unit.
+pub fn stress(value: f64, significant: usize) -> String {
+    let (unit, scale) = unit_of(value);
+    format!("{} {unit}", digits(value / scale, significant))
+}
+
+/// A number with so many significant digits.
+pub fn digits(value: f64, significant: usize) -> String {
+    let exponent = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    let after = significant as i32 - 1 - exponent;
+    match exponent {
+        -5..=6 => format!("{value:.*}", after.max(0) as usize),
+        _ => format!("{value:.*e}", significant - 1),
+    }
+}

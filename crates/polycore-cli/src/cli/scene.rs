@@ -1,0 +1,272 @@
+//! The scene of fits and trials: which laws, which data, trials, expectations.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use harness::report::Expect;
+use harness::scene::{SceneError, Source};
+use polycore::constitutive::hyperelastic::data::{Mode, Table};
+use polycore::constitutive::hyperelastic::fit::neo_hookean_modulus;
+use polycore::constitutive::hyperelastic::{
+    self, MODELS, Meaning, ModelDescriptor, StrainMeasure, StressMeasure,
+};
+use serde::Deserialize;
+
+use super::quantities as q;
+use super::trials::Trial;
+
+/// The file as written.
+#[derive(Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Scene {
+    /// Checked by its type only.
+    #[serde(rename = "program")]
+    _program: Program,
+    /// One line for tables and pictures.
+    #[serde(default)]
+    title: String,
+    /// Fits.
+    #[serde(default)]
+    fit: Fit,
+    /// Laws at single states and fits to a few, with their expected behaviour.
+    #[serde(default)]
+    trial: Vec<Trial>,
+    /// Expected results.
+    #[serde(default)]
+    expect: Vec<Expect>,
+}
+
+/// The program that runs these scenes; `cargo xtask validate` chooses by it.
+#[derive(Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum Program {
+    Polycore,
+}
+
+/// Laws and data to fit.
+#[derive(Default, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Fit {
+    /// Names of laws; all of them if not given.
+    laws: Option<Vec<String>>,
+    /// Whether a law fitted to one table is judged on the others, too.
+    #[serde(default)]
+    cross: bool,
+    /// Tables of measurements.
+    #[serde(default)]
+    data: Vec<Data>,
+}
+
+/// A table of homogeneous states.
+#[derive(Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Data {
+    /// Its name in the report.
+    name: String,
+    /// The CSV file, relative to the scene.
+    file: PathBuf,
+    /// Only the states of this test; of a table without a column of tests, the test of all its states.
+    mode: Option<Mode>,
+    /// Measure of the strain where its heading leaves it open.
+    strain: Option<StrainMeasure>,
+    /// Measure of the stress where its heading leaves it open.
+    stress: Option<StressMeasure>,
+    /// Unit of a stress whose heading has none: `MPa`.
+    stress_unit: Option<String>,
+    /// Heading of the strain, of several.
+    strain_column: Option<String>,
+    /// Heading of the stress, of several.
+    stress_column: Option<String>,
+}
+
+/// A table to be fitted.
+pub struct DataSet {
+    pub name: String,
+    pub table: Table,
+    /// How its file was understood, and what was left out of it, a line each.
+    pub read: Vec<String>,
+}
+
+/// The JSON Schema of scenes.
+pub fn schema() -> serde_json::Value {
+    harness::scene::schema("polycore", &[q::ALL], |generator| vec![generator.subschema_for::<Scene>()])
+}
+
+/// A scene that was checked, with its data.
+pub struct Case {
+    pub source: Source,
+    pub title: String,
+    pub laws: Vec<&'static ModelDescriptor>,
+    pub cross: bool,
+    pub data: Vec<DataSet>,
+    pub trials: Vec<Trial>,
+    pub expect: Vec<Expect>,
+}
+
+impl Case {
+    /// Parses and checks a scene and the tables that it names.
+    pub fn parse(source: &Source) -> Result<Self, SceneError> {
+        let Scene { _program: Program::Polycore, title, fit, trial, expect } = source.parse()?;
+        let laws = match &fit.laws {
+            None => MODELS.iter().collect(),
+            Some(names) => selected(source, names)?,
+        };
+        let mut data: Vec<DataSet> = Vec::new();
+        for (i, entry) in fit.data.into_iter().enumerate() {
+            let key = |field: &str| format!("fit.data[{i}].{field}");
+            let valid = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+            if entry.name.is_empty() || !entry.name.chars().all(valid) {
+                let allowed = "letters, digits, `-` and `_`: it names files";
+                return Err(source.error(&key("name"), format!("`{}`", entry.name), allowed));
+            }
+            if data.iter().any(|other| other.name == entry.name) {
+                return Err(source.error(
+                    &key("name"),
+                    format!("`{}` a second time", entry.name),
+                    "another name",
+                ));
+            }
+            let meaning = Meaning {
+                mode: entry.mode,
+                strain: entry.strain,
+                stress: entry.stress,
+                stress_unit: entry.stress_unit,
+                strain_column: entry.strain_column,
+                stress_column: entry.stress_column,
+            };
+            let reading = Table::read_as(source.file(&entry.file), &meaning)
+                .map_err(|error| source.refused(&key("file"), error))?;
+            let read = [vec![reading.understood], reading.notes].concat();
+            let mut table = reading.table;
+            if let Some(mode) = entry.mode {
+                table = table.of(mode).map_err(|error| {
+                    source.error(&key("mode"), error, "a test of which the table has a stress")
+                })?;
+            }
+            neo_hookean_modulus(&table).map_err(|error| source.refused(&key("file"), error))?;
+            for model in laws.iter().filter(|_| fit.laws.is_some()) {
+                if table.measurements() < model.parameters.len() {
+                    let found = format!("{} measured stresses", table.measurements());
+                    let allowed = format!("at least {} for `{}`", model.parameters.len(), model.key);
+                    return Err(source.error(&key("file"), found, allowed));
+                }
+            }
+            data.push(DataSet { name: entry.name, table, read });
+        }
+        if data.is_empty() && trial.is_empty() {
+            return Err(source.error(
+                "fit.data",
+                "no data",
+                "at least one `[[fit.data]]` with `name` and `file`, or a `[[trial]]`",
+            ));
+        }
+        super::trials::check(source, &trial)?;
+        let case =
+            Self { source: source.clone(), title, laws, cross: fit.cross, data, trials: trial, expect };
+        case.check_expectations()?;
+        Ok(case)
+    }
+
+    /// What a run will do, in lines.
+    pub fn plan(&self) -> String {
+        let mut text = format!("{}: {}\n", self.source.path.display(), self.title);
+        for DataSet { name, table, read } in &self.data {
+            let (states, measured) = (table.states.len(), table.measurements());
+            let source =
+                if table.source.is_empty() { "no line `# source: …` in it" } else { &table.source };
+            let _ = writeln!(text, "data {name}: {states} states, {measured} measured stresses ({source})");
+            read.iter().for_each(|line| text += &format!("  {line}\n"));
+        }
+        for model in &self.laws {
+            let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
+            let _ = writeln!(text, "law {}: {}", model.key, names.join(", "));
+        }
+        let _ = writeln!(
+            text,
+            "{} fits, {} trials, {} expectations; writes fits.csv, <data>_states.csv, materials.toml, pictures (not with \
+             --quick), report.json",
+            self.laws.len() * self.data.len(),
+            self.trials.len(),
+            self.expect.len()
+        );
+        text
+    }
+
+    /// Names of all scalars that the report will have.
+    fn quantities(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        for DataSet { name: data, .. } in &self.data {
+            for model in &self.laws {
+                let fit = format!("{data}.{}", model.key);
+                let own = [q::RMS, q::MAE, q::R2, q::SHEAR_MODULUS, q::STABLE, q::FAILED];
+                names.extend(own.map(|quantity| quantity.of(&[&fit]).name));
+                let parameters = model.parameters.iter().map(|parameter| parameter.name);
+                names.extend(parameters.map(|parameter| q::PARAMETER.of(&[&fit, parameter]).name));
+                for other in self.data.iter().filter(|other| self.cross && other.name != *data) {
+                    let fit = format!("{fit}.{}", other.name);
+                    names
+                        .extend([q::RMS, q::MAE, q::R2, q::LOCKED].map(|quantity| quantity.of(&[&fit]).name));
+                }
+            }
+        }
+        for trial in &self.trials {
+            names.extend(trial.quantities());
+        }
+        names
+    }
+
+    fn check_expectations(&self) -> Result<(), SceneError> {
+        let names = self.quantities();
+        for (i, expect) in self.expect.iter().enumerate() {
+            if let Some(name) = expect.names().find(|name| !names.iter().any(|known| known == name)) {
+                let known: Vec<&str> = names.iter().map(String::as_str).collect();
+                return Err(self.source.unknown(&format!("expect[{i}].quantity"), name, &known));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn selected(source: &Source, names: &[String]) -> Result<Vec<&'static ModelDescriptor>, SceneError> {
+    let mut laws: Vec<&'static ModelDescriptor> = Vec::new();
+    for (i, name) in names.iter().enumerate() {
+        let all = || MODELS.iter().map(|model| model.key).collect::<Vec<_>>().join(", ");
+        let key = format!("fit.laws[{i}]");
+        let model = hyperelastic::model(name).map_err(|_| match advice(name) {
+            Some(advice) => source.error(&key, format!("`{name}`"), advice),
+            None => source.error(&key, format!("`{name}`"), all()),
+        })?;
+        if laws.iter().any(|law| law.key == model.key) {
+            return Err(source.error(&key, format!("`{name}` a second time"), "every law once"));
+        }
+        laws.push(model);
+    }
+    if laws.is_empty() {
+        return Err(source.error("fit.laws", "no law", "at least one, or no key `laws` for all"));
+    }
+    Ok(laws)
+}
+
+/// What to take for a law of another name, or for what no law here is.
+fn advice(name: &str) -> Option<&'static str> {
+    let plain: String = name.to_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();
+    Some(match plain.as_str() {
+        "arrudaboyce" | "8chain" => "`eight-chain`: that is Arruda and Boyce's law",
+        "ogden" => "`ogden-1`, `ogden-2` or `ogden-3`: by the number of terms",
+        "mooney" | "polynomial" | "polynomial1" => "`mooney-rivlin`: the polynomial of first order",
+        "reducedpolynomial" | "reducedpolynomial3" | "polynomial3" | "yeoh3" => {
+            "`yeoh`: the reduced polynomial of third order"
+        }
+        "biderman" => "`yeoh`: of I1 alone",
+        "neohooke" | "neohookean" | "neo" => "`neo-hookean`",
+        "marlow" | "vanderwaals" | "extendedtube" => "`eight-chain-root-i2`, the nearest by its behaviour",
+        "prony" | "viscoelastic" | "maxwell" | "creep" => {
+            "an elastic law: rates and relaxation are not modelled; fit the curve of the slowest test"
+        }
+        "poissonratio" | "nu" => {
+            "nothing: the rubber of a fit is incompressible; compressibility is `bulk_modulus` in a scene of peri"
+        }
+        "hyperfoam" | "ogdenfoam" | "blatzko" => "an incompressible law: foams are not among them",
+        _ => return None,
+    })
+}

@@ -1,0 +1,221 @@
+//! Trials: a law at a stretch, or fitted to a few states, with their expected behaviour.
+
+use harness::report::{self, Judgement, Quantity, Report};
+use harness::scene::{SceneError, Source};
+use polycore::Error;
+use polycore::constitutive;
+use polycore::constitutive::hyperelastic::data::{Mode, State, Table};
+use polycore::constitutive::hyperelastic::fit::fit;
+use polycore::constitutive::hyperelastic::{
+    self, Compressible, Hyperelastic, Volumetric, homogeneous, model, plane_stress,
+};
+use polycore::tensor::Tensor2;
+use polycore::units::Stress;
+use serde::Deserialize;
+
+use super::{MPA, quantities as q};
+
+/// One trial: with `parameters` a law is evaluated at a `stretch`, with `data` it is fitted.
+#[derive(Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Trial {
+    /// Its name in the report.
+    name: String,
+    /// Expected behaviour, in words.
+    description: String,
+    /// The law's name.
+    law: String,
+    /// Its parameters, in their order.
+    parameters: Option<Vec<Number>>,
+    /// The test.
+    #[serde(default = "uniaxial")]
+    mode: Mode,
+    /// First stretch.
+    stretch: Option<f64>,
+    /// λ of Lamé of a quadratic volumetric term, with the incompressible law's stress where it is not given.
+    bulk: Option<Stress>,
+    /// λ₁ and P₁ of states in that mode.
+    data: Option<Vec<(f64, Stress)>>,
+    /// Part of the expected error message.
+    refused: Option<String>,
+}
+
+/// A parameter: a stress with its unit, or a number.
+#[derive(Deserialize, schemars::JsonSchema)]
+#[serde(untagged)]
+enum Number {
+    /// With its unit.
+    Stress(Stress),
+    /// Without.
+    Plain(f64),
+}
+
+impl Number {
+    fn si(&self) -> f64 {
+        match self {
+            Self::Stress(stress) => stress.si(),
+            Self::Plain(value) => *value,
+        }
+    }
+}
+
+fn uniaxial() -> Mode {
+    Mode::Uniaxial
+}
+
+/// Result of a trial.
+enum Seen {
+    Stress { nominal: f64, energy: f64 },
+    Fit(Box<hyperelastic::fit::Fit>),
+}
+
+impl Trial {
+    /// Names of the scalars that it may have.
+    pub fn quantities(&self) -> Vec<String> {
+        let parameters = model(&self.law).map_or(&[][..], |model| model.parameters);
+        let fixed = [q::NOMINAL, q::ENERGY, q::REFUSED, q::RMS, q::SHEAR_MODULUS];
+        let fixed = fixed.iter().map(|quantity| quantity.of(&[&self.name]));
+        let own = parameters.iter().map(|parameter| q::PARAMETER.of(&[&self.name, parameter.name]));
+        fixed.chain(own).map(|quantity| quantity.name).collect()
+    }
+
+    fn attempt(&self) -> Result<Seen, constitutive::Error> {
+        let model = model(&self.law)?;
+        if let Some(data) = &self.data {
+            let state = |(stretch, nominal): &(f64, Stress)| State {
+                mode: self.mode,
+                stretches: [*stretch, self.mode.second_stretch(*stretch)],
+                nominal: [nominal.si(), 0.0],
+            };
+            let table = Table { source: String::new(), states: data.iter().map(state).collect() };
+            return Ok(Seen::Fit(Box::new(fit(model, &table)?)));
+        }
+        let values: Vec<f64> = self.parameters.iter().flatten().map(Number::si).collect();
+        let law = model.law(&values)?;
+        let first = self.stretch.unwrap_or(1.0);
+        let second = self.mode.second_stretch(first);
+        let Some(bulk) = self.bulk else {
+            let nominal = homogeneous::biaxial(&law, first, second)?[0];
+            let stretches = homogeneous::incompressible(first, second)?;
+            return Ok(Seen::Stress { nominal, energy: law.energy_at(stretches)? });
+        };
+        let law = Compressible::new(law, Volumetric::Quadratic { lame: bulk.si() })?;
+        let state = plane_stress(&law, &Tensor2::new(first, 0.0, 0.0, second))?;
+        Ok(Seen::Stress { nominal: first * state.stress[0], energy: law.energy(&state.deformation)? })
+    }
+}
+
+/// Rules of the list.
+///
+/// # Errors
+/// What is wrong and where.
+pub fn check(source: &Source, trials: &[Trial]) -> Result<(), SceneError> {
+    for (i, trial) in trials.iter().enumerate() {
+        let key = |field: &str| format!("trial[{i}].{field}");
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if trial.name.is_empty() || !trial.name.chars().all(plain) {
+            return Err(source.error(
+                &key("name"),
+                format!("`{}`", trial.name),
+                "letters, digits, `-` and `_`",
+            ));
+        }
+        if trials[..i].iter().any(|other| other.name == trial.name) {
+            return Err(source.error(
+                &key("name"),
+                format!("`{}` a second time", trial.name),
+                "another name",
+            ));
+        }
+        let Ok(model) = model(&trial.law) else {
+            let all: Vec<&str> = hyperelastic::MODELS.iter().map(|model| model.key).collect();
+            return Err(source.error(&key("law"), format!("`{}`", trial.law), all.join(", ")));
+        };
+        if trial.data.is_some() == trial.parameters.is_some() {
+            let found = if trial.data.is_some() { "`data` together with `parameters`" } else { "neither" };
+            return Err(source.error(&key("law"), found, "`parameters` and `stretch`, or `data` to fit"));
+        }
+        if trial.data.is_some() && (trial.stretch.is_some() || trial.bulk.is_some()) {
+            let found = "`stretch` or `bulk` together with `data`";
+            return Err(source.error(&key("data"), found, "`data` alone: the law is fitted"));
+        }
+        let Some(parameters) = &trial.parameters else { continue };
+        if parameters.len() != model.parameters.len() {
+            let names: Vec<_> = model.parameters.iter().map(|parameter| parameter.name).collect();
+            return Err(source.error(
+                &key("parameters"),
+                format!("{} of them", parameters.len()),
+                names.join(", "),
+            ));
+        }
+        for (given, parameter) in parameters.iter().zip(model.parameters) {
+            if matches!(given, Number::Stress(_)) != (parameter.unit == "Pa") {
+                let (found, allowed) = match parameter.unit {
+                    "Pa" => (format!("`{}` without a unit", parameter.name), "a stress, as \"0.3 MPa\""),
+                    _ => (format!("`{}` with a unit", parameter.name), "a number without unit"),
+                };
+                return Err(source.error(&key("parameters"), found, allowed));
+            }
+        }
+        if trial.stretch.is_none() {
+            return Err(source.error(&key("parameters"), "no `stretch` beside it", "`stretch = 2.0`"));
+        }
+    }
+    Ok(())
+}
+
+/// Runs a trial and records the observed behaviour.
+///
+/// # Errors
+/// Unexpected failures.
+pub fn run(trial: &Trial, report: &mut Report) -> Result<(), Error> {
+    let of = |quantity: Quantity| quantity.of(&[&trial.name]);
+    let seen = trial.attempt();
+    let mut passed = true;
+    let text = match (seen, &trial.refused) {
+        (Err(error), Some(part)) => {
+            let error = error.to_string();
+            passed = error.contains(part.as_str());
+            report.value(of(q::REFUSED), f64::from(u8::from(passed)));
+            format!("refused: {error}")
+        }
+        (Err(error), None) => return Err(error.into()),
+        (Ok(seen), refused) => {
+            if refused.is_some() {
+                passed = false;
+                report.value(of(q::REFUSED), 0.0);
+            }
+            match seen {
+                Seen::Stress { nominal, energy } => {
+                    report.value(of(q::NOMINAL), nominal / MPA);
+                    report.value(of(q::ENERGY), energy / MPA);
+                    format!("P = {:e} MPa, W = {:e} MJ/m³", nominal / MPA, energy / MPA)
+                }
+                Seen::Fit(fit) => {
+                    report.value(of(q::RMS), fit.rms / MPA);
+                    report.value(of(q::SHEAR_MODULUS), fit.law.shear_modulus() / MPA);
+                    for parameter in &fit.parameters {
+                        let (scale, unit) = if parameter.unit == "Pa" { (MPA, "MPa") } else { (1.0, "") };
+                        let quantity = q::PARAMETER.of(&[&trial.name, parameter.name]).in_unit(unit);
+                        report.value(quantity, parameter.value / scale);
+                    }
+                    format!("rms {:e} MPa", fit.rms / MPA)
+                }
+            }
+        }
+    };
+    let (what, description) = (trial.name.clone(), trial.description.clone());
+    report.trials.push(report::Trial { what, description, observed: text, iterations: None, passed });
+    Ok(())
+}
+
+/// A trial fails with any expectation on it.
+pub fn judge(trials: &[Trial], report: &mut Report) {
+    for (trial, seen) in trials.iter().zip(&mut report.trials) {
+        let own = trial.quantities();
+        let fails = |judged: &&Judgement| {
+            !judged.pass && judged.expect.names().any(|name| own.iter().any(|o| o == name))
+        };
+        seen.passed &= !report.expect.iter().any(|judged| fails(&judged));
+    }
+}

@@ -1,0 +1,69 @@
+//! The `polycore` command line: fits hyperelastic laws to the data that a case names, and tabulates laws.
+
+// harness::say! prints without a panic where nobody reads any more
+#![deny(clippy::print_stdout, clippy::print_stderr)]
+
+use std::process::ExitCode;
+
+use harness::case::{self, Finished, Program, Run, terminal};
+use harness::scene::{Failure, Source};
+use polycore::Error;
+
+mod cli {
+    /// Everything printed and written is in MPa.
+    pub const MPA: f64 = 1e6;
+
+    pub mod card;
+    pub mod draw;
+    pub mod exact;
+    pub mod fits;
+    pub mod material;
+    pub mod quantities;
+    pub mod scene;
+    pub mod trials;
+}
+
+use cli::{exact, fits, scene};
+
+/// Fits of hyperelastic laws.
+struct Fits;
+
+impl case::Case for Fits {
+    const PROGRAM: Program = Program {
+        name: "polycore",
+        version: env!("CARGO_PKG_VERSION"),
+        about: "Hyperelastic laws: fits to data, tables, checks",
+        examples: "  polycore check cases/ch1/rubber-fits/case.toml    which laws it fits to which data
+  polycore run cases/ch1/rubber-fits/case.toml      fit, draw, judge; results in out/rubber-fits
+  polycore exact eight-chain \"0.27 MPa\" 25 --to 4  nominal stress against stretch, as CSV",
+        magic: b"poly-ck2",
+        columns: &["*.rms"],
+    };
+    type Error = Error;
+
+    fn explain(source: &Source, _quick: bool) -> Result<Vec<String>, Failure<Error>> {
+        Ok(scene::Case::parse(source)?.plan().lines().map(str::to_owned).collect())
+    }
+
+    fn solve(source: &Source, run: &mut Run) -> Result<Finished, Failure<Error>> {
+        Ok(fits::run(&scene::Case::parse(source)?, run)?)
+    }
+
+    fn schema() -> serde_json::Value {
+        scene::schema()
+    }
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Tabulate the nominal stress of an incompressible law, as CSV that a case can read back as data.
+    Exact(exact::Arguments),
+}
+
+fn main() -> ExitCode {
+    case::main::<Fits, _>(|Command::Exact(arguments)| {
+        let refused = |reason| Error::Option { option: "exact".to_owned(), reason };
+        terminal::print(exact::table(&arguments).map_err(refused)?);
+        Ok(true)
+    })
+}
