@@ -141,18 +141,6 @@ impl Layers {
         faces.push(high);
         Self::from_heights(mesh, elements, &faces)
     }
-
-    /// Time at which each element of the mesh appears, s: of layer k (from 0) `first` + k · `interval`; elements in no
-    /// layer exist from the start, at −∞.
-    pub fn activation(&self, mesh: &Mesh, first: f64, interval: f64) -> Vec<f64> {
-        let mut times = vec![f64::NEG_INFINITY; mesh.element_count()];
-        for (layer, elements) in self.elements.iter().enumerate() {
-            for element in elements {
-                times[*element as usize] = first + layer as f64 * interval;
-            }
-        }
-        times
-    }
 }
 
 /// Elements that appear together, by time: those due within a `window`, s, at its end, so that nothing appears before
@@ -216,9 +204,10 @@ mod tests {
         let printed = &mesh.element_sets["bar"];
         assert_eq!(Layers::from_height(&mesh, printed, 2e-4).unwrap(), named);
         assert_eq!(Layers::from_heights(&mesh, printed, &[0.0, 2e-4, 4e-4, 6e-4]).unwrap(), named);
-        let times = named.activation(&mesh, 5.0, 10.0);
-        assert_eq!(times[named.elements[2][0] as usize], 25.0);
-        assert_eq!(times[mesh.element_sets["substrate"][0] as usize], f64::NEG_INFINITY);
+        let mut times = vec![f64::NEG_INFINITY; mesh.element_count()];
+        for (time, elements) in [5.0, 15.0, 25.0].into_iter().zip(&named.elements) {
+            elements.iter().for_each(|element| times[*element as usize] = time);
+        }
         let groups = groups(&times, 0.0).unwrap();
         let expected: Vec<(f64, Vec<u32>)> = [5.0, 15.0, 25.0].into_iter().zip(named.elements).collect();
         assert_eq!(groups, expected);
