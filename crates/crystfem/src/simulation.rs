@@ -4,13 +4,14 @@
 mod step;
 
 use crate::error::Error;
+pub use crate::fields::Statistics;
 use crate::ledger::{Ledger, Record};
 use crate::problem::Problem;
 use crate::solver::Task;
 pub use crate::solver::{Choice, LinearSolver, Method};
 use crate::system::{Behaviour, Exchange, NONE, System};
 pub use crate::system::{Memory, Points};
-use crate::time::{Scheme, Stepper, Steps, Work};
+use crate::time::{Scheme, Start, Stepper, Steps, Work};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -100,6 +101,14 @@ pub struct State {
     pub ledger: Ledger,
     /// Work since the start.
     pub work: Work,
+}
+
+impl State {
+    /// What a step begins with.
+    pub(crate) fn start(&self) -> Start<'_> {
+        let Self { time, temperature, slope, rate, exchange, memory, .. } = self;
+        Start { time: *time, temperature, slope, rate, exchange, memory }
+    }
 }
 
 /// A problem being solved.
@@ -306,6 +315,23 @@ impl Simulation {
     /// As [`Self::advance`].
     pub fn run_until(&mut self, until: f64) -> Result<(), Error> {
         self.advance(until, &mut |_, _| ControlFlow::Continue(())).map(|_| ())
+    }
+
+    /// [`Self::advance`] with a look at each accepted step, which ends at its first error.
+    ///
+    /// # Errors
+    /// As [`Self::advance`], and those of `after_step`.
+    pub fn observe(
+        &mut self,
+        until: f64,
+        mut after_step: impl FnMut(&Self) -> Result<(), Error> + Send,
+    ) -> Result<(), Error> {
+        let mut result = Ok(());
+        let _ = self.advance(until, &mut |simulation, _| {
+            result = after_step(simulation);
+            if result.is_err() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        result
     }
 
     /// How linear systems would be solved from now to a time, and why.

@@ -7,8 +7,8 @@
 use super::Crystallization;
 use super::crystallization::{FAINT, Grown, HEATING_PANELS, NOTHING};
 use super::semicrystalline::{LARGEST_CHANGE, LONGEST};
-use crate::elementary::{SMALL, exp, expm1_small, ln, ln_1p};
 use crate::kinetics::{PANELS, Panels};
+use crate::simd_math::{SMALL, exp, expm1_small, ln, ln_1p};
 use pulp::{Arch, Simd, WithSimd};
 
 /// z at least for powers of it; zⁿ at most for its exponential, and the logarithm of that.

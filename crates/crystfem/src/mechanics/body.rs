@@ -4,7 +4,7 @@ use super::branch::Energies;
 use super::element::{POINTS, Six};
 use super::kind::{self, Element};
 use super::maxwell::Increment;
-use super::solve::{Load, gather};
+use super::product::{Load, gather};
 use crate::error::Error;
 use crate::mesh::Mesh;
 use nalgebra::Vector3;

@@ -4,6 +4,10 @@ use nalgebra::{SMatrix, SVector};
 
 /// Strains and stresses, xx, yy, zz, xy, yz, zx, shear strains as angles.
 pub type Six = SVector<f64, 6>;
+/// Components of the nodes of an element, 0 beyond those that it has.
+pub type Wide = SVector<f64, 30>;
+/// Forces of the modes of a hexahedron.
+pub type Modal = SVector<f64, 9>;
 type Nodal = SVector<f64, 24>;
 
 /// Gauss points.

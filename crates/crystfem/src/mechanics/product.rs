@@ -1,6 +1,7 @@
 //! Products of element matrices with displacements: each element by vectors of the processor, then the sum at each node in the order of its
 //! elements, so that its bits do not depend on threads.
 
+use super::element::Wide;
 use crate::system::vector::sum;
 use nalgebra::{Matrix3, Vector3};
 use pulp::{Arch, Simd, WithSimd};
@@ -10,6 +11,13 @@ use rayon::prelude::*;
 const ITEM: usize = 512;
 /// Components of an element.
 const COMPONENTS: usize = 24;
+
+/// Forces that add up to a load, node by node.
+pub(super) struct Load {
+    pub(super) sum: Vec<Vector3<f64>>,
+    /// Sum of the squares of the parts.
+    pub(super) parts: f64,
+}
 
 /// Elements of so many nodes: those, K̂ column by column, and its modulus.
 type Stiff<'a, const N: usize> = ([u32; N], &'a [f64], f64);
@@ -166,6 +174,15 @@ impl WithSimd for Product<'_, '_> {
 /// a·b, in work items.
 pub fn dot(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
     sum(a.len(), |k| a[k].dot(&b[k]))
+}
+
+/// Displacements of an element's nodes.
+pub(super) fn gather(nodes: &[u32], u: &[Vector3<f64>]) -> Wide {
+    let mut local = Wide::zeros();
+    for (k, &node) in nodes.iter().enumerate() {
+        local.fixed_rows_mut::<3>(3 * k).copy_from(&u[node as usize]);
+    }
+    local
 }
 
 #[cfg(test)]

@@ -2,8 +2,7 @@
 
 use super::body::Body;
 use super::coarse::Coarse;
-use super::kind::Wide;
-use super::product::{Elements, block, dot};
+use super::product::{Elements, Load, block, dot};
 use crate::error::Error;
 use crate::system::vector::combine;
 use nalgebra::{Matrix3, Vector3};
@@ -15,13 +14,6 @@ const ITERATIONS: usize = 20;
 
 /// A load below this part of the forces that add up to it is their rounding.
 const ROUNDING: f64 = 1e-14;
-
-/// Forces that add up to a load, node by node.
-pub(super) struct Load {
-    pub(super) sum: Vec<Vector3<f64>>,
-    /// Sum of the squares of the parts.
-    pub(super) parts: f64,
-}
 
 impl Body<'_> {
     /// Conjugate gradients with the inverse 3 × 3 blocks of the nodes and a coarse level of rigid motions, on the nodes that exist; adds
@@ -117,12 +109,4 @@ impl Body<'_> {
             allowed: format!("at most {goal:e}: are all rigid motions held?"),
         })
     }
-}
-
-pub(super) fn gather(nodes: &[u32], u: &[Vector3<f64>]) -> Wide {
-    let mut local = Wide::zeros();
-    for (k, &node) in nodes.iter().enumerate() {
-        local.fixed_rows_mut::<3>(3 * k).copy_from(&u[node as usize]);
-    }
-    local
 }

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
+use crate::file::line_error;
 use crate::mesh::Shape;
-use crate::mesh::labelled::{Content, Element, Kind, Node, ReadMesh, line_error};
+use crate::mesh::file_mesh::{Content, Element, Kind, Node, ReadMesh};
 
 mod cards;
 mod ignored;
@@ -33,7 +34,7 @@ pub use write::write;
 /// fit, sets and nodes that do not exist, and what would change the mesh unseen (`*NGEN`, `*SYSTEM`, …);
 /// [`Error::Mesh`] from [`crate::mesh::quality::check`]. Memory follows the size of the file.
 pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
-    let bytes = super::read_bytes(path)?;
+    let bytes = crate::file::read_bytes(path)?;
     parse(path, &bytes, scale)
 }
 

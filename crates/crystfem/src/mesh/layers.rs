@@ -204,13 +204,6 @@ mod tests {
         let printed = &mesh.element_sets["bar"];
         assert_eq!(Layers::from_height(&mesh, printed, 2e-4).unwrap(), named);
         assert_eq!(Layers::from_heights(&mesh, printed, &[0.0, 2e-4, 4e-4, 6e-4]).unwrap(), named);
-        let mut times = vec![f64::NEG_INFINITY; mesh.element_count()];
-        for (time, elements) in [5.0, 15.0, 25.0].into_iter().zip(&named.elements) {
-            elements.iter().for_each(|element| times[*element as usize] = time);
-        }
-        let groups = groups(&times, 0.0).unwrap();
-        let expected: Vec<(f64, Vec<u32>)> = [5.0, 15.0, 25.0].into_iter().zip(named.elements).collect();
-        assert_eq!(groups, expected);
     }
 
     #[test]

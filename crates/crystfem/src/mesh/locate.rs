@@ -2,7 +2,7 @@
 
 use super::Mesh;
 use crate::element::natural::{self, Natural};
-use crate::element::{self, CORNERS, WIDE};
+use crate::element::{CORNERS, WIDE};
 use crate::mesh::Shape;
 use nalgebra::{Matrix3, Vector3};
 
@@ -56,7 +56,7 @@ impl Mesh {
 
     /// Shape functions of an element's nodes at a place, m, in it or on its faces; `None` outside.
     pub fn shapes_at(&self, element: u32, at: [f64; 3]) -> Option<[f64; WIDE]> {
-        let (corners, nodes) = element::positions::<WIDE>(self, element);
+        let (corners, nodes) = self.positions::<WIDE>(element);
         let (weights, distance, rounding) = near(corners.get(..nodes).filter(|list| !list.is_empty())?, at)?;
         (distance <= rounding).then_some(weights)
     }
@@ -109,7 +109,7 @@ impl Mesh {
     fn locate_in(&self, elements: impl Iterator<Item = u32>, at: [f64; 3]) -> Option<Place> {
         let mut found: Vec<(u32, [f64; WIDE], f64, f64)> = Vec::new();
         for number in elements {
-            let (corners, nodes) = element::positions::<WIDE>(self, number);
+            let (corners, nodes) = self.positions::<WIDE>(number);
             let corners = &corners[..nodes];
             if let Some((weights, distance, rounding)) = near(corners, at) {
                 found.push((number, weights, distance, rounding));

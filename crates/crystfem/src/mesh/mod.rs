@@ -2,14 +2,15 @@
 
 pub mod abaqus;
 mod bar;
+mod file_mesh;
+mod geometry;
 pub mod gmsh;
-mod labelled;
 pub mod layers;
 mod locate;
 mod order;
 pub mod path;
 pub mod quality;
-mod shape;
+mod read;
 mod split;
 pub mod stl;
 mod structured;
@@ -18,16 +19,16 @@ mod tube;
 mod voxels;
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use nalgebra::Vector3;
 
 use crate::error::Error;
 
+pub use crate::shape::{Cell, HEXAHEDRON_SIDES, Shape, TETRAHEDRON_SIDES};
 pub use bar::{Bar, Substrate};
-pub use labelled::ReadMesh;
+pub use file_mesh::ReadMesh;
 pub use locate::Place;
-pub use shape::{Cell, Shape};
+pub use read::read;
 pub use split::Split;
 pub use structured::{Block, Grid, graded};
 pub use tube::Tube;
@@ -62,13 +63,6 @@ pub struct Mesh {
     /// Named surfaces.
     pub surfaces: BTreeMap<String, Vec<Face>>,
 }
-
-/// Local nodes of the sides S1 … S6 of a hexahedron, anticlockwise seen from outside.
-pub const HEXAHEDRON_SIDES: [[usize; 4]; 6] =
-    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
-
-/// Local nodes of the sides S1 … S4 of a tetrahedron, anticlockwise seen from outside.
-pub const TETRAHEDRON_SIDES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
 
 /// Sides of a box that bounds a mesh and the names of the surfaces on them: x−, x+, y−, y+, z−, z+.
 pub const BOX_SIDES: [&str; 6] = ["left", "right", "front", "back", "bottom", "top"];
@@ -311,30 +305,6 @@ impl Mesh {
     pub(crate) fn point(&self, node: u32) -> Vector3<f64> {
         Vector3::from(self.points[node as usize])
     }
-}
-
-/// Reads a mesh file, `.msh` of Gmsh ([`gmsh::read`]) or `.inp` of Abaqus and CalculiX ([`abaqus::read`]), coordinates
-/// multiplied by `scale` (1e-3 for a file in mm), and checks it.
-///
-/// # Errors
-/// Another ending of the name, and what those functions refuse.
-pub fn read(path: &Path, scale: f64) -> Result<ReadMesh, Error> {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    match ending.as_str() {
-        "msh" => gmsh::read(path, scale),
-        "inp" => abaqus::read(path, scale),
-        _ => Err(Error::Mesh(format!(
-            "{}: allowed: .msh (Gmsh 2 and 4), .inp (Abaqus, CalculiX)",
-            path.display()
-        ))),
-    }
-}
-
-/// The bytes of a mesh file.
-fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
-    std::fs::read(path).map_err(|source| {
-        Error::Shared(polycore::Error::Io { operation: "read", path: path.to_owned(), source })
-    })
 }
 
 #[cfg(test)]

@@ -237,7 +237,7 @@ fn told(counts: &mut BTreeMap<String, usize>) -> String {
 }
 
 fn error(path: &Path, line: usize, what: &str, found: impl ToString, allowed: impl Into<String>) -> Error {
-    crate::mesh::labelled::line_error(path, line, what, found, allowed)
+    crate::file::line_error(path, line, what, found, allowed)
 }
 
 #[cfg(test)]

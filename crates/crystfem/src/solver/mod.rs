@@ -2,6 +2,7 @@
 
 mod aggregation;
 mod bicgstab;
+mod cached;
 mod cg;
 mod choice;
 mod direct;
@@ -9,6 +10,7 @@ mod dissection;
 mod multigrid;
 mod packed;
 
+pub use cached::Cached;
 pub use cg::{Ended, Goal};
 pub use choice::{Choice, LEVELS, LinearSolver, Method, Task};
 pub use direct::Direct;
@@ -66,7 +68,7 @@ pub struct Iterative {
     conjugate: ConjugateGradients,
     biconjugate: BiconjugateGradients,
     /// The preconditioner of symmetric matrices, where it is not the diagonal.
-    pub multigrid: Option<Multigrid>,
+    pub multigrid: Cached<Option<Multigrid>>,
 }
 
 impl Iterative {
@@ -87,7 +89,7 @@ impl Iterative {
         goal: &Goal,
     ) -> Ended {
         let Self { conjugate, biconjugate, multigrid } = self;
-        match multigrid {
+        match &mut multigrid.value {
             _ if !symmetric => biconjugate.solve(operator, inverse, residual, solution, goal),
             Some(levels) => conjugate.solve_with(levels, operator, inverse, residual, solution, goal),
             None => conjugate.solve(operator, inverse, residual, solution, goal),

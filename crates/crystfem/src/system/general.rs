@@ -195,7 +195,7 @@ impl General {
         energy: &mut [f64],
     ) -> Result<Part<N>, Error> {
         let number = self.elements[index];
-        let (corners, nodes) = element::positions::<N>(&problem.mesh, number);
+        let (corners, nodes) = problem.mesh.positions::<N>(number);
         let material = &*problem.materials[usize::from(problem.material_of[number as usize])];
         let Some(geometry) = Geometry::<N, P>::new(&corners[..nodes]) else {
             return Err(Error::Mesh(format!("element {number}: inverted, flat or folded")));

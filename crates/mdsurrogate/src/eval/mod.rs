@@ -3,6 +3,7 @@
 mod ellipticity;
 mod physics;
 mod uncertainty;
+pub mod uniaxial;
 
 pub use ellipticity::Ellipticity;
 pub use physics::Physics;

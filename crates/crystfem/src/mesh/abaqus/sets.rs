@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
-use crate::mesh::labelled::{Content, Labels, line_error};
+use crate::file::line_error;
+use crate::mesh::file_mesh::{Content, Labels};
 use crate::mesh::surface::Surface;
 use crate::mesh::{Cell, Face, Mesh, Shape};
 

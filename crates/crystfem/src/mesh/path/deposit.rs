@@ -23,6 +23,13 @@ pub struct Cells {
     pub least: f64,
 }
 
+impl Cells {
+    /// Cells of these edges, m, for filament of 1.75 mm: beads as high as the file tells, cells that are a tenth full.
+    pub fn new(size: [f64; 3]) -> Self {
+        Self { size, filament: super::FILAMENT, height: None, least: 0.1 }
+    }
+}
+
 /// What a path lays down.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deposit {

@@ -32,7 +32,7 @@ const MOST_TOOLS: f64 = 63.0;
 /// a centre or radius that fits, other curves (G5), other planes (G18, G19), and temperatures below absolute
 /// zero.
 pub fn read_gcode(path: &Path) -> Result<ToolPath, Error> {
-    parse(path, &crate::mesh::read_bytes(path)?)
+    parse(path, &crate::file::read_bytes(path)?)
 }
 
 /// [`read_gcode`], of bytes; `path` is for messages only.

@@ -1,19 +1,9 @@
 //! Times of moves of a machine that cannot change its velocity at once.
 
-use super::limits::Limits;
+use super::limits::{Limits, Ramp};
 use super::{Motion, ToolPath};
 use crate::error::Error;
 use nalgebra::Vector3;
-
-/// A straight motion: how long it is, m, how fast, m/s, how it gets there, m/s², and with which velocity it
-/// may begin.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ramp {
-    pub length: f64,
-    pub velocity: f64,
-    pub acceleration: f64,
-    pub enter: f64,
-}
 
 /// Durations of motions one after another, s, by trapezoids of velocity from rest to rest: passes back and
 /// forth give the velocity at each corner. `exit`: the velocity of the last at its end.

@@ -1,10 +1,10 @@
 //! The material alone: curves, events, pictures.
 
 use super::Failure;
-use super::celsius::CELSIUS;
 use super::draw::{self, Run};
 use crate::error::Error;
 use crate::point::{Course, Curves, Drive, Event, Stepping};
+use crate::program::observe::celsius::CELSIUS;
 use crate::program::quantities as q;
 use crate::program::scene::{NodesSpec, PointScene};
 use harness::output::csv;

@@ -129,7 +129,7 @@ impl Simulation {
         for birth in &self.problem.births[first..self.state.births] {
             for &number in &birth.elements {
                 let material = usize::from(self.problem.material_of[number as usize]);
-                let (corners, nodes) = element::corners(&self.problem.mesh, number);
+                let (corners, nodes) = self.problem.mesh.positions::<MOST>(number);
                 let volumes = match <Geometry>::new(&corners[..nodes]) {
                     Some(geometry) => geometry.corner_volumes,
                     None => return Err(Error::Mesh(format!("element {number}: inverted"))),
@@ -231,7 +231,7 @@ impl Simulation {
         for (number, g) in system.around(equation, &state.born) {
             let Ok(index) = system.general.elements.binary_search(&number) else { continue };
             let material = problem.material_of[number as usize];
-            let (corners, nodes) = element::corners(&problem.mesh, number);
+            let (corners, nodes) = problem.mesh.positions::<MOST>(number);
             let volumes = <Geometry>::new(&corners[..nodes]).map_or([0.0; MOST], |g| g.corner_volumes);
             let mass = problem.materials[usize::from(material)].density() * volumes[g];
             let point = system.general.starts[index] as usize + g;

@@ -1,7 +1,7 @@
 //! A picture of the warped part.
 
-use super::mechanics::Follower;
 use super::outside::{Frame, Outside};
+use crate::coupling::StressCoupling;
 use crate::error::Error;
 use crate::program::scene::{PartScene, Task};
 use harness::output::picture::{ColorMap, Solids, Strip};
@@ -11,13 +11,13 @@ use std::path::Path;
 const SEEN: f64 = 0.1;
 
 /// warped.png: what bears stress at the end, displacements magnified by `output.magnify`, with its lift and its Mises stress.
-pub fn draw(scene: &PartScene, task: &Task, follower: &Follower, output: &Path) -> Result<(), Error> {
+pub fn draw(scene: &PartScene, task: &Task, stress: &StressCoupling, output: &Path) -> Result<(), Error> {
     let mesh = &task.problem.mesh;
-    let stresses = follower.mises();
+    let stresses = stress.mises();
     let own: Vec<u32> =
         (0..mesh.element_count() as u32).filter(|&e| stresses[e as usize].is_finite()).collect();
     let Some(bounds) = mesh.bounds_of(&own) else { return Ok(()) };
-    let moved = follower.displacement();
+    let moved = stress.displacement();
     let most = moved.chunks(3).map(|u| u[0].hypot(u[1]).hypot(u[2])).filter(|u| u.is_finite());
     let size = (0..3).map(|d| bounds[1][d] - bounds[0][d]).fold(0.0, f64::max);
     let factor = scene.output.magnify.unwrap_or_else(|| round(SEEN * size / most.fold(0.0, f64::max)));
@@ -59,8 +59,7 @@ pub fn draw(scene: &PartScene, task: &Task, follower: &Follower, output: &Path) 
     let solids = Solids { title: scene.title.clone(), bounds, unit: ("mm".into(), 1e-3), view, fields };
     let outside = Outside::new(mesh, &own, scene.output.solid.plane(bounds))?.at(points);
     let exists = stresses.iter().map(|stress| stress.is_finite()).collect();
-    let state =
-        if scene.mechanics.as_ref().is_some_and(|spec| spec.release) { "released" } else { "on the bed" };
+    let state = if stress.settings().release { "released" } else { "on the bed" };
     let title = format!("{state}, displacements × {factor}");
     let (title, skin) = outside.skin(Frame { title, values: vec![lift, mises], exists });
     solids.write(output.join("warped.png"), 1, |_| Ok((title.clone(), skin.clone())))?;

@@ -4,11 +4,11 @@ use super::celsius::CELSIUS;
 use crate::error::Error;
 use crate::mesh::Place;
 use crate::program::quantities as q;
-use crate::program::scene::{PartScene, ProbeSpec};
+use crate::program::scene::{PartScene, ProbeSpec, Task};
 use crate::simulation::Simulation;
+use harness::observe::{Observer, Outputs, Scalars};
 use harness::output::csv;
 use harness::output::picture::{LinePlot, Series};
-use harness::report::Report;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -39,16 +39,13 @@ impl Probe {
         }
     }
 
-    pub(super) fn name(&self) -> &str {
+    /// Its name.
+    pub fn name(&self) -> &str {
         &self.name
     }
 
-    pub(super) fn place(&self) -> &Place {
-        &self.place
-    }
-
     /// Temperature, °C, and a field at a time, linear between rows; `None` where it was not there.
-    pub(super) fn at(&self, time: f64, field: usize) -> Option<[f64; 2]> {
+    pub fn at(&self, time: f64, field: usize) -> Option<[f64; 2]> {
         let after = self.time.partition_point(|&row| row < time).max(1);
         let (from, to) = (*self.time.get(after - 1)?, *self.time.get(after)?);
         let share = (time - from) / (to - from);
@@ -107,71 +104,103 @@ pub fn record(probes: &mut [Probe], simulation: &Simulation, names: &[&'static s
     Ok(())
 }
 
-/// probe_NAME.csv, the values at the end, and the extremes of temperature.
-pub fn write(
-    probes: &[Probe],
-    names: &[&'static str],
-    output: &Path,
-    report: &mut Report,
-) -> Result<(), Error> {
-    for probe in probes {
-        let name = &probe.name;
-        report.value(q::DISTANCE.of(&[name]), probe.place.distance());
-        let mut columns: Vec<csv::Column> =
-            vec![("time", "s", &probe.time), ("temperature", "degC", &probe.temperature)];
-        columns.extend(names.iter().zip(&probe.fields).map(|(name, values)| (*name, "", values.as_slice())));
-        csv::write(output.join(format!("probe_{name}.csv")), &columns)?;
-        let mut last = |quantity: &str, values: &[f64], unit: &str| {
-            // `record` has refused all others: no material there has it
-            if let Some(last) = values.last().filter(|last| !last.is_nan()) {
-                report.value(q::AT_PROBE.of(&[name, quantity]).in_unit(unit), *last);
-            }
-        };
-        last("temperature", &probe.temperature, "degC");
-        for (quantity, values) in names.iter().zip(&probe.fields) {
-            last(quantity, values, "");
-        }
-        if !probe.temperature.is_empty() {
-            let extreme = |pick: fn(f64, f64) -> f64| probe.temperature.iter().copied().reduce(pick);
-            let [lowest, highest] = [extreme(f64::min), extreme(f64::max)].map(Option::unwrap_or_default);
-            report.value(q::LOWEST_TEMPERATURE.of(&[name]), lowest);
-            report.value(q::HIGHEST_TEMPERATURE.of(&[name]), highest);
-        }
-    }
-    Ok(())
+/// The probes of a scene.
+pub struct Probes<'a> {
+    scene: &'a PartScene,
+    task: &'a Task,
+    names: Vec<&'static str>,
+    probes: Vec<Probe>,
 }
 
-/// What births do to the probes that are there: NAME.jump_at_birth_N, by how much the temperature rises after the N-th birth
-/// before the next one, K, and of each field FIELD_at_birth_N, its value just before, and FIELD_lost_at_birth_N, by how
-/// much it falls below that.
-pub fn births(probes: &[Probe], names: &[&'static str], times: &[f64], report: &mut Report) {
-    for probe in probes {
-        for (number, &birth) in (1..).zip(times) {
+impl<'a> Probes<'a> {
+    /// Probes of which nothing is recorded yet.
+    pub fn new(scene: &'a PartScene, task: &'a Task) -> Self {
+        let names = task.problem.field_names();
+        let probes = scene.probe.iter().zip(&task.probes);
+        let probes = probes.map(|(spec, place)| Probe::new(spec, place, names.len())).collect();
+        Self { scene, task, names, probes }
+    }
+
+    /// Effects of births on a probe that is there: NAME.jump_at_birth_N, by how much the temperature rises after the N-th birth before
+    /// the next one, K, and of each field FIELD_at_birth_N, its value just before, and FIELD_lost_at_birth_N, by how
+    /// much it falls below that.
+    fn births(&self, probe: &Probe, to: &mut Scalars<Simulation>) {
+        let births = &self.task.problem.births;
+        for (number, birth) in (1..).zip(births) {
             // a row at the time of a birth shows what was before it
-            let first = probe.time.partition_point(|&time| time <= birth);
-            let next = times.get(number).copied().unwrap_or(f64::INFINITY);
+            let first = probe.time.partition_point(|&time| time <= birth.time);
+            let next = births.get(number).map_or(f64::INFINITY, |next| next.time);
             let last = probe.time.partition_point(|&time| time <= next);
-            let (Some(before), true) = (first.checked_sub(1), last > first) else { continue };
             // the row at which the probe itself was born says nothing
-            if probe.time[0] >= birth {
-                continue;
-            }
+            let seen = first > 0 && last > first && probe.time[0] < birth.time;
+            let before = |values: &[f64]| Some(values[first - 1]).filter(|value| !value.is_nan());
             let after = |values: &[f64], pick: fn(f64, f64) -> f64| {
-                values[first..last].iter().copied().fold(values[before], pick) - values[before]
+                values[first..last].iter().copied().fold(values[first - 1], pick) - values[first - 1]
             };
             let (name, number) = (probe.name.as_str(), number.to_string());
-            report.value(q::JUMP.of(&[name, &number]), after(&probe.temperature, f64::max));
-            for (field, values) in names.iter().zip(&probe.fields).filter(|(_, v)| !v[before].is_nan()) {
-                report.value(q::AT_BIRTH.of(&[name, field, &number]), values[before]);
-                let lost = after(values, f64::min).abs();
-                report.value(q::LOST_AT_BIRTH.of(&[name, field, &number]), lost);
+            let rise = |_: &Simulation| seen.then(|| after(&probe.temperature, f64::max));
+            to.add_if(q::JUMP.of(&[name, &number]), rise);
+            for (field, values) in self.names.iter().zip(&probe.fields) {
+                let known = || seen.then(|| before(values)).flatten();
+                to.add_if(q::AT_BIRTH.of(&[name, field, &number]), |_| known());
+                let lost = |_: &Simulation| known().map(|_| after(values, f64::min).abs());
+                to.add_if(q::LOST_AT_BIRTH.of(&[name, field, &number]), lost);
             }
         }
+    }
+}
+
+impl Observer<Simulation, Error> for Probes<'_> {
+    fn scalars(&self, to: &mut Scalars<Simulation>) {
+        for probe in &self.probes {
+            let name = probe.name.as_str();
+            to.add(q::DISTANCE.of(&[name]), |_| probe.place.distance());
+            // `record` has refused all others: no material there has it
+            let last = |values: &[f64]| values.last().copied().filter(|last| !last.is_nan());
+            let at = q::AT_PROBE.of(&[name, "temperature"]).in_unit("degC");
+            to.add_if(at, |_| last(&probe.temperature));
+            for (quantity, values) in self.names.iter().zip(&probe.fields) {
+                to.add_if(q::AT_PROBE.of(&[name, quantity]).in_unit(""), |_| last(values));
+            }
+            let extreme = |pick: fn(f64, f64) -> f64| probe.temperature.iter().copied().reduce(pick);
+            to.add_if(q::LOWEST_TEMPERATURE.of(&[name]), |_| extreme(f64::min));
+            to.add_if(q::HIGHEST_TEMPERATURE.of(&[name]), |_| extreme(f64::max));
+            if !self.task.layers.is_empty() {
+                self.births(probe, to);
+            }
+        }
+    }
+
+    fn see(&mut self, simulation: &Simulation) -> Result<(), Error> {
+        record(&mut self.probes, simulation, &self.names)
+    }
+
+    fn write(&self, _: &Simulation, to: &Outputs) -> Result<(), Error> {
+        for probe in &self.probes {
+            let mut columns: Vec<csv::Column> =
+                vec![("time", "s", &probe.time), ("temperature", "degC", &probe.temperature)];
+            let fields = self.names.iter().zip(&probe.fields);
+            columns.extend(fields.map(|(name, values)| (*name, "", values.as_slice())));
+            csv::write(to.folder.join(format!("probe_{}.csv", probe.name)), &columns)?;
+        }
+        Ok(())
+    }
+
+    fn draw(&self, _: &Simulation, to: &Outputs) -> Result<(), Error> {
+        draw(&self.probes, &self.names, self.scene, to.folder)
+    }
+
+    fn save(&self) -> Vec<u8> {
+        harness::observe::encode(&self.probes)
+    }
+
+    fn restore(&mut self, saved: &[u8]) -> Result<(), Error> {
+        Ok(self.probes = harness::observe::decode(saved)?)
     }
 }
 
 /// Temperatures and fields of all probes over time.
-pub fn draw(probes: &[Probe], names: &[&'static str], scene: &PartScene, output: &Path) -> Result<(), Error> {
+fn draw(probes: &[Probe], names: &[&'static str], scene: &PartScene, output: &Path) -> Result<(), Error> {
     let quantities =
         std::iter::once(("temperature", "T [°C]")).chain(names.iter().map(|name| (*name, *name)));
     for (index, (name, label)) in quantities.enumerate() {

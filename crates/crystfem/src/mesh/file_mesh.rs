@@ -1,9 +1,10 @@
-//! From what a mesh file says, in its own numbers, to a mesh.
+//! Converts labelled nodes and elements of a file to a [`Mesh`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::Error;
+use crate::file::line_error;
 use crate::mesh::quality::{self, Quality};
 use crate::mesh::{Cell, Face, Mesh, Shape};
 
@@ -135,22 +136,6 @@ impl Labels {
         let end = self.sorted.partition_point(|entry| entry.0 <= last);
         self.sorted.get(start..end).unwrap_or(&[])
     }
-}
-
-/// The crate's error for a line; long findings are cut.
-pub(super) fn line_error(
-    path: &Path,
-    line: usize,
-    what: impl Into<String>,
-    found: impl ToString,
-    allowed: impl Into<String>,
-) -> Error {
-    let mut found = found.to_string();
-    if let Some((end, _)) = found.char_indices().nth(80) {
-        found.truncate(end);
-        found.push('…');
-    }
-    Error::File { path: path.to_owned(), line, what: what.into(), found, allowed: allowed.into() }
 }
 
 impl Content {

@@ -8,9 +8,13 @@ use crate::error::Error;
 use crate::mesh::Mesh;
 use crate::program::scene::{PartScene, Task};
 use crate::simulation::Simulation;
+use harness::observe::{Observer, Outputs};
 use harness::output::picture::{ColorMap, Skin, Solids, Stage, Strip, Strips};
 use harness::output::vtkhdf::{self, Series};
 use std::path::Path;
+
+/// Name of the file of fields.
+pub const FIELDS: &str = "fields.vtkhdf";
 
 /// Frames of an animation at most, and how long each is shown, s.
 const FRAMES: usize = 60;
@@ -34,9 +38,25 @@ enum Origin<'a> {
     End(&'a Simulation),
 }
 
+/// Pictures of the process.
+pub struct Animation<'a> {
+    /// The scene.
+    pub scene: &'a PartScene,
+    /// What is printed when.
+    pub task: &'a Task,
+}
+
+impl Observer<Simulation, Error> for Animation<'_> {
+    fn draw(&self, simulation: &Simulation, to: &Outputs) -> Result<(), Error> {
+        let path = to.folder.join(FIELDS);
+        let path = Some(path.as_path()).filter(|_| self.scene.output.fields);
+        draw(self.scene, self.task, simulation, path, to.folder)
+    }
+}
+
 /// sections.png, solid.png: stages beside one another, temperature and crystallinity; process.png, process_solid.png: all
 /// frames, animated; turntable.png: the end from all sides. A field has one range in all of them.
-pub fn draw(
+fn draw(
     scene: &PartScene,
     task: &Task,
     simulation: &Simulation,

@@ -2,6 +2,11 @@
 
 /// Sides of a wedge: triangles 0 and 1, quadrilaterals 2 to 4, numbered as in Abaqus, anticlockwise seen from outside.
 const WEDGE_SIDES: [&[usize]; 5] = [&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]];
+/// Local nodes of the sides S1 … S6 of a hexahedron, anticlockwise seen from outside.
+pub const HEXAHEDRON_SIDES: [[usize; 4]; 6] =
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+/// Local nodes of the sides S1 … S4 of a tetrahedron, anticlockwise seen from outside.
+pub const TETRAHEDRON_SIDES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
 const HEXAHEDRON_EDGES: [[usize; 2]; 12] =
     [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 const TETRAHEDRON_EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
@@ -98,8 +103,8 @@ impl Shape {
     pub fn side(self, side: u8) -> &'static [usize] {
         let side = usize::from(side);
         match self.corners() {
-            8 => super::HEXAHEDRON_SIDES.get(side).map_or(&[], |side| side.as_slice()),
-            4 => super::TETRAHEDRON_SIDES.get(side).map_or(&[], |side| side.as_slice()),
+            8 => HEXAHEDRON_SIDES.get(side).map_or(&[], |side| side.as_slice()),
+            4 => TETRAHEDRON_SIDES.get(side).map_or(&[], |side| side.as_slice()),
             _ => WEDGE_SIDES.get(side).copied().unwrap_or_default(),
         }
     }
