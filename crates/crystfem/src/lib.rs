@@ -59,10 +59,6 @@ mod system;
 pub mod table;
 pub mod time;
 
-// `cargo bench` compiles a file of `program`, in which this crate has its name
-#[cfg(feature = "case")]
-extern crate self as crystfem;
-
 #[cfg(feature = "case")]
 pub mod program;
 

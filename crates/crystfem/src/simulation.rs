@@ -124,6 +124,12 @@ pub struct Simulation {
 }
 
 impl Simulation {
+    /// Counts material points and distinct rows of the matrix, and bytes of all stored rows.
+    pub fn storage(&self) -> [usize; 3] {
+        let rows = &self.system.rows;
+        [self.system.nodal.material.len(), rows.stored()[0], rows.bytes()]
+    }
+
     /// At time 0, with what exists then. A problem that others use too is shared by an [`Arc`].
     ///
     /// # Errors

@@ -5,6 +5,7 @@
 
 mod benchmark;
 mod cooling;
+pub mod cube;
 mod front;
 mod half_space;
 mod manufactured;
