@@ -36,10 +36,11 @@ mod overlay;
 mod schema;
 mod solid;
 
+pub use crate::stamp::{InputStamp, Stamp};
 pub use constitutive::{Constant, ConstitutiveSpec};
 pub use error::SceneError;
 pub use failure::Failure;
-pub use files::{Changed, InputStamp, Stamp};
+pub use files::Changed;
 pub use line::{LineSpec, check_name};
 pub use schema::schema;
 pub use solid::{CutSpec, SolidSpec};

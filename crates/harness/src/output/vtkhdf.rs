@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use polycore::Error;
 use polycore::file::{parent, sync_directory};
 
+mod content;
 mod frames;
 mod mesh;
 mod packed;
@@ -24,7 +25,8 @@ mod read;
 mod tests;
 mod write;
 
-pub use mesh::{Cells, MeshSeries};
+pub use content::Cells;
+pub use mesh::MeshSeries;
 pub use particles::ParticleSeries;
 pub use read::{Series, read};
 

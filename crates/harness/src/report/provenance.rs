@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use crate::scene::Stamp;
+use crate::stamp::Stamp;
 use serde::{Deserialize, Serialize};
 
 /// Where a report comes from.

@@ -8,39 +8,17 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use toml::de::{DeTable, DeValue};
 
 use super::{INPUTS, SceneError, Source};
 use crate::report::{FILE_NAME, Report};
+use crate::stamp::{InputStamp, Stamp};
 
 /// Hashes of the files that a scene has read, by their paths; all copies of a source share them.
 pub(super) type Notes = Arc<Mutex<BTreeMap<PathBuf, String>>>;
 /// Results of other scenes, by their names.
 pub(super) type Inputs = Arc<BTreeMap<String, InputStamp>>;
-
-/// What results were computed from, beside the program and its version.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Stamp {
-    /// SHA-256 of the scene's text.
-    pub scene: String,
-    /// Whether what is marked `quick = false` was left out.
-    pub quick: bool,
-    /// Files that were read, relative to the scene where they lie beside it, with the SHA-256 of their contents.
-    pub files: BTreeMap<PathBuf, String>,
-    /// Results of other scenes that were read.
-    pub inputs: BTreeMap<String, InputStamp>,
-}
-
-/// Results of another scene, as a run has read them.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct InputStamp {
-    /// Their folder.
-    pub output: PathBuf,
-    /// The [`Stamp::identity`] of them.
-    pub identity: String,
-}
 
 /// What results no longer agree with.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,11 +1,22 @@
 //! F of periodic boxes: each run from its own undeformed box, with the flips of tilted boxes undone.
 
 use super::options::{LENGTHS, Origin, ReadOptions, TILTS};
-use super::read::Run;
 use super::table::{Column, Table};
 use crate::Error;
 use crate::kinematics::PeriodicBox;
 use polycore::tensor::DeformationGradient;
+
+/// The rows of one run.
+pub(super) struct Run {
+    /// Its name.
+    pub id: String,
+    /// All its rows, as they stand in the file.
+    pub all: Vec<usize>,
+    /// The first of them.
+    pub first: usize,
+    /// Those with values, with their samples, in the order of the samples.
+    pub rows: Vec<(u64, usize)>,
+}
 
 /// F of a row in which a box is taken for undeformed may be so far from 1: how tables round.
 const ROUNDED: f64 = 1e-6;

@@ -197,7 +197,7 @@ pub fn read(path: impl AsRef<std::path::Path>) -> Result<Dataset, Error> {
         let lines = dataset(&file, "provenance", size).and_then(|dataset| dataset.read_vlen_strings());
         set.provenance = lines.map_err(none)?;
     }
-    set.provenance.push(format!("{}: {size} bytes, HDF5, {rows} rows", super::table::name_of(path)));
+    set.provenance.push(format!("{}: {size} bytes, HDF5, {rows} rows", polycore::file::name_of(path)));
     Ok(set)
 }
 

@@ -266,7 +266,7 @@ pub(super) fn read(path: &Path, text: &[u8], kind: Kind, options: &ReadOptions) 
         let allowed = "one set of columns, or `blocks` in `[data]`";
         return Err(Error::file(path, format!("other columns in run {number} than before"), allowed));
     }
-    let file = super::table::name_of(path);
+    let file = polycore::file::name_of(path);
     let time = |block: &Block| block.headings.iter().position(|name| name == "Time").zip(units);
     let timed = usable.iter().all(|(_, block, _)| time(block).is_some());
     let (mut records, mut before) = (Vec::new(), None);

@@ -1,6 +1,6 @@
 //! Data sets from CSV tables in four forms, from LAMMPS' own files, and from HDF5.
 
-use super::boxes::Boxes;
+use super::boxes::{Boxes, Run};
 use super::options::{Columns, LENGTHS, Origin, ReadOptions};
 use super::stress::{Stress, Symmetry, nine};
 use super::table::{Column, Table};
@@ -77,18 +77,6 @@ pub(super) fn is_hdf5(path: &std::path::Path) -> Result<bool, Error> {
     file.take(8).read_to_end(&mut start).map_err(Error::io("read", path))?;
     let named = path.extension().is_some_and(|e| e == "h5" || e == "hdf5");
     Ok(named || start == b"\x89HDF\r\n\x1a\n")
-}
-
-/// The rows of one run.
-pub(super) struct Run {
-    /// Its name.
-    pub id: String,
-    /// All its rows, as they stand in the file.
-    pub all: Vec<usize>,
-    /// The first of them.
-    pub first: usize,
-    /// Those with values, with their samples, in the order of the samples.
-    pub rows: Vec<(u64, usize)>,
 }
 
 /// Where a table keeps the deformation.
@@ -188,7 +176,7 @@ impl Layout {
     /// The runs of a table, in order of appearance, and how many rows are blank.
     pub fn runs(&self, table: &Table) -> Result<(Vec<Run>, usize), Error> {
         let [id, sample] = ["run_id", "sample"].map(|name| table.find(name));
-        let file_name = super::table::name_of(&table.path);
+        let file_name = polycore::file::name_of(&table.path);
         let mut runs: Vec<Run> = Vec::new();
         let mut index: HashMap<String, usize> = HashMap::new();
         let mut samples: HashMap<(usize, u64), u64> = HashMap::new();
@@ -282,7 +270,7 @@ fn nominal(table: &Table) -> Result<Dataset, Error> {
     set.paths.retain(|run| !run.rows.is_empty());
     let line = format!(
         "{}: {}, nominal stresses, {} rows of {} runs, {} at rest or free",
-        super::table::name_of(path),
+        polycore::file::name_of(path),
         table.fingerprint,
         set.len(),
         set.paths.len(),
@@ -357,7 +345,7 @@ fn table(table: &Table, options: &ReadOptions) -> Result<Dataset, Error> {
     symmetry.check(&table.path)?;
     let mut line = format!(
         "{}: {}, {}, {} rows of {} runs, {} skipped",
-        super::table::name_of(&table.path),
+        polycore::file::name_of(&table.path),
         table.fingerprint,
         layout.name,
         set.len(),

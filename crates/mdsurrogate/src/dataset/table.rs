@@ -270,8 +270,3 @@ fn unpacked(path: &Path) -> Result<(Vec<u8>, String), Error> {
     }
     Ok((text, fingerprint))
 }
-
-/// A file's name without its folder: provenance is the same from wherever a file is read.
-pub(super) fn name_of(path: &std::path::Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-}

@@ -1,19 +1,5 @@
 //! Curves over two axes.
 
-use std::io::Write;
-use std::path::Path;
-
-use kuva::backend::raster::RasterBackend;
-use kuva::backend::svg::SvgBackend;
-
-use super::canvas::{Anchor, Canvas, Text};
-use super::{picture_error, plot};
-use polycore::Error;
-use polycore::file::atomic_write;
-
-/// Pixels of a PNG for each unit of the layout.
-const PIXELS: f64 = 2.0;
-
 /// A plot of several curves.
 ///
 /// ```
@@ -168,40 +154,7 @@ impl LinePlot {
         self
     }
 
-    /// Writes a `.png` or `.svg`, whole or not at all.
-    ///
-    /// # Errors
-    /// [`Error::Data`] for another extension, for nothing to draw, for infinite numbers and for numbers ≤ 0 on a
-    /// logarithmic axis; [`Error::Io`].
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        let path = path.as_ref();
-        self.check().map_err(|reason| picture_error(path, reason))?;
-        let bytes = match path.extension().and_then(|extension| extension.to_str()) {
-            Some("svg") => self.svg().map_err(|reason| picture_error(path, reason))?,
-            Some("png") => self.png().map_err(|reason| picture_error(path, reason))?,
-            _ => return Err(picture_error(path, "the file name must end in .png or .svg")),
-        };
-        atomic_write(path, |file| file.write_all(&bytes))
-    }
-
-    fn svg(&self) -> Result<Vec<u8>, String> {
-        let (mut scene, label) = plot::scene(self)?;
-        scene.add(label.primitive());
-        Ok(SvgBackend::new().render_scene(&scene).into_bytes())
-    }
-
-    fn png(&self) -> Result<Vec<u8>, String> {
-        let (scene, label) = plot::scene(self)?;
-        let mut canvas =
-            Canvas::decode(&RasterBackend::new().with_scale(PIXELS as f32).render_scene(&scene)?)?;
-        // the raster back end turns letters pixel by pixel; a quarter turn of ours loses nothing
-        let text = Text::new(&label.text, (f64::from(label.size) * PIXELS) as u32)?;
-        let [x, y] = [label.x, label.y].map(|at| (at * PIXELS).round() as isize);
-        canvas.text(x, y, &text, Anchor::Upwards);
-        canvas.encode()
-    }
-
-    fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), String> {
         let mut any = false;
         for series in &self.series {
             for &(x, y) in series.runs().flatten() {

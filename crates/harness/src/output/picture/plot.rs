@@ -1,12 +1,22 @@
 //! The drawing of a line plot from lines, texts and markers.
 
+use std::io::Write;
+use std::path::Path;
+
+use kuva::backend::raster::RasterBackend;
+use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
 use super::axis::Axis;
-use super::canvas::Text;
+use super::canvas::{Anchor, Canvas, Text};
 use super::line::{LegendPlace, LinePlot, Style};
+use super::picture_error;
+use polycore::Error;
+use polycore::file::atomic_write;
 
+/// Pixels of a PNG for each unit of the layout.
+const PIXELS: f64 = 2.0;
 /// Okabe & Ito's colours, told apart by the colour-blind (<https://jfly.uni-koeln.de/color/>); black is for references.
 const COLORS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f"];
 const GRID: &str = "#dddddd";
@@ -37,8 +47,43 @@ impl UprightLabel {
     }
 }
 
+impl LinePlot {
+    /// Writes a `.png` or `.svg`, whole or not at all.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for another extension, for nothing to draw, for infinite numbers and for numbers ≤ 0 on a
+    /// logarithmic axis; [`Error::Io`].
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let path = path.as_ref();
+        self.check().map_err(|reason| picture_error(path, reason))?;
+        let bytes = match path.extension().and_then(|extension| extension.to_str()) {
+            Some("svg") => self.svg().map_err(|reason| picture_error(path, reason))?,
+            Some("png") => self.png().map_err(|reason| picture_error(path, reason))?,
+            _ => return Err(picture_error(path, "the file name must end in .png or .svg")),
+        };
+        atomic_write(path, |file| file.write_all(&bytes))
+    }
+
+    fn svg(&self) -> Result<Vec<u8>, String> {
+        let (mut scene, label) = scene(self)?;
+        scene.add(label.primitive());
+        Ok(SvgBackend::new().render_scene(&scene).into_bytes())
+    }
+
+    fn png(&self) -> Result<Vec<u8>, String> {
+        let (scene, label) = scene(self)?;
+        let mut canvas =
+            Canvas::decode(&RasterBackend::new().with_scale(PIXELS as f32).render_scene(&scene)?)?;
+        // the raster back end turns letters pixel by pixel; a quarter turn of ours loses nothing
+        let text = Text::new(&label.text, (f64::from(label.size) * PIXELS) as u32)?;
+        let [x, y] = [label.x, label.y].map(|at| (at * PIXELS).round() as isize);
+        canvas.text(x, y, &text, Anchor::Upwards);
+        canvas.encode()
+    }
+}
+
 /// Everything but the label of the y axis.
-pub(super) fn scene(plot: &LinePlot) -> Result<(Scene, UprightLabel), String> {
+fn scene(plot: &LinePlot) -> Result<(Scene, UprightLabel), String> {
     let (width, height) = plot.size;
     let values = |pick: fn(&(f64, f64)) -> f64| plot.series.iter().flat_map(|s| s.runs()).flatten().map(pick);
     let x = Axis::new(values(|point| point.0), plot.x_range, plot.log[0], (width / 90.0) as usize);

@@ -3,10 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::packed::{Rows, Table};
+use super::content::{Cells, Step};
+use super::packed::Table;
 use super::read::{Series, read};
 use super::write::Writer;
-use super::{Layout, data_error, mesh::Cells, remove, temporary_name, whole_file};
+use super::{Layout, data_error, remove, temporary_name, whole_file};
 use polycore::Error;
 use polycore::file::{parent, sync_directory};
 
@@ -20,16 +21,6 @@ pub struct Frames {
     layout: Option<Layout>,
     /// Of a mesh: what stands still.
     mesh: Option<(Vec<[f64; 3]>, Cells)>,
-}
-
-/// A step: time, points where they move, arrays on points and on cells.
-pub struct Step<'a> {
-    pub time: f64,
-    pub points: Option<Rows<'a>>,
-    pub arrays: Vec<Rows<'a>>,
-    pub cell_arrays: Vec<Rows<'a>>,
-    /// In the order of the layout.
-    pub moments: Vec<f64>,
 }
 
 impl Frames {

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::frames::{Frames, Step};
+use super::content::Step;
+use super::frames::Frames;
 use super::packed::{Rows, is_single};
 use super::{Data, Layout, Moment, check_points};
 use polycore::Error;

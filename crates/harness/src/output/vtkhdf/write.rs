@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5Group};
 
 use super::Layout;
-use super::frames::Step;
-use super::mesh::Cells;
+use super::content::{Cells, Step};
 use super::packed::{LEVEL, Rows, Table, is_single};
 use polycore::Error;
 use polycore::hdf5::{Created, write_error};
