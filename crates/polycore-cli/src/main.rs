@@ -20,6 +20,7 @@ mod cli {
     pub mod material;
     pub mod quantities;
     pub mod scene;
+    pub mod set;
     pub mod trials;
 }
 

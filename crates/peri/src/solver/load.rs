@@ -1,6 +1,6 @@
 //! Loads and supports: body forces and prescribed displacement components, proportional to one load factor but for regions that turn.
 
-use super::rotation::Turned;
+use super::turn::Turned;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
 use rayon::prelude::*;

@@ -2,91 +2,13 @@
 
 use super::load::Loads;
 use super::system::System;
+use super::turn::Turned;
 use crate::bonds::BodyGeometry;
 use crate::field::{CHUNK, Field};
-use crate::geometry::length;
 use rayon::prelude::*;
 
 /// Particles of a region from which the first guess measures distances.
 const SAMPLES: usize = 256;
-
-/// A turn about an axis, of the whole angle at load factor 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rotation<const D: usize> {
-    /// A point of the axis, m.
-    pub centre: [f64; D],
-    /// Direction of the axis, of length 1; (0, 0, 1) in the plane.
-    pub axis: [f64; 3],
-    /// Angle at load factor 1, rad.
-    pub angle: f64,
-}
-
-impl<const D: usize> Rotation<D> {
-    /// Part of a vector across the axis, and n × of it.
-    fn across(&self, from: [f64; D]) -> [[f64; D]; 2] {
-        let n = self.axis;
-        let r: [f64; 3] = std::array::from_fn(|d| from.get(d).copied().unwrap_or(0.0));
-        let along: f64 = (0..3).map(|d| n[d] * r[d]).sum();
-        let cross = |d: usize| n[(d + 1) % 3] * r[(d + 2) % 3] - n[(d + 2) % 3] * r[(d + 1) % 3];
-        [std::array::from_fn(|d| r[d] - along * n[d]), std::array::from_fn(cross)]
-    }
-
-    /// (R(φ) − 1) r of a vector from the axis: sin φ n × r − 2 sin²(φ/2) r_⊥ (Rodrigues).
-    pub fn turn(&self, angle: f64, from: [f64; D]) -> [f64; D] {
-        let [across, cross] = self.across(from);
-        let (sine, half) = (angle.sin(), (0.5 * angle).sin());
-        std::array::from_fn(|d| sine * cross[d] - 2.0 * half * half * across[d])
-    }
-
-    /// Displacement of a place X at a load factor, m.
-    pub fn displacement(&self, place: [f64; D], factor: f64) -> [f64; D] {
-        self.turn(factor * self.angle, self.from(place))
-    }
-
-    /// Its rate over the load factor, m: θ n × R(X − c).
-    fn rate(&self, place: [f64; D], factor: f64) -> [f64; D] {
-        let (from, moved) = (self.from(place), self.displacement(place, factor));
-        let [_, cross] = self.across(std::array::from_fn(|d| from[d] + moved[d]));
-        cross.map(|x| self.angle * x)
-    }
-
-    /// Distance of a place from the axis, m.
-    fn radius(&self, place: [f64; D]) -> f64 {
-        length(self.across(self.from(place))[0])
-    }
-
-    fn from(&self, place: [f64; D]) -> [f64; D] {
-        std::array::from_fn(|d| place[d] - self.centre[d])
-    }
-}
-
-/// A region that is turned.
-#[derive(Clone, Debug)]
-pub struct Turned<const D: usize> {
-    /// About what.
-    pub rotation: Rotation<D>,
-    /// Displacement at load factor 1 beside it, m.
-    pub shift: [f64; D],
-    /// Bit d: component d is prescribed.
-    pub components: u8,
-    /// Its place among [`Loads::held_regions`].
-    pub region: usize,
-    /// Its sites, less those that a later region holds.
-    pub sites: Vec<u32>,
-}
-
-impl<const D: usize> Turned<D> {
-    fn set(&self, field: &mut Field<D>, site: u32, value: [f64; D]) {
-        let old = field.get(site as usize);
-        let prescribed = |d: usize| self.components >> d & 1 == 1;
-        field.set(site as usize, std::array::from_fn(|d| if prescribed(d) { value[d] } else { old[d] }));
-    }
-
-    fn displacement(&self, place: [f64; D], factor: f64) -> [f64; D] {
-        let turned = self.rotation.displacement(place, factor);
-        std::array::from_fn(|d| turned[d] + factor * self.shift[d])
-    }
-}
 
 /// A region that carries free particles: its turn, its displacement at load factor 1, m, and places of some of its particles.
 type Carrier<'a, const D: usize> = (Option<&'a Turned<D>>, [f64; D], Vec<[f64; D]>);

@@ -6,8 +6,8 @@ use std::path::Path;
 use polycore::Error;
 use polycore::file::atomic_write;
 
-use super::fits::Set;
 use super::material::{BULK_RATIO, unusable};
+use super::set::Set;
 
 /// Files by units: their name, what they say of it, and the host's unit of stress, Pa.
 const FILES: [(&str, &str, f64); 2] =

@@ -13,30 +13,11 @@ use polycore::constitutive::hyperelastic::fit::{Agreement, Fit, Fitted, Standing
 use polycore::constitutive::hyperelastic::{Hyperelastic, homogeneous, stability};
 
 use super::MPA;
-use super::material::{DIGITS, digits, unit_of};
+use super::material::{DIGITS, digits};
 use super::quantities as q;
 use super::scene::{Case, DataSet};
+use super::set::{Set, unit_of};
 use super::{card, draw, material, trials};
-
-/// What was fitted to one table.
-pub struct Set<'a> {
-    pub name: &'a str,
-    pub table: &'a Table,
-    /// How the file was understood.
-    read: &'a [String],
-    pub fits: Vec<Fit>,
-    /// Laws that could not be fitted, and why.
-    failed: Vec<(&'static str, String)>,
-    /// Law, other table, agreement there: none where the law locks.
-    crossed: Vec<(&'static str, &'a str, Option<Agreement>)>,
-}
-
-impl Set<'_> {
-    /// The unit of its stresses, and its Pa: by the largest modulus.
-    fn unit(&self) -> (&'static str, f64) {
-        unit_of(self.fits.iter().map(|fit| fit.law.shear_modulus()).fold(0.0, f64::max))
-    }
-}
 
 /// Fits every law to every table, writes tables and pictures. A law that cannot be fitted is named; the others are kept. Where it is
 /// stopped, what is done is written.

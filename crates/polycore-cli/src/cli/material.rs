@@ -8,7 +8,7 @@ use polycore::Error;
 use polycore::constitutive::hyperelastic::fit::{Fit, Fitted, Standing};
 use polycore::file::atomic_write;
 
-use super::fits::Set;
+use super::set::{Set, unit_of};
 
 /// Laws of which the printed block is taken before others.
 const EIGHT_CHAINS: &str = "eight-chain";
@@ -108,16 +108,6 @@ pub fn write(directory: &Path, all: &[Set]) -> Result<(), Error> {
 
 /// Significant digits of parameters.
 pub const DIGITS: usize = 7;
-
-/// Unit in which a stress has a readable number, and its Pa.
-pub fn unit_of(stress: f64) -> (&'static str, f64) {
-    match stress.abs() {
-        size if size >= 1e9 => ("GPa", 1e9),
-        size if size >= 1e4 => ("MPa", 1e6),
-        size if size >= 1e2 => ("kPa", 1e3),
-        _ => ("Pa", 1.0),
-    }
-}
 
 /// With its unit.
 pub fn stress(value: f64, significant: usize) -> String {

@@ -12,6 +12,7 @@ use nalgebra::DVector;
 use super::data::Table;
 use super::descriptor::Start;
 use super::fit_map::{Map, REJECTED};
+pub use super::fit_map::{Standing, residuals};
 use super::{Error, Hyperelastic, ModelDescriptor, homogeneous};
 use crate::numerics::least_squares::{Found, levenberg_marquardt};
 
@@ -50,31 +51,6 @@ pub struct Fitted {
     pub standard_error: Option<f64>,
     /// Whether the data say anything of it.
     pub standing: Standing,
-}
-
-/// What data say of a fitted parameter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
-    /// They determine it.
-    Determined,
-    /// A modulus without any effect on the stresses, or the exponent of such a term: the term is absent.
-    Absent,
-    /// It may have any value as large, as a locking limit far beyond the data.
-    Undetermined,
-}
-
-/// Model minus data for every measured stress, Pa, state by state.
-///
-/// # Errors
-/// What the law refuses at a state of the table.
-pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<Vec<f64>, Error> {
-    let mut residuals = Vec::with_capacity(2 * table.states.len());
-    for state in &table.states {
-        let nominal = homogeneous::biaxial(law, state.stretches[0], state.stretches[1])?;
-        let measured = nominal.into_iter().zip(state.nominal).filter(|(_, data)| *data != 0.0);
-        residuals.extend(measured.map(|(model, data)| model - data));
-    }
-    Ok(residuals)
 }
 
 /// Root mean square of [`residuals`], Pa.

@@ -4,8 +4,32 @@ use nalgebra::{DMatrix, DVector};
 
 use super::data::{State, Table};
 use super::descriptor::UNLIMITED;
-use super::fit::{Standing, residuals};
-use super::{Domain, Error, ModelDescriptor};
+use super::{Domain, Error, Hyperelastic, ModelDescriptor, homogeneous};
+
+/// What data say of a fitted parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// They determine it.
+    Determined,
+    /// A modulus without any effect on the stresses, or the exponent of such a term: the term is absent.
+    Absent,
+    /// It may have any value as large, as a locking limit far beyond the data.
+    Undetermined,
+}
+
+/// Model minus data for every measured stress, Pa, state by state.
+///
+/// # Errors
+/// What the law refuses at a state of the table.
+pub fn residuals<L: Hyperelastic + ?Sized>(law: &L, table: &Table) -> Result<Vec<f64>, Error> {
+    let mut residuals = Vec::with_capacity(2 * table.states.len());
+    for state in &table.states {
+        let nominal = homogeneous::biaxial(law, state.stretches[0], state.stretches[1])?;
+        let measured = nominal.into_iter().zip(state.nominal).filter(|(_, data)| *data != 0.0);
+        residuals.extend(measured.map(|(model, data)| model - data));
+    }
+    Ok(residuals)
+}
 
 /// The differences carry 1e-10, and an effect below 1e-6 of the stresses tells nothing.
 const EFFECT: f64 = 1e-6;

@@ -55,7 +55,7 @@ pub(super) const OGDEN_1: ModelDescriptor = ModelDescriptor {
     example: &[0.4e6, 2.2],
     starts: ogden_starts::starts::<1>,
     contains: &[Contained { key: "neo-hookean", embed: |p, _| vec![vec![p[0], 2.0]] }],
-    slopes: Some(slopes),
+    slopes: Some(ogden_starts::slopes),
     refine: Some(projected),
 };
 
@@ -70,7 +70,7 @@ pub(super) const OGDEN_2: ModelDescriptor = ModelDescriptor {
         Contained { key: "ogden-1", embed: ogden_starts::grown },
         Contained { key: "mooney-rivlin", embed: |p, _| vec![vec![2.0 * p[0], 2.0, 2.0 * p[1], -2.0]] },
     ],
-    slopes: Some(slopes),
+    slopes: Some(ogden_starts::slopes),
     refine: Some(projected),
 };
 
@@ -83,31 +83,9 @@ pub(super) const OGDEN_3: ModelDescriptor = ModelDescriptor {
     example: &[0.4095e6, 1.3, 0.003e6, 5.0, 0.01e6, -2.0],
     starts: ogden_starts::starts::<3>,
     contains: &[Contained { key: "ogden-2", embed: ogden_starts::grown }],
-    slopes: Some(slopes),
+    slopes: Some(ogden_starts::slopes),
     refine: Some(projected),
 };
-
-/// Pᵢ = Σ 2μ/α (λᵢ^α − λ₃^α)/λᵢ with λ₃ = 1/(λ₁λ₂), in Abaqus' convention, and its derivatives.
-pub(super) fn slopes(p: &[f64], stretches: [f64; 2], slopes: &mut [[f64; 2]]) -> [f64; 2] {
-    let logs = stretches.map(f64::ln);
-    let third = -(logs[0] + logs[1]);
-    let mut nominal = [0.0; 2];
-    for (k, term) in p.chunks_exact(2).enumerate() {
-        let (modulus, exponent) = (term[0], term[1]);
-        let thin = (exponent * third).exp();
-        for i in [0, 1] {
-            let factor = 2.0 / exponent / stretches[i];
-            // thick − thin without cancellation
-            let difference = thin * (exponent * (logs[i] - third)).exp_m1();
-            let unit = factor * difference;
-            let thick = difference + thin;
-            nominal[i] += modulus * unit;
-            slopes[2 * k][i] = unit;
-            slopes[2 * k + 1][i] = modulus * (factor * (logs[i] * thick - third * thin) - unit / exponent);
-        }
-    }
-    nominal
-}
 
 impl Ogden {
     const NAME: &'static str = "Ogden";

@@ -5,7 +5,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::descriptor::{ABSENT, Start};
-use super::ogden::slopes;
+use super::ogden_starts::slopes;
 use crate::numerics::least_squares::levenberg_marquardt;
 
 /// A start, moved to where the exponents are best; itself where the search fails.

@@ -4,7 +4,6 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::descriptor::{ABSENT, Start};
-use super::ogden::slopes;
 
 /// |α| of the grid; both signs are tried.
 const EXPONENTS: [f64; 14] = [0.3, 0.6, 1.0, 1.5, 2.0, 2.7, 3.6, 4.8, 6.5, 9.0, 12.0, 17.0, 24.0, 34.0];
@@ -132,4 +131,26 @@ fn next_subset(chosen: &mut [usize], count: usize) -> bool {
         }
     }
     false
+}
+
+/// Pᵢ = Σ 2μ/α (λᵢ^α − λ₃^α)/λᵢ with λ₃ = 1/(λ₁λ₂), in Abaqus' convention, and its derivatives.
+pub(super) fn slopes(p: &[f64], stretches: [f64; 2], slopes: &mut [[f64; 2]]) -> [f64; 2] {
+    let logs = stretches.map(f64::ln);
+    let third = -(logs[0] + logs[1]);
+    let mut nominal = [0.0; 2];
+    for (k, term) in p.chunks_exact(2).enumerate() {
+        let (modulus, exponent) = (term[0], term[1]);
+        let thin = (exponent * third).exp();
+        for i in [0, 1] {
+            let factor = 2.0 / exponent / stretches[i];
+            // thick − thin without cancellation
+            let difference = thin * (exponent * (logs[i] - third)).exp_m1();
+            let unit = factor * difference;
+            let thick = difference + thin;
+            nominal[i] += modulus * unit;
+            slopes[2 * k][i] = unit;
+            slopes[2 * k + 1][i] = modulus * (factor * (logs[i] * thick - third * thin) - unit / exponent);
+        }
+    }
+    nominal
 }

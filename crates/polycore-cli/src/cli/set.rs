@@ -1,0 +1,34 @@
+//! Fits of one table.
+
+use polycore::constitutive::hyperelastic::data::Table;
+use polycore::constitutive::hyperelastic::fit::{Agreement, Fit};
+
+/// What was fitted to one table.
+pub struct Set<'a> {
+    pub name: &'a str,
+    pub table: &'a Table,
+    /// How the file was understood.
+    pub read: &'a [String],
+    pub fits: Vec<Fit>,
+    /// Laws that could not be fitted, and why.
+    pub failed: Vec<(&'static str, String)>,
+    /// Law, other table, agreement there: none where the law locks.
+    pub crossed: Vec<(&'static str, &'a str, Option<Agreement>)>,
+}
+
+impl Set<'_> {
+    /// The unit of its stresses, and its Pa: by the largest modulus.
+    pub fn unit(&self) -> (&'static str, f64) {
+        unit_of(self.fits.iter().map(|fit| fit.law.shear_modulus()).fold(0.0, f64::max))
+    }
+}
+
+/// Unit in which a stress has a readable number, and its Pa.
+pub fn unit_of(stress: f64) -> (&'static str, f64) {
+    match stress.abs() {
+        size if size >= 1e9 => ("GPa", 1e9),
+        size if size >= 1e4 => ("MPa", 1e6),
+        size if size >= 1e2 => ("kPa", 1e3),
+        _ => ("Pa", 1.0),
+    }
+}
