@@ -80,3 +80,27 @@ impl<const D: usize> Turned<D> {
         std::array::from_fn(|d| turned[d] + factor * self.shift[d])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// (R − 1) r about z and about a diagonal, which R(120°) permutes; its rate by differences.
+    #[test]
+    fn turns() {
+        let quarter =
+            Rotation { centre: [1.0, 0.0], axis: [0.0, 0.0, 1.0], angle: std::f64::consts::FRAC_PI_2 };
+        let [x, y] = quarter.displacement([2.0, 0.0], 1.0);
+        assert!((x + 1.0).abs() < 1e-15 && (y - 1.0).abs() < 1e-15);
+        let axis = [1.0 / 3.0_f64.sqrt(); 3];
+        let third = Rotation { centre: [0.0; 3], axis, angle: 2.0 * std::f64::consts::FRAC_PI_3 };
+        let moved = third.displacement([1.0, 2.0, 4.0], 1.0);
+        let expected = [4.0 - 1.0, 1.0 - 2.0, 2.0 - 4.0];
+        assert!((0..3).all(|d| (moved[d] - expected[d]).abs() < 1e-14), "{moved:?}");
+        let (place, h) = ([1.0, 2.0, 4.0], 1e-6);
+        let [low, high] = [0.4 - h, 0.4 + h].map(|factor| third.displacement(place, factor));
+        let rate = third.rate(place, 0.4);
+        // central differences: h² and rounding over h
+        assert!((0..3).all(|d| (rate[d] - (high[d] - low[d]) / (2.0 * h)).abs() < 1e-8));
+    }
+}
