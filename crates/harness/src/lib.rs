@@ -7,4 +7,5 @@ pub mod observe;
 pub mod output;
 pub mod report;
 pub mod scene;
+pub mod study;
 pub mod view;

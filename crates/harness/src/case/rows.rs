@@ -1,6 +1,7 @@
 //! Several runs side by side: a row for each, with what is left at its end.
 
 use crate::report::{Report, Value};
+use crate::study::Solved;
 use polycore::file::atomic_write;
 use std::path::Path;
 
@@ -18,6 +19,24 @@ pub struct Row {
     pub settings: Vec<String>,
     /// Its report, or why there is none.
     pub outcome: Result<Report, String>,
+}
+
+impl Solved for Row {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn scalar(&self, quantity: &str) -> Option<(f64, &str)> {
+        match self.outcome.as_ref().ok()?.values.get(quantity)? {
+            Value::Scalar { value, unit } => Some((*value, unit)),
+            Value::Curve { .. } => None,
+        }
+    }
+
+    fn solve_seconds(&self) -> f64 {
+        let own = self.outcome.as_ref().ok();
+        own.and_then(|own| own.seconds.get("solve")).copied().unwrap_or(f64::NAN)
+    }
 }
 
 /// Runs and the headings of their settings.

@@ -79,8 +79,8 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
     let mut families: Vec<(String, usize)> = Vec::new();
     for variant in &variants {
         // what must fail may have no scene at all
-        let fails = variant.study.is_some_and(|index| scene.study[index].expect_error.is_some());
-        let own = match variant.resolve(source, scene) {
+        let fails = variant.of.expect_error.is_some();
+        let own = match variant.resolve() {
             Ok((_, own)) => quantities(&own).into_iter().map(|quantity| quantity.name).collect(),
             Err(_) if fails => Vec::new(),
             Err(error) => return Err(error),
@@ -95,7 +95,7 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
                     names.extend(compared.then(|| q::SAME_EVENTS.of(&[&variant.name()]).name));
                     names
                         .extend(q::BALANCES.iter().any(|balance| balance.name == name).then(|| name.clone()));
-                    names.push(format!("{name}[{}]", variant.name()));
+                    names.push(super::NAMING.value(&variant.of.name, &name));
                 }
             }
         }
@@ -111,6 +111,7 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
             names.extend(kinds.map(|kind| q::MEASURE_ORDER.of(&[measure.name(), kind, family]).name));
         }
     }
+    names.extend(scene.comparisons().names().map(|quantity| quantity.name));
     if scene.output.integrals {
         names.extend(q::INTEGRALS.iter().map(|quantity| quantity.name.to_owned()));
     }
