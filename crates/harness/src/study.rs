@@ -19,6 +19,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer};
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::marker::PhantomData;
 
 crate::quantities! {
@@ -33,8 +34,11 @@ crate::quantities! {
 #[derive(Clone, Copy, Debug)]
 pub struct Instead<T>(PhantomData<T>);
 
+/// A value of any type.
+pub use serde_json::Value;
+
 /// A value of any type that a study gives.
-pub type Any = Instead<serde_json::Value>;
+pub type Any = Instead<Value>;
 
 impl<'de, T> Deserialize<'de> for Instead<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -81,6 +85,8 @@ macro_rules! study {
             pub quick: Option<bool>,
             /// Values by their paths (`"time.end"`, `"boundary[1].displacement"`), merged into the scene.
             pub set: Option<std::collections::BTreeMap<String, $crate::study::Any>>,
+            /// Lists of values by their paths; every combination is a variant, named as the runs of a sweep.
+            pub vary: std::collections::BTreeMap<String, Vec<$crate::study::Value>>,
             $(#[doc = concat!("Instead of `", $key, "`.")]
             pub $block: Option<$crate::study::Instead<$replaced>>,)*
             $(#[doc = concat!("Values of `", $path, "`.")]
@@ -90,7 +96,7 @@ macro_rules! study {
         impl $name {
             /// The study as the harness resolves it.
             pub fn study(&self) -> $crate::study::Study {
-                let Self { name, description, expect_error, quick, set, .. } = self.clone();
+                let Self { name, description, expect_error, quick, set, vary, .. } = self.clone();
                 let replaced = [$(($key, stringify!($block), self.$block.is_some()),)*];
                 let lists: &[(&str, &str, usize)] = &[$(($path, stringify!($list), self.$list.len()),)*];
                 $crate::study::Study {
@@ -101,6 +107,7 @@ macro_rules! study {
                     sets: set.is_some(),
                     replaced: replaced.into_iter().filter(|own| own.2).map(|own| [own.0, own.1]).collect(),
                     lists: lists.iter().filter(|own| own.2 > 0).copied().collect(),
+                    vary,
                 }
             }
         }
@@ -124,6 +131,8 @@ pub struct Study {
     pub replaced: Vec<[&'static str; 2]>,
     /// Keys of the scene, the study's lists of values for them, and their lengths.
     pub lists: Vec<(&'static str, &'static str, usize)>,
+    /// Values of other keys of the scene.
+    pub vary: BTreeMap<String, Vec<Value>>,
 }
 
 /// Names of variants in values and files.
@@ -200,15 +209,27 @@ pub fn variants(
     }
     let mut variants: Vec<Variant> = Vec::new();
     for (index, study) in studies.iter().enumerate() {
-        naming.check(source, &format!("study[{index}].name"), study.name.as_deref())?;
+        if study.name.is_some() || study.vary.is_empty() {
+            naming.check(source, &format!("study[{index}].name"), study.name.as_deref())?;
+        }
         if quick && !study.quick {
             continue;
         }
-        for values in grid(&study.lists.iter().map(|list| list.2).collect::<Vec<_>>()) {
+        let lists = study.lists.iter().map(|(key, list, length)| (*key, (*list).to_owned(), *length, None));
+        let vary = study
+            .vary
+            .iter()
+            .map(|(key, values)| (key.as_str(), format!("vary.{key}"), values.len(), Some(values)));
+        let lists: Vec<_> = lists.chain(vary).collect();
+        for places in grid(&lists.iter().map(|list| list.2).collect::<Vec<_>>()) {
             // of what concerns a key the first holds: listed values before single keys, and these before blocks
-            let mut own = source.clone();
-            for ((key, list, _), value) in study.lists.iter().zip(values) {
-                own = own.with_replaced(key, &format!("study[{index}].{list}[{value}]"));
+            let (mut own, mut label) = (source.clone(), study.name.clone());
+            for ((key, list, _, values), place) in lists.iter().zip(places) {
+                own = own.with_replaced(key, &format!("study[{index}].{list}[{place}]"));
+                if let Some(value) = values.and_then(|values| values.get(place)) {
+                    let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+                    label = Some(label.map_or_else(String::new, |label| label + "_") + &named(key, &text));
+                }
             }
             if study.sets {
                 own = own.with_merged(&format!("study[{index}].set"));
@@ -216,7 +237,7 @@ pub fn variants(
             for [key, by] in &study.replaced {
                 own = own.with_replaced(key, &format!("study[{index}].{by}"));
             }
-            let name = name(&own, study.name.as_deref())?;
+            let name = name(&own, label.as_deref())?;
             // folders of some systems do not tell `A` from `a`
             let same = |other: &Variant| match naming {
                 Naming::Brackets => other.name == name,
@@ -228,7 +249,7 @@ pub fn variants(
             } else if naming == Naming::Folders {
                 let found = format!("`{name}` twice");
                 return Err(source.error(&format!("study[{index}].name"), found, "different names"));
-            } else if study.sets || !study.replaced.is_empty() {
+            } else if study.sets || !(study.replaced.is_empty() && study.vary.is_empty()) {
                 let allowed = "a `name` for each study that replaces a part of the scene";
                 let found = format!("a second variant `{name}`");
                 return Err(source.error(&format!("study[{index}]"), found, allowed));
@@ -242,6 +263,15 @@ pub fn variants(
         }
         false => Ok(variants),
     }
+}
+
+/// Name of a key's value: `print.layer_time`, `10 s` → `layer_time-10s`.
+pub(crate) fn named(key: &str, value: &str) -> String {
+    let plain = |text: &str| -> String {
+        let kept = text.chars().filter(|c| !c.is_whitespace());
+        kept.map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect()
+    };
+    format!("{}-{}", plain(key.rsplit('.').next().unwrap_or(key)), plain(value))
 }
 
 /// Combinations of values of lists of these lengths, by their places; the last runs fastest.

@@ -85,12 +85,25 @@ pub fn check_expectations(
     expectations: &[Expect],
     declared: &[&[Quantity]],
 ) -> Result<(), SceneError> {
+    let known: Vec<&str> = declared.iter().flat_map(|list| *list).map(|quantity| quantity.name).collect();
+    check_quantities(source, expectations, &known, |name| {
+        declared.iter().flat_map(|list| *list).any(|quantity| fits(&quantity.pattern(), name))
+    })
+}
+
+/// Refuses an expectation of a scalar that is not `known`; `is_known` may know more.
+///
+/// # Errors
+/// As [`check_expectations`].
+pub fn check_quantities(
+    source: &Source,
+    expectations: &[Expect],
+    known: &[&str],
+    is_known: impl Fn(&str) -> bool,
+) -> Result<(), SceneError> {
     for (index, expect) in expectations.iter().enumerate() {
-        let is_declared =
-            |name: &str| declared.iter().flat_map(|list| *list).any(|q| fits(&q.pattern(), name));
-        if let Some(name) = expect.names().find(|name| !is_declared(name)) {
-            let known: Vec<&str> = declared.iter().flat_map(|list| *list).map(|q| q.name).collect();
-            return Err(source.unknown(&format!("expect[{index}].quantity"), name, &known));
+        if let Some(name) = expect.names().find(|name| !(known.contains(name) || is_known(name))) {
+            return Err(source.unknown(&format!("expect[{index}].quantity"), name, known));
         }
     }
     Ok(())

@@ -46,6 +46,16 @@ fn lists_keys_and_blocks() {
     assert!(names(&own) == ["a 8 1"] && own[0].study.is_none());
 }
 
+/// Values of any keys, named as in a sweep; no name is needed.
+#[test]
+fn any_keys() {
+    let studies = "[[study]]\nvary = { 'plate.hole' = [1, 0.5], law = ['b c'] }\n[[study]]\nname = 'x'\nvary = { 'plate.new' = [3] }";
+    let all = plates(studies, false, Naming::Folders).unwrap();
+    let expected = ["b c 8 1law-bc_hole-1", "b c 8 0.5law-bc_hole-0_5", "a 8 1x_new-3"];
+    assert_eq!(names(&all), expected);
+    assert_eq!(all[1].source.error("plate.hole", 1, 2).key(), Some("study[0].vary.plate.hole[1]"));
+}
+
 #[test]
 fn names_that_are_refused() {
     for (studies, naming, message) in [
@@ -75,14 +85,8 @@ fn names_of_values() {
 fn solved_side_by_side() {
     use crate::case::{Options, Program, Run};
     use crate::scene::Failure;
-    const PROGRAM: Program = Program {
-        name: "test",
-        version: "0",
-        about: "",
-        examples: "",
-        magic: b"test-ck1",
-        columns: &[],
-    };
+    const PROGRAM: Program =
+        Program { name: "test", version: "0", about: "", examples: "", magic: b"test-ck1", columns: &[] };
     let folder = tempfile::tempdir().unwrap();
     let source = Source::new("scene.toml", SCENE);
     let variants: Vec<String> = ('a'..='e').map(String::from).collect();

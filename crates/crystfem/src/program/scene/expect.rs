@@ -91,14 +91,9 @@ impl PartScene {
         names: &[Named],
         absent: &[&str],
     ) -> Result<(), SceneError> {
-        let asked = || self.expect.iter().enumerate();
-        for (index, quantity) in asked().flat_map(|(at, expect)| expect.names().map(move |name| (at, name))) {
-            let left_out = absent.iter().any(|study| super::NAMING.is_of(study, quantity));
-            if !left_out && !names.iter().any(|known| known.name == quantity) {
-                let known: Vec<&str> = names.iter().map(|known| known.name.as_str()).collect();
-                return Err(source.unknown(&format!("expect[{index}].quantity"), quantity, &known));
-            }
-        }
-        Ok(())
+        let known: Vec<&str> = names.iter().map(|known| known.name.as_str()).collect();
+        harness::case::check_quantities(source, &self.expect, &known, |quantity| {
+            absent.iter().any(|study| super::NAMING.is_of(study, quantity))
+        })
     }
 }

@@ -128,11 +128,6 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Ok(());
     }
     let names = quantities_of(source, scene)?;
-    for (index, expect) in scene.expect.iter().enumerate() {
-        if let Some(name) = expect.names().find(|name| !names.iter().any(|known| known == name)) {
-            let allowed: Vec<&str> = names.iter().map(String::as_str).collect();
-            return Err(source.unknown(&format!("expect[{index}].quantity"), name, &allowed));
-        }
-    }
-    Ok(())
+    let known: Vec<&str> = names.iter().map(String::as_str).collect();
+    harness::case::check_quantities(source, &scene.expect, &known, |_| false)
 }
