@@ -337,15 +337,17 @@ impl Phases {
     }
 }
 
-fn align<const N: usize>(text: &mut String, rows: &[[String; N]]) {
-    let mut widths = [0; N];
-    for row in rows {
+/// Appends rows in columns; what is longer or shorter than the first row may stick out.
+pub(crate) fn align<R: AsRef<[String]>>(text: &mut String, rows: &[R]) {
+    let mut widths = vec![0; rows.first().map_or(0, |row| row.as_ref().len())];
+    let count = widths.len();
+    for row in rows.iter().map(AsRef::as_ref).filter(|row| row.len() == count) {
         for (width, cell) in widths.iter_mut().zip(row) {
             *width = (*width).max(cell.chars().count());
         }
     }
     for row in rows {
-        let cells = row.iter().zip(widths).map(|(cell, width)| format!("{cell:<width$}"));
+        let cells = row.as_ref().iter().zip(&widths).map(|(cell, &width)| format!("{cell:<width$}"));
         let _ = writeln!(text, "{}", cells.collect::<Vec<_>>().join("  ").trim_end());
     }
 }

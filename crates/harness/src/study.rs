@@ -313,29 +313,30 @@ impl Comparisons<'_> {
     /// Names that are taken or that no variant has, and what each table refuses.
     pub fn check(&self, source: &Source, variants: &[&str]) -> Result<(), SceneError> {
         let mut taken = variants.to_vec();
-        let tables = self.convergence.iter().map(|spec| spec.name.as_str()).enumerate();
-        let tables = tables.map(|(index, name)| (format!("convergence[{index}].name"), name));
-        let curves = self.curves.iter().map(|spec| spec.name.as_str()).enumerate();
-        let curves = curves.map(|(index, name)| (format!("error_against_time[{index}].name"), name));
-        for (key, name) in tables.chain(curves) {
+        let tables = self.convergence.iter().map(|spec| &spec.name).enumerate();
+        let curves = self.curves.iter().map(|spec| &spec.name).enumerate();
+        let named =
+            tables.map(|one| ("convergence", one)).chain(curves.map(|one| ("error_against_time", one)));
+        for (table, (index, name)) in named {
+            let key = format!("{table}[{index}].name");
             check_name(source, &key, name)?;
-            if taken.contains(&name) {
+            if taken.contains(&name.as_str()) {
                 return Err(source.error(&key, format!("`{name}` twice"), "a unique name"));
             }
             taken.push(name);
         }
-        let tables = self.convergence.iter().enumerate();
-        tables.clone().try_for_each(|(index, spec)| spec.check(source, index, variants))?;
+        self.convergence
+            .iter()
+            .enumerate()
+            .try_for_each(|(index, spec)| spec.check(source, index, variants))?;
         self.curves.iter().enumerate().try_for_each(|(index, spec)| spec.check(source, index, variants))
     }
 
     /// Names of the scalars that they add to a report.
     pub fn names(&self) -> impl Iterator<Item = Named> {
         let tables = self.convergence.iter().flat_map(|spec| [LIMIT, ORDER].map(|q| q.of(&[&spec.name])));
-        let curve = |spec: &'_ ErrorAgainstTime| {
-            spec.studies.iter().map(|study| ERROR_OF.of(&[&spec.name, study])).collect::<Vec<_>>()
-        };
-        tables.chain(self.curves.iter().flat_map(curve))
+        let curves = self.curves.iter().flat_map(|spec| spec.studies.iter().map(|study| (&spec.name, study)));
+        tables.chain(curves.map(|(curve, study)| ERROR_OF.of(&[curve, study])))
     }
 
     /// Adds their results to a report.

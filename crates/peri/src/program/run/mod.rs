@@ -93,10 +93,10 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     // every body is built once before anything is computed or written: faults show at once
     let (mut largest, mut memory) = (0, f64::MIN_POSITIVE);
     for variant in variants.iter().filter(|variant| variant.of.expect_error.is_none()) {
-        let (source, scene) = variant.resolve()?;
-        let bonds = Built::<D>::new(&source, &scene, variant)?.bonded.body.bonds;
+        let (source, scene) = variant.resolved();
+        let bonds = Built::<D>::new(source, scene, variant)?.bonded.body.bonds;
         largest = largest.max(bonds.particles().len());
-        memory = memory.max(scene::memory_needed(&scene, &*bonds));
+        memory = memory.max(scene::memory_needed(scene, &*bonds));
     }
     run.begin()?;
     // one after another where steps are watched and where errors are drawn against run times
@@ -109,12 +109,11 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     let mut finished = study::solve(run, NAMING, &names, at_once, |index, own| {
         let variant = &variants[index];
         let (state, expected) = (own.reached()?, variant.of.expect_error.as_deref());
-        let outcome = variant
-            .resolve()
-            .and_then(|(source, scene)| scene::check_variant(&source, &scene).map(|()| (source, scene)))
+        let (own_source, own_scene) = variant.resolved();
+        let outcome = scene::check_variant(own_source, own_scene)
             .map_err(Failure::from)
-            .and_then(|(source, scene)| {
-                run_variant::<D>(&source, &scene, variant, output, &UnderWay(own.into()), state)
+            .and_then(|()| {
+                run_variant::<D>(own_source, own_scene, variant, output, &UnderWay(own.into()), state)
             })
             .and_then(|(outcome, ended)| match ended {
                 Some(error) if expected.is_none_or(|text| !error.to_string().contains(text)) => {
@@ -479,11 +478,11 @@ fn explanation_in<const D: usize>(
             lines.push(format!("variant {}\n  expects    an error that contains `{error}`", variant.name()));
             continue;
         }
-        let (source, scene) = variant.resolve()?;
-        let built = Built::<D>::new(&source, &scene, &variant)?;
+        let (source, scene) = variant.resolved();
+        let built = Built::<D>::new(source, scene, &variant)?;
         let Bonded { body, criterion, toughness, followed, .. } = &built.bonded;
-        lines.extend(scene::explain(&source, &scene, &variant, body, criterion.as_ref())?);
-        lines.extend(scene::explain_tearing(&scene, body, toughness.as_ref()));
+        lines.extend(scene::explain(source, scene, &variant, body, criterion.as_ref())?);
+        lines.extend(scene::explain_tearing(scene, body, toughness.as_ref()));
         lines.extend(followed.iter().map(|one| format!("  follows    {one}")));
     }
     lines.extend(lengths.into_iter().map(|text| format!("  warning    {text}")));

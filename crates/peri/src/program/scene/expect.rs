@@ -78,14 +78,8 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
     let mut names = Vec::new();
     let mut families: Vec<(String, usize)> = Vec::new();
     for variant in &variants {
-        // what must fail may have no scene at all
-        let fails = variant.of.expect_error.is_some();
-        let own = match variant.resolve() {
-            Ok((_, own)) => quantities(&own).into_iter().map(|quantity| quantity.name).collect(),
-            Err(_) if fails => Vec::new(),
-            Err(error) => return Err(error),
-        };
-        let own = own.into_iter().chain(fails.then(|| q::FAILED_AS_EXPECTED.name.to_owned()));
+        let fails = variant.of.expect_error.is_some().then(|| Named::from(q::FAILED_AS_EXPECTED));
+        let own = quantities(&variant.scene).into_iter().chain(fails).map(|quantity| quantity.name);
         match variants.len() {
             1 => names.extend(own),
             _ => {

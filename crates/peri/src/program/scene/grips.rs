@@ -22,8 +22,8 @@ pub fn free_lengths<const D: usize>(variants: &[Variant]) -> Result<Vec<String>,
         if variant.of.expect_error.is_some() {
             continue;
         }
-        let (source, scene) = variant.resolve()?;
-        let (_, low, high) = outline::<D>(&source, &scene)?;
+        let (source, scene) = variant.resolved();
+        let (_, low, high) = outline::<D>(source, scene)?;
         let free = std::array::from_fn(|axis| {
             let depth = |upper: bool| {
                 let is_here = |boundary: &&Boundary| {

@@ -5,7 +5,6 @@ use crate::bonds::VolumeCorrection;
 use harness::scene::{SceneError, Source};
 use harness::study::{self, Naming};
 use polycore::units::Length;
-use serde::Deserialize;
 
 harness::study! {
     /// A set of variants: every combination of the listed values; other keys keep the scene's value. A replaced part of the
@@ -35,8 +34,10 @@ pub const NAMING: Naming = Naming::Brackets;
 /// A variant and its discretisation.
 #[derive(Clone, Debug)]
 pub struct Variant {
-    /// Its scene.
+    /// Its name, its study, its source.
     pub of: study::Variant,
+    /// Its scene.
+    pub scene: Scene,
     /// Spacing, m (0 for a cloud).
     pub spacing: f64,
     /// Horizon over spacing.
@@ -47,37 +48,16 @@ pub struct Variant {
     pub volume: VolumeCorrection,
 }
 
-/// What names a variant; the rest is read later.
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Outline {
-    body: Lattice,
-    material: Corrections,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Lattice {
-    spacing: Option<Length>,
-    horizon_ratio: Option<f64>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Corrections {
-    surface_correction: SurfaceCorrection,
-    volume_correction: VolumeCorrection,
-}
-
 impl Variant {
     fn new(of: study::Variant) -> Result<Self, SceneError> {
-        let Outline { body, material } = of.source.parse()?;
+        let scene: Scene = of.source.parse()?;
         Ok(Self {
+            spacing: scene.body.spacing.map_or(0.0, |spacing| spacing.si()),
+            horizon_ratio: scene.body.horizon_ratio.unwrap_or(HORIZON_RATIO),
+            surface: scene.material.surface_correction,
+            volume: scene.material.volume_correction,
             of,
-            spacing: body.spacing.map_or(0.0, |spacing| spacing.si()),
-            horizon_ratio: body.horizon_ratio.unwrap_or(HORIZON_RATIO),
-            surface: material.surface_correction,
-            volume: material.volume_correction,
+            scene,
         })
     }
 
@@ -91,18 +71,15 @@ impl Variant {
         self.of.name.split_once(' ').map_or(&*self.of.name, |(_, rest)| rest).to_owned()
     }
 
-    /// The scene of this variant, with the parts that its study replaces; errors point there.
-    ///
-    /// # Errors
-    /// As [`Source::parse`].
-    pub fn resolve(&self) -> Result<(Source, Scene), SceneError> {
-        Ok((self.of.source.clone(), self.of.source.parse()?))
+    /// Its source, whose errors point at its study, and its scene.
+    pub fn resolved(&self) -> (&Source, &Scene) {
+        (&self.of.source, &self.scene)
     }
 }
 
 /// `dx=4mm m=3.015`, corrections where there are any, the study's name.
 fn name(source: &Source, study: Option<&str>) -> Result<String, SceneError> {
-    let Outline { body, material } = source.parse()?;
+    let Scene { body, material, .. } = source.parse()?;
     // twelve digits: what a user wrote, without the rounding of its conversion to SI
     let round = |value: f64| format!("{value:.12e}").parse().unwrap_or(value);
     let ratio = body.horizon_ratio.unwrap_or(HORIZON_RATIO);
