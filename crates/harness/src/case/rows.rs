@@ -1,6 +1,6 @@
 //! Several runs side by side: a row for each, with what is left at its end.
 
-use crate::report::{Report, Value, align};
+use crate::report::{Report, Value, aligned};
 use crate::study::Solved;
 use polycore::file::atomic_write;
 use std::path::Path;
@@ -149,9 +149,7 @@ impl Rows {
             }
             table.push(line);
         }
-        let mut text = String::new();
-        align(&mut text, &table);
-        text
+        aligned(&table)
     }
 
     /// The table as CSV, with all digits; what a run does not tell is empty.

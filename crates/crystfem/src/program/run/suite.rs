@@ -2,6 +2,7 @@
 
 use super::{Failure, part};
 use crate::error::Error;
+use crate::program::observe::observers;
 use crate::program::quantities as q;
 use crate::program::scene::{NAMING, PartScene};
 use harness::case::{Fault, Finished, Row, Rows, Run};
@@ -29,7 +30,7 @@ pub fn run(source: &Source, scene: &PartScene, run: &mut Run) -> Result<Finished
         for study in studies.iter().filter(|study| study.expect_error.is_none()) {
             let scene = PartScene::of_variant(study)?;
             let task = scene.task(&study.source, scene.mesh.build(&study.source)?)?;
-            names.extend(of_study(&study.name, scene.quantities(&task)));
+            names.extend(of_study(&study.name, observers(&scene, &task).names()));
         }
         check_expectations(source, scene, &studies, names)?;
         run.begin()?;

@@ -1,6 +1,7 @@
 //! Studies of a scene: what each changes, and the scene that comes out.
 
 use super::PartScene;
+use harness::report::Named;
 use harness::scene::{SceneError, Source};
 use harness::study::{Comparisons, Naming, Study, Variant, variants};
 
@@ -57,5 +58,22 @@ impl PartScene {
         let scene: Self = variant.source.parse()?;
         scene.check(&variant.source)?;
         Ok(scene)
+    }
+
+    /// Refuses an expectation of a quantity that no run of the scene reports; those of studies that are left out of it,
+    /// `absent`, are passed over.
+    ///
+    /// # Errors
+    /// The quantity, and names like it.
+    pub fn check_expectations(
+        &self,
+        source: &Source,
+        names: &[Named],
+        absent: &[&str],
+    ) -> Result<(), SceneError> {
+        let known: Vec<&str> = names.iter().map(|known| known.name.as_str()).collect();
+        harness::case::check_quantities(source, &self.expect, &known, |quantity| {
+            absent.iter().any(|study| NAMING.is_of(study, quantity))
+        })
     }
 }

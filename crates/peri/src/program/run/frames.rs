@@ -47,7 +47,7 @@ fn all_intact<const D: usize>(bonds: &dyn Bonds<D>) -> Vec<u32> {
 fn wanted<const D: usize>(every: usize, state: &State<D>, rows: usize) -> bool {
     let history = &state.history;
     let before = rows.checked_sub(2).map_or(0, |k| history[k].broken);
-    let prescribed = state.prescribed(rows).is_some_and(|steps| steps.is_multiple_of(every));
+    let prescribed = state.control.prescribed(rows).is_some_and(|steps| steps.is_multiple_of(every));
     rows > 0 && (prescribed || history[rows - 1].broken > before)
 }
 
@@ -68,7 +68,7 @@ fn frames_of<const D: usize>(every: usize, state: &State<D>) -> usize {
         let last = wanted(every, state, step + 1);
         in_between(state.history[step].rounds.saturating_sub(1)) + usize::from(last)
     };
-    (0..state.history.len()).map(of_step).sum::<usize>() + in_between(state.round)
+    (0..state.history.len()).map(of_step).sum::<usize>() + in_between(state.control.round)
 }
 
 /// Flags as a number, the sum of 1 for a component of C outside of the box of the training data, 2 for one that never changed there,
@@ -123,11 +123,11 @@ impl<'a, const D: usize> Frames<'a, D> {
     /// Files that cannot be written.
     pub fn step(&mut self, bonds: &dyn Bonds<D>, state: &State<D>, phases: &mut Phases) -> Result<(), Error> {
         let Some(every) = self.scene.output.every.filter(|_| self.scene.output.fields) else { return Ok(()) };
-        if is_stage(state.round) {
+        if is_stage(state.control.round) {
             let stresses = self.stresses(bonds, state, phases)?;
-            let equilibrium = state.round as f64;
+            let equilibrium = state.control.round as f64;
             self.write(bonds, state, &stresses, state.step as f64 + equilibrium / (equilibrium + 1.0))?;
-        } else if state.round == 0 && wanted(every, state, state.history.len()) {
+        } else if state.control.round == 0 && wanted(every, state, state.history.len()) {
             let stresses = self.stresses(bonds, state, phases)?;
             self.write(bonds, state, &stresses, state.step as f64)?;
             self.written = Some(state.step);

@@ -8,7 +8,7 @@
 
 use super::frames::Stresses;
 use super::outcome::Outcome;
-use crate::bonds::{Bonds, CellGrid, Kind};
+use crate::bonds::{BodyGeometry, Bonds, CellGrid, Kind};
 use crate::error::Error;
 use crate::geometry::{Cut, length, severed};
 use crate::program::scene::{LineField, Scene, cuts_of, line_fields};

@@ -224,7 +224,7 @@ fn run_variant<const D: usize>(
     if let Some(error) = &ended {
         // the last equilibrium has bonds that are broken by now
         body = Built::<D>::new(source, scene, variant)?.bonded.body;
-        state.sever(&mut *body.bonds)?;
+        state.fracture.restore(&mut *body.bonds)?;
         outcome.error = Some(error.to_string());
     }
     outcome.work_of(&*body.bonds, &state);
@@ -249,12 +249,12 @@ fn run_variant<const D: usize>(
     }
     if scene.dynamics.is_some() {
         // a body that is held everywhere has none
-        if state.motion.critical_step.is_finite() {
-            outcome.value(q::CRITICAL_TIME_STEP, state.motion.critical_step);
+        if state.motion.limits.critical_step.is_finite() {
+            outcome.value(q::CRITICAL_TIME_STEP, state.motion.limits.critical_step);
         }
-        outcome.value(q::TIME_STEP, state.motion.time_step);
-        outcome.value(q::KINETIC_ENERGY, state.motion.kinetic);
-        body.bonds.round(&state.displacement);
+        outcome.value(q::TIME_STEP, state.motion.steps.time_step);
+        outcome.value(q::KINETIC_ENERGY, state.motion.energies.kinetic);
+        body.bonds.prepare(&state.displacement);
         let lattice = body.bonds.as_lattice();
         if let Some(error) = lattice.and_then(|lattice| lattice.mixed_error(&state.displacement)) {
             outcome.value(q::MIXED_ERROR, error);
@@ -267,7 +267,7 @@ fn run_variant<const D: usize>(
     }
     let stresses = frames.stresses(&*body.bonds, &state, &mut phases)?;
     outcome.history.clone_from(&state.history);
-    outcome.events.clone_from(&state.events);
+    outcome.events.clone_from(&state.fracture.events);
     outcome.regions = scene::region_names(scene);
     let planes = scene.contact.iter().flat_map(|contact| contact.plane.iter().enumerate());
     outcome.planes = planes.map(|(index, plane)| plane.name(index)).collect();
@@ -409,7 +409,7 @@ fn solve<const D: usize>(
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {
         phases.stop();
         frames.step(bonds, state, phases)?;
-        if state.round == 0 {
+        if state.control.round == 0 {
             under_way.step(|| seen(bonds, state));
         }
         phases.start("solve");

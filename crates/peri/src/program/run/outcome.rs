@@ -113,23 +113,23 @@ impl Outcome {
             ("particles", bonds.particles().len() as u64),
             ("directed_bonds", directed),
             ("steps", state.step as u64),
-            ("iterations", state.total_iterations),
-            ("unconverged_searches", state.unconverged),
-            ("force_evaluations", state.evaluations),
-            ("bond_evaluations", state.bond_evaluations),
+            ("iterations", state.counts.total_iterations),
+            ("unconverged_searches", state.counts.unconverged),
+            ("force_evaluations", state.counts.evaluations),
+            ("bond_evaluations", state.counts.bond_evaluations),
             ("bytes_bonds", bonds.bytes() as u64),
         ] {
             self.work.push((name.to_owned(), count));
         }
-        if state.motion.bounds > 0 {
-            self.work.push(("frequency_bounds".to_owned(), state.motion.bounds));
-            self.work.push(("frequency_searches".to_owned(), state.motion.searches));
+        if state.motion.limits.bounds > 0 {
+            self.work.push(("frequency_bounds".to_owned(), state.motion.limits.bounds));
+            self.work.push(("frequency_searches".to_owned(), state.motion.limits.searches));
         }
         let rows = || state.history.iter();
         self.value(q::SMALLEST_STRETCH, rows().map(|row| row.smallest_stretch).fold(1.0, f64::min));
         self.value(q::LARGEST_STRETCH, rows().map(|row| row.largest_stretch).fold(1.0, f64::max));
-        self.value(q::SMALLEST_STRETCH_MET, (1.0 + state.observed.low).max(0.0).sqrt());
-        self.value(q::LARGEST_STRETCH_MET, (1.0 + state.observed.high).sqrt());
+        self.value(q::SMALLEST_STRETCH_MET, (1.0 + state.stretches.observed.low).max(0.0).sqrt());
+        self.value(q::LARGEST_STRETCH_MET, (1.0 + state.stretches.observed.high).sqrt());
     }
 
     /// Largest displacement, force of the held regions, applied force.
