@@ -112,7 +112,7 @@ fn one_run_at_a_time() {
     let sweep = "sweep bar.toml --vary print.layer_time=5s,10s --output sweep";
     for (program, line, file, again) in [
         ("crystfem", "run bar.toml --output part", "part/checkpoint.bin", "resume part"),
-        ("crystfem", "run studies.toml --output whole", "whole/a/checkpoint.bin", "resume whole"),
+        ("crystfem", "run studies.toml --output whole", "whole/checkpoint.bin", "resume whole"),
         ("crystfem", sweep, "sweep/layer_time-5s/checkpoint.bin", sweep),
         ("mdsurrogate", "run law.toml --output law --checkpoint-every 0", "law/checkpoint.bin", "resume law"),
     ] {

@@ -29,24 +29,16 @@ pub struct Header {
     pub scene_path: PathBuf,
     /// Whether this is a `--quick` run.
     pub quick: bool,
-    /// The study, of the run in the directory above.
-    pub study: Option<String>,
     /// What else the run is computed from.
     pub stamp: Stamp,
 }
 
 impl Header {
-    /// Of a scene, or of one of its studies.
-    pub fn new(source: &Source, quick: bool, study: Option<&str>) -> Self {
+    /// Of a scene.
+    pub fn new(source: &Source, quick: bool) -> Self {
         // files that a scene names lie beside it, from wherever the run is resumed
         let scene_path = std::path::absolute(&source.path).unwrap_or_else(|_| source.path.clone());
-        Self {
-            scene: source.text.clone(),
-            scene_path,
-            quick,
-            study: study.map(str::to_owned),
-            stamp: source.stamp(quick),
-        }
+        Self { scene: source.text.clone(), scene_path, quick, stamp: source.stamp(quick) }
     }
 
     /// Reads which scene the checkpoint of an output directory belongs to.
@@ -99,7 +91,7 @@ pub fn resume<T: DeserializeOwned>(directory: &Path, magic: &Magic) -> Result<Op
 /// # Errors
 /// [`Error::Checkpoint`] for what cannot be serialised, [`Error::Io`] where the file cannot be written.
 pub fn write(path: &Path, magic: &Magic, value: &impl Serialize) -> Result<(), Error> {
-    let bytes = postcard::to_stdvec(value).map_err(|error| refused(path, error))?;
+    let bytes = encode(path, value)?;
     atomic_write(path, |file| {
         file.write_all(magic)?;
         file.write_all(&checksum(&bytes).to_le_bytes())?;
@@ -126,7 +118,17 @@ pub fn read<T: DeserializeOwned>(path: &Path, magic: &Magic) -> Result<T, Error>
         let why = "damaged or truncated: its checksum is wrong; run the scene again";
         return Err(refused(path, why));
     }
-    postcard::take_from_bytes(rest).map(|(value, _)| value).map_err(|error| refused(path, error))
+    decode(path, rest)
+}
+
+/// The bytes of a value in the checkpoint at `path`.
+pub(crate) fn encode(path: &Path, value: &impl Serialize) -> Result<Vec<u8>, Error> {
+    postcard::to_stdvec(value).map_err(|error| refused(path, error))
+}
+
+/// A value of [`encode`].
+pub(crate) fn decode<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T, Error> {
+    postcard::take_from_bytes(bytes).map(|(value, _)| value).map_err(|error| refused(path, error))
 }
 
 /// What a file without the right magic is.

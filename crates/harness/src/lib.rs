@@ -8,4 +8,5 @@ pub mod output;
 pub mod report;
 pub mod scene;
 mod stamp;
+pub mod study;
 pub mod view;

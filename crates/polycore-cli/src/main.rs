@@ -37,7 +37,7 @@ impl case::Case for Fits {
         examples: "  polycore check cases/ch1/rubber-fits/case.toml    which laws it fits to which data
   polycore run cases/ch1/rubber-fits/case.toml      fit, draw, judge; results in out/rubber-fits
   polycore exact eight-chain \"0.27 MPa\" 25 --to 4  nominal stress against stretch, as CSV",
-        magic: b"poly-ck2",
+        magic: b"poly-ck3",
         columns: &["*.rms"],
     };
     type Error = Error;

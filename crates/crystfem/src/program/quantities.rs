@@ -42,9 +42,6 @@ harness::quantities! {
     AT_BIRTH = "{probe}.{field}_at_birth_{number}", "", "value of a field just before a birth";
     LOST_AT_BIRTH = "{probe}.{field}_lost_at_birth_{number}", "", "by how much it falls after the birth";
     FAILED_AS_EXPECTED = "{study}.failed_as_expected", "", "1 if a study with `expect_error` ended with this error, else 0";
-    LIMIT = "{convergence}.limit", "*", "value that three studies tend to, after Richardson";
-    ORDER = "{convergence}.order", "", "observed order of these studies";
-    ERROR_OF = "{curve}.error_of_{study}", "", "root mean square of the errors of a study, in the unit of its quantities, in an error-against-time curve";
 }
 
 harness::quantities! {
@@ -86,4 +83,4 @@ harness::quantities! {
 }
 
 /// All of them.
-pub const ALL: &[&[harness::report::Quantity]] = &[OF_PARTS, OF_POINTS, OF_FITS];
+pub const ALL: &[&[harness::report::Quantity]] = &[OF_PARTS, harness::study::OF_STUDIES, OF_POINTS, OF_FITS];

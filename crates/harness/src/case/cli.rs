@@ -212,12 +212,6 @@ fn resume<C: Case>(output: &Path, every: Duration) -> Result<bool, Failure<C::Er
         return Ok(true);
     }
     let header = Header::read(output, C::PROGRAM.magic)?;
-    if header.study.is_some()
-        && let Some(whole) = output.canonicalize().ok().and_then(|output| output.parent().map(PathBuf::from))
-    {
-        crate::say!("{} is a study of the run in {}", output.display(), whole.display());
-        return resume::<C>(&whole, every);
-    }
     header.check(output)?;
     let source = Source::new(header.scene_path, header.scene).with_inputs(header.stamp.inputs);
     finish::<C>(&source, output, header.quick, every, true)

@@ -85,12 +85,25 @@ pub fn check_expectations(
     expectations: &[Expect],
     declared: &[&[Quantity]],
 ) -> Result<(), SceneError> {
+    let known: Vec<&str> = declared.iter().flat_map(|list| *list).map(|quantity| quantity.name).collect();
+    check_quantities(source, expectations, &known, |name| {
+        declared.iter().flat_map(|list| *list).any(|quantity| fits(&quantity.pattern(), name))
+    })
+}
+
+/// Refuses an expectation of a scalar that is not `known`; `is_known` may know more.
+///
+/// # Errors
+/// As [`check_expectations`].
+pub fn check_quantities(
+    source: &Source,
+    expectations: &[Expect],
+    known: &[&str],
+    is_known: impl Fn(&str) -> bool,
+) -> Result<(), SceneError> {
     for (index, expect) in expectations.iter().enumerate() {
-        let is_declared =
-            |name: &str| declared.iter().flat_map(|list| *list).any(|q| fits(&q.pattern(), name));
-        if let Some(name) = expect.names().find(|name| !is_declared(name)) {
-            let known: Vec<&str> = declared.iter().flat_map(|list| *list).map(|q| q.name).collect();
-            return Err(source.unknown(&format!("expect[{index}].quantity"), name, &known));
+        if let Some(name) = expect.names().find(|name| !(known.contains(name) || is_known(name))) {
+            return Err(source.unknown(&format!("expect[{index}].quantity"), name, known));
         }
     }
     Ok(())
@@ -199,18 +212,23 @@ pub struct Run<'a> {
     lock: Option<RunLock>,
     saved: Instant,
     asked: Option<Instant>,
-    stopped: bool,
+    pub(crate) stopped: bool,
+    kept: Option<Kept<'a>>,
+}
+
+/// A run's part in the checkpoint of the run that it belongs to.
+#[derive(Clone)]
+pub(crate) struct Kept<'a> {
+    /// Takes what the part has reached.
+    pub keep: &'a (dyn Fn(Vec<u8>) -> Result<(), Error> + Sync),
+    /// What it had reached, where the whole is resumed.
+    pub reached: Option<Vec<u8>>,
 }
 
 impl<'a> Run<'a> {
-    /// A run of a scene, or of one of its studies in a directory of its own.
-    pub fn new(
-        program: &'static Program,
-        source: &Source,
-        study: Option<&str>,
-        options: Options<'a>,
-    ) -> Self {
-        let header = Header::new(source, options.quick, study);
+    /// A run of a scene.
+    pub fn new(program: &'static Program, source: &Source, options: Options<'a>) -> Self {
+        let header = Header::new(source, options.quick);
         Self {
             options,
             program,
@@ -220,7 +238,13 @@ impl<'a> Run<'a> {
             saved: Instant::now(),
             asked: None,
             stopped: false,
+            kept: None,
         }
+    }
+
+    /// A run of one variant, into the checkpoint of this one.
+    pub(crate) fn of_variant<'b>(&self, options: Options<'b>, kept: Kept<'b>) -> Run<'b> {
+        Run { kept: Some(kept), ..Run::new(self.program, &self.source, options) }
     }
 
     /// Takes the output directory. From here on a new run can be resumed.
@@ -229,6 +253,11 @@ impl<'a> Run<'a> {
     /// The directory cannot be written to, or another run holds it.
     pub fn begin(&mut self) -> Result<(), Error> {
         let directory = self.options.output;
+        if self.kept.is_some() {
+            let begin = if self.options.resume { resume_run } else { prepare_run };
+            self.lock = Some(begin(directory)?);
+            return Ok(());
+        }
         if self.options.resume {
             self.lock = Some(resume_run(directory)?);
             return Header::read(directory, self.program.magic)?.check(directory);
@@ -262,9 +291,14 @@ impl<'a> Run<'a> {
     /// # Errors
     /// The checkpoint cannot be read.
     pub fn reached<T: DeserializeOwned>(&self) -> Result<Option<T>, Error> {
-        match self.options.resume {
-            true => checkpoint::resume(self.options.output, self.program.magic),
-            false => Ok(None),
+        match &self.kept {
+            Some(kept) => kept
+                .reached
+                .as_deref()
+                .map(|bytes| checkpoint::decode(self.options.output, bytes))
+                .transpose(),
+            None if self.options.resume => checkpoint::resume(self.options.output, self.program.magic),
+            None => Ok(None),
         }
     }
 
@@ -274,6 +308,9 @@ impl<'a> Run<'a> {
     /// It cannot be written.
     pub fn save<T: Serialize>(&mut self, state: &T) -> Result<(), Error> {
         self.saved = Instant::now();
+        if let Some(kept) = &self.kept {
+            return (kept.keep)(checkpoint::encode(self.options.output, state)?);
+        }
         self.header.stamp = self.source.stamp(self.options.quick);
         checkpoint::save(self.options.output, self.program.magic, &self.header, Some(state))
     }
@@ -342,7 +379,7 @@ impl<'a> Run<'a> {
 /// # Errors
 /// [`Failure`]; nothing half-written remains, and an interrupted run can be resumed.
 pub fn run<C: Case>(source: &Source, options: Options) -> Result<Finished, Failure<C::Error>> {
-    let mut run = Run::new(const { &C::PROGRAM }, source, None, options);
+    let mut run = Run::new(const { &C::PROGRAM }, source, options);
     let finished = C::solve(source, &mut run)?;
     run.finish(&finished.report)?;
     Ok(finished)

@@ -1,6 +1,7 @@
 //! Several runs side by side: a row for each, with what is left at its end.
 
 use crate::report::{Report, Value, aligned};
+use crate::study::Solved;
 use polycore::file::atomic_write;
 use std::path::Path;
 
@@ -18,6 +19,24 @@ pub struct Row {
     pub settings: Vec<String>,
     /// Its report, or why there is none.
     pub outcome: Result<Report, String>,
+}
+
+impl Solved for Row {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn scalar(&self, quantity: &str) -> Option<(f64, &str)> {
+        match self.outcome.as_ref().ok()?.values.get(quantity)? {
+            Value::Scalar { value, unit } => Some((*value, unit)),
+            Value::Curve { .. } => None,
+        }
+    }
+
+    fn solve_seconds(&self) -> f64 {
+        let own = self.outcome.as_ref().ok();
+        own.and_then(|own| own.seconds.get("solve")).copied().unwrap_or(f64::NAN)
+    }
 }
 
 /// Runs and the headings of their settings.
@@ -38,18 +57,13 @@ impl Rows {
 
     /// Whether some run has a value.
     pub fn has(&self, name: &str) -> bool {
-        self.rows
-            .iter()
-            .filter_map(|row| row.outcome.as_ref().ok())
-            .any(|report| report.scalar(name).is_some())
+        self.reports().any(|report| report.scalar(name).is_some())
     }
 
     /// Fields whose statistics some run tells, the temperature first.
     pub fn fields(&self) -> Vec<String> {
         let mut fields: Vec<String> = self
-            .rows
-            .iter()
-            .filter_map(|row| row.outcome.as_ref().ok())
+            .reports()
             .flat_map(|report| report.values.keys())
             .filter_map(|name| Some(name.strip_prefix(STATISTICS[0])?.to_owned()))
             .collect();
@@ -70,6 +84,13 @@ impl Rows {
             names.extend(found.into_iter().filter(|name| !names.contains(name)).cloned().collect::<Vec<_>>());
         }
         names
+    }
+
+    /// Names of all values that the table shows: the statistics of each field, and what further columns ask for.
+    pub fn names(&self) -> Vec<String> {
+        let fields = self.fields();
+        let statistics = fields.iter().flat_map(|field| STATISTICS.map(|name| format!("{name}{field}")));
+        statistics.chain(self.asked()).collect()
     }
 
     /// Whether some run has expectations.
@@ -136,12 +157,7 @@ impl Rows {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), polycore::Error> {
-        let fields = self.fields();
-        let mut values: Vec<String> = fields
-            .iter()
-            .flat_map(|field| STATISTICS.map(|statistic| format!("{statistic}{field}")))
-            .collect();
-        values.extend(self.asked());
+        let values = self.names();
         let mut head = vec!["run".to_owned()];
         head.extend(self.settings.iter().cloned());
         head.extend(values.iter().map(|name| self.heading(name)));

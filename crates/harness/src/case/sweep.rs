@@ -4,12 +4,14 @@ use super::rows::{Row, Rows};
 use super::{Case, Fault, Finished, Options, Program};
 use crate::report::{Phases, Report};
 use crate::scene::{Failure, Source};
+use crate::study::{grid, named};
 use polycore::Error;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::str::FromStr;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 mod one;
@@ -25,7 +27,7 @@ crate::quantities! {
     LEAST_VALUE = "least_value", "*", "least value that a search found to meet all expectations";
 }
 
-use one::{Run, named, quoted};
+use one::{Run, quoted};
 pub use sample::{OF_SAMPLES, Sample, drawn};
 pub use search::{Search, search};
 pub use shard::{Part, Shard, job};
@@ -257,21 +259,16 @@ fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>
         return Err(Error::Option { option: format!("--vary {}", keys[twice]), reason }.into());
     }
     let count = vary.iter().map(|vary| vary.values.len()).try_fold(1, usize::checked_mul);
-    let Some(count) = count.filter(|&count| count <= MOST) else {
+    if count.is_none_or(|count| count > MOST) {
         let found: f64 = vary.iter().map(|vary| vary.values.len() as f64).product();
         let reason = format!("found {found} runs; allowed: 1 to {MOST}");
         let option = "--vary".to_owned();
         return Err(Error::Option { option, reason }.into());
-    };
+    }
     let mut runs: Vec<Run> = Vec::new();
-    for index in 0..count {
-        let mut rest = index;
-        // the last key runs fastest
-        let mut values: Vec<String> = Vec::new();
-        for vary in vary.iter().rev() {
-            values.insert(0, vary.values[rest % vary.values.len()].clone());
-            rest /= vary.values.len();
-        }
+    for places in grid(&vary.iter().map(|vary| vary.values.len()).collect::<Vec<_>>()) {
+        let values: Vec<String> =
+            vary.iter().zip(places).map(|(vary, place)| vary.values[place].clone()).collect();
         let mut name = name(vary, &values);
         let same = runs.iter().filter(|run| run.name == name).count();
         if same > 0 {
@@ -294,32 +291,24 @@ fn runs<C: Case>(source: &Source, vary: &[Vary], quick: bool) -> Result<Vec<Run>
     }
 }
 
-/// What a run gave; nothing where it was not run.
-type Outcome<C> = Option<Result<Report, Failure<<C as Case>::Error>>>;
-
 /// Each run on a thread of its own, as many at once as there are threads.
 fn solve<C: Case>(
     runs: &[Run],
     options: &mut SweepOptions,
 ) -> Result<Vec<Result<Report, String>>, Failure<C::Error>> {
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let outcomes: Vec<Mutex<Outcome<C>>> = runs.iter().map(|_| Mutex::default()).collect();
     let SweepOptions { output, quick, checkpoint_every, interrupted, .. } = *options;
-    let progress = Mutex::new(&mut *options.progress);
+    let next = AtomicUsize::new(0);
+    let finished = Mutex::new((BTreeMap::new(), &mut *options.progress));
     let work = || {
         while !interrupted() {
             let index = next.fetch_add(1, Ordering::Relaxed);
-            let (Some(run), Some(place)) = (runs.get(index), outcomes.get(index)) else { break };
+            let Some(run) = runs.get(index) else { break };
             let directory = &output.join(&run.name);
             let one = Options { quick, checkpoint_every, interrupted, ..Options::new(directory) };
             let outcome = run.solve::<C>(output, one);
-            if let Ok(mut place) = place.lock() {
-                *place = Some(outcome);
-            }
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if let Ok(mut progress) = progress.lock() {
-                progress(done, runs.len(), &run.name);
-            }
+            let (outcomes, progress) = &mut *finished.lock().unwrap_or_else(PoisonError::into_inner);
+            outcomes.insert(index, outcome);
+            progress(outcomes.len(), runs.len(), &run.name);
         }
     };
     std::thread::scope(|scope| {
@@ -332,24 +321,18 @@ fn solve<C: Case>(
             });
         }
     });
-    let mut told = Vec::new();
-    for outcome in outcomes {
-        told.push(match outcome.into_inner().ok().flatten() {
-            None => return Err(Error::SweepInterrupted(output.to_path_buf()).into()),
-            Some(Err(Failure::Run(error))) if error.is_interruption() => {
-                return Err(Error::SweepInterrupted(output.to_path_buf()).into());
-            }
-            Some(outcome) => outcome.map_err(|failure| failure.to_string()),
-        });
+    let (outcomes, _) = finished.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let stopped = |outcome: &Result<Report, Failure<C::Error>>| matches!(outcome, Err(Failure::Run(error)) if error.is_interruption());
+    if outcomes.len() < runs.len() || outcomes.values().any(stopped) {
+        return Err(Error::SweepInterrupted(output.to_path_buf()).into());
     }
-    Ok(told)
+    Ok(outcomes.into_values().map(|outcome| outcome.map_err(|failure| failure.to_string())).collect())
 }
 
 /// `layer_time-10s_film-20W_m_2_K`, of values of keys.
 fn name(vary: &[Vary], values: &[String]) -> String {
     let each = vary.iter().flat_map(Vary::keys).zip(values.iter().flat_map(|value| divided(value, ';')));
-    let name: String = each.map(|(key, value)| named(&key, &value)).collect();
-    name.trim_start_matches('_').to_owned()
+    each.map(|(key, value)| named(&key, &value)).collect::<Vec<_>>().join("_")
 }
 
 #[cfg(test)]

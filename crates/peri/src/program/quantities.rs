@@ -128,4 +128,4 @@ pub fn load_at(displacement: f64) -> Named {
 }
 
 /// All of them.
-pub const ALL: &[&[Quantity]] = &[OF_A_VARIANT, OF_A_FIELD, OF_A_SCENE];
+pub const ALL: &[&[Quantity]] = &[OF_A_VARIANT, OF_A_FIELD, OF_A_SCENE, harness::study::OF_STUDIES];

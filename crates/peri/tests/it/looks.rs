@@ -11,7 +11,7 @@ use std::process::Command;
 fn solve(text: &str, output: &Path) -> Finished {
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
-    let mut own = Run::new(const { &Peri::PROGRAM }, &source, None, Options::new(output));
+    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(output));
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 

@@ -16,7 +16,7 @@ fn solve(text: &str) -> Finished {
     let source =
         Source::new("scene.toml", text.to_owned() + "\n[output]\nfields = false\npictures = false\n");
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
-    let mut own = Run::new(const { &Peri::PROGRAM }, &source, None, Options::new(directory.path()));
+    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(directory.path()));
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -393,7 +393,7 @@ pictures = false
         let directory = tempfile::tempdir().unwrap();
         let source = Source::new("scene.toml", text);
         let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
-        let mut own = Run::new(const { &Peri::PROGRAM }, &source, None, Options::new(directory.path()));
+        let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(directory.path()));
         run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"));
         let frames = vtkhdf::read(directory.path().join("dx-1mm_m-3.015.vtkhdf")).unwrap();
         let damage = frames.data(frames.len() - 1, "damage").unwrap();

@@ -15,7 +15,7 @@ fn solve(text: &str) -> Finished {
     let directory = tempfile::tempdir().unwrap();
     let source = Source::new("scene.toml", text);
     let scene = source.parse::<Scene>().unwrap_or_else(|error| panic!("{}", error.render()));
-    let mut own = Run::new(const { &Peri::PROGRAM }, &source, None, Options::new(directory.path()));
+    let mut own = Run::new(const { &Peri::PROGRAM }, &source, Options::new(directory.path()));
     run(&source, &scene, &mut own).unwrap_or_else(|error| panic!("{error}"))
 }
 

@@ -1,9 +1,6 @@
 //! Scenes, as written in TOML. Only what a scene names is built.
 
-mod convergence;
-mod curve;
 mod either;
-mod expect;
 mod fault;
 mod file;
 mod fit;
@@ -26,8 +23,6 @@ mod setting;
 mod study;
 mod voxels;
 
-pub use convergence::ConvergenceSpec;
-pub use curve::CurveSpec;
 pub use fit::{FitScene, Job};
 pub use fit_part::PartFit;
 pub use fit_spec::{DataSpec, Direction, FitLaw, FitSpec, HeatFlowSpec, Limit};
@@ -40,7 +35,7 @@ pub(crate) use places::millimetres;
 pub use point::{CompareSpec, ExchangeSpec, LegSpec, NodesSpec, PointScene, PointSpec};
 pub use problem::Task;
 pub use schedule::{ScheduleSpec, TimesSpec};
-pub use study::StudySpec;
+pub use study::{NAMING, StudySpec};
 pub use voxels::{BuiltMesh, Filling, PathSpec, StlSpec};
 
 pub(crate) use harness::scene::check_name;

@@ -1,14 +1,14 @@
 //! The scene of a body in time: mesh, materials, layers, what acts on it.
 
 use super::{
-    ConvergenceSpec, CurveSpec, HealingSpec, MaterialSpec, MechanicsSpec, MeshSpec, Program, ScheduleSpec,
-    StudySpec, check_name,
+    HealingSpec, MaterialSpec, MechanicsSpec, MeshSpec, Program, ScheduleSpec, StudySpec, check_name,
 };
 use crate::problem::Capacity;
 use crate::simulation::LinearSolver;
 use crate::time::Scheme;
 use harness::report::Expect;
 use harness::scene::{LineSpec, SceneError, SolidSpec, Source};
+use harness::study::{Convergence, ErrorAgainstTime};
 use polycore::units::dimension::{
     HeatFluxDimension, HeatTransferDimension, PowerDensityDimension, TemperatureDimension,
 };
@@ -58,10 +58,10 @@ pub struct PartScene {
     pub study: Vec<StudySpec>,
     /// Limits and orders of quantities over studies.
     #[serde(default)]
-    pub convergence: Vec<ConvergenceSpec>,
+    pub convergence: Vec<Convergence>,
     /// Error against run time over studies.
     #[serde(default)]
-    pub error_against_time: Vec<CurveSpec>,
+    pub error_against_time: Vec<ErrorAgainstTime>,
     /// Expected results.
     #[serde(default)]
     pub expect: Vec<Expect>,

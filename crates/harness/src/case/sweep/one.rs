@@ -112,16 +112,6 @@ fn paths_of(value: &serde_json::Value, name: &str, above: &str, paths: &mut Vec<
     }
 }
 
-/// `print.layer_time`, `10 s` → `_layer_time-10s`.
-pub(super) fn named(key: &str, value: &str) -> String {
-    let key = key.rsplit('.').next().unwrap_or(key);
-    let plain = |text: &str| -> String {
-        let kept = text.chars().filter(|c| !c.is_whitespace());
-        kept.map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect()
-    };
-    format!("_{}-{}", plain(key), plain(value))
-}
-
 pub(super) fn quoted(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
@@ -158,7 +148,7 @@ mod tests {
         ] {
             assert_eq!(literal(value), toml);
         }
-        assert_eq!(named("boundary[1].ambient", "80 degC"), "_ambient-80degC");
+        assert_eq!(crate::study::named("boundary[1].ambient", "80 degC"), "ambient-80degC");
         let texts = |list: &[&str]| list.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
         assert_eq!(numeric(&texts(&["10s", "20 s"])), Some((vec![10.0, 20.0], "s".into())));
         assert_eq!(numeric(&texts(&["10s", "1 min"])), None);

@@ -1,7 +1,7 @@
 //! Values of keys drawn from a table: the uncertainty of a fit, carried through a scene.
 
 use super::Vary;
-use crate::case::rows::{Rows, STATISTICS};
+use crate::case::rows::Rows;
 use crate::output::csv;
 use crate::report::Report;
 use polycore::Error;
@@ -120,12 +120,7 @@ pub(super) fn bands(vary: &[Vary], rows: &Rows, output: &Path, report: &mut Repo
     let others = |settings: &[String]| -> Vec<String> {
         settings.iter().enumerate().filter(|(k, _)| *k != drawn).map(|(_, text)| text.clone()).collect()
     };
-    let mut names: Vec<String> = rows
-        .fields()
-        .iter()
-        .flat_map(|field| STATISTICS.map(|statistic| format!("{statistic}{field}")))
-        .collect();
-    names.extend(rows.asked());
+    let names = rows.names();
     let mut bands: Vec<Band> = Vec::new();
     for row in &rows.rows {
         let (settings, Ok(run)) = (others(&row.settings), &row.outcome) else { continue };

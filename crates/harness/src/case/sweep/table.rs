@@ -22,13 +22,7 @@ pub(super) fn together(program: &Program, source: &Source, vary: &[Vary], rows: 
             columns.push((vary.key.clone(), unit, list));
         }
     }
-    let mut names = Vec::new();
-    for field in rows.fields() {
-        for statistic in STATISTICS {
-            names.push(format!("{statistic}{field}"));
-        }
-    }
-    for name in names.into_iter().chain(rows.asked()) {
+    for name in rows.names() {
         let list = finished().map(|(_, report)| report.scalar(&name).unwrap_or(f64::NAN)).collect::<Vec<_>>();
         // a curve has no gaps
         if list.iter().all(|value| value.is_finite()) {

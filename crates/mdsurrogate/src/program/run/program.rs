@@ -22,7 +22,7 @@ impl Case for Mdsurrogate {
                                                         stress and uncertainty at the strains of a table
   mdsurrogate info cases/ch3/pa12-data/runs.csv.gz      describe a table
   mdsurrogate schema > mdsurrogate.schema.json          for editors",
-        magic: b"mdsg-ck3",
+        magic: b"mdsg-ck4",
         columns: &["*.error_over_noise", "*.best_validation_loss"],
     };
     type Error = Error;

@@ -2,7 +2,7 @@
 
 use crate::program::quantities as q;
 use crate::program::run::Failure;
-use crate::program::scene::Scene;
+use crate::program::scene::{NAMING, Scene};
 use harness::output::csv;
 use harness::output::picture::{LinePlot, Series};
 use harness::output::vtkhdf::{Data, ParticleSeries};
@@ -66,7 +66,7 @@ pub fn import(folder: &Path, output: &Path) -> Result<Report, Failure> {
     let mut value = |quantity: Quantity, value: f64| {
         let name = match model.variant.as_str() {
             "" => quantity.name.to_owned(),
-            variant => format!("{}[{variant}]", quantity.name),
+            variant => NAMING.value(variant, quantity.name),
         };
         report.value(harness::report::Named::new(name, quantity.unit), value);
     };

@@ -47,12 +47,12 @@ pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<S
     let variant = &variants[index];
     // values of one variant have its name behind theirs only where there are others
     let texts = [&*source.text, if names.len() > 1 { &*names[index] } else { "" }];
-    let (source, scene) = variant.resolve(source, &scene)?;
-    scene::check_variant(&source, &scene)?;
-    refuse::refuse(&source, &scene, variant)?;
+    let (source, scene) = variant.resolved();
+    scene::check_variant(source, scene)?;
+    refuse::refuse(source, scene, variant)?;
     match scene.body.space {
-        Space::Solid => write::<3>(&source, &scene, variant, texts, output),
-        _ => write::<2>(&source, &scene, variant, texts, output),
+        Space::Solid => write::<3>(source, scene, variant, texts, output),
+        _ => write::<2>(source, scene, variant, texts, output),
     }
 }
 

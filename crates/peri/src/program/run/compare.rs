@@ -4,10 +4,11 @@ use super::outcome::{Outcome, Profile, families};
 use crate::bonds::Bonds;
 use crate::exact;
 use crate::program::quantities as q;
-use crate::program::scene::{ExactSpec, Scene};
+use crate::program::scene::{ExactSpec, NAMING, Scene};
 use crate::stress::{Measure, Tensor};
 use harness::report::{Bound, Expect, Kind, Named, Report};
 use harness::scene::Source;
+use harness::study::{self, Compare, SuiteRow};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -128,7 +129,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
     let several =
         crate::program::scene::check(source, scene, false).map_or(outcomes.len(), |all| all.len()) > 1;
     let full = |name: &str, outcome: &Outcome| {
-        if several { format!("{name}[{}]", outcome.name) } else { name.to_owned() }
+        if several { NAMING.value(&outcome.name, name) } else { name.to_owned() }
     };
     for outcome in outcomes {
         for (name, value, unit) in &outcome.values {
@@ -188,8 +189,10 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
         }
     }
     if let Some(compare) = &scene.output.compare {
-        super::against::add(&mut report, compare, outcomes);
+        compare.add(&mut report, outcomes, q::COMPARED, method);
+        same_events(&mut report, compare, outcomes);
     }
+    scene.comparisons().add(&mut report, outcomes);
     for (family, change) in super::history::peak_changes(outcomes) {
         report.value(q::PEAK_LOAD_CHANGE.of(&[&family]), change);
     }
@@ -197,6 +200,27 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
     expectations.extend(outcomes.iter().filter_map(|outcome| stiff_contact(scene, outcome, several)));
     report.judge(&expectations, quick);
     report
+}
+
+/// Adds `same_events[VARIANT]`, how many of the first events of a variant have the same bonds in the same load step as those of
+/// the reference, where bonds break.
+fn same_events(report: &mut Report, compare: &Compare, outcomes: &[Outcome]) {
+    let compared = || outcomes.iter().filter(|outcome| outcome.get(&compare.quantity).is_some());
+    let truth = compared().find(|o| Some(&o.name) == compare.variant.as_ref());
+    let Some(truth) = truth.filter(|truth| !truth.events.is_empty()) else { return };
+    for outcome in compared().filter(|outcome| outcome.name != truth.name) {
+        let pairs = outcome.events.iter().zip(&truth.events);
+        let same = pairs.take_while(|(a, b)| (a.step, a.fingerprint) == (b.step, b.fingerprint)).count();
+        report.value(q::SAME_EVENTS.of(&[&outcome.name]), same as f64);
+    }
+}
+
+/// Name of a variant without its spacing, and without a number at its end.
+fn method(outcome: &Outcome) -> String {
+    match outcome.family.rsplit_once(' ') {
+        Some((method, last)) if last.parse::<f64>().is_ok() => method.to_owned(),
+        _ => outcome.family.clone(),
+    }
 }
 
 /// Part of the stored energy that contact may hold in equilibrium.
@@ -208,7 +232,7 @@ fn stiff_contact(scene: &Scene, outcome: &Outcome, several: bool) -> Option<Expe
     outcome.get(q::CONTACT_SHARE.name).filter(|_| judged && scene.dynamics.is_none())?;
     let name = q::CONTACT_SHARE.name;
     Some(Expect {
-        quantity: if several { format!("{name}[{}]", outcome.name) } else { name.to_owned() },
+        quantity: if several { NAMING.value(&outcome.name, name) } else { name.to_owned() },
         bound: Bound::Range { at_least: None, at_most: Some(SOFTEST) },
         kind: Kind::Bound,
         source: "of every scene with contact: the load is about this part too low".to_owned(),
@@ -268,8 +292,7 @@ pub fn table(outcomes: &[Outcome]) -> String {
     }
     text.push('\n');
     for outcome in outcomes {
-        let work = |name: &str| outcome.work.iter().find(|w| w.0 == name).map_or(0, |w| w.1);
-        let (particles, iterations) = (work("particles"), work("iterations"));
+        let [particles, iterations] = ["particles", "iterations"].map(|name| outcome.count_of(name));
         let _ = write!(
             text,
             "{:<width$} {particles:>10} {iterations:>10} {:>9.2}",
@@ -323,8 +346,36 @@ pub fn notes(outcomes: &[Outcome]) -> String {
     lines.iter().map(|line| format!("{line}\n")).collect()
 }
 
+/// The table of a suite, also as trials of the report: each variant, its expected and observed behaviour, and its cost.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn suite(report: &mut Report, outcomes: &[Outcome], output: &Path) -> Result<(), polycore::Error> {
+    let row = |outcome: &'_ Outcome| {
+        let value = |name: &str| outcome.get(name).unwrap_or(f64::NAN);
+        format!(
+            "stretches {:.3} to {:.3}, residual {:.1e}, {} bonds broken",
+            value("smallest_stretch"),
+            value("largest_stretch"),
+            value("largest_residual"),
+            outcome.history.last().map_or(0, |r| r.broken),
+        )
+    };
+    let rows = outcomes.iter().map(|outcome| SuiteRow {
+        name: &outcome.name,
+        description: outcome.description.as_deref(),
+        observed: outcome.error.as_deref().map_or_else(|| Ok(row(outcome)), Err),
+        count: outcome.count_of("iterations"),
+        seconds: outcome.seconds_of("solve"),
+    });
+    let trials = study::suite(report, NAMING, "iterations", &rows.collect::<Vec<_>>(), output)?;
+    let described = trials.into_iter().zip(outcomes).filter(|(_, outcome)| outcome.description.is_some());
+    report.trials.extend(described.map(|(trial, _)| trial));
+    Ok(())
+}
+
 /// All values of all variants, a row for each.
-pub fn study(outcomes: &[Outcome], output: &Path) -> Result<(), polycore::Error> {
+pub fn write(outcomes: &[Outcome], output: &Path) -> Result<(), polycore::Error> {
     if outcomes.len() < 2 {
         return Ok(());
     }

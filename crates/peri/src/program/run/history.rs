@@ -7,7 +7,6 @@ use crate::program::scene::{ContactSpec, Scene, of_plane};
 use crate::solver::{Balance, Event, Record};
 use harness::output::csv;
 use harness::output::picture::{LegendPlace, LinePlot, Series};
-use harness::report::{Report, Trial};
 use polycore::Error;
 use std::path::Path;
 
@@ -300,49 +299,6 @@ fn peaks(outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
         }
     }
     if any { plot.write(output.join("peak_load.png")) } else { Ok(()) }
-}
-
-/// The table of a suite, also as trials of the report: each variant, its expected and observed behaviour, and its cost.
-///
-/// # Errors
-/// A file that cannot be written.
-pub fn suite(report: &mut Report, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {
-    use std::fmt::Write;
-    if outcomes.iter().all(|o| o.description.is_none()) {
-        return Ok(());
-    }
-    let mut text =
-        String::from("| case | expected | observed | iterations | seconds |\n|---|---|---|---|---|\n");
-    for outcome in outcomes {
-        let work = |name: &str| outcome.work.iter().find(|w| w.0 == name).map_or(0, |w| w.1);
-        let (held, failed) = report.verdict_on(|name| name.ends_with(&format!("[{}]", outcome.name)));
-        let observed = match (&outcome.error, failed.is_empty()) {
-            (Some(error), _) => format!("refused: {}", error.lines().next().unwrap_or_default()),
-            (None, true) => format!(
-                "stretches {:.3} to {:.3}, residual {:.1e}, {} bonds broken; {held} expectations satisfied",
-                outcome.get("smallest_stretch").unwrap_or(f64::NAN),
-                outcome.get("largest_stretch").unwrap_or(f64::NAN),
-                outcome.get("largest_residual").unwrap_or(f64::NAN),
-                outcome.history.last().map_or(0, |r| r.broken),
-            ),
-            (None, false) => format!("missed: {}", failed.join(", ")),
-        };
-        let description = outcome.description.clone().unwrap_or_default();
-        let _ = writeln!(
-            text,
-            "| {} | {description} | {observed} | {} | {:.2} |",
-            outcome.name,
-            work("iterations"),
-            outcome.seconds_of("solve")
-        );
-        if outcome.description.is_some() {
-            let (what, iterations) = (outcome.name.clone(), Some(work("iterations")));
-            report.trials.push(Trial { what, description, observed, iterations, passed: failed.is_empty() });
-        }
-    }
-    polycore::file::atomic_write(output.join("suite.md"), |file| {
-        std::io::Write::write_all(file, text.as_bytes())
-    })
 }
 
 /// Tables of every variant, one plot of all loads, and a plot of energies for each variant whose bonds break.

@@ -1,6 +1,5 @@
 //! A whole scene: every variant solved, measured, compared, drawn and judged; restartable at any moment.
 
-mod against;
 mod compare;
 mod draw;
 mod envelope;
@@ -35,13 +34,14 @@ use crate::error::Error;
 use crate::material::relief;
 use crate::potential::KernelFit;
 use crate::program::quantities as q;
-use crate::program::scene::{self, Scene, Variant, body_of, loads_of};
+use crate::program::scene::{self, NAMING, Scene, Variant, body_of, loads_of};
 use crate::solver::{
     Bilinear, Breaking, Criterion, Loads, Method, Record, State, Status, System, load_stepping,
 };
 use harness::case::{Fault, Run, Step, StepField};
 use harness::report::{Phases, Report};
 use harness::scene::Source;
+use harness::study;
 use polycore::memory::available;
 use std::path::Path;
 
@@ -92,11 +92,11 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     let variants = scene::check(source, scene, quick)?;
     // every body is built once before anything is computed or written: faults show at once
     let (mut largest, mut memory) = (0, f64::MIN_POSITIVE);
-    for variant in variants.iter().filter(|variant| expected_error(scene, variant).is_none()) {
-        let (source, scene) = variant.resolve(source, scene)?;
-        let bonds = Built::<D>::new(&source, &scene, variant)?.bonded.body.bonds;
+    for variant in variants.iter().filter(|variant| variant.of.expect_error.is_none()) {
+        let (source, scene) = variant.resolved();
+        let bonds = Built::<D>::new(source, scene, variant)?.bonded.body.bonds;
         largest = largest.max(bonds.particles().len());
-        memory = memory.max(scene::memory_needed(&scene, &*bonds));
+        memory = memory.max(scene::memory_needed(scene, &*bonds));
     }
     run.begin()?;
     // one after another where steps are watched and where errors are drawn against run times
@@ -105,43 +105,43 @@ fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Resu
     let fitting = (available() / memory) as usize;
     let at_once = if alone { 1 } else { rayon::current_num_threads().min(fitting).max(1) };
     let names: Vec<String> = variants.iter().map(Variant::name).collect();
-    let lengths = scene::free_lengths::<D>(source, scene, &variants)?;
-    let mut finished = variants::all::<D>(run, &names, at_once, |index, under_way, state| {
+    let lengths = scene::free_lengths::<D>(&variants)?;
+    let mut finished = study::solve(run, NAMING, &names, at_once, |index, own| {
         let variant = &variants[index];
-        let (own_source, own_scene) = variant.resolve(source, scene)?;
-        let study = variant.study.and_then(|index| scene.study.get(index));
-        let expected = expected_error(scene, variant);
-        let mut outcome = match scene::check_variant(&own_source, &own_scene)
+        let (state, expected) = (own.reached()?, variant.of.expect_error.as_deref());
+        let (own_source, own_scene) = variant.resolved();
+        let outcome = scene::check_variant(own_source, own_scene)
             .map_err(Failure::from)
-            .and_then(|()| run_variant::<D>(&own_source, &own_scene, variant, output, under_way, state))
+            .and_then(|()| {
+                run_variant::<D>(own_source, own_scene, variant, output, &UnderWay(own.into()), state)
+            })
             .and_then(|(outcome, ended)| match ended {
                 Some(error) if expected.is_none_or(|text| !error.to_string().contains(text)) => {
                     kept((source, scene, quick), outcome, &error, output)?;
                     Err(Failure::Run(error))
                 }
                 _ => Ok(outcome),
-            }) {
-            Err(failure) if expected.is_some_and(|text| failure.to_string().contains(text)) => {
-                let mut outcome = Outcome::new(variant.name(), variant);
-                outcome.error = Some(failure.to_string());
-                outcome
-            }
+            });
+        let mut outcome = match study::expected(outcome, expected) {
             Err(Failure::Run(error)) if variants.len() > 1 && !error.is_interruption() => {
                 return Err(Error::Within { variant: variant.name(), error: Box::new(error) }.into());
             }
-            other => other?,
+            outcome => outcome?.unwrap_or_else(|error| Outcome {
+                error: Some(error),
+                ..Outcome::new(variant.name(), variant)
+            }),
         };
         if expected.is_some() {
             outcome.value(q::FAILED_AS_EXPECTED, f64::from(u8::from(outcome.error.is_some())));
         }
-        outcome.description = study.and_then(|study| study.description.clone());
+        outcome.description.clone_from(&variant.of.description);
         Ok(outcome)
     })?;
     finished.iter_mut().take(1).for_each(|outcome| outcome.warnings.extend(lengths.clone()));
     let mut report = compare::report(source, scene, &finished, quick);
     history::write(scene, &finished, output)?;
-    compare::study(&finished, output)?;
-    history::suite(&mut report, &finished, output)?;
+    compare::write(&finished, output)?;
+    compare::suite(&mut report, &finished, output)?;
     if scene.output.pictures {
         draw::curves(scene, &finished, output)?;
     }
@@ -163,17 +163,12 @@ fn kept(
     Ok(())
 }
 
-/// What the error of a variant must contain, where one is expected.
-fn expected_error<'a>(scene: &'a Scene, variant: &Variant) -> Option<&'a str> {
-    variant.study.and_then(|index| scene.study.get(index)?.expect_error.as_deref())
-}
-
 fn run_variant<const D: usize>(
     source: &Source,
     scene: &Scene,
     variant: &Variant,
     output: &Path,
-    under_way: &UnderWay<D>,
+    under_way: &UnderWay,
     state: Option<State<D>>,
 ) -> Result<(Outcome, Option<Error>), Failure> {
     let mut phases = Phases::new();
@@ -372,7 +367,7 @@ struct Solution<'a, const D: usize> {
 fn solve<const D: usize>(
     (source, scene): (&Source, &Scene),
     solution: &Solution<D>,
-    under_way: &UnderWay<D>,
+    under_way: &UnderWay,
     body: &mut scene::Body<D>,
     state: &mut State<D>,
     phases: &mut Phases,
@@ -477,17 +472,17 @@ fn explanation_in<const D: usize>(
 ) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
     let variants = scene::check(source, scene, quick)?;
-    let lengths = scene::free_lengths::<D>(source, scene, &variants)?;
+    let lengths = scene::free_lengths::<D>(&variants)?;
     for variant in variants {
-        if let Some(error) = expected_error(scene, &variant) {
+        if let Some(error) = &variant.of.expect_error {
             lines.push(format!("variant {}\n  expects    an error that contains `{error}`", variant.name()));
             continue;
         }
-        let (source, scene) = variant.resolve(source, scene)?;
-        let built = Built::<D>::new(&source, &scene, &variant)?;
+        let (source, scene) = variant.resolved();
+        let built = Built::<D>::new(source, scene, &variant)?;
         let Bonded { body, criterion, toughness, followed, .. } = &built.bonded;
-        lines.extend(scene::explain(&source, &scene, &variant, body, criterion.as_ref())?);
-        lines.extend(scene::explain_tearing(&scene, body, toughness.as_ref()));
+        lines.extend(scene::explain(source, scene, &variant, body, criterion.as_ref())?);
+        lines.extend(scene::explain_tearing(scene, body, toughness.as_ref()));
         lines.extend(followed.iter().map(|one| format!("  follows    {one}")));
     }
     lines.extend(lengths.into_iter().map(|text| format!("  warning    {text}")));

@@ -5,6 +5,7 @@ use crate::program::quantities as q;
 use crate::program::scene::Variant;
 use crate::solver::{Event, Loads, Record, State};
 use harness::report::{Named, Phases};
+use harness::study::Solved;
 use serde::{Deserialize, Serialize};
 
 /// Everything of a variant that outlives its fields.
@@ -100,6 +101,11 @@ impl Outcome {
         self.values.iter().find(|(n, _, _)| n == name).map(|v| v.1)
     }
 
+    /// A count of work by name.
+    pub fn count_of(&self, name: &str) -> u64 {
+        self.work.iter().find(|(n, _)| n == name).map_or(0, |w| w.1)
+    }
+
     /// Counts of the solution.
     pub fn work_of<const D: usize>(&mut self, bonds: &dyn Bonds<D>, state: &State<D>) {
         let directed = bonds.directed_bonds();
@@ -154,6 +160,20 @@ impl Outcome {
     /// Seconds of a phase.
     pub fn seconds_of(&self, phase: &str) -> f64 {
         self.seconds.iter().filter(|(name, _)| name == phase).map(|s| s.1).fold(0.0, |sum, s| sum + s)
+    }
+}
+
+impl Solved for Outcome {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn scalar(&self, quantity: &str) -> Option<(f64, &str)> {
+        self.values.iter().find(|(name, _, _)| name == quantity).map(|(_, value, unit)| (*value, &**unit))
+    }
+
+    fn solve_seconds(&self) -> f64 {
+        self.seconds_of("solve")
     }
 }
 

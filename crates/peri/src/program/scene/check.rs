@@ -1,8 +1,8 @@
 //! Values that can be judged without building anything, and the list of variants to run.
 
-use super::values::{plain, positive};
+use super::values::{plain, positive, ratio};
 use super::variant::{Variant, variants};
-use super::{Method, Parameter, Probe, Scene, Track};
+use super::{HORIZON_RATIO, Method, Parameter, Probe, Scene, Track};
 use crate::calibrate::{Calibration, Space};
 use crate::solver::Policy;
 use crate::stress::Measure;
@@ -19,27 +19,16 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
     let variants = variants(source, scene, quick)?;
     for variant in &variants {
         // what must fail does so when its turn comes
-        if variant.study.is_none_or(|index| scene.study[index].expect_error.is_none()) {
-            let (source, scene) = variant.resolve(source, scene)?;
-            check_variant(&source, &scene)?;
+        if variant.of.expect_error.is_none() {
+            let (source, scene) = variant.resolved();
+            check_variant(source, scene)?;
         }
     }
     super::expect::check(source, scene)?;
-    if let Some(name) = scene.output.compare.as_ref().and_then(|compare| compare.variant.as_ref()) {
-        let names: Vec<String> =
-            super::variant::variants(source, scene, false)?.iter().map(Variant::name).collect();
-        if !names.contains(name) {
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            return Err(source.unknown("output.compare.variant", name, &names));
-        }
-    }
-    if variants.is_empty() {
-        return Err(source.error(
-            "study",
-            "no variant left in a --quick run",
-            "at least one without `quick = false`",
-        ));
-    }
+    let all = super::variant::variants(source, scene, false)?;
+    let names: Vec<&str> = all.iter().map(|variant| variant.of.name.as_str()).collect();
+    scene.comparisons().check(source, &names)?;
+    scene.output.compare.iter().try_for_each(|compare| compare.check(source, &names))?;
     Ok(variants)
 }
 
@@ -174,20 +163,6 @@ fn output(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     for (index, at) in scene.output.load_at.iter().enumerate() {
         positive(source, &format!("output.load_at[{index}]"), at.si(), "m")?;
     }
-    if let Some(compare) = &scene.output.compare {
-        let found = match (&compare.variant, compare.value) {
-            (Some(_), Some(_)) => "both `variant` and `value`",
-            (None, None) => "neither `variant` nor `value`",
-            (None, Some(value)) if !(value.is_finite() && value != 0.0) => {
-                "a value with which nothing compares"
-            }
-            _ => "",
-        };
-        if !found.is_empty() {
-            let allowed = "`variant`, the name of one, or `value`, a number in SI units other than 0";
-            return Err(source.error("output.compare", found, allowed));
-        }
-    }
     if scene.output.every == Some(0) {
         return Err(source.error("output.every", 0, "at least 1 step"));
     }
@@ -225,14 +200,11 @@ fn body(source: &Source, scene: &Scene) -> Result<(), SceneError> {
             ));
         }
         (false, false) => {
-            let spacing = body
-                .spacing
-                .map(|s| s.si())
-                .or(scene.study.iter().find_map(|s| Some(s.spacing.first()?.si())));
-            let spacing = spacing.ok_or_else(|| {
+            let spacing = body.spacing.ok_or_else(|| {
                 source.error("body.spacing", "nothing", "a length; a lattice needs its `spacing`")
             })?;
-            positive(source, "body.spacing", spacing, "m")?;
+            positive(source, "body.spacing", spacing.si(), "m")?;
+            ratio(source, "body.horizon_ratio", body.horizon_ratio.unwrap_or(HORIZON_RATIO))?;
             if body.horizon.is_some() {
                 return Err(source.error("body.horizon", "`horizon` of a lattice", "`horizon_ratio`"));
             }

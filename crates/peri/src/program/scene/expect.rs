@@ -78,14 +78,8 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
     let mut names = Vec::new();
     let mut families: Vec<(String, usize)> = Vec::new();
     for variant in &variants {
-        // what must fail may have no scene at all
-        let fails = variant.study.is_some_and(|index| scene.study[index].expect_error.is_some());
-        let own = match variant.resolve(source, scene) {
-            Ok((_, own)) => quantities(&own).into_iter().map(|quantity| quantity.name).collect(),
-            Err(_) if fails => Vec::new(),
-            Err(error) => return Err(error),
-        };
-        let own = own.into_iter().chain(fails.then(|| q::FAILED_AS_EXPECTED.name.to_owned()));
+        let fails = variant.of.expect_error.is_some().then(|| Named::from(q::FAILED_AS_EXPECTED));
+        let own = quantities(&variant.scene).into_iter().chain(fails).map(|quantity| quantity.name);
         match variants.len() {
             1 => names.extend(own),
             _ => {
@@ -95,7 +89,7 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
                     names.extend(compared.then(|| q::SAME_EVENTS.of(&[&variant.name()]).name));
                     names
                         .extend(q::BALANCES.iter().any(|balance| balance.name == name).then(|| name.clone()));
-                    names.push(format!("{name}[{}]", variant.name()));
+                    names.push(super::NAMING.value(&variant.of.name, &name));
                 }
             }
         }
@@ -111,6 +105,7 @@ pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, Scen
             names.extend(kinds.map(|kind| q::MEASURE_ORDER.of(&[measure.name(), kind, family]).name));
         }
     }
+    names.extend(scene.comparisons().names().map(|quantity| quantity.name));
     if scene.output.integrals {
         names.extend(q::INTEGRALS.iter().map(|quantity| quantity.name.to_owned()));
     }
@@ -127,11 +122,6 @@ pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
         return Ok(());
     }
     let names = quantities_of(source, scene)?;
-    for (index, expect) in scene.expect.iter().enumerate() {
-        if let Some(name) = expect.names().find(|name| !names.iter().any(|known| known == name)) {
-            let allowed: Vec<&str> = names.iter().map(String::as_str).collect();
-            return Err(source.unknown(&format!("expect[{index}].quantity"), name, &allowed));
-        }
-    }
-    Ok(())
+    let known: Vec<&str> = names.iter().map(String::as_str).collect();
+    harness::case::check_quantities(source, &scene.expect, &known, |_| false)
 }

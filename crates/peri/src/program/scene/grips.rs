@@ -1,8 +1,8 @@
 //! The free length between grips over the spacings of a study.
 
 use super::build::outline;
-use super::{Boundary, Scene, Variant};
-use harness::scene::{SceneError, Source};
+use super::{Boundary, Variant};
+use harness::scene::SceneError;
 
 /// Relative change of a free length above which a study warns.
 const TOLD: f64 = 1e-3;
@@ -15,19 +15,15 @@ type Lengths<const D: usize> = (f64, [Option<f64>; D]);
 ///
 /// # Errors
 /// As [`super::body_of`].
-pub fn free_lengths<const D: usize>(
-    source: &Source,
-    scene: &Scene,
-    variants: &[Variant],
-) -> Result<Vec<String>, SceneError> {
+pub fn free_lengths<const D: usize>(variants: &[Variant]) -> Result<Vec<String>, SceneError> {
     let mut told = Vec::new();
     let mut seen: Vec<(String, Vec<Lengths<D>>)> = Vec::new();
     for variant in variants.iter().filter(|variant| variant.spacing > 0.0) {
-        if variant.study.is_some_and(|index| scene.study[index].expect_error.is_some()) {
+        if variant.of.expect_error.is_some() {
             continue;
         }
-        let (source, scene) = variant.resolve(source, scene)?;
-        let (_, low, high) = outline::<D>(&source, &scene)?;
+        let (source, scene) = variant.resolved();
+        let (_, low, high) = outline::<D>(source, scene)?;
         let free = std::array::from_fn(|axis| {
             let depth = |upper: bool| {
                 let is_here = |boundary: &&Boundary| {

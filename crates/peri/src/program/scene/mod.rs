@@ -51,7 +51,7 @@ pub use probe::{Probe, Track};
 pub use solid::{SolidKind, SolidLaw};
 pub use tearing::{explain_tearing, tearing_warnings};
 pub use values::{Body, plain};
-pub use variant::Variant;
+pub use variant::{NAMING, Study, Variant};
 pub use warn::warnings;
 
 use crate::bonds::VolumeCorrection;
@@ -61,10 +61,9 @@ use crate::potential::Law;
 use crate::stress::{BallVolume, Measure};
 use harness::report::Expect;
 use harness::scene::{LineSpec, SolidSpec};
+use harness::study::{Compare, Comparisons, Convergence, ErrorAgainstTime};
 use polycore::units::{Length, Stress};
 use serde::Deserialize;
-use serde::de::IgnoredAny;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// A whole scene.
@@ -103,6 +102,12 @@ pub struct Scene {
     /// Variants to run instead of the scene's own discretisation.
     #[serde(default)]
     pub study: Vec<Study>,
+    /// Limits and orders of quantities over variants.
+    #[serde(default)]
+    pub convergence: Vec<Convergence>,
+    /// Error against run time over variants.
+    #[serde(default)]
+    pub error_against_time: Vec<ErrorAgainstTime>,
     /// Expected results.
     #[serde(default)]
     pub expect: Vec<Expect>,
@@ -371,23 +376,11 @@ pub struct OutputSpec {
     /// The integrals over the horizon of Appendix A, by quadrature, among the values of the report.
     pub integrals: bool,
     /// Reference for the variants.
-    pub compare: Option<CompareSpec>,
+    pub compare: Option<Compare>,
     /// Lines along which fields are written at the end.
     pub line: Vec<LineSpec>,
     /// Planes across which the transmitted force is written in every row of the history.
     pub section: Vec<SectionSpec>,
-}
-
-/// A reference for one result: that of a variant, or a number.
-#[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CompareSpec {
-    /// The result, such as `peak_load`.
-    pub quantity: String,
-    /// Name of the reference variant.
-    pub variant: Option<String>,
-    /// The reference value, in SI units.
-    pub value: Option<f64>,
 }
 
 impl Default for OutputSpec {
@@ -408,48 +401,6 @@ impl Default for OutputSpec {
     }
 }
 
-/// A set of variants: every combination of the listed values; other keys keep the scene's value. A replaced part of the
-/// scene is replaced as a whole.
-#[derive(Clone, Debug, Default, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Study {
-    /// Suffix of the variants' names.
-    pub name: Option<String>,
-    /// Expected behaviour, for the table of a suite.
-    pub description: Option<String>,
-    /// The run must end with an error that contains this.
-    pub expect_error: Option<String>,
-    /// Values by their paths (`"solver.tolerance"`, `"boundary[1].displacement"`), merged into the scene.
-    #[schemars(with = "Option<BTreeMap<String, serde_json::Value>>")]
-    pub set: Option<BTreeMap<String, IgnoredAny>>,
-    /// Instead of `body.shapes`.
-    pub shapes: Option<Vec<ShapeSpec>>,
-    /// Instead of `body.cracks`.
-    pub cracks: Option<Vec<CrackSpec>>,
-    /// Instead of `material`.
-    pub material: Option<Material>,
-    /// Instead of `material.critical`.
-    pub critical: Option<Critical>,
-    /// Instead of `boundary`.
-    pub boundary: Option<Vec<Boundary>>,
-    /// Instead of `solver`.
-    pub solver: Option<Solver>,
-    /// Instead of `dynamics`.
-    pub dynamics: Option<Dynamics>,
-    /// Instead of `contact`.
-    pub contact: Option<ContactSpec>,
-    /// Spacings.
-    pub spacing: Vec<Length>,
-    /// Horizon ratios.
-    pub horizon_ratio: Vec<f64>,
-    /// Surface corrections.
-    pub surface_correction: Vec<SurfaceCorrection>,
-    /// Volume corrections.
-    pub volume_correction: Vec<VolumeCorrection>,
-    /// Part of `--quick` runs.
-    pub quick: Option<bool>,
-}
-
 /// The JSON Schema of scenes.
 pub fn schema() -> serde_json::Value {
     harness::scene::schema("peri", crate::program::quantities::ALL, |generator| {
@@ -458,6 +409,11 @@ pub fn schema() -> serde_json::Value {
 }
 
 impl Scene {
+    /// What compares its variants.
+    pub fn comparisons(&self) -> Comparisons<'_> {
+        Comparisons { convergence: &self.convergence, curves: &self.error_against_time }
+    }
+
     /// Whether outputs ask for forces, stresses or flags.
     pub fn observes_forces(&self) -> bool {
         let j_integral = self.probe.iter().any(|probe| probe.track == Track::JIntegral);

@@ -1,7 +1,8 @@
 //! Studies of one quantity, each twice as fine as the one before: where it goes, and how fast.
 
-use super::{PartScene, check_name};
-use harness::scene::{SceneError, Source};
+use super::{LIMIT, ORDER, Solved};
+use crate::report::Report;
+use crate::scene::{SceneError, Source};
 use serde::Deserialize;
 
 /// Three studies with steps or elements of h, h/2, h/4.
@@ -14,7 +15,7 @@ use serde::Deserialize;
 /// ```
 #[derive(Clone, Debug, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ConvergenceSpec {
+pub struct Convergence {
     /// Its name: values are `NAME.limit` and `NAME.order`.
     pub name: String,
     /// The quantity, without the study's name.
@@ -30,7 +31,7 @@ fn space() -> [u32; 2] {
     [2, 4]
 }
 
-impl ConvergenceSpec {
+impl Convergence {
     /// The limit, without the two powers of h (Richardson 1911, doi:10.1098/rsta.1911.0009), and the observed order
     /// log₂ |(v₀ − v₁)/(v₁ − v₂)|.
     pub fn limit_and_order(&self, [coarse, middle, fine]: [f64; 3]) -> [f64; 2] {
@@ -39,35 +40,29 @@ impl ConvergenceSpec {
         let limit = without(without(fine, middle, first), without(middle, coarse, first), second);
         [limit, ((coarse - middle) / (middle - fine)).abs().log2()]
     }
-}
 
-impl PartScene {
-    /// Checks names and powers.
-    ///
-    /// # Errors
-    /// Names that are taken or that no study has, powers that do not rise from 1 on.
-    pub fn check_convergence(&self, source: &Source) -> Result<(), SceneError> {
-        for (index, spec) in self.convergence.iter().enumerate() {
-            let key = |of: &str| format!("convergence[{index}].{of}");
-            check_name(source, &key("name"), &spec.name)?;
-            let taken = self.study.iter().map(|study| &study.name);
-            let taken = taken.chain(self.convergence[..index].iter().map(|other| &other.name));
-            if taken.into_iter().any(|other| *other == spec.name) {
-                return Err(source.error(&key("name"), format!("`{}` twice", spec.name), "a unique name"));
-            }
-            for name in &spec.studies {
-                if !self.study.iter().any(|study| study.name == *name) {
-                    let allowed = "names of three studies";
-                    return Err(source.error(&key("studies"), format!("`{name}`"), allowed));
-                }
-            }
-            let [first, second] = spec.powers;
-            if !(1..second).contains(&first) || second > 16 {
-                let found = format!("{first} and {second}");
-                return Err(source.error(&key("powers"), found, "two increasing powers, from 1 to 16"));
-            }
+    pub(super) fn check(&self, source: &Source, index: usize, known: &[&str]) -> Result<(), SceneError> {
+        let key = |of: &str| format!("convergence[{index}].{of}");
+        if let Some(name) = self.studies.iter().find(|name| !known.contains(&name.as_str())) {
+            return Err(source.error(&key("studies"), format!("`{name}`"), "names of three studies"));
+        }
+        let [first, second] = self.powers;
+        if !(1..second).contains(&first) || second > 16 {
+            let found = format!("{first} and {second}");
+            return Err(source.error(&key("powers"), found, "two increasing powers, from 1 to 16"));
         }
         Ok(())
+    }
+
+    pub(super) fn add<'a, S: Solved + 'a>(&self, report: &mut Report, of: impl Fn(&String) -> Option<&'a S>) {
+        let values = self.studies.each_ref().map(|name| of(name)?.scalar(&self.quantity));
+        let [Some((coarse, unit)), Some((middle, _)), Some((fine, _))] = values else { return };
+        let [limit, order] = self.limit_and_order([coarse, middle, fine]);
+        report.value(LIMIT.of(&[&self.name]).in_unit(unit), limit);
+        // of equal values there is none
+        if order.is_finite() {
+            report.value(ORDER.of(&[&self.name]), order);
+        }
     }
 }
 
@@ -77,7 +72,7 @@ mod tests {
 
     #[test]
     fn two_powers_are_taken_out() {
-        let spec = |powers| ConvergenceSpec {
+        let spec = |powers| Convergence {
             name: String::new(),
             quantity: String::new(),
             studies: Default::default(),
