@@ -14,7 +14,8 @@ pub use import::import;
 use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::potential::BondPotential;
-use crate::program::run::{Acting, Bonded, Failure};
+use crate::program::observe::{self, BodyWithMaterial, SceneMaterial};
+use crate::program::run::Failure;
 use crate::program::scene::{self, Scene, Variant, body_of, loads_of};
 use crate::solver::{Criterion, Loads};
 use harness::scene::Source;
@@ -27,7 +28,7 @@ use std::path::Path;
 /// A [`harness::scene::SceneError`] for what tables cannot represent; files that cannot be written.
 pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<Summary, Failure> {
     let scene: Scene = source.parse()?;
-    let variants = scene::check(source, &scene, false)?;
+    let variants = observe::check(source, &scene, false)?;
     let names: Vec<String> = variants.iter().map(Variant::name).collect();
     let index = match variant {
         None if variants.len() == 1 => 0,
@@ -77,10 +78,10 @@ fn write<const D: usize>(
     texts: [&str; 2],
     output: &Path,
 ) -> Result<Summary, Failure> {
-    let body = body_of::<D>(source, scene, variant)?;
+    let mut body = body_of::<D>(source, scene, variant)?;
     let (loads, _) = loads_of(source, scene, &body)?;
-    let bonded = Bonded::new(source, scene, variant, body)?;
-    let Acting::Bonds(material) = &bonded.material else {
+    let bonded = BodyWithMaterial::new(source, scene, variant, &mut body)?;
+    let SceneMaterial::Bonds(material) = &bonded.material else {
         // nothing else is left after `refuse`
         return Err(source.error("material", "another material", "a bond law").into());
     };
@@ -88,7 +89,7 @@ fn write<const D: usize>(
         Some(Criterion::Stretch(stretch)) => Some(stretch.least()),
         _ => None,
     };
-    let model = Model::new(&*bonded.body.bonds, material.law(), material.modulus(), critical, &loads);
+    let model = Model::new(&*body.bonds, material.law(), material.modulus(), critical, &loads);
     if model.clamps.len() > MOST_CLAMPS {
         let found = format!("{} kinds of clamps, overlaps counted", model.clamps.len());
         return Err(source

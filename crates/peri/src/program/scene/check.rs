@@ -24,7 +24,6 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
             check_variant(&source, &scene)?;
         }
     }
-    super::expect::check(source, scene)?;
     if let Some(name) = scene.output.compare.as_ref().and_then(|compare| compare.variant.as_ref()) {
         let names: Vec<String> =
             super::variant::variants(source, scene, false)?.iter().map(Variant::name).collect();

@@ -16,6 +16,7 @@ pub fn explain<const D: usize>(
     variant: &Variant,
     body: &Body<D>,
     criterion: Option<&Criterion>,
+    reports: &[Named],
 ) -> Result<Vec<String>, SceneError> {
     let bonds = &*body.bonds;
     let particles = bonds.particles().len();
@@ -124,7 +125,7 @@ pub fn explain<const D: usize>(
     omits(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), "body forces");
     omits(scene.output.fields, "VTKHDF fields");
     omits(scene.output.pictures, "pictures");
-    lines.push(format!("  reports    {}", Named::list(&super::quantities(scene))));
+    lines.push(format!("  reports    {}", Named::list(reports)));
     lines.extend(super::warnings(source, scene, body).into_iter().map(|text| format!("  warning    {text}")));
     Ok(lines)
 }

@@ -94,7 +94,7 @@ fn round(value: f64) -> f64 {
 }
 
 /// The scene's own discretisation, or every combination that its studies list.
-pub(super) fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+pub fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
     let own = Study::default();
     let mut variants: Vec<Variant> = Vec::new();
     let studies: Vec<&Study> = if scene.study.is_empty() { vec![&own] } else { scene.study.iter().collect() };
