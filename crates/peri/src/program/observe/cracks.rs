@@ -19,12 +19,12 @@ pub(super) fn breaking<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>
         return;
     }
     if by_energy(scene) {
-        to.add_if(q::CRITICAL_ENERGY, |m| match m.physics.criterion.as_ref()? {
+        to.add_if(q::CRITICAL_ENERGY, |m| match m.physics.body.criterion.as_ref()? {
             Criterion::Energy(limit) | Criterion::Softening(Bilinear { limit, .. }) => Some(*limit),
             Criterion::Stretch(_) => None,
         });
     } else {
-        to.add_if(q::CRITICAL_STRETCH, |m| m.physics.criterion.as_ref().map(Criterion::least_stretch));
+        to.add_if(q::CRITICAL_STRETCH, |m| m.physics.body.criterion.as_ref().map(Criterion::least_stretch));
     }
     to.add(q::FRAGMENTS, |m| m.fragments().len() as f64);
     to.add(q::LARGEST_FRAGMENT, |m| {

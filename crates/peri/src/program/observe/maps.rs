@@ -24,7 +24,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Pictures<'_> {
             maps(m, to.folder)?;
             flags.iter().try_for_each(|values| flagged(m, values, to.folder))?;
         }
-        let breaks = m.physics.criterion.is_some();
+        let breaks = m.physics.body.criterion.is_some();
         if spec.fields && spec.every.is_some() && self.0.stress.is_some() && breaks {
             stages::stages(m, to.folder)?;
         } else if D == 3 {

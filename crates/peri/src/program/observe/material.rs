@@ -165,16 +165,8 @@ impl<const D: usize> BodyWithMaterial<D> {
 pub struct Physics<const D: usize> {
     /// Name of its files.
     pub name: String,
-    /// The material.
-    pub material: SceneMaterial<D>,
-    /// When bonds break.
-    pub criterion: Option<Criterion>,
-    /// Fracture energies of the critical stretch of a bond law.
-    pub toughness: Option<Toughness>,
-    /// The parameters that follow fields.
-    pub followed: Vec<Followed>,
-    /// Stiffness of the material over what it is without inclusions.
-    pub stiffness: Property,
+    /// The material in the body.
+    pub body: BodyWithMaterial<D>,
     /// Loads and supports.
     pub loads: Loads<D>,
     /// Sites in any loading layer.
@@ -232,14 +224,9 @@ impl<const D: usize> Physics<D> {
         let sections = sections.collect::<Result<_, SceneError>>()?;
         super::lines::check(source, scene, &*body.bonds)?;
         let with = BodyWithMaterial::new(source, scene, variant, &mut body)?;
-        let BodyWithMaterial { material, criterion, toughness, followed, stiffness } = with;
         let physics = Self {
             name: String::new(),
-            material,
-            criterion,
-            toughness,
-            followed,
-            stiffness,
+            body: with,
             loads,
             loaded,
             held,
@@ -266,9 +253,10 @@ impl<const D: usize> Physics<D> {
         variant: &Variant,
         body: &Body<D>,
     ) -> Result<(), SceneError> {
-        let (bonds, breaks) = (&*body.bonds, self.criterion.is_some());
+        let (bonds, own) = (&*body.bonds, &self.body);
+        let breaks = own.criterion.is_some();
         self.plate = scene::exact_plate(source, scene, body)?;
-        self.evaluator = match &self.material {
+        self.evaluator = match &own.material {
             SceneMaterial::Bonds(material) => {
                 StressEvaluator::of_bonds(material.clone(), scene.fit_bound(), breaks)
             }
@@ -283,10 +271,10 @@ impl<const D: usize> Physics<D> {
             [left.zip(&cracked).map(|(left, cracked)| left + cracked).collect(), cracked]
         });
         let given = scene.material.critical.and_then(|critical| critical.fracture_energy);
-        self.tearing = self.toughness.as_ref().map(|own| own.tearing).or(given.map(|energy| energy.si()));
+        let toughness = own.toughness.as_ref();
+        self.tearing = toughness.map(|own| own.tearing).or(given.map(|energy| energy.si()));
         self.cracks = breaks.then(|| {
-            let own = self.toughness.as_ref();
-            CrackArea::new(bonds, &own.map_or_else(|| Crossing::new(bonds, None), |own| own.crossing))
+            CrackArea::new(bonds, &toughness.map_or_else(|| Crossing::new(bonds, None), |own| own.crossing))
         });
         let corrected = variant.surface == SurfaceCorrection::Energy;
         self.by_window = self.loaded.iter().map(|&loaded| loaded || corrected).collect();

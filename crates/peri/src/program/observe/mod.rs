@@ -88,7 +88,7 @@ impl<'a, const D: usize> Moment<'a, D> {
 
     /// Pieces of the body, the largest first, where bonds may break.
     pub fn fragments(&self) -> &[Fragment] {
-        let breaks = self.physics.criterion.is_some();
+        let breaks = self.physics.body.criterion.is_some();
         self.fragments.get_or_init(|| if breaks { fragments(self.bonds) } else { Vec::new() })
     }
 

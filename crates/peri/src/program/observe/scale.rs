@@ -19,7 +19,7 @@ pub fn stress_unit(largest: f64) -> (f64, &'static str) {
 /// How far apart, in spacings, neighbours on a lattice may be that are still bonded: no intact bond was longer. Where
 /// bonds break, the longest observed may have broken.
 pub(super) fn bridge<const D: usize>(m: &Moment<D>) -> f64 {
-    let most = match &m.physics.criterion {
+    let most = match &m.physics.body.criterion {
         Some(Criterion::Stretch(stretch)) => stretch.least(),
         _ => m.each(|row| row.largest_stretch).fold(1.0, f64::max),
     };

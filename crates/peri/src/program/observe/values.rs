@@ -23,7 +23,7 @@ pub(super) fn followed<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>
         for (index, quantity) in q::OF_A_FIELD.iter().enumerate() {
             // its unit is that of the field, which only the body knows
             to.add_in_unit(quantity.of(&[field.of.value_name()]), |m| {
-                let one = m.physics.followed.iter().find(|one| one.parameter == field.of)?;
+                let one = m.physics.body.followed.iter().find(|one| one.parameter == field.of)?;
                 let [mean, least, largest] = one.field;
                 Some((one.unit, [mean, one.mesh_mean, least, largest][index]))
             });
@@ -63,7 +63,7 @@ impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Fit<'_> {
     }
 
     fn end(&mut self, m: &Moment<'m, D>) -> Result<(), Error> {
-        if let Some(law) = m.physics.material.bond_law() {
+        if let Some(law) = m.physics.body.material.bond_law() {
             let stretches = covered_stretches(m.bonds, &m.state.displacement);
             self.error = KernelFit::new(law, stretches, self.scene.fit_bound())?.max_error;
         }

@@ -165,7 +165,7 @@ fn run_variant<const D: usize>(
     let mut outcome = Outcome::new(variant.name(), variant);
     physics.name = outcome.file_name();
     outcome.warnings = scene::warnings(source, scene, &body);
-    outcome.warnings.extend(scene::tearing_warnings(scene, &body, physics.toughness.as_ref()));
+    outcome.warnings.extend(scene::tearing_warnings(scene, &body, physics.body.toughness.as_ref()));
     outcome.snaps_back = scene.solver.snap_back;
     let mut state = begin((source, scene), &body, state, output)?;
     let mut observers = observe::observers::<D>(scene);
@@ -249,14 +249,14 @@ fn solve<const D: usize>(
     phases: &RefCell<Phases>,
     (observers, frames): (&mut Observers<D>, &mut Frames),
 ) -> Result<(), Failure> {
-    let Physics { material, loads, .. } = physics;
+    let (material, loads) = (&physics.body.material, &physics.loads);
     let factors = scene.solver.factors();
     let mut watch = |status: &Status, state: &State<D>| under_way.watch(status, state);
     let contact = match &scene.contact {
         Some(contact) => {
             let planes = contact.planes(source, scene.dynamics.is_some()).map_err(Failure::from)?;
             let whole = material.longitudinal_modulus(&*body.bonds);
-            let modulus = Property::new(&*body.bonds, |site, _| whole * physics.stiffness.at(site));
+            let modulus = Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.at(site));
             let held = physics.held.as_deref();
             let tied = held.map(|held| (held, contact.tie_stiffness(scene.dynamics.is_some())));
             Some(contact.contact(planes, body, material.micromodulus(&*body.bonds), &modulus, tied)?)
@@ -271,7 +271,7 @@ fn solve<const D: usize>(
     system.course = course.as_ref().map(|course| course as _);
     system.observer = Some(&row);
     system.fit_bound = scene.fit_bound();
-    let criterion = physics.criterion.clone();
+    let criterion = physics.body.criterion.clone();
     system.breaking = criterion.map(|criterion| Breaking { criterion, policy: scene.solver.breaking });
     system.contact = contact;
     (system.refine, system.snap_back) = (scene.solver.refine, scene.solver.snap_back);
@@ -353,10 +353,10 @@ fn explanation_in<const D: usize>(
         }
         let (source, scene) = variant.resolve(source, scene)?;
         let (body, physics) = Physics::<D>::new(&source, &scene, &variant)?;
-        let (criterion, reports) = (physics.criterion.as_ref(), observe::quantities(&scene));
+        let (criterion, reports) = (physics.body.criterion.as_ref(), observe::quantities(&scene));
         lines.extend(scene::explain(&source, &scene, &variant, &body, criterion, &reports)?);
-        lines.extend(scene::explain_tearing(&scene, &body, physics.toughness.as_ref()));
-        lines.extend(physics.followed.iter().map(|one| format!("  follows    {one}")));
+        lines.extend(scene::explain_tearing(&scene, &body, physics.body.toughness.as_ref()));
+        lines.extend(physics.body.followed.iter().map(|one| format!("  follows    {one}")));
     }
     lines.extend(lengths.into_iter().map(|text| format!("  warning    {text}")));
     Ok(lines)
