@@ -239,7 +239,7 @@ fn scenes_of_peri() {
     files.extend(below("tests/bad", ".toml").into_iter().filter(|file| file.is_file()));
     attack_scenes(&files, |source| {
         let scene = source.parse::<peri::program::scene::Scene>()?;
-        peri::program::scene::check(source, &scene, false).map(|_| ())
+        peri::program::observe::check(source, &scene, false).map(|_| ())
     });
 }
 
