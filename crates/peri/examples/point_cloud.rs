@@ -10,7 +10,8 @@ fn main() -> Result<(), peri::Error> {
     // 40 × 12 points 1 mm apart, each shifted by up to 0.2 mm; 1 mm thick
     let (thickness, horizon, youngs_modulus) = (1e-3, 3.015e-3, 1e6);
     let shift = |k: usize, step: f64| 0.4e-3 * ((k as f64 * step).fract() - 0.5);
-    let place = |k: usize| [1e-3 * (k % 40) as f64 + shift(k, 0.618), 1e-3 * (k / 40) as f64 + shift(k, 0.732)];
+    let place =
+        |k: usize| [1e-3 * (k % 40) as f64 + shift(k, 0.618), 1e-3 * (k / 40) as f64 + shift(k, 0.732)];
     let points: Vec<[f64; 2]> = (0..480).map(place).collect();
     let volumes = vec![1e-6 * thickness; points.len()];
     let mut bonds = CloudBonds::new(&points, &volumes, thickness, horizon, VolumeCorrection::None, &[])?;

@@ -1,6 +1,6 @@
 //! Contact and friction at the end, the planes that the body rests on, and warnings where contact is soft or never begins.
 
-use super::Moment;
+use super::moment::Moment;
 use super::values::axes;
 use crate::contact::Resting;
 use crate::program::quantities as q;

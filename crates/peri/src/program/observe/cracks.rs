@@ -1,6 +1,6 @@
 //! What bonds bear, the pieces of a broken body, and the energy that new cracks take over their area.
 
-use super::Moment;
+use super::moment::Moment;
 use crate::error::Error;
 use crate::program::quantities as q;
 use crate::program::scene::Scene;

@@ -1,6 +1,6 @@
 //! Stresses around a hole against Kirsch's solution or that of the scene's plate.
 
-use super::Moment;
+use super::moment::Moment;
 use crate::error::Error;
 use crate::exact::{HoleComparison, Region};
 use crate::program::quantities as q;

@@ -1,7 +1,7 @@
 //! What a scene's expectations may ask for: the names of the scalars that its report can have.
 
+use super::list::quantities;
 use super::probes::of_probe;
-use super::quantities;
 use crate::program::quantities as q;
 use crate::program::scene::{self, Scene, Variant, variants};
 use harness::observe::Scalars;

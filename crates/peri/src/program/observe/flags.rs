@@ -1,17 +1,15 @@
 //! Where a law learnt from data is uncertain.
 
-use super::{Moment, probes};
+use super::moment::Moment;
+use super::rows::width;
 use crate::program::quantities as q;
 use crate::program::scene::Scene;
 use harness::observe::{Fields, Place, Scalars};
 use polycore::constitutive::Flags;
 
-/// Columns of the history: shares of particles outside of the box of the training data, and with any flag.
-pub(super) const COLUMNS: [harness::report::Quantity; 2] = [q::OUTSIDE_SHARE, q::FLAGGED_SHARE];
-
-/// The first of [`COLUMNS`] in the rows of the history: they are behind those of probes.
+/// First column of the two shares in the rows of the history: they are behind those of probes.
 fn column(scene: &Scene) -> usize {
-    scene.probe.iter().map(probes::width).sum()
+    scene.probe.iter().map(width).sum()
 }
 
 /// The row of the history in which a column is first above 0.
@@ -23,7 +21,7 @@ fn first<const D: usize>(m: &Moment<D>, column: usize) -> Option<usize> {
 pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
     if scene.is_learnt() {
         let column = column(scene);
-        for (index, quantity) in COLUMNS.into_iter().enumerate() {
+        for (index, quantity) in [q::OUTSIDE_SHARE, q::FLAGGED_SHARE].into_iter().enumerate() {
             to.add_if(quantity, |m| m.state.history.last()?.seen.get(column + index).copied());
         }
         to.add_if(q::FIRST_STEP_OUTSIDE, |m| first(m, column).map(|row| row as f64));

@@ -1,6 +1,6 @@
 //! Fields of single steps: what is written during a run.
 
-use super::{Moment, Observers};
+use super::moment::{Moment, Observers};
 use crate::bonds::Kind;
 use crate::error::Error;
 use crate::program::scene::Scene;

@@ -1,6 +1,6 @@
 //! Scalars of the history: peak load, first break, energies, balances.
 
-use super::Moment;
+use super::moment::Moment;
 use crate::probe::load_at;
 use crate::program::quantities as q;
 use crate::program::scene::Scene;

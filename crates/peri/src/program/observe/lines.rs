@@ -1,30 +1,10 @@
 //! Fields along lines through the body at rest, at the end of a run.
 
-use super::Moment;
-use crate::bonds::Bonds;
+use super::moment::Moment;
 use crate::error::Error;
 use crate::probe::LineSampler;
 use crate::program::scene::{LineField, Scene, cuts_of, line_fields};
 use harness::observe::{Observer, Outputs};
-use harness::scene::{SceneError, Source};
-
-/// Refuses lines of which no point lies in the body.
-///
-/// # Errors
-/// The line.
-pub(super) fn check<const D: usize>(
-    source: &Source,
-    scene: &Scene,
-    bonds: &dyn Bonds<D>,
-) -> Result<(), SceneError> {
-    for (index, line) in scene.output.line.iter().enumerate() {
-        let places = line.places::<D>();
-        let around = LineSampler::new(bonds, &[], [places[0], places[places.len() - 1]]);
-        let inside = places.iter().any(|at| around.weights(*at).is_some());
-        line.refuse_outside(source, index, inside)?;
-    }
-    Ok(())
-}
 
 /// The lines of a scene.
 pub(super) struct Lines<'s>(pub &'s Scene);

@@ -1,7 +1,8 @@
 //! Pictures of a body at the end of a run.
 
+use super::moment::Moment;
 use super::scale::{bridge, short, stress_unit};
-use super::{Moment, solid, stages};
+use super::{solid, stages};
 use crate::error::Error;
 use crate::program::scene::Scene;
 use harness::observe::{Observer, Outputs};

@@ -1,6 +1,6 @@
 //! What a variant of a scene is turned into before it is solved: a body, its material, its loads, what its outputs look at.
 
-use super::probes::Tracked;
+use super::rows::Tracked;
 use crate::bonds::{Bonds, Property};
 use crate::calibrate;
 use crate::correction::{bond_factors, surface_factors};
@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::exact::Plate;
 use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, Response, relief};
 use crate::potential::BondPotential;
-use crate::probe::{Section, Solid, StressEvaluator};
+use crate::probe::{LineSampler, Section, Solid, StressEvaluator};
 use crate::program::scene::{self, Body, Followed, Inclusions, Scene, SurfaceCorrection, Variant};
 use crate::solver::{Criterion, Loads, State};
 use harness::scene::{SceneError, Source};
@@ -222,7 +222,7 @@ impl<const D: usize> Physics<D> {
                 .map_err(|none| source.error(&format!("{key}.point"), none, allowed))
         });
         let sections = sections.collect::<Result<_, SceneError>>()?;
-        super::lines::check(source, scene, &*body.bonds)?;
+        check_lines(source, scene, &*body.bonds)?;
         let with = BodyWithMaterial::new(source, scene, variant, &mut body)?;
         let physics = Self {
             name: String::new(),
@@ -299,4 +299,22 @@ impl<const D: usize> Physics<D> {
     pub fn field_file(&self) -> String {
         format!("{}.vtkhdf", self.name)
     }
+}
+
+/// Refuses lines of which no point lies in the body.
+///
+/// # Errors
+/// The line.
+fn check_lines<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    bonds: &dyn Bonds<D>,
+) -> Result<(), SceneError> {
+    for (index, line) in scene.output.line.iter().enumerate() {
+        let places = line.places::<D>();
+        let around = LineSampler::new(bonds, &[], [places[0], places[places.len() - 1]]);
+        let inside = places.iter().any(|at| around.weights(*at).is_some());
+        line.refuse_outside(source, index, inside)?;
+    }
+    Ok(())
 }

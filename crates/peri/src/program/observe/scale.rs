@@ -1,6 +1,6 @@
 //! Numbers, units and distances of pictures.
 
-use super::Moment;
+use super::moment::Moment;
 use crate::solver::{Criterion, Record};
 
 /// Four digits.

@@ -1,8 +1,8 @@
 //! Forces and moments across sections of the body.
 
-use super::Moment;
 use super::history::is_dynamic;
-use super::probes::columns;
+use super::moment::Moment;
+use super::rows::columns;
 use crate::calibrate::Space;
 use crate::error::Error;
 use crate::program::quantities as q;

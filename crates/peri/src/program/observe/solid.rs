@@ -1,7 +1,7 @@
 //! Pictures of solids as they look from outside.
 
-use super::Moment;
 use super::frames::{in_space, tensor_in_space};
+use super::moment::Moment;
 use super::scale::{bridge, stress_unit, title};
 use crate::error::Error;
 use crate::program::scene::StressSpec;

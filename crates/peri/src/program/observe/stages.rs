@@ -1,6 +1,6 @@
 //! Pictures of the stages of a run: the body as its fields show it.
 
-use super::Moment;
+use super::moment::Moment;
 use super::scale::{bridge, title};
 use super::solid::{self, Look, shown};
 use crate::error::Error;

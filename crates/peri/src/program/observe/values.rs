@@ -1,6 +1,6 @@
 //! Scalars of every run: stretches, the fit of the law, reactions, the largest displacement, motion, fields of other scenes.
 
-use super::Moment;
+use super::moment::Moment;
 use crate::bonds::covered_stretches;
 use crate::calibrate::Space;
 use crate::error::Error;
