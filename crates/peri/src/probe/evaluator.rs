@@ -61,8 +61,8 @@ impl<const D: usize> StressEvaluator<D> {
         }
     }
 
-    /// Forces of the bonds of `sites` to the sites that `wanted` names, N, each on the particle in the first: `visit` takes that site
-    /// and their sum.
+    /// Sums forces of the bonds of `sites` to the sites that `wanted` names, N, each on the particle in the first: `visit` takes
+    /// that site and the sum.
     pub fn forces(
         &self,
         bonds: &dyn Bonds<D>,
@@ -121,9 +121,10 @@ impl<const D: usize> StressEvaluator<D> {
         }
     }
 
-    /// Σ V_I V_J (x_J − x_I) × T_IJ over the bonds of `sites` to the sites that `wanted` names, N m: bonds of solids are not parallel to their
-    /// forces, T_IJ − T_JI, and Σ_J V_J (x_J − x_I) × T_IJ = 0 in a whole family alone. With it, the moment of the forces of `sites` is what the
-    /// body transmits.
+    /// Couples Σ V_I V_J (x_J − x_I) × T_IJ of the bonds of `sites` to the sites that `wanted` names, N m.
+    ///
+    /// Bonds of solids are not parallel to their forces, T_IJ − T_JI, and Σ_J V_J (x_J − x_I) × T_IJ = 0 in a whole family alone.
+    /// With it, the moment of the forces of `sites` is what the body transmits.
     pub fn couple(
         &self,
         bonds: &dyn Bonds<D>,

@@ -1,8 +1,9 @@
-//! Fields along lines through the body at rest, between particles by moving least squares with a linear basis (Lancaster & Salkauskas 1981,
-//! doi:10.1090/S0025-5718-1981-0616367-1) over the nearest particle and those that intact bonds join to it, with the weights
-//! w = (δ/d − 1)⁴ of their distances d: a linear field is exact, and a particle has its own value. No value crosses a crack of
-//! the body at rest: the nearest particle is one on the same side, and so is what is bonded to it. Where bonds broke later, the side is that
-//! of the nearest particle.
+//! Fields along lines through the body at rest, between particles by moving least squares with a linear basis.
+//!
+//! Lancaster & Salkauskas (1981), doi:10.1090/S0025-5718-1981-0616367-1, over the nearest particle and those that intact bonds
+//! join to it, with the weights w = (δ/d − 1)⁴ of their distances d: a linear field is exact, and a particle has its own value.
+//! No value crosses a crack of the body at rest: the nearest particle is one on the same side, and so is what is bonded to it.
+//! Where bonds broke later, the side is that of the nearest particle.
 
 use crate::bonds::{Bonds, CellGrid, Kind};
 use crate::geometry::{Cut, length, severed};

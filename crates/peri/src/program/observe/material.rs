@@ -1,6 +1,6 @@
 //! What a variant of a scene is turned into before it is solved: a body, its material, its loads, what its outputs look at.
 
-use super::rows::Tracked;
+use super::rows::{Row, rows};
 use crate::bonds::{Bonds, Property};
 use crate::calibrate;
 use crate::correction::{bond_factors, surface_factors};
@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::exact::Plate;
 use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, Response, relief};
 use crate::potential::BondPotential;
-use crate::probe::{LineSampler, Section, Solid, StressEvaluator};
+use crate::probe::{LineSampler, Solid, StressEvaluator};
 use crate::program::scene::{self, Body, Followed, Inclusions, Scene, SurfaceCorrection, Variant};
 use crate::solver::{Criterion, Loads, State};
 use harness::scene::{SceneError, Source};
@@ -173,8 +173,7 @@ pub struct Physics<const D: usize> {
     pub loaded: Vec<bool>,
     /// Particles of grips that are tied at their surface, by site.
     pub held: Option<Vec<bool>>,
-    probes: Vec<Tracked>,
-    sections: Vec<Section<D>>,
+    rows: Vec<Row<D>>,
     /// Forces and stresses, since [`Self::begin`], as the following.
     pub evaluator: StressEvaluator<D>,
     /// Bonds of each particle without cracks, and how many these have broken; only where there are cracks, or bonds break.
@@ -210,18 +209,7 @@ impl<const D: usize> Physics<D> {
             let list = crate::contact::across(&*body.bonds, held);
             body.bonds.sever(&list);
         }
-        let probes = scene.probe.iter().enumerate();
-        let probes =
-            probes.map(|(index, probe)| Tracked::new(source, &format!("probe[{index}]"), probe, &body));
-        let probes = probes.collect::<Result<_, SceneError>>()?;
-        let sections = scene.output.section.iter().enumerate().map(|(index, spec)| {
-            let key = format!("output.section[{index}]");
-            let (point, normal) = spec.plane(source, &key)?;
-            let allowed = "a point in the body: bonds must cross the plane";
-            Section::new(&*body.bonds, point, normal)
-                .map_err(|none| source.error(&format!("{key}.point"), none, allowed))
-        });
-        let sections = sections.collect::<Result<_, SceneError>>()?;
+        let rows = rows(source, scene, &body)?;
         check_lines(source, scene, &*body.bonds)?;
         let with = BodyWithMaterial::new(source, scene, variant, &mut body)?;
         let physics = Self {
@@ -230,8 +218,7 @@ impl<const D: usize> Physics<D> {
             loads,
             loaded,
             held,
-            probes,
-            sections,
+            rows,
             evaluator: StressEvaluator::none(),
             whole: None,
             cracks: None,
@@ -283,16 +270,7 @@ impl<const D: usize> Physics<D> {
 
     /// Numbers of a row of the history: of probes, of a learnt law's flags, of sections.
     pub fn row(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Vec<f64> {
-        let evaluator = &self.evaluator;
-        let mut row: Vec<f64> =
-            self.probes.iter().flat_map(|probe| probe.row(bonds, state, evaluator)).collect();
-        row.extend(evaluator.flagged(bonds, state).into_iter().flatten());
-        for section in &self.sections {
-            let (force, moment) = section.force(evaluator, bonds, state);
-            row.extend(force);
-            row.extend(&moment[if D == 3 { 0 } else { 2 }..]);
-        }
-        row
+        self.rows.iter().flat_map(|part| part(bonds, state, &self.evaluator)).collect()
     }
 
     /// Name of the field file.

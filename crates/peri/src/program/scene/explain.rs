@@ -118,7 +118,7 @@ pub fn explain<const D: usize>(
     omits(scene.dynamics.is_some(), "inertia");
     omits(!scene.body.cracks.is_empty(), "pre-cut cracks");
     omits(scene.contact.is_some(), "contact (no [contact] in this scene)");
-    omits(scene.material.critical.is_some(), "damage and bond breaking (no `critical` in this scene)");
+    omits(criterion.is_some(), "damage and bond breaking (no `critical` in this scene)");
     omits(scene.output.every.is_some(), "fields of the steps before the last");
     let constrained = scene.boundary.iter().any(|b| b.holds());
     omits(constrained, "prescribed displacements");
