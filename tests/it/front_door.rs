@@ -242,7 +242,7 @@ fn scenes_of_peri() {
     files.extend(bad.iter().map(|scene| folder.path().join(format!("{}.toml", scene.name))));
     attack_scenes(&files, |source| {
         let scene = source.parse::<peri::program::scene::Scene>()?;
-        peri::program::scene::check(source, &scene, false).map(|_| ())
+        peri::program::observe::check(source, &scene, false).map(|_| ())
     });
 }
 

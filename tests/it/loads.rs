@@ -6,7 +6,8 @@ use crate::results::{report, scalar};
 use crate::scenes;
 use harness::output::vtkhdf;
 use harness::scene::Source;
-use peri::program::scene::{Scene, quantities_of};
+use peri::program::observe::quantities_of;
+use peri::program::scene::Scene;
 use serde_json::Value;
 use std::fs;
 

@@ -23,6 +23,16 @@ pub trait Observer<S: ?Sized, E> {
         Vec::new()
     }
 
+    /// Curves for the report, of the final state.
+    fn curves(&self, _state: &S) -> Vec<Curve> {
+        Vec::new()
+    }
+
+    /// Sentences on what is allowed and most likely not meant, of the final state.
+    fn warnings(&self, _state: &S) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Memory that it keeps during the run, bytes.
     fn memory(&self) -> f64 {
         0.0
@@ -92,6 +102,15 @@ pub fn decode<T: DeserializeOwned>(saved: &[u8]) -> Result<T, Error> {
     })
 }
 
+/// A curve of a report.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Name.
+    pub name: String,
+    /// Columns: name, unit, values.
+    pub columns: Vec<(&'static str, &'static str, Vec<f64>)>,
+}
+
 /// Where the files of observers go.
 #[derive(Clone, Copy, Debug)]
 pub struct Outputs<'a> {
@@ -124,6 +143,19 @@ impl<'a, S: ?Sized> Scalars<'a, S> {
         match self.state.map(value) {
             None => (self.take)(quantity.into(), f64::NAN),
             Some(Some(value)) => (self.take)(quantity.into(), value),
+            Some(None) => {}
+        }
+    }
+
+    /// Adds a scalar whose unit only the result knows.
+    pub fn add_in_unit(
+        &mut self,
+        quantity: impl Into<Named>,
+        value: impl FnOnce(&S) -> Option<(&'static str, f64)>,
+    ) {
+        match self.state.map(value) {
+            None => (self.take)(quantity.into(), f64::NAN),
+            Some(Some((unit, value))) => (self.take)(quantity.into().in_unit(unit), value),
             Some(None) => {}
         }
     }

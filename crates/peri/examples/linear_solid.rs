@@ -121,7 +121,7 @@ pub fn poisson_ratio(solid: LinearSolid) -> Result<f64, peri::Error> {
     let mut state = State::new(bonds.sites());
     let mut system = System::new(&mut bonds, solid, &loads, &[1.0]);
     let method = Lbfgs { tolerance: 1e-6, ..Default::default() };
-    method.solve(&mut system, &mut state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))?;
+    method.run(&mut system, &mut state)?;
     let moved = |site: usize, axis: usize| state.displacement.get(site)[axis];
     let along = (moved(east, 0) - moved(west, 0)) / 8.0;
     let across = (moved(north, 1) - moved(south, 1)) / 6.0;

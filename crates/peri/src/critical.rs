@@ -9,8 +9,9 @@ pub use crossing::{Convention, Crossing};
 use crate::bonds::BodyGeometry;
 use crate::calibrate::Space;
 use crate::error::Error;
+use crate::material::{PointLaw, energy_at_strength};
 use crate::potential::{BondPotential, NetworkStretch, softened_energy};
-use crate::solver::Bilinear;
+use crate::solver::{Bilinear, Criterion};
 use polycore::numerics::{bisect, bisected};
 use polycore::units::{EnergyPerArea, Stress};
 use serde::Deserialize;
@@ -166,6 +167,35 @@ impl Critical {
             ("fracture_energy", self.fracture_energy.is_some()),
         ];
         all.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
+    }
+
+    /// When bonds of a solid break: at a stretch, at an energy, or softened at an energy beyond a strength.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`]: a strength that the law does not reach, or too large for the fracture energy.
+    pub fn of_solid<const D: usize>(
+        &self,
+        law: &dyn PointLaw<D>,
+        bonds: &dyn BodyGeometry<D>,
+    ) -> Result<Criterion, Error> {
+        let energy = self.fracture_energy.map_or(f64::NAN, |energy| energy.si());
+        match (self.stretch, self.strength.map(|strength| strength.si())) {
+            (Some(stretch), _) => Ok(stretch.into()),
+            (None, None) => Ok(Criterion::Energy(energy_limit(bonds, energy))),
+            (None, Some(strength)) => {
+                let fault =
+                    |allowed| Error::Parameter { name: "critical.strength", found: strength, allowed };
+                let onset = energy_at_strength(law, strength)
+                    .ok_or_else(|| fault("a stress that the law reaches in uniaxial tension".to_owned()))?;
+                let softening = bilinear(bonds, energy, onset).map_err(|limit| {
+                    fault(format!(
+                        "less, or a finer spacing: at it W = {onset:.4e} J/m³, and bonds of this fracture energy break at \
+                         {limit:.4e} J/m³"
+                    ))
+                })?;
+                Ok(Criterion::Softening(softening))
+            }
+        }
     }
 
     /// The critical bond stretch.

@@ -1,7 +1,9 @@
 //! Closed-form solutions and homogeneous responses: what results are compared with.
 
+mod hole;
 mod plate;
 
+pub use hole::{HoleComparison, Region};
 pub use plate::Plate;
 
 use crate::bonds::Stencil;
@@ -27,6 +29,16 @@ pub fn kirsch(x: f64, y: f64, radius: f64, remote: f64) -> [f64; 3] {
 /// `ratio` = diameter/width: (2 + (1 − ratio)³)/(1 − ratio), Heywood (1952), within 1 % of Howland (1930) to 0.6.
 pub fn heywood_gross(ratio: f64) -> f64 {
     (2.0 + (1.0 - ratio).powi(3)) / (1.0 - ratio)
+}
+
+/// Observed order: slope of ln(error) over ln(spacing) by least squares.
+pub fn observed_order(spacing: &[f64], error: &[f64]) -> f64 {
+    let points: Vec<(f64, f64)> = spacing.iter().zip(error).map(|(h, e)| (h.ln(), e.ln())).collect();
+    let n = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let (top, bottom) =
+        points.iter().fold((0.0, 0.0), |(t, b), p| (t + (p.0 - x) * (p.1 - y), b + (p.0 - x) * (p.0 - x)));
+    top / bottom
 }
 
 /// Nominal stress P of a homogeneously deformed plane lattice under a bond law, over kθ, with F = diag(stretches):
@@ -145,6 +157,13 @@ mod tests {
         // formulation.md: 3.047
         assert!((heywood_gross(0.12) - 3.047).abs() < 5e-4);
         assert!((heywood_gross(1e-9) - 3.0).abs() < 1e-8);
+    }
+
+    #[test]
+    fn order_of_a_power_law() {
+        let h = [4.0, 2.0, 1.0];
+        let error = h.map(|h: f64| 0.3 * h.powf(0.45));
+        assert!((observed_order(&h, &error) - 0.45).abs() < 1e-14);
     }
 
     /// formulation.md: lattice uniaxial, n̄ = 720, unscaled, P11/E.

@@ -45,6 +45,7 @@ pub mod integrals;
 pub mod material;
 pub mod model;
 pub mod potential;
+pub mod probe;
 mod quadrature;
 pub mod solver;
 pub mod stress;

@@ -9,12 +9,14 @@ pub use rubber::Rubber;
 use crate::bonds::{BodyGeometry, LatticeBonds, Property, covered_stretches, fragments};
 use crate::contact::{Contact, Plane};
 use crate::error::Error;
-use crate::material::{BondMaterial, Material};
+use crate::material::{BondMaterial, Material, NonlocalSolid, PointLaw};
 use crate::potential::KernelFit;
+use crate::probe::StressEvaluator;
 use crate::solver::{
     Breaking, Loads, Method, Policy, Record, Rotation, State, Status, Support, System, Turned,
 };
 use crate::stress::{self, BallVolume, Loaded, Measure, Missing, Tensor};
+use std::sync::Arc;
 
 /// What a body can be made of: a [`Material`], or a description that becomes one in a body, such as [`Rubber`].
 pub trait IntoMaterial<const D: usize> {
@@ -254,6 +256,20 @@ impl<const D: usize, M: Material<D> + Clone> Simulation<D, M> {
     /// Pieces that the body has broken into.
     pub fn fragments(&self) -> usize {
         fragments(&self.bonds).len()
+    }
+}
+
+impl<const D: usize> Simulation<D, BondMaterial<'static>> {
+    /// Evaluates forces of bonds, see [`crate::probe`].
+    pub fn evaluator(&self) -> StressEvaluator<D> {
+        StressEvaluator::of_bonds(self.material.clone(), 1e-9, self.breaking.is_some())
+    }
+}
+
+impl<const D: usize, L: PointLaw<D> + Clone + 'static> Simulation<D, NonlocalSolid<L>> {
+    /// Evaluates forces, stresses and energy-momentum, see [`crate::probe`]; to be made before bonds break.
+    pub fn evaluator(&self) -> StressEvaluator<D> {
+        StressEvaluator::of_solid(Arc::new(self.material.0.clone()), false, &self.bonds)
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod bridge;
 pub mod command;
+pub mod observe;
 pub mod quantities;
 pub mod run;
 pub mod scene;

@@ -1,4 +1,4 @@
-//! The scalars that reports of `peri` can have. A scene's own are those of [`crate::program::scene::quantities`].
+//! The scalars that reports of `peri` can have. A scene's own are those of [`crate::program::observe::quantities`].
 
 harness::quantities! {
     /// Scalars of every variant; with several variants each has its variant's name behind it in square brackets.

@@ -23,4 +23,12 @@ pub trait Method<const D: usize> {
         watch: &mut Watch<D>,
         finished: &mut Finished<D>,
     ) -> Result<(), Error>;
+
+    /// [`Self::solve`] to the end, watched by nobody.
+    ///
+    /// # Errors
+    /// Those of the method.
+    fn run(&self, system: &mut System<D>, state: &mut State<D>) -> Result<(), Error> {
+        self.solve(system, state, &mut |_, _| Ok(()), &mut |_, _| Ok(()))
+    }
 }

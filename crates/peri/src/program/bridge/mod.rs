@@ -14,8 +14,9 @@ pub use import::import;
 use crate::bonds::Bonds;
 use crate::calibrate::Space;
 use crate::potential::BondPotential;
-use crate::program::run::{Acting, Bonded, Failure};
-use crate::program::scene::{self, Scene, Variant, body_of, loads_of};
+use crate::program::observe::{self, Physics, SceneMaterial};
+use crate::program::run::Failure;
+use crate::program::scene::{self, Scene, Variant};
 use crate::solver::{Criterion, Loads};
 use harness::scene::Source;
 use std::path::Path;
@@ -27,7 +28,7 @@ use std::path::Path;
 /// A [`harness::scene::SceneError`] for what tables cannot represent; files that cannot be written.
 pub fn export(source: &Source, variant: Option<&str>, output: &Path) -> Result<Summary, Failure> {
     let scene: Scene = source.parse()?;
-    let variants = scene::check(source, &scene, false)?;
+    let variants = observe::check(source, &scene, false)?;
     let names: Vec<String> = variants.iter().map(Variant::name).collect();
     let index = match variant {
         None if variants.len() == 1 => 0,
@@ -77,18 +78,16 @@ fn write<const D: usize>(
     texts: [&str; 2],
     output: &Path,
 ) -> Result<Summary, Failure> {
-    let body = body_of::<D>(source, scene, variant)?;
-    let (loads, _) = loads_of(source, scene, &body)?;
-    let bonded = Bonded::new(source, scene, variant, body)?;
-    let Acting::Bonds(material) = &bonded.material else {
+    let (body, physics) = Physics::<D>::new(source, scene, variant)?;
+    let SceneMaterial::Bonds(material) = &physics.body.material else {
         // nothing else is left after `refuse`
         return Err(source.error("material", "another material", "a bond law").into());
     };
-    let critical = match &bonded.criterion {
+    let critical = match &physics.body.criterion {
         Some(Criterion::Stretch(stretch)) => Some(stretch.least()),
         _ => None,
     };
-    let model = Model::new(&*bonded.body.bonds, material.law(), material.modulus(), critical, &loads);
+    let model = Model::new(&*body.bonds, material.law(), material.modulus(), critical, &physics.loads);
     if model.clamps.len() > MOST_CLAMPS {
         let found = format!("{} kinds of clamps, overlaps counted", model.clamps.len());
         return Err(source
@@ -99,7 +98,7 @@ fn write<const D: usize>(
         let allowed = "clamps that move against each other: the load is the force that does work on them";
         return Err(source.error("boundary", "no displacement", allowed).into());
     }
-    files::write(&model, scene, &loads, texts, output)?;
+    files::write(&model, scene, &physics.loads, texts, output)?;
     Ok(Summary { particles: model.labels.len(), bonds: model.bonds.len(), types: model.types.len() })
 }
 

@@ -1,106 +1,13 @@
 //! Comparison with closed forms, convergence, and the report.
 
-use super::outcome::{Outcome, Profile, families};
-use crate::bonds::Bonds;
+use super::outcome::{Outcome, families};
 use crate::exact;
 use crate::program::quantities as q;
-use crate::program::scene::{ExactSpec, NAMING, Scene};
-use crate::stress::{Measure, Tensor};
+use crate::program::scene::{NAMING, Scene};
 use harness::report::{Bound, Expect, Kind, Named, Report};
 use harness::scene::Source;
 use harness::study::{self, Compare, SuiteRow};
-use rayon::prelude::*;
 use std::path::Path;
-
-/// Stress around a hole against Kirsch's solution or, given, that of this plate: peak and profile at θ = π/2, RMSE (2.84)
-/// over all particles and without the loading layers; of a plate also within 2δ of the hole, and beyond up to five radii.
-pub fn hole<const D: usize>(
-    bonds: &dyn Bonds<D>,
-    spec: &ExactSpec,
-    plate: Option<&exact::Plate>,
-    fields: &[(Measure, Vec<Tensor<D>>)],
-    loaded: &[bool],
-    outcome: &mut Outcome,
-) {
-    let (radius, remote) = spec.hole();
-    let positions: Vec<[f64; D]> = bonds.particles().iter().map(|&s| bonds.position(s as usize)).collect();
-    let kirsch: Vec<f64> = positions.iter().map(|p| exact::kirsch(p[0], p[1], radius, 1.0)[0]).collect();
-    let truth =
-        plate.map(|plate| positions.par_iter().map(|p| plate.stress(p[0], p[1])[0]).collect::<Vec<f64>>());
-    let exact = truth.as_ref().unwrap_or(&kirsch);
-    let near = radius + 2.0 * bonds.horizon();
-    let inner: Vec<bool> = bonds.particles().iter().map(|&site| !loaded[site as usize]).collect();
-    let distance: Vec<f64> = positions.iter().map(|p| p[0].hypot(p[1])).collect();
-    let column = column(&positions, bonds.spacing());
-    if !column.is_empty() {
-        outcome.value(q::KIRSCH_FIRST, mean(&column[0].1, &kirsch));
-        outcome.profiles.push(profile("kirsch", &column, &kirsch));
-        if let (Some(plate), Some(truth)) = (plate, &truth) {
-            outcome.value(q::EXACT_FIRST, mean(&column[0].1, truth));
-            outcome.value(q::EXACT_PEAK, plate.stress(0.0, radius)[0]);
-            outcome.profiles.push(profile("exact", &column, truth));
-        }
-    }
-    for (measure, field) in fields {
-        let name = measure.name();
-        let normal: Vec<f64> = field.iter().map(|s| s[0][0] / remote).collect();
-        let rms = |exact: &[f64], wanted: &dyn Fn(usize) -> bool| {
-            let squares = (0..normal.len()).filter(|&i| wanted(i)).map(|i| (normal[i] - exact[i]).powi(2));
-            let (sum, count) = squares.fold((0.0, 0_usize), |(sum, count), square| (sum + square, count + 1));
-            (sum / count.max(1) as f64).sqrt()
-        };
-        let most =
-            (0..normal.len()).filter(|&i| inner[i]).map(|i| normal[i]).fold(f64::NEG_INFINITY, f64::max);
-        outcome.value(q::MEASURE_MAX.of(&[name]), most);
-        for kind in spec.errors() {
-            let of = if kind.ends_with("kirsch") { &kirsch } else { exact };
-            let error = match *kind {
-                "rmse_inner" | "rmse_inner_kirsch" => rms(of, &|i| inner[i]),
-                "rmse_bulk" => rms(of, &|i| distance[i] > near && distance[i] < 5.0 * radius),
-                "rmse_ring" => rms(of, &|i| distance[i] <= near),
-                _ => rms(of, &|_| true),
-            };
-            outcome.value(q::MEASURE_ERROR.of(&[name, kind]), error);
-        }
-        if !column.is_empty() {
-            let profile = profile(name, &column, &normal);
-            let peak = profile.value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            outcome.value(q::MEASURE_PEAK.of(&[name]), peak);
-            outcome.value(q::MEASURE_PEAK_ERROR.of(&[name]), peak / mean(&column[0].1, exact) - 1.0);
-            outcome.value(q::MEASURE_FIRST.of(&[name]), profile.value[0]);
-            outcome.profiles.push(profile);
-        }
-    }
-}
-
-/// Heights above the hole and the particles there: the column(s) of particles nearest the line x = 0, y > 0.
-fn column<const D: usize>(positions: &[[f64; D]], spacing: f64) -> Vec<(f64, Vec<usize>)> {
-    let mut near: Vec<usize> = (0..positions.len())
-        .filter(|&i| positions[i][0].abs() < 0.6 * spacing && positions[i][1] > 0.0)
-        .collect();
-    near.sort_by(|&a, &b| positions[a][1].total_cmp(&positions[b][1]));
-    let mut rows: Vec<(f64, Vec<usize>)> = Vec::new();
-    for particle in near {
-        let height = positions[particle][1];
-        match rows.last_mut() {
-            Some((last, members)) if height - *last < 0.1 * spacing => members.push(particle),
-            _ => rows.push((height, vec![particle])),
-        }
-    }
-    rows
-}
-
-fn mean(members: &[usize], values: &[f64]) -> f64 {
-    members.iter().map(|&i| values[i]).sum::<f64>() / members.len() as f64
-}
-
-fn profile(name: &str, column: &[(f64, Vec<usize>)], values: &[f64]) -> Profile {
-    Profile {
-        name: name.to_owned(),
-        at: column.iter().map(|row| row.0).collect(),
-        value: column.iter().map(|row| mean(&row.1, values)).collect(),
-    }
-}
 
 /// Seconds that a stress field of one measure takes from the scene on, as if it were the only one.
 pub fn run_time(outcome: &Outcome, measure: &str) -> f64 {
@@ -110,16 +17,6 @@ pub fn run_time(outcome: &Outcome, measure: &str) -> f64 {
         .sum()
 }
 
-/// Observed order: slope of ln(error) over ln(spacing) by least squares.
-pub fn observed_order(spacing: &[f64], error: &[f64]) -> f64 {
-    let points: Vec<(f64, f64)> = spacing.iter().zip(error).map(|(h, e)| (h.ln(), e.ln())).collect();
-    let n = points.len() as f64;
-    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
-    let (top, bottom) =
-        points.iter().fold((0.0, 0.0), |(t, b), p| (t + (p.0 - x) * (p.1 - y), b + (p.0 - x) * (p.0 - x)));
-    top / bottom
-}
-
 /// The report of all variants; with one variant its values keep their plain names.
 pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool) -> Report {
     let mut report =
@@ -127,7 +24,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
     report.threads(rayon::current_num_threads());
     // names must not depend on how many of the variants run
     let several =
-        crate::program::scene::check(source, scene, false).map_or(outcomes.len(), |all| all.len()) > 1;
+        crate::program::scene::variants(source, scene, false).map_or(outcomes.len(), |all| all.len()) > 1;
     let full = |name: &str, outcome: &Outcome| {
         if several { NAMING.value(&outcome.name, name) } else { name.to_owned() }
     };
@@ -160,7 +57,7 @@ pub fn report(source: &Source, scene: &Scene, outcomes: &[Outcome], quick: bool)
                 for kind in problem.errors() {
                     let errors = errors_of(kind);
                     if errors.len() == spacing.len() {
-                        let order = observed_order(&spacing, &errors);
+                        let order = exact::observed_order(&spacing, &errors);
                         report.value(q::MEASURE_ORDER.of(&[name, kind, &family]), order);
                     }
                 }
@@ -423,12 +320,5 @@ mod tests {
     fn six_digits() {
         let texts = [0.0, 1234567.8, 0.001234567, 8.9e-5, -15.25, 2e9].map(digits);
         assert_eq!(texts, ["0", "1234568", "0.00123457", "8.90000e-5", "-15.25", "2.00000e9"]);
-    }
-
-    #[test]
-    fn order_of_a_power_law() {
-        let h = [4.0, 2.0, 1.0];
-        let error = h.map(|h: f64| 0.3 * h.powf(0.45));
-        assert!((observed_order(&h, &error) - 0.45).abs() < 1e-14);
     }
 }

@@ -1,92 +1,15 @@
-//! Pictures and field files of a run.
+//! Pictures of several variants: profiles, convergence, error against run time.
 
 use super::compare::{plate_width, run_time};
 use super::outcome::Outcome;
 use super::outcome::families;
-use super::scale::{bridge, short, stress_unit};
-use crate::bonds::Bonds;
 use crate::exact;
 use crate::program::scene::{ExactSpec, Scene};
-use crate::solver::State;
-use crate::stress::{Measure, Tensor};
+use crate::stress::Measure;
 use harness::output::csv;
-use harness::output::picture::{FieldMap, LegendPlace, LinePlot, Panel, Series};
+use harness::output::picture::{LegendPlace, LinePlot, Series};
 use polycore::Error;
 use std::path::Path;
-
-/// Maps of the stress components of the first measure (Fig. 2.6); plane bodies only.
-pub fn maps<const D: usize>(
-    scene: &Scene,
-    bonds: &dyn Bonds<D>,
-    state: &State<D>,
-    fields: &[(Measure, Vec<Tensor<D>>)],
-    outcome: &Outcome,
-    output: &Path,
-) -> Result<(), Error> {
-    let Some((measure, field)) = fields.first().filter(|_| D == 2) else { return Ok(()) };
-    let [rest, places] = in_plane(bonds, state);
-    let largest = field.iter().flatten().flatten().fold(0.0_f64, |most, s| most.max(s.abs()));
-    let (scale, unit) = match &scene.exact {
-        Some(exact) => (1.0 / exact.hole().1, "/σ∞".to_owned()),
-        None => {
-            let (scale, unit) = stress_unit(largest);
-            (scale, format!(" ({unit})"))
-        }
-    };
-    let components: Vec<(&str, Vec<f64>)> = [("σ₁₁", 0, 0), ("σ₂₂", 1, 1), ("σ₁₂", 0, 1)]
-        .map(|(name, a, b)| (name, field.iter().map(|t| t[a][b] * scale).collect()))
-        .into();
-    let mut map = FieldMap::new().lengths("mm", 1e-3);
-    let [wide, high] = [0, 1].map(|d| {
-        let (low, high) =
-            places.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x[d]), high.max(x[d])));
-        high - low
-    });
-    if wide > 1.8 * high {
-        map = map.columns(1).size(1200);
-    }
-    for (name, values) in &components {
-        let label = format!("{name}{unit}");
-        // of a body that is torn this is what is left in its pieces
-        let last = outcome.history.last().filter(|last| last.broken > 0);
-        let at = last.map_or(String::new(), |r| {
-            format!(", U = {} mm, F = {} N", short(r.displacement * 1e3), short(r.load))
-        });
-        let title = format!("{label}, {}{at}", measure.name());
-        let panel = Panel::new(&title, &label, &places, values, bonds.spacing()).reference(&rest);
-        map = map.panel(panel.bridge(bridge(outcome)));
-    }
-    map.write(output.join(format!("stress_{}.png", outcome.file_name())))
-}
-
-/// Map of the particles of a plane body at which a learnt law is uncertain.
-///
-/// # Errors
-/// A file that cannot be written.
-pub fn flagged<const D: usize>(
-    bonds: &dyn Bonds<D>,
-    state: &State<D>,
-    values: &[f64],
-    outcome: &Outcome,
-    output: &Path,
-) -> Result<(), Error> {
-    let [rest, places] = in_plane(bonds, state);
-    let panel = Panel::new("where the learnt law is uncertain", "flagged", &places, values, bonds.spacing());
-    let map = FieldMap::new()
-        .lengths("mm", 1e-3)
-        .panel(panel.range(0.0, 1.0).reference(&rest).bridge(bridge(outcome)));
-    map.write(output.join(format!("flags_{}.png", outcome.file_name())))
-}
-
-/// Where the particles of a plane body were and are.
-fn in_plane<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> [Vec<[f64; 2]>; 2] {
-    let sites = bonds.particles().iter().map(|&site| site as usize);
-    let rest: Vec<[f64; 2]> =
-        sites.clone().map(|site| [bonds.position(site)[0], bonds.position(site)[1]]).collect();
-    let moved = sites.map(|site| state.displacement.get(site));
-    let places = rest.iter().zip(moved).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect();
-    [rest, places]
-}
 
 /// Profiles (Fig. 2.7), convergence (Fig. 2.8), error against run time.
 pub fn curves(scene: &Scene, outcomes: &[Outcome], output: &Path) -> Result<(), Error> {

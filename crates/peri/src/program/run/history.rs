@@ -1,10 +1,10 @@
 //! The history of loading: values, tables and curves of load against displacement and of energies.
 
-use super::envelope::envelope;
 use super::outcome::Outcome;
-use crate::program::quantities as q;
-use crate::program::scene::{ContactSpec, Scene, of_plane};
-use crate::solver::{Balance, Event, Record};
+use crate::probe::envelope;
+use crate::program::observe::{damped, is_dynamic};
+use crate::program::scene::Scene;
+use crate::solver::{Event, Record};
 use harness::output::csv;
 use harness::output::picture::{LegendPlace, LinePlot, Series};
 use polycore::Error;
@@ -16,24 +16,9 @@ const LEGEND: usize = 8;
 /// A column: name, unit, values.
 type Column = (String, String, Vec<f64>);
 
-/// Part of the stored energy that contact may hold before a run warns, and the part that its advice is for.
-const SOFT: f64 = 0.02;
-const WANTED: f64 = 0.01;
-/// Stored energy over the work below which a body is at rest.
-const AT_REST: f64 = 1e-12;
-
 impl Outcome {
     pub(super) fn is_dynamic(&self) -> bool {
-        self.history.iter().any(|r| r.time > 0.0)
-    }
-
-    /// Energy that damping has taken, J: in quasi-static runs all that is neither stored nor released.
-    fn damped(&self, record: &Record) -> f64 {
-        if self.is_dynamic() {
-            record.damped
-        } else {
-            record.work - record.stored - record.released - record.rubbed
-        }
+        is_dynamic(&self.history)
     }
 
     /// The steps as columns.
@@ -67,7 +52,7 @@ impl Outcome {
             ("work".to_owned(), "J".to_owned(), each(&|r| r.work)),
             ("stored".to_owned(), "J".to_owned(), each(&|r| r.stored)),
             ("released".to_owned(), "J".to_owned(), each(&|r| r.released)),
-            ("damped".to_owned(), "J".to_owned(), each(&|r| self.damped(r))),
+            ("damped".to_owned(), "J".to_owned(), each(&|r| damped(r, self.is_dynamic()))),
         ]);
         if self.history.iter().any(|r| r.rubbed != 0.0) {
             columns.push(("friction_work".to_owned(), "J".to_owned(), each(&|r| r.rubbed)));
@@ -102,116 +87,6 @@ impl Outcome {
         columns
     }
 
-    /// Peak, first break, energies at the end.
-    pub fn values_of_history(&mut self, scene: &Scene) {
-        let Some(last) = self.history.last().cloned() else { return };
-        let peak = self.history.iter().max_by(|a, b| a.load.total_cmp(&b.load)).cloned();
-        if let Some(peak) = peak.filter(|_| self.history.len() > 1) {
-            self.value(q::PEAK_LOAD, peak.load);
-            self.value(q::DISPLACEMENT_AT_PEAK, peak.displacement);
-        }
-        for at in &scene.output.load_at {
-            if let Some(load) = self.load_at(at.si()) {
-                self.value(q::load_at(at.si()), load);
-            }
-        }
-        if scene.material.critical.is_some() {
-            if let Some(first) = self.history.iter().position(|r| r.broken > 0) {
-                self.value(q::FIRST_BREAK, self.history[first].displacement);
-                // that at the end of the step may be past the collapse
-                let before = first.checked_sub(1).map_or(0.0, |s| self.history[s].load);
-                self.value(q::LOAD_AT_FIRST_BREAK, before);
-                if let Some(event) = self.events.first().filter(|_| !self.is_dynamic()) {
-                    self.value(q::LOAD_OF_FIRST_EVENT, event.load);
-                }
-            }
-            self.value(q::BROKEN_BONDS, last.broken as f64);
-            if !self.is_dynamic() {
-                self.value(q::BREAKING_EVENTS, self.events.len() as f64);
-            }
-            self.value(q::DETACHED_PARTICLES, last.detached as f64);
-            self.value(q::LAST_LOAD, last.load);
-            self.value(q::LAST_DISPLACEMENT, last.displacement);
-        }
-        self.value(q::WORK_OF_LOADS, last.work);
-        self.value(q::STORED_ENERGY, last.stored);
-        if scene.material.critical.is_some() {
-            self.value(q::RELEASED_ENERGY, last.released);
-        }
-        self.value(q::DAMPED_ENERGY, self.damped(&last));
-        if self.is_dynamic() {
-            // largest difference of what came in and what is there, over what was turned over
-            let off = |r: &Record| (r.work - r.stored - r.released - r.damped - r.rubbed - r.kinetic).abs();
-            let most =
-                self.history.iter().map(|r| r.work.abs().max(r.kinetic)).fold(f64::MIN_POSITIVE, f64::max);
-            let error = self.history.iter().map(off).fold(0.0, f64::max) / most;
-            self.value(q::ENERGY_ERROR, error);
-        }
-        if !self.is_dynamic() {
-            let most =
-                |get: fn(&Balance) -> f64| self.history.iter().map(|r| get(&r.balance)).fold(0.0, f64::max);
-            let size = most(|b| b.size).max(f64::MIN_POSITIVE);
-            let (force, external) = (most(|b| b.force) / size, most(|b| b.external) / size);
-            let moment = most(|b| b.moment / b.arm.max(f64::MIN_POSITIVE)) / size;
-            for (quantity, value) in q::BALANCES.into_iter().zip([force, moment, external]) {
-                self.value(quantity, value);
-            }
-        }
-        let residual = self.history.iter().map(|r| r.residual).fold(0.0, f64::max);
-        self.value(q::LARGEST_RESIDUAL, residual);
-    }
-
-    /// Contact and friction at the end, the planes that the body rests on, and warnings where contact is soft or never begins.
-    pub fn values_of_contact<const D: usize>(&mut self, scene: &Scene) {
-        let Some(last) = self.history.last().cloned() else { return };
-        let Some(contact) = &scene.contact else { return };
-        let explicit = self.is_dynamic();
-        let of_plane_or_pairs = contact.plane.first().map(|plane| contact.stiffness_of(plane, explicit));
-        let stiffness = of_plane_or_pairs.or(contact.short_range).unwrap_or(contact.pair_stiffness());
-        self.value(q::CONTACT_STIFFNESS, stiffness);
-        if let Some(touching) = last.contact {
-            self.value(q::CONTACT_ENERGY, touching.energy);
-            self.value(q::CONTACTS, touching.pairs as f64);
-            let deepest = self.history.iter().filter_map(|r| Some(r.contact?.overlap)).fold(0.0, f64::max);
-            self.value(q::DEEPEST_OVERLAP, deepest);
-            let at_rest = last.stored <= AT_REST * last.work.abs();
-            let share = if at_rest || last.stored <= 0.0 { 0.0 } else { touching.energy / last.stored };
-            self.value(q::CONTACT_SHARE, share);
-            if share > SOFT && !explicit && contact.short_range.is_none() {
-                self.warnings.push(format!(
-                    "contact holds {:.1} % of the stored energy, and the load is about as much too low: raise `stiffness` from {stiffness} to {:.0}",
-                    100.0 * share,
-                    stiffness * share / WANTED
-                ));
-            }
-            if deepest > 0.5 && contact.short_range.is_none() {
-                self.warnings.push(format!(
-                    "a contact overlaps by {deepest:.2} of half a spacing: raise `contact.stiffness`, or take a finer spacing"
-                ));
-            }
-        }
-        for (plane, name) in contact.plane.iter().zip(self.planes.clone()).filter(|(plane, _)| !plane.bonded)
-        {
-            let index = self.planes.iter().position(|other| *other == name).unwrap_or(0);
-            let gaps =
-                self.history.iter().filter_map(|row| row.resting.get(index)).map(|resting| resting.gap);
-            let least = gaps.fold(f64::INFINITY, f64::min);
-            let wanted = plane.displacement.is_some() || plane.friction.is_some_and(|mu| mu > 0.0);
-            if least > 0.0 && wanted {
-                self.warnings
-                    .push(format!("nothing has touched plane `{name}`: the least gap was {least:.3e} m"));
-            }
-        }
-        if scene.contact.as_ref().is_some_and(ContactSpec::rubs) {
-            self.value(q::FRICTION_WORK, last.rubbed);
-        }
-        for (name, resting) in self.planes.clone().iter().zip(&last.resting) {
-            let values =
-                resting.force[..D].iter().copied().chain([resting.area, resting.spread, resting.width]);
-            of_plane(name, D).into_iter().zip(values).for_each(|(named, value)| self.value(named, value));
-        }
-    }
-
     /// By how much of it the load rises to its peak, or falls from it, in one step.
     pub(super) fn step_at_peak(&self) -> Option<f64> {
         let loads: Vec<f64> = std::iter::once(0.0).chain(self.history.iter().map(|r| r.load)).collect();
@@ -223,20 +98,6 @@ impl Outcome {
     fn envelope(&self) -> [Vec<f64>; 2] {
         let rows = self.history.iter().map(|r| [r.displacement, r.load]);
         envelope(&std::iter::once([0.0; 2]).chain(rows).collect::<Vec<_>>())
-    }
-
-    /// Load at a displacement between two steps, linearly; from the undeformed body on.
-    fn load_at(&self, displacement: f64) -> Option<f64> {
-        let mut before = (0.0, 0.0);
-        for record in &self.history {
-            let here = (record.displacement, record.load);
-            if here.0 >= displacement * (1.0 - 1e-12) {
-                let part = (displacement - before.0) / (here.0 - before.0);
-                return Some(before.1 + part.min(1.0) * (here.1 - before.1));
-            }
-            before = here;
-        }
-        None
     }
 }
 

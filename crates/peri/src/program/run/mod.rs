@@ -2,47 +2,30 @@
 
 mod compare;
 mod draw;
-mod envelope;
-mod frames;
 mod history;
-mod lines;
-mod material;
 mod outcome;
-mod probes;
 mod program;
-mod scale;
-mod sections;
-mod solid;
-mod stages;
-mod toughness;
 mod variants;
 
 pub use outcome::{Outcome, Profile};
 pub use program::Peri;
 
-use frames::Frames;
-use material::Observed;
-pub(crate) use material::{Acting, Bonded};
-use probes::Probes;
-use sections::Sections;
-use toughness::NewCrack;
 use variants::UnderWay;
 
-use crate::bonds::{Bonds, Property, covered_stretches, fragments};
+use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
 use crate::error::Error;
-use crate::material::relief;
-use crate::potential::KernelFit;
+use crate::program::observe::{self, Frames, Moment, Observers, Physics, in_space};
 use crate::program::quantities as q;
-use crate::program::scene::{self, NAMING, Scene, Variant, body_of, loads_of};
-use crate::solver::{
-    Bilinear, Breaking, Criterion, Loads, Method, Record, State, Status, System, load_stepping,
-};
+use crate::program::scene::{self, NAMING, Scene, Variant};
+use crate::solver::{Breaking, Method, Record, State, Status, System, load_stepping};
 use harness::case::{Fault, Run, Step, StepField};
+use harness::observe::{Outputs, Scalars};
 use harness::report::{Phases, Report};
 use harness::scene::Source;
 use harness::study;
 use polycore::memory::available;
+use std::cell::RefCell;
 use std::path::Path;
 
 /// What stops a run: a fault in the scene, or one on the way.
@@ -50,8 +33,6 @@ pub type Failure = harness::scene::Failure<Error>;
 
 /// Particles of a body from which on its own loops keep all threads busy: such variants are solved one after another.
 const LARGE: usize = 100_000;
-/// Error of forces in mixed precision beyond which a run warns.
-const MIXED: f64 = 1e-2;
 
 /// A finished run.
 pub struct Finished {
@@ -89,12 +70,12 @@ pub fn run(source: &Source, scene: &Scene, run: &mut Run) -> Result<Finished, Fa
 
 fn run_in<const D: usize>(source: &Source, scene: &Scene, run: &mut Run) -> Result<Finished, Failure> {
     let (output, quick) = (run.options.output, run.options.quick);
-    let variants = scene::check(source, scene, quick)?;
+    let variants = observe::check(source, scene, quick)?;
     // every body is built once before anything is computed or written: faults show at once
     let (mut largest, mut memory) = (0, f64::MIN_POSITIVE);
     for variant in variants.iter().filter(|variant| variant.of.expect_error.is_none()) {
         let (source, scene) = variant.resolved();
-        let bonds = Built::<D>::new(source, scene, variant)?.bonded.body.bonds;
+        let bonds = Physics::<D>::new(source, scene, variant)?.0.bonds;
         largest = largest.max(bonds.particles().len());
         memory = memory.max(scene::memory_needed(scene, &*bonds));
     }
@@ -171,216 +152,107 @@ fn run_variant<const D: usize>(
     under_way: &UnderWay,
     state: Option<State<D>>,
 ) -> Result<(Outcome, Option<Error>), Failure> {
-    let mut phases = Phases::new();
-    phases.start("build");
-    let Built { bonded, loads, loaded, held, probes, sections } = Built::<D>::new(source, scene, variant)?;
-    let Bonded { mut body, material, criterion, toughness, followed, stiffness } = bonded;
-    let plate = scene::exact_plate(source, scene, &body)?;
-    phases.stop();
-    let mut warnings = scene::warnings(source, scene, &body);
-    warnings.extend(scene::tearing_warnings(scene, &body, toughness.as_ref()));
-    let crack = criterion.as_ref().map(|_| NewCrack::new(scene, &*body.bonds, toughness.as_ref()));
-    let sites = body.bonds.sites();
-    let fresh = state.is_none();
-    let mut state = state.unwrap_or_else(|| State::new(sites));
-    if fresh && scene.dynamics.is_some() {
-        state.velocity = scene::velocities_of(source, scene, &body)?;
-    }
-    if state.displacement.sites() != sites {
-        let why = format!("it has {} particles' sites, the body now has {sites}", state.displacement.sites());
-        let path = output.join(harness::checkpoint::FILE_NAME);
-        return Err(polycore::Error::Checkpoint { path, why }.into());
-    }
+    let phases = RefCell::new(Phases::new());
+    phases.borrow_mut().start("build");
+    let (mut body, mut physics) = Physics::<D>::new(source, scene, variant)?;
+    physics.begin(source, scene, variant, &body)?;
+    phases.borrow_mut().stop();
     let mut outcome = Outcome::new(variant.name(), variant);
-    outcome.warnings = warnings;
+    physics.name = outcome.file_name();
+    outcome.warnings = scene::warnings(source, scene, &body);
+    outcome.warnings.extend(scene::tearing_warnings(scene, &body, physics.body.toughness.as_ref()));
     outcome.snaps_back = scene.solver.snap_back;
-    for scene::Followed { parameter, field: [mean, least, largest], mesh_mean, unit, .. } in &followed {
-        for (quantity, value) in q::OF_A_FIELD.iter().zip([mean, mesh_mean, least, largest]) {
-            outcome.value(quantity.of(&[parameter.value_name()]).in_unit(unit), *value);
-        }
-    }
-    let path = output.join(format!("{}.vtkhdf", outcome.file_name()));
-    // where forces act, and where the surface correction has already made up for missing bonds
-    let corrected = variant.surface == scene::SurfaceCorrection::Energy;
-    let by_window = loaded.iter().map(|&loaded| loaded || corrected).collect();
-    let observed = Observed::new(scene, &material, &*body.bonds);
-    let mut frames = Frames::new(scene, &observed, (&*body.bonds, &body.cuts), &state, path, by_window)?;
-    let solution = Solution {
-        material: &material,
-        observed: &observed,
-        loads: &loads,
-        probes: &probes,
-        sections: &sections,
-        criterion: criterion.as_ref(),
-        stiffness: &stiffness,
-        held: held.as_deref(),
-    };
-    let solved =
-        solve((source, scene), &solution, under_way, &mut body, &mut state, &mut phases, &mut frames);
-    let ended = match solved {
+    let mut state = begin((source, scene), &body, state, output)?;
+    let mut observers = observe::observers::<D>(scene);
+    let mut frames = Frames::new(scene, &state, &output.join(physics.field_file()))?;
+    let ended = match solve(
+        (source, scene),
+        &physics,
+        under_way,
+        &mut body,
+        &mut state,
+        &phases,
+        (&mut observers, &mut frames),
+    ) {
         Err(Failure::Run(error @ Error::NoEquilibrium { .. })) if !state.history.is_empty() => Some(error),
         other => other.map(|()| None)?,
     };
     if let Some(error) = &ended {
         // the last equilibrium has bonds that are broken by now
-        body = Built::<D>::new(source, scene, variant)?.bonded.body;
+        body = Physics::<D>::new(source, scene, variant)?.0;
         state.fracture.restore(&mut *body.bonds)?;
         outcome.error = Some(error.to_string());
     }
-    outcome.work_of(&*body.bonds, &state);
-    if let Acting::Bonds(bonded) = &material {
-        let stretches = covered_stretches(&*body.bonds, &state.displacement);
-        outcome.value(q::FIT_ERROR, KernelFit::new(bonded.law(), stretches, scene.fit_bound())?.max_error);
-    }
-    if let Some(criterion) = &criterion {
-        match criterion {
-            Criterion::Stretch(stretch) => outcome.value(q::CRITICAL_STRETCH, stretch.least()),
-            Criterion::Energy(limit) | Criterion::Softening(Bilinear { limit, .. }) => {
-                outcome.value(q::CRITICAL_ENERGY, *limit);
-            }
-        }
-        outcome.fragments = fragments(&*body.bonds);
-        outcome.value(q::FRAGMENTS, outcome.fragments.len() as f64);
-        let volume: f64 = body.bonds.particles().iter().map(|&site| body.bonds.volume(site as usize)).sum();
-        outcome.value(
-            q::LARGEST_FRAGMENT,
-            outcome.fragments.first().map_or(0.0, |largest| largest.volume / volume),
-        );
-    }
     if scene.dynamics.is_some() {
-        // a body that is held everywhere has none
-        if state.motion.limits.critical_step.is_finite() {
-            outcome.value(q::CRITICAL_TIME_STEP, state.motion.limits.critical_step);
-        }
-        outcome.value(q::TIME_STEP, state.motion.steps.time_step);
-        outcome.value(q::KINETIC_ENERGY, state.motion.energies.kinetic);
         body.bonds.prepare(&state.displacement);
-        let lattice = body.bonds.as_lattice();
-        if let Some(error) = lattice.and_then(|lattice| lattice.mixed_error(&state.displacement)) {
-            outcome.value(q::MIXED_ERROR, error);
-            if error > MIXED {
-                outcome.warnings.push(format!(
-                    "forces in mixed precision are wrong by {error:.1e} of their mean: take double precision"
-                ));
-            }
-        }
     }
-    let stresses = frames.stresses(&*body.bonds, &state, &mut phases)?;
+    let moment = Moment::new((scene, &physics), &*body.bonds, &state, &phases);
+    moment.stresses()?;
+    phases.borrow_mut().start("compare");
+    observers.iter_mut().try_for_each(|observer| observer.end(&moment))?;
+    for observer in &observers {
+        let mut take = |named, value| outcome.value(named, value);
+        observer.scalars(&mut Scalars::new(Some(&moment), &mut take));
+        outcome.warnings.extend(observer.warnings(&moment));
+        outcome.profiles.extend(observer.curves(&moment).into_iter().filter_map(Profile::of));
+    }
+    phases.borrow_mut().stop();
+    outcome.work_of(&*body.bonds, &state);
     outcome.history.clone_from(&state.history);
     outcome.events.clone_from(&state.fracture.events);
+    outcome.fragments = moment.fragments().to_vec();
     outcome.regions = scene::region_names(scene);
     let planes = scene.contact.iter().flat_map(|contact| contact.plane.iter().enumerate());
     outcome.planes = planes.map(|(index, plane)| plane.name(index)).collect();
-    phases.time("compare", || {
-        outcome.responses(&*body.bonds, &loads, &state);
-        outcome.values_of_history(scene);
-        if let Some(crack) = &crack {
-            crack.values(&*body.bonds, &mut outcome);
-        }
-        outcome.values_of_contact::<D>(scene);
-        outcome.values_of_probes(scene);
-        if let Some(exact) = &scene.exact {
-            compare::hole(&*body.bonds, exact, plate.as_ref(), &stresses.cauchy, &loaded, &mut outcome);
-        }
-    });
-    sections::write::<D>(scene, &mut outcome, output)?;
-    if !scene.output.line.is_empty() {
-        let damage = frames.damage(&*body.bonds);
-        lines::write(scene, &*body.bonds, &state, &stresses, damage.as_deref(), &outcome, output)?;
-    }
-    outcome.seconds(&phases);
-    let path = frames.path().to_path_buf();
-    let staged =
-        scene.output.fields && scene.output.every.is_some() && scene.stress.is_some() && criterion.is_some();
-    let seen_at_end = D == 3 && scene.output.pictures && !staged;
-    let flagged = scene.output.pictures && scene.output.flags;
-    let flagged = if flagged { observed.flags(&*body.bonds, &state) } else { None };
-    let flagged: Option<Vec<f64>> =
-        flagged.map(|flags| flags.iter().map(|flags| f64::from(u8::from(flags.any()))).collect());
-    let damage = if seen_at_end && flagged.is_none() { frames.damage(&*body.bonds) } else { None };
-    let cracks = frames.damage_of_cracks();
-    frames.finish(&*body.bonds, &state, &stresses)?;
-    if scene.output.pictures {
-        draw::maps(scene, &*body.bonds, &state, &stresses.cauchy, &outcome, output)?;
-        if let Some(values) = flagged.as_ref().filter(|_| D == 2) {
-            draw::flagged(&*body.bonds, &state, values, &outcome, output)?;
-        }
-        if staged {
-            stages::stages(scene, &outcome, (body.bonds.spacing(), cracks), &path, output)?;
-        } else if seen_at_end {
-            let damage = damage.map(|damage| (solid::damage_field(), damage));
-            let second = flagged.map(|flagged| (solid::flagged_field(), flagged)).or(damage);
-            solid::end(scene, &*body.bonds, &state, &stresses, second, &outcome, output)?;
-        }
-    }
+    outcome.probes = observe::columns(scene);
+    outcome.seconds(&phases.borrow());
+    frames.finish(&observers, &moment)?;
+    let outputs = Outputs { folder: output, pictures: scene.output.pictures };
+    observers.iter().try_for_each(|observer| observer.write(&moment, &outputs))?;
     Ok((outcome, ended))
 }
 
-/// All that a variant is before it is solved.
-struct Built<const D: usize> {
-    bonded: Bonded<D>,
-    loads: Loads<D>,
-    /// Sites in any loading layer.
-    loaded: Vec<bool>,
-    /// Particles of grips that are tied at their surface, by site.
-    held: Option<Vec<bool>>,
-    probes: Probes<D>,
-    sections: Sections<D>,
-}
-
-impl<const D: usize> Built<D> {
-    fn new(source: &Source, scene: &Scene, variant: &Variant) -> Result<Self, Failure> {
-        let mut body = body_of::<D>(source, scene, variant)?;
-        // before the loads: tractions act on the areas that it leaves
-        if scene.material.solid.is_some()
-            && let Some(theta) = relief(&*body.bonds)
-        {
-            body.bonds.set_relief(theta);
+/// The state from which a variant is solved: the undeformed body, unless the checkpoint has one.
+fn begin<const D: usize>(
+    (source, scene): (&Source, &Scene),
+    body: &scene::Body<D>,
+    state: Option<State<D>>,
+    output: &Path,
+) -> Result<State<D>, Failure> {
+    let sites = body.bonds.sites();
+    let Some(state) = state else {
+        let mut state = State::new(sites);
+        if scene.dynamics.is_some() {
+            state.velocity = scene::velocities_of(source, scene, body)?;
         }
-        let (loads, loaded) = loads_of(source, scene, &body)?;
-        scene::check_placement(source, scene, &body, &loads)?;
-        let held = scene::tied_grips(source, scene, &*body.bonds, &loads)?;
-        if let Some(held) = &held {
-            let list = crate::contact::across(&*body.bonds, held);
-            body.bonds.sever(&list);
-        }
-        let probes = Probes::new(source, scene, &body)?;
-        let sections = Sections::new(source, &scene.output.section, &body)?;
-        lines::check(source, &scene.output.line, &*body.bonds)?;
-        let bonded = Bonded::new(source, scene, variant, body)?;
-        Ok(Self { bonded, loads, loaded, held, probes, sections })
+        return Ok(state);
+    };
+    if state.displacement.sites() != sites {
+        let why = format!("it has {} particles' sites, the body now has {sites}", state.displacement.sites());
+        let path = output.join(harness::checkpoint::FILE_NAME);
+        return Err(polycore::Error::Checkpoint { path, why }.into());
     }
-}
-
-/// What is solved and does not change.
-struct Solution<'a, const D: usize> {
-    material: &'a Acting<D>,
-    observed: &'a Observed<'a, D>,
-    loads: &'a Loads<D>,
-    probes: &'a Probes<D>,
-    sections: &'a Sections<D>,
-    criterion: Option<&'a Criterion>,
-    stiffness: &'a Property,
-    held: Option<&'a [bool]>,
+    Ok(state)
 }
 
 fn solve<const D: usize>(
     (source, scene): (&Source, &Scene),
-    solution: &Solution<D>,
+    physics: &Physics<D>,
     under_way: &UnderWay,
     body: &mut scene::Body<D>,
     state: &mut State<D>,
-    phases: &mut Phases,
-    frames: &mut Frames<D>,
+    phases: &RefCell<Phases>,
+    (observers, frames): (&mut Observers<D>, &mut Frames),
 ) -> Result<(), Failure> {
-    let Solution { material, observed, loads, probes, sections, criterion, stiffness, held } = *solution;
+    let (material, loads) = (&physics.body.material, &physics.loads);
     let factors = scene.solver.factors();
     let mut watch = |status: &Status, state: &State<D>| under_way.watch(status, state);
     let contact = match &scene.contact {
         Some(contact) => {
             let planes = contact.planes(source, scene.dynamics.is_some()).map_err(Failure::from)?;
             let whole = material.longitudinal_modulus(&*body.bonds);
-            let modulus = Property::new(&*body.bonds, |site, _| whole * stiffness.at(site));
+            let modulus = Property::new(&*body.bonds, |site, _| whole * physics.body.stiffness.at(site));
+            let held = physics.held.as_deref();
             let tied = held.map(|held| (held, contact.tie_stiffness(scene.dynamics.is_some())));
             Some(contact.contact(planes, body, material.micromodulus(&*body.bonds), &modulus, tied)?)
         }
@@ -388,38 +260,34 @@ fn solve<const D: usize>(
     };
     let course = scene.dynamics.as_ref().and_then(|dynamics| dynamics.factor.as_ref());
     let course = course.map(|formula| |time: f64| formula.in_time(time));
-    let observer = |bonds: &dyn Bonds<D>, state: &State<D>| {
-        let mut seen = probes.see(bonds, state, observed);
-        seen.extend(observed.flagged(bonds, state).into_iter().flatten());
-        seen.extend(sections.see(bonds, state, observed));
-        seen
-    };
-    let sees = !scene.probe.is_empty() || !scene.output.section.is_empty() || scene.is_learnt();
+    let row = |bonds: &dyn Bonds<D>, state: &State<D>| physics.row(bonds, state);
     let response = material.respond(&*body.bonds);
     let mut system = System::of_response(&mut *body.bonds, response, loads, &factors);
     system.course = course.as_ref().map(|course| course as _);
-    system.observer = sees.then_some(&observer as _);
+    system.observer = Some(&row);
     system.fit_bound = scene.fit_bound();
-    system.breaking =
-        criterion.map(|criterion| Breaking { criterion: criterion.clone(), policy: scene.solver.breaking });
+    let criterion = physics.body.criterion.clone();
+    system.breaking = criterion.map(|criterion| Breaking { criterion, policy: scene.solver.breaking });
     system.contact = contact;
     (system.refine, system.snap_back) = (scene.solver.refine, scene.solver.snap_back);
     system.stop_below = scene.solver.stop_below.unwrap_or(0.0);
-    phases.start("solve");
+    phases.borrow_mut().start("solve");
     let mut finished = |bonds: &dyn Bonds<D>, state: &State<D>| {
-        phases.stop();
-        frames.step(bonds, state, phases)?;
+        phases.borrow_mut().stop();
+        let moment = Moment::new((scene, physics), bonds, state, phases);
+        observers.iter_mut().try_for_each(|observer| observer.see(&moment))?;
+        frames.step(observers, &moment)?;
         if state.control.round == 0 {
             under_way.step(|| seen(bonds, state));
         }
-        phases.start("solve");
+        phases.borrow_mut().start("solve");
         Ok(())
     };
     let solved = match &scene.dynamics {
         Some(dynamics) => dynamics.method().solve(&mut system, state, &mut watch, &mut finished),
         None => load_stepping(&mut *scene.equilibria(), &mut system, state, &mut watch, &mut finished),
     };
-    phases.stop();
+    phases.borrow_mut().stop();
     Ok(solved?)
 }
 
@@ -427,7 +295,7 @@ fn solve<const D: usize>(
 fn seen<const D: usize>(bonds: &dyn Bonds<D>, state: &State<D>) -> Step {
     let Some(record) = state.history.last() else { return Step::default() };
     let of_particles = |name, get: &dyn Fn(usize) -> [f64; D]| {
-        let each = bonds.particles().iter().flat_map(|&site| frames::in_space(get(site as usize)));
+        let each = bonds.particles().iter().flat_map(|&site| in_space(get(site as usize)));
         StepField { name, unit: "m", components: 3, data: each.collect() }
     };
     Step {
@@ -471,7 +339,7 @@ fn explanation_in<const D: usize>(
     quick: bool,
 ) -> Result<Vec<String>, Failure> {
     let mut lines = Vec::new();
-    let variants = scene::check(source, scene, quick)?;
+    let variants = observe::check(source, scene, quick)?;
     let lengths = scene::free_lengths::<D>(&variants)?;
     for variant in variants {
         if let Some(error) = &variant.of.expect_error {
@@ -479,11 +347,11 @@ fn explanation_in<const D: usize>(
             continue;
         }
         let (source, scene) = variant.resolved();
-        let built = Built::<D>::new(source, scene, &variant)?;
-        let Bonded { body, criterion, toughness, followed, .. } = &built.bonded;
-        lines.extend(scene::explain(source, scene, &variant, body, criterion.as_ref())?);
-        lines.extend(scene::explain_tearing(scene, body, toughness.as_ref()));
-        lines.extend(followed.iter().map(|one| format!("  follows    {one}")));
+        let (body, physics) = Physics::<D>::new(source, scene, &variant)?;
+        let (criterion, reports) = (physics.body.criterion.as_ref(), observe::quantities(scene));
+        lines.extend(scene::explain(source, scene, &variant, &body, criterion, &reports)?);
+        lines.extend(scene::explain_tearing(scene, &body, physics.body.toughness.as_ref()));
+        lines.extend(physics.body.followed.iter().map(|one| format!("  follows    {one}")));
     }
     lines.extend(lengths.into_iter().map(|text| format!("  warning    {text}")));
     Ok(lines)

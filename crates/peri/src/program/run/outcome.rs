@@ -1,9 +1,9 @@
 //! Results of one variant.
 
 use crate::bonds::{Bonds, Fragment};
-use crate::program::quantities as q;
 use crate::program::scene::Variant;
-use crate::solver::{Event, Loads, Record, State};
+use crate::solver::{Event, Record, State};
+use harness::observe::Curve;
 use harness::report::{Named, Phases};
 use harness::study::Solved;
 use serde::{Deserialize, Serialize};
@@ -58,6 +58,14 @@ pub struct Profile {
     pub at: Vec<f64>,
     /// How much.
     pub value: Vec<f64>,
+}
+
+impl Profile {
+    /// Of a curve of two columns.
+    pub fn of(curve: Curve) -> Option<Self> {
+        let mut columns = curve.columns.into_iter().map(|(_, _, values)| values);
+        Some(Self { name: curve.name, at: columns.next()?, value: columns.next()? })
+    }
 }
 
 impl Outcome {
@@ -124,31 +132,6 @@ impl Outcome {
         if state.motion.limits.bounds > 0 {
             self.work.push(("frequency_bounds".to_owned(), state.motion.limits.bounds));
             self.work.push(("frequency_searches".to_owned(), state.motion.limits.searches));
-        }
-        let rows = || state.history.iter();
-        self.value(q::SMALLEST_STRETCH, rows().map(|row| row.smallest_stretch).fold(1.0, f64::min));
-        self.value(q::LARGEST_STRETCH, rows().map(|row| row.largest_stretch).fold(1.0, f64::max));
-        self.value(q::SMALLEST_STRETCH_MET, (1.0 + state.stretches.observed.low).max(0.0).sqrt());
-        self.value(q::LARGEST_STRETCH_MET, (1.0 + state.stretches.observed.high).sqrt());
-    }
-
-    /// Largest displacement, force of the held regions, applied force.
-    pub fn responses<const D: usize>(&mut self, bonds: &dyn Bonds<D>, loads: &Loads<D>, state: &State<D>) {
-        let mut largest = 0.0_f64;
-        for &site in bonds.particles() {
-            let displacement = state.displacement.get(site as usize);
-            largest = largest.max(displacement.iter().map(|x| x * x).sum::<f64>().sqrt());
-        }
-        let (reaction, applied) = (loads.reaction(bonds, &state.force), loads.applied(bonds));
-        self.value(q::LARGEST_DISPLACEMENT, largest);
-        for d in 0..D {
-            let axis = ["x", "y", "z"][d];
-            if !loads.constrained.is_empty() {
-                self.value(q::REACTION.of(&[axis]), reaction[d]);
-            }
-            if loads.body_force.is_some() {
-                self.value(q::APPLIED.of(&[axis]), applied[d]);
-            }
         }
     }
 

@@ -24,7 +24,6 @@ pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>
             check_variant(source, scene)?;
         }
     }
-    super::expect::check(source, scene)?;
     let all = super::variant::variants(source, scene, false)?;
     let names: Vec<&str> = all.iter().map(|variant| variant.of.name.as_str()).collect();
     scene.comparisons().check(source, &names)?;

@@ -7,9 +7,7 @@ use crate::bonds::{Bonds, Property};
 use crate::calibrate::Space;
 use crate::contact::{Contact, Interface, PAIR_STIFFNESS, PLANE_STIFFNESS, Plane, grips};
 use crate::error::Error;
-use crate::program::quantities as q;
 use crate::solver::Loads;
-use harness::report::Named;
 use harness::scene::{SceneError, Source, check_name};
 use polycore::units::{Length, Speed};
 use serde::Deserialize;
@@ -222,19 +220,6 @@ pub fn tied_grips<const D: usize>(
     let held = grips(lattice, &loads.constrained);
     let free = bonds.particles().iter().any(|&site| !held[site as usize]);
     Ok((free && held.contains(&true)).then_some(held))
-}
-
-/// Values of all planes of a scene: forces along the axes, area, spread.
-pub(super) fn values(scene: &Scene) -> impl Iterator<Item = Named> {
-    let axes = if scene.body.space == Space::Solid { 3 } else { 2 };
-    let planes = scene.contact.iter().flat_map(|contact| contact.plane.iter().enumerate());
-    planes.flat_map(move |(index, plane)| of_plane(&plane.name(index), axes))
-}
-
-/// Values of a plane: forces along the axes, area, spread.
-pub fn of_plane(name: &str, axes: usize) -> Vec<Named> {
-    let forces = ["x", "y", "z"].into_iter().take(axes).map(|axis| q::PLANE_FORCE.of(&[name, axis]));
-    forces.chain([q::PLANE_AREA, q::PLANE_SPREAD, q::PLANE_WIDTH].map(|one| one.of(&[name]))).collect()
 }
 
 /// Checks what can be judged without a body.

@@ -16,6 +16,7 @@ pub fn explain<const D: usize>(
     variant: &Variant,
     body: &Body<D>,
     criterion: Option<&Criterion>,
+    reports: &[Named],
 ) -> Result<Vec<String>, SceneError> {
     let bonds = &*body.bonds;
     let particles = bonds.particles().len();
@@ -117,14 +118,14 @@ pub fn explain<const D: usize>(
     omits(scene.dynamics.is_some(), "inertia");
     omits(!scene.body.cracks.is_empty(), "pre-cut cracks");
     omits(scene.contact.is_some(), "contact (no [contact] in this scene)");
-    omits(scene.material.critical.is_some(), "damage and bond breaking (no `critical` in this scene)");
+    omits(criterion.is_some(), "damage and bond breaking (no `critical` in this scene)");
     omits(scene.output.every.is_some(), "fields of the steps before the last");
     let constrained = scene.boundary.iter().any(|b| b.holds());
     omits(constrained, "prescribed displacements");
     omits(scene.boundary.iter().any(|b| b.traction.is_some() || b.force.is_some()), "body forces");
     omits(scene.output.fields, "VTKHDF fields");
     omits(scene.output.pictures, "pictures");
-    lines.push(format!("  reports    {}", Named::list(&super::quantities(scene))));
+    lines.push(format!("  reports    {}", Named::list(reports)));
     lines.extend(super::warnings(source, scene, body).into_iter().map(|text| format!("  warning    {text}")));
     Ok(lines)
 }

@@ -4,8 +4,6 @@ use super::Scene;
 use super::values::vector;
 use crate::calibrate::Space;
 use crate::geometry::length;
-use crate::program::quantities as q;
-use harness::report::Named;
 use harness::scene::{LineSpec, SceneError, Source, check_name};
 use polycore::units::Length;
 use serde::Deserialize;
@@ -67,14 +65,6 @@ fn dimension(scene: &Scene) -> usize {
 }
 
 impl SectionSpec {
-    /// Forces along x, y(, z), then moments about z in a plane body, about x, y, z in a solid.
-    pub fn values(&self, dimension: usize) -> Vec<Named> {
-        let (axes, about) = (&["x", "y", "z"][..dimension], if dimension == 3 { 0 } else { 2 });
-        let forces = axes.iter().map(|axis| q::SECTION_FORCE.of(&[&self.name, axis]));
-        let moments = ["x", "y", "z"].into_iter().skip(about);
-        forces.chain(moments.map(|axis| q::SECTION_MOMENT.of(&[&self.name, axis]))).collect()
-    }
-
     /// Point, m, and unit normal.
     ///
     /// # Errors
@@ -112,12 +102,6 @@ pub(super) fn plane_of<const D: usize>(
     let normal = normal.map(|x| x / largest);
     let size = length(normal);
     Ok((point, normal.map(|x| x / size)))
-}
-
-/// Values of all sections of a scene.
-pub(super) fn values(scene: &Scene) -> impl Iterator<Item = Named> {
-    let dimension = dimension(scene);
-    scene.output.section.iter().flat_map(move |section| section.values(dimension))
 }
 
 /// Checks what can be judged without a body.

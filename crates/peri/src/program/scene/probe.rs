@@ -5,7 +5,6 @@ use super::loads::region;
 use super::values::{Body, vector};
 use super::{Axis, Boundary, Method, Scene, Side};
 use crate::calibrate::Space;
-use crate::program::quantities as q;
 use harness::report::{Named, Quantity};
 use harness::scene::{SceneError, Source};
 use polycore::units::Length;
@@ -85,19 +84,6 @@ impl Axis {
 }
 
 impl Probe {
-    /// Names of its values.
-    pub fn values(&self) -> Vec<Named> {
-        let front = [q::PROBE_SPEED, q::PROBE_BETWEEN_GAUGES, q::PROBE_BACKSTEP];
-        let more = match self.track {
-            Track::Displacement | Track::Strain | Track::JIntegral => Vec::new(),
-            Track::Rotation => vec![q::PROBE_FREQUENCY, q::PROBE_RATE],
-            Track::Crack => [&front[..], &[q::PROBE_ACROSS]].concat(),
-            Track::Front => front.to_vec(),
-        };
-        let all = [q::PROBE, q::PROBE_PEAK].into_iter().chain(more);
-        all.map(|quantity| self.named(quantity)).collect()
-    }
-
     /// A quantity of this probe, in its unit where it has none of its own.
     pub fn named(&self, quantity: Quantity) -> Named {
         let named = quantity.of(&[&self.name]);
@@ -164,35 +150,17 @@ impl Probe {
         Ok(marks)
     }
 
-    /// The particles between the radii of a J-integral, each with its area times ∇q, m: q falls linearly from 1 at the inner radius
-    /// to 0 at the outer.
+    /// Tip and radii of a J-integral, m.
     ///
     /// # Errors
-    /// A ring without particles.
+    /// A tip of another dimension.
     pub fn ring<const D: usize>(
         &self,
         source: &Source,
         key: &str,
-        body: &Body<D>,
-    ) -> Result<(Vec<u32>, Vec<[f64; 2]>), SceneError> {
+    ) -> Result<([f64; D], [f64; 2]), SceneError> {
         let tip = vector::<D>(source, &format!("{key}.tip"), self.tip.as_deref().unwrap_or_default())?;
-        let [inner, outer] = self.radii.map_or([0.0; 2], |radii| radii.map(|r| r.si()));
-        let (mut sites, mut weights) = (Vec::new(), Vec::new());
-        for &site in body.bonds.particles() {
-            let place = body.bonds.position(site as usize);
-            let arm = [place[0] - tip[0], place[1] - tip[1]];
-            let radius = arm[0].hypot(arm[1]);
-            if radius > inner && radius < outer {
-                let area = body.bonds.volume(site as usize) / body.thickness;
-                sites.push(site);
-                weights.push(arm.map(|x| -area * x / (radius * (outer - inner))));
-            }
-        }
-        if sites.is_empty() {
-            let found = format!("{inner} m to {outer} m about {tip:?} m, where no particle is");
-            return Err(source.error(&format!("{key}.radii"), found, "a ring with particles"));
-        }
-        Ok((sites, weights))
+        Ok((tip, self.radii.map_or([0.0; 2], |radii| radii.map(|r| r.si()))))
     }
 }
 
@@ -202,21 +170,12 @@ impl Probe {
 /// The key, what was found and what is allowed.
 pub(super) fn check(source: &Source, scene: &Scene) -> Result<(), SceneError> {
     let dimension = if scene.body.space == Space::Solid { 3 } else { 2 };
-    let taken = super::quantities(&Scene { probe: Vec::new(), ..scene.clone() });
-    let mut names: Vec<String> = taken.into_iter().map(|quantity| quantity.name).collect();
     for (index, probe) in scene.probe.iter().enumerate() {
         let key = |name: &str| format!("probe[{index}].{name}");
         let letters = |c: char| c.is_ascii_alphanumeric() || "_-".contains(c);
         if probe.name.is_empty() || !probe.name.chars().all(letters) {
             let found = format!("`{}`", probe.name);
             return Err(source.error(&key("name"), found, "letters, digits, `_` and `-`"));
-        }
-        for Named { name: value, .. } in probe.values() {
-            if names.contains(&value) {
-                let found = format!("`{}`, of which `{value}` is taken", probe.name);
-                return Err(source.error(&key("name"), found, "a unique name"));
-            }
-            names.push(value);
         }
         let track = probe.track;
         // name, given, belongs, needed

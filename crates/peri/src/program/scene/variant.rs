@@ -95,7 +95,7 @@ fn name(source: &Source, study: Option<&str>) -> Result<String, SceneError> {
 }
 
 /// The scene's own discretisation, or every combination that its studies list.
-pub(super) fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+pub fn variants(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
     let studies: Vec<study::Study> = scene.study.iter().map(Study::study).collect();
     study::variants(source, &studies, quick, NAMING, name)?.into_iter().map(Variant::new).collect()
 }

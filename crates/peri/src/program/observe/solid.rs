@@ -1,13 +1,10 @@
 //! Pictures of solids as they look from outside.
 
-use super::frames::{Stresses, in_space, tensor_in_space};
-use super::outcome::Outcome;
-use super::scale::{self, bridge, stress_unit};
-
-use crate::bonds::Bonds;
+use super::frames::{in_space, tensor_in_space};
+use super::moment::Moment;
+use super::scale::{bridge, stress_unit, title};
 use crate::error::Error;
-use crate::program::scene::{Scene, StressSpec};
-use crate::solver::State;
+use crate::program::scene::StressSpec;
 use harness::output::picture::{ColorMap, Particles, Skin, Solids, Strip};
 use nalgebra::Matrix3;
 use std::borrow::Cow;
@@ -35,10 +32,8 @@ pub struct Field {
 }
 
 /// A variant in pictures.
-pub struct Picture<'a> {
-    pub scene: &'a Scene,
-    pub outcome: &'a Outcome,
-    pub spacing: f64,
+pub struct Picture<'a, const D: usize> {
+    pub moment: &'a Moment<'a, D>,
     /// Around all places.
     pub bounds: [[f64; 3]; 2],
 }
@@ -109,20 +104,16 @@ fn field(label: String, scale: f64, (low, high): (f64, f64)) -> Field {
 /// # Errors
 /// A file that cannot be written.
 pub fn end<const D: usize>(
-    scene: &Scene,
-    bonds: &dyn Bonds<D>,
-    state: &State<D>,
-    stresses: &Stresses<D>,
+    m: &Moment<D>,
     second: Option<(Field, Vec<f64>)>,
-    outcome: &Outcome,
     output: &Path,
 ) -> Result<(), Error> {
-    let sites = || bonds.particles().iter().map(|&site| site as usize);
-    let rest: Vec<[f64; 3]> = sites().map(|site| in_space(bonds.position(site))).collect();
-    let moved = || sites().map(|site| in_space(state.displacement.get(site)));
+    let stresses = m.stresses()?;
+    let rest: Vec<[f64; 3]> = m.sites().map(|site| in_space(m.bonds.position(site))).collect();
+    let moved = || m.sites().map(|site| in_space(m.state.displacement.get(site)));
     let places: Vec<[f64; 3]> =
         rest.iter().zip(moved()).map(|(x, u)| [0, 1, 2].map(|d| x[d] + u[d])).collect();
-    let (first, values) = match (&scene.stress, stresses.cauchy.first()) {
+    let (first, values) = match (&m.scene.stress, stresses.cauchy.first()) {
         (Some(spec), Some((_, tensors))) => {
             let values: Vec<f64> = tensors.iter().map(|t| shown(spec, false, &tensor_in_space(t))).collect();
             (stress_field(spec, values.clone()), values)
@@ -136,14 +127,14 @@ pub fn end<const D: usize>(
     let (second, others) = second.filter(|(_, values)| values.iter().any(|&value| value > 0.0)).unzip();
     let fields = std::iter::once(first).chain(second).collect();
     let mut bounds = NOWHERE;
-    let title = scale::title(outcome, outcome.history.len() as f64);
+    let title = title(&m.state.history, m.state.history.len() as f64);
     widen(&mut bounds, &places);
     let look = Look { title, places, rest, values: [values, others.unwrap_or_default()] };
-    let picture = Picture { scene, outcome, spacing: bonds.spacing(), bounds };
+    let picture = Picture { moment: m, bounds };
     picture.draw(output, fields, 1, |_| Ok(Cow::Borrowed(&look)))
 }
 
-impl Picture<'_> {
+impl<const D: usize> Picture<'_, D> {
     /// Writes the stages beside one another, and the last in a full turn where the scene wants one.
     ///
     /// # Errors
@@ -155,16 +146,17 @@ impl Picture<'_> {
         stages: usize,
         mut look: impl FnMut(usize) -> Result<Cow<'l, Look>, polycore::Error>,
     ) -> Result<(), Error> {
-        let spec = self.scene.output.solid.unwrap_or_default();
+        let (m, spacing) = (self.moment, self.moment.bonds.spacing());
+        let spec = m.scene.output.solid.unwrap_or_default();
         let mut last = None;
         let scales: Vec<f64> = fields.iter().map(|field| field.scale).collect();
         let mut bounds = self.bounds;
         for d in 0..3 {
-            bounds[0][d] -= 0.5 * self.spacing;
-            bounds[1][d] += 0.5 * self.spacing;
+            bounds[0][d] -= 0.5 * spacing;
+            bounds[1][d] += 0.5 * spacing;
         }
         let solids = Solids {
-            title: self.scene.title.clone(),
+            title: m.scene.title.clone(),
             bounds,
             unit: ("mm".into(), 1e-3),
             view: spec.view(),
@@ -175,15 +167,15 @@ impl Picture<'_> {
             let Look { title, places, rest, values } = &*look;
             let mut at_rest = NOWHERE;
             widen(&mut at_rest, rest);
-            let bridge = bridge(self.outcome);
-            let particles = Particles { reference: rest, positions: places, spacing: self.spacing, bridge };
+            let bridge = bridge(m);
+            let particles = Particles { reference: rest, positions: places, spacing, bridge };
             let value = |field: usize, k: usize| {
                 let scale = scales.get(field).copied().unwrap_or(1.0);
                 values[field].get(k).map_or(f64::NAN, |value| value * scale)
             };
             Ok((title.clone(), particles.skin(spec.plane(at_rest), |k| [value(0, k), value(1, k)])))
         };
-        let name = self.outcome.file_name();
+        let name = &m.physics.name;
         solids.write(output.join(format!("solid_{name}.png")), stages, |index| {
             let drawn = stage(index)?;
             last = spec.turntable.then(|| drawn.clone());

@@ -1,10 +1,9 @@
 //! Pictures of the stages of a run: the body as its fields show it.
 
-use super::outcome::Outcome;
-use super::scale::{self, bridge};
+use super::moment::Moment;
+use super::scale::{bridge, title};
 use super::solid::{self, Look, shown};
 use crate::error::Error;
-use crate::program::scene::Scene;
 use harness::output::picture::{FieldMap, Panel};
 use harness::output::vtkhdf;
 use std::borrow::Cow;
@@ -15,30 +14,25 @@ use std::path::Path;
 ///
 /// # Errors
 /// Files that cannot be read or written.
-pub fn stages(
-    scene: &Scene,
-    outcome: &Outcome,
-    (spacing, cracks): (f64, f64),
-    series: &Path,
-    output: &Path,
-) -> Result<(), Error> {
-    let frames = vtkhdf::read(series)?;
+pub fn stages<const D: usize>(m: &Moment<D>, output: &Path) -> Result<(), Error> {
+    let (cracks, spacing, history) = (m.damage_of_cracks(), m.bonds.spacing(), &m.state.history);
+    let frames = vtkhdf::read(&output.join(m.physics.field_file()))?;
     let damages: Vec<f64> = (0..frames.len())
         .map(|k| Ok(since(frames.data(k, "damage")?.iter().sum(), cracks)))
         .collect::<Result<_, Error>>()?;
     // the step of the peak load, which the damage does not determine
-    let peak = outcome.history.iter().enumerate().max_by(|a, b| a.1.load.total_cmp(&b.1.load));
+    let peak = history.iter().enumerate().max_by(|a, b| a.1.load.total_cmp(&b.1.load));
     let peak = peak.and_then(|(k, _)| frames.times().iter().position(|&time| time == (k + 1) as f64));
-    let chosen = choose(&damages, peak, scene.output.stages);
-    let Some(spec) = &scene.stress else { return Ok(()) };
+    let chosen = choose(&damages, peak, m.scene.output.stages);
+    let Some(spec) = &m.scene.stress else { return Ok(()) };
     let measure = format!("cauchy_{}", spec.measures[0].name());
-    let flat = scene.body.space != crate::calibrate::Space::Solid;
+    let flat = D == 2;
     let look = |frame: usize| -> Result<Look, polycore::Error> {
         let (places, moved) = (frames.points(frame)?, frames.data(frame, "displacement")?);
         let tensors = frames.data(frame, &measure)?;
         let at_rest = |(k, x): (usize, &[f64; 3])| [0, 1, 2].map(|d| x[d] - moved[3 * k + d]);
         Ok(Look {
-            title: scale::title(outcome, frames.times()[frame]),
+            title: title(history, frames.times()[frame]),
             rest: places.iter().enumerate().map(at_rest).collect(),
             places,
             values: [
@@ -76,11 +70,11 @@ pub fn stages(
     let (field, damage) = (solid::stress_field(spec, all), solid::damage_field());
     let (scale, strips) = (field.scale, [field.strip.clone(), damage.strip.clone()]);
     if !flat {
-        let picture = solid::Picture { scene, outcome, spacing, bounds };
+        let picture = solid::Picture { moment: m, bounds };
         let fields = vec![field, damage];
         picture.draw(output, fields, chosen.len(), |k| Ok(Cow::Owned(look(chosen[k])?)))?;
     }
-    let bridge = bridge(outcome);
+    let bridge = bridge(m);
     let [wide, tall] = [0, 1].map(|d| {
         let ends = |(low, high): (f64, f64), x: &[f64; 2]| (low.min(x[d]), high.max(x[d]));
         let extent = |stage: &Stage| stage.places.iter().fold((f64::MAX, f64::MIN), ends);
@@ -107,7 +101,7 @@ pub fn stages(
         let panel = panel.range(strip.range.0, strip.range.1).reference(&stage.rest).bridge(bridge);
         map = map.panel(panel);
     }
-    map.write(output.join(format!("stages_{}.png", outcome.file_name())))?;
+    map.write(output.join(format!("stages_{}.png", m.physics.name)))?;
     Ok(())
 }
 

@@ -1,6 +1,7 @@
 //! Numbers, units and distances of pictures.
 
-use super::outcome::Outcome;
+use super::moment::Moment;
+use crate::solver::{Criterion, Record};
 
 /// Four digits.
 pub fn short(value: f64) -> String {
@@ -17,15 +18,18 @@ pub fn stress_unit(largest: f64) -> (f64, &'static str) {
 
 /// How far apart, in spacings, neighbours on a lattice may be that are still bonded: no intact bond was longer. Where
 /// bonds break, the longest observed may have broken.
-pub fn bridge(outcome: &Outcome) -> f64 {
-    let most = outcome.get("critical_stretch").or(outcome.get("largest_stretch")).unwrap_or(1.0);
+pub(super) fn bridge<const D: usize>(m: &Moment<D>) -> f64 {
+    let most = match &m.physics.body.criterion {
+        Some(Criterion::Stretch(stretch)) => stretch.least(),
+        _ => m.each(|row| row.largest_stretch).fold(1.0, f64::max),
+    };
     (1.02 * most).clamp(1.5, 100.0)
 }
 
 /// What a moment of a run is called: a load step's displacement and load, or a place within a step.
-pub fn title(outcome: &Outcome, time: f64) -> String {
+pub(super) fn title(history: &[Record], time: f64) -> String {
     let step = time.ceil() as usize;
-    let Some(record) = step.checked_sub(1).and_then(|k| outcome.history.get(k)) else { return String::new() };
+    let Some(record) = step.checked_sub(1).and_then(|k| history.get(k)) else { return String::new() };
     let place = format!("U = {} mm", short(record.displacement * 1e3));
     let part = time - time.floor();
     if part > 0.0 {

@@ -1,21 +1,13 @@
-//! Fields along lines through the body at rest, at the end of a run.
+//! Fields along lines through the body at rest, between particles by moving least squares with a linear basis.
 //!
-//! Between particles by moving least squares with a linear basis (Lancaster & Salkauskas 1981,
-//! doi:10.1090/S0025-5718-1981-0616367-1) over the nearest particle and those that intact bonds join to it, with the weights
-//! w = (δ/d − 1)⁴ of their distances d: a linear field is exact, and a particle has its own value. No value crosses a crack of
-//! the scene: the nearest particle is one on the same side, and so is what is bonded to it. Where bonds broke later, the side is that
-//! of the nearest particle.
+//! Lancaster & Salkauskas (1981), doi:10.1090/S0025-5718-1981-0616367-1, over the nearest particle and those that intact bonds
+//! join to it, with the weights w = (δ/d − 1)⁴ of their distances d: a linear field is exact, and a particle has its own value.
+//! No value crosses a crack of the body at rest: the nearest particle is one on the same side, and so is what is bonded to it.
+//! Where bonds broke later, the side is that of the nearest particle.
 
-use super::frames::Stresses;
-use super::outcome::Outcome;
 use crate::bonds::{BodyGeometry, Bonds, CellGrid, Kind};
-use crate::error::Error;
 use crate::geometry::{Cut, length, severed};
-use crate::program::scene::{LineField, Scene, cuts_of, line_fields};
-use crate::solver::State;
-use harness::scene::{LineSpec, SceneError, Source};
 use nalgebra::{Matrix3, Vector3};
-use std::path::Path;
 
 /// A distance over the spacing that counts as none.
 const NEAR: f64 = 1e-9;
@@ -27,8 +19,8 @@ const FLAT: f64 = 1e-10;
 /// take large multiples of small differences.
 const MOST: f64 = 5.0;
 
-/// The particles around a line.
-struct Around<'a, const D: usize> {
+/// Particles around a line, between which fields are interpolated.
+pub struct LineSampler<'a, const D: usize> {
     bonds: &'a dyn Bonds<D>,
     sites: Vec<u32>,
     places: Vec<[f64; D]>,
@@ -47,9 +39,9 @@ fn reach<const D: usize>(bonds: &dyn Bonds<D>, site: usize) -> f64 {
     }
 }
 
-impl<'a, const D: usize> Around<'a, D> {
-    fn new(bonds: &'a dyn Bonds<D>, cuts: &'a [Cut<D>], line: &[[f64; D]]) -> Self {
-        let ends = [line[0], line[line.len() - 1]];
+impl<'a, const D: usize> LineSampler<'a, D> {
+    /// Finds the particles near the line between two `ends`, m, of a body with these cracks.
+    pub fn new(bonds: &'a dyn Bonds<D>, cuts: &'a [Cut<D>], ends: [[f64; D]; 2]) -> Self {
         let along: [f64; D] = std::array::from_fn(|d| ends[1][d] - ends[0][d]);
         let square: f64 = along.iter().map(|x| x * x).sum();
         let all = bonds.particles().iter();
@@ -65,9 +57,9 @@ impl<'a, const D: usize> Around<'a, D> {
         Self { bonds, cuts, grid: CellGrid::new(&places, most), sites, places, most }
     }
 
-    /// Sites whose values make up that at a place, and their weights; none outside of the body, and where the nearest
+    /// Sites whose values make up that at a place of the line, m, and their weights; none outside of the body, and where the nearest
     /// particles lie on both sides of a crack.
-    fn weights(&self, at: [f64; D]) -> Option<Vec<(usize, f64)>> {
+    pub fn weights(&self, at: [f64; D]) -> Option<Vec<(usize, f64)>> {
         let (bonds, small) = (self.bonds, self.bonds.spacing());
         if self.sites.is_empty() {
             return None;
@@ -156,77 +148,6 @@ fn distance<const D: usize>(a: [f64; D], b: [f64; D]) -> f64 {
     length::<D>(std::array::from_fn(|d| a[d] - b[d]))
 }
 
-/// Refuses lines of which no point lies in the body.
-///
-/// # Errors
-/// The line.
-pub fn check<const D: usize>(
-    source: &Source,
-    lines: &[LineSpec],
-    bonds: &dyn Bonds<D>,
-) -> Result<(), SceneError> {
-    for (index, line) in lines.iter().enumerate() {
-        let places = line.places::<D>();
-        let around = Around::new(bonds, &[], &places);
-        let inside = places.iter().any(|at| around.weights(*at).is_some());
-        line.refuse_outside(source, index, inside)?;
-    }
-    Ok(())
-}
-
-/// Writes `line_NAME_VARIANT.csv` of every line; `damage` is in the order of the particles.
-///
-/// # Errors
-/// A file that cannot be written.
-pub fn write<const D: usize>(
-    scene: &Scene,
-    bonds: &dyn Bonds<D>,
-    state: &State<D>,
-    stresses: &Stresses<D>,
-    damage: Option<&[f64]>,
-    outcome: &Outcome,
-    output: &Path,
-) -> Result<(), Error> {
-    let value = |field: LineField, site: usize| {
-        let particle = || bonds.particles().partition_point(|&other| (other as usize) < site);
-        match field {
-            LineField::Displacement(d) => state.displacement.get(site)[d],
-            LineField::Damage => {
-                damage.and_then(|damage| damage.get(particle()).copied()).unwrap_or(f64::NAN)
-            }
-            LineField::Stress { piola, measure, entry: [a, b] } => {
-                let fields = if piola { &stresses.piola } else { &stresses.cauchy };
-                fields.get(measure).map_or(f64::NAN, |(_, tensors)| tensors[particle()][a][b])
-            }
-        }
-    };
-    let cuts = cuts_of(scene);
-    for line in &scene.output.line {
-        let places = line.places::<D>();
-        let around = Around::new(bonds, &cuts, &places);
-        let by_default = |field| !matches!(field, LineField::Stress { piola: true, .. });
-        let wanted = line_fields(scene).into_iter().filter(|(f, name, _)| line.wants(name, by_default(*f)));
-        let wanted: Vec<_> = wanted.collect();
-        let empty = || Vec::with_capacity(places.len());
-        let mut columns: Vec<(String, &str, Vec<f64>)> =
-            wanted.iter().map(|(_, name, unit)| (name.clone(), *unit, empty())).collect();
-        // point by point: the weights of all would take more than the body
-        for at in &places {
-            let weights = around.weights(*at);
-            for ((field, ..), (_, _, values)) in wanted.iter().zip(&mut columns) {
-                let sum = |weights: &Vec<(usize, f64)>| {
-                    weights.iter().map(|(site, weight)| weight * value(*field, *site)).sum()
-                };
-                let found: f64 = weights.as_ref().map_or(f64::NAN, sum);
-                // a slope leads out of the range of a share
-                values.push(if *field == LineField::Damage { found.clamp(0.0, 1.0) } else { found });
-            }
-        }
-        line.write::<D>(&output.join(format!("line_{}_{}.csv", line.name, outcome.file_name())), &columns)?;
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -259,7 +180,7 @@ mod tests {
         at: [f64; 2],
         field: &dyn Fn([f64; 2]) -> f64,
     ) -> Option<f64> {
-        let around = Around::new(bonds, cuts, &[[-1.0, at[1]], [13.0, at[1]]]);
+        let around = LineSampler::new(bonds, cuts, [[-1.0, at[1]], [13.0, at[1]]]);
         let weights = around.weights(at)?;
         Some(weights.iter().map(|(site, weight)| weight * field(bonds.position(*site))).sum())
     }

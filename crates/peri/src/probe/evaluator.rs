@@ -1,0 +1,225 @@
+//! Forces, stresses, energy-momentum and flags of a state, of bond laws and of solids.
+
+use crate::bonds::Bonds;
+use crate::material::{BondMaterial, Family, NonlocalSolid, PointLaw, Pointwise, Response, Tensor as Matrix};
+use crate::potential::KernelFit;
+use crate::solver::State;
+use crate::stress::{Tensor, force_over_length};
+use polycore::constitutive::Flags;
+use rayon::prelude::*;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A solid of any law.
+pub type Solid<const D: usize> = NonlocalSolid<Arc<dyn PointLaw<D>>>;
+
+/// Evaluates forces and stresses of a material in the states of a body.
+pub struct StressEvaluator<const D: usize>(Kind<D>);
+
+enum Kind<const D: usize> {
+    /// A bond law, with the fit that the solver makes: bonds then carry the solver's own forces.
+    Bonds {
+        material: BondMaterial<'static>,
+        /// Largest relative error of the fit.
+        bound: f64,
+        /// Whether the law is constant beyond the fitted stretches.
+        clamped: bool,
+        /// The fit made last, with its stretches.
+        last: Mutex<Option<([f64; 2], KernelFit)>>,
+    },
+    Nothing,
+    /// A solid, with states of its particles.
+    Solid {
+        law: Arc<dyn PointLaw<D>>,
+        learnt: bool,
+        states: Mutex<Pointwise<Solid<D>, D>>,
+    },
+}
+
+impl<const D: usize> StressEvaluator<D> {
+    /// An evaluator of nothing: no forces, no stresses.
+    pub fn none() -> Self {
+        Self(Kind::Nothing)
+    }
+
+    /// An evaluator of a bond law that is fitted to a relative error of `bound`; where bonds break the law is `clamped` beyond the
+    /// fitted stretches.
+    pub fn of_bonds(material: BondMaterial<'static>, bound: f64, clamped: bool) -> Self {
+        Self(Kind::Bonds { material, bound, clamped, last: Mutex::new(None) })
+    }
+
+    /// An evaluator of a solid; `bonds` are those of the body as it was built. A law `learnt` from data has flags.
+    pub fn of_solid(law: Arc<dyn PointLaw<D>>, learnt: bool, bonds: &dyn Bonds<D>) -> Self {
+        let states = Mutex::new(Pointwise::new(NonlocalSolid(law.clone()), bonds));
+        Self(Kind::Solid { law, learnt, states })
+    }
+
+    /// The bond law, where it is one.
+    pub fn bond_material(&self) -> Option<&BondMaterial<'static>> {
+        match &self.0 {
+            Kind::Bonds { material, .. } => Some(material),
+            _ => None,
+        }
+    }
+
+    /// Sums forces of the bonds of `sites` to the sites that `wanted` names, N, each on the particle in the first: `visit` takes
+    /// that site and the sum.
+    pub fn forces(
+        &self,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        sites: &[u32],
+        wanted: &dyn Fn(usize) -> bool,
+        visit: &mut dyn FnMut(usize, [f64; D]),
+    ) {
+        match &self.0 {
+            Kind::Nothing => {}
+            Kind::Bonds { material, bound, clamped, last } => {
+                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+                if last.as_ref().is_none_or(|(stretches, _)| *stretches != state.fitted) {
+                    let fit = KernelFit::new(material.law(), state.fitted, *bound).ok();
+                    *last = fit.map(|fit| (state.fitted, if *clamped { fit.clamped() } else { fit }));
+                }
+                // the solver has made the same fit
+                let Some((_, fit)) = &*last else { return };
+                for site in sites.iter().map(|&site| site as usize) {
+                    let (own, volume) = (state.displacement.get(site), bonds.volume(site));
+                    let mut sum = [0.0; D];
+                    bonds.neighbours(site, &mut |bond| {
+                        if wanted(bond.site) {
+                            let other = state.displacement.get(bond.site);
+                            let eta: [f64; D] = std::array::from_fn(|d| other[d] - own[d]);
+                            let pull = force_over_length(
+                                fit,
+                                material.modulus(),
+                                bond.weight,
+                                volume,
+                                bond.bond,
+                                eta,
+                            );
+                            for d in 0..D {
+                                sum[d] += pull * (bond.bond[d] + eta[d]);
+                            }
+                        }
+                    });
+                    visit(site, sum);
+                }
+            }
+            Kind::Solid { states, .. } => {
+                let states = prepared(states, bonds, state);
+                for site in sites.iter().map(|&site| site as usize) {
+                    let (mut sum, volume) = ([0.0; D], bonds.volume(site));
+                    states.bond_forces(bonds, &state.displacement, site, |bond, density| {
+                        if wanted(bond.to) {
+                            for d in 0..D {
+                                sum[d] += volume * bond.volume * density[d];
+                            }
+                        }
+                    });
+                    visit(site, sum);
+                }
+            }
+        }
+    }
+
+    /// Couples Σ V_I V_J (x_J − x_I) × T_IJ of the bonds of `sites` to the sites that `wanted` names, N m.
+    ///
+    /// Bonds of solids are not parallel to their forces, T_IJ − T_JI, and Σ_J V_J (x_J − x_I) × T_IJ = 0 in a whole family alone.
+    /// With it, the moment of the forces of `sites` is what the body transmits.
+    pub fn couple(
+        &self,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        sites: &[u32],
+        wanted: &dyn Fn(usize) -> bool,
+    ) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        let Kind::Solid { states, .. } = &self.0 else { return sum };
+        let states = prepared(states, bonds, state);
+        for site in sites.iter().map(|&site| site as usize) {
+            let (volume, points) = (bonds.volume(site), states.points());
+            Family::new(bonds, &state.displacement, site).each(|bond| {
+                if wanted(bond.to) {
+                    let part = points[site].own_force(&bond);
+                    let at = |of: &dyn Fn(usize) -> f64, d: usize| if d < D { of(d) } else { 0.0 };
+                    let (arm, pull) = (|d: usize| bond.reference[d] + bond.change[d], |d: usize| part[d]);
+                    for d in 0..3 {
+                        let (a, b) = ((d + 1) % 3, (d + 2) % 3);
+                        let cross = at(&arm, a) * at(&pull, b) - at(&arm, b) * at(&pull, a);
+                        sum[d] += volume * bond.volume * cross;
+                    }
+                }
+            });
+        }
+        sum
+    }
+
+    /// First Piola–Kirchhoff and Cauchy stress of a solid's law in every particle, Pa; `None` for bond laws.
+    pub fn stress(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[Vec<Tensor<D>>; 2]> {
+        let Kind::Solid { law, states, .. } = &self.0 else { return None };
+        let states = prepared(states, bonds, state);
+        let both = bonds.particles().iter().map(|&site| {
+            let point = &states.points()[site as usize];
+            let Some(deformation) = point.deformation() else { return ([[0.0; D]; D], [[0.0; D]; D]) };
+            let gradient = deformation.gradient();
+            let piola = point.respond(&**law).piola * point.integrity();
+            let volume = (1.0 + deformation.volume_change()) * law.thickness_stretch(deformation);
+            let cauchy = piola * gradient.transpose() / volume;
+            let rows = |t: &Matrix<D>| std::array::from_fn(|a| std::array::from_fn(|b| t[(a, b)]));
+            (rows(&piola), rows(&cauchy))
+        });
+        let (piola, cauchy) = both.unzip();
+        Some([piola, cauchy])
+    }
+
+    /// Eshelby's energy–momentum ∇uᵀP − W 1 of a solid at some sites, Pa; `visit` takes the place in `sites` with it. Nothing
+    /// of bond laws, and of particles without deformation gradient.
+    pub fn energy_momentum(
+        &self,
+        bonds: &dyn Bonds<D>,
+        state: &State<D>,
+        sites: &[u32],
+        visit: &mut dyn FnMut(usize, Tensor<D>),
+    ) {
+        let Kind::Solid { law, states, .. } = &self.0 else { return };
+        let states = prepared(states, bonds, state);
+        for (at, &site) in sites.iter().enumerate() {
+            let point = &states.points()[site as usize];
+            let Some(deformation) = point.deformation() else { continue };
+            let piola = point.respond(&**law).piola;
+            let tensor = (deformation.displacement_gradient.transpose() * piola
+                - Matrix::<D>::identity() * point.energy(&**law).unwrap_or(0.0))
+                * point.integrity();
+            visit(at, std::array::from_fn(|a| std::array::from_fn(|b| tensor[(a, b)])));
+        }
+    }
+
+    /// Where and why a learnt law is uncertain, particle by particle; none where it is not at work; `None` for laws in closed form.
+    pub fn flags(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<Vec<Flags>> {
+        let Kind::Solid { law, learnt: true, states } = &self.0 else { return None };
+        let states = prepared(states, bonds, state);
+        let of = |&site: &u32| {
+            states.points()[site as usize].deformation().map_or(Flags::default(), |found| law.flags(found))
+        };
+        Some(bonds.particles().par_iter().map(of).collect())
+    }
+
+    /// The shares of particles outside of the box of the training data, and with any flag.
+    pub fn flagged(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Option<[f64; 2]> {
+        let flags = self.flags(bonds, state)?;
+        let share = |is: &dyn Fn(&Flags) -> bool| {
+            flags.iter().filter(|flags| is(flags)).count() as f64 / flags.len().max(1) as f64
+        };
+        Some([share(&|flags| flags.outside.contains(&true)), share(&Flags::any)])
+    }
+}
+
+/// States of particles at a displacement.
+fn prepared<'a, const D: usize>(
+    states: &'a Mutex<Pointwise<Solid<D>, D>>,
+    bonds: &dyn Bonds<D>,
+    state: &State<D>,
+) -> MutexGuard<'a, Pointwise<Solid<D>, D>> {
+    let mut states = states.lock().unwrap_or_else(PoisonError::into_inner);
+    states.prepare(bonds, &state.displacement);
+    states
+}

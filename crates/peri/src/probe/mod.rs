@@ -1,0 +1,16 @@
+//! Quantities of a body in a state: forces across sections, J-integrals and crack tips, motion of parts, fields along lines, and what
+//! follows from their histories.
+
+mod crack;
+mod evaluator;
+mod line;
+mod motion;
+mod path;
+mod section;
+
+pub use crack::{CrackTip, JIntegral};
+pub use evaluator::{Solid, StressEvaluator};
+pub use line::LineSampler;
+pub use motion::{WaveFront, mean_displacement, rotation, strain};
+pub use path::{crossing, envelope, first_swing, load_at, unwrapped};
+pub use section::Section;

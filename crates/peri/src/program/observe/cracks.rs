@@ -1,0 +1,81 @@
+//! What bonds bear, the pieces of a broken body, and the energy that new cracks take over their area.
+
+use super::moment::Moment;
+use crate::error::Error;
+use crate::program::quantities as q;
+use crate::program::scene::Scene;
+use crate::solver::{Bilinear, Criterion};
+use harness::observe::{Fields, Observer, Place, Scalars};
+
+/// Whether bonds break by their energy.
+fn by_energy(scene: &Scene) -> bool {
+    let energy = scene.material.critical.is_some_and(|critical| critical.fracture_energy.is_some());
+    scene.material.solid.is_some() && energy
+}
+
+/// Critical stretch or energy, fragments.
+pub(super) fn breaking<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+    if scene.material.critical.is_none() {
+        return;
+    }
+    if by_energy(scene) {
+        to.add_if(q::CRITICAL_ENERGY, |m| match m.physics.body.criterion.as_ref()? {
+            Criterion::Energy(limit) | Criterion::Softening(Bilinear { limit, .. }) => Some(*limit),
+            Criterion::Stretch(_) => None,
+        });
+    } else {
+        to.add_if(q::CRITICAL_STRETCH, |m| m.physics.body.criterion.as_ref().map(Criterion::least_stretch));
+    }
+    to.add(q::FRAGMENTS, |m| m.fragments().len() as f64);
+    to.add(q::LARGEST_FRAGMENT, |m| {
+        let volume: f64 = m.sites().map(|site| m.bonds.volume(site)).sum();
+        m.fragments().first().map_or(0.0, |largest| largest.volume / volume)
+    });
+}
+
+/// Damage, where there are cracks or bonds break.
+pub(super) fn field<const D: usize>(scene: &Scene, to: &mut Fields<Moment<D>>) {
+    if scene.material.critical.is_some() || !scene.body.cracks.is_empty() {
+        to.add("damage", 1, Place::Points, |m| m.damage().unwrap_or_default());
+    }
+}
+
+/// Area of new cracks, dissipated energy over it, and that over the tearing energy of the body without its inclusions.
+pub(super) struct NewCracks<'s> {
+    scene: &'s Scene,
+    /// Area, m², and energy over it, J/m².
+    found: Option<[f64; 2]>,
+}
+
+impl<'s> NewCracks<'s> {
+    pub(super) fn new(scene: &'s Scene) -> Self {
+        Self { scene, found: None }
+    }
+}
+
+impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for NewCracks<'_> {
+    fn scalars(&self, to: &mut Scalars<Moment<'m, D>>) {
+        if self.scene.material.critical.is_none() {
+            return;
+        }
+        let tears = self.scene.material.solid.is_none() || by_energy(self.scene);
+        if tears {
+            to.add_if(q::TEARING_ENERGY, |m| m.physics.tearing);
+        }
+        to.add_if(q::NEW_CRACK_AREA, |_| self.found.map(|[area, _]| area));
+        to.add_if(q::DISSIPATED_PER_AREA, |_| self.found.map(|[_, spent]| spent));
+        if tears {
+            to.add_if(q::DISSIPATION_BIAS, |m| Some(self.found?[1] / m.physics.tearing? - 1.0));
+        }
+    }
+
+    fn end(&mut self, m: &Moment<'m, D>) -> Result<(), Error> {
+        let last = m.state.history.last().filter(|last| last.broken > 0);
+        if let Some((last, cracks)) = last.zip(m.physics.cracks.as_ref()) {
+            let area = cracks.of(m.bonds);
+            let spent = (last.work - last.stored - last.kinetic - last.rubbed) / area;
+            self.found = (area > 0.0 && area.is_finite()).then_some([area, spent]);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,93 @@
+//! What a scene's expectations may ask for: the names of the scalars that its report can have.
+
+use super::list::quantities;
+use super::probes::of_probe;
+use crate::program::quantities as q;
+use crate::program::scene::{self, Scene, Variant, variants};
+use harness::observe::Scalars;
+use harness::report::Named;
+use harness::scene::{SceneError, Source};
+
+/// Scalars that the report of a scene can have, with its variants.
+///
+/// # Errors
+/// As [`super::check`].
+pub fn quantities_of(source: &Source, scene: &Scene) -> Result<Vec<String>, SceneError> {
+    let variants = variants(source, scene, false)?;
+    let mut names = Vec::new();
+    let mut families: Vec<(String, usize)> = Vec::new();
+    for variant in &variants {
+        let fails = variant.of.expect_error.is_some().then(|| Named::from(q::FAILED_AS_EXPECTED));
+        let own = quantities(&variant.scene).into_iter().chain(fails).map(|quantity| quantity.name);
+        match variants.len() {
+            1 => names.extend(own),
+            _ => {
+                for name in own {
+                    let compared = scene.output.compare.as_ref().filter(|c| c.quantity == name).is_some();
+                    names.extend(compared.then(|| q::COMPARED.of(&[&name, &variant.name()]).name));
+                    names.extend(compared.then(|| q::SAME_EVENTS.of(&[&variant.name()]).name));
+                    names
+                        .extend(q::BALANCES.iter().any(|balance| balance.name == name).then(|| name.clone()));
+                    names.push(scene::NAMING.value(&variant.of.name, &name));
+                }
+            }
+        }
+        match families.iter_mut().find(|(family, _)| *family == variant.family()) {
+            Some((_, count)) => *count += 1,
+            None => families.push((variant.family(), 1)),
+        }
+    }
+    for (family, _) in families.iter().filter(|(_, count)| *count > 1) {
+        names.push(q::PEAK_LOAD_CHANGE.of(&[family]).name);
+        for measure in scene.stress.iter().flat_map(|stress| &stress.measures) {
+            let kinds = scene.exact.iter().flat_map(|exact| exact.errors());
+            names.extend(kinds.map(|kind| q::MEASURE_ORDER.of(&[measure.name(), kind, family]).name));
+        }
+    }
+    names.extend(scene.comparisons().names().map(|quantity| quantity.name));
+    if scene.output.integrals {
+        names.extend(q::INTEGRALS.iter().map(|quantity| quantity.name.to_owned()));
+    }
+    names.extend(scene.exact.as_ref().map(|_| q::KT_FINITE_WIDTH.name.to_owned()));
+    Ok(names)
+}
+
+/// Checks a scene, lists its variants, and refuses an expectation that no run of the scene could meet, and probes whose values have
+/// names of others.
+///
+/// # Errors
+/// As [`scene::check`]; the name, and those that are most like it.
+pub fn check(source: &Source, scene: &Scene, quick: bool) -> Result<Vec<Variant>, SceneError> {
+    let variants = scene::check(source, scene, quick)?;
+    for variant in &variants {
+        if variant.of.expect_error.is_none() {
+            let (source, scene) = variant.resolved();
+            unique(source, scene)?;
+        }
+    }
+    if !scene.expect.is_empty() {
+        let names = quantities_of(source, scene)?;
+        let known: Vec<&str> = names.iter().map(String::as_str).collect();
+        harness::case::check_quantities(source, &scene.expect, &known, |_| false)?;
+    }
+    Ok(variants)
+}
+
+/// Refuses probes whose values have names of other scalars.
+fn unique(source: &Source, scene: &Scene) -> Result<(), SceneError> {
+    if scene.probe.is_empty() {
+        return Ok(());
+    }
+    let others = Scene { probe: Vec::new(), ..scene.clone() };
+    let mut taken: Vec<String> = quantities(&others).into_iter().map(|named| named.name).collect();
+    for (index, probe) in scene.probe.iter().enumerate() {
+        let mut own = Vec::new();
+        of_probe::<2>(probe, 0, &mut Scalars::new(None, &mut |named, _| own.push(named.name)));
+        if let Some(value) = own.iter().find(|value| taken.contains(value)) {
+            let found = format!("`{}`, of which `{value}` is taken", probe.name);
+            return Err(source.error(&format!("probe[{index}].name"), found, "a unique name"));
+        }
+        taken.extend(own);
+    }
+    Ok(())
+}

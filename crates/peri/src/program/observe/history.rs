@@ -1,0 +1,102 @@
+//! Scalars of the history: peak load, first break, energies, balances.
+
+use super::moment::Moment;
+use crate::probe::load_at;
+use crate::program::quantities as q;
+use crate::program::scene::Scene;
+use crate::solver::{Balance, Record};
+use harness::observe::Scalars;
+use harness::report::Quantity;
+
+/// Whether a history is one in time.
+pub fn is_dynamic(history: &[Record]) -> bool {
+    history.iter().any(|row| row.time > 0.0)
+}
+
+/// Energy that damping has taken, J: in quasi-static runs all that is neither stored nor released.
+pub fn damped(row: &Record, dynamic: bool) -> f64 {
+    if dynamic { row.damped } else { row.work - row.stored - row.released - row.rubbed }
+}
+
+/// Peak, first break, energies at the end.
+pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+    let dynamic = scene.dynamics.is_some();
+    let breaks = scene.material.critical.is_some();
+    let records = scene.dynamics.as_ref().map_or(scene.solver.steps, |dynamics| dynamics.method().records);
+    let peak = |get: fn(&Record) -> f64| {
+        move |m: &Moment<D>| {
+            let peak = m.state.history.iter().max_by(|a, b| a.load.total_cmp(&b.load));
+            peak.filter(|_| m.state.history.len() > 1).map(get)
+        }
+    };
+    if records > 1 || scene.solver.refine > 1 {
+        to.add_if(q::PEAK_LOAD, peak(|row| row.load));
+        to.add_if(q::DISPLACEMENT_AT_PEAK, peak(|row| row.displacement));
+    }
+    for at in scene.output.load_at.iter().map(|at| at.si()) {
+        let path =
+            |m: &Moment<D>| load_at(m.state.history.iter().map(|row| [row.displacement, row.load]), at);
+        to.add_if(q::load_at(at), path);
+    }
+    if breaks {
+        breaking(dynamic, to);
+    }
+    last(to, q::WORK_OF_LOADS, |row| row.work);
+    last(to, q::STORED_ENERGY, |row| row.stored);
+    if breaks {
+        last(to, q::RELEASED_ENERGY, |row| row.released);
+    }
+    last(to, q::DAMPED_ENERGY, if dynamic { |row| damped(row, true) } else { |row| damped(row, false) });
+    if dynamic {
+        // largest difference of what came in and what is there, over what was turned over
+        to.add_if(q::ENERGY_ERROR, |m| {
+            m.state.history.last()?;
+            let off = |r: &Record| (r.work - r.stored - r.released - r.damped - r.rubbed - r.kinetic).abs();
+            let most = m.each(|r| r.work.abs().max(r.kinetic)).fold(f64::MIN_POSITIVE, f64::max);
+            Some(m.state.history.iter().map(off).fold(0.0, f64::max) / most)
+        });
+    } else {
+        let balances: [fn(&Balance) -> f64; 3] =
+            [|b| b.force, |b| b.moment / b.arm.max(f64::MIN_POSITIVE), |b| b.external];
+        for (quantity, get) in q::BALANCES.into_iter().zip(balances) {
+            to.add_if(quantity, move |m| {
+                m.state.history.last()?;
+                let most = |get: fn(&Balance) -> f64| {
+                    m.state.history.iter().map(|row| get(&row.balance)).fold(0.0, f64::max)
+                };
+                Some(most(get) / most(|b| b.size).max(f64::MIN_POSITIVE))
+            });
+        }
+    }
+    to.add_if(q::LARGEST_RESIDUAL, |m| {
+        m.state.history.last()?;
+        Some(m.each(|row| row.residual).fold(0.0, f64::max))
+    });
+}
+
+fn breaking<const D: usize>(dynamic: bool, to: &mut Scalars<Moment<D>>) {
+    let first = |history: &[Record]| history.iter().position(|row| row.broken > 0);
+    to.add_if(q::FIRST_BREAK, |m| Some(m.state.history[first(&m.state.history)?].displacement));
+    // that at the end of the step may be past the collapse
+    to.add_if(q::LOAD_AT_FIRST_BREAK, |m| {
+        Some(first(&m.state.history)?.checked_sub(1).map_or(0.0, |before| m.state.history[before].load))
+    });
+    if !dynamic {
+        to.add_if(q::LOAD_OF_FIRST_EVENT, |m| {
+            first(&m.state.history)?;
+            Some(m.state.events.first()?.load)
+        });
+    }
+    last(to, q::BROKEN_BONDS, |row| row.broken as f64);
+    if !dynamic {
+        to.add_if(q::BREAKING_EVENTS, |m| m.state.history.last().map(|_| m.state.events.len() as f64));
+    }
+    last(to, q::DETACHED_PARTICLES, |row| row.detached as f64);
+    last(to, q::LAST_LOAD, |row| row.load);
+    last(to, q::LAST_DISPLACEMENT, |row| row.displacement);
+}
+
+/// Adds a number of the last row.
+pub(super) fn last<const D: usize>(to: &mut Scalars<Moment<D>>, quantity: Quantity, get: fn(&Record) -> f64) {
+    to.add_if(quantity, |m| m.state.history.last().map(get));
+}

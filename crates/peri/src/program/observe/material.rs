@@ -1,0 +1,298 @@
+//! What a variant of a scene is turned into before it is solved: a body, its material, its loads, what its outputs look at.
+
+use super::rows::{Row, rows};
+use crate::bonds::{Bonds, Property};
+use crate::calibrate;
+use crate::correction::{bond_factors, surface_factors};
+use crate::critical::{Context, CrackArea, Critical, Crossing, Toughness};
+use crate::error::Error;
+use crate::exact::Plate;
+use crate::material::{BondMaterial, Material, NonlocalSolid, Prestrained, Response, relief};
+use crate::potential::BondPotential;
+use crate::probe::{LineSampler, Solid, StressEvaluator};
+use crate::program::scene::{self, Body, Followed, Inclusions, Scene, SurfaceCorrection, Variant};
+use crate::solver::{Criterion, Loads, State};
+use harness::scene::{SceneError, Source};
+use std::sync::Arc;
+
+type Failure = harness::scene::Failure<Error>;
+
+/// What acts between the particles of a scene.
+pub enum SceneMaterial<const D: usize> {
+    /// A bond law.
+    Bonds(BondMaterial<'static>),
+    /// A bond law with prestrains.
+    Prestrained(Prestrained<D>),
+    /// A solid of the mean deformation of a family.
+    Solid(Solid<D>),
+}
+
+impl<const D: usize> SceneMaterial<D> {
+    /// For the solver.
+    pub fn respond(&self, bonds: &dyn Bonds<D>) -> Box<dyn Response<D>> {
+        match self {
+            Self::Bonds(bonded) => bonded.clone().respond(bonds),
+            Self::Prestrained(prestrained) => prestrained.clone().respond(bonds),
+            Self::Solid(solid) => solid.clone().respond(bonds),
+        }
+    }
+
+    /// Longitudinal modulus at rest, Pa.
+    pub fn longitudinal_modulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+        match self {
+            Self::Bonds(bonded) => bonded.longitudinal_modulus(bonds),
+            Self::Prestrained(prestrained) => prestrained.longitudinal_modulus(bonds),
+            Self::Solid(solid) => solid.longitudinal_modulus(bonds),
+        }
+    }
+
+    /// kθ, N/m⁶, of linear bonds about as stiff.
+    pub fn micromodulus(&self, bonds: &dyn Bonds<D>) -> f64 {
+        match self {
+            Self::Bonds(bonded) => bonded.modulus(),
+            Self::Prestrained(prestrained) => prestrained.micromodulus(bonds),
+            Self::Solid(solid) => solid.micromodulus(bonds),
+        }
+    }
+
+    /// The bond law, where its bonds are at rest as the body was built.
+    pub fn bond_law(&self) -> Option<&dyn BondPotential> {
+        match self {
+            Self::Bonds(bonded) => Some(bonded.law()),
+            _ => None,
+        }
+    }
+}
+
+/// A material in a body, whose bonds have their factors but not their law yet.
+pub struct BodyWithMaterial<const D: usize> {
+    /// The material.
+    pub material: SceneMaterial<D>,
+    /// When bonds break, where the scene says so.
+    pub criterion: Option<Criterion>,
+    /// Fracture energies of the critical stretch of a bond law.
+    pub toughness: Option<Toughness>,
+    /// The parameters that follow fields.
+    pub followed: Vec<Followed>,
+    /// Stiffness of the material over what it is without inclusions.
+    pub stiffness: Property,
+}
+
+impl<const D: usize> BodyWithMaterial<D> {
+    /// Calibrates and corrects a body.
+    ///
+    /// # Errors
+    /// A fault of the material.
+    pub fn new(
+        source: &Source,
+        scene: &Scene,
+        variant: &Variant,
+        body: &mut Body<D>,
+    ) -> Result<Self, Failure> {
+        let (space, spec) = (scene.body.space, &scene.material);
+        let (horizon, thickness) = (body.bonds.horizon(), body.thickness);
+        let fault = |error| match error {
+            Error::Parameter { name, found, allowed } => {
+                let unit = match name {
+                    "critical.fracture_energy" => " J/m²",
+                    "critical.strength" => " Pa",
+                    _ => "",
+                };
+                source.error(&format!("material.{name}"), scene::plain(found) + unit, allowed)
+            }
+            other => source.error("material.critical", other, "a critical stretch"),
+        };
+        if let Some(solid) = &spec.solid {
+            let law = solid.build::<D>(source, space, scene.is_beside_planes())?;
+            let criterion = spec.critical.map(|critical| critical.of_solid(&*law, &*body.bonds));
+            return Ok(Self {
+                criterion: criterion.transpose().map_err(fault)?,
+                material: SceneMaterial::Solid(NonlocalSolid(law)),
+                toughness: None,
+                followed: Vec::new(),
+                stiffness: 1.0.into(),
+            });
+        }
+        let law: Arc<dyn BondPotential> = Arc::from(spec.bond_law()?);
+        let youngs_modulus = spec.youngs_modulus.map_or(f64::NAN, |modulus| modulus.si());
+        let mut modulus = calibrate::modulus(space, youngs_modulus, horizon, thickness);
+        if let Some(lattice) = body.bonds.as_lattice() {
+            modulus *= calibrate::lattice_factor::<D>(spec.calibration, lattice);
+        }
+        let surface = (variant.surface == SurfaceCorrection::Energy).then(|| {
+            surface_factors(&*body.bonds, modulus, calibrate::stiffness_1111(space, youngs_modulus))
+        });
+        let crossing = spec.critical.map(|_| Crossing::new(&*body.bonds, surface.as_ref()));
+        let followed = scene::followed(source, scene, body)?;
+        let inclusions = Inclusions::new(source, scene, body, &followed)?;
+        if let Some(factors) = bond_factors(&*body.bonds, surface, &inclusions.micromodulus) {
+            body.bonds.set_factors(factors);
+        }
+        let context = |stiffness: f64, crossing: Crossing| {
+            let (links, modulus) = (spec.links, stiffness * modulus);
+            let convention = spec.critical.and_then(|critical| critical.convention).unwrap_or_default();
+            Context { law: &*law, links, space, modulus, horizon, thickness, crossing, convention }
+        };
+        let (mut criterion, mut toughness): (Option<Criterion>, _) = (None, None);
+        if let Some((critical, crossing)) = spec.critical.zip(crossing) {
+            let rest = context(1.0, crossing);
+            let stretch = critical.resolve(&rest).map_err(fault)?;
+            toughness = Some(Toughness::new(&critical, &rest, stretch));
+            let own = |critical: Critical, stiffness| critical.resolve(&context(stiffness, crossing));
+            criterion = Some(inclusions.critical_stretch(source, &*body.bonds, stretch, &own)?.into());
+        }
+        let mut bonded = BondMaterial::new(law, modulus);
+        if scene.softens()
+            && let Some(Criterion::Stretch(end)) = &criterion
+        {
+            bonded = bonded.softening(end.clone());
+        }
+        let material = match inclusions.prestrain {
+            Some(strain) => {
+                let prestrained = Prestrained::new(bonded, strain);
+                SceneMaterial::Prestrained(match &criterion {
+                    Some(criterion) => prestrained.clamped(criterion.most()),
+                    None => prestrained,
+                })
+            }
+            None => SceneMaterial::Bonds(bonded),
+        };
+        Ok(Self { material, criterion, toughness, followed, stiffness: inclusions.micromodulus })
+    }
+}
+
+/// What a variant is before it is solved, its body aside.
+pub struct Physics<const D: usize> {
+    /// Name of its files.
+    pub name: String,
+    /// The material in the body.
+    pub body: BodyWithMaterial<D>,
+    /// Loads and supports.
+    pub loads: Loads<D>,
+    /// Sites in any loading layer.
+    pub loaded: Vec<bool>,
+    /// Particles of grips that are tied at their surface, by site.
+    pub held: Option<Vec<bool>>,
+    rows: Vec<Row<D>>,
+    /// Forces and stresses, since [`Self::begin`], as the following.
+    pub evaluator: StressEvaluator<D>,
+    /// Bonds of each particle without cracks, and how many these have broken; only where there are cracks, or bonds break.
+    pub whole: Option<[Vec<u32>; 2]>,
+    /// Area of new cracks, where bonds break.
+    pub cracks: Option<CrackArea>,
+    /// Energy at which a crack runs, J/m²; none of a solid with a critical stretch.
+    pub tearing: Option<f64>,
+    /// Exact stresses of the plate that the scene names.
+    pub plate: Option<Plate>,
+    /// Sites in which stress measures make up for missing bonds by their window's share in the body: where forces act, and where the
+    /// surface correction has already made up for them.
+    pub by_window: Vec<bool>,
+}
+
+impl<const D: usize> Physics<D> {
+    /// Builds the body of a variant, its material, its loads, and finds what its outputs look at.
+    ///
+    /// # Errors
+    /// A fault of the scene.
+    pub fn new(source: &Source, scene: &Scene, variant: &Variant) -> Result<(Body<D>, Self), Failure> {
+        let mut body = scene::body_of::<D>(source, scene, variant)?;
+        // before the loads: tractions act on the areas that it leaves
+        if scene.material.solid.is_some()
+            && let Some(theta) = relief(&*body.bonds)
+        {
+            body.bonds.set_relief(theta);
+        }
+        let (loads, loaded) = scene::loads_of(source, scene, &body)?;
+        scene::check_placement(source, scene, &body, &loads)?;
+        let held = scene::tied_grips(source, scene, &*body.bonds, &loads)?;
+        if let Some(held) = &held {
+            let list = crate::contact::across(&*body.bonds, held);
+            body.bonds.sever(&list);
+        }
+        let rows = rows(source, scene, &body)?;
+        check_lines(source, scene, &*body.bonds)?;
+        let with = BodyWithMaterial::new(source, scene, variant, &mut body)?;
+        let physics = Self {
+            name: String::new(),
+            body: with,
+            loads,
+            loaded,
+            held,
+            rows,
+            evaluator: StressEvaluator::none(),
+            whole: None,
+            cracks: None,
+            tearing: None,
+            plate: None,
+            by_window: Vec::new(),
+        };
+        Ok((body, physics))
+    }
+
+    /// Notes what outputs need of the body as it was built.
+    ///
+    /// # Errors
+    /// A hole that the plate of `[exact]` cannot have.
+    pub fn begin(
+        &mut self,
+        source: &Source,
+        scene: &Scene,
+        variant: &Variant,
+        body: &Body<D>,
+    ) -> Result<(), SceneError> {
+        let (bonds, own) = (&*body.bonds, &self.body);
+        let breaks = own.criterion.is_some();
+        self.plate = scene::exact_plate(source, scene, body)?;
+        self.evaluator = match &own.material {
+            SceneMaterial::Bonds(material) => {
+                StressEvaluator::of_bonds(material.clone(), scene.fit_bound(), breaks)
+            }
+            SceneMaterial::Solid(solid) if scene.observes_forces() => {
+                StressEvaluator::of_solid(solid.0.clone(), scene.is_learnt(), bonds)
+            }
+            _ => StressEvaluator::none(),
+        };
+        self.whole = (breaks || !body.cuts.is_empty()).then(|| {
+            let cracked = scene::severed_of_each(bonds, &body.cuts);
+            let left = bonds.particles().iter().map(|&site| bonds.bonded(site as usize));
+            [left.zip(&cracked).map(|(left, cracked)| left + cracked).collect(), cracked]
+        });
+        let given = scene.material.critical.and_then(|critical| critical.fracture_energy);
+        let toughness = own.toughness.as_ref();
+        self.tearing = toughness.map(|own| own.tearing).or(given.map(|energy| energy.si()));
+        self.cracks = breaks.then(|| {
+            CrackArea::new(bonds, &toughness.map_or_else(|| Crossing::new(bonds, None), |own| own.crossing))
+        });
+        let corrected = variant.surface == SurfaceCorrection::Energy;
+        self.by_window = self.loaded.iter().map(|&loaded| loaded || corrected).collect();
+        Ok(())
+    }
+
+    /// Numbers of a row of the history: of probes, of a learnt law's flags, of sections.
+    pub fn row(&self, bonds: &dyn Bonds<D>, state: &State<D>) -> Vec<f64> {
+        self.rows.iter().flat_map(|part| part(bonds, state, &self.evaluator)).collect()
+    }
+
+    /// Name of the field file.
+    pub fn field_file(&self) -> String {
+        format!("{}.vtkhdf", self.name)
+    }
+}
+
+/// Refuses lines of which no point lies in the body.
+///
+/// # Errors
+/// The line.
+fn check_lines<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    bonds: &dyn Bonds<D>,
+) -> Result<(), SceneError> {
+    for (index, line) in scene.output.line.iter().enumerate() {
+        let places = line.places::<D>();
+        let around = LineSampler::new(bonds, &[], [places[0], places[places.len() - 1]]);
+        let inside = places.iter().any(|at| around.weights(*at).is_some());
+        line.refuse_outside(source, index, inside)?;
+    }
+    Ok(())
+}

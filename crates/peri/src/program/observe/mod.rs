@@ -1,0 +1,31 @@
+//! Observers of a run: each names its scalars, its fields and its files, and how they follow from a state, in one place.
+
+mod contact;
+mod cracks;
+mod exact;
+mod expect;
+mod flags;
+mod frames;
+mod history;
+mod lines;
+mod list;
+mod maps;
+mod material;
+mod moment;
+mod probes;
+mod rows;
+mod scale;
+mod sections;
+mod solid;
+mod stages;
+mod values;
+
+pub use expect::{check, quantities_of};
+pub use frames::Frames;
+pub(crate) use frames::in_space;
+pub use history::{damped, is_dynamic};
+pub use list::{observers, quantities};
+pub use material::{BodyWithMaterial, Physics, SceneMaterial};
+pub use moment::{Moment, Observers};
+pub use rows::columns;
+pub use scale::{short, stress_unit};

@@ -1,0 +1,66 @@
+//! Values of a scene's probes, which follow from their columns in the history.
+
+use super::moment::Moment;
+use super::rows::width;
+use crate::probe::{crossing, first_swing, unwrapped};
+use crate::program::quantities as q;
+use crate::program::scene::{Probe, Scene, Track};
+use harness::observe::Scalars;
+use harness::report::Quantity;
+use std::f64::consts::PI;
+
+/// Values of all probes.
+pub(super) fn scalars<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+    let mut column = 0;
+    for probe in &scene.probe {
+        of_probe(probe, column, to);
+        column += width(probe);
+    }
+}
+
+/// The values of a probe; what was never seen has none.
+pub(super) fn of_probe<const D: usize>(probe: &Probe, column: usize, to: &mut Scalars<Moment<D>>) {
+    let turns = probe.track == Track::Rotation;
+    let rows = |m: &Moment<D>| {
+        let all = m.state.history.iter().map(|row| (row.time, row.seen[column]));
+        let rows = all.filter(|(_, x)| x.is_finite()).collect();
+        if turns { unwrapped(rows) } else { rows }
+    };
+    let mut add = |quantity: Quantity, value: &dyn Fn(&[(f64, f64)]) -> Option<f64>| {
+        to.add_if(probe.named(quantity), |m| value(&rows(m)).filter(|value| value.is_finite()));
+    };
+    let frequency = |rows: &[(f64, f64)]| first_swing(rows).map(|(_, time)| PI / time);
+    let peak = |rows: &[(f64, f64)]| {
+        let swing = if turns { first_swing(rows) } else { None };
+        let until = swing.map_or(rows.len(), |(end, _)| end);
+        rows[..until].iter().map(|row| row.1).max_by(|a, b| a.abs().total_cmp(&b.abs()))
+    };
+    add(q::PROBE, &|rows| rows.last().map(|row| row.1));
+    add(q::PROBE_PEAK, &peak);
+    if turns {
+        add(q::PROBE_FREQUENCY, &frequency);
+        add(q::PROBE_RATE, &|rows| frequency(rows).zip(peak(rows)).map(|(a, b)| a * b.abs()));
+    }
+    let gauges = probe.gauges.map(|gauges| gauges.map(|at| at.si()));
+    if matches!(probe.track, Track::Crack | Track::Front) {
+        add(q::PROBE_SPEED, &|rows| match gauges {
+            Some([from, to]) => Some((to - from) / (crossing(rows, to)? - crossing(rows, from)?)),
+            None => rows.first().zip(rows.last()).map(|(a, b)| (b.1 - a.1) / (b.0 - a.0)),
+        });
+        let between = |rows: &[(f64, f64)]| -> Option<Vec<f64>> {
+            let [from, to] = gauges?;
+            Some(rows.iter().map(|row| row.1).filter(|x| (from..=to).contains(x)).collect())
+        };
+        add(q::PROBE_BETWEEN_GAUGES, &|rows| Some(between(rows)?.len() as f64));
+        add(q::PROBE_BACKSTEP, &|rows| {
+            Some(between(rows)?.windows(2).map(|pair| pair[0] - pair[1]).fold(0.0, f64::max))
+        });
+    }
+    if probe.track == Track::Crack {
+        let [from, until] = gauges.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+        to.add_if(probe.named(q::PROBE_ACROSS), |m| {
+            let within = m.state.history.iter().filter(|row| (from..=until).contains(&row.seen[column]));
+            within.map(|row| row.seen[column + 1]).filter(|x| x.is_finite()).reduce(f64::max)
+        });
+    }
+}

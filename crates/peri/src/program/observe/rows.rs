@@ -1,0 +1,109 @@
+//! Rows of the history: what a scene's probes are on a body, and the columns of their numbers.
+
+use crate::bonds::Bonds;
+use crate::probe::{
+    CrackTip, JIntegral, Section, StressEvaluator, WaveFront, mean_displacement, rotation, strain,
+};
+use crate::program::quantities as q;
+use crate::program::scene::{Body, Probe, Scene, Track};
+use crate::solver::State;
+use harness::report::Named;
+use harness::scene::{SceneError, Source};
+
+/// Damage of particles at the tip of a crack: less is not torn, more lies behind it.
+const AT_THE_TIP: [f64; 2] = [0.35, 0.9];
+/// Part of the largest velocity that the front of a wave has.
+const AT_THE_FRONT: f64 = 0.02;
+
+/// Numbers of a body in a state, a part of a row of the history.
+pub type Row<const D: usize> =
+    Box<dyn Fn(&dyn Bonds<D>, &State<D>, &StressEvaluator<D>) -> Vec<f64> + Send + Sync>;
+
+/// Parts of a row: of probes, of the flags of a learnt law, of sections.
+///
+/// # Errors
+/// Regions without particles, marks outside the body, sections that no bond crosses.
+pub(super) fn rows<const D: usize>(
+    source: &Source,
+    scene: &Scene,
+    body: &Body<D>,
+) -> Result<Vec<Row<D>>, SceneError> {
+    let probes = scene.probe.iter().enumerate();
+    let probes = probes.map(|(index, spec)| probe(source, &format!("probe[{index}]"), spec, body));
+    let flags: Row<D> =
+        Box::new(|bonds, state, evaluator| evaluator.flagged(bonds, state).into_iter().flatten().collect());
+    let sections = scene.output.section.iter().enumerate().map(|(index, spec)| -> Result<Row<D>, _> {
+        let key = format!("output.section[{index}]");
+        let (point, normal) = spec.plane(source, &key)?;
+        let allowed = "a point in the body: bonds must cross the plane";
+        let section = Section::new(&*body.bonds, point, normal)
+            .map_err(|none| source.error(&format!("{key}.point"), none, allowed))?;
+        Ok(Box::new(move |bonds, state, evaluator| {
+            let (force, moment) = section.force(evaluator, bonds, state);
+            [&force, &moment[if D == 3 { 0 } else { 2 }..]].concat()
+        }))
+    });
+    probes.chain([Ok(flags)]).chain(sections).collect()
+}
+
+/// A probe on a body: one number, two of a crack.
+fn probe<const D: usize>(
+    source: &Source,
+    key: &str,
+    spec: &Probe,
+    body: &Body<D>,
+) -> Result<Row<D>, SceneError> {
+    let (axis, bonds) = (spec.axis.map_or(0, |axis| axis.index()), &*body.bonds);
+    let sites = || spec.members(source, key, body);
+    Ok(match spec.track {
+        Track::Displacement => {
+            let sites = sites()?;
+            Box::new(move |_, state, _| vec![mean_displacement(state, &sites, axis)])
+        }
+        Track::Rotation => {
+            let sites = sites()?;
+            Box::new(move |bonds, state, _| vec![rotation(bonds, state, &sites, axis)])
+        }
+        Track::Strain => {
+            let marks = spec.marks(source, key, body)?;
+            Box::new(move |bonds, state, _| vec![strain(bonds, state, &marks)])
+        }
+        Track::Crack => {
+            let tip = CrackTip {
+                sites: sites()?,
+                whole: (0..bonds.sites()).map(|site| bonds.bonded(site)).collect(),
+                damage: spec.damage.unwrap_or(AT_THE_TIP),
+                axis,
+                across: spec.across.map(|across| across.index()),
+            };
+            Box::new(move |bonds, _, _| tip.value(bonds).to_vec())
+        }
+        Track::Front => {
+            let front = WaveFront::new(bonds, sites()?, axis, spec.threshold.unwrap_or(AT_THE_FRONT));
+            Box::new(move |_, state, _| vec![front.value(state)])
+        }
+        Track::JIntegral => {
+            let (tip, radii) = spec.ring(source, key)?;
+            let ring = JIntegral::new(bonds, body.thickness, tip, radii, axis)
+                .map_err(|none| source.error(&format!("{key}.radii"), none, "a ring with particles"))?;
+            Box::new(move |bonds, state, evaluator| vec![ring.value(evaluator, bonds, state)])
+        }
+    })
+}
+
+/// Numbers of a probe in a row.
+pub(super) fn width(probe: &Probe) -> usize {
+    1 + usize::from(probe.track == Track::Crack)
+}
+
+/// Columns of probes and flags in the table of the history, with their units.
+pub fn columns(scene: &Scene) -> Vec<(String, String)> {
+    let each = |probe: &Probe| {
+        let own = (probe.name.clone(), probe.track.unit().to_owned());
+        let across = (width(probe) > 1).then(|| probe.named(q::PROBE_ACROSS));
+        [Some(own), across.map(|Named { name, unit }| (name, unit))]
+    };
+    let flags = [q::OUTSIDE_SHARE, q::FLAGGED_SHARE].map(|share| (share.name.to_owned(), String::new()));
+    let probes = scene.probe.iter().flat_map(each).flatten();
+    probes.chain(flags.into_iter().filter(|_| scene.is_learnt())).collect()
+}

@@ -1,0 +1,123 @@
+//! Scalars of every run: stretches, the fit of the law, reactions, the largest displacement, motion, fields of other scenes.
+
+use super::moment::Moment;
+use crate::bonds::covered_stretches;
+use crate::calibrate::Space;
+use crate::error::Error;
+use crate::potential::KernelFit;
+use crate::program::quantities as q;
+use crate::program::scene::Scene;
+use harness::observe::{Observer, Scalars};
+
+/// Error of forces in mixed precision beyond which a run warns.
+const MIXED: f64 = 1e-2;
+
+/// Axes of a scene.
+pub(super) fn axes(scene: &Scene) -> &'static [&'static str] {
+    if scene.body.space == Space::Solid { &["x", "y", "z"] } else { &["x", "y"] }
+}
+
+/// Parameters that follow fields of other scenes.
+pub(super) fn followed<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+    for field in &scene.material.fields {
+        for (index, quantity) in q::OF_A_FIELD.iter().enumerate() {
+            // its unit is that of the field, which only the body knows
+            to.add_in_unit(quantity.of(&[field.of.value_name()]), |m| {
+                let one = m.physics.body.followed.iter().find(|one| one.parameter == field.of)?;
+                let [mean, least, largest] = one.field;
+                Some((one.unit, [mean, one.mesh_mean, least, largest][index]))
+            });
+        }
+    }
+}
+
+/// Smallest and largest stretches.
+pub(super) fn stretches<const D: usize>(_: &Scene, to: &mut Scalars<Moment<D>>) {
+    to.add(q::SMALLEST_STRETCH, |m| m.each(|row| row.smallest_stretch).fold(1.0, f64::min));
+    to.add(q::LARGEST_STRETCH, |m| m.each(|row| row.largest_stretch).fold(1.0, f64::max));
+    to.add(q::SMALLEST_STRETCH_MET, |m| (1.0 + m.state.observed.low).max(0.0).sqrt());
+    to.add(q::LARGEST_STRETCH_MET, |m| (1.0 + m.state.observed.high).sqrt());
+}
+
+/// Error of the fitted bond law.
+pub(super) struct Fit<'s> {
+    scene: &'s Scene,
+    error: f64,
+}
+
+impl<'s> Fit<'s> {
+    pub(super) fn new(scene: &'s Scene) -> Self {
+        Self { scene, error: f64::NAN }
+    }
+
+    fn is_fitted(&self) -> bool {
+        self.scene.material.solid.is_none() && !self.scene.material.is_prestrained()
+    }
+}
+
+impl<'m, const D: usize> Observer<Moment<'m, D>, Error> for Fit<'_> {
+    fn scalars(&self, to: &mut Scalars<Moment<'m, D>>) {
+        if self.is_fitted() {
+            to.add(q::FIT_ERROR, |_| self.error);
+        }
+    }
+
+    fn end(&mut self, m: &Moment<'m, D>) -> Result<(), Error> {
+        if let Some(law) = m.physics.body.material.bond_law() {
+            let stretches = covered_stretches(m.bonds, &m.state.displacement);
+            self.error = KernelFit::new(law, stretches, self.scene.fit_bound())?.max_error;
+        }
+        Ok(())
+    }
+}
+
+/// Explicit dynamics; a body that is held everywhere has no critical step.
+pub(super) fn motion<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+    if scene.dynamics.is_none() {
+        return;
+    }
+    to.add_if(q::CRITICAL_TIME_STEP, |m| Some(m.state.motion.critical_step).filter(|step| step.is_finite()));
+    to.add(q::TIME_STEP, |m| m.state.motion.time_step);
+    to.add(q::KINETIC_ENERGY, |m| m.state.motion.kinetic);
+    if scene.is_mixed() {
+        to.add_if(q::MIXED_ERROR, mixed_error);
+    }
+}
+
+fn mixed_error<const D: usize>(m: &Moment<D>) -> Option<f64> {
+    m.scene.dynamics.as_ref()?;
+    m.bonds.as_lattice()?.mixed_error(&m.state.displacement)
+}
+
+/// A warning where mixed precision is too rough.
+pub(super) fn mixed<const D: usize>(m: &Moment<D>) -> Vec<String> {
+    let error = mixed_error(m).filter(|&error| error > MIXED);
+    let warning = |error| {
+        format!("forces in mixed precision are wrong by {error:.1e} of their mean: take double precision")
+    };
+    error.map(warning).into_iter().collect()
+}
+
+/// Largest displacement, force of the held regions, applied force.
+pub(super) fn responses<const D: usize>(scene: &Scene, to: &mut Scalars<Moment<D>>) {
+    to.add(q::LARGEST_DISPLACEMENT, |m| {
+        let length = |site| m.state.displacement.get(site).iter().map(|x| x * x).sum::<f64>().sqrt();
+        m.sites().map(length).fold(0.0, f64::max)
+    });
+    let holds = scene.boundary.iter().any(|boundary| boundary.holds());
+    let loads = scene.boundary.iter().any(|boundary| boundary.traction.is_some() || boundary.force.is_some());
+    for (d, axis) in axes(scene).iter().enumerate() {
+        if holds {
+            to.add_if(q::REACTION.of(&[axis]), |m| {
+                let loads = &m.physics.loads;
+                (!loads.constrained.is_empty()).then(|| loads.reaction(m.bonds, &m.state.force)[d])
+            });
+        }
+        if loads {
+            to.add_if(q::APPLIED.of(&[axis]), |m| {
+                let loads = &m.physics.loads;
+                loads.body_force.is_some().then(|| loads.applied(m.bonds)[d])
+            });
+        }
+    }
+}
